@@ -1,0 +1,1 @@
+"""Speech in, lip motion out."""

@@ -1,0 +1,65 @@
+"""Files and folders that appear whole or not at all.
+
+Everything is written under a temporary name beside its target and renamed at the end.
+"""
+
+from __future__ import annotations
+
+import shutil
+import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from lipmotion.errors import ExportError
+
+TEMPORARY = ".part-"
+"""Names of unfinished files start with this; a killed run may leave one, the next removes it."""
+
+
+def _temporary(target: Path) -> Path:
+    if not target.parent.is_dir():
+        raise ExportError(f"{target}: the folder {target.parent} does not exist; create it first")
+    return target.with_name(f"{TEMPORARY}{uuid.uuid4().hex[:8]}-{target.name}")
+
+
+@contextmanager
+def whole_file(target: Path) -> Iterator[Path]:
+    """Give a temporary path to write to, with the target's suffix; rename it to ``target`` on success.
+
+    Raises ExportError: the folder does not exist, or the file cannot be written (disk full, no permission).
+    """
+    temporary = _temporary(target)
+    try:
+        yield temporary
+        temporary.replace(target)
+    except OSError as error:
+        raise ExportError(f"{target}: cannot be written: {error.strerror or error}") from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def whole_folder(target: Path) -> Iterator[Path]:
+    """Give a temporary folder to fill; rename it to ``target``, which must not exist, on success.
+
+    Raises ExportError: the parent does not exist, or something cannot be written.
+    """
+    temporary = _temporary(target)
+    try:
+        temporary.mkdir()
+        yield temporary
+        temporary.replace(target)
+    except OSError as error:
+        raise ExportError(f"{target}: cannot be written: {error.strerror or error}") from error
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def remove_unfinished(folder: Path) -> None:
+    """Delete what a killed run left behind in ``folder``."""
+    for path in folder.glob(f"{TEMPORARY}*"):
+        if path.is_dir():
+            shutil.rmtree(path, ignore_errors=True)
+        else:
+            path.unlink(missing_ok=True)

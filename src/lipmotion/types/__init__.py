@@ -1,0 +1,28 @@
+"""The data that flows. Plain frozen values; nothing here computes more than a look-up."""
+
+from lipmotion.types.audio import Audio
+from lipmotion.types.features import FRAME_RATE_HZ, Features
+from lipmotion.types.generation import Constraints, Example, Generation, Pin, Speech, Trace
+from lipmotion.types.motion import EYE_DISTANCE, Channel, Motion
+from lipmotion.types.timeline import Span, Timeline, Unit
+from lipmotion.types.utterance import Track, Utterance
+
+__all__ = [
+    "EYE_DISTANCE",
+    "FRAME_RATE_HZ",
+    "Audio",
+    "Channel",
+    "Constraints",
+    "Example",
+    "Features",
+    "Generation",
+    "Motion",
+    "Pin",
+    "Span",
+    "Speech",
+    "Timeline",
+    "Trace",
+    "Track",
+    "Unit",
+    "Utterance",
+]

@@ -1,0 +1,78 @@
+"""What goes into an engine and what comes out of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.types.features import Features
+from lipmotion.types.motion import Motion
+from lipmotion.types.timeline import Timeline, Unit
+
+
+@dataclass(frozen=True, eq=False)
+class Speech:
+    """One recording as an engine sees it: features, and the phones in time."""
+
+    features: Features
+    units: Timeline[Unit]
+
+
+@dataclass(frozen=True, eq=False)
+class Example:
+    """Speech with the motion that went with it.
+
+    motion : at 100 Hz, on the frames of ``speech.features``
+    valid  : bool array [shape=(T,)], False where the motion was not seen
+    """
+
+    name: str
+    speech: Speech
+    motion: Motion
+    valid: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Pin:
+    """The generated ``channel`` must take ``value`` at ``time_s`` (the nearest 10 ms frame)."""
+
+    time_s: float
+    channel: str
+    value: float
+
+
+@dataclass(frozen=True)
+class Constraints:
+    """What the generated motion must obey exactly."""
+
+    pins: tuple[Pin, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """Which state of the model stood behind each frame.
+
+    states : readable names
+    frames : int array [shape=(T,)], the index into ``states`` for every frame
+    """
+
+    states: tuple[str, ...]
+    frames: NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class Generation:
+    """The result of an engine.
+
+    motion   : the trajectory at 100 Hz
+    variance : float array [shape=(T, P)], the model's own posterior variance, in squared channel units
+    units    : the labels behind it; edit them and generate again
+    trace    : the states behind every frame
+    """
+
+    motion: Motion
+    variance: NDArray[np.float64]
+    units: Timeline[Unit]
+    trace: Trace

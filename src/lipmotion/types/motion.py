@@ -1,0 +1,78 @@
+"""Movement as named curves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import InputError
+
+EYE_DISTANCE = "eye_distance"
+"""The unit of all tracked distances: that between the outer eye corners."""
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One curve: its name and the unit of its values."""
+
+    name: str
+    unit: str = EYE_DISTANCE
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Movement, one row a frame, frame n at ``n / rate_hz`` seconds.
+
+    values   : float array [shape=(T, P)]
+    rate_hz  : frames per second
+    channels : the P curves
+    Raises InputError: the shapes do not fit, two channels share a name, or the rate is not positive.
+    """
+
+    values: NDArray[np.float64]
+    rate_hz: float
+    channels: tuple[Channel, ...]
+
+    def __post_init__(self) -> None:
+        if self.values.ndim != 2 or self.values.shape[1] != len(self.channels):
+            raise InputError(f"motion values have shape {self.values.shape}, required (T, {len(self.channels)})")
+        if not self.rate_hz > 0:
+            raise InputError(f"motion rate is {self.rate_hz} Hz, required more than 0")
+        if len(set(self.names)) != len(self.channels):
+            raise InputError(f"motion channel names repeat: {', '.join(self.names)}")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of the channels, in order."""
+        return tuple(channel.name for channel in self.channels)
+
+    @property
+    def time_s(self) -> NDArray[np.float64]:
+        """The time of every frame, in seconds [shape=(T,)]."""
+        return np.arange(len(self.values)) / self.rate_hz
+
+    def __getitem__(self, name: str) -> NDArray[np.float64]:
+        """Return one channel's curve [shape=(T,)]. Raises InputError: no such channel."""
+        if name not in self.names:
+            raise InputError(f"no motion channel {name!r}; there are: {', '.join(self.names)}")
+        curve: NDArray[np.float64] = self.values[:, self.names.index(name)]
+        return curve
+
+    def at(self, time_s: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the values at other times [shape=(len(time_s), P)].
+
+        Linear between frames, as every figure is computed (docs: measures); constant beyond both ends.
+        """
+        position = np.clip(np.asarray(time_s) * self.rate_hz, 0, len(self.values) - 1)
+        low = np.minimum(position.astype(int), max(len(self.values) - 2, 0))
+        high = np.minimum(low + 1, len(self.values) - 1)
+        share = (position - low)[:, None]
+        values: NDArray[np.float64] = (1 - share) * self.values[low] + share * self.values[high]
+        return values
+
+    def resampled(self, rate_hz: float) -> Motion:
+        """Return the same curves at another rate, over the same duration (linear between frames)."""
+        count = int(np.floor((len(self.values) - 1) / self.rate_hz * rate_hz + 1e-9)) + 1
+        return Motion(self.at(np.arange(count) / rate_hz), rate_hz, self.channels)

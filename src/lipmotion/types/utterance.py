@@ -1,0 +1,45 @@
+"""One recorded sentence of a corpus."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.types.audio import Audio
+from lipmotion.types.features import Features
+from lipmotion.types.motion import Motion
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """A face followed through a video, head motion removed.
+
+    motion   : at the camera's rate: ``opening``, ``width``, ``outer`` and the lip and jaw points
+               (``x_17``, ``y_17``, ``z_17``: face-mesh point 17), lengths in eye distances
+    seen     : bool array [shape=(T,)], False where no face was found (motion interpolated there)
+    crops    : uint8 array [shape=(T, 56, 72, 3)], RGB mouth images, or None
+    """
+
+    motion: Motion
+    seen: NDArray[np.bool_]
+    crops: NDArray[np.uint8] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Utterance:
+    """One recorded sentence: sound, features, motion, and what was said.
+
+    words  : the transcript, or None where it is not known
+    split  : ``train``, ``val`` or ``test``
+    source : where it came from (file, sizes, licence, ...)
+    """
+
+    name: str
+    audio: Audio
+    features: Features
+    track: Track
+    words: tuple[str, ...] | None
+    split: str
+    source: dict[str, str]
