@@ -17,6 +17,14 @@ TEMPORARY = ".part-"
 """Names of unfinished files start with this; a killed run may leave one, the next removes it."""
 
 
+def check_target(target: Path) -> None:
+    """Raise ExportError unless a file can be put there: before work begins, not after it."""
+    if target.is_dir():
+        raise ExportError(f"{target}: is a folder; give the name of a file in it")
+    if not target.parent.is_dir():
+        raise ExportError(f"{target}: the folder {target.parent} does not exist; create it first")
+
+
 def _temporary(target: Path) -> Path:
     if not target.parent.is_dir():
         raise ExportError(f"{target}: the folder {target.parent} does not exist; create it first")

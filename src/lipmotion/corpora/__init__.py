@@ -1,1 +1,1 @@
-""""""
+"""Recordings in, and the corpus they become."""

@@ -1,1 +1,1 @@
-""""""
+"""Figures: arrays in, numbers out, exactly as docs/measures.md defines them."""

@@ -1,1 +1,1 @@
-""""""
+"""Sound in: reading, features, forced alignment and recognition."""

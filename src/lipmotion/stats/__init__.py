@@ -1,1 +1,1 @@
-""""""
+"""Statistics shared by recogniser and engines."""

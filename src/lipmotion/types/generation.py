@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,3 +76,15 @@ class Generation:
     variance: NDArray[np.float64]
     units: Timeline[Unit]
     trace: Trace
+
+    def resampled(self, rate_hz: float) -> Generation:
+        """Return the same result at another rate: values between frames, the state of the nearest frame.
+
+        Raises InputError: the rate is not more than 0.
+        """
+        motion = self.motion.resampled(rate_hz)
+        variance = replace(self.motion, values=self.variance).at(motion.time_s)
+        nearest = np.minimum(np.round(motion.time_s * self.motion.rate_hz).astype(int), len(self.trace.frames) - 1)
+        return replace(
+            self, motion=motion, variance=variance, trace=Trace(self.trace.states, self.trace.frames[nearest])
+        )

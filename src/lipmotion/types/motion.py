@@ -73,6 +73,11 @@ class Motion:
         return values
 
     def resampled(self, rate_hz: float) -> Motion:
-        """Return the same curves at another rate, over the same duration (linear between frames)."""
+        """Return the same curves at another rate, over the same duration (linear between frames).
+
+        Raises InputError: the rate is not more than 0.
+        """
+        if not 0 < rate_hz < float("inf"):
+            raise InputError(f"motion rate is {rate_hz} Hz, required more than 0")
         count = int(np.floor((len(self.values) - 1) / self.rate_hz * rate_hz + 1e-9)) + 1
         return Motion(self.at(np.arange(count) / rate_hz), rate_hz, self.channels)

@@ -1,1 +1,20 @@
-""""""
+"""What is spoken: phones, visemes, words. Data and look-ups, no audio."""
+
+from lipmotion.units.lexicon import Lexicon, Pronunciation
+from lipmotion.units.phones import PAUSE, PHONES, RELATIVES, SILENCE, is_silent, stand_in
+from lipmotion.units.transcript import words_of
+from lipmotion.units.visemes import VISEME_OF, VISEMES
+
+__all__ = [
+    "PAUSE",
+    "PHONES",
+    "RELATIVES",
+    "SILENCE",
+    "VISEMES",
+    "VISEME_OF",
+    "Lexicon",
+    "Pronunciation",
+    "is_silent",
+    "stand_in",
+    "words_of",
+]

@@ -1,1 +1,1 @@
-""""""
+"""Video in, motion out."""

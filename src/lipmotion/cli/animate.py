@@ -1,0 +1,36 @@
+"""``lipmotion animate``: speech to motion files and videos."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+
+def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the verb."""
+    parser = verbs.add_parser("animate", help="turn speech into lip motion or an animated face")
+    parser.add_argument("speech", type=Path, help="audio or video file")
+    parser.add_argument("-o", "--output", nargs="+", required=True, help="FILE.mp4 .json .csv .npz; several at once")
+    parser.add_argument("--transcript", metavar="TEXT|FILE", help="what is said, if known")
+    parser.add_argument("--lexicon", type=Path, metavar="FILE", help="pronunciations: WORD PHONE PHONE ... a line")
+    parser.add_argument("--model", type=Path, help="trained model (default: the one that ships with the package)")
+    parser.add_argument("--rate", type=float, metavar="HZ", help="frames per second of motion files (default: 100)")
+    parser.add_argument("--fps", type=float, default=25.0, help="frames per second of videos (default: 25)")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Call ``lipmotion.animate`` and ``lipmotion.write``."""
+    from lipmotion.cli.texts import text_or_file
+    from lipmotion.pipeline.animate import animate, check_outputs, write
+    from lipmotion.pipeline.model import load_model
+    from lipmotion.units import Lexicon
+
+    check_outputs(options.output, options.speech)
+    transcript = text_or_file(options.transcript) if options.transcript is not None else None
+    lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
+    model = load_model(options.model)
+    result = animate(options.speech, transcript=transcript, model=model, lexicon=lexicon)
+    write(result, options.output, speech=options.speech, model=model, rate_hz=options.rate, fps=options.fps)
+    for path in options.output:
+        print(path)

@@ -1,0 +1,39 @@
+"""``lipmotion evaluate``: how good a model is on recordings it has not seen."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+
+def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the verb."""
+    parser = verbs.add_parser("evaluate", help="compare generated with recorded motion")
+    parser.add_argument("model", type=Path)
+    parser.add_argument("corpus", type=Path)
+    parser.add_argument("--split", default="test", help="train, val, test or all (default: test)")
+    parser.add_argument("--lexicon", type=Path, metavar="FILE", help="pronunciations: WORD PHONE PHONE ... a line")
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE.json", help="write all figures here as well")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Call ``lipmotion.evaluate`` and print its figures."""
+    import json
+
+    from lipmotion.corpora.store import Corpus
+    from lipmotion.evaluate.report import table
+    from lipmotion.files import check_target, whole_file
+    from lipmotion.pipeline.evaluate import evaluate
+    from lipmotion.pipeline.model import load_model
+    from lipmotion.units import Lexicon
+
+    if options.output:
+        check_target(options.output)
+    lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
+    split = None if options.split == "all" else options.split
+    figures = evaluate(load_model(options.model), Corpus.open(options.corpus), split=split, lexicon=lexicon)
+    print(table(figures))
+    if options.output:
+        with whole_file(options.output) as unfinished:
+            unfinished.write_text(json.dumps(figures, indent=1) + "\n")

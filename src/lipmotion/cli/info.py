@@ -1,0 +1,29 @@
+"""``lipmotion info``: what a model is and where it comes from."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+
+def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the verb."""
+    parser = verbs.add_parser("info", help="say what a model is, and whose recordings it comes from")
+    parser.add_argument("model", type=Path, nargs="?", help="default: the model that ships with the package")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Print the model's header."""
+    from lipmotion.pipeline.model import read_header, shipped_path
+
+    path = options.model or shipped_path()
+    print(f"{'file':14} {path} ({path.stat().st_size / 1e6:.1f} MB)" if path.is_file() else path)
+    for name, value in read_header(path).items():
+        print(f"{name:14} {_plain(value)}")
+
+
+def _plain(value: object) -> str:
+    if isinstance(value, dict):
+        return ", ".join(f"{key}={item}" for key, item in value.items())
+    return "; ".join(map(str, value)) if isinstance(value, list) else str(value)

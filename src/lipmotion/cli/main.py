@@ -1,0 +1,61 @@
+"""``lipmotion VERB ...``: errors in one line, and an exit code that says what kind."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import sys
+from collections.abc import Sequence
+
+from lipmotion.cli import animate, corpus, evaluate, info, train
+from lipmotion.errors import LipMotionError
+
+VERBS = (animate, corpus, train, evaluate, info)
+EXIT_CODES = """exit codes: 0 done, 1 a bug, 2 wrong command line, 3 unusable input, 4 corpus, 5 alignment,
+6 model file, 7 output, 8 missing package, 130 interrupted"""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command; return its exit code."""
+    options = _parser().parse_args(arguments)
+    logging.basicConfig(format="lipmotion: %(levelname)s: %(message)s", level=logging.WARNING)
+    logging.addLevelName(logging.WARNING, "warning")
+    try:
+        options.run(options)
+    except LipMotionError as error:
+        print(f"lipmotion: error: {' '.join(str(error).split())}", file=sys.stderr)
+        return error.exit_code
+    except KeyboardInterrupt:
+        print("lipmotion: interrupted", file=sys.stderr)
+        return 130
+    except BrokenPipeError:
+        sys.stderr.close()  # the reader of our output has gone; nothing is left to say
+        return 0
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="lipmotion",
+        description="Speech in, lip motion out, with models trained from your own recordings.",
+        epilog=EXIT_CODES,
+    )
+    parser.add_argument("--version", action=_Version, nargs=0, help="print the version")
+    verbs = parser.add_subparsers(title="verbs", dest="verb", required=True, metavar="VERB")
+    for verb in VERBS:
+        verb.add(verbs)
+    return parser
+
+
+class _Version(argparse.Action):
+    """Looks the version up only when it is wanted."""
+
+    def __call__(self, *_: object) -> None:
+        from importlib.metadata import version
+
+        print(f"lipmotion {version('lipmotion')}")
+        sys.exit(0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,25 @@
+"""Arguments that are a text or the name of a file that holds it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from lipmotion.errors import InputError
+
+LONGEST_NAME = 255
+
+
+def text_or_file(argument: str) -> str:
+    """Return the content of a file of that name, else the argument itself.
+
+    Raises InputError: it looks like a file's name but there is none, or the file is not UTF-8 text.
+    """
+    path = Path(argument)
+    if len(argument) > LONGEST_NAME or not path.is_file():
+        if path.suffix == ".txt" and " " not in argument:
+            raise InputError(f"{argument}: no such transcript file")
+        return argument
+    try:
+        return path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{argument}: not a readable UTF-8 text ({error})") from error

@@ -1,0 +1,79 @@
+"""The GRID corpus: clips, word times, and sentences spelled out by their file names."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from lipmotion.corpora.base import Recording, Recordings, videos
+from lipmotion.corpora.splits import with_splits
+from lipmotion.errors import InputError
+
+KIND = "GRID corpus"
+RIGHTS = {
+    "licence": "CC BY 4.0",
+    "attribution": "GRID corpus (Cooke, Barker, Cunningham, Shao 2006), CC BY 4.0",
+}
+
+SILENCES = frozenset({"sil", "sp"})
+"""Marks of a word-time file that are not words."""
+
+COMMANDS = {"b": "bin", "l": "lay", "p": "place", "s": "set"}
+COLOURS = {"b": "blue", "g": "green", "r": "red", "w": "white"}
+PREPOSITIONS = {"a": "at", "b": "by", "i": "in", "w": "with"}
+DIGITS = dict(zip("z123456789", "zero one two three four five six seven eight nine".split(), strict=True))
+ADVERBS = {"a": "again", "n": "now", "p": "please", "s": "soon"}
+NAME = re.compile(r"[blps][bgrw][abiw][a-vx-z][z1-9][anps]")
+"""A letter for each of the six words: command, colour, preposition, letter (there is no w), digit, adverb."""
+
+
+def read_grid(directory: Path) -> Recordings | None:
+    """Return the sentences of a GRID folder, or None if most of its videos are not named like GRID's.
+
+    directory : holds clips/ or the videos themselves; align/ or the .align files beside the videos; the lists
+    """
+    clips = directory / "clips"
+    files = videos((clips if clips.is_dir() else directory).iterdir())
+    if 2 * sum(sentence(path.stem) is not None for path in files) <= len(files):
+        return None
+    items, problems = [], {}
+    for path in files:
+        try:
+            items.append(Recording(path.stem, path, _words(directory, path), rights=RIGHTS))
+        except InputError as error:
+            problems[path.stem] = str(error)
+    return with_splits(Recordings(KIND, tuple(items), problems), directory)
+
+
+def sentence(name: str) -> tuple[str, ...] | None:
+    """Return the six words that a GRID file name spells out, or None if it is not one."""
+    if not NAME.fullmatch(name):
+        return None
+    command, colour, preposition, letter, digit, adverb = tuple(name)
+    return (
+        *(COMMANDS[command], COLOURS[colour], PREPOSITIONS[preposition]),
+        *(letter, DIGITS[digit], ADVERBS[adverb]),
+    )
+
+
+def _words(directory: Path, video: Path) -> tuple[str, ...] | None:
+    for folder in (directory / "align", video.parent):
+        path = folder / f"{video.stem}.align"
+        if path.is_file():
+            return aligned_words(path)
+    return sentence(video.stem)
+
+
+def aligned_words(path: Path) -> tuple[str, ...]:
+    """Return the words of a word-time file: lines of start, end (unit 1/25000 s) and word.
+
+    Raises InputError: not such a file, or without a word.
+    """
+    rows = [line.split() for line in path.read_text(encoding="utf-8", errors="replace").splitlines() if line.strip()]
+    for number, row in enumerate(rows, 1):
+        if len(row) != 3 or not (row[0].isdecimal() and row[1].isdecimal()):
+            raise InputError(f"{path}: line {number} is {' '.join(row)!r}; required: start end word")
+    words = tuple(row[2].lower() for row in rows if row[2].lower() not in SILENCES)
+    if not words:
+        raise InputError(f"{path}: holds no word; remove the file if the words are not known")
+    return words

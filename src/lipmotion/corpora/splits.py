@@ -1,0 +1,54 @@
+"""The lists train.txt, val.txt and test.txt."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from lipmotion.corpora.base import Recordings
+from lipmotion.errors import CorpusError
+
+SPLITS = ("train", "val", "test")
+LISTS = tuple(f"{split}.txt" for split in SPLITS)
+
+
+def with_splits(found: Recordings, directory: Path) -> Recordings:
+    """Return the recordings with the splits that the lists in ``directory`` give them.
+
+    Without lists everything is ``train``. With a train.txt, recordings in no list become problems, for training on
+    them was not asked for; so do names without a recording.
+    Raises CorpusError: a name stands in two lists.
+    """
+    split_of = _read_lists(directory)
+    rest = None if (directory / "train.txt").is_file() else "train"
+    problems = {
+        name: f"listed in {split}.txt, but there is no such recording"
+        for name, split in split_of.items()
+        if name not in {item.name for item in found.items} and name not in found.problems
+    }
+    items = []
+    for item in found.items:
+        split = split_of.get(item.name, rest)
+        if split is None:
+            problems[item.name] = f"in none of the lists of {directory} ({', '.join(LISTS)}); add it to one"
+        else:
+            items.append(replace(item, split=split))
+    return Recordings(found.kind, tuple(items), found.problems | problems)
+
+
+def _read_lists(directory: Path) -> dict[str, str]:
+    split_of: dict[str, str] = {}
+    for split in SPLITS:
+        path = directory / f"{split}.txt"
+        for name in _names(path) if path.is_file() else ():
+            if split_of.setdefault(name, split) != split:
+                raise CorpusError(f"{name} is in {split_of[name]}.txt and in {split}.txt of {directory}; keep one")
+    return split_of
+
+
+def _names(path: Path) -> list[str]:
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except UnicodeDecodeError as error:
+        raise CorpusError(f"{path}: is not UTF-8 text; required: one name a line") from error
+    return [line.strip().replace("/", "-") for line in lines if line.strip()]

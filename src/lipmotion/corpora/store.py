@@ -1,0 +1,132 @@
+"""A corpus on disk: a manifest and one folder an utterance."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from lipmotion.corpora.entry import read_entry, read_utterance, write_utterance
+from lipmotion.corpora.splits import SPLITS
+from lipmotion.errors import CorpusError, ExportError
+from lipmotion.files import TEMPORARY, remove_unfinished, whole_file
+from lipmotion.types import Utterance
+
+FORMAT = "lipmotion.corpus"
+VERSION = 1
+MANIFEST = "corpus.json"
+UTTERANCES = "utterances"
+
+
+class Corpus:
+    """Prepared recordings. Reading needs neither OpenCV nor MediaPipe.
+
+    path : the folder
+    Open one with ``Corpus.open``, make or extend one with ``Corpus.create``.
+    """
+
+    def __init__(self, path: Path, index: dict[str, dict[str, Any]]) -> None:
+        self.path = path
+        self._index = index
+
+    @classmethod
+    def open(cls, path: Path) -> Corpus:
+        """Return an existing corpus. Raises CorpusError: missing, not a corpus, or of a newer version."""
+        if not path.is_dir():
+            raise CorpusError(f"{path}: no such corpus; make one: lipmotion prepare RECORDINGS -o {path}")
+        return cls(path, _read_manifest(path / MANIFEST))
+
+    @classmethod
+    def create(cls, path: Path) -> Corpus:
+        """Return a corpus to add to: the one that is there, or a new one in a folder that is new or empty.
+
+        Raises CorpusError: the folder holds something else. Raises ExportError: it cannot be created.
+        """
+        if not (path / MANIFEST).is_file():
+            _make_folder(path)
+            cls(path, {})._write_manifest()
+        corpus = cls.open(path)
+        (path / UTTERANCES).mkdir(exist_ok=True)
+        remove_unfinished(path)
+        remove_unfinished(path / UTTERANCES)
+        return corpus
+
+    def __len__(self) -> int:
+        return len(self._index)
+
+    @property
+    def splits(self) -> dict[str, int]:
+        """How many utterances there are of train, val and test."""
+        return {split: len(self.names(split)) for split in SPLITS}
+
+    def names(self, split: str | None = None) -> tuple[str, ...]:
+        """Return the names of all utterances, or of one split, sorted."""
+        return tuple(sorted(name for name, entry in self._index.items() if split in (None, entry["split"])))
+
+    def folder(self, name: str) -> Path:
+        """Return where an utterance of this name is, or would be."""
+        return self.path / UTTERANCES / name
+
+    def utterance(self, name: str) -> Utterance:
+        """Return one utterance; its large arrays stay on disk until they are used.
+
+        Raises CorpusError: there is none of that name, or it is damaged.
+        """
+        if name not in self._index:
+            some = ", ".join(self.names()[:5])
+            raise CorpusError(f"{self.path}: no utterance {name!r} among {len(self)} ({some}, ...)")
+        return read_utterance(self.folder(name))
+
+    def add(self, utterance: Utterance, settings: dict[str, str] | None = None) -> None:
+        """Write one utterance, in the place of one of the same name, and list it.
+
+        settings : what it depends on besides its source
+        Raises InputError: its name cannot be a folder's. Raises ExportError: it cannot be written.
+        """
+        folder = self.folder(utterance.name)
+        write_utterance(folder, utterance, settings or {})
+        self._index[utterance.name] = _summary(read_entry(folder))
+        self._write_manifest()
+
+    def refresh(self) -> None:
+        """List the utterances that are on disk: several processes may have written them."""
+        folders = sorted(path for path in (self.path / UTTERANCES).iterdir() if path.is_dir())
+        whole = [path for path in folders if not path.name.startswith(".")]
+        self._index = {path.name: _summary(read_entry(path)) for path in whole}
+        self._write_manifest()
+
+    def _write_manifest(self) -> None:
+        content = {"format": FORMAT, "version": VERSION, "utterances": self._index}
+        with whole_file(self.path / MANIFEST) as unfinished:
+            text = json.dumps(content, indent=1, sort_keys=True, ensure_ascii=False)
+            unfinished.write_text(text + "\n", encoding="utf-8")
+
+
+def _make_folder(path: Path) -> None:
+    if path.exists() and (not path.is_dir() or any(not inner.name.startswith(TEMPORARY) for inner in path.iterdir())):
+        raise CorpusError(f"{path}: exists and is not a corpus; give a new or an empty folder")
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ExportError(f"{path}: cannot be created: {error.strerror or error}") from error
+
+
+def _summary(entry: dict[str, Any]) -> dict[str, Any]:
+    return {key: entry[key] for key in ("split", "duration_s", "frames", "unseen_frames")}
+
+
+def _read_manifest(path: Path) -> dict[str, dict[str, Any]]:
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        found, version = content["format"], content["version"]
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise CorpusError(f"{path.parent}: not a corpus (no readable {MANIFEST}); give a prepared corpus") from error
+    if found != FORMAT:
+        raise CorpusError(f"{path}: format is {found!r}, required {FORMAT!r}; give a prepared corpus")
+    if version != VERSION:
+        raise CorpusError(
+            f"{path}: corpus version {version}, this lipmotion reads version {VERSION}; "
+            "upgrade lipmotion, or prepare the recordings again into a new folder"
+        )
+    index: dict[str, dict[str, Any]] = content["utterances"]
+    return index

@@ -1,0 +1,60 @@
+"""What every engine does."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, Generic, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.stats.em import Monitor
+from lipmotion.types import Constraints, Example, Generation, Speech
+
+ModelT = TypeVar("ModelT")
+Arrays = Mapping[str, NDArray[Any]]
+
+
+@dataclass(frozen=True, eq=False)
+class Fit(Generic[ModelT]):
+    """A trained model, and figures of its training by name."""
+
+    model: ModelT
+    figures: Mapping[str, float]
+
+
+class Engine(ABC, Generic[ModelT]):
+    """Holds its configuration only. What was learned is the model, what came out is the ``Generation``."""
+
+    name: ClassVar[str]
+    config: Any
+
+    @abstractmethod
+    def fit(self, examples: Sequence[Example], monitor: Monitor) -> Fit[ModelT]:
+        """Learn from speech with its motion.
+
+        Raises CorpusError: no example, or none with motion that was seen.
+        """
+
+    @abstractmethod
+    def generate(self, model: ModelT, speech: Speech, constraints: Constraints | None = None) -> Generation:
+        """Return the motion that goes with speech, at 100 Hz, one row a feature frame.
+
+        Raises InputError: a constraint names no channel, or lies outside the recording.
+        """
+
+    @abstractmethod
+    def to_arrays(self, model: ModelT) -> dict[str, NDArray[Any]]:
+        """Return the model as plain arrays (numbers, or fixed-width text)."""
+
+    @abstractmethod
+    def from_arrays(self, arrays: Arrays) -> ModelT:
+        """Return the model again. Raises ModelFormatError: an array is missing or has the wrong shape."""
+
+
+def frame_of(time_s: float, frames: int, rate_hz: float) -> int | None:
+    """Return the frame nearest to a time, or None where the recording has none."""
+    frame = int(np.floor(time_s * rate_hz + 0.5))
+    return frame if 0 <= frame < frames else None

@@ -1,0 +1,24 @@
+"""Confidence intervals by resampling clips."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+Clips = Sequence[NDArray[np.float64]]
+DRAWS = 2000
+
+
+def interval(
+    figure: Callable[[Clips, Clips], float], generated: Clips, original: Clips, seed: int, draws: int = DRAWS
+) -> tuple[float, float]:
+    """Return the 95 % bootstrap interval of a figure over clips."""
+    draw = np.random.default_rng(seed)
+    values = []
+    for _ in range(draws):
+        chosen = draw.integers(len(generated), size=len(generated))
+        values.append(figure([generated[i] for i in chosen], [original[i] for i in chosen]))
+    low, high = np.percentile(values, [2.5, 97.5])
+    return float(low), float(high)

@@ -1,0 +1,125 @@
+"""Does the mouth close when it should?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Curve = NDArray[np.float64]
+CLOSED_SHARE = 0.10
+"""The mouth is closed under this share of the 95th percentile of opening on the training list."""
+REACH = 2
+"""A generated closing matches an original one within this many frames (Hofer 2008, §6)."""
+
+
+@dataclass(frozen=True)
+class Closures:
+    """Figures over a set of clips.
+
+    score     : share of original closings with a generated one within ±2 frames (Hofer 2008)
+    precision : share of generated closings with an original one within ±2 frames
+    timing_ms : median signed error of the matched ones, positive = generated late
+    original, generated : how many closings there are
+    """
+
+    score: float
+    precision: float
+    timing_ms: float
+    original: int
+    generated: int
+
+
+@dataclass(frozen=True)
+class PhoneClosures:
+    """Figures over the intervals of some phones in which the original closes.
+
+    recall        : share of them in which the generated mouth closes
+    intervals     : how many there are
+    false_per_minute, original_per_minute : closings outside these phones per minute of speech
+    """
+
+    recall: float
+    intervals: int
+    false_per_minute: float
+    original_per_minute: float
+
+
+def closed_threshold(openings: Sequence[Curve], share: float = CLOSED_SHARE) -> float:
+    """Return the opening under which a mouth is closed, from the training list's curves."""
+    return float(share * np.percentile(np.concatenate(openings), 95))
+
+
+def closings(opening: Curve, threshold: float) -> NDArray[np.intp]:
+    """Return the frames of all closings: the first closed frame after an open one."""
+    closed = opening < threshold
+    return np.nonzero(closed[1:] & ~closed[:-1])[0] + 1
+
+
+def match(generated: NDArray[np.intp], original: NDArray[np.intp], reach: int = REACH) -> list[tuple[int, int]]:
+    """Return pairs of closings no further apart than ``reach``, one to one, nearest first."""
+    pairs = sorted(
+        (abs(int(g) - int(o)), int(g), int(o)) for g in generated for o in original if abs(int(g) - int(o)) <= reach
+    )
+    used_g: set[int] = set()
+    used_o: set[int] = set()
+    chosen = []
+    for _, g, o in pairs:
+        if g not in used_g and o not in used_o:
+            used_g.add(g)
+            used_o.add(o)
+            chosen.append((g, o))
+    return chosen
+
+
+def closure_figures(
+    generated: Sequence[Curve], original: Sequence[Curve], threshold: float, rate_hz: float
+) -> Closures:
+    """Return the closure figures of openings, clip by clip."""
+    g_closings = [closings(g, threshold) for g in generated]
+    o_closings = [closings(o, threshold) for o in original]
+    pairs = [pair for g, o in zip(g_closings, o_closings, strict=True) for pair in match(g, o)]
+    g_count, o_count = sum(map(len, g_closings)), sum(map(len, o_closings))
+    errors = [g - o for g, o in pairs]
+    return Closures(
+        score=len(pairs) / o_count if o_count else float("nan"),
+        precision=len(pairs) / g_count if g_count else float("nan"),
+        timing_ms=float(np.median(errors)) / rate_hz * 1000 if errors else float("nan"),
+        original=o_count,
+        generated=g_count,
+    )
+
+
+def phone_closures(
+    generated: Sequence[Curve],
+    original: Sequence[Curve],
+    intervals: Sequence[Sequence[tuple[float, float]]],
+    speech_s: float,
+    threshold: float,
+    rate_hz: float,
+) -> PhoneClosures:
+    """Return how often the mouth closes in given intervals (seconds, taken ±1 frame), and elsewhere.
+
+    speech_s : seconds of speech outside the intervals, over all clips
+    """
+    wanted = hit = false = natural = 0
+    for g, o, clip in zip(generated, original, intervals, strict=True):
+        inside = np.zeros(len(o), bool)
+        for start_s, end_s in clip:
+            first = max(int(np.floor(start_s * rate_hz)) - 1, 0)
+            stop = min(int(np.ceil(end_s * rate_hz)) + 2, len(o))
+            inside[first:stop] = True
+            if (o[first:stop] < threshold).any():
+                wanted += 1
+                hit += bool((g[first:stop] < threshold).any())
+        false += int((~inside[closings(g, threshold)]).sum())
+        natural += int((~inside[closings(o, threshold)]).sum())
+    minutes = speech_s / 60
+    return PhoneClosures(
+        recall=hit / wanted if wanted else float("nan"),
+        intervals=wanted,
+        false_per_minute=false / minutes if minutes else float("nan"),
+        original_per_minute=natural / minutes if minutes else float("nan"),
+    )

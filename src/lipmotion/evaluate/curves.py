@@ -1,0 +1,81 @@
+"""How close generated curves are to recorded ones.
+
+A set of clips is a list of arrays [shape=(T_i, P)] at the video's own rate, generated and original alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Clips = Sequence[Array]
+
+
+def correlation(generated: Array, original: Array) -> Array:
+    """Return the correlation of every channel over all frames [shape=(P,)]; 0 where one is constant.
+
+    Source: Xie & Liu 2007, Eq. 21 (whose ACC is the mean of these over channels).
+    """
+    a, b = generated - generated.mean(axis=0), original - original.mean(axis=0)
+    scale = np.sqrt((a * a).sum(axis=0) * (b * b).sum(axis=0))
+    return (a * b).sum(axis=0) / np.where(scale > 0, scale, np.inf)
+
+
+def pooled_correlation(generated: Clips, original: Clips) -> Array:
+    """Return ``correlation`` over the frames of all clips together."""
+    return correlation(np.concatenate(generated), np.concatenate(original))
+
+
+def per_clip_correlation(generated: Clips, original: Clips) -> Array:
+    """Return the mean over clips of each clip's ``correlation``."""
+    return np.mean([correlation(g, o) for g, o in zip(generated, original, strict=True)], axis=0)
+
+
+def mean_distance(generated: Clips, original: Clips) -> float:
+    """Return the mean over frames of the Euclidean distance, in the channels' unit. Source: Xie & Liu, Eq. 20."""
+    return float(np.linalg.norm(np.concatenate(generated) - np.concatenate(original), axis=1).mean())
+
+
+def normalised_rmse(generated: Clips, original: Clips) -> Array:
+    """Return the RMSE of every channel in units of its standard deviation over all frames [shape=(P,)]."""
+    o = np.concatenate(original)
+    return np.sqrt(np.square(np.concatenate(generated) - o).mean(axis=0)) / o.std(axis=0)
+
+
+def global_variance_ratio(generated: Clips, original: Clips) -> Array:
+    """Return mean over clips of std(generated) / mean over clips of std(original) [shape=(P,)]."""
+    return np.mean([g.std(axis=0) for g in generated], axis=0) / np.mean([o.std(axis=0) for o in original], axis=0)
+
+
+def jerk_ratio(generated: Clips, original: Clips) -> Array:
+    """Return mean |third difference|, generated over original [shape=(P,)]."""
+
+    def jerk(clips: Clips) -> Array:
+        return np.abs(np.concatenate([np.diff(clip, 3, axis=0) for clip in clips if len(clip) > 3])).mean(axis=0)
+
+    return jerk(generated) / jerk(original)
+
+
+def lag_ms(generated: Clips, original: Clips, rate_hz: float, reach_s: float = 0.4) -> float:
+    """Return how late the first channel is, in ms: the cross-correlation's maximum, refined by a parabola."""
+    reach = round(reach_s * rate_hz)
+    shifts = range(-reach, reach + 1)
+    scores = np.array([_shifted_correlation(generated, original, shift) for shift in shifts])
+    best = int(np.clip(scores.argmax(), 1, len(scores) - 2))
+    before, at, after = scores[best - 1 : best + 2]
+    curvature = before - 2 * at + after
+    refined = best + (0.5 * (before - after) / curvature if curvature < 0 else 0)
+    return float((refined - reach) / rate_hz * 1000)
+
+
+def _shifted_correlation(generated: Clips, original: Clips, shift: int) -> float:
+    """Correlate generated[t + shift] with original[t]."""
+    pairs = [
+        (g[max(shift, 0) : len(g) + min(shift, 0), :1], o[max(-shift, 0) : len(o) - max(shift, 0), :1])
+        for g, o in zip(generated, original, strict=True)
+        if len(g) > abs(shift) + 1
+    ]
+    return float(pooled_correlation([g for g, _ in pairs], [o for _, o in pairs])[0]) if pairs else 0.0

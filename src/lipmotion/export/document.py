@@ -1,0 +1,74 @@
+"""What every motion file says besides its values, and what must hold for it to be read."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import InputError
+from lipmotion.types import Channel, Generation, Motion, Span, Timeline, Unit
+
+FORMAT = "lipmotion.motion"
+VERSION = 1
+
+
+def header(generation: Generation) -> dict[str, Any]:
+    """Return format, version, rate and channels."""
+    motion = generation.motion
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "rate_hz": float(motion.rate_hz),
+        "channels": [{"name": channel.name, "unit": channel.unit} for channel in motion.channels],
+    }
+
+
+def labels(generation: Generation, source: Mapping[str, str], model: Mapping[str, str]) -> dict[str, Any]:
+    """Return units, source and model."""
+    units = [
+        {"start_s": span.start_s, "end_s": span.end_s, "phone": span.label.phone, "unit": span.label.unit}
+        for span in generation.units
+    ]
+    return {"units": units, "source": dict(source), "model": dict(model)}
+
+
+def parse(document: Any, values: Any) -> tuple[Motion, Timeline[Unit]]:
+    """Return what a document and its values describe.
+
+    Raises InputError: not a motion document, a version from the future, or parts that are missing or do not fit.
+    """
+    _check(document)
+    try:
+        channels = tuple(Channel(str(channel["name"]), str(channel["unit"])) for channel in document["channels"])
+        motion = Motion(_array(values, len(channels)), float(document["rate_hz"]), channels)
+        return motion, Timeline(tuple(_span(row) for row in document["units"]))
+    except InputError:
+        raise
+    except KeyError as error:
+        raise InputError(f"the motion document has no {error}; export it again") from error
+    except (TypeError, ValueError) as error:
+        raise InputError(f"the motion document is damaged ({error}); export it again") from error
+
+
+def _check(document: Any) -> None:
+    if not isinstance(document, dict) or document.get("format") != FORMAT:
+        raise InputError(f"not a motion document: its 'format' must be {FORMAT!r}")
+    version = document.get("version")
+    if not isinstance(version, int) or version < 1:
+        raise InputError(f"the motion document has version {version!r}, required {VERSION}; export it again")
+    if version > VERSION:
+        raise InputError(
+            f"the motion document has version {version}, this lipmotion reads up to {VERSION}: upgrade lipmotion"
+        )
+
+
+def _array(values: Any, channels: int) -> NDArray[np.float64]:
+    array = np.asarray(values, dtype=np.float64)
+    return array.reshape(0, channels) if array.size == 0 else array
+
+
+def _span(row: Any) -> Span[Unit]:
+    return Span(float(row["start_s"]), float(row["end_s"]), Unit(str(row["phone"]), str(row["unit"])))

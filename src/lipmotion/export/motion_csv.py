@@ -1,0 +1,48 @@
+"""``.csv``: a table for spreadsheets and scripts, ``time_s`` and one column a channel. It has no units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import ExportError, InputError
+from lipmotion.export.rounded import rows
+from lipmotion.types import Channel, Generation, Motion, Timeline, Unit
+
+
+def write(path: Path, generation: Generation, _source: Mapping[str, str], _model: Mapping[str, str]) -> None:
+    """Write a header and one line a frame. Raises ExportError: a channel's name would break the header."""
+    motion = generation.motion
+    for name in motion.names:
+        if set(name) & set(',"\r\n'):
+            raise ExportError(f"the channel name {name!r} does not fit in a table; write .json or .npz")
+    times = [f"{time_s:.9f}".rstrip("0").rstrip(".") for time_s in motion.time_s.tolist()]
+    lines = [f"{time_s},{row}" for time_s, row in zip(times, rows(motion.values), strict=True)]
+    path.write_text("\n".join([",".join(["time_s", *motion.names]), *lines, ""]), encoding="utf-8")
+
+
+def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
+    """Read it back; all channels count as eye distances. Raises InputError: not such a table, or uneven times."""
+    try:
+        head, *lines = path.read_text(encoding="utf-8-sig").splitlines()
+        table = np.array([line.split(",") for line in lines if line], dtype=np.float64)
+    except ValueError as error:
+        raise InputError(f"not a table of numbers under a header ({error}); export it again") from error
+    first, *names = head.split(",")
+    if first != "time_s" or not names:
+        raise InputError(f"the first line is {head[:60]!r}, required 'time_s,opening,...'")
+    if table.ndim != 2 or table.shape[1] != len(names) + 1:
+        raise InputError(f"the rows have shape {table.shape}, required {len(names) + 1} numbers in each")
+    return Motion(table[:, 1:], _rate(table[:, 0]), tuple(Channel(name) for name in names)), Timeline(())
+
+
+def _rate(time_s: NDArray[np.float64]) -> float:
+    if len(time_s) < 2:
+        raise InputError("the table has fewer than two rows, so its frame rate is unknown; use .json or .npz")
+    step_s = (time_s[-1] - time_s[0]) / (len(time_s) - 1)
+    if time_s[0] != 0 or not step_s > 0 or np.abs(np.diff(time_s) - step_s).max() > 1e-6:
+        raise InputError("the column time_s must begin at 0 and rise in even steps")
+    return round(float(1 / step_s), 6)

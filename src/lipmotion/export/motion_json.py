@@ -1,0 +1,29 @@
+"""``.json``: the whole document; one row of values a line."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+from lipmotion.errors import InputError
+from lipmotion.export.document import header, labels, parse
+from lipmotion.export.rounded import rows
+from lipmotion.types import Generation, Motion, Timeline, Unit
+
+
+def write(path: Path, generation: Generation, source: Mapping[str, str], model: Mapping[str, str]) -> None:
+    """Write one JSON object: format, version, rate_hz, channels, values, units, source, model."""
+    before = json.dumps(header(generation), ensure_ascii=False)
+    after = json.dumps(labels(generation, source, model), ensure_ascii=False)
+    values = ",\n".join([f"[{row}]" for row in rows(generation.motion.values)])
+    path.write_text(f'{before[:-1]}, "values": [\n{values}\n], {after[1:]}\n', encoding="utf-8")
+
+
+def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
+    """Read it back. Raises InputError: not JSON, or not a motion document."""
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise InputError(f"not JSON ({error}); export it again") from error
+    return parse(document, document.get("values") if isinstance(document, dict) else None)

@@ -1,0 +1,30 @@
+"""``.npz``: the values unrounded, and all else as JSON in a string array. Never pickled."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from zipfile import BadZipFile
+
+import numpy as np
+
+from lipmotion.errors import InputError
+from lipmotion.export.document import header, labels, parse
+from lipmotion.types import Generation, Motion, Timeline, Unit
+
+
+def write(path: Path, generation: Generation, source: Mapping[str, str], model: Mapping[str, str]) -> None:
+    """Write the arrays ``values`` [shape=(T, P)] and ``document``, the JSON format's text without its values."""
+    document = json.dumps({**header(generation), **labels(generation, source, model)}, ensure_ascii=False)
+    np.savez(path, values=np.asarray(generation.motion.values, dtype=np.float64), document=np.array(document))
+
+
+def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
+    """Read it back. Raises InputError: not an .npz file, or not a motion document."""
+    try:
+        with np.load(path, allow_pickle=False) as arrays:
+            values, document = arrays["values"], json.loads(str(arrays["document"]))
+    except (ValueError, KeyError, EOFError, BadZipFile, TypeError) as error:
+        raise InputError(f"not a motion file ({error}); export it again") from error
+    return parse(document, values)

@@ -1,0 +1,39 @@
+"""What the phones add that lip measures do not show: the lip on the teeth, the tip of the tongue."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.types import Timeline, Unit
+
+BLEND_S = 0.06
+"""A gesture grows and fades over this long, centred on the boundaries of its phone."""
+TUCKS: Mapping[str, float] = {"f": 1.0, "v": 1.0}
+"""The lower lip touches the upper teeth."""
+CLOSURES: Mapping[str, float] = {"p": 1.0, "b": 1.0, "m": 1.0, "em": 1.0}
+"""The lips touch; a tuck next to one of these is over before it begins."""
+TIP_RAISES: Mapping[str, float] = {"th": 1.0, "dh": 1.0, "l": 0.9, "el": 0.9, "t": 0.4, "d": 0.4, "n": 0.4, "en": 0.4}
+"""The tip of the tongue: between the teeth, or behind the upper ones, where less of it shows."""
+
+
+def weight(units: Timeline[Unit], strengths: Mapping[str, float], time_s: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return how far a gesture is made at each time, 0..1 [shape=(T,)].
+
+    Neighbouring phones of the same gesture run together: their slopes add up to 1.
+    """
+    total = np.zeros(len(time_s))
+    for span in units:
+        strength = strengths.get(span.label.phone)
+        if strength:
+            total += strength * (_risen(time_s - span.start_s) - _risen(time_s - span.end_s))
+    return np.minimum(total, 1)
+
+
+def _risen(after_s: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return a smooth step from 0 to 1, half way at 0 seconds."""
+    share = np.clip(after_s / BLEND_S + 0.5, 0, 1)
+    rise: NDArray[np.float64] = share * share * (3 - 2 * share)
+    return rise

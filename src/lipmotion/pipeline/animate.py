@@ -1,0 +1,104 @@
+"""Speech to motion, and motion to files: the main job."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from lipmotion.errors import ExportError
+from lipmotion.export.base import MOTION_SUFFIXES, write_motion
+from lipmotion.files import check_target
+from lipmotion.pipeline.model import Model, load_model
+from lipmotion.pipeline.transcribe import transcribe
+from lipmotion.speech.mfcc import mfcc
+from lipmotion.speech.read import read_audio
+from lipmotion.types import Audio, Constraints, Generation, Speech, Timeline, Unit
+from lipmotion.units import Lexicon, words_of
+
+VIDEO_SUFFIX = ".mp4"
+SOUND_RATE_HZ = 48_000
+"""The sound track of a rendered video."""
+
+
+def animate(
+    speech: str | Path | Audio,
+    *,
+    transcript: str | None = None,
+    units: Timeline[Unit] | None = None,
+    model: Model | None = None,
+    lexicon: Lexicon | None = None,
+    constraints: Constraints | None = None,
+) -> Generation:
+    """Return the lip motion that goes with speech.
+
+    speech      : an audio or video file, or samples at 16 kHz
+    transcript  : what is said, if known: the phones are then aligned instead of recognised
+    units       : phones in time, for instance edited ones of an earlier result; nothing is recognised then
+    model       : from ``load_model``; the shipped one by default
+    lexicon     : pronunciations of words that the dictionary does not have
+    constraints : values that the motion must take
+    Raises InputError: the recording, the transcript or a constraint is not usable.
+    Raises AlignmentError: the transcript does not fit into the recording.
+    """
+    chosen = model or load_model()
+    features = mfcc(speech if isinstance(speech, Audio) else read_audio(Path(speech)))
+    if units is None:
+        words = words_of(transcript) if transcript is not None else None
+        units = transcribe(chosen.phones, features, words, lexicon or Lexicon())
+    return chosen.engine.generate(chosen.learned, Speech(features, units), constraints)
+
+
+def write(
+    generation: Generation,
+    outputs: Sequence[str | Path],
+    *,
+    speech: str | Path | None = None,
+    model: Model | None = None,
+    rate_hz: float | None = None,
+    fps: float = 25.0,
+) -> None:
+    """Write one result to several files, each in the format of its suffix.
+
+    outputs : ``.json``, ``.csv``, ``.npz`` (motion) or ``.mp4`` (the drawn face, with sound)
+    speech  : the recording it came from; a video needs it
+    rate_hz : frames per second of motion files; the model's own 100 by default
+    fps     : frames per second of videos
+    Raises ExportError: unknown suffix, no such folder, or a file that cannot be written. All are checked
+    before the first is written.
+    """
+    paths = [Path(output) for output in outputs]
+    check_outputs(paths, speech)
+    for path in paths:
+        if path.suffix.lower() == VIDEO_SUFFIX:
+            _write_video(generation, path, Path(str(speech)), fps)
+        else:
+            _write_motion(generation, path, speech, model, rate_hz)
+
+
+def check_outputs(outputs: Sequence[str | Path], speech: str | Path | None = None) -> None:
+    """Raise ExportError unless every output can be written: before work begins, not after it."""
+    suffixes = (*MOTION_SUFFIXES, VIDEO_SUFFIX)
+    for path in map(Path, outputs):
+        if path.suffix.lower() not in suffixes:
+            raise ExportError(f"{path}: unknown format {path.suffix!r}; required one of: {' '.join(suffixes)}")
+        check_target(path)
+        if path.suffix.lower() == VIDEO_SUFFIX and speech is None:
+            raise ExportError(f"{path}: a video needs the recording: write(..., speech=FILE)")
+
+
+def _write_motion(
+    generation: Generation, path: Path, speech: str | Path | None, model: Model | None, rate_hz: float | None
+) -> None:
+    if rate_hz is not None:
+        generation = generation.resampled(rate_hz)
+    about = (model or load_model()).about
+    named = {key: str(about[key]) for key in ("name", "corpus", "licence", "attribution") if key in about}
+    write_motion(path, generation, source={"file": Path(speech).name} if speech else {}, model=named)
+
+
+def _write_video(generation: Generation, path: Path, speech: Path, fps: float) -> None:
+    from lipmotion.export.mp4 import write_mp4
+    from lipmotion.faces.character import render
+
+    frames = render(generation.motion, generation.units, fps=fps)
+    write_mp4(path, frames, fps=fps, audio=read_audio(speech, SOUND_RATE_HZ))

@@ -1,0 +1,141 @@
+"""A trained model as one value and as one file."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.engines import Engine, engine_named
+from lipmotion.errors import InputError, ModelFormatError
+from lipmotion.files import whole_file
+from lipmotion.stats.hmm.model import HmmConfig, UnitHmm, hmm_arrays, hmm_from_arrays
+
+FORMAT = "lipmotion.model"
+VERSION = 1
+SHIPPED = "grid-s1.lipmotion"
+HEADER = "header.json"
+OLDEST_DATE = (1980, 1, 1, 0, 0, 0)
+"""The date of everything in the file: the same model gives the same bytes."""
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """Everything that speech needs to become motion.
+
+    phones  : the acoustic models
+    engine  : with its configuration
+    learned : what the engine learned
+    about   : corpus, split, seed, versions, licence, attribution: whatever a user must know
+    """
+
+    phones: UnitHmm
+    engine: Engine[Any]
+    learned: Any
+    about: Mapping[str, Any]
+
+
+def save_model(model: Model, path: Path) -> None:
+    """Write a model: a zip of plain arrays and a JSON header, never pickle.
+
+    Raises ExportError: the file cannot be written.
+    """
+    arrays = {f"phones/{key}": array for key, array in hmm_arrays(model.phones).items()}
+    arrays |= {f"engine/{key}": array for key, array in model.engine.to_arrays(model.learned).items()}
+    header = {
+        "format": FORMAT,
+        "version": VERSION,
+        "engine": model.engine.name,
+        "configuration": asdict(model.engine.config),
+        "recogniser": asdict(model.phones.config),
+        **model.about,
+    }
+    with whole_file(path) as unfinished, zipfile.ZipFile(unfinished, "w") as file:
+        _put(file, HEADER, json.dumps(header, indent=1, ensure_ascii=False).encode())
+        for name, array in sorted(arrays.items()):
+            with file.open(_member(f"{name}.npy"), "w") as member:
+                np.lib.format.write_array(member, np.ascontiguousarray(array), allow_pickle=False)
+
+
+def load_model(path: Path | None = None) -> Model:
+    """Return a model; the one that ships with the package by default.
+
+    Raises InputError: no such file.  Raises ModelFormatError: not a model, damaged, or of a newer version.
+    """
+    if path is None:
+        return _shipped()
+    if not path.is_file():
+        raise InputError(f"{path}: no such model; train one (lipmotion train) or leave --model out")
+    return _read(path)
+
+
+def read_header(path: Path) -> dict[str, Any]:
+    """Return what a model file says of itself. Raises as ``load_model``."""
+    if not path.is_file():
+        raise InputError(f"{path}: no such model")
+    try:
+        with zipfile.ZipFile(path) as file:
+            header = json.loads(file.read(HEADER))
+    except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
+        raise ModelFormatError(
+            f"{path}: not a lipmotion model ({error}); give a file that `lipmotion train` wrote"
+        ) from error
+    if not isinstance(header, dict) or header.get("format") != FORMAT:
+        raise ModelFormatError(f"{path}: not a lipmotion model; give a file that `lipmotion train` wrote")
+    if header.get("version") != VERSION:
+        raise ModelFormatError(
+            f"{path}: model version {header.get('version')}, this lipmotion reads version {VERSION}; "
+            "upgrade lipmotion, or train the model again"
+        )
+    return header
+
+
+def shipped_path() -> Path:
+    """Return where the model that ships with the package lies."""
+    return Path(str(resources.files("lipmotion") / "models" / SHIPPED))
+
+
+@cache
+def _shipped() -> Model:
+    if not shipped_path().is_file():
+        raise ModelFormatError("the package holds no model; install it again, or give one with --model")
+    return _read(shipped_path())
+
+
+def _read(path: Path) -> Model:
+    header = read_header(path)
+    arrays: dict[str, dict[str, NDArray[Any]]] = {"phones": {}, "engine": {}}
+    try:
+        with zipfile.ZipFile(path) as file:
+            for name in file.namelist():
+                if name != HEADER:
+                    part, _, key = name.removesuffix(".npy").partition("/")
+                    with file.open(name) as member:
+                        arrays[part][key] = np.lib.format.read_array(member, allow_pickle=False)
+        engine = engine_named(header["engine"], header["configuration"])
+        recogniser = HmmConfig(**header["recogniser"])
+    except (OSError, KeyError, ValueError, TypeError, zipfile.BadZipFile) as error:
+        raise ModelFormatError(f"{path}: the model is damaged ({error}); train or download it again") from error
+    about = {key: value for key, value in header.items() if key not in _OWN_KEYS}
+    return Model(hmm_from_arrays(arrays["phones"], recogniser), engine, engine.from_arrays(arrays["engine"]), about)
+
+
+_OWN_KEYS = ("format", "version", "engine", "configuration", "recogniser")
+
+
+def _member(name: str) -> zipfile.ZipInfo:
+    info = zipfile.ZipInfo(name, OLDEST_DATE)
+    info.compress_type = zipfile.ZIP_DEFLATED
+    return info
+
+
+def _put(file: zipfile.ZipFile, name: str, content: bytes) -> None:
+    file.writestr(_member(name), content)

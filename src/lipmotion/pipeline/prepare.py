@@ -1,0 +1,251 @@
+"""Recordings to a corpus: ``prepare(recordings) → corpus``."""
+
+from __future__ import annotations
+
+import hashlib
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from importlib import metadata
+from pathlib import Path
+
+from tqdm import tqdm
+
+from lipmotion.corpora.base import Recording, Recordings
+from lipmotion.corpora.discover import discover
+from lipmotion.corpora.entry import quantised, read_entry, write_utterance
+from lipmotion.corpora.store import Corpus
+from lipmotion.errors import CorpusError, ExportError, InputError, MissingDependencyError
+from lipmotion.speech.mfcc import mfcc
+from lipmotion.speech.read import read_audio
+from lipmotion.types import Utterance
+from lipmotion.vision.packages import versions
+from lipmotion.vision.track import track
+
+RECIPE = "1"
+"""Raised whenever the same video would give other numbers: older utterances are then made again."""
+
+
+@dataclass(frozen=True)
+class PrepareReport:
+    """What became of the recordings.
+
+    corpus   : the corpus's folder
+    kind     : what the recordings were taken for
+    prepared : names of the utterances made now
+    kept     : names of those that were there already, from the same source with the same settings
+    failed   : recordings that could not be used, name to reason
+    unseen   : utterances with frames without a face, name to the number of those frames
+    seconds  : wall time
+    """
+
+    corpus: Path
+    kind: str
+    prepared: tuple[str, ...]
+    kept: tuple[str, ...]
+    failed: dict[str, str]
+    unseen: dict[str, int]
+    seconds: float
+
+
+@dataclass(frozen=True)
+class _Job:
+    """One recording, the folder it becomes, and what is known of it beforehand."""
+
+    recording: Recording
+    folder: Path
+    source: dict[str, str]
+    settings: dict[str, str]
+
+
+@dataclass(frozen=True)
+class _Outcome:
+    name: str
+    kept: bool = False
+    unseen: int = 0
+    problem: str = ""
+
+
+def prepare(
+    directory: Path, output: Path, *, workers: int | None = None, crops: bool = True, progress: bool = True
+) -> PrepareReport:
+    """Turn a folder of recordings into a corpus, or add them to one.
+
+    directory : GRID's layout, or any folder of videos (``corpora.discover`` says which)
+    output    : the corpus; utterances in it that are up to date are kept, so a stopped run goes on where it stopped
+    workers   : processes, by default one a core. With more than one, a script must call this under
+                ``if __name__ == "__main__":``, as for every process pool
+    crops     : keep the mouth images
+    progress  : show a progress bar, if stderr is a terminal
+    A recording that cannot be used is reported and left out. The corpus does not depend on ``workers``, nor on how
+    often it was interrupted.
+    Raises InputError, CorpusError: no recordings, none of them usable, or ``output`` is something else.
+    Raises MissingDependencyError: MediaPipe or OpenCV is not installed. Raises ExportError: the disk is full.
+    """
+    start_s = time.monotonic()
+    found = discover(directory)
+    packages = versions()
+    corpus = Corpus.create(output)
+    settings = {"recipe": RECIPE, "tracker": f"mediapipe {packages['mediapipe']}", "crops": "yes" if crops else "no"}
+    jobs = [_job(item, directory.resolve(), corpus, packages, settings) for item in found.items]
+    try:
+        outcomes = list(_with_progress(_outcomes(jobs, workers or os.cpu_count() or 1), len(jobs), progress))
+    finally:
+        corpus.refresh()
+    report = _report(corpus, found, outcomes, time.monotonic() - start_s)
+    if not report.prepared and not report.kept:
+        name, reason = next(iter(report.failed.items()))
+        raise CorpusError(
+            f"{directory}: none of {len(report.failed)} recordings is usable; the first, {name}: {reason}"
+        )
+    return report
+
+
+def _report(corpus: Corpus, found: Recordings, outcomes: list[_Outcome], seconds: float) -> PrepareReport:
+    outcomes = sorted(outcomes, key=lambda outcome: outcome.name)
+    good = [outcome for outcome in outcomes if not outcome.problem]
+    problems = found.problems | {outcome.name: outcome.problem for outcome in outcomes if outcome.problem}
+    return PrepareReport(
+        corpus=corpus.path,
+        kind=found.kind,
+        prepared=tuple(outcome.name for outcome in good if not outcome.kept),
+        kept=tuple(outcome.name for outcome in good if outcome.kept),
+        failed=dict(sorted(problems.items())),
+        unseen={outcome.name: outcome.unseen for outcome in good if outcome.unseen},
+        seconds=seconds,
+    )
+
+
+def _job(
+    recording: Recording, directory: Path, corpus: Corpus, packages: dict[str, str], settings: dict[str, str]
+) -> _Job:
+    collection = "/".join(directory.parts[-2:]).strip("/")
+    name = recording.name
+    if _is_taken(corpus.folder(name), recording.video, collection):
+        name = f"{collection.replace('/', '-')}-{name}"
+    source = {
+        "collection": collection,
+        "file": recording.video.name,
+        "lipmotion": metadata.version("lipmotion"),
+        **packages,
+        **recording.rights,
+    }
+    return _Job(replace(recording, name=name), corpus.folder(name), source, settings)
+
+
+def _is_taken(folder: Path, video: Path, collection: str) -> bool:
+    """Is this name another recording's, from another folder? (GRID's speakers share their file names.)"""
+    try:
+        source = read_entry(folder).get("source", {})
+    except CorpusError:
+        return False
+    return source.get("collection") != collection and source.get("sha256") != _sha256(video)
+
+
+def _sha256(path: Path) -> str:
+    digest = hashlib.sha256()
+    with path.open("rb") as file:
+        while block := file.read(1 << 20):
+            digest.update(block)
+    return digest.hexdigest()
+
+
+def _process(job: _Job) -> _Outcome:
+    name = job.recording.name
+    try:
+        source = job.source | {"sha256": _sha256(job.recording.video), "bytes": str(job.recording.video.stat().st_size)}
+        unseen = _kept_unseen(job, source["sha256"])
+        if unseen is not None:
+            return _Outcome(name, kept=True, unseen=unseen)
+        utterance = _utterance(job, source)
+        write_utterance(job.folder, utterance, job.settings)
+    except (MissingDependencyError, ExportError):
+        raise  # every other recording would fail in the same way
+    except InputError as error:
+        return _Outcome(name, problem=str(error))
+    except Exception as error:  # one strange file must not stop the rest
+        return _Outcome(name, problem=f"{job.recording.video}: {type(error).__name__}: {error}")
+    return _Outcome(name, unseen=int((~utterance.track.seen).sum()))
+
+
+def _kept_unseen(job: _Job, sha256: str) -> int | None:
+    """Return the frames without a face of an utterance that is up to date, None if there is none."""
+    try:
+        entry = read_entry(job.folder)
+    except CorpusError:
+        return None
+    words = None if job.recording.words is None else list(job.recording.words)
+    wanted = (sha256, words, job.recording.split, job.settings)
+    found = (entry["source"].get("sha256"), entry["words"], entry["split"], entry["settings"])
+    return int(entry["unseen_frames"]) if found == wanted else None
+
+
+def _utterance(job: _Job, source: dict[str, str]) -> Utterance:
+    audio = quantised(read_audio(job.recording.video))
+    return Utterance(
+        name=job.recording.name,
+        audio=audio,
+        features=mfcc(audio),
+        track=track(job.recording.video, crops=job.settings["crops"] == "yes"),
+        words=job.recording.words,
+        split=job.recording.split,
+        source=source,
+    )
+
+
+def _with_progress(outcomes: Iterator[_Outcome], count: int, progress: bool) -> Iterator[_Outcome]:
+    shown = progress and sys.stderr is not None and sys.stderr.isatty()
+    yield from tqdm(outcomes, total=count, unit="clip", disable=not shown)
+
+
+def _outcomes(jobs: Sequence[_Job], workers: int) -> Iterator[_Outcome]:
+    """Yield the outcomes as they come; with one worker, in this process."""
+    workers = min(workers, len(jobs))
+    if workers <= 1:
+        yield from map(_process, jobs)
+        return
+    with _pool(workers) as pool:
+        try:
+            for future in as_completed([pool.submit(_process, job) for job in jobs]):
+                yield future.result()
+        except BrokenProcessPool as error:
+            raise CorpusError(
+                "a worker process died (out of memory? or a script that calls prepare() outside of "
+                '`if __name__ == "__main__":`); what is finished is kept: prepare again, with fewer workers'
+            ) from error
+
+
+@contextmanager
+def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
+    """Give a pool whose processes end when it is left in a hurry, or when this process is killed."""
+    others = set(multiprocessing.active_children())
+    pool = ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), _start_worker)
+    try:
+        yield pool
+    except BaseException:
+        pool.shutdown(wait=False, cancel_futures=True)
+        for process in set(multiprocessing.active_children()) - others:
+            process.terminate()
+        raise
+    finally:
+        pool.shutdown()
+
+
+def _start_worker() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that started this one
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+    os._exit(1)

@@ -1,0 +1,136 @@
+"""A corpus to a model: ``train(corpus) → model``."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from importlib import metadata
+from typing import Any
+
+import numpy as np
+
+from lipmotion.corpora.store import Corpus
+from lipmotion.engines import Engine, engine_named
+from lipmotion.errors import AlignmentError, CorpusError, InputError
+from lipmotion.pipeline.model import Model, load_model
+from lipmotion.pipeline.transcribe import report_guesses
+from lipmotion.speech.phones import align, recognise, train_phones
+from lipmotion.stats.em import Monitor, silent_monitor
+from lipmotion.stats.hmm.model import HmmConfig, UnitHmm
+from lipmotion.stats.resample import to_model_frames
+from lipmotion.types import FRAME_RATE_HZ, Example, Features, Motion, Speech, Timeline, Track, Unit, Utterance
+from lipmotion.units import Lexicon
+
+LOG = logging.getLogger("lipmotion")
+
+
+@dataclass(frozen=True)
+class TrainReport:
+    """What training used and found.
+
+    used     : names of the utterances behind the motion
+    skipped  : utterances left out, name to reason
+    figures  : of the engine's training, by name
+    """
+
+    used: tuple[str, ...]
+    skipped: Mapping[str, str]
+    figures: Mapping[str, float]
+
+
+def train(
+    corpus: Corpus,
+    *,
+    split: str | None = "train",
+    names: Sequence[str] | None = None,
+    engine: Engine[Any] | None = None,
+    recogniser: HmmConfig | None = None,
+    lexicon: Lexicon | None = None,
+    monitor: Monitor = silent_monitor,
+) -> tuple[Model, TrainReport]:
+    """Train phone models on what is transcribed, then the motion of everything.
+
+    corpus     : from ``prepare``
+    split      : the list to train on; None: all utterances
+    names      : these utterances only, whatever their list (learning curves)
+    engine     : with its configuration; the trajectory engine by default
+    recogniser : configuration of the phone models
+    Utterances without a transcript are recognised, by the phone models of the transcribed ones or, where there
+    are none, by those of the shipped model.  Nothing here is random: the same corpus gives the same model.
+    Raises CorpusError: no such utterances, or nothing in them to learn from.
+    """
+    lexicon = lexicon or Lexicon()
+    engine = engine or engine_named("trajectory", {})
+    chosen = tuple(names) if names is not None else corpus.names(split)
+    if not chosen:
+        found = ", ".join(f"{name}: {count}" for name, count in corpus.splits.items())
+        raise CorpusError(f"{corpus.path}: no utterances of split {split!r} (there are {found})")
+    utterances = [corpus.utterance(name) for name in chosen]
+    phones = _phones(utterances, lexicon, recogniser or HmmConfig(), monitor)
+    examples, skipped = _examples(utterances, phones, lexicon)
+    fit = engine.fit(examples, monitor)
+    used = tuple(example.name for example in examples)
+    about = _about(corpus, utterances, "given names" if names is not None else split or "all", len(used))
+    return Model(phones, engine, fit.model, about), TrainReport(used, skipped, fit.figures)
+
+
+def labels_of(utterance: Utterance, phones: UnitHmm, lexicon: Lexicon) -> Timeline[Unit]:
+    """Return the phones of an utterance: aligned if its words are known, else recognised."""
+    features = Features(np.asarray(utterance.features.values), utterance.features.duration_s)
+    if utterance.words is None:
+        return recognise(phones, features)
+    return align(phones, features, utterance.words, lexicon)
+
+
+def model_motion(track: Track, frames: int) -> tuple[Motion, Any]:
+    """Return tracked motion on ``frames`` model frames, and where it rests on seen camera frames."""
+    motion = track.motion
+    values, valid = to_model_frames(
+        np.asarray(motion.values, float), np.asarray(track.seen), motion.rate_hz, frames, FRAME_RATE_HZ
+    )
+    return replace(motion, values=values, rate_hz=FRAME_RATE_HZ), valid
+
+
+def _phones(utterances: Sequence[Utterance], lexicon: Lexicon, config: HmmConfig, monitor: Monitor) -> UnitHmm:
+    spoken = [(utterance.features, utterance.words) for utterance in utterances if utterance.words]
+    if not spoken:
+        LOG.warning("no transcripts in the corpus: its phones are recognised by the shipped model")
+        return load_model().phones
+    said = dict.fromkeys(word for _, words in spoken for word in words)
+    report_guesses(tuple(said), lexicon)
+    return train_phones(spoken, lexicon, config, monitor)
+
+
+def _examples(
+    utterances: Sequence[Utterance], phones: UnitHmm, lexicon: Lexicon
+) -> tuple[list[Example], dict[str, str]]:
+    examples: list[Example] = []
+    skipped: dict[str, str] = {}
+    for utterance in utterances:
+        try:
+            units = labels_of(utterance, phones, lexicon)
+        except (AlignmentError, InputError) as error:
+            skipped[utterance.name] = str(error)
+            continue
+        motion, valid = model_motion(utterance.track, len(utterance.features.values))
+        examples.append(Example(utterance.name, Speech(utterance.features, units), motion, valid))
+    if not examples:
+        name, reason = next(iter(skipped.items()))
+        raise CorpusError(f"none of {len(skipped)} utterances could be used; the first, {name}: {reason}")
+    return examples, skipped
+
+
+def _about(corpus: Corpus, utterances: Sequence[Utterance], split: str, used: int) -> dict[str, Any]:
+    """Return the header's part that users must know, attribution above all."""
+    sources = [utterance.source for utterance in utterances]
+    minutes = sum(utterance.audio.duration_s for utterance in utterances) / 60
+    return {
+        "corpus": sorted({source["collection"] for source in sources if "collection" in source}) or [corpus.path.name],
+        "split": split,
+        "utterances": used,
+        "minutes": round(minutes, 1),
+        "licence": sorted({source["licence"] for source in sources if "licence" in source}),
+        "attribution": sorted({source["attribution"] for source in sources if "attribution" in source}),
+        "versions": {name: metadata.version(name) for name in ("lipmotion", "numpy", "scipy")},
+    }

@@ -1,0 +1,33 @@
+"""Recordings to phones in time: with a transcript by alignment, without one by recognition."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+
+from lipmotion.speech.phones import align, recognise
+from lipmotion.stats.hmm.model import UnitHmm
+from lipmotion.types import Features, Timeline, Unit
+from lipmotion.units import Lexicon
+
+LOG = logging.getLogger("lipmotion")
+
+
+def transcribe(phones: UnitHmm, features: Features, words: Sequence[str] | None, lexicon: Lexicon) -> Timeline[Unit]:
+    """Return the phones of a recording.
+
+    words : what is said in it, lower case, or None
+    Raises AlignmentError: the words do not fit into the recording.
+    """
+    if words is None:
+        return recognise(phones, features)
+    report_guesses(words, lexicon)
+    return align(phones, features, words, lexicon)
+
+
+def report_guesses(words: Sequence[str], lexicon: Lexicon) -> None:
+    """Warn of every word whose pronunciation is a guess."""
+    for word in dict.fromkeys(words):
+        if not lexicon.known(word):
+            guessed = " ".join(lexicon.pronunciations(word)[0])
+            LOG.warning("%r is not in the dictionary; read as %r; a lexicon file can say better", word, guessed)

@@ -1,0 +1,114 @@
+"""The acoustic front end of the papers: MFCC, log energy, Δ and ΔΔ."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+
+from lipmotion.errors import InputError
+from lipmotion.speech.read import SPEECH_RATE_HZ
+from lipmotion.types import FRAME_RATE_HZ, Audio, Features
+
+WINDOW = 400  # 25 ms
+HOP = 160  # 10 ms
+FFT_SIZE = 512
+FILTERS = 26
+CEPSTRA = 12
+LIFTER = 22
+PRE_EMPHASIS = 0.97
+DYNAMIC_RANGE = 1e-8
+"""Powers are floored this far below the loudest of the recording (80 dB): digital silence has a logarithm."""
+BLOCK = 4096
+"""Frames transformed at a time: memory stays bounded for any length."""
+
+
+def mfcc(audio: Audio) -> Features:
+    """Return 39 normalised features a frame: c1–c12, log energy, their Δ and ΔΔ.
+
+    Frame n is centred at n · 10 ms, the signal reflected at both ends: T = floor(duration · 100) + 1.
+    Mean and variance are normalised over the recording.
+    Raises InputError: the rate is not 16 kHz, or the recording is shorter than one window.
+    Source: Xie & Liu 2007, §5.1; details in the project's conventions.
+    """
+    if audio.rate_hz != SPEECH_RATE_HZ:
+        raise InputError(f"speech features need {SPEECH_RATE_HZ} Hz, found {audio.rate_hz} Hz; resample first")
+    if len(audio.samples) < WINDOW:
+        raise InputError(f"speech features need {WINDOW} samples, found {len(audio.samples)}")
+    static = _static(audio.samples.astype(np.float32))
+    delta = regression_delta(static)
+    values = np.concatenate([static, delta, regression_delta(delta)], axis=1)
+    return Features(normalised(values), audio.duration_s)
+
+
+def regression_delta(values: NDArray[np.float32], reach: int = 2) -> NDArray[np.float32]:
+    """Return the slope of a line through ±``reach`` frames, per frame [shape=(T, D)]; the ends repeat."""
+    padded = np.pad(values, ((reach, reach), (0, 0)), mode="edge")
+    count = len(values)
+    slope = np.zeros_like(values)
+    for step in range(1, reach + 1):
+        slope += step * (padded[reach + step : reach + step + count] - padded[reach - step : reach - step + count])
+    slope /= 2 * sum(step * step for step in range(1, reach + 1))
+    return slope
+
+
+def normalised(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return the columns with mean 0 and standard deviation 1; a constant column becomes 0."""
+    deviation = values.std(axis=0)
+    return (values - values.mean(axis=0)) / np.where(deviation > 1e-6, deviation, 1).astype(np.float32)
+
+
+def _static(samples: NDArray[np.float32]) -> NDArray[np.float32]:
+    half = WINDOW // 2
+    padded = np.pad(samples, half, mode="reflect")
+    emphasised = np.concatenate([padded[:1], padded[1:] - np.float32(PRE_EMPHASIS) * padded[:-1]])
+    count = int(len(samples) / SPEECH_RATE_HZ * FRAME_RATE_HZ + 1e-9) + 1
+    mel = np.empty((count, FILTERS), np.float32)
+    energy = np.empty(count, np.float32)
+    for start in range(0, count, BLOCK):
+        block = slice(start, min(start + BLOCK, count))
+        mel[block] = _mel_power(_frames(emphasised, block))
+        energy[block] = np.square(_frames(padded, block)).sum(axis=1)
+    cepstra = _log_power(mel) @ _cosine()
+    return np.concatenate([cepstra, _log_power(energy)[:, None]], axis=1)
+
+
+def _frames(samples: NDArray[np.float32], block: slice) -> NDArray[np.float32]:
+    first, last = block.start * HOP, (block.stop - 1) * HOP + WINDOW
+    return sliding_window_view(samples[first:last], WINDOW)[::HOP]
+
+
+def _mel_power(frames: NDArray[np.float32]) -> NDArray[np.float32]:
+    spectrum = np.fft.rfft(frames * np.hamming(WINDOW).astype(np.float32), FFT_SIZE)
+    power: NDArray[np.float32] = (np.square(spectrum.real) + np.square(spectrum.imag)) @ _filters()
+    return power
+
+
+def _log_power(power: NDArray[np.float32]) -> NDArray[np.float32]:
+    floor = np.float32(max(DYNAMIC_RANGE * float(power.max()), 1e-30))
+    log_power: NDArray[np.float32] = np.log(np.maximum(power, floor))
+    return log_power
+
+
+@cache
+def _filters() -> NDArray[np.float32]:
+    """Triangles, equally spaced in mel from 0 to 8 kHz [shape=(257, 26)]."""
+    bins = _mel(np.arange(FFT_SIZE // 2 + 1) * SPEECH_RATE_HZ / FFT_SIZE)
+    edges = np.linspace(0, _mel(np.array(SPEECH_RATE_HZ / 2)), FILTERS + 2)
+    rising = (bins[:, None] - edges[:-2]) / (edges[1:-1] - edges[:-2])
+    falling = (edges[2:] - bins[:, None]) / (edges[2:] - edges[1:-1])
+    return np.maximum(0, np.minimum(rising, falling)).astype(np.float32)
+
+
+def _mel(hertz: NDArray[np.float64]) -> NDArray[np.float64]:
+    return 1127 * np.log1p(hertz / 700)
+
+
+@cache
+def _cosine() -> NDArray[np.float32]:
+    """Orthonormal DCT-II, c1–c12, liftered [shape=(26, 12)]."""
+    order = np.arange(1, CEPSTRA + 1)
+    basis = np.cos(np.pi * (np.arange(FILTERS)[:, None] + 0.5) * order / FILTERS) * np.sqrt(2 / FILTERS)
+    return (basis * (1 + LIFTER / 2 * np.sin(np.pi * order / LIFTER))).astype(np.float32)

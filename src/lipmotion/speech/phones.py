@@ -1,0 +1,78 @@
+"""The project's acoustic phone models, and phones in time out of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.stats.em import Monitor
+from lipmotion.stats.hmm.align import align_units, choose_pronunciations
+from lipmotion.stats.hmm.decode import decode_units
+from lipmotion.stats.hmm.model import HmmConfig, UnitHmm
+from lipmotion.stats.hmm.train import Transcribed, UnitInventory, train_hmm
+from lipmotion.types import FRAME_RATE_HZ, Features, Span, Timeline, Unit
+from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent, stand_in
+
+LOG_ENERGY = 12
+"""The column of the features that holds the log energy."""
+SHORT_PAUSE_S = 0.2
+"""Silence shorter than this is a pause between words."""
+
+
+def train_phones(
+    spoken: Sequence[tuple[Features, tuple[str, ...]]], lexicon: Lexicon, config: HmmConfig, monitor: Monitor
+) -> UnitHmm:
+    """Train phone models from recordings and the words said in them.
+
+    Raises CorpusError: no transcript fits into its recording.
+    """
+    utterances = [
+        Transcribed(features.values, tuple(lexicon.pronunciations(word) for word in words))
+        for features, words in spoken
+    ]
+    return train_hmm(utterances, UnitInventory(SILENCE, PAUSE, LOG_ENERGY), config, monitor)
+
+
+def align(hmm: UnitHmm, features: Features, words: Sequence[str], lexicon: Lexicon) -> Timeline[Unit]:
+    """Return the phones of a known transcript in time.
+
+    Which pronunciation was used, and where there were pauses, follows from the sound. A phone that the models
+    have never heard borrows the sound of the nearest one that they have (``units.RELATIVES``).
+    Raises AlignmentError: the transcript does not fit into the recording.
+    """
+    variants = [lexicon.pronunciations(word) for word in words]
+    known = [unit for unit in hmm.table.units if not is_silent(unit)]
+    heard = [[tuple(stand_in(p, known) for p in variant) for variant in choices] for choices in variants]
+    said = choose_pronunciations(hmm, features.values, heard, PAUSE)
+    bounds = align_units(hmm, features.values, [unit for part in said for unit in part.units])
+    labels = [
+        (phone, words[part.word] if part.word >= 0 else "")
+        for part in said
+        for phone in (variants[part.word][part.variant] if part.word >= 0 else part.units)
+    ]
+    return _timeline(labels, bounds, features.duration_s)
+
+
+def recognise(hmm: UnitHmm, features: Features) -> Timeline[Unit]:
+    """Return the phones that were most probably said, in time: Viterbi with a back-off bigram.
+
+    Source: Hofer 2008, Eq. 5.
+    """
+    inventory = [unit for unit in hmm.table.units if unit != PAUSE]
+    phones, bounds = decode_units(hmm, features.values, inventory)
+    return _timeline([(phone, "") for phone in phones], bounds, features.duration_s)
+
+
+def _timeline(labels: list[tuple[str, str]], bounds: NDArray[np.intp], duration_s: float) -> Timeline[Unit]:
+    """Frame n covers (n ± ½) · 10 ms."""
+    edges = np.clip((bounds - 0.5) / FRAME_RATE_HZ, 0, duration_s)
+    edges[-1] = duration_s
+    spans = []
+    for (phone, word), start_s, end_s in zip(labels, edges[:-1].tolist(), edges[1:].tolist(), strict=True):
+        name = phone
+        if is_silent(phone):
+            name = PAUSE if end_s - start_s < SHORT_PAUSE_S else SILENCE
+        spans.append(Span(start_s, end_s, Unit(name, word=word)))
+    return Timeline(tuple(spans))

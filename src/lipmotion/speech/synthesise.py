@@ -1,0 +1,285 @@
+"""Phones and durations → sound: a small source–filter formant synthesiser.
+
+A glottal pulse train and noise excite five resonances in cascade; a second noise goes through one resonance beside them
+(frication). Every phone is one to three *parts*, each a share of its duration with fixed targets; the targets become
+smooth tracks. It speaks without any recording, so tests have speech whose phone times are exactly known.
+
+Source: D. H. Klatt, "Software for a cascade/parallel formant synthesizer", JASA 67 (1980): resonators, and most figures
+of the table. D. H. and L. C. Klatt, JASA 87 (1990): the glottal pulse. Deviations: no nasal zero, one hiss resonance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
+from scipy.signal import lfilter, sosfilt
+
+from lipmotion.errors import InputError
+from lipmotion.types import Audio, Span, Timeline, Unit
+
+Array = NDArray[np.float64]
+Formants = tuple[float, float, float]
+
+CONTROL_HZ = 320
+"""Tracks are updated this often."""
+LOWEST_RATE_HZ = 16000
+"""Below it the frication of s does not fit."""
+FLOOR_DB = -70.0
+"""Level of the noise under everything, in dB of full scale (root mean square)."""
+
+SHORTEST_S = 0.001
+"""No phone may be shorter."""
+
+_FORMANT_SMOOTHING_S, _LEVEL_SMOOTHING_S = 0.016, 0.004  # standard deviations
+_HIGH_HZ, _HIGH_WIDTHS_HZ = (4500.0, 3500.0), (280.0, 220.0)  # F5 and F4, the same for all phones
+_OPEN_SHARE, _TILT, _DECLINATION = 0.6, 0.2, 0.06  # of the glottal pulse, of its low pass, of the pitch
+_GAIN = 0.12
+
+
+@dataclass(frozen=True)
+class Part:
+    """A stretch of a phone with fixed targets.
+
+    share              : of the phone's duration; the shares of one phone sum to 1
+    formants, widths   : F1–F3 and their bandwidths, Hz; no formants: those of what follows
+    voice, breath      : levels of the glottal pulses and of the noise through the formants
+    hiss               : level of the noise beside them, around ``hiss_hz``, ``hiss_width`` Hz wide
+    """
+
+    share: float = 1.0
+    formants: Formants | None = None
+    widths: Formants = (70.0, 100.0, 160.0)
+    voice: float = 0.0
+    breath: float = 0.0
+    hiss: float = 0.0
+    hiss_hz: float = 4000.0
+    hiss_width: float = 2000.0
+
+
+Sound = tuple[Part, ...]
+
+
+def _vowel(start: Formants, end: Formants | None = None) -> Sound:
+    if end is None:
+        return (Part(1.0, start, voice=1.0, breath=0.01),)
+    return Part(0.5, start, voice=1.0, breath=0.01), Part(0.5, end, voice=0.9, breath=0.01)
+
+
+def _glide(formants: Formants) -> Sound:
+    return (Part(1.0, formants, (60.0, 110.0, 180.0), voice=0.6),)
+
+
+def _nasal(formants: Formants) -> Sound:
+    return (Part(1.0, formants, (70.0, 300.0, 350.0), voice=0.45),)
+
+
+def _fricative(formants: Formants, hiss: float, hiss_hz: float, hiss_width: float, voice: float = 0.0) -> Sound:
+    return (Part(1.0, formants, (120.0, 150.0, 200.0), voice, 0.0, hiss, hiss_hz, hiss_width),)
+
+
+def _stop(formants: Formants, hiss: float, hiss_hz: float, hiss_width: float, voiced: bool) -> Sound:
+    """Closure, burst, release; a voiced one murmurs in its closure, an unvoiced one is aspirated."""
+    closure = Part(0.6, formants, (150.0, 300.0, 400.0), voice=0.12 if voiced else 0.0)
+    burst = Part(0.14, formants, hiss=hiss, hiss_hz=hiss_hz, hiss_width=hiss_width)
+    release = Part(0.26, formants, voice=0.6) if voiced else Part(0.26, formants, (200.0, 150.0, 200.0), breath=0.12)
+    return closure, burst, release
+
+
+def _affricate(formants: Formants, hiss: float, hiss_hz: float, hiss_width: float, voice: float = 0.0) -> Sound:
+    """Closure, then a fricative."""
+    (release,) = _fricative(formants, hiss, hiss_hz, hiss_width, voice)
+    return Part(0.4, formants, (150.0, 300.0, 400.0), voice=voice / 2), replace(release, share=0.6)
+
+
+def _syllabic(sound: Sound) -> Sound:
+    """A schwa that runs into a consonant."""
+    return replace(_vowel(SCHWA)[0], share=0.35), *(replace(part, share=0.65 * part.share) for part in sound)
+
+
+SCHWA: Formants = (500, 1400, 2450)
+_PALATAL, _ALVEOLAR, _LABIAL, _VELAR = (270, 1850, 2500), (280, 1700, 2650), (260, 850, 2100), (270, 1900, 2300)
+_M, _N, _L = _nasal((260, 1000, 2200)), _nasal((270, 1550, 2600)), _glide((340, 1050, 2750))
+
+SOUNDS: dict[str, Sound] = {
+    "sil": (Part(),),
+    "sp": (Part(),),
+    "iy": _vowel((290, 2200, 2950)),
+    "ih": _vowel((400, 1920, 2560)),
+    "ix": _vowel((420, 1700, 2500)),
+    "eh": _vowel((540, 1760, 2500)),
+    "ae": _vowel((680, 1700, 2420)),
+    "aa": _vowel((730, 1090, 2440)),
+    "ao": _vowel((580, 860, 2500)),
+    "ah": _vowel((640, 1220, 2400)),
+    "ax": _vowel(SCHWA),
+    "uh": _vowel((450, 1050, 2350)),
+    "uw": _vowel((320, 900, 2250)),
+    "er": _vowel((470, 1270, 1560)),
+    "axr": _vowel((490, 1380, 1700)),
+    "ey": _vowel((480, 1800, 2520), (330, 2150, 2700)),
+    "ay": _vowel((710, 1200, 2480), (380, 2050, 2600)),
+    "oy": _vowel((540, 850, 2450), (370, 1950, 2550)),
+    "aw": _vowel((710, 1250, 2450), (420, 880, 2350)),
+    "ow": _vowel((530, 980, 2350), (370, 820, 2300)),
+    "w": _glide((290, 620, 2150)),
+    "y": _glide((265, 2250, 3000)),
+    "r": _glide((330, 1080, 1400)),
+    "l": _L,
+    "el": _syllabic(_L),
+    "m": _M,
+    "em": _syllabic(_M),
+    "n": _N,
+    "en": _syllabic(_N),
+    "ng": _nasal((280, 2100, 2600)),
+    "hh": (Part(widths=(200.0, 150.0, 200.0), breath=0.12),),
+    "f": _fricative((300, 1050, 2200), 0.10, 5000, 5000),
+    "v": _fricative((280, 1050, 2200), 0.05, 5000, 5000, voice=0.35),
+    "th": _fricative((300, 1350, 2550), 0.08, 6500, 2500),
+    "dh": _fricative((280, 1350, 2550), 0.04, 6500, 2500, voice=0.35),
+    "s": _fricative((300, 1650, 2600), 0.40, 5800, 1800),
+    "z": _fricative((270, 1650, 2600), 0.22, 5800, 1800, voice=0.3),
+    "sh": _fricative((300, 1850, 2450), 0.45, 2900, 1300),
+    "zh": _fricative((270, 1850, 2450), 0.25, 2900, 1300, voice=0.3),
+    "p": _stop(_LABIAL, 0.25, 900, 1200, voiced=False),
+    "b": _stop(_LABIAL, 0.18, 800, 1200, voiced=True),
+    "t": _stop(_ALVEOLAR, 0.45, 4500, 2500, voiced=False),
+    "d": _stop(_ALVEOLAR, 0.30, 4200, 2500, voiced=True),
+    "k": _stop(_VELAR, 0.45, 1950, 500, voiced=False),
+    "g": _stop(_VELAR, 0.30, 1900, 500, voiced=True),
+    "ch": _affricate(_PALATAL, 0.45, 3000, 1400),
+    "jh": _affricate(_PALATAL, 0.28, 3000, 1400, voice=0.3),
+}
+"""The phones of the inventory (conventions: Phones), their parts in order."""
+
+
+def synthesise(
+    phones: Sequence[tuple[str, float]], *, pitch_hz: float = 120.0, rate_hz: int = 16000, seed: int = 0
+) -> tuple[Audio, Timeline[Unit]]:
+    """Speak ``phones``, and return the sound with the exact time of each of them.
+
+    phones   : names and durations (seconds, ≥ 0.001), in order; at least one
+    pitch_hz : mean pitch, 50–500 Hz; it falls by 12 % from start to end
+    rate_hz  : sampling rate, 16,000 Hz or more
+    seed     : of the noise; the same arguments give the same samples
+    Returns Audio of ``round(sum of durations · rate_hz)`` samples, silence at −70 dB; and the phones in time, from 0 s.
+    Raises InputError: a phone that is not in ``SOUNDS``, or a duration, pitch or rate out of range.
+    """
+    _check(phones, pitch_hz, rate_hz)
+    edges_s = np.concatenate([[0.0], np.cumsum([duration_s for _, duration_s in phones])])
+    noise = np.random.default_rng(seed).standard_normal((3, round(float(edges_s[-1]) * rate_hz)))
+    speech = _speech(_tracks([SOUNDS[phone] for phone, _ in phones], edges_s, rate_hz), noise, pitch_hz, rate_hz)
+    samples = _GAIN * speech + 10 ** (FLOOR_DB / 20) * noise[2]
+    spans = (Span(float(a), float(b), Unit(p)) for (p, _), a, b in zip(phones, edges_s, edges_s[1:], strict=False))
+    return Audio(samples.astype(np.float32), rate_hz), Timeline(tuple(spans))
+
+
+def _check(phones: Sequence[tuple[str, float]], pitch_hz: float, rate_hz: int) -> None:
+    if not phones:
+        raise InputError("there are no phones to speak; give at least one")
+    for phone, duration_s in phones:
+        if phone not in SOUNDS:
+            raise InputError(f"phone {phone!r} is not known; use one of: {' '.join(sorted(SOUNDS))}")
+        if not SHORTEST_S <= duration_s < np.inf:
+            raise InputError(f"phone {phone!r} lasts {duration_s} s, required at least {SHORTEST_S} s")
+    if not 50 <= pitch_hz <= 500:
+        raise InputError(f"pitch is {pitch_hz} Hz, required 50 to 500")
+    if rate_hz < LOWEST_RATE_HZ:
+        raise InputError(f"sampling rate is {rate_hz} Hz, required at least {LOWEST_RATE_HZ}; resample the result")
+
+
+class _Tracks(NamedTuple):
+    """Smooth targets, one row a frame: F1–F3 and widths; voice, breath, hiss; the hiss's centre and width (all Hz)."""
+
+    formants: Array
+    widths: Array
+    levels: Array
+    hiss: Array
+
+
+def _tracks(sounds: Sequence[Sound], edges_s: Array, rate_hz: int) -> _Tracks:
+    hop_s = (rate_hz // CONTROL_HZ) / rate_hz
+    time_s = (np.arange(int(edges_s[-1] / hop_s) + 1) + 0.5) * hop_s
+    parts = _with_formants([part for sound in sounds for part in sound])
+    part_s = [part.share * d for sound, d in zip(sounds, np.diff(edges_s), strict=True) for part in sound]
+    which = np.minimum(np.searchsorted(np.cumsum(part_s), time_s, side="right"), len(parts) - 1)
+    formants = np.array([(part.formants, part.widths) for part in parts])[which]
+    levels = np.array([(part.voice, part.breath, part.hiss) for part in parts])[which]
+    hiss = np.array([(part.hiss_hz, part.hiss_width) for part in parts])[which]
+    loudness = levels[:, 2:] + 1e-9  # the hiss's place is the mean over what hisses nearby
+    return _Tracks(
+        _smooth(formants[:, 0], _FORMANT_SMOOTHING_S),
+        _smooth(formants[:, 1], _FORMANT_SMOOTHING_S),
+        _smooth(levels, _LEVEL_SMOOTHING_S),
+        _smooth(hiss * loudness, _LEVEL_SMOOTHING_S) / _smooth(loudness, _LEVEL_SMOOTHING_S),
+    )
+
+
+def _with_formants(parts: Sequence[Part]) -> list[Part]:
+    """Give the parts without formants those of the next that has some, at the end those of the last."""
+    following: Formants = next((part.formants for part in reversed(parts) if part.formants), SCHWA)
+    filled = []
+    for part in reversed(parts):
+        following = part.formants or following
+        filled.append(replace(part, formants=following))
+    return filled[::-1]
+
+
+def _smooth(frames: Array, deviation_s: float) -> Array:
+    smooth: Array = gaussian_filter1d(frames, deviation_s * CONTROL_HZ, axis=0, mode="nearest")
+    return smooth
+
+
+def _speech(tracks: _Tracks, noise: Array, pitch_hz: float, rate_hz: int) -> Array:
+    """Return what comes out of the mouth; ``noise`` [shape=(≥ 2, samples)] excites breath and hiss."""
+    count, hop = noise.shape[1], rate_hz // CONTROL_HZ
+    centres = (np.arange(len(tracks.levels)) + 0.5) * hop
+    voice, breath, hiss = (np.interp(np.arange(count), centres, level) for level in tracks.levels.T)
+    source = voice * _pulses(count, pitch_hz, rate_hz) + breath * noise[0]
+    voiced = _filtered(source, _formant_sections(tracks, rate_hz), hop)
+    return voiced + _filtered(hiss * noise[1], _hiss_sections(tracks, rate_hz), hop)
+
+
+def _pulses(count: int, pitch_hz: float, rate_hz: int) -> Array:
+    """Return the derivative of the glottal flow, peak −1 [shape=(count,)]."""
+    pitch = pitch_hz * np.linspace(1 + _DECLINATION, 1 - _DECLINATION, count)
+    opened = np.cumsum(pitch / rate_hz) % 1.0 / _OPEN_SHARE
+    pulses: Array = lfilter([1 - _TILT], [1.0, -_TILT], np.where(opened < 1, opened * (2 - 3 * opened), 0.0))
+    return pulses
+
+
+def _formant_sections(tracks: _Tracks, rate_hz: int) -> Array:
+    """Return F5–F1 as second-order sections of unit gain at 0 Hz [shape=(frames, 5, 6)].
+
+    F1 comes last: it damps the clicks that the changes of the others make.
+    """
+    high = np.ones((len(tracks.formants), 1))
+    centre = np.concatenate([high * _HIGH_HZ, tracks.formants[:, ::-1]], axis=1)
+    width = np.concatenate([high * _HIGH_WIDTHS_HZ, tracks.widths[:, ::-1]], axis=1)
+    a1, a2 = _poles(centre, width, rate_hz)
+    zero, one = np.zeros_like(a1), np.ones_like(a1)
+    return np.stack([1 + a1 + a2, zero, zero, one, a1, a2], axis=-1)
+
+
+def _hiss_sections(tracks: _Tracks, rate_hz: int) -> Array:
+    """Return one band pass of unit gain at its centre, zero at 0 Hz [shape=(frames, 1, 6)]."""
+    a1, a2 = _poles(tracks.hiss[:, :1], tracks.hiss[:, 1:], rate_hz)
+    gain, zero, one = (1 - a2) / 2, np.zeros_like(a1), np.ones_like(a1)
+    return np.stack([gain, zero, -gain, one, a1, a2], axis=-1)
+
+
+def _poles(centre_hz: Array, width_hz: Array, rate_hz: int) -> tuple[Array, Array]:
+    radius = np.exp(-np.pi * width_hz / rate_hz)
+    return -2 * radius * np.cos(2 * np.pi * centre_hz / rate_hz), radius**2
+
+
+def _filtered(samples: Array, sections: Array, hop: int) -> Array:
+    """Filter ``samples``, ``hop`` at a time with the sections of that frame; the state is carried over."""
+    filtered, state = np.empty_like(samples), np.zeros((sections.shape[1], 2))
+    for start, frame_sections in zip(range(0, len(samples), hop), sections, strict=False):
+        filtered[start : start + hop], state = sosfilt(frame_sections, samples[start : start + hop], zi=state)
+    return filtered

@@ -1,0 +1,1 @@
+"""Hidden Markov models of units: flat start, embedded training, alignment, decoding."""

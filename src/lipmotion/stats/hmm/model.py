@@ -1,0 +1,89 @@
+"""A trained set of unit models."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import ModelFormatError
+from lipmotion.stats.bigram import Bigram
+from lipmotion.stats.hmm.states import StateTable
+from lipmotion.stats.mixture import Mixtures
+
+
+@dataclass(frozen=True)
+class HmmConfig:
+    """How unit models are built and trained.
+
+    states       : states per unit, left to right, no skips
+    mixtures     : Gaussians per state (a power of two)
+    context_frames : least frames of data for a state in context to get a density of its own
+    relevance    : frames that the density without context counts for, per Gaussian, in one with context
+    iterations   : embedded Baum–Welch iterations per stage
+    variance_floor   : share of a feature's overall variance
+    bigram_weight, insertion : scale of the log bigram, and log price of every unit, when decoding
+    """
+
+    states: int = 3
+    mixtures: int = 8
+    context_frames: int = 60
+    relevance: float = 10.0
+    iterations: int = 4
+    variance_floor: float = 0.02
+    bigram_weight: float = 6.0
+    insertion: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class UnitHmm:
+    """Models of all units: tied states, their densities, how long each lasts, and which unit follows which.
+
+    log_stay : float32 array [shape=(G,)], of the densities without context; log P(keep the state)
+    """
+
+    config: HmmConfig
+    table: StateTable
+    mixtures: Mixtures
+    log_stay: NDArray[np.float32]
+    bigram: Bigram
+
+    def stay(self, unit: str, state: int) -> float:
+        """Return log P(keep this state one frame longer)."""
+        return float(self.log_stay[self.table.density(unit, state)])
+
+    def move(self, unit: str, state: int) -> float:
+        """Return log P(leave this state)."""
+        return float(np.log(-np.expm1(self.stay(unit, state))))
+
+
+def hmm_arrays(hmm: UnitHmm) -> dict[str, NDArray[Any]]:
+    """Return the models as arrays, Gaussians at half precision; the configuration is not among them."""
+    return {
+        "units": np.array(hmm.table.units),
+        "counts": np.array(hmm.table.counts, np.int32),
+        "names": np.array(hmm.table.names),
+        "free": np.array(hmm.table.free),
+        "log_weights": hmm.mixtures.log_weights.astype(np.float16),
+        "means": hmm.mixtures.means.astype(np.float16),
+        "variances": hmm.mixtures.variances.astype(np.float16),
+        "log_stay": hmm.log_stay,
+        "bigram": hmm.bigram.log_probability,
+    }
+
+
+def hmm_from_arrays(arrays: Mapping[str, NDArray[Any]], config: HmmConfig) -> UnitHmm:
+    """Return the models again. Raises ModelFormatError: something is missing or has the wrong shape."""
+    try:
+        units, counts, names, free = (arrays[key].tolist() for key in ("units", "counts", "names", "free"))
+        table = StateTable(tuple(units), tuple(counts), tuple(names), tuple(free))
+        mixtures = Mixtures(*(arrays[key].astype(np.float32) for key in ("log_weights", "means", "variances")))
+        if mixtures.means.shape != mixtures.variances.shape or len(mixtures.means) != len(names):
+            raise ValueError(f"{len(names)} states, means of shape {mixtures.means.shape}")
+        bigram = Bigram(table.units, arrays["bigram"].astype(np.float32))
+        return UnitHmm(config, table, mixtures, arrays["log_stay"].astype(np.float32), bigram)
+    except (KeyError, ValueError) as error:
+        raise ModelFormatError(f"the phone models are damaged ({error}); train or download the model again") from error

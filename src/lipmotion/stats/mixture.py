@@ -1,0 +1,146 @@
+"""Mixtures of diagonal Gaussians, many densities at a time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+SPLIT_STEP = 0.2
+"""Halves of a split component move apart by this many standard deviations."""
+LOG_2PI = float(np.log(2 * np.pi))
+
+
+@dataclass(frozen=True, eq=False)
+class Mixtures:
+    """G mixture densities of M diagonal Gaussians each.
+
+    log_weights : float32 array [shape=(G, M)], -inf marks an unused component
+    means, variances : float32 arrays [shape=(G, M, D)]
+    """
+
+    log_weights: NDArray[np.float32]
+    means: NDArray[np.float32]
+    variances: NDArray[np.float32]
+
+    @property
+    def size(self) -> tuple[int, int, int]:
+        """G, M and D."""
+        G, M, D = self.means.shape
+        return G, M, D
+
+    def log_components(self, x: NDArray[np.float32], chosen: NDArray[np.intp] | None = None) -> NDArray[np.float32]:
+        """Return log weight + log density of every component [shape=(T, G', M)].
+
+        x      : [shape=(T, D)]
+        chosen : [shape=(G',)], the densities wanted; all by default
+        Cost: O(T·G'·M·D), as two matrix products.
+        """
+        pick = slice(None) if chosen is None else chosen
+        means, precision = self.means[pick], 1 / self.variances[pick]
+        G, M, D = means.shape
+        constant = self.log_weights[pick] - 0.5 * (
+            D * LOG_2PI - np.log(precision).sum(axis=2) + (means * means * precision).sum(axis=2)
+        )
+        log_density = x @ (means * precision).reshape(G * M, D).T
+        log_density -= (x * x) @ (precision / 2).reshape(G * M, D).T
+        return log_density.reshape(len(x), G, M) + constant.astype(np.float32)
+
+    def log_likelihood(self, x: NDArray[np.float32], chosen: NDArray[np.intp] | None = None) -> NDArray[np.float32]:
+        """Return the log density of every frame under every mixture [shape=(T, G')]."""
+        components = self.log_components(x, chosen)
+        if components.shape[2] == 1:
+            return components[:, :, 0]
+        best = components.max(axis=2)
+        components -= best[:, :, None]
+        np.exp(components, out=components)
+        return best + np.log(components.sum(axis=2))
+
+    def split(self) -> Mixtures:
+        """Return twice as many components, each half moved apart along all axes."""
+        step = SPLIT_STEP * np.sqrt(self.variances)
+        return Mixtures(
+            np.concatenate([self.log_weights, self.log_weights], axis=1) - np.float32(np.log(2)),
+            np.concatenate([self.means + step, self.means - step], axis=1),
+            np.concatenate([self.variances, self.variances], axis=1),
+        )
+
+    def picked(self, chosen: NDArray[np.intp]) -> Mixtures:
+        """Return copies of some densities, in the order given."""
+        return Mixtures(self.log_weights[chosen], self.means[chosen], self.variances[chosen])
+
+    def joined(self, other: Mixtures) -> Mixtures:
+        """Return both sets of densities, which have as many components each."""
+        return Mixtures(
+            np.concatenate([self.log_weights, other.log_weights]),
+            np.concatenate([self.means, other.means]),
+            np.concatenate([self.variances, other.variances]),
+        )
+
+    def improve(
+        self, density: int, x: NDArray[np.float32], share: NDArray[np.float32], floor: NDArray[np.float32]
+    ) -> None:
+        """Take one EM step of one density, in place (training works on a ``copy``).
+
+        x     : [shape=(N, D)], the frames it accounts for
+        share : [shape=(N,)], their state posteriors
+        floor : [shape=(D,)], least variance
+        A component with less than two frames' worth of data is switched off.
+        """
+        posterior = self._responsibilities(density, x, share)
+        count = posterior.sum(axis=0)
+        alive = count >= min(2.0, count.max())
+        safe = np.where(alive, count, 1)[:, None]
+        mean = (posterior.T @ x) / safe
+        variance = np.maximum((posterior.T @ (x * x)) / safe - mean * mean, floor)
+        weights = np.where(alive, count, 0)
+        with np.errstate(divide="ignore"):
+            self.log_weights[density] = np.log(weights / weights.sum())
+        self.means[density] = np.where(alive[:, None], mean, 0)
+        self.variances[density] = np.where(alive[:, None], variance, 1)
+
+    def adapt(
+        self, density: int, x: NDArray[np.float32], share: NDArray[np.float32], prior: int, relevance: float
+    ) -> None:
+        """Take one maximum-a-posteriori step of one density towards its data, from another one as its prior.
+
+        x, share  : as in ``improve``
+        prior     : the density that counts as much as ``relevance`` frames a component
+        Source: Gauvain & Lee 1994, with the prior's own shape as its certainty.
+        """
+        posterior = self._responsibilities(density, x, share)
+        count = posterior.sum(axis=0)[:, None]
+        weight, mean, variance = np.exp(self.log_weights[prior]), self.means[prior], self.variances[prior]
+        new_mean = (relevance * mean + posterior.T @ x) / (relevance + count)
+        second = (relevance * (variance + mean * mean) + posterior.T @ (x * x)) / (relevance + count)
+        weights = relevance * len(weight) * weight + count[:, 0]
+        with np.errstate(divide="ignore"):
+            self.log_weights[density] = np.log(weights / weights.sum())
+        self.means[density] = new_mean
+        self.variances[density] = np.maximum(second - new_mean * new_mean, variance / 4)
+
+    def _responsibilities(
+        self, density: int, x: NDArray[np.float32], share: NDArray[np.float32]
+    ) -> NDArray[np.float32]:
+        components = self.log_components(x, np.array([density]))[:, 0]
+        components -= components.max(axis=1, keepdims=True)
+        posterior = np.exp(components)
+        posterior *= (share / posterior.sum(axis=1))[:, None]
+        return posterior
+
+    def copy(self) -> Mixtures:
+        """Return the same mixtures in arrays of their own."""
+        return replace(
+            self, log_weights=self.log_weights.copy(), means=self.means.copy(), variances=self.variances.copy()
+        )
+
+
+def single_gaussian(x: NDArray[np.float32], count: int) -> Mixtures:
+    """Return ``count`` equal single Gaussians with the mean and variance of ``x`` (the flat start)."""
+    mean, variance = x.mean(axis=0), np.maximum(x.var(axis=0), 1e-4)
+    return Mixtures(
+        np.zeros((count, 1), np.float32),
+        np.tile(mean, (count, 1, 1)).astype(np.float32),
+        np.tile(variance, (count, 1, 1)).astype(np.float32),
+    )

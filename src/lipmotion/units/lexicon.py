@@ -1,0 +1,126 @@
+"""Words to phones: a user's file, then the dictionary inside pocketsphinx's package, then spelling rules."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+
+from lipmotion.errors import InputError, MissingDependencyError
+from lipmotion.units.phones import PHONES, is_silent
+from lipmotion.units.spelling import guess
+
+Pronunciation = tuple[str, ...]
+
+REDUCED = {"ah": "ax", "er": "axr", "ih": "ix"}
+"""What the unstressed forms of these ARPAbet vowels are called in the inventory."""
+FULL_VOWELS = frozenset("aa ae ao aw ay eh ey iy ow oy uh uw".split())
+WEAK_WORDS = frozenset("a an the of and from was but than that's her were your for if in is it its".split())
+"""Words of one syllable that are unstressed in running speech."""
+
+
+@dataclass(frozen=True)
+class Lexicon:
+    """Pronunciations of words.
+
+    user : words of the user's own, ahead of the dictionary
+    """
+
+    user: dict[str, tuple[Pronunciation, ...]] = field(default_factory=dict)
+
+    @classmethod
+    def from_file(cls, path: Path) -> Lexicon:
+        """Read ``word PHONE PHONE ...`` lines, one pronunciation a line; ``#`` starts a comment.
+
+        Phones are ARPAbet in either case, with or without stress digits, or the project's own names.
+        Raises InputError: no such file, not UTF-8, no phones after a word, or an unknown phone (with its line).
+        """
+        user: dict[str, tuple[Pronunciation, ...]] = {}
+        for number, line in enumerate(_lines(path), start=1):
+            word, *phones = line.split("#")[0].split() or [""]
+            if not word:
+                continue
+            word = re.sub(r"\(\d+\)$", "", word.lower())
+            user[word] = (*user.get(word, ()), _user_phones(phones, f"{path}, line {number}"))
+        return cls(user)
+
+    def known(self, word: str) -> bool:
+        """Whether the word is in the user's file or in the dictionary."""
+        return word in self.user or bool(_dictionary_entries(word))
+
+    def pronunciations(self, word: str) -> tuple[Pronunciation, ...]:
+        """Return every pronunciation of a lower-case word; of an unknown one, the spelling rules' guess."""
+        if word in self.user:
+            return self.user[word]
+        entries = _dictionary_entries(word)
+        variants = [_with_reduced_vowels(word, entry) for entry in entries]
+        return tuple(dict.fromkeys(variants)) or (_with_reduced_vowels(word, guess(word)),)
+
+
+def _lines(path: Path) -> list[str]:
+    try:
+        return path.read_text(encoding="utf-8-sig").splitlines()
+    except FileNotFoundError as error:
+        raise InputError(f"{path}: no such lexicon file") from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: not a readable UTF-8 lexicon ({error}); one word and its phones a line") from error
+
+
+def _user_phones(phones: list[str], where: str) -> Pronunciation:
+    if not phones:
+        raise InputError(f"{where}: a word without phones; write the word, then its phones")
+    result = []
+    for phone in phones:
+        name = re.sub(r"\d$", "", phone.lower())
+        name = REDUCED.get(name, name) if phone.endswith("0") else name
+        if name not in PHONES or is_silent(name):
+            raise InputError(f"{where}: unknown phone {phone!r}; the phones are: {' '.join(PHONES)}")
+        result.append(name)
+    return tuple(result)
+
+
+@cache
+def _dictionary() -> bytes:
+    spec = find_spec("pocketsphinx")  # its data file is read, the package itself is not imported
+    if spec is None or not spec.submodule_search_locations:
+        raise MissingDependencyError("the pronunciation dictionary comes with pocketsphinx: pip install pocketsphinx")
+    folder = Path(spec.submodule_search_locations[0])
+    return b"\n" + (folder / "model" / "en-us" / "cmudict-en-us.dict").read_bytes()
+
+
+@cache
+def _dictionary_entries(word: str) -> tuple[Pronunciation, ...]:
+    """Search the sorted text itself: faster than reading 134,000 lines for one sentence."""
+    text, entries = _dictionary(), []
+    for variant in range(1, 10):
+        key = f"\n{word} " if variant == 1 else f"\n{word}({variant}) "
+        start = text.find(key.encode())
+        if start < 0:
+            break
+        line = text[start + len(key.encode()) : text.index(b"\n", start + 1)].decode()
+        entries.append(tuple(line.lower().split()))
+    return tuple(entries)
+
+
+def _with_reduced_vowels(word: str, phones: Pronunciation) -> Pronunciation:
+    """Mark the unstressed AH, ER and IH. The dictionary has no stress, so a rule decides.
+
+    A word of one syllable keeps its vowel unless it is a weak word. In a longer word these three are
+    unstressed, but for the first vowel when it follows a consonant and no full vowel (see FULL_VOWELS)
+    precedes the last syllable's: ``b ah t axr`` but ``ax b aw t``.
+    """
+    vowels = [i for i, phone in enumerate(phones) if phone in FULL_VOWELS or phone in REDUCED]
+    stressed = set() if word in WEAK_WORDS else {_stressed_vowel(phones, vowels)}
+    return tuple(REDUCED.get(p, p) if i not in stressed else p for i, p in enumerate(phones))
+
+
+def _stressed_vowel(phones: Pronunciation, vowels: list[int]) -> int:
+    """Return the index of the vowel that is taken as stressed, -1 where there is none."""
+    if not vowels:
+        return -1
+    first = vowels[0]
+    if len(vowels) == 1 or phones[first] in FULL_VOWELS or first > 0:
+        return first
+    return next((i for i in vowels if phones[i] in FULL_VOWELS), vowels[1])

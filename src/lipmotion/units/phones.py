@@ -1,0 +1,83 @@
+"""The one phone inventory: the 47 of Xie & Liu 2007, Table 1."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+from lipmotion.units.visemes import VISEME_OF, VISEMES
+
+SILENCE = "sil"
+PAUSE = "sp"
+"""A pause between words too short to be silence."""
+
+PHONES: tuple[str, ...] = tuple(sorted(VISEME_OF))
+
+RELATIVES: dict[str, tuple[str, ...]] = {
+    # A phone that a corpus never says borrows the sound of the first of these that it does say.
+    "aa": ("ao", "ah"),
+    "ae": ("eh", "aa"),
+    "ah": ("ax", "aa"),
+    "ao": ("aa", "ow"),
+    "aw": ("aa", "ow"),
+    "ax": ("ah", "ix", "ih"),
+    "axr": ("er", "r", "ax"),
+    "ay": ("aa", "ey"),
+    "b": ("p", "m", "d"),
+    "ch": ("jh", "sh", "t"),
+    "d": ("t", "dh", "n"),
+    "dh": ("th", "v", "d"),
+    "eh": ("ae", "ih"),
+    "el": ("l", "ow"),
+    "em": ("m", "ax"),
+    "en": ("n", "ax"),
+    "er": ("axr", "r", "ax"),
+    "ey": ("eh", "iy"),
+    "f": ("v", "th", "s"),
+    "g": ("k", "d"),
+    "hh": ("th", "f", "k"),
+    "ih": ("ix", "iy", "eh"),
+    "ix": ("ih", "ax"),
+    "iy": ("ih", "ey"),
+    "jh": ("ch", "zh", "d"),
+    "k": ("g", "t"),
+    "l": ("el", "ow", "w"),
+    "m": ("n", "em"),
+    "n": ("m", "en"),
+    "ng": ("n", "m"),
+    "ow": ("ao", "uh", "uw"),
+    "oy": ("ao", "ow"),
+    "p": ("b", "t"),
+    "r": ("axr", "er", "w"),
+    "s": ("z", "sh", "f"),
+    "sh": ("ch", "s"),
+    "t": ("d", "k"),
+    "th": ("f", "dh", "s"),
+    "uh": ("uw", "ax", "ow"),
+    "uw": ("uh", "ow"),
+    "v": ("f", "dh", "b"),
+    "w": ("uw", "l", "r"),
+    "y": ("iy", "ih"),
+    "z": ("s", "zh"),
+    "zh": ("jh", "sh", "z"),
+    "sil": ("sp",),
+    "sp": ("sil",),
+}
+
+
+def is_silent(phone: str) -> bool:
+    """Whether nothing is spoken in this phone."""
+    return phone in (SILENCE, PAUSE)
+
+
+def stand_in(phone: str, known: Collection[str]) -> str:
+    """Return the phone itself if known, else the known phone that sounds most like it.
+
+    First its relatives, then the relatives of those, then its viseme class, then any.
+    """
+    queue = [phone]
+    for candidate in queue:
+        if candidate in known:
+            return candidate
+        queue += [relative for relative in RELATIVES[candidate] if relative not in queue]
+    alike = [other for other in VISEMES[VISEME_OF[phone]] if other in known]
+    return alike[0] if alike else min(known)

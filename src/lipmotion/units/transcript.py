@@ -1,0 +1,43 @@
+"""Text as people write it to the words that are spoken."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+
+from lipmotion.errors import InputError
+
+ONES = (
+    "zero one two three four five six seven eight nine ten eleven twelve thirteen fourteen fifteen sixteen "
+    "seventeen eighteen nineteen"
+).split()
+TENS = "_ _ twenty thirty forty fifty sixty seventy eighty ninety".split()
+SCALES = ((10**9, "billion"), (10**6, "million"), (1000, "thousand"), (100, "hundred"))
+
+
+def words_of(text: str) -> tuple[str, ...]:
+    """Return the lower-case words of a text: punctuation dropped, hyphens split, whole numbers spelled out.
+
+    Raises InputError: there is no word in it.
+    """
+    plain = unicodedata.normalize("NFKC", text).lower().replace("’", "'")
+    words: list[str] = []
+    for token in re.findall(r"[^\W\d_]+(?:'[^\W\d_]+)*'?|\d+", re.sub(r"(?<=\d),(?=\d{3})", "", plain)):
+        words += number_words(token) if token.isdecimal() else [token]
+    if not words:
+        raise InputError(f"the transcript {text[:40]!r} holds no word; give the words that are spoken")
+    return tuple(words)
+
+
+def number_words(digits: str) -> list[str]:
+    """Return the words of a whole number; past a trillion, or with leading zeros, digit by digit."""
+    number = int(digits)
+    if number >= 10**12 or (len(digits) > 1 and digits[0] == "0"):
+        return [ONES[int(digit)] for digit in digits]
+    if number < 20:
+        return [ONES[number]]
+    if number < 100:
+        return [TENS[number // 10], *([ONES[number % 10]] if number % 10 else [])]
+    scale, name = next((scale, name) for scale, name in SCALES if number >= scale)
+    rest = number_words(str(number % scale)) if number % scale else []
+    return [*number_words(str(number // scale)), name, *rest]

@@ -1,0 +1,77 @@
+"""MediaPipe's face mesh, one instance a clip, silent."""
+
+from __future__ import annotations
+
+import os
+import sys
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.vision.landmarks import TRACKED_POINTS
+from lipmotion.vision.packages import import_face_mesh
+
+
+class FaceMesh:
+    """Finds the face in the frames of one clip, in order; it follows the face from frame to frame.
+
+    Use it as a context manager. Raises MissingDependencyError: MediaPipe is not installed.
+    """
+
+    def __init__(self) -> None:
+        self._module = import_face_mesh()
+        self._mesh: Any = None
+
+    def __enter__(self) -> FaceMesh:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._mesh is not None:
+            self._mesh.close()
+
+    def points(self, image: NDArray[np.uint8]) -> NDArray[np.float64] | None:
+        """Return the points of one frame, or None where there is no face.
+
+        image : uint8 array [shape=(H, W, 3)], RGB
+        Returns array [shape=(len(TRACKED_POINTS), 3)], px, x to the right, y down, z away from the camera.
+        """
+        faces = self._process(image).multi_face_landmarks
+        if not faces:
+            return None
+        landmarks = faces[0].landmark
+        height, width = image.shape[:2]
+        kept = (landmarks[index] for index in TRACKED_POINTS)
+        return np.array([(point.x, point.y, point.z) for point in kept]) * (width, height, width)
+
+    def _process(self, image: NDArray[np.uint8]) -> Any:
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", "SymbolDatabase.GetPrototype", UserWarning)
+            if self._mesh is not None:
+                return self._mesh.process(image)
+            with quiet_stderr():  # the graph logs while it starts, up to its first result
+                self._mesh = self._module.FaceMesh(max_num_faces=1, refine_landmarks=True)
+                return self._mesh.process(image)
+
+
+@contextmanager
+def quiet_stderr() -> Iterator[None]:
+    """Drop what native code writes to stderr: MediaPipe logs before its log level can be set."""
+    try:
+        saved = os.dup(2)
+    except OSError:  # the process has no stderr
+        yield
+        return
+    try:
+        if sys.stderr is not None:
+            sys.stderr.flush()
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, 2)
+        os.close(nowhere)
+        yield
+    finally:
+        os.dup2(saved, 2)
+        os.close(saved)

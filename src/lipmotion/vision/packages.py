@@ -1,0 +1,45 @@
+"""The optional packages of face tracking, imported when they are first needed."""
+
+from __future__ import annotations
+
+import os
+from importlib import metadata
+from typing import Any
+
+from lipmotion.errors import MissingDependencyError
+
+
+def import_opencv() -> Any:
+    """Return the module ``cv2``. Raises MissingDependencyError."""
+    try:
+        import cv2
+    except ImportError as error:
+        raise _missing("OpenCV", error) from error
+    return cv2
+
+
+def import_face_mesh() -> Any:
+    """Return MediaPipe's module ``face_mesh``, its log lowered. Raises MissingDependencyError."""
+    os.environ.setdefault("GLOG_minloglevel", "2")
+    os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")
+    try:
+        from mediapipe.python.solutions import face_mesh
+    except ImportError as error:
+        raise _missing("MediaPipe", error) from error
+    return face_mesh
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of the packages that a track depends on. Raises MissingDependencyError."""
+    try:
+        mediapipe = metadata.version("mediapipe")
+    except metadata.PackageNotFoundError as error:
+        raise _missing("MediaPipe", error) from error
+    return {"mediapipe": mediapipe, "opencv": str(import_opencv().__version__), "av": metadata.version("av")}
+
+
+def _missing(package: str, error: ImportError) -> MissingDependencyError:
+    return MissingDependencyError(
+        f"face tracking needs {package}, which cannot be imported ({error}); "
+        'pip install "lipmotion[video]" with Python 3.10 to 3.12 (MediaPipe needs Python < 3.13)'
+    )

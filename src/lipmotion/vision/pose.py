@@ -1,0 +1,80 @@
+"""Head motion removed: every frame laid on the clip's own mean face."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.vision.landmarks import EYE_CORNERS, FOREHEAD, FOREHEAD_SLOPE_DEG, NASION, RIGID_POINTS
+
+Array = NDArray[np.float64]
+
+ROUNDS = 3
+"""Rounds of aligning to the mean and taking the mean again. On GRID the second moves points by up to 4e-6 eye
+distances, the third by less than 1e-9."""
+
+
+def head_frame(points: Array, layout: Sequence[int]) -> Array:
+    """Return the points without the motion of the head.
+
+    points : array [shape=(T, N, 3)], any unit, x to the speaker's left, y up, z out of the face
+    layout : the face-mesh index of each of the N points; holds all of RIGID_POINTS
+    Returns array [shape=(T, N, 3)]: origin between the outer eye corners of the mean face, unit their distance,
+    x to the speaker's left, y up, z out of the face.
+    Every frame is turned, moved and scaled as a whole, so speech is left as it was.
+    Source: Umeyama 1991 (one frame), Gower 1975 (the mean face).
+    Cost: O(T·N), T singular value decompositions of 3 × 3.
+    """
+    column = {index: n for n, index in enumerate(layout)}
+    rigid = points[:, [column[index] for index in RIGID_POINTS]]
+    face = _mean_face(rigid)
+    turn, scale, shift = similarity(rigid, face)
+    axes, origin, unit = _head_axes(face)
+    turn, shift = axes @ turn, (shift - origin) @ axes.T
+    moved: Array = (scale[:, None, None] * (points @ turn.transpose(0, 2, 1)) + shift[:, None, :]) / unit
+    return moved
+
+
+def similarity(points: Array, target: Array) -> tuple[Array, Array, Array]:
+    """Return the rotations, scales and shifts that bring each frame closest to one shape.
+
+    points : array [shape=(T, K, 3)]
+    target : array [shape=(K, 3)]
+    Returns R [shape=(T, 3, 3)], s [shape=(T,), > 0], t [shape=(T, 3)]: least squares of s·R·x + t − target.
+    Source: Umeyama 1991, Eqs. 40–42 (no reflections).
+    """
+    mean, target_mean = points.mean(axis=1), target.mean(axis=0)
+    centred, goal = points - mean[:, None, :], target - target_mean
+    left, singular, right = np.linalg.svd(goal.T @ centred)
+    sign = np.ones_like(singular)
+    sign[:, 2] = np.sign(np.linalg.det(left @ right))
+    turn = (left * sign[:, None, :]) @ right
+    scale = (singular * sign).sum(axis=1) / np.square(centred).sum(axis=(1, 2))
+    shift = target_mean - scale[:, None] * (turn @ mean[:, :, None])[:, :, 0]
+    return turn, scale, shift
+
+
+def _mean_face(rigid: Array) -> Array:
+    face = rigid[0] - rigid[0].mean(axis=0)
+    size = np.linalg.norm(face)
+    for _ in range(ROUNDS):
+        turn, scale, shift = similarity(rigid, face)
+        face = (scale[:, None, None] * (rigid @ turn.transpose(0, 2, 1)) + shift[:, None, :]).mean(axis=0)
+        face *= size / np.linalg.norm(face)  # without this the mean shrinks from round to round
+    return face
+
+
+def _head_axes(face: Array) -> tuple[Array, Array, float]:
+    """Return the head's axes as rows [shape=(3, 3)], the origin [shape=(3,)] and the unit, from its rigid points."""
+    right_eye, left_eye, forehead, nasion = (
+        face[RIGID_POINTS.index(index)] for index in (*EYE_CORNERS, FOREHEAD, NASION)
+    )
+    unit = float(np.linalg.norm(left_eye - right_eye))
+    x = (left_eye - right_eye) / unit
+    up = forehead - nasion - ((forehead - nasion) @ x) * x
+    up /= np.linalg.norm(up)
+    slope = np.deg2rad(FOREHEAD_SLOPE_DEG)
+    y = np.cos(slope) * up + np.sin(slope) * np.cross(x, up)
+    return np.stack([x, y, np.cross(x, y)]), (left_eye + right_eye) / 2, unit

@@ -1,0 +1,94 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from lipmotion.corpora.discover import discover
+from lipmotion.corpora.folder import transcript_words
+from lipmotion.errors import CorpusError, InputError
+
+
+def touch(folder: Path, *names: str) -> None:
+    for name in names:
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).touch()
+
+
+def test_videos_of_any_kind_are_found(tmp_path):
+    touch(tmp_path, "b.MP4", "a.mov", "day 1/c.webm", "notes.pdf", "speech.wav", ".cache/d.mp4", ".part-e.mkv")
+    found = discover(tmp_path)
+    assert found.kind == "folder of videos"
+    assert [item.name for item in found.items] == ["a", "b", "day 1-c"]
+    assert [item.words for item in found.items] == [None, None, None]
+    assert {item.split for item in found.items} == {"train"}
+
+
+def test_transcripts_lie_beside_the_videos(tmp_path):
+    touch(tmp_path, "a.mp4", "sub/b.mp4", "c.mp4")
+    (tmp_path / "a.txt").write_text("﻿Hello, World! It’s 3 o'clock — naïve.\n", encoding="utf-8")
+    (tmp_path / "sub" / "b.txt").write_text("Nothing.\n")
+    (tmp_path / "c.txt").write_text("\n")
+    words = {item.name: item.words for item in discover(tmp_path).items}
+    assert words == {"a": ("hello", "world", "it's", "3", "o'clock", "naïve"), "sub-b": ("nothing",), "c": None}
+
+
+def test_words():
+    assert transcript_words('\'Tis well-known; "YES"!') == ("tis", "well", "known", "yes")
+    assert transcript_words("...") == ()
+
+
+def test_a_transcript_in_another_encoding_is_reported(tmp_path):
+    touch(tmp_path, "a.mp4", "b.mp4")
+    (tmp_path / "a.txt").write_bytes("naïve".encode("latin-1"))
+    found = discover(tmp_path)
+    assert [item.name for item in found.items] == ["b"]
+    assert "is not UTF-8 text" in found.problems["a"]
+
+
+def test_videos_of_the_same_name_are_reported(tmp_path):
+    touch(tmp_path, "a.mp4", "a.mkv", "b.mp4")
+    found = discover(tmp_path)
+    assert [item.name for item in found.items] == ["b"]
+    assert "2 videos share this name" in found.problems["a"]
+
+
+def test_lists_give_the_splits_and_are_not_transcripts(tmp_path):
+    touch(tmp_path, "a.mp4", "test.mp4", "sub/b.mp4")
+    (tmp_path / "test.txt").write_text("test\n\nsub/b\n")
+    items = {item.name: item for item in discover(tmp_path).items}
+    assert {name: item.split for name, item in items.items()} == {"a": "train", "test": "test", "sub-b": "test"}
+    assert items["test"].words is None
+
+
+def test_recordings_outside_of_the_lists_are_left_out(tmp_path):
+    touch(tmp_path, "a.mp4", "b.mp4", "c.mp4")
+    (tmp_path / "train.txt").write_text("a\n")
+    (tmp_path / "val.txt").write_text("b\nlost\n")
+    found = discover(tmp_path)
+    assert {item.name: item.split for item in found.items} == {"a": "train", "b": "val"}
+    assert "in none of the lists" in found.problems["c"]
+    assert found.problems["lost"] == "listed in val.txt, but there is no such recording"
+
+
+def test_a_name_in_two_lists_is_refused(tmp_path):
+    touch(tmp_path, "a.mp4")
+    (tmp_path / "train.txt").write_text("a\n")
+    (tmp_path / "test.txt").write_text("a\n")
+    with pytest.raises(CorpusError, match=r"a is in train\.txt and in test\.txt"):
+        discover(tmp_path)
+
+
+def test_an_unreadable_list_is_refused(tmp_path):
+    touch(tmp_path, "a.mp4")
+    (tmp_path / "train.txt").write_bytes(b"\xff\xfe\x00a")
+    with pytest.raises(CorpusError, match="one name a line"):
+        discover(tmp_path)
+
+
+def test_nothing_to_find(tmp_path):
+    with pytest.raises(InputError, match="no such folder"):
+        discover(tmp_path / "none")
+    touch(tmp_path, "speech.wav")
+    with pytest.raises(CorpusError, match=r"no videos in it; required: files ending in one of .*\.mp4"):
+        discover(tmp_path)

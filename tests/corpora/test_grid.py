@@ -1,0 +1,87 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from lipmotion.corpora.discover import discover
+from lipmotion.corpora.grid import aligned_words, read_grid, sentence
+from lipmotion.errors import InputError
+
+
+@pytest.fixture
+def grid(tmp_path: Path) -> Path:
+    for folder in ("clips", "align"):
+        (tmp_path / folder).mkdir()
+    for name in ("brwa3s", "swiz9n", "lgazzp"):
+        (tmp_path / "clips" / f"{name}.mkv").touch()
+    (tmp_path / "align" / "brwa3s.align").write_text("0 15750 sil\n15750 21500 bin\n21500 22000 sp\n22000 30000 RED\n")
+    return tmp_path
+
+
+def test_file_names_spell_sentences():
+    assert sentence("brwa3s") == ("bin", "red", "with", "a", "three", "soon")
+    assert sentence("swiz9n") == ("set", "white", "in", "z", "nine", "now")
+    assert sentence("lgazzp") == ("lay", "green", "at", "z", "zero", "please")
+    assert sentence("pbbc1a") == ("place", "blue", "by", "c", "one", "again")
+
+
+@pytest.mark.parametrize("name", ["brwa3", "brww3s", "brwa0s", "xrwa3s", "brwa3s2", "BRWA3S", ""])
+def test_other_names_do_not(name):
+    assert sentence(name) is None
+
+
+def test_reads_the_layout(grid):
+    found = discover(grid)
+    assert found.kind == "GRID corpus"
+    assert [item.name for item in found.items] == ["brwa3s", "lgazzp", "swiz9n"]
+    assert found.items[0].words == ("bin", "red")  # what was said, not what the name spells
+    assert found.items[1].words == ("lay", "green", "at", "z", "zero", "please")
+    assert found.items[0].video == grid / "clips" / "brwa3s.mkv"
+    assert {item.split for item in found.items} == {"train"}
+    assert found.items[0].rights["attribution"].startswith("GRID corpus (Cooke, Barker, Cunningham, Shao 2006)")
+    assert found.problems == {}
+
+
+def test_videos_and_times_directly_in_the_folder(tmp_path):
+    for name in ("brbk7n.mpg", "swwp2s.mpg"):
+        (tmp_path / name).touch()
+    (tmp_path / "swwp2s.align").write_text("0 9000 sil\n9000 20000 set\n")
+    found = discover(tmp_path)
+    assert found.kind == "GRID corpus"
+    assert found.items[1].words == ("set",)
+
+
+def test_bad_word_times_are_reported_and_the_rest_is_read(grid):
+    (grid / "align" / "swiz9n.align").write_text("0 100 set\n100 two white\n")
+    (grid / "align" / "lgazzp.align").write_text("0 74500 sil\n")
+    found = discover(grid)
+    assert [item.name for item in found.items] == ["brwa3s"]
+    assert "line 2 is '100 two white'; required: start end word" in found.problems["swiz9n"]
+    assert "holds no word" in found.problems["lgazzp"]
+
+
+def test_a_missing_word_time_file(tmp_path):
+    (tmp_path / "x.align").write_text("")
+    with pytest.raises(InputError, match="holds no word"):
+        aligned_words(tmp_path / "x.align")
+
+
+def test_other_videos_are_not_grid(tmp_path):
+    (tmp_path / "holiday.mp4").touch()
+    assert read_grid(tmp_path) is None
+    assert discover(tmp_path).kind == "folder of videos"
+
+
+@pytest.mark.recordings
+def test_the_real_thing():
+    folder = Path(__file__).parents[2].parent / "shared" / "corpora" / "grid-s1"
+    if not folder.is_dir():
+        pytest.skip("the real recordings are not here")
+    found = discover(folder)
+    assert found.kind == "GRID corpus"
+    assert found.problems == {}
+    splits = [item.split for item in found.items]
+    assert {split: splits.count(split) for split in splits} == {"train": 452, "val": 22, "test": 50}
+    assert sum(item.words == sentence(item.name) for item in found.items) >= 520
+    assert all(item.words is not None and len(item.words) == 6 for item in found.items)

@@ -1,0 +1,203 @@
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lipmotion.corpora.entry import quantised, read_entry
+from lipmotion.corpora.store import Corpus
+from lipmotion.errors import CorpusError, ExportError, InputError
+from lipmotion.types import Audio, Channel, Features, Motion, Track, Utterance
+
+
+def utterance(name: str = "one", split: str = "train", crops: bool = True) -> Utterance:
+    rng = np.random.default_rng(len(name))
+    audio = quantised(Audio(rng.uniform(-1, 1, 16_000).astype(np.float32), 16_000))
+    motion = Motion(rng.normal(size=(25, 2)), 25.0, (Channel("opening"), Channel("jaw", "degrees")))
+    images = rng.integers(0, 256, (25, 56, 72, 3)).astype(np.uint8) if crops else None
+    return Utterance(
+        name=name,
+        audio=audio,
+        features=Features(rng.normal(size=(101, 39)).astype(np.float32), audio.duration_s),
+        track=Track(motion, np.arange(25) > 2, images),
+        words=("bin", "näh") if crops else None,
+        split=split,
+        source={"file": f"{name}.mp4"},
+    )
+
+
+@pytest.fixture
+def corpus(tmp_path: Path) -> Corpus:
+    corpus = Corpus.create(tmp_path / "corpus")
+    for name, split in (("two", "train"), ("one", "train"), ("three", "test")):
+        corpus.add(utterance(name, split))
+    return corpus
+
+
+@pytest.mark.parametrize("crops", [True, False])
+def test_an_utterance_survives_the_round_trip(tmp_path, crops):
+    given = utterance(crops=crops)
+    Corpus.create(tmp_path / "corpus").add(given)
+    found = Corpus.open(tmp_path / "corpus").utterance("one")
+    np.testing.assert_array_equal(found.audio.samples, given.audio.samples)
+    np.testing.assert_array_equal(found.features.values, given.features.values)
+    np.testing.assert_array_equal(found.track.motion.values, given.track.motion.values.astype(np.float32))
+    np.testing.assert_array_equal(found.track.seen, given.track.seen)
+    assert (found.track.crops is None) == (given.track.crops is None)
+    if given.track.crops is not None:
+        np.testing.assert_array_equal(found.track.crops, given.track.crops)
+    assert found.track.motion.channels == given.track.motion.channels
+    assert found.track.motion.rate_hz == given.track.motion.rate_hz
+    assert found.features.duration_s == given.features.duration_s
+    for name in ("name", "words", "split", "source"):
+        assert getattr(found, name) == getattr(given, name)
+
+
+def test_large_arrays_stay_on_disk(corpus):
+    found = corpus.utterance("one")
+    assert isinstance(found.track.crops, np.memmap)
+    assert isinstance(found.features.values, np.memmap)
+    assert not found.features.values.flags.writeable
+
+
+def test_sixteen_bit_sound_is_kept_exactly():
+    samples = np.array([-32768, -1, 0, 1, 32767], np.float32) / 32768
+    np.testing.assert_array_equal(quantised(Audio(samples, 16_000)).samples, samples)
+    np.testing.assert_array_equal(quantised(Audio(np.float32([1.0, -1.5]), 16_000)).samples, [32767 / 32768, -1])
+
+
+def test_names_and_splits(corpus):
+    for each in (corpus, Corpus.open(corpus.path)):
+        assert len(each) == 3
+        assert each.names() == ("one", "three", "two")
+        assert each.names("train") == ("one", "two")
+        assert each.names("val") == ()
+        assert each.splits == {"train": 2, "val": 0, "test": 1}
+
+
+def test_an_utterance_is_replaced(corpus):
+    corpus.add(replace(utterance("two", "val"), words=("new",)))
+    assert Corpus.open(corpus.path).utterance("two").words == ("new",)
+    assert Corpus.open(corpus.path).splits == {"train": 1, "val": 1, "test": 1}
+
+
+def test_the_bytes_do_not_depend_on_the_order(corpus, tmp_path):
+    other = Corpus.create(tmp_path / "other")
+    for name, split in (("three", "test"), ("one", "train"), ("two", "train")):
+        other.add(utterance(name, split))
+    files = [path.relative_to(corpus.path) for path in sorted(corpus.path.rglob("*")) if path.is_file()]
+    assert files == [path.relative_to(other.path) for path in sorted(other.path.rglob("*")) if path.is_file()]
+    for path in files:
+        assert (corpus.path / path).read_bytes() == (other.path / path).read_bytes()
+
+
+def test_no_path_of_this_machine_is_kept(corpus):
+    for path in corpus.path.rglob("*.json"):
+        assert str(corpus.path.parent) not in path.read_text()
+
+
+def test_creating_again_keeps_what_is_there(corpus):
+    assert Corpus.create(corpus.path).names() == ("one", "three", "two")
+
+
+def test_leftovers_of_a_killed_run_are_removed(corpus):
+    (corpus.path / ".part-0-corpus.json").touch()
+    (corpus.path / "utterances" / ".part-1-four").mkdir()
+    again = Corpus.create(corpus.path)
+    again.refresh()
+    assert len(again) == 3
+    assert not list(corpus.path.rglob(".part-*"))
+
+
+def test_utterances_written_by_others_are_found(corpus):
+    manifest = corpus.path / "corpus.json"
+    whole = manifest.read_bytes()
+    content = json.loads(whole)
+    del content["utterances"]["two"]
+    manifest.write_text(json.dumps(content))
+    again = Corpus.create(corpus.path)
+    again.refresh()
+    assert manifest.read_bytes() == whole
+
+
+def test_something_else_is_not_overwritten(tmp_path):
+    (tmp_path / "letter.txt").write_text("dear")
+    with pytest.raises(CorpusError, match="is not a corpus; give a new or an empty folder"):
+        Corpus.create(tmp_path)
+    with pytest.raises(CorpusError, match="is not a corpus"):
+        Corpus.create(tmp_path / "letter.txt")
+
+
+def test_a_folder_that_cannot_be_made(tmp_path):
+    (tmp_path / "file").touch()
+    with pytest.raises(ExportError, match="cannot be created"):
+        Corpus.create(tmp_path / "file" / "corpus")
+
+
+@pytest.mark.parametrize("name", ["../two", "a/b", ".hidden", "", ".."])
+def test_names_must_be_those_of_folders(corpus, name):
+    with pytest.raises(InputError, match="cannot be named"):
+        corpus.add(replace(utterance(), name=name))
+
+
+def test_a_missing_corpus(tmp_path):
+    with pytest.raises(CorpusError, match="no such corpus; make one: lipmotion prepare"):
+        Corpus.open(tmp_path / "none")
+
+
+@pytest.mark.parametrize("content", [None, "", "[]", "{}", '{"format": "lipmotion.motion", "version": 1}'])
+def test_not_a_corpus(tmp_path, content):
+    if content is not None:
+        (tmp_path / "corpus.json").write_text(content)
+    with pytest.raises(CorpusError, match="give a prepared corpus"):
+        Corpus.open(tmp_path)
+
+
+def test_a_newer_version(corpus):
+    manifest = corpus.path / "corpus.json"
+    manifest.write_text(manifest.read_text().replace('"version": 1', '"version": 2'))
+    with pytest.raises(CorpusError, match="corpus version 2, this lipmotion reads version 1; upgrade lipmotion"):
+        Corpus.open(corpus.path)
+
+
+def test_an_unknown_utterance(corpus):
+    with pytest.raises(CorpusError, match="no utterance 'four' among 3"):
+        corpus.utterance("four")
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda folder: (folder / "motion.npy").unlink(),
+        lambda folder: (folder / "seen.npy").write_bytes(b""),
+        lambda folder: (folder / "features.npy").write_bytes((folder / "features.npy").read_bytes()[:200]),
+        lambda folder: (folder / "entry.json").write_text("{"),
+        lambda folder: (folder / "entry.json").write_text('{"name": "one"}'),
+    ],
+)
+def test_a_damaged_utterance(corpus, damage):
+    damage(corpus.folder("one"))
+    with pytest.raises(CorpusError, match=r"one: not a whole utterance .* prepare again"):
+        corpus.utterance("one")
+
+
+def test_settings_are_kept(tmp_path):
+    corpus = Corpus.create(tmp_path / "corpus")
+    corpus.add(utterance(), {"crops": "yes"})
+    entry = read_entry(corpus.folder("one"))
+    assert entry["settings"] == {"crops": "yes"}
+    assert entry["unseen_frames"] == 3
+
+
+def test_reading_needs_no_video_packages(corpus):
+    code = (
+        "import sys; sys.modules['cv2'] = sys.modules['mediapipe'] = sys.modules['av'] = None; "
+        "from pathlib import Path; from lipmotion.corpora.store import Corpus; "
+        f"Corpus.open(Path({str(corpus.path)!r})).utterance('one').track.crops.sum()"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)

@@ -1,0 +1,39 @@
+import numpy as np
+import pytest
+
+from lipmotion.faces.character.outlines import STEPS, closed, corners, ellipse, lowered, opened, stroke, symmetric
+
+PATH = "0 0, 1 0.5, 2 -0.5, 3 0"
+
+
+def test_curves_go_through_their_points():
+    assert opened(PATH)[::STEPS] == pytest.approx(corners(PATH))
+    assert closed(PATH)[::STEPS] == pytest.approx(corners(PATH))
+
+
+def test_curves_are_smooth():
+    steps = np.diff(closed("0 0, 1 0, 1 1, 0 1"), axis=0)
+    turns = np.abs(np.diff(np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))))
+    assert turns.max() < 0.3
+
+
+def test_a_straight_path_stays_straight():
+    line = opened([(0.0, 0.0), (1.0, 1.0), (2.0, 2.0)])
+    assert line[:, 0] == pytest.approx(line[:, 1])
+
+
+def test_symmetric_outlines_mirror_themselves():
+    outline = symmetric("0 -1, 1 0, 0.5 0.5, 0 1")
+    mirrored = outline * (-1, 1)
+    away = np.abs(outline[:, None] - mirrored[None]).sum(axis=2).min(axis=1)
+    assert away.max() < 1e-9
+
+
+def test_a_stroke_is_as_wide_as_asked():
+    outline = stroke(opened("0 0, 1 0, 2 0"), [0.2, 0.4])
+    assert outline[0, 1] - outline[-1, 1] == pytest.approx(0.2)
+    assert np.ptp(outline[:, 1]) == pytest.approx(0.4)
+
+
+def test_lowered_is_further_down():
+    assert lowered(ellipse(0, 0, 1, 2), 0.5).mean(axis=0) == pytest.approx([0, 0.5])

@@ -1,0 +1,60 @@
+"""The drawn face, seen by a face tracker that knows nothing of it, moves as it was told to."""
+
+import numpy as np
+import pytest
+
+from lipmotion.faces.character import render
+from lipmotion.types import Channel, Motion, Span, Timeline, Unit
+
+pytestmark = pytest.mark.video
+mediapipe = pytest.importorskip("mediapipe")
+
+INNER_LIPS, CORNERS, OUTER_LIPS, EYES = (13, 14), (61, 291), (0, 17), (33, 263)
+
+
+def syllables() -> tuple[Motion, Timeline[Unit]]:
+    """Three seconds: silence, then syllables of different openings and widths that begin with closed lips."""
+    time_s = np.arange(301) / 100
+    said = (time_s > 0.4) & (time_s < 2.6)
+    number = ((time_s - 0.4) / 0.2).astype(int) % 4
+    sizes, widths = np.array([0.08, 0.16, 0.05, 0.22])[number], np.array([0.03, 0.0, -0.06, -0.02])[number]
+    beat = np.where(said, np.sin(np.pi * ((time_s - 0.4) % 0.2) / 0.2) ** 2, 0)
+    opening = sizes * beat
+    values = np.stack([opening, 0.56 + widths * beat, 0.22 + opening], axis=1)
+    silence = Timeline((Span(0.0, 0.4, Unit("sil")), Span(2.6, 3.01, Unit("sil"))))
+    return Motion(values, 100.0, tuple(map(Channel, ("opening", "width", "outer")))), silence
+
+
+def tracked(frames: list[np.ndarray]) -> np.ndarray:
+    """Opening, width and outer of each frame [shape=(T, 3)]; NaN where no face was found."""
+    rows = []
+    with mediapipe.solutions.face_mesh.FaceMesh(max_num_faces=1, refine_landmarks=True) as mesh:
+        for frame in frames:
+            faces = mesh.process(frame).multi_face_landmarks
+            points = np.array([(p.x, p.y) for p in faces[0].landmark]) if faces else np.full((478, 2), np.nan)
+            pairs = points[[INNER_LIPS, CORNERS, OUTER_LIPS, EYES]]
+            distances = np.linalg.norm(pairs[:, 0] - pairs[:, 1], axis=1)
+            rows.append(distances[:3] / distances[3])
+    return np.array(rows)
+
+
+@pytest.fixture(scope="module")
+def told_and_seen() -> tuple[np.ndarray, np.ndarray]:
+    motion, units = syllables()
+    return motion.resampled(25.0).values, tracked(list(render(motion, units, fps=25.0, height=480)))
+
+
+def test_the_face_is_found_in_every_frame(told_and_seen):
+    assert np.isfinite(told_and_seen[1]).all()
+
+
+@pytest.mark.parametrize(("column", "least"), [(0, 0.95), (1, 0.8), (2, 0.9)], ids=["opening", "width", "outer"])
+def test_what_was_told_is_seen(told_and_seen, column, least):
+    told, seen = told_and_seen
+    assert np.corrcoef(told[:, column], seen[:, column])[0, 1] >= least
+
+
+def test_the_opening_is_seen_at_its_size(told_and_seen):
+    told, seen = told_and_seen[0][:, 0], told_and_seen[1][:, 0]
+    assert 0.8 < np.polyfit(told, seen, 1)[0] < 1.2
+    assert seen[told < 0.01].max() < 0.02

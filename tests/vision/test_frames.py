@@ -1,0 +1,102 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lipmotion.errors import InputError
+from lipmotion.vision.frames import Frame, open_video
+
+
+def all_frames(path: Path) -> list[Frame]:
+    with open_video(path) as video:
+        return list(video.frames)
+
+
+def test_every_frame_comes_with_its_time(write_video):
+    frames = all_frames(write_video())
+    np.testing.assert_allclose([frame.time_s for frame in frames], np.arange(10) / 25, atol=1e-9)
+    np.testing.assert_allclose([frame.image.mean() for frame in frames], 10 * np.arange(10), atol=3)
+    assert frames[0].image.shape == (48, 64, 3)
+    assert frames[0].image.dtype == np.uint8
+
+
+def test_dropped_frames_keep_their_times(write_video):
+    frames = all_frames(write_video(ticks=[0, 1, 2, 5, 6, 9]))
+    np.testing.assert_allclose([frame.time_s for frame in frames], np.array([0, 1, 2, 5, 6, 9]) / 25, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["clip.ts", "clip.mkv"])
+def test_time_zero_is_the_start_of_the_container(write_video, name):
+    frames = all_frames(write_video(name, ticks=range(100, 110)))
+    np.testing.assert_allclose([frame.time_s for frame in frames], np.arange(10) / 25, atol=1e-3)
+
+
+def test_states_the_nominal_rate(write_video):
+    with open_video(write_video(rate=30)) as video:
+        assert video.stated_rates_hz[0] == 30
+
+
+def test_a_rotated_video_comes_upright(write_video):
+    picture = np.zeros((48, 64, 3), np.uint8)
+    picture[:16, :16] = 255
+    image = all_frames(write_video(picture=picture, rotation=90))[0].image
+    assert image.shape == (64, 48, 3)
+    assert image[-16:, :16].mean() > 200
+    assert image[:-16].mean() < 20
+
+
+def test_oblong_pixels_become_square(write_video):
+    assert all_frames(write_video(pixel_shape=(3, 2)))[0].image.shape == (48, 96, 3)
+
+
+def test_decodes_as_it_is_asked(write_video):
+    with open_video(write_video()) as video:
+        assert next(video.frames).time_s == 0
+    with pytest.raises(StopIteration):
+        next(video.frames)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda path: path.with_suffix(".mkv").touch(), "no such file"),
+        (lambda path: path.mkdir(), "is a folder"),
+        (lambda path: path.write_bytes(b""), "empty"),
+        (lambda path: path.write_text("words, not pictures\n" * 50), "not a readable video"),
+    ],
+)
+def test_says_what_is_wrong(tmp_path, make, message):
+    path = tmp_path / "clip.mp4"
+    make(path)
+    with pytest.raises(InputError, match=message), open_video(path):
+        pass
+
+
+def test_sound_alone_is_not_a_video(tmp_path):
+    import wave
+
+    with wave.open(str(tmp_path / "speech.wav"), "wb") as file:
+        file.setnchannels(1)
+        file.setsampwidth(2)
+        file.setframerate(16000)
+        file.writeframes(bytes(32000))
+    with pytest.raises(InputError, match="no video stream"), open_video(tmp_path / "speech.wav"):
+        pass
+
+
+def test_truncated_before_its_first_picture(write_video):
+    path = write_video(
+        "clip.mkv", picture=np.random.default_rng(0).integers(0, 255, (480, 640, 3)).astype(np.uint8), size=(640, 480)
+    )
+    path.write_bytes(path.read_bytes()[:3000])
+    with pytest.raises(InputError, match=r"picture|not a readable video"):
+        all_frames(path)
+
+
+def test_truncated_later_ends_there(write_video):
+    path = write_video("clip.mkv", ticks=range(100))
+    whole = path.read_bytes()
+    path.write_bytes(whole[: len(whole) * 2 // 3])
+    assert 1 <= len(all_frames(path)) < 100

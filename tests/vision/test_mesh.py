@@ -1,0 +1,63 @@
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from lipmotion.errors import MissingDependencyError
+from lipmotion.vision.mesh import FaceMesh, quiet_stderr
+from lipmotion.vision.packages import import_face_mesh, import_opencv, versions
+
+
+def test_missing_packages_are_named_with_the_way_to_install_them(monkeypatch):
+    monkeypatch.setitem(sys.modules, "cv2", None)
+    monkeypatch.setitem(sys.modules, "mediapipe.python.solutions", None)
+    for load, package in ((import_opencv, "OpenCV"), (import_face_mesh, "MediaPipe")):
+        with pytest.raises(MissingDependencyError, match=package) as caught:
+            load()
+        assert 'pip install "lipmotion[video]"' in str(caught.value)
+        assert "Python < 3.13" in str(caught.value)
+    with pytest.raises(MissingDependencyError, match="MediaPipe"):
+        FaceMesh()
+
+
+def test_versions_need_the_packages(monkeypatch):
+    from importlib import metadata
+
+    def missing(name: str) -> str:
+        raise metadata.PackageNotFoundError(name)
+
+    monkeypatch.setattr(metadata, "version", missing)
+    with pytest.raises(MissingDependencyError, match="mediapipe"):
+        versions()
+
+
+def test_native_messages_are_dropped_only_inside(capfd):
+    with quiet_stderr():
+        os.write(2, b"noise")
+    os.write(2, b"news")
+    assert capfd.readouterr().err == "news"
+
+
+def test_importing_needs_no_video_packages():
+    code = (
+        "import sys; sys.modules['cv2'] = sys.modules['mediapipe'] = None; "
+        "import lipmotion.vision.track, lipmotion.corpora.store, lipmotion.pipeline.prepare"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+@pytest.mark.video
+def test_a_picture_without_a_face_has_no_points():
+    pytest.importorskip("mediapipe")
+    with FaceMesh() as mesh:
+        assert mesh.points(np.full((120, 160, 3), 90, np.uint8)) is None
+
+
+@pytest.mark.video
+def test_versions_are_known():
+    pytest.importorskip("mediapipe")
+    assert versions().keys() == {"mediapipe", "opencv", "av"}

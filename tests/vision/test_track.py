@@ -1,0 +1,181 @@
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from lipmotion.errors import InputError
+from lipmotion.vision import track as module
+from lipmotion.vision.landmarks import JAW_POINTS, LIP_POINTS, TRACKED_POINTS
+from lipmotion.vision.track import CHANNELS, motion_values, track
+
+COLUMN = {index: n for n, index in enumerate(TRACKED_POINTS)}
+
+
+def face(opening: float) -> NDArray[np.float64]:
+    """A face of 60 px between the eyes, as the face mesh gives it [shape=(N, 3)]."""
+    points = np.random.default_rng(11).uniform(0, 48, (len(TRACKED_POINTS), 3))
+    points[[COLUMN[33], COLUMN[263], COLUMN[10], COLUMN[168]]] = [[2, 20, 0], [62, 20, 0], [32, 2, 5], [32, 20, 0]]
+    points[[COLUMN[13], COLUMN[14]], :2] = [[32, 40], [32, 40 + 60 * opening]]
+    return points
+
+
+class ScriptedMesh:
+    """Stands for the face mesh: one answer a frame, None for no face."""
+
+    def __init__(self, answers: Sequence[NDArray[np.float64] | None]) -> None:
+        self.answers = iter(answers)
+
+    def __enter__(self) -> ScriptedMesh:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def points(self, _image: NDArray[np.uint8]) -> NDArray[np.float64] | None:
+        return next(self.answers)
+
+
+@pytest.fixture
+def scripted(monkeypatch):
+    def script(answers: Sequence[NDArray[np.float64] | None]) -> None:
+        monkeypatch.setattr(module, "FaceMesh", lambda: ScriptedMesh(answers))
+
+    return script
+
+
+OPENINGS = 0.1 + 0.05 * np.sin(np.arange(20) / 3)
+
+
+def test_channels_are_named_and_ordered():
+    names = [channel.name for channel in CHANNELS]
+    assert names[:6] == ["opening", "width", "outer", "x_61", "y_61", "z_61"]
+    assert names[-1] == f"z_{JAW_POINTS[-1]}"
+    assert len(names) == 3 + 3 * (len(LIP_POINTS) + len(JAW_POINTS)) == len(set(names))
+    assert {channel.unit for channel in CHANNELS} == {"eye_distance"}
+
+
+def test_distances_are_measured_in_the_image_plane():
+    points = np.stack([face(0.2)])
+    points[0, COLUMN[14], 2] += 100  # depth has no part in them
+    values = motion_values(points)[0]
+    assert values[0] == pytest.approx(0.2)
+    expected = np.linalg.norm(points[0, COLUMN[61], :2] - points[0, COLUMN[291], :2]) / 60
+    assert values[1] == pytest.approx(expected)
+
+
+def test_every_frame_is_measured(write_video, scripted):
+    scripted([face(opening) for opening in OPENINGS])
+    result = track(write_video(ticks=range(20)), crops=False)
+    np.testing.assert_allclose(result.motion["opening"], OPENINGS, atol=1e-9)
+    assert result.motion.rate_hz == 25
+    assert result.seen.all()
+    assert result.crops is None
+
+
+def test_frames_without_a_face_are_marked_and_interpolated(write_video, scripted):
+    unseen = [0, 1, 9, 19]
+    scripted([None if n in unseen else face(opening) for n, opening in enumerate(OPENINGS)])
+    result = track(write_video(ticks=range(20)), crops=False)
+    assert np.flatnonzero(~result.seen).tolist() == unseen
+    opening = result.motion["opening"]
+    np.testing.assert_allclose(opening[[0, 1, 19]], OPENINGS[[2, 2, 18]], atol=1e-9)
+    assert opening[9] == pytest.approx(OPENINGS[9], abs=2e-3)
+    assert np.isfinite(result.motion.values).all()
+
+
+def test_dropped_frames_are_put_in_their_place(write_video, scripted):
+    ticks = [n for n in range(20) if n not in (6, 13)]
+    scripted([face(OPENINGS[n]) for n in ticks])
+    result = track(write_video(ticks=ticks), crops=False)
+    np.testing.assert_allclose(result.motion["opening"], OPENINGS, atol=2e-3)
+    np.testing.assert_allclose(result.motion["opening"][ticks], OPENINGS[ticks], atol=1e-9)
+    assert np.flatnonzero(~result.seen).tolist() == [6, 13]
+
+
+def test_too_few_faces_are_refused_with_counts(write_video, scripted):
+    scripted([face(0.1) if n < 15 else None for n in range(20)])
+    with pytest.raises(InputError, match=r"no face in 5 of 20 frames; required: a face in at least 80%"):
+        track(write_video(ticks=range(20)), crops=False)
+
+
+def test_no_face_at_all_is_refused(write_video, scripted):
+    scripted([None] * 20)
+    with pytest.raises(InputError, match=r"no face in 20 of 20 frames"):
+        track(write_video(ticks=range(20)), crops=False)
+
+
+def test_broken_time_stamps_are_refused(write_video, scripted):
+    scripted([face(0.1)] * 20)
+    with pytest.raises(InputError, match=r"20 frames span 40\.\d s.*constant frame rate"):
+        track(write_video("clip.mkv", ticks=[*range(19), 1000]), crops=False)
+
+
+@pytest.mark.video
+def test_unseen_frames_show_the_nearest_mouth(write_video, scripted):
+    pytest.importorskip("cv2")
+    unseen = [0, 1, 9, 19]
+    scripted([None if n in unseen else face(0.1) for n in range(20)])
+    result = track(write_video(ticks=range(20)))
+    assert result.crops is not None
+    assert result.crops.shape == (20, 56, 72, 3)
+    shown = result.crops.mean(axis=(1, 2, 3))  # frame n is a flat grey of 10 n
+    np.testing.assert_allclose(shown, [20, 20, *range(20, 90, 10), 80, *range(100, 190, 10), 180], atol=3)
+
+
+@pytest.mark.video
+def test_a_video_without_a_face(write_video):
+    pytest.importorskip("mediapipe")
+    with pytest.raises(InputError, match=r"no face in 10 of 10 frames"):
+        track(write_video())
+
+
+@pytest.mark.video
+@pytest.mark.recordings
+class TestRealRecordings:
+    @pytest.fixture(autouse=True)
+    def _packages(self):
+        pytest.importorskip("mediapipe")
+
+    def test_a_clip_is_tracked_the_same_twice(self, recordings: Path):
+        path = recordings / "grid-s1" / "clips" / "brwa3s.mkv"
+        first, second = track(path), track(path)
+        assert first.motion.values.shape == (75, len(CHANNELS))
+        assert first.motion.rate_hz == 25
+        assert first.seen.all()
+        np.testing.assert_array_equal(first.motion.values, second.motion.values)
+        np.testing.assert_array_equal(first.crops, second.crops)
+        assert first.motion["opening"][:10].max() < 0.02  # silence
+        assert 0.1 < first.motion["opening"].max() < 0.3
+        assert 0.4 < first.motion["width"].mean() < 0.7
+
+    def test_two_encodings_of_a_clip_agree(self, recordings: Path):
+        one = track(recordings / "grid-s1" / "clips" / "bbal8p.mkv", crops=False).motion
+        two = track(recordings / "grid-s1" / "original" / "bbal8p.mpg", crops=False).motion
+        for name, least in (("opening", 0.98), ("width", 0.9), ("y_17", 0.98), ("y_152", 0.95)):
+            assert np.corrcoef(one[name], two[name])[0, 1] > least
+
+    def test_the_head_is_upright_and_still(self, recordings: Path):
+        motion = track(recordings / "grid-others" / "lbax4n.mpg", crops=False).motion
+        assert abs(motion["x_0"].mean()) < 0.1
+        assert motion["y_0"].mean() < -0.5
+        assert motion["y_152"].mean() < motion["y_17"].mean() < motion["y_0"].mean()
+        assert motion["z_0"].mean() > 0.2
+        assert motion["x_61"].mean() < 0 < motion["x_291"].mean()
+
+    def test_a_clip_that_starts_without_a_picture(self, recordings: Path):
+        result = track(recordings / "grid-s1" / "clips" / "bbizzn.mkv")
+        assert np.flatnonzero(~result.seen).tolist() == list(range(12))
+        np.testing.assert_array_equal(result.motion.values[:12], np.tile(result.motion.values[12], (12, 1)))
+        np.testing.assert_array_equal(result.crops[0], result.crops[12])
+
+    def test_nothing_is_printed(self, recordings: Path):
+        path = recordings / "grid-s1" / "clips" / "brwa3s.mkv"
+        code = f"from pathlib import Path; from lipmotion.vision.track import track; track(Path({str(path)!r}))"
+        done = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True)
+        assert (done.stdout, done.stderr) == (b"", b"")
