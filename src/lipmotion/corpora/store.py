@@ -63,6 +63,22 @@ class Corpus:
         """Return the names of all utterances, or of one split, sorted."""
         return tuple(sorted(name for name, entry in self._index.items() if split in (None, entry["split"])))
 
+    def summary(self) -> dict[str, str]:
+        """Return what a user wants to know of the corpus, by name."""
+        seconds = sum(float(entry["duration_s"]) for entry in self._index.values())
+        frames = sum(int(entry["frames"]) for entry in self._index.values())
+        unseen = sum(int(entry["unseen_frames"]) for entry in self._index.values())
+        sources = [read_entry(self.folder(name)) for name in self.names()]
+        rights = sorted({entry["source"]["attribution"] for entry in sources if "attribution" in entry["source"]})
+        return {
+            "corpus": str(self.path),
+            "utterances": f"{len(self)} ({', '.join(f'{count} {split}' for split, count in self.splits.items())})",
+            "transcribed": str(sum(entry["words"] is not None for entry in sources)),
+            "minutes": f"{seconds / 60:.1f}",
+            "frames": f"{frames}, {unseen} without a face",
+            "attribution": "; ".join(rights) or "none stated",
+        }
+
     def folder(self, name: str) -> Path:
         """Return where an utterance of this name is, or would be."""
         return self.path / UTTERANCES / name

@@ -1,1 +1,1 @@
-""""""
+"""Motion → what people look at."""

@@ -66,13 +66,16 @@ def recognise(hmm: UnitHmm, features: Features) -> Timeline[Unit]:
 
 
 def _timeline(labels: list[tuple[str, str]], bounds: NDArray[np.intp], duration_s: float) -> Timeline[Unit]:
-    """Frame n covers (n ± ½) · 10 ms."""
+    """Frame n covers (n ± ½) · 10 ms. Silence at both ends is silence however short, between words a pause."""
     edges = np.clip((bounds - 0.5) / FRAME_RATE_HZ, 0, duration_s)
     edges[-1] = duration_s
     spans = []
-    for (phone, word), start_s, end_s in zip(labels, edges[:-1].tolist(), edges[1:].tolist(), strict=True):
+    for i, ((phone, word), start_s, end_s) in enumerate(
+        zip(labels, edges[:-1].tolist(), edges[1:].tolist(), strict=True)
+    ):
         name = phone
         if is_silent(phone):
-            name = PAUSE if end_s - start_s < SHORT_PAUSE_S else SILENCE
+            inside = 0 < i < len(labels) - 1
+            name = PAUSE if inside and end_s - start_s < SHORT_PAUSE_S else SILENCE
         spans.append(Span(start_s, end_s, Unit(name, word=word)))
     return Timeline(tuple(spans))

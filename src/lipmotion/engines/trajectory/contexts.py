@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.types import FRAME_RATE_HZ, Span, Timeline, Unit
-from lipmotion.units import PHONES, SILENCE, VISEME_OF
+from lipmotion.units import PHONES, SILENCE, VISEME_OF, is_silent
 
 
 class Place(NamedTuple):
@@ -22,18 +22,35 @@ class Place(NamedTuple):
     part: int
 
 
-LEVELS = 5
+REST_MARGIN_S = 0.3
+"""The mouth rests in silence this far from speech."""
+LEVELS = 8
 
 
 def level_names(place: Place) -> tuple[str, ...]:
     """Return the names of a place from the most general to the most particular context.
 
-    Any phone, its viseme class, the phone, the phone between viseme classes, the phone between phones: so an
-    unseen context, and a phone never seen at all, resolve to the closest class that was seen.
+    Any phone; its viseme class, then beside the class to its left and to its right; the phone, then beside the
+    classes to its left and right; the phone between phones. So an unseen context, and a phone never seen at
+    all, resolve to the closest classes that were seen.
     """
     left, phone, right, part = place
-    around = f"[{VISEME_OF[left]}]-{phone}+[{VISEME_OF[right]}]"
-    return tuple(f"{name}:{part}" for name in ("*", f"[{VISEME_OF[phone]}]", phone, around, f"{left}-{phone}+{right}"))
+    before, viseme, after = f"[{VISEME_OF[left]}]", f"[{VISEME_OF[phone]}]", f"[{VISEME_OF[right]}]"
+    names = (
+        "*",
+        viseme,
+        f"{before}-{viseme}",
+        f"{viseme}+{after}",
+        phone,
+        f"{before}-{phone}",
+        f"{phone}+{after}",
+        f"{left}-{phone}+{right}",
+    )
+    return tuple(f"{name}:{part}" for name in names)
+
+
+SPREAD_LEVELS = (0, 1, 4)
+"""The levels that have variances of their own: any phone, viseme class, phone."""
 
 
 def with_neighbours(units: Timeline[Unit]) -> Iterator[tuple[str, Span[Unit], str]]:
@@ -43,22 +60,40 @@ def with_neighbours(units: Timeline[Unit]) -> Iterator[tuple[str, Span[Unit], st
 
 
 def places(units: Timeline[Unit], frames: int, parts: int, edge_s: float) -> list[Place]:
-    """Return the place of every frame [length ``frames``]; frames outside all units are silence.
+    """Return the place of every frame [length ``frames``].
+
+    Silence further than ``REST_MARGIN_S`` from speech, and frames outside all units, are ``rest_place``.
 
     parts  : an odd number of parts a phone is cut into
     edge_s : the parts before and after the middle one last an equal share, but no longer than this:
              it is the middle of a long sound that gets longer
     Raises InputError: a phone outside the inventory.
     """
-    result = [Place(SILENCE, SILENCE, SILENCE, parts // 2)] * frames
+    result = [rest_place(parts)] * frames
     for left, span, right in with_neighbours(units):
         if span.label.phone not in VISEME_OF:
             raise InputError(f"unknown phone {span.label.phone!r} at {span.start_s} s; the phones: {' '.join(PHONES)}")
         first, stop = (int(np.ceil(t * FRAME_RATE_HZ - 1e-6)) for t in (span.start_s, span.end_s))
-        time_s = np.arange(first, min(stop, frames)) / FRAME_RATE_HZ
-        for frame, part in enumerate(_parts(time_s, span.start_s, span.end_s, parts, edge_s), first):
-            result[frame] = Place(left, span.label.phone, right, int(part))
+        time_s = np.arange(max(first, 0), min(stop, frames)) / FRAME_RATE_HZ
+        rests = _rests(time_s, left, span, right)
+        part = _parts(time_s, span.start_s, span.end_s, parts, edge_s)
+        for i in np.nonzero(~rests)[0]:
+            result[max(first, 0) + i] = Place(left, span.label.phone, right, int(part[i]))
     return result
+
+
+def rest_place(parts: int) -> Place:
+    """Return the place of frames in silence away from speech."""
+    return Place(SILENCE, SILENCE, SILENCE, parts // 2)
+
+
+def _rests(time_s: NDArray[np.float64], left: str, span: Span[Unit], right: str) -> NDArray[np.bool_]:
+    """Return which frames of a span are silence away from speech; beyond the recording's ends there is none."""
+    if not is_silent(span.label.phone):
+        return np.zeros(len(time_s), bool)
+    after = np.full(len(time_s), is_silent(left)) | (time_s - span.start_s > REST_MARGIN_S)
+    before = np.full(len(time_s), is_silent(right)) | (span.end_s - time_s > REST_MARGIN_S)
+    return after & before
 
 
 def _parts(time_s: NDArray[np.float64], start_s: float, end_s: float, parts: int, edge_s: float) -> NDArray[np.intp]:

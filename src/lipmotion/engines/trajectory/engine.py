@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.base import Arrays, Engine, Fit, frame_of
+from lipmotion.engines.trajectory.closure import Closure, closing_frames
 from lipmotion.engines.trajectory.contexts import LEVELS, places, with_neighbours
 from lipmotion.engines.trajectory.model import TrajectoryModel, model_arrays, model_from_arrays
 from lipmotion.engines.trajectory.train import fit_trajectory
 from lipmotion.errors import InputError
-from lipmotion.kernels.banded import Bands, normal_equations, pin, solve
+from lipmotion.kernels.banded import normal_equations, pin, solve
 from lipmotion.stats.em import Monitor
-from lipmotion.types import FRAME_RATE_HZ, Constraints, Example, Generation, Motion, Pin, Speech, Timeline, Trace, Unit
+from lipmotion.types import FRAME_RATE_HZ, Constraints, Example, Generation, Motion, Speech, Timeline, Trace, Unit
 
 
 @dataclass(frozen=True)
@@ -26,14 +27,17 @@ class TrajectoryConfig:
     parts      : parts a phone is cut into, an odd number
     edge_s     : most seconds that a part before or after the middle one lasts
     components : dimensions that all point channels are reduced to
-    shrinkage, variance_shrinkage : frames that a more general context counts for
+    shrinkage  : frames of evidence that a context must outweigh to change the mean
+    variance_shrinkage : frames that the more general variance counts for
+    closures   : make the lips meet in every p, b and m
     """
 
     parts: int = 5
     edge_s: float = 0.08
     components: int = 16
-    shrinkage: float = 5.0
+    shrinkage: float = 10.0
     variance_shrinkage: float = 20.0
+    closures: bool = True
 
     def __post_init__(self) -> None:
         if self.parts < 1 or self.parts % 2 == 0:
@@ -55,7 +59,9 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
     name: ClassVar[str] = "trajectory"
 
     def fit(self, examples: Sequence[Example], monitor: Monitor) -> Fit[TrajectoryModel]:  # noqa: D102
-        model = fit_trajectory(examples, **asdict(self.config), monitor=monitor)
+        options = asdict(self.config)
+        del options["closures"]  # of generation
+        model = fit_trajectory(examples, **options, monitor=monitor)
         frames = sum(int(example.valid.sum()) for example in examples)
         return Fit(model, {"frames": frames, "contexts": len(model.levels[-1].rows)})
 
@@ -66,15 +72,14 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
         mean, precision, sources = zip(*(model.statistics(place) for place in distinct), strict=True)
         index = {place: number for number, place in enumerate(distinct)}
         path = np.array([index[place] for place in where], np.intp)
-        bands = normal_equations(np.array(mean)[path], np.array(precision)[path])
-        pins = constraints.pins if constraints else ()
-        pinned = [_apply(pin_, bands, model, frames) for pin_ in pins]
-        values, variance = solve(bands)
-        for frame, channel in pinned:
-            variance[frame, channel] = 0
-        motion, spread = model.to_motion(values, variance)
+        means, precisions = np.array(mean)[path], np.array(precision)[path]
+        pins = _resolved(constraints, model, frames)
+        values, variance = _trajectory(means, precisions, pins)
+        if self.config.closures and model.closure is not None:
+            _close_lips(model.closure, speech.units, (means, precisions), pins, (values, variance))
+        motion, spread = model.space.restore(values, variance)
         return Generation(
-            Motion(motion, FRAME_RATE_HZ, model.channels),
+            Motion(motion, FRAME_RATE_HZ, model.space.channels),
             spread,
             _named(speech.units),
             Trace(sources, path),
@@ -87,20 +92,60 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
         return model_from_arrays(arrays, LEVELS)
 
 
-def _apply(wanted: Pin, bands: Bands, model: TrajectoryModel, frames: int) -> tuple[int, int]:
-    """Pin one value; return its frame and its column in the model's space."""
-    names = [model.channels[channel].name for channel in model.direct]
-    if wanted.channel not in names:
-        raise InputError(f"cannot pin {wanted.channel!r}; channels that can be pinned: {', '.join(names)}")
-    frame = frame_of(wanted.time_s, frames, FRAME_RATE_HZ)
-    if frame is None:
-        last_s = (frames - 1) / FRAME_RATE_HZ
-        raise InputError(f"pin at {wanted.time_s} s lies outside the recording (0 to {last_s:.2f} s)")
-    if not np.isfinite(wanted.value):
-        raise InputError(f"pin at {wanted.time_s} s has the value {wanted.value}, required a finite number")
-    channel = names.index(wanted.channel)
-    pin(bands, frame, channel, wanted.value)
-    return frame, channel
+_Pins = dict[tuple[int, int], float]
+"""Frame and column in the model's space, to the value there."""
+_Array = NDArray[np.float64]
+
+
+def _resolved(constraints: Constraints | None, model: TrajectoryModel, frames: int) -> _Pins:
+    names = model.space.direct_names
+    pins: _Pins = {}
+    for wanted in constraints.pins if constraints else ():
+        if wanted.channel not in names:
+            raise InputError(f"cannot pin {wanted.channel!r}; channels that can be pinned: {', '.join(names)}")
+        frame = frame_of(wanted.time_s, frames, FRAME_RATE_HZ)
+        if frame is None:
+            last_s = (frames - 1) / FRAME_RATE_HZ
+            raise InputError(f"pin at {wanted.time_s} s lies outside the recording (0 to {last_s:.2f} s)")
+        if not np.isfinite(wanted.value):
+            raise InputError(f"pin at {wanted.time_s} s has the value {wanted.value}, required a finite number")
+        pins[frame, names.index(wanted.channel)] = wanted.value
+    return pins
+
+
+def _trajectory(mean: _Array, precision: _Array, pins: _Pins) -> tuple[_Array, _Array]:
+    """Return the trajectory through all pins, and its variance (0 there), both [shape=(T, Q)]."""
+    bands = normal_equations(mean, precision)
+    for (frame, column), value in pins.items():
+        pin(bands, frame, column, value)
+    values, variance = solve(bands)
+    for frame, column in pins:
+        variance[frame, column] = 0
+    return values, variance
+
+
+def _close_lips(
+    closure: Closure,
+    units: Timeline[Unit],
+    statistics: tuple[_Array, _Array],
+    pins: _Pins,
+    result: tuple[_Array, _Array],
+) -> None:
+    """Make the lips meet in every p, b and m (in place); what the user did not pin follows the opening."""
+    values, variance = result
+    column = closure.column
+    taken = [frame for frame, pinned in pins if pinned == column]
+    frames = closing_frames(closure, values[:, column], units, taken)
+    if not frames:
+        return
+    wanted = {(frame, 0): closure.closed for frame in frames}
+    wanted |= {(frame, 0): pins[frame, column] for frame in taken}
+    opening = slice(column, column + 1)
+    closing, spread = _trajectory(statistics[0][:, :, opening], statistics[1][:, :, opening], wanted)
+    follow = closure.follow.copy()
+    follow[[pinned for _, pinned in pins]] = 0
+    values += (closing - values[:, opening]) * follow
+    values[:, opening], variance[:, opening] = closing, spread
 
 
 def _named(units: Timeline[Unit]) -> Timeline[Unit]:

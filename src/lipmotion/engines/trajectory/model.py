@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.trajectory.contexts import Place, level_names
+from lipmotion.engines.trajectory.closure import Closure
+from lipmotion.engines.trajectory.contexts import SPREAD_LEVELS, Place, level_names
+from lipmotion.engines.trajectory.space import MotionSpace
 from lipmotion.errors import ModelFormatError
 from lipmotion.stats.pca import Pca
 from lipmotion.types import Channel
@@ -20,7 +22,7 @@ class Level:
     """Contexts of one generality.
 
     rows  : the row of each context
-    means : float32 array [shape=(R, 3, Q)], what each adds to the mean of the more general one
+    means : float32 array [shape=(R, 3, Q)], what each adds to the sum of the more general ones
     frames: int array [shape=(R,)], the frames behind each
     """
 
@@ -33,44 +35,18 @@ class Level:
 class TrajectoryModel:
     """Statistics of motion for every part of every unit in context.
 
-    channels  : the P channels of the motion
-    direct    : the channels that are modelled as they are [shape=(P',)]
-    points    : the space of all others (None: there are none); Q = P' + its dimensions
+    space     : the Q dimensions in which motion is modelled
     levels    : from any phone to the phone between phones
-    spread    : contexts of the first three levels -> rows of ``variances``
+    spread    : contexts of ``SPREAD_LEVELS`` -> rows of ``variances``
     variances : float32 array [shape=(R, 3, Q)] around the full mean; static, Δ, Δ²
+    closure   : how the lips close (None: the motion has no opening)
     """
 
-    channels: tuple[Channel, ...]
-    direct: NDArray[np.intp]
-    points: Pca | None
+    space: MotionSpace
     levels: tuple[Level, ...]
     spread: Mapping[str, int]
     variances: NDArray[np.float32]
-
-    @property
-    def reduced(self) -> NDArray[np.intp]:
-        """The channels that are generated in principal components."""
-        return np.setdiff1d(np.arange(len(self.channels)), self.direct)
-
-    def to_model_space(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return motion [shape=(T, P)] as the model sees it [shape=(T, Q)]."""
-        direct = values[:, self.direct]
-        if self.points is None:
-            return direct
-        return np.concatenate([direct, self.points.project(values[:, self.reduced])], axis=1)
-
-    def to_motion(
-        self, values: NDArray[np.float64], variance: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return values and variances [shape=(T, Q)] as those of the channels [shape=(T, P)]."""
-        motion, spread = (np.empty((len(values), len(self.channels))) for _ in range(2))
-        count = len(self.direct)
-        motion[:, self.direct], spread[:, self.direct] = values[:, :count], variance[:, :count]
-        if self.points is not None:
-            motion[:, self.reduced] = self.points.restore(values[:, count:])
-            spread[:, self.reduced] = variance[:, count:] @ np.square(self.points.basis)
-        return motion, spread
+    closure: Closure | None
 
     def statistics(self, place: Place) -> tuple[NDArray[np.float64], NDArray[np.float64], str]:
         """Return mean and precision [shape=(3, Q)] of a place, and what they rest on."""
@@ -81,20 +57,27 @@ class TrajectoryModel:
             if row is not None:
                 mean = mean + level.means[row]
                 source = f"{name} ({level.frames[row]} frames)"
-        row = next(self.spread[name] for name in reversed(names[:3]) if name in self.spread)
+        candidates = [names[level] for level in reversed(SPREAD_LEVELS)]
+        row = next(self.spread[name] for name in candidates if name in self.spread)
         return mean, 1 / self.variances[row].astype(float), source
 
 
 def model_arrays(model: TrajectoryModel) -> dict[str, NDArray[Any]]:
     """Return the model as arrays; means and variances at half precision."""
     arrays: dict[str, NDArray[Any]] = {
-        "channels": np.array([(channel.name, channel.unit) for channel in model.channels]),
-        "direct": model.direct,
+        "channels": np.array([(channel.name, channel.unit) for channel in model.space.channels]),
+        "direct": model.space.direct,
         "spread": np.array(list(model.spread)),
         "variances": model.variances,
     }
-    if model.points is not None:
-        arrays |= {"points_mean": model.points.mean, "points_basis": model.points.basis.astype(np.float32)}
+    if model.space.points is not None:
+        points = model.space.points
+        arrays |= {"points_mean": points.mean, "points_basis": points.basis.astype(np.float32)}
+    if model.closure is not None:
+        arrays |= {
+            "closure": np.array([model.closure.column, model.closure.closed]),
+            "closure_follow": model.closure.follow,
+        }
     for number, level in enumerate(model.levels):
         arrays |= {
             f"level{number}_names": np.array(list(level.rows)),
@@ -110,13 +93,20 @@ def model_from_arrays(arrays: Mapping[str, NDArray[Any]], levels: int) -> Trajec
         points = None
         if "points_mean" in arrays:
             points = Pca(arrays["points_mean"].astype(float), arrays["points_basis"].astype(float))
+        closure = None
+        if "closure" in arrays:
+            column, closed = arrays["closure"]
+            closure = Closure(int(column), float(closed), arrays["closure_follow"].astype(float))
         return TrajectoryModel(
-            channels=tuple(Channel(str(name), str(unit)) for name, unit in arrays["channels"]),
-            direct=arrays["direct"].astype(np.intp),
-            points=points,
+            space=MotionSpace(
+                channels=tuple(Channel(str(name), str(unit)) for name, unit in arrays["channels"]),
+                direct=arrays["direct"].astype(np.intp),
+                points=points,
+            ),
             levels=tuple(_level(arrays, number) for number in range(levels)),
             spread={str(name): row for row, name in enumerate(arrays["spread"])},
             variances=arrays["variances"].astype(np.float32),
+            closure=closure,
         )
     except (KeyError, ValueError) as error:
         raise ModelFormatError(f"the trajectory model is damaged ({error}); train or download it again") from error

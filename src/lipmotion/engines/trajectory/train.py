@@ -1,4 +1,4 @@
-"""Statistics of motion, unit by unit, each context shrunk towards the more general one."""
+"""Statistics of motion, unit by unit: a sum of what every generality of context adds."""
 
 from __future__ import annotations
 
@@ -7,14 +7,17 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.trajectory.contexts import LEVELS, level_names, places
+from lipmotion.engines.trajectory.closure import OPENING, fit_closure
+from lipmotion.engines.trajectory.contexts import LEVELS, SPREAD_LEVELS, level_names, places, rest_place
 from lipmotion.engines.trajectory.model import Level, TrajectoryModel
+from lipmotion.engines.trajectory.space import fit_space
 from lipmotion.errors import CorpusError
 from lipmotion.stats.em import Monitor
-from lipmotion.stats.pca import Pca, fit_pca
 from lipmotion.stats.windows import with_dynamics
 from lipmotion.types import Channel, Example
 
+PASSES = 4
+"""Rounds of backfitting; more change nothing on the validation list."""
 LEAST_VARIANCE_SHARE = 1e-3
 """No variance falls under this share of the overall one."""
 
@@ -29,34 +32,39 @@ def fit_trajectory(
     variance_shrinkage: float,
     monitor: Monitor,
 ) -> TrajectoryModel:
-    """Return means of every context as deviations from the next more general one, and variances.
+    """Return what every context adds to the mean, and variances around the sum.
 
+    The means are a ridge regression of static, Δ and Δ² on the indicators of all contexts of a frame, solved
+    by backfitting: a context with few frames, or one that the more general ones explain, adds little.
     components : dimensions that all point channels (``x_17``, ...) are reduced to
-    shrinkage, variance_shrinkage : frames that the more general context counts for
+    shrinkage  : frames of evidence that a context must outweigh (the ridge)
+    variance_shrinkage : frames that the more general variance counts for
     Raises CorpusError: no example with motion that was seen, or examples of different channels.
     """
     channels = _common_channels(examples)
-    direct, points = _spaces(examples, channels, components)
-    model = TrajectoryModel(channels, direct, points, (), {}, np.zeros((0, 3, 0), np.float32))
+    seen = np.concatenate([example.motion.values[example.valid] for example in examples])
+    space = fit_space(channels, seen, components)
     names: list[tuple[str, ...]] = []
+    values: list[NDArray[np.float64]] = []
     rows: list[NDArray[np.float32]] = []
     for example in examples:
         inner = example.valid.copy()
         inner[[0, -1]] = False  # no dynamics there
-        dynamics = with_dynamics(model.to_model_space(example.motion.values))
+        values.append(space.reduce(example.motion.values))
+        dynamics = with_dynamics(values[-1])
         where = places(example.speech.units, len(inner), parts, edge_s)
         rows.append(dynamics[inner].astype(np.float32))
         names += [level_names(place) for place, kept in zip(where, inner, strict=True) if kept]
-    rest = np.concatenate(rows)
-    overall = rest.var(axis=0)
-    levels = []
-    for number in range(LEVELS):
-        level, explained = _fit_level([name[number] for name in names], rest, shrinkage)
-        rest -= explained
-        levels.append(level)
-        monitor(f"contexts of level {number}", len(level.rows))
-    spread, variances = _fit_variances(names, rest, overall, variance_shrinkage)
-    return TrajectoryModel(channels, direct, points, tuple(levels), spread, variances)
+    motion = np.concatenate(rows)
+    _still(motion, [name == level_names(rest_place(parts)) for name in names])
+    overall = motion.var(axis=0)
+    levels = _backfit(names, motion, shrinkage, monitor)
+    spread, variances = _fit_variances(names, motion, overall, variance_shrinkage)
+    closure = None
+    if OPENING in space.direct_names:
+        timelines = [example.speech.units for example in examples]
+        closure = fit_closure(values, timelines, space.direct_names.index(OPENING))
+    return TrajectoryModel(space, tuple(levels), spread, variances, closure)
 
 
 def _common_channels(examples: Sequence[Example]) -> tuple[Channel, ...]:
@@ -68,17 +76,6 @@ def _common_channels(examples: Sequence[Example]) -> tuple[Channel, ...]:
     return found.pop()
 
 
-def _spaces(
-    examples: Sequence[Example], channels: tuple[Channel, ...], components: int
-) -> tuple[NDArray[np.intp], Pca | None]:
-    is_point = np.array([channel.name[:2] in ("x_", "y_", "z_") for channel in channels])
-    direct = np.nonzero(~is_point)[0].astype(np.intp)
-    if not is_point.any():
-        return direct, None
-    seen = np.concatenate([example.motion.values[example.valid][:, is_point] for example in examples])
-    return direct, fit_pca(seen, components)
-
-
 def _groups(names: Sequence[str]) -> tuple[list[str], NDArray[np.intp], NDArray[np.intp]]:
     """Return the distinct names, the frames sorted by name, and where each name's begin."""
     index: dict[str, int] = {}
@@ -87,32 +84,49 @@ def _groups(names: Sequence[str]) -> tuple[list[str], NDArray[np.intp], NDArray[
     return list(index), np.argsort(numbers, kind="stable"), starts.astype(np.intp)
 
 
-def _fit_level(names: Sequence[str], rest: NDArray[np.float32], shrinkage: float) -> tuple[Level, NDArray[np.float32]]:
-    """Return one level, and what it explains of every frame."""
-    distinct, order, starts = _groups(names)
-    counts = np.diff(np.append(starts, len(order)))
-    sums = np.add.reduceat(rest[order].astype(float), starts, axis=0)
-    means = (sums / (counts + shrinkage)[:, None, None]).astype(np.float32)
-    explained = np.empty_like(rest)
-    explained[order] = np.repeat(means, counts, axis=0)
-    level = Level({name: row for row, name in enumerate(distinct)}, means, counts.astype(np.int32))
-    return level, explained
+def _still(dynamics: NDArray[np.float32], rests: Sequence[bool]) -> None:
+    """Replace what the mouth did in silence away from speech (breath, a lick of the lips) by its median pose."""
+    resting = np.array(rests)
+    if resting.any():
+        dynamics[resting, 0] = np.median(dynamics[resting, 0], axis=0)
+        dynamics[resting, 1:] = 0
+
+
+def _backfit(
+    names: Sequence[tuple[str, ...]], rest: NDArray[np.float32], shrinkage: float, monitor: Monitor
+) -> list[Level]:
+    """Return all levels; ``rest`` becomes what they leave unexplained."""
+    groups = [_groups([name[number] for name in names]) for number in range(LEVELS)]
+    counts = [np.diff(np.append(starts, len(order))) for _, order, starts in groups]
+    means = [np.zeros((len(distinct), *rest.shape[1:]), np.float32) for distinct, _, _ in groups]
+    for _ in range(PASSES):
+        for number, (_, order, starts) in enumerate(groups):
+            rest[order] += np.repeat(means[number], counts[number], axis=0)
+            sums = np.add.reduceat(rest[order].astype(float), starts, axis=0)
+            means[number] = (sums / (counts[number] + shrinkage)[:, None, None]).astype(np.float32)
+            rest[order] -= np.repeat(means[number], counts[number], axis=0)
+        monitor("motion unexplained", float(rest[:, 0].var(axis=0).sum()))
+    return [
+        Level({name: row for row, name in enumerate(distinct)}, mean, count.astype(np.int32))
+        for (distinct, _, _), mean, count in zip(groups, means, counts, strict=True)
+    ]
 
 
 def _fit_variances(
     names: Sequence[tuple[str, ...]], rest: NDArray[np.float32], overall: NDArray[np.float32], shrinkage: float
 ) -> tuple[dict[str, int], NDArray[np.float32]]:
-    """Return the variances around the full mean, of the first three levels, each shrunk towards the one before."""
+    """Return the variances around the full mean, of some levels, each shrunk towards the more general one."""
     rows: dict[str, int] = {}
     variances: list[NDArray[np.float32]] = []
     squares = np.square(rest)
-    for number in range(3):
+    for position, number in enumerate(SPREAD_LEVELS):
         distinct, order, starts = _groups([name[number] for name in names])
         first = {name[number]: name for name in names}
+        general_level = SPREAD_LEVELS[position - 1]
         sums = np.add.reduceat(squares[order].astype(float), starts, axis=0)
         counts = np.diff(np.append(starts, len(order)))
         for name, total, count in zip(distinct, sums, counts, strict=True):
-            general = variances[rows[first[name][number - 1]]] if number else rest.var(axis=0)
+            general = variances[rows[first[name][general_level]]] if position else rest.var(axis=0)
             variance = (total + shrinkage * general) / (count + shrinkage)
             rows[name] = len(variances)
             variances.append(np.maximum(variance, LEAST_VARIANCE_SHARE * overall).astype(np.float32))

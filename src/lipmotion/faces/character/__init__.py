@@ -1,4 +1,9 @@
-"""A drawn face that speaks: a flat portrait whose mouth follows the motion. Needs numpy and Pillow only."""
+"""A drawn face that speaks: a flat portrait whose mouth follows the motion. Needs numpy and Pillow only.
+
+The way of a frame: ``pose`` (motion and phones → numbers) → ``geometry`` (numbers → outlines) → ``mouth``
+(outlines → pixels, with ``bands``) → ``rasteriser`` (pixels → picture). What stands still is painted once,
+by ``portrait``, ``head`` and ``eyes`` on a ``layer``.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +17,7 @@ from lipmotion.faces.character.eyes import closure
 from lipmotion.faces.character.pose import MouthPose, mouth_poses
 from lipmotion.types import Motion, Timeline, Unit
 
-__all__ = ["MouthPose", "mouth_poses", "render"]
+__all__ = ["render"]
 
 
 def render(

@@ -15,7 +15,7 @@ TUCKS: Mapping[str, float] = {"f": 1.0, "v": 1.0}
 """The lower lip touches the upper teeth."""
 CLOSURES: Mapping[str, float] = {"p": 1.0, "b": 1.0, "m": 1.0, "em": 1.0}
 """The lips touch; a tuck next to one of these is over before it begins."""
-TIP_RAISES: Mapping[str, float] = {"th": 1.0, "dh": 1.0, "l": 0.9, "el": 0.9, "t": 0.4, "d": 0.4, "n": 0.4, "en": 0.4}
+TIP_RAISES: Mapping[str, float] = {"th": 1.0, "dh": 1.0, "l": 0.8, "el": 0.8, "t": 0.4, "d": 0.4, "n": 0.4, "en": 0.4}
 """The tip of the tongue: between the teeth, or behind the upper ones, where less of it shows."""
 
 

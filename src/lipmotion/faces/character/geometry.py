@@ -118,10 +118,11 @@ def _inner_width(gap: float, round_: float) -> float:
 
 
 def _tongue(pose: MouthPose, x: Pixels) -> tuple[Pixels, Pixels]:
-    """Return top and bottom of what shows of the tongue: its back behind the lower teeth, or its raised tip."""
+    """Return top and bottom of what shows of the tongue: its back behind the lower teeth, or its tip between both."""
     teeth = LINE_Y + LOWER_TEETH_EDGE + pose.jaw
-    back = teeth - min(0.08, 0.32 * pose.gap)
-    tip = min(LINE_Y + TEETH_EDGE + 0.004, back)
+    upper_teeth = LINE_Y + TEETH_EDGE
+    back = max(teeth - min(0.08, 0.32 * pose.gap), upper_teeth)
+    tip = upper_teeth - 0.014
     top = back + pose.tip * (tip - back)
     half_width = 0.2 - 0.04 * pose.tip
     bulge = 0.06 - 0.01 * pose.tip

@@ -1,0 +1,91 @@
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lipmotion.errors import ExportError, InputError
+from lipmotion.export import MOTION_SUFFIXES, read_motion, write_motion
+from lipmotion.types import Channel, Generation, Motion, Timeline
+
+
+def write(path: Path, generation: Generation) -> Path:
+    write_motion(path, generation, source={"file": "Größe.wav"}, model={"engine": "trajectory"})
+    return path
+
+
+@pytest.mark.parametrize("suffix", MOTION_SUFFIXES)
+def test_motion_comes_back(tmp_path, generation, suffix):
+    motion, units = read_motion(write(tmp_path / f"a{suffix}", generation))
+    assert motion.names == generation.motion.names
+    assert motion.rate_hz == 100.0
+    assert np.abs(motion.values - generation.motion.values).max() <= 5.1e-6
+    assert len(units) == (0 if suffix == ".csv" else 2)
+
+
+@pytest.mark.parametrize("suffix", MOTION_SUFFIXES)
+@pytest.mark.parametrize("rate_hz", [25.0, 29.97, 30.0, 60.0, 100.0])
+def test_the_rate_comes_back(tmp_path, generation, suffix, rate_hz):
+    moved = replace(generation, motion=replace(generation.motion, rate_hz=rate_hz))
+    assert read_motion(write(tmp_path / f"a{suffix}", moved))[0].rate_hz == rate_hz
+
+
+@pytest.mark.parametrize("suffix", MOTION_SUFFIXES)
+def test_the_same_motion_gives_the_same_bytes(tmp_path, generation, suffix):
+    first, second = (write(tmp_path / f"{name}{suffix}", generation).read_bytes() for name in "ab")
+    assert first == second
+
+
+def test_the_suffix_may_be_in_capitals(tmp_path, generation):
+    assert read_motion(write(tmp_path / "A.JSON", generation))[0].names == generation.motion.names
+
+
+@pytest.mark.parametrize(("name", "found"), [("a.fbx", "'.fbx'"), ("a", "without a suffix")])
+def test_an_unknown_suffix_names_the_known_ones(tmp_path, generation, name, found):
+    with pytest.raises(ExportError, match=rf"{found}.*\.json, \.csv, \.npz"):
+        write(tmp_path / name, generation)
+    with pytest.raises(InputError, match=rf"{found}.*\.json, \.csv, \.npz"):
+        read_motion(tmp_path / name)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("suffix", MOTION_SUFFIXES)
+def test_values_that_are_not_finite_are_not_written(tmp_path, generation, suffix):
+    broken = Motion(np.array([[0.0], [np.nan]]), 100.0, (Channel("opening"),))
+    with pytest.raises(ExportError, match="not finite"):
+        write(tmp_path / f"a{suffix}", replace(generation, motion=broken))
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("suffix", MOTION_SUFFIXES)
+def test_an_old_file_survives_a_failure(tmp_path, generation, suffix, monkeypatch):
+    path = write(tmp_path / f"a{suffix}", generation)
+    before = path.read_bytes()
+
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "replace", full)
+    with pytest.raises(ExportError, match="No space left"):
+        write(path, generation)
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("suffix", MOTION_SUFFIXES)
+def test_a_missing_and_a_damaged_file_are_named(tmp_path, suffix):
+    path = tmp_path / f"a{suffix}"
+    with pytest.raises(InputError, match=rf"a\{suffix}: cannot be read: No such file"):
+        read_motion(path)
+    for rubbish in (b"", b"\x00\xff\xfe", b"[1, 2]", b"time_s\n", b"{}"):
+        path.write_bytes(rubbish)
+        with pytest.raises(InputError, match=rf"a\{suffix}: "):
+            read_motion(path)
+
+
+@pytest.mark.parametrize("suffix", [".json", ".npz"])
+def test_no_frames_come_back_as_no_frames(tmp_path, generation, suffix):
+    nothing = Motion(np.zeros((0, 2)), 100.0, generation.motion.channels)
+    motion, units = read_motion(write(tmp_path / f"a{suffix}", replace(generation, motion=nothing, units=Timeline(()))))
+    assert motion.values.shape == (0, 2)
+    assert len(units) == 0

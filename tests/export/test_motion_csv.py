@@ -1,0 +1,59 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from lipmotion.errors import ExportError, InputError
+from lipmotion.export import read_motion, write_motion
+from lipmotion.types import Channel, Motion
+
+
+def test_the_table_is_as_specified(tmp_path, generation):
+    path = tmp_path / "a.csv"
+    write_motion(path, generation, source={}, model={})
+    lines = path.read_text(encoding="utf-8").split("\n")
+    assert lines[0] == "time_s,opening,x_17"
+    assert lines[4] == "0.03,0.00000,0.12346"
+    assert lines[-1] == ""
+    table = np.loadtxt(path, delimiter=",", skiprows=1)
+    assert table[:, 0] == pytest.approx(np.arange(101) / 100)
+    assert table[:, 1:] == pytest.approx(generation.motion.values, abs=5.1e-6)
+
+
+def test_a_table_saved_by_a_spreadsheet_is_read(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_bytes("\ufefftime_s,opening\r\n0,0.1\r\n0.04,0.2\r\n".encode())
+    motion, units = read_motion(path)
+    assert motion.rate_hz == 25
+    assert motion["opening"].tolist() == [0.1, 0.2]
+    assert len(units) == 0
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("opening\n0\n", "first line is 'opening', required 'time_s,opening"),
+        ("time_s\n0\n", "first line is 'time_s'"),
+        ("time_s,opening\n0,a\n0.1,b\n", "not a table of numbers"),
+        ("time_s,opening\n0,1\n0.1\n", "not a table of numbers"),
+        ("time_s,opening\n0,1,2\n0.1,1,2\n", "required 2 numbers in each"),
+        ("time_s,opening\n0,1\n", "fewer than two rows"),
+        ("time_s,opening\n0.1,1\n0.2,1\n", "begin at 0"),
+        ("time_s,opening\n0,1\n0.1,1\n0.3,1\n", "even steps"),
+        ("time_s,opening\n0,1\n0,1\n", "even steps"),
+        ("time_s,opening,opening\n0,1,1\n0.1,1,1\n", "names repeat"),
+    ],
+)
+def test_what_is_wrong_is_said(tmp_path, text, message):
+    path = tmp_path / "a.csv"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match=message):
+        read_motion(path)
+
+
+@pytest.mark.parametrize("name", ["a,b", 'a"b', "a\nb"])
+def test_a_name_that_breaks_the_header_is_refused(tmp_path, generation, name):
+    odd = Motion(generation.motion.values[:, :1], 100.0, (Channel(name),))
+    with pytest.raises(ExportError, match="does not fit in a table"):
+        write_motion(tmp_path / "a.csv", replace(generation, motion=odd), source={}, model={})
+    assert not list(tmp_path.iterdir())
