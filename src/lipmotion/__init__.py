@@ -1,1 +1,77 @@
-"""Speech in, lip motion out."""
+"""Speech in, lip motion out.
+
+    >>> import lipmotion
+    >>> result = lipmotion.animate("hello.wav", transcript="Hello there")
+    >>> result.motion["opening"]
+    >>> lipmotion.write(result, ["hello.mp4", "hello.json"], speech="hello.wav")
+
+Names are imported when they are first used: ``import lipmotion`` alone costs nothing.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from lipmotion.corpora.store import Corpus
+    from lipmotion.engines import engine_named
+    from lipmotion.export.base import read_motion
+    from lipmotion.pipeline.animate import animate, write
+    from lipmotion.pipeline.evaluate import evaluate
+    from lipmotion.pipeline.model import Model, load_model, save_model
+    from lipmotion.pipeline.prepare import prepare
+    from lipmotion.pipeline.train import train
+    from lipmotion.types import Audio, Constraints, Generation, Motion, Pin, Span, Timeline, Unit
+    from lipmotion.units import Lexicon
+
+__all__ = [
+    "Audio",
+    "Constraints",
+    "Corpus",
+    "Generation",
+    "Lexicon",
+    "Model",
+    "Motion",
+    "Pin",
+    "Span",
+    "Timeline",
+    "Unit",
+    "animate",
+    "engine_named",
+    "evaluate",
+    "load_model",
+    "prepare",
+    "read_motion",
+    "save_model",
+    "train",
+    "write",
+]
+
+_HOMES = {
+    "Corpus": "lipmotion.corpora.store",
+    "Lexicon": "lipmotion.units",
+    "Model": "lipmotion.pipeline.model",
+    "animate": "lipmotion.pipeline.animate",
+    "engine_named": "lipmotion.engines",
+    "evaluate": "lipmotion.pipeline.evaluate",
+    "load_model": "lipmotion.pipeline.model",
+    "prepare": "lipmotion.pipeline.prepare",
+    "read_motion": "lipmotion.export.base",
+    "save_model": "lipmotion.pipeline.model",
+    "train": "lipmotion.pipeline.train",
+    "write": "lipmotion.pipeline.animate",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in __all__:
+        raise AttributeError(f"module 'lipmotion' has no attribute {name!r}")
+    from importlib import import_module
+
+    value = getattr(import_module(_HOMES.get(name, "lipmotion.types")), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -22,7 +22,7 @@ def run(options: argparse.Namespace) -> None:
     import json
 
     from lipmotion.corpora.store import Corpus
-    from lipmotion.evaluate.report import table
+    from lipmotion.measures.report import table
     from lipmotion.files import check_target, whole_file
     from lipmotion.pipeline.evaluate import evaluate
     from lipmotion.pipeline.model import load_model

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import CorpusError
-from lipmotion.evaluate import curves
-from lipmotion.evaluate.bootstrap import interval
-from lipmotion.evaluate.closures import closed_threshold, closure_figures, phone_closures
+from lipmotion.measures import curves
+from lipmotion.measures.bootstrap import interval
+from lipmotion.measures.closures import closed_threshold, closure_figures, phone_closures
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.train import labels_of
 from lipmotion.speech.phones import recognise
