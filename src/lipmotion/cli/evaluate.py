@@ -22,8 +22,8 @@ def run(options: argparse.Namespace) -> None:
     import json
 
     from lipmotion.corpora.store import Corpus
-    from lipmotion.measures.report import table
     from lipmotion.files import check_target, whole_file
+    from lipmotion.measures.report import table
     from lipmotion.pipeline.evaluate import evaluate
     from lipmotion.pipeline.model import load_model
     from lipmotion.units import Lexicon

@@ -34,8 +34,8 @@ class HmmConfig:
     relevance: float = 10.0
     iterations: int = 4
     variance_floor: float = 0.02
-    bigram_weight: float = 6.0
-    insertion: float = 0.0
+    bigram_weight: float = 4.0
+    insertion: float = -4.0
 
 
 @dataclass(frozen=True, eq=False)

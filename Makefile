@@ -1,0 +1,60 @@
+# make demo   installs, then turns a spoken sentence into an animated face with the model in the package
+# make test   installs everything, then runs the tests
+# make check  lint, types, import contracts
+# make bench  the speed figures of the README
+# make model  trains and measures the model that ships with the package (needs GRID speaker s1)
+# make requirements  renews the pinned requirements (needs uv)
+
+PYTHON ?= python3
+VENV ?= .venv
+GRID ?= ../shared/corpora/grid-s1
+BUILD ?= build
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
+SOURCES := $(shell find src -type f -not -name '*.pyc') pyproject.toml README.md
+.PHONY: demo test check bench model requirements clean
+.DELETE_ON_ERROR:
+
+demo: $(VENV)/core
+	mkdir -p $(BUILD)
+	$(BIN)/lipmotion animate examples/welcome.flac --transcript examples/welcome.txt -o $(BUILD)/welcome.mp4 $(BUILD)/welcome.json
+
+test: $(VENV)/dev
+	$(BIN)/python -m pytest
+
+check: $(VENV)/dev
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+bench: $(VENV)/dev
+	$(BIN)/python benchmarks/main_path.py --grid $(GRID) --full
+
+model: $(VENV)/dev
+	mkdir -p $(BUILD)
+	$(BIN)/lipmotion corpus prepare $(GRID) -o $(BUILD)/grid-s1
+	$(BIN)/lipmotion train $(BUILD)/grid-s1 -o $(BUILD)/grid-s1-train.lipmotion
+	$(BIN)/lipmotion evaluate $(BUILD)/grid-s1-train.lipmotion $(BUILD)/grid-s1 --split test -o docs/results/grid-s1-test.json
+	$(BIN)/lipmotion train $(BUILD)/grid-s1 --split all -o src/lipmotion/models/grid-s1.lipmotion
+
+requirements:
+	for list in core dev; do uv pip compile --universal --python-version 3.10 --generate-hashes --no-emit-index-url \
+	  --no-annotate --no-header --override requirements/overrides.txt requirements/$$list.in -o requirements/$$list.txt; done
+
+clean:
+	rm -rf $(VENV) $(BUILD)
+
+$(BIN)/python:
+	$(PYTHON) -m venv $(VENV)
+
+# The dev requirements hold the core ones: whichever came first, the package itself is always the newest.
+$(VENV)/core: $(BIN)/python requirements/core.txt $(SOURCES)
+	$(PIP) --no-deps --require-hashes -r requirements/core.txt
+	$(PIP) --no-deps --no-build-isolation --force-reinstall .
+	touch $@
+
+$(VENV)/dev: $(BIN)/python requirements/dev.txt $(SOURCES)
+	$(PIP) --no-deps --require-hashes -r requirements/dev.txt
+	$(PIP) --no-deps --no-build-isolation --force-reinstall .
+	touch $@
