@@ -19,16 +19,20 @@ TEMPORARY = ".part-"
 
 def check_target(target: Path) -> None:
     """Raise ExportError unless a file can be put there: before work begins, not after it."""
-    if target.is_dir():
+    try:
+        is_folder, has_parent = target.is_dir(), target.parent.is_dir()
+    except OSError as error:  # a name too long
+        raise ExportError(f"{target}: cannot be written: {error.strerror or error}") from error
+    if is_folder:
         raise ExportError(f"{target}: is a folder; give the name of a file in it")
-    if not target.parent.is_dir():
+    if not has_parent:
         raise ExportError(f"{target}: the folder {target.parent} does not exist; create it first")
 
 
 def _temporary(target: Path) -> Path:
     if not target.parent.is_dir():
         raise ExportError(f"{target}: the folder {target.parent} does not exist; create it first")
-    return target.with_name(f"{TEMPORARY}{uuid.uuid4().hex[:8]}-{target.name}")
+    return target.with_name(f"{TEMPORARY}{uuid.uuid4().hex[:8]}{target.suffix}")
 
 
 @contextmanager

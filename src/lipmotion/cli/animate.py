@@ -26,7 +26,7 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.pipeline.model import load_model
     from lipmotion.units import Lexicon
 
-    check_outputs(options.output, options.speech)
+    check_outputs(options.output, options.speech, rate_hz=options.rate, fps=options.fps)
     transcript = text_or_file(options.transcript) if options.transcript is not None else None
     lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
     model = load_model(options.model)

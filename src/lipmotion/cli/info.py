@@ -18,8 +18,9 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.pipeline.model import read_header, shipped_path
 
     path = options.model or shipped_path()
-    print(f"{'file':14} {path} ({path.stat().st_size / 1e6:.1f} MB)" if path.is_file() else path)
-    for name, value in read_header(path).items():
+    header = read_header(path)
+    print(f"{'file':14} {path} ({path.stat().st_size / 1e6:.1f} MB)")
+    for name, value in header.items():
         print(f"{name:14} {_plain(value)}")
 
 

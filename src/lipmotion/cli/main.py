@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import argparse
 import logging
+import os
 import sys
 from collections.abc import Sequence
 
 from lipmotion.cli import animate, corpus, evaluate, info, train
-from lipmotion.errors import LipMotionError
+from lipmotion.errors import InputError, LipMotionError
 
 VERBS = (animate, corpus, train, evaluate, info)
 EXIT_CODES = """exit codes: 0 done, 1 a bug, 2 wrong command line, 3 unusable input, 4 corpus, 5 alignment,
@@ -17,21 +18,33 @@ EXIT_CODES = """exit codes: 0 done, 1 a bug, 2 wrong command line, 3 unusable in
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; return its exit code."""
-    options = _parser().parse_args(arguments)
     logging.basicConfig(format="lipmotion: %(levelname)s: %(message)s", level=logging.WARNING)
     logging.addLevelName(logging.WARNING, "warning")
     try:
-        options.run(options)
+        try:
+            options = _parser().parse_args(arguments)
+            options.run(options)
+        finally:
+            sys.stdout.flush()  # now, for what goes wrong when Python ends cannot be told any more
     except LipMotionError as error:
         print(f"lipmotion: error: {' '.join(str(error).split())}", file=sys.stderr)
         return error.exit_code
     except KeyboardInterrupt:
         print("lipmotion: interrupted", file=sys.stderr)
         return 130
-    except BrokenPipeError:
-        sys.stderr.close()  # the reader of our output has gone; nothing is left to say
+    except BrokenPipeError:  # the reader of our output has gone; nothing is left to say
+        _discard_output()
         return 0
+    except OSError as error:  # what the operating system refuses: no permission, a name too long
+        _discard_output()
+        print(f"lipmotion: error: {error}", file=sys.stderr)
+        return InputError.exit_code
     return 0
+
+
+def _discard_output() -> None:
+    """Send what was printed but not yet delivered nowhere: Python would try again when it ends."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -6,8 +6,6 @@ from pathlib import Path
 
 from lipmotion.errors import InputError
 
-LONGEST_NAME = 255
-
 
 def text_or_file(argument: str) -> str:
     """Return the content of a file of that name, else the argument itself.
@@ -15,7 +13,7 @@ def text_or_file(argument: str) -> str:
     Raises InputError: it looks like a file's name but there is none, or the file is not UTF-8 text.
     """
     path = Path(argument)
-    if len(argument) > LONGEST_NAME or not path.is_file():
+    if not _is_file(path):
         if path.suffix == ".txt" and " " not in argument:
             raise InputError(f"{argument}: no such transcript file")
         return argument
@@ -23,3 +21,10 @@ def text_or_file(argument: str) -> str:
         return path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{argument}: not a readable UTF-8 text ({error})") from error
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:  # too long for a file's name
+        return False

@@ -34,7 +34,7 @@ def normal_equations(mean: Array, precision: Array) -> Bands:
 
 
 def pin(bands: Bands, frame: int, channel: int, value: float) -> None:
-    """Make the solution take ``value`` in one frame of one channel, exactly (in place)."""
+    """Make the solution take ``value`` in one frame of one channel, exactly (in place; once for each)."""
     main, first, second, right = bands
     for reach, diagonal in ((1, first), (2, second)):
         if frame >= reach:

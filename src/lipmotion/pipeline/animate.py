@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from lipmotion.errors import ExportError
+from lipmotion.errors import ExportError, InputError
 from lipmotion.export.base import MOTION_SUFFIXES, write_motion
 from lipmotion.files import check_target
 from lipmotion.pipeline.model import Model, load_model
@@ -18,6 +18,8 @@ from lipmotion.units import Lexicon, words_of
 VIDEO_SUFFIX = ".mp4"
 SOUND_RATE_HZ = 48_000
 """The sound track of a rendered video."""
+SLOWEST_HZ, FASTEST_HZ = 1.0, 1000.0
+"""Frame rates that files are written at; a mistyped one must not fill the memory."""
 
 
 def animate(
@@ -63,11 +65,11 @@ def write(
     speech  : the recording it came from; a video needs it
     rate_hz : frames per second of motion files; the model's own 100 by default
     fps     : frames per second of videos
-    Raises ExportError: unknown suffix, no such folder, or a file that cannot be written. All are checked
-    before the first is written.
+    Raises ExportError: unknown suffix, no such folder, or a file that cannot be written.
+    Raises InputError: a frame rate that is not from 1 to 1000. All are checked before the first is written.
     """
     paths = [Path(output) for output in outputs]
-    check_outputs(paths, speech)
+    check_outputs(paths, speech, rate_hz=rate_hz, fps=fps)
     for path in paths:
         if path.suffix.lower() == VIDEO_SUFFIX:
             _write_video(generation, path, Path(str(speech)), fps)
@@ -75,8 +77,17 @@ def write(
             _write_motion(generation, path, speech, model, rate_hz)
 
 
-def check_outputs(outputs: Sequence[str | Path], speech: str | Path | None = None) -> None:
-    """Raise ExportError unless every output can be written: before work begins, not after it."""
+def check_outputs(
+    outputs: Sequence[str | Path],
+    speech: str | Path | None = None,
+    *,
+    rate_hz: float | None = None,
+    fps: float = 25.0,
+) -> None:
+    """Raise ExportError or InputError unless every output can be written: before work begins, not after it."""
+    for hertz in (fps, rate_hz):
+        if hertz is not None and not SLOWEST_HZ <= hertz <= FASTEST_HZ:
+            raise InputError(f"the frame rate is {hertz}, required {SLOWEST_HZ:.0f} to {FASTEST_HZ:.0f} a second")
     suffixes = (*MOTION_SUFFIXES, VIDEO_SUFFIX)
     for path in map(Path, outputs):
         if path.suffix.lower() not in suffixes:
@@ -84,6 +95,8 @@ def check_outputs(outputs: Sequence[str | Path], speech: str | Path | None = Non
         check_target(path)
         if path.suffix.lower() == VIDEO_SUFFIX and speech is None:
             raise ExportError(f"{path}: a video needs the recording: write(..., speech=FILE)")
+        if speech is not None and path.exists() and Path(speech).exists() and path.samefile(speech):
+            raise ExportError(f"{path}: is the recording itself; give another name")
 
 
 def _write_motion(
@@ -92,8 +105,12 @@ def _write_motion(
     if rate_hz is not None:
         generation = generation.resampled(rate_hz)
     about = (model or load_model()).about
-    named = {key: str(about[key]) for key in ("name", "corpus", "licence", "attribution") if key in about}
+    named = {key: _text(about[key]) for key in ("name", "corpus", "licence", "attribution") if about.get(key)}
     write_motion(path, generation, source={"file": Path(speech).name} if speech else {}, model=named)
+
+
+def _text(value: object) -> str:
+    return "; ".join(map(str, value)) if isinstance(value, list) else str(value)
 
 
 def _write_video(generation: Generation, path: Path, speech: Path, fps: float) -> None:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import json
 import zipfile
+import zlib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from functools import cache
@@ -25,6 +27,8 @@ SHIPPED = "grid-s1.lipmotion"
 HEADER = "header.json"
 OLDEST_DATE = (1980, 1, 1, 0, 0, 0)
 """The date of everything in the file: the same model gives the same bytes."""
+UNREADABLE = (OSError, EOFError, KeyError, ValueError, TypeError, RuntimeError, zlib.error, zipfile.BadZipFile)
+"""What reading a damaged zip, or one of something else, may raise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +88,7 @@ def read_header(path: Path) -> dict[str, Any]:
     try:
         with zipfile.ZipFile(path) as file:
             header = json.loads(file.read(HEADER))
-    except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
+    except UNREADABLE as error:
         raise ModelFormatError(
             f"{path}: not a lipmotion model ({error}); give a file that `lipmotion train` wrote"
         ) from error
@@ -118,14 +122,15 @@ def _read(path: Path) -> Model:
             for name in file.namelist():
                 if name != HEADER:
                     part, _, key = name.removesuffix(".npy").partition("/")
-                    with file.open(name) as member:
-                        arrays[part][key] = np.lib.format.read_array(member, allow_pickle=False)
+                    member = io.BytesIO(file.read(name))  # whole, so that its checksum is compared first
+                    arrays[part][key] = np.lib.format.read_array(member, allow_pickle=False)
         engine = engine_named(header["engine"], header["configuration"])
-        recogniser = HmmConfig(**header["recogniser"])
-    except (OSError, KeyError, ValueError, TypeError, zipfile.BadZipFile) as error:
+        phones = hmm_from_arrays(arrays["phones"], HmmConfig(**header["recogniser"]))
+        learned = engine.from_arrays(arrays["engine"])
+    except UNREADABLE as error:
         raise ModelFormatError(f"{path}: the model is damaged ({error}); train or download it again") from error
     about = {key: value for key, value in header.items() if key not in _OWN_KEYS}
-    return Model(hmm_from_arrays(arrays["phones"], recogniser), engine, engine.from_arrays(arrays["engine"]), about)
+    return Model(phones, engine, learned, about)
 
 
 _OWN_KEYS = ("format", "version", "engine", "configuration", "recogniser")

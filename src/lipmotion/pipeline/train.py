@@ -128,6 +128,7 @@ def _about(corpus: Corpus, utterances: Sequence[Utterance], split: str, used: in
     return {
         "corpus": sorted({source["collection"] for source in sources if "collection" in source}) or [corpus.path.name],
         "split": split,
+        "seed": "none: training draws no random numbers",
         "utterances": used,
         "minutes": round(minutes, 1),
         "licence": sorted({source["licence"] for source in sources if "licence" in source}),

@@ -31,9 +31,9 @@ def words_of(text: str) -> tuple[str, ...]:
 
 def number_words(digits: str) -> list[str]:
     """Return the words of a whole number; past a trillion, or with leading zeros, digit by digit."""
-    number = int(digits)
-    if number >= 10**12 or (len(digits) > 1 and digits[0] == "0"):
+    if len(digits) > 12 or (len(digits) > 1 and digits[0] == "0"):
         return [ONES[int(digit)] for digit in digits]
+    number = int(digits)
     if number < 20:
         return [ONES[number]]
     if number < 100:

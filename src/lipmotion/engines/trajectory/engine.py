@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.base import Arrays, Engine, Fit, frame_of
-from lipmotion.engines.trajectory.closure import Closure, closing_frames
+from lipmotion.engines.trajectory.closure import OPENING, Closure, closing_frames
 from lipmotion.engines.trajectory.contexts import LEVELS, places, with_neighbours
 from lipmotion.engines.trajectory.model import TrajectoryModel, model_arrays, model_from_arrays
 from lipmotion.engines.trajectory.train import fit_trajectory
@@ -75,8 +75,11 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
         means, precisions = np.array(mean)[path], np.array(precision)[path]
         pins = _resolved(constraints, model, frames)
         values, variance = _trajectory(means, precisions, pins)
-        if self.config.closures and model.closure is not None:
-            _close_lips(model.closure, speech.units, (means, precisions), pins, (values, variance))
+        if model.closure is not None:
+            if self.config.closures:
+                _close_lips(model.closure, speech.units, (means, precisions), pins, (values, variance))
+            opening = values[:, model.closure.column]
+            np.maximum(opening, 0, out=opening)  # a smooth curve through a closure may overshoot
         motion, spread = model.space.restore(values, variance)
         return Generation(
             Motion(motion, FRAME_RATE_HZ, model.space.channels),
@@ -109,6 +112,8 @@ def _resolved(constraints: Constraints | None, model: TrajectoryModel, frames: i
             raise InputError(f"pin at {wanted.time_s} s lies outside the recording (0 to {last_s:.2f} s)")
         if not np.isfinite(wanted.value):
             raise InputError(f"pin at {wanted.time_s} s has the value {wanted.value}, required a finite number")
+        if wanted.channel == OPENING and wanted.value < 0:
+            raise InputError(f"pin at {wanted.time_s} s opens the mouth by {wanted.value}, required at least 0")
         pins[frame, names.index(wanted.channel)] = wanted.value
     return pins
 

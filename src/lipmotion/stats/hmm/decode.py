@@ -22,7 +22,7 @@ def decode_units(
     features  : [shape=(T, D)]
     inventory : the units to choose from, silence (the first free unit) among them
     Viterbi over context-dependent states with the bigram (Hofer 2008, Eq. 5). A recording begins and ends
-    in silence or in a unit beside it.
+    in silence, which costs nothing there, or in a unit beside it.
     """
     silence = hmm.table.free[0]
     builder = NetworkBuilder()
@@ -31,12 +31,13 @@ def decode_units(
     for unit in inventory:
         for following in inventory:
             _join(builder, hmm, unit, following, rows)
-        for entry in rows[unit][0]:
-            if unit == silence or entry[1] == silence:
-                builder.initial(entry[0], _language(hmm, silence, unit))
-        for leave in rows[unit][-1]:
-            if unit == silence or leave[1] == silence:
-                builder.final(leave[0], hmm.move(unit, len(rows[unit]) - 1))
+        for entry, met in rows[unit][0]:
+            if met in (None, silence):
+                builder.initial(entry, hmm.config.insertion if unit == silence else _language(hmm, silence, unit))
+        for leave, expected in rows[unit][-1]:
+            if expected in (None, silence):
+                price = _language(hmm, unit, silence) if expected is None and unit != silence else 0.0
+                builder.final(leave, hmm.move(unit, len(rows[unit]) - 1) + price)
     path = builder.build().best_path(hmm.mixtures.log_likelihood(features))
     return _units_of(path, rows, owners)
 

@@ -30,7 +30,7 @@ class HmmConfig:
 
     states: int = 3
     mixtures: int = 8
-    context_frames: int = 60
+    context_frames: int = 30
     relevance: float = 10.0
     iterations: int = 4
     variance_floor: float = 0.02

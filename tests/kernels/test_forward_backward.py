@@ -1,0 +1,84 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lipmotion.kernels.forward_backward import IMPOSSIBLE, chain_posteriors
+from oracles import chains
+
+
+def padded(seed: int, sizes: list[tuple[int, int]], padding: float = 0.0):
+    """Random chains of (frames, states) as the kernel wants them, and one by one as the oracle does."""
+    draw = np.random.default_rng(seed)
+    T, S = (max(size[axis] for size in sizes) for axis in range(2))
+    log_emission = np.full((T, len(sizes), S), padding)
+    log_stay = np.full((len(sizes), S), -1.0)
+    log_move = log_stay.copy()
+    single = []
+    for u, (frames, states) in enumerate(sizes):
+        emission, keep = draw.normal(0, 3, (frames, states)), draw.uniform(0.05, 0.95, states)
+        log_emission[:frames, u, :states] = emission
+        log_stay[u, :states], log_move[u, :states] = np.log(keep), np.log1p(-keep)
+        single.append((emission, np.log(keep), np.log1p(-keep)))
+    frames, states = np.array(sizes, np.intp).T
+    return (log_emission, log_stay, log_move, frames, states), single
+
+
+SIZES = st.lists(st.tuples(st.integers(1, 7), st.integers(1, 3)), min_size=1, max_size=4)
+
+
+@given(seed=st.integers(0, 2**32 - 1), sizes=SIZES, padding=st.sampled_from([0.0, 50.0, -1e4, 1e4]))
+@settings(deadline=None, max_examples=40)
+def test_agrees_with_the_enumeration_of_all_paths(seed, sizes, padding):
+    batch, single = padded(seed, sizes, padding)
+    posterior, stay, log_likelihood = chain_posteriors(*batch)
+    for u, (frames, states) in enumerate(sizes):
+        wanted_posterior, wanted_stay, wanted_log_likelihood = chains.chain_posteriors(*single[u])
+        assert posterior[:frames, u, :states] == pytest.approx(wanted_posterior, abs=1e-10)
+        assert not posterior[frames:, u].any()
+        assert not posterior[:, u, states:].any()
+        assert stay[u, :states] == pytest.approx(wanted_stay, abs=1e-10)
+        assert not stay[u, states:].any()
+        if frames < states:
+            assert log_likelihood[u] <= IMPOSSIBLE / 2
+        else:
+            assert log_likelihood[u] == pytest.approx(wanted_log_likelihood, abs=1e-9)
+
+
+@given(seed=st.integers(0, 2**32 - 1), loudness=st.sampled_from([1.0, 1e3, 1e5]))
+@settings(deadline=None, max_examples=25)
+def test_posteriors_of_every_frame_sum_to_one(seed, loudness):
+    (log_emission, *rest), _ = padded(seed, [(60, 7), (31, 5), (7, 7)])
+    posterior, stay, _ = chain_posteriors(log_emission * loudness, *rest)
+    for u, frames in enumerate((60, 31, 7)):
+        assert posterior[:frames, u].sum(axis=1) == pytest.approx(np.ones(frames), abs=1e-6)
+        assert stay[u].sum() == pytest.approx(frames - (7, 5, 7)[u], abs=1e-6)  # what is not a move is a stay
+
+
+def test_too_short_an_utterance_has_no_path_and_harms_no_other():
+    batch, _ = padded(3, [(6, 3), (2, 3)])
+    alone, _ = padded(3, [(6, 3)])
+    posterior, stay, log_likelihood = chain_posteriors(*batch)
+    assert log_likelihood[1] <= IMPOSSIBLE / 2
+    assert not posterior[:, 1].any()
+    assert not stay[1].any()
+    for together, apart in zip((posterior, stay, log_likelihood), chain_posteriors(*alone), strict=True):
+        whole = together[:, :1] if together.ndim == 3 else together[:1]
+        assert whole == pytest.approx(apart, abs=1e-12)
+
+
+def test_as_many_frames_as_states_leave_one_path():
+    batch, _ = padded(5, [(4, 4)])
+    posterior, stay, _ = chain_posteriors(*batch)
+    assert posterior[:, 0] == pytest.approx(np.eye(4), abs=1e-12)
+    assert not stay.any()
+
+
+def test_order_of_utterances_changes_nothing():
+    batch, _ = padded(7, [(6, 3), (4, 2), (5, 1)])
+    log_emission, log_stay, log_move, frames, states = batch
+    back = [2, 0, 1]
+    shuffled = chain_posteriors(log_emission[:, back], log_stay[back], log_move[back], frames[back], states[back])
+    for mixed, straight in zip(shuffled, chain_posteriors(*batch), strict=True):
+        wanted = straight[:, back] if straight.ndim == 3 else straight[back]
+        assert np.array_equal(mixed, wanted)

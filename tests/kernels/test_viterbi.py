@@ -1,0 +1,113 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lipmotion.kernels import viterbi
+from oracles import paths
+
+
+def random_network(seed: int, states: int, densities: int, density_of_arcs: float):
+    """A network with loops and random arcs, as the kernel wants it, and its arcs by source and target."""
+    draw = np.random.default_rng(seed)
+    arcs = {}
+    for target in range(states):
+        for source in range(states):
+            if source == target or draw.random() < density_of_arcs:
+                arcs[source, target] = np.float32(draw.normal(-2, 1))
+    ordered = sorted(arcs, key=lambda arc: arc[1])
+    some = draw.random((2, states)) < 0.6
+    initial, final = np.where(some, draw.normal(-1, 1, (2, states)), -np.inf).astype(np.float32)
+    arrays = {
+        "emission": draw.integers(densities, size=states),
+        "arc_from": np.array([source for source, _ in ordered], np.intp),
+        "arc_log": np.array([arcs[arc] for arc in ordered], np.float32),
+        "arc_start": np.searchsorted([target for _, target in ordered], np.arange(states)).astype(np.intp),
+        "log_initial": initial,
+        "log_final": final,
+    }
+    return arrays, arcs
+
+
+def random_emission(seed: int, frames: int, densities: int) -> np.ndarray:
+    return np.random.default_rng([seed, 1]).normal(-20, 4, (frames, densities)).astype(np.float32)
+
+
+@pytest.fixture(params=[1, 2, 3, 5, 2048])
+def block(request, monkeypatch) -> int:
+    monkeypatch.setattr(viterbi, "BLOCK", request.param)
+    return request.param
+
+
+@pytest.mark.usefixtures("block")
+@pytest.mark.parametrize("frames", range(1, 8))
+@pytest.mark.parametrize("seed", range(4))
+def test_agrees_with_the_enumeration_of_all_paths(seed, frames):
+    arrays, arcs = random_network(seed, states=3 + seed % 2, densities=3, density_of_arcs=0.5)
+    log_emission = random_emission(seed, frames, 3)
+    path, score = viterbi.best_path(log_emission, **arrays)
+    ends = arrays["log_initial"], arrays["log_final"]
+    wanted, best = paths.best_path(log_emission, arrays["emission"], arcs, *ends)
+    if np.isinf(best):
+        assert score == -np.inf
+    else:
+        assert tuple(path) == wanted
+        assert score == pytest.approx(best, abs=1e-3)
+
+
+@given(seed=st.integers(0, 2**32 - 1), frames=st.integers(1, 80), block=st.integers(1, 90))
+@settings(deadline=None, max_examples=60)
+def test_blocks_change_nothing(seed, frames, block):
+    arrays, arcs = random_network(seed, states=7, densities=4, density_of_arcs=0.3)
+    log_emission = random_emission(seed, frames, 4)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(viterbi, "BLOCK", 1000)
+        whole, score = viterbi.best_path(log_emission, **arrays)
+        patch.setattr(viterbi, "BLOCK", block)
+        path, in_blocks = viterbi.best_path(log_emission, **arrays)
+    assert np.array_equal(path, whole)
+    assert in_blocks == pytest.approx(score, abs=1e-3)
+    if np.isfinite(score):  # and the score is that of the path
+        ends = arrays["log_initial"], arrays["log_final"]
+        own = paths.path_score(tuple(path), log_emission, arrays["emission"], arcs, *ends)
+        assert score == pytest.approx(own, abs=1e-2)
+
+
+def left_to_right(states: int) -> dict:
+    """A chain of states in which the first must begin and the last must end."""
+    nowhere = np.full(states, -np.inf, np.float32)
+    first, last = nowhere.copy(), nowhere.copy()
+    first[0] = last[-1] = 0
+    sources = [source for target in range(states) for source in (target - 1, target) if source >= 0]
+    return {
+        "emission": np.arange(states),
+        "arc_from": np.array(sources, np.intp),
+        "arc_log": np.full(len(sources), -0.5, np.float32),
+        "arc_start": np.array([0, *range(1, 2 * states - 1, 2)], np.intp),
+        "log_initial": first,
+        "log_final": last,
+    }
+
+
+@pytest.mark.usefixtures("block")
+@pytest.mark.parametrize("frames", [1, 2, 3, 4, 6, 7])
+def test_a_network_longer_than_the_recording_is_impossible(frames):
+    _, score = viterbi.best_path(np.zeros((frames, 8), np.float32), **left_to_right(8))
+    assert score == -np.inf
+
+
+@pytest.mark.usefixtures("block")
+def test_the_only_path_is_found():
+    path, score = viterbi.best_path(np.zeros((8, 8), np.float32), **left_to_right(8))
+    assert path.tolist() == list(range(8))
+    assert score == pytest.approx(-3.5)
+
+
+def test_hours_lose_no_precision():
+    chain = left_to_right(2)
+    log_emission = np.full((30_000, 2), -80.0, np.float32)
+    log_emission[:17_000, 0] += 0.25
+    log_emission[17_000:, 1] += 0.25
+    path, score = viterbi.best_path(log_emission, **chain)
+    assert path.argmax() == 17_000
+    assert score == pytest.approx(30_000 * -79.75 - 29_999 * 0.5, rel=1e-6)

@@ -1,0 +1,65 @@
+"""Recognition by trying every unit sequence with every segmentation."""
+
+from itertools import combinations, product
+
+
+def segmentations(frames: int, states: int):
+    """Give every way to cut frames into so many runs, none empty, as their lengths."""
+    for cuts in combinations(range(1, frames), states - 1):
+        edges = (0, *cuts, frames)
+        yield tuple(stop - start for start, stop in zip(edges, edges[1:], strict=False))
+
+
+def sequences(inventory, counts: dict[str, int], frames: int):
+    """Give every sequence of units that fits into the frames."""
+    for length in range(1, frames // min(counts.values()) + 1):
+        for units in product(inventory, repeat=length):
+            if sum(counts[unit] for unit in units) <= frames:
+                yield units
+
+
+def score(hmm, features, units, durations, silence: str = "sil") -> float:
+    """Return the log probability of units whose states last ``durations`` frames.
+
+    Silence lies around the recording. Every unit pays its bigram once, given the one before it; where the
+    recording begins in silence, that silence only pays its insertion; where it ends in a unit, the silence
+    behind it pays as well.
+    """
+    config = hmm.config
+
+    def price(unit, following):
+        return config.bigram_weight * hmm.bigram(unit, following) + config.insertion
+
+    total = config.insertion if units[0] == silence else price(silence, units[0])
+    total += sum(price(unit, following) for unit, following in zip(units, units[1:], strict=False))
+    total += price(units[-1], silence) if units[-1] != silence else 0.0
+    around = (silence, *units, silence)
+    frame, lasting = 0, iter(durations)
+    for position, unit in enumerate(units):
+        for state in range(hmm.table.count(unit)):
+            neighbour = hmm.table.neighbour(around[position], unit, around[position + 2], state)
+            density, count = hmm.table.density(unit, state, neighbour), next(lasting)
+            total += float(hmm.mixtures.log_likelihood(features[frame : frame + count])[:, density].sum())
+            total += (count - 1) * hmm.stay(unit, state) + hmm.move(unit, state)
+            frame += count
+    return total
+
+
+def boundaries(hmm, units, durations) -> list[int]:
+    """Return the first frame of each unit, and the frame count at the end."""
+    edges, frame, lasting = [0], 0, iter(durations)
+    for unit in units:
+        frame += sum(next(lasting) for _ in range(hmm.table.count(unit)))
+        edges.append(frame)
+    return edges
+
+
+def best(hmm, features, candidates, silence: str = "sil"):
+    """Return the best of some unit sequences, its boundaries and its score (None, None, -inf: none fits)."""
+    found = (None, None, float("-inf"))
+    for units in candidates:
+        for durations in segmentations(len(features), sum(hmm.table.count(unit) for unit in units)):
+            total = score(hmm, features, units, durations, silence)
+            if total > found[2]:
+                found = (units, boundaries(hmm, units, durations), total)
+    return found

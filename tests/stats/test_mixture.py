@@ -1,0 +1,152 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.special import logsumexp
+from scipy.stats import multivariate_normal
+
+from lipmotion.stats.mixture import Mixtures, single_gaussian
+
+SEEDS = st.integers(0, 2**32 - 1)
+FLOOR = np.full(3, 1e-3, np.float32)
+
+
+def random_mixtures(seed: int, densities: int = 3, components: int = 2, dimensions: int = 3) -> Mixtures:
+    draw = np.random.default_rng(seed)
+    shape = (densities, components, dimensions)
+    weights = draw.dirichlet(np.full(components, 3.0), densities)
+    return Mixtures(
+        np.log(weights).astype(np.float32),
+        draw.normal(0, 2, shape).astype(np.float32),
+        draw.uniform(0.2, 3, shape).astype(np.float32),
+    )
+
+
+def random_data(seed: int, frames: int = 200) -> tuple[np.ndarray, np.ndarray]:
+    """Two clouds, and how much of each frame a density accounts for."""
+    draw = np.random.default_rng([seed, 7])
+    centres = draw.normal(0, 2, (2, 3))[draw.integers(2, size=frames)]
+    return (centres + draw.normal(0, 0.7, (frames, 3))).astype(np.float32), draw.random(frames).astype(np.float32)
+
+
+def component_logs(mixtures: Mixtures, density: int, x: np.ndarray) -> np.ndarray:
+    """The same as ``log_components`` by SciPy [shape=(T, M)]."""
+    rows = zip(mixtures.log_weights[density], mixtures.means[density], mixtures.variances[density], strict=True)
+    return np.stack([w + multivariate_normal(mean, np.diag(var)).logpdf(x) for w, mean, var in rows], axis=1)
+
+
+def weighted_log_likelihood(mixtures: Mixtures, density: int, x: np.ndarray, share: np.ndarray) -> float:
+    return float(share @ logsumexp(component_logs(mixtures, density, x), axis=1))
+
+
+@given(seed=SEEDS, components=st.sampled_from([1, 2, 4]))
+@settings(deadline=None, max_examples=20)
+def test_log_likelihood_is_that_of_scipy(seed, components):
+    mixtures, (x, _) = random_mixtures(seed, components=components), random_data(seed, 20)
+    for density in range(3):
+        wanted = component_logs(mixtures, density, x)
+        assert mixtures.log_components(x)[:, density] == pytest.approx(wanted, abs=2e-3)
+        assert mixtures.log_likelihood(x)[:, density] == pytest.approx(logsumexp(wanted, axis=1), abs=2e-3)
+
+
+def test_chosen_densities_come_in_the_order_asked_for():
+    mixtures, (x, _) = random_mixtures(1), random_data(1, 10)
+    chosen = np.array([2, 0, 2])
+    assert mixtures.log_likelihood(x, chosen) == pytest.approx(mixtures.log_likelihood(x)[:, chosen], abs=1e-5)
+    assert np.array_equal(mixtures.picked(chosen).log_likelihood(x), mixtures.log_likelihood(x, chosen))
+    assert mixtures.joined(mixtures.picked(chosen)).size == (6, 2, 3)
+
+
+@given(seed=SEEDS)
+@settings(deadline=None, max_examples=30)
+def test_no_step_of_improvement_lowers_the_likelihood(seed):
+    mixtures, (x, share) = random_mixtures(seed), random_data(seed)
+    before = -np.inf
+    for _ in range(8):
+        mixtures.improve(1, x, share, FLOOR)
+        used = np.isfinite(mixtures.log_weights[1])
+        after = weighted_log_likelihood(mixtures.picked(np.array([1])), 0, x, share)
+        if used.all():  # switching a component off is no step of EM
+            assert after >= before - 1e-2  # single precision, 200 frames
+        before = after
+
+
+def test_one_gaussian_takes_the_weighted_mean_and_variance():
+    mixtures, (x, share) = random_mixtures(2, components=1), random_data(2)
+    untouched = mixtures.copy()
+    mixtures.improve(1, x, share, FLOOR)
+    mean = np.average(x, axis=0, weights=share)
+    assert mixtures.means[1, 0] == pytest.approx(mean, abs=1e-4)
+    assert mixtures.variances[1, 0] == pytest.approx(np.average((x - mean) ** 2, axis=0, weights=share), abs=1e-3)
+    assert mixtures.log_weights[1] == pytest.approx(0, abs=1e-6)
+    assert np.array_equal(mixtures.means[[0, 2]], untouched.means[[0, 2]])
+
+
+def test_variances_stay_above_the_floor():
+    mixtures = single_gaussian(np.zeros((10, 3), np.float32), 1)
+    floor = np.array([0.1, 0.2, 0.3], np.float32)
+    mixtures.improve(0, np.ones((50, 3), np.float32), np.ones(50, np.float32), floor)
+    assert mixtures.variances[0, 0] == pytest.approx(floor)
+
+
+def test_a_component_without_data_is_switched_off():
+    mixtures, (x, share) = random_mixtures(3), random_data(3)
+    mixtures.means[0, 1] = 1000
+    mixtures.improve(0, x, share, FLOOR)
+    assert mixtures.log_weights[0].tolist() == pytest.approx([0, -np.inf])
+    assert np.isfinite(mixtures.log_likelihood(x)).all()
+    mixtures.improve(0, x, share, FLOOR)
+    assert np.isfinite(mixtures.split().log_likelihood(x)).all()
+
+
+@given(seed=SEEDS)
+@settings(deadline=None, max_examples=20)
+def test_huge_relevance_keeps_the_prior(seed):
+    mixtures, (x, share) = random_mixtures(seed), random_data(seed)
+    wanted = mixtures.picked(np.array([2]))
+    mixtures.means[0], mixtures.variances[0], mixtures.log_weights[0] = (
+        wanted.means[0],
+        wanted.variances[0],
+        wanted.log_weights[0],
+    )
+    mixtures.adapt(0, x, share, prior=2, relevance=1e8)
+    assert mixtures.means[0] == pytest.approx(wanted.means[0], abs=1e-3)
+    assert mixtures.variances[0] == pytest.approx(wanted.variances[0], rel=1e-3, abs=1e-3)
+    assert mixtures.log_weights[0] == pytest.approx(wanted.log_weights[0], abs=1e-3)
+
+
+def test_tiny_relevance_follows_the_data():
+    mixtures, (x, share) = random_mixtures(4, components=1), random_data(4)
+    mixtures.variances[2] = 1  # the prior's variance bounds what adaptation may reach from below
+    mixtures.adapt(0, x, share, prior=2, relevance=1e-6)
+    mean = np.average(x, axis=0, weights=share)
+    variance = np.average((x - mean) ** 2, axis=0, weights=share)
+    assert mixtures.means[0, 0] == pytest.approx(mean, abs=1e-3)
+    assert mixtures.variances[0, 0] == pytest.approx(np.maximum(variance, 0.25), rel=1e-2)
+
+
+def test_relevance_counts_as_frames():
+    mixtures, x = random_mixtures(5, components=1), np.full((30, 3), 2.0, np.float32)
+    prior = mixtures.means[1, 0].astype(float)
+    mixtures.adapt(0, x, np.ones(30, np.float32), prior=1, relevance=10.0)
+    assert mixtures.means[0, 0] == pytest.approx((10 * prior + 30 * 2) / 40, abs=1e-5)
+
+
+@given(seed=SEEDS)
+@settings(deadline=None, max_examples=20)
+def test_splitting_keeps_the_density_nearly_the_same(seed):
+    mixtures, (x, _) = random_mixtures(seed), random_data(seed, 50)
+    split = mixtures.split()
+    assert split.size == (3, 4, 3)
+    assert np.exp(split.log_weights).sum(axis=1) == pytest.approx(np.ones(3), abs=1e-5)
+    assert split.means.reshape(3, 2, 2, 3).mean(axis=1) == pytest.approx(mixtures.means, abs=1e-5)
+    inner = np.abs(x[:, None] - mixtures.means.mean(axis=1)).max(axis=2) < 3
+    change = split.log_likelihood(x) - mixtures.log_likelihood(x)
+    assert np.abs(change[inner]).max(initial=0) < 1.5  # 0.02 z² a dimension, here up to five deviations out
+    assert np.median(np.abs(change)) < 0.5
+
+
+def test_a_copy_shares_nothing():
+    mixtures = random_mixtures(6)
+    mixtures.copy().means[:] = 0
+    assert mixtures.means.any()
