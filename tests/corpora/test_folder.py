@@ -5,7 +5,6 @@ from pathlib import Path
 import pytest
 
 from lipmotion.corpora.discover import discover
-from lipmotion.corpora.folder import transcript_words
 from lipmotion.errors import CorpusError, InputError
 
 
@@ -30,12 +29,15 @@ def test_transcripts_lie_beside_the_videos(tmp_path):
     (tmp_path / "sub" / "b.txt").write_text("Nothing.\n")
     (tmp_path / "c.txt").write_text("\n")
     words = {item.name: item.words for item in discover(tmp_path).items}
-    assert words == {"a": ("hello", "world", "it's", "3", "o'clock", "naïve"), "sub-b": ("nothing",), "c": None}
+    assert words == {"a": ("hello", "world", "it's", "three", "o'clock", "naïve"), "sub-b": ("nothing",), "c": None}
 
 
-def test_words():
-    assert transcript_words('\'Tis well-known; "YES"!') == ("tis", "well", "known", "yes")
-    assert transcript_words("...") == ()
+def test_a_transcript_without_words_is_reported(tmp_path):
+    touch(tmp_path, "a.mp4", "b.mp4")
+    (tmp_path / "a.txt").write_text("...")
+    found = discover(tmp_path)
+    assert [item.name for item in found.items] == ["b"]
+    assert "holds no word" in found.problems["a"]
 
 
 def test_a_transcript_in_another_encoding_is_reported(tmp_path):

@@ -1,13 +1,13 @@
 """Recognition by trying every unit sequence with every segmentation."""
 
-from itertools import combinations, product
+from itertools import combinations, pairwise, product
 
 
 def segmentations(frames: int, states: int):
     """Give every way to cut frames into so many runs, none empty, as their lengths."""
     for cuts in combinations(range(1, frames), states - 1):
         edges = (0, *cuts, frames)
-        yield tuple(stop - start for start, stop in zip(edges, edges[1:], strict=False))
+        yield tuple(stop - start for start, stop in pairwise(edges))
 
 
 def sequences(inventory, counts: dict[str, int], frames: int):
@@ -31,7 +31,7 @@ def score(hmm, features, units, durations, silence: str = "sil") -> float:
         return config.bigram_weight * hmm.bigram(unit, following) + config.insertion
 
     total = config.insertion if units[0] == silence else price(silence, units[0])
-    total += sum(price(unit, following) for unit, following in zip(units, units[1:], strict=False))
+    total += sum(price(unit, following) for unit, following in pairwise(units))
     total += price(units[-1], silence) if units[-1] != silence else 0.0
     around = (silence, *units, silence)
     frame, lasting = 0, iter(durations)

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from scipy.special import logsumexp
 from scipy.stats import multivariate_normal
 
-from lipmotion.stats.mixture import Mixtures, single_gaussian
+from lipmotion.stats.mixture import SPLIT_STEP, Mixtures, single_gaussian
 
 SEEDS = st.integers(0, 2**32 - 1)
 FLOOR = np.full(3, 1e-3, np.float32)
@@ -132,18 +132,20 @@ def test_relevance_counts_as_frames():
     assert mixtures.means[0, 0] == pytest.approx((10 * prior + 30 * 2) / 40, abs=1e-5)
 
 
-@given(seed=SEEDS)
+@given(seed=SEEDS, components=st.sampled_from([1, 2]))
 @settings(deadline=None, max_examples=20)
-def test_splitting_keeps_the_density_nearly_the_same(seed):
-    mixtures, (x, _) = random_mixtures(seed), random_data(seed, 50)
+def test_splitting_keeps_the_density_nearly_the_same(seed, components):
+    mixtures, (x, _) = random_mixtures(seed, components=components), random_data(seed, 50)
     split = mixtures.split()
-    assert split.size == (3, 4, 3)
+    assert split.size == (3, 2 * components, 3)
     assert np.exp(split.log_weights).sum(axis=1) == pytest.approx(np.ones(3), abs=1e-5)
-    assert split.means.reshape(3, 2, 2, 3).mean(axis=1) == pytest.approx(mixtures.means, abs=1e-5)
-    inner = np.abs(x[:, None] - mixtures.means.mean(axis=1)).max(axis=2) < 3
+    assert split.means.reshape(3, 2, components, 3).mean(axis=1) == pytest.approx(mixtures.means, abs=1e-5)
     change = split.log_likelihood(x) - mixtures.log_likelihood(x)
-    assert np.abs(change[inner]).max(initial=0) < 1.5  # 0.02 z² a dimension, here up to five deviations out
-    assert np.median(np.abs(change)) < 0.5
+    z = ((x[:, None, None] - mixtures.means) / np.sqrt(mixtures.variances)).sum(axis=3)
+    wanted = np.log(np.cosh(SPLIT_STEP * z)) - 3 * SPLIT_STEP**2 / 2  # of each component
+    assert (change > wanted.min(axis=2) - 5e-3).all()
+    assert (change < wanted.max(axis=2) + 5e-3).all()
+    assert wanted[np.abs(z) < 2].max(initial=0) < 0.1
 
 
 def test_a_copy_shares_nothing():

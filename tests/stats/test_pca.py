@@ -39,7 +39,7 @@ def test_never_more_components_than_dimensions():
 
 
 def test_a_line_is_one_component():
-    line = np.outer(np.linspace(-1, 1, 9), [3.0, 0.0, 4.0]) + [1, 2, 3]
+    line = np.outer(np.linspace(-1, 1, 9), [3.0, 0.0, 4.0]) + np.array([1, 2, 3])
     pca = fit_pca(line, 1)
     assert pca.basis[0] == pytest.approx([0.6, 0, 0.8])  # the sign too: the largest entry is positive
     assert pca.restore(pca.project(line)) == pytest.approx(line)

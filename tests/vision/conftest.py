@@ -10,14 +10,6 @@ from numpy.typing import NDArray
 WriteVideo = Callable[..., Path]
 
 
-@pytest.fixture(scope="session")
-def recordings() -> Path:
-    folder = Path(__file__).parents[2].parent / "shared" / "corpora"
-    if not folder.is_dir():
-        pytest.skip("the real recordings are not here")
-    return folder
-
-
 @pytest.fixture
 def write_video(tmp_path: Path) -> WriteVideo:
     """Writes a video whose frame n is a flat grey of value 10 · n."""

@@ -21,11 +21,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     logging.basicConfig(format="lipmotion: %(levelname)s: %(message)s", level=logging.WARNING)
     logging.addLevelName(logging.WARNING, "warning")
     try:
-        try:
-            options = _parser().parse_args(arguments)
-            options.run(options)
-        finally:
-            sys.stdout.flush()  # now, for what goes wrong when Python ends cannot be told any more
+        _run(arguments)
     except LipMotionError as error:
         print(f"lipmotion: error: {' '.join(str(error).split())}", file=sys.stderr)
         return error.exit_code
@@ -33,18 +29,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print("lipmotion: interrupted", file=sys.stderr)
         return 130
     except BrokenPipeError:  # the reader of our output has gone; nothing is left to say
-        _discard_output()
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except OSError as error:  # what the operating system refuses: no permission, a name too long
-        _discard_output()
         print(f"lipmotion: error: {error}", file=sys.stderr)
         return InputError.exit_code
     return 0
 
 
-def _discard_output() -> None:
-    """Send what was printed but not yet delivered nowhere: Python would try again when it ends."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+def _run(arguments: Sequence[str] | None) -> None:
+    try:
+        options = _parser().parse_args(arguments)
+        options.run(options)
+    finally:
+        if sys.stdout is not None:
+            sys.stdout.flush()  # not when Python ends: nobody could be told then that it failed
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 from lipmotion.corpora.base import Recording, Recordings, videos
 from lipmotion.corpora.splits import LISTS, with_splits
 from lipmotion.errors import InputError
+from lipmotion.units import words_of
 
 KIND = "folder of videos"
-WORD = re.compile(r"\w+(?:'\w+)*")
-"""Letters and digits of any script, with apostrophes inside."""
 
 
 def read_folder(directory: Path) -> Recordings:
@@ -34,11 +32,6 @@ def read_folder(directory: Path) -> Recordings:
     return with_splits(Recordings(KIND, tuple(items), problems), directory)
 
 
-def transcript_words(text: str) -> tuple[str, ...]:
-    """Return the words of a text, lower case, without punctuation."""
-    return tuple(WORD.findall(text.lower().replace("’", "'")))
-
-
 def _only(paths: list[Path]) -> Path:
     if len(paths) > 1:
         raise InputError(f"{len(paths)} videos share this name: {', '.join(map(str, paths))}; rename all but one")
@@ -49,6 +42,7 @@ def _words(path: Path, directory: Path) -> tuple[str, ...] | None:
     if not path.is_file() or (path.parent == directory and path.name in LISTS):
         return None
     try:
-        return transcript_words(path.read_text(encoding="utf-8-sig")) or None
+        text = path.read_text(encoding="utf-8-sig")
+        return words_of(text) if text.strip() else None
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: the transcript is not UTF-8 text; save it as UTF-8") from error

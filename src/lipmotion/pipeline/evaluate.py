@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.corpora.store import Corpus
-from lipmotion.errors import CorpusError
+from lipmotion.errors import AlignmentError, CorpusError
 from lipmotion.measures import curves
 from lipmotion.measures.bootstrap import interval
 from lipmotion.measures.closures import closed_threshold, closure_figures, phone_closures
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.train import labels_of
 from lipmotion.speech.phones import recognise
-from lipmotion.types import Speech, Timeline, Unit, Utterance
+from lipmotion.types import Motion, Speech, Timeline, Unit, Utterance
 from lipmotion.units import Lexicon, is_silent
 
 DISTANCES = ("opening", "width", "outer")
@@ -46,7 +46,8 @@ def evaluate(
     The reference for what is speech and where its p, b, m are is the forced alignment, or recognition where
     nothing is transcribed. The mouth counts as closed relative to the corpus's own training list (without
     one: to the split itself).
-    Raises CorpusError: no utterances of this split, or other motion channels than the model's.
+    Raises CorpusError: no utterances of this split, or corpus or model without the channels compared.
+    Raises AlignmentError: a transcript does not fit into its recording.
     """
     lexicon = lexicon or Lexicon()
     names = corpus.names(split)
@@ -54,8 +55,8 @@ def evaluate(
         found = ", ".join(f"{name}: {count}" for name, count in corpus.splits.items())
         raise CorpusError(f"{corpus.path}: no utterances of split {split!r} (there are {found})")
     utterances = [corpus.utterance(name) for name in names]
-    _check_channels(utterances[0])
-    reference = [labels_of(utterance, model.phones, lexicon) for utterance in utterances]
+    _check_channels("corpus", utterances[0].track.motion)
+    reference = [_reference(utterance, model, lexicon) for utterance in utterances]
     threshold = closed_threshold([_openings(u) for u in _training(corpus) or utterances])
     conditions = {"audio only": [recognise(model.phones, u.features) for u in utterances]}
     if all(utterance.words for utterance in utterances):
@@ -81,10 +82,17 @@ def _openings(utterance: Utterance) -> NDArray[np.float64]:
     return np.asarray(utterance.track.motion["opening"], float)[np.asarray(utterance.track.seen)]
 
 
-def _check_channels(utterance: Utterance) -> None:
-    missing = [name for name in DISTANCES if name not in utterance.track.motion.names]
+def _check_channels(owner: str, motion: Motion) -> None:
+    missing = [name for name in DISTANCES if name not in motion.names]
     if missing:
-        raise CorpusError(f"the corpus has no channels {', '.join(missing)}: these figures compare lip distances")
+        raise CorpusError(f"the {owner} has no channels {', '.join(missing)}: these figures compare lip distances")
+
+
+def _reference(utterance: Utterance, model: Model, lexicon: Lexicon) -> Timeline[Unit]:
+    try:
+        return labels_of(utterance, model.phones, lexicon)
+    except AlignmentError as error:
+        raise AlignmentError(f"{utterance.name}: {error}; correct its transcript, or leave it out") from error
 
 
 def _clip(model: Model, utterance: Utterance, units: Timeline[Unit], reference: Timeline[Unit]) -> Clip:
@@ -92,6 +100,7 @@ def _clip(model: Model, utterance: Utterance, units: Timeline[Unit], reference: 
     seen = np.asarray(utterance.track.seen)
     time_s = (np.arange(len(motion.values)) / motion.rate_hz)[seen]
     generated = model.engine.generate(model.learned, Speech(utterance.features, units)).motion
+    _check_channels("model", generated)
     spoken = tuple((s.start_s, s.end_s, s.label.phone) for s in reference if not is_silent(s.label.phone))
     return Clip(
         original=np.stack([motion[name][seen] for name in DISTANCES], axis=1).astype(float),

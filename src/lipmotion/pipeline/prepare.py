@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import multiprocessing
 import os
+import shutil
 import signal
 import sys
 import threading
@@ -93,6 +94,7 @@ def prepare(
     start_s = time.monotonic()
     found = discover(directory)
     packages = versions()
+    is_new = not output.exists()
     corpus = Corpus.create(output)
     settings = {"recipe": RECIPE, "tracker": f"mediapipe {packages['mediapipe']}", "crops": "yes" if crops else "no"}
     jobs = [_job(item, directory.resolve(), corpus, packages, settings) for item in found.items]
@@ -102,6 +104,8 @@ def prepare(
         corpus.refresh()
     report = _report(corpus, found, outcomes, time.monotonic() - start_s)
     if not report.prepared and not report.kept:
+        if is_new:
+            shutil.rmtree(output)
         name, reason = next(iter(report.failed.items()))
         raise CorpusError(
             f"{directory}: none of {len(report.failed)} recordings is usable; the first, {name}: {reason}"

@@ -93,13 +93,20 @@ def model_motion(track: Track, frames: int) -> tuple[Motion, Any]:
 
 
 def _phones(utterances: Sequence[Utterance], lexicon: Lexicon, config: HmmConfig, monitor: Monitor) -> UnitHmm:
-    spoken = [(utterance.features, utterance.words) for utterance in utterances if utterance.words]
+    spoken = [(u.features, u.words) for u in utterances if u.words and _can_be_said(u.words, lexicon)]
     if not spoken:
         LOG.warning("no transcripts in the corpus: its phones are recognised by the shipped model")
         return load_model().phones
     said = dict.fromkeys(word for _, words in spoken for word in words)
     report_guesses(tuple(said), lexicon)
     return train_phones(spoken, lexicon, config, monitor)
+
+
+def _can_be_said(words: Sequence[str], lexicon: Lexicon) -> bool:
+    try:
+        return all(lexicon.pronunciations(word) for word in words)
+    except InputError:  # a word of another script; the utterance is reported when it is aligned
+        return False
 
 
 def _examples(

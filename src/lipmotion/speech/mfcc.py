@@ -21,6 +21,8 @@ LIFTER = 22
 PRE_EMPHASIS = 0.97
 DYNAMIC_RANGE = 1e-8
 """Powers are floored this far below the loudest of the recording (80 dB): digital silence has a logarithm."""
+LOUDEST = 1e6
+"""Samples beyond are damage, whatever their full scale was; their squares would not be finite."""
 BLOCK = 4096
 """Frames transformed at a time: memory stays bounded for any length."""
 
@@ -30,13 +32,17 @@ def mfcc(audio: Audio) -> Features:
 
     Frame n is centred at n · 10 ms, the signal reflected at both ends: T = floor(duration · 100) + 1.
     Mean and variance are normalised over the recording.
-    Raises InputError: the rate is not 16 kHz, or the recording is shorter than one window.
+    Raises InputError: the rate is not 16 kHz, the recording is shorter than one window, or not one channel of
+    finite samples.
     Source: Xie & Liu 2007, §5.1; details in the project's conventions.
     """
     if audio.rate_hz != SPEECH_RATE_HZ:
         raise InputError(f"speech features need {SPEECH_RATE_HZ} Hz, found {audio.rate_hz} Hz; resample first")
-    if len(audio.samples) < WINDOW:
-        raise InputError(f"speech features need {WINDOW} samples, found {len(audio.samples)}")
+    if audio.samples.ndim != 1 or len(audio.samples) < WINDOW:
+        raise InputError(f"speech features need {WINDOW} samples of one channel, found shape {audio.samples.shape}")
+    peak = float(np.abs(audio.samples).max())
+    if not peak < LOUDEST:
+        raise InputError(f"speech features need finite samples, full scale 1, found a peak of {peak:g}")
     static = _static(audio.samples.astype(np.float32))
     delta = regression_delta(static)
     values = np.concatenate([static, delta, regression_delta(delta)], axis=1)
@@ -57,7 +63,8 @@ def regression_delta(values: NDArray[np.float32], reach: int = 2) -> NDArray[np.
 def normalised(values: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return the columns with mean 0 and standard deviation 1; a constant column becomes 0."""
     deviation = values.std(axis=0)
-    return (values - values.mean(axis=0)) / np.where(deviation > 1e-6, deviation, 1).astype(np.float32)
+    scaled = (values - values.mean(axis=0)) / np.where(deviation > 1e-6, deviation, 1).astype(np.float32)
+    return np.where(np.ptp(values, axis=0) > 0, scaled, np.float32(0))  # the mean of a constant is rounded
 
 
 def _static(samples: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -58,8 +58,11 @@ def align(hmm: UnitHmm, features: Features, words: Sequence[str], lexicon: Lexic
 def recognise(hmm: UnitHmm, features: Features) -> Timeline[Unit]:
     """Return the phones that were most probably said, in time: Viterbi with a back-off bigram.
 
+    Digital silence, of which all normalised features are 0, is silence.
     Source: Hofer 2008, Eq. 5.
     """
+    if not features.values.any():
+        return _timeline([(SILENCE, "")], np.array([0, len(features.values)]), features.duration_s)
     inventory = [unit for unit in hmm.table.units if unit != PAUSE]
     phones, bounds = decode_units(hmm, features.values, inventory)
     return _timeline([(phone, "") for phone in phones], bounds, features.duration_s)

@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 SPLIT_STEP = 0.2
 """Halves of a split component move apart by this many standard deviations."""
+BLOCK = 256
+"""Frames whose components are computed at a time: they fit into the cache."""
 LOG_2PI = float(np.log(2 * np.pi))
 
 
@@ -35,27 +37,31 @@ class Mixtures:
 
         x      : [shape=(T, D)]
         chosen : [shape=(G',)], the densities wanted; all by default
-        Cost: O(T·G'·M·D), as two matrix products.
+        Cost: O(T·G'·M·D), as one matrix product.
         """
-        pick = slice(None) if chosen is None else chosen
-        means, precision = self.means[pick], 1 / self.variances[pick]
-        G, M, D = means.shape
-        constant = self.log_weights[pick] - 0.5 * (
-            D * LOG_2PI - np.log(precision).sum(axis=2) + (means * means * precision).sum(axis=2)
-        )
-        log_density = x @ (means * precision).reshape(G * M, D).T
-        log_density -= (x * x) @ (precision / 2).reshape(G * M, D).T
-        return log_density.reshape(len(x), G, M) + constant.astype(np.float32)
+        return _quadratic(x, *self._quadratic_form(chosen)).transpose(0, 2, 1)
 
     def log_likelihood(self, x: NDArray[np.float32], chosen: NDArray[np.intp] | None = None) -> NDArray[np.float32]:
         """Return the log density of every frame under every mixture [shape=(T, G')]."""
-        components = self.log_components(x, chosen)
-        if components.shape[2] == 1:
-            return components[:, :, 0]
-        best = components.max(axis=2)
-        components -= best[:, :, None]
-        np.exp(components, out=components)
-        return best + np.log(components.sum(axis=2))
+        form, constant = self._quadratic_form(chosen)
+        result = np.empty((len(x), constant.shape[1]), np.float32)
+        for start in range(0, len(x), BLOCK):
+            components = _quadratic(x[start : start + BLOCK], form, constant)
+            best = components.max(axis=1)
+            components -= best[:, None]
+            np.exp(components, out=components)
+            result[start : start + BLOCK] = best + np.log(components.sum(axis=1))
+        return result
+
+    def _quadratic_form(self, chosen: NDArray[np.intp] | None) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Return what x and x² are multiplied by [shape=(2 D, M G')], and what is added [shape=(M, G')]."""
+        pick = slice(None) if chosen is None else chosen
+        means, precision = self.means[pick], 1 / self.variances[pick]
+        constant = self.log_weights[pick] - 0.5 * (
+            means.shape[2] * LOG_2PI - np.log(precision).sum(axis=2) + (means * means * precision).sum(axis=2)
+        )
+        form = np.concatenate([means * precision, precision / -2], axis=2).transpose(2, 1, 0)
+        return np.ascontiguousarray(form).reshape(len(form), -1), constant.T.astype(np.float32)
 
     def split(self) -> Mixtures:
         """Return twice as many components, each half moved apart along all axes."""
@@ -134,6 +140,13 @@ class Mixtures:
         return replace(
             self, log_weights=self.log_weights.copy(), means=self.means.copy(), variances=self.variances.copy()
         )
+
+
+def _quadratic(x: NDArray[np.float32], form: NDArray[np.float32], constant: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return the log densities of components [shape=(T, M, G)]; G last, for sums over M run along memory."""
+    values = (np.concatenate([x, x * x], axis=1) @ form).reshape(len(x), *constant.shape)
+    values += constant
+    return values
 
 
 def single_gaussian(x: NDArray[np.float32], count: int) -> Mixtures:

@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from lipmotion.stats.hmm.model import UnitHmm
 from lipmotion.stats.hmm.network import NetworkBuilder
+from lipmotion.stats.hmm.states import Context
 
-Node = tuple[int, "str | None"]
-"""A state of the network, and the neighbour it stands for (None: any)."""
+Row = dict[Context, int]
+"""One state of a unit: its node for each neighbour that has one of its own, under None that for all others."""
 
 
 def decode_units(
@@ -27,36 +28,36 @@ def decode_units(
     silence = hmm.table.free[0]
     builder = NetworkBuilder()
     owners: list[str] = []
-    rows = {unit: _unit_nodes(builder, owners, hmm, unit, inventory) for unit in inventory}
+    rows = {unit: _unit_rows(builder, owners, hmm, unit, inventory) for unit in inventory}
     for unit in inventory:
-        for following in inventory:
-            _join(builder, hmm, unit, following, rows)
-        for entry, met in rows[unit][0]:
-            if met in (None, silence):
-                builder.initial(entry, hmm.config.insertion if unit == silence else _language(hmm, silence, unit))
-        for leave, expected in rows[unit][-1]:
-            if expected in (None, silence):
-                price = _language(hmm, unit, silence) if expected is None and unit != silence else 0.0
-                builder.final(leave, hmm.move(unit, len(rows[unit]) - 1) + price)
+        _join(builder, hmm, unit, inventory, rows)
+        if unit == silence:
+            builder.initial(_node(rows[unit][0], silence), hmm.config.insertion)
+            builder.final(_node(rows[unit][-1], silence), hmm.move(unit, len(rows[unit]) - 1))
+        else:
+            builder.initial(_node(rows[unit][0], silence), _language(hmm, silence, unit))
+            builder.final(_node(rows[unit][-1], silence), _leave(hmm, unit, silence, rows))
     path = builder.build().best_path(hmm.mixtures.log_likelihood(features))
-    return _units_of(path, rows, owners)
+    return _units_of(path, {entry for unit_rows in rows.values() for entry in unit_rows[0].values()}, owners)
 
 
 def _language(hmm: UnitHmm, unit: str, following: str) -> float:
     return hmm.config.bigram_weight * hmm.bigram(unit, following) + hmm.config.insertion
 
 
-def _unit_nodes(
+def _node(row: Row, neighbour: str) -> int:
+    return row[neighbour] if neighbour in row else row[None]
+
+
+def _unit_rows(
     builder: NetworkBuilder, owners: list[str], hmm: UnitHmm, unit: str, inventory: Sequence[str]
-) -> list[list[Node]]:
+) -> list[Row]:
     """Add the states of one unit in all contexts, and the arcs between them."""
-    rows: list[list[Node]] = []
+    rows: list[Row] = []
     for state in range(hmm.table.count(unit)):
-        contexts = inventory if hmm.table.side(unit, state) else [None]
-        row = []
-        for context in contexts:
-            number = builder.state(hmm.table.density(unit, state, context), hmm.stay(unit, state))
-            row.append((number, context))
+        row: Row = {}
+        for context in _contexts(hmm, unit, state, inventory):
+            row[context] = builder.state(hmm.table.density(unit, state, context), hmm.stay(unit, state))
             owners.append(unit)
         if rows:
             _advance(builder, hmm, unit, state, rows[-1], row)
@@ -64,36 +65,50 @@ def _unit_nodes(
     return rows
 
 
-def _advance(
-    builder: NetworkBuilder, hmm: UnitHmm, unit: str, state: int, sources: list[Node], targets: list[Node]
-) -> None:
-    """Join two successive states of a unit; the one that fixes the right neighbour pays for it."""
+def _contexts(hmm: UnitHmm, unit: str, state: int, inventory: Sequence[str]) -> list[Context]:
+    """Return the neighbours that need a node of their own; all others share one, whose densities are the same.
+
+    A neighbour known to any state on one side of the unit counts for all states on that side: so a path never
+    has to remember more than its node says, and the search stays exact.
+    """
+    side = hmm.table.side(unit, state)
+    alike = [k for k in range(hmm.table.count(unit)) if hmm.table.side(unit, k) == side] if side else []
+    own: list[Context] = [
+        neighbour
+        for neighbour in inventory
+        if any(hmm.table.density(unit, k, neighbour) != hmm.table.density(unit, k) for k in alike)
+    ]
+    return own if len(own) == len(inventory) else [*own, None]
+
+
+def _advance(builder: NetworkBuilder, hmm: UnitHmm, unit: str, state: int, sources: Row, targets: Row) -> None:
+    """Join two successive states of a unit; a node that fixes the right neighbour is paid for on the way in."""
     move = hmm.move(unit, state - 1)
     same_side = hmm.table.side(unit, state - 1) == hmm.table.side(unit, state)
     pays = hmm.table.side(unit, state) == ">" and not same_side
-    for source, met in sources:
-        for target, wanted in targets:
+    for met, source in sources.items():
+        for wanted, target in targets.items():
             if not same_side or met == wanted:
                 price = _language(hmm, unit, wanted) if pays and wanted is not None else 0.0
                 builder.arc(source, target, move + price)
 
 
-def _join(builder: NetworkBuilder, hmm: UnitHmm, unit: str, following: str, rows: dict[str, list[list[Node]]]) -> None:
-    """Join the end of a unit to the start of the one that follows."""
-    move = hmm.move(unit, len(rows[unit]) - 1)
-    for leave, expected in rows[unit][-1]:
-        if expected not in (None, following):
-            continue
-        price = _language(hmm, unit, following) if expected is None else 0.0
-        for entry, met in rows[following][0]:
-            if met in (None, unit):
-                builder.arc(leave, entry, move + price)
+def _join(
+    builder: NetworkBuilder, hmm: UnitHmm, unit: str, inventory: Sequence[str], rows: dict[str, list[Row]]
+) -> None:
+    """Join the end of a unit to every unit that may follow."""
+    for following in inventory:
+        entry = _node(rows[following][0], unit)
+        builder.arc(_node(rows[unit][-1], following), entry, _leave(hmm, unit, following, rows))
 
 
-def _units_of(
-    path: NDArray[np.intp], rows: dict[str, list[list[Node]]], owners: list[str]
-) -> tuple[tuple[str, ...], NDArray[np.intp]]:
+def _leave(hmm: UnitHmm, unit: str, following: str, rows: dict[str, list[Row]]) -> float:
+    """Return the price of going from a unit to another: the bigram, unless the node that is left has paid it."""
+    price = 0.0 if following in rows[unit][-1] else _language(hmm, unit, following)
+    return hmm.move(unit, len(rows[unit]) - 1) + price
+
+
+def _units_of(path: NDArray[np.intp], entries: set[int], owners: list[str]) -> tuple[tuple[str, ...], NDArray[np.intp]]:
     """Return the units along a path: one begins where a first state is entered from another state."""
-    entries = {entry for row in rows.values() for entry, _ in row[0]}
     starts = [t for t in range(len(path)) if t == 0 or (path[t] != path[t - 1] and path[t] in entries)]
     return tuple(owners[path[t]] for t in starts), np.array([*starts, len(path)], np.intp)

@@ -79,11 +79,26 @@ def hmm_from_arrays(arrays: Mapping[str, NDArray[Any]], config: HmmConfig) -> Un
     """Return the models again. Raises ModelFormatError: something is missing or has the wrong shape."""
     try:
         units, counts, names, free = (arrays[key].tolist() for key in ("units", "counts", "names", "free"))
+        _check_shapes(arrays)
         table = StateTable(tuple(units), tuple(counts), tuple(names), tuple(free))
         mixtures = Mixtures(*(arrays[key].astype(np.float32) for key in ("log_weights", "means", "variances")))
-        if mixtures.means.shape != mixtures.variances.shape or len(mixtures.means) != len(names):
-            raise ValueError(f"{len(names)} states, means of shape {mixtures.means.shape}")
         bigram = Bigram(table.units, arrays["bigram"].astype(np.float32))
         return UnitHmm(config, table, mixtures, arrays["log_stay"].astype(np.float32), bigram)
     except (KeyError, ValueError) as error:
         raise ModelFormatError(f"the phone models are damaged ({error}); train or download the model again") from error
+
+
+def _check_shapes(arrays: Mapping[str, NDArray[Any]]) -> None:
+    units, densities = len(arrays["units"]), len(arrays["names"])
+    each = (densities, *arrays["means"].shape[1:])
+    required = {
+        "counts": (units,),
+        "bigram": (units, units),
+        "log_stay": (int(arrays["counts"].sum()),),
+        "log_weights": each[:2],
+        "means": each,
+        "variances": each,
+    }
+    for name, shape in required.items():
+        if arrays[name].shape != shape:
+            raise ValueError(f"{name} of shape {arrays[name].shape}, required {shape}")

@@ -22,8 +22,11 @@ BATCH = 64
 """Utterances whose posteriors are computed together."""
 LEAST_POSTERIOR = 1e-3
 """State posteriors under this are left out of the statistics."""
-ONSET_SHARE = 0.4
+ONSET_SHARE = 0.5
 """For the flat start, speech is where the log energy has risen this far from its 10th to its 95th percentile."""
+ONSET_FRAMES = 21
+"""The log energy is averaged over so many frames for that. Without it a click or a breath is the end of speech, and
+the state before it takes the silence for its own: the last words of GRID then ended up to 0.8 s late."""
 LONGEST_SILENCE, LONGEST_STATE = 200.0, 12.0
 """Most frames that a state of silence, or of any other unit, may last on average. Without the second limit the
 closure of a stop that begins every other sentence takes the silence before it for its own."""
@@ -55,7 +58,7 @@ def train_hmm(
     """Train models of every unit that the utterances say.
 
     Stages: flat start with the first pronunciations; choice of pronunciations and pauses; mixtures by
-    splitting; states in context. Each stage is embedded Baum–Welch over whole utterances.
+    splitting; the choice again; states in context. Each stage is embedded Baum–Welch over whole utterances.
     Raises CorpusError: no utterance, or none long enough for its transcript.
     """
     sequences = [_first_guess(u, inventory) for u in utterances]
@@ -68,12 +71,14 @@ def train_hmm(
     data = [utterances[i].features for i in kept]
     hmm = _flat_start(data, [sequences[i] for i in kept], inventory, config)
     hmm = _iterate(hmm, data, [sequences[i] for i in kept], monitor, "flat start", 2 * config.iterations)
+    hmm = _with_pause(hmm, inventory)
     said = [_pronounced(hmm, utterances[i], sequences[i], inventory) for i in kept]
     hmm = _iterate(hmm, data, said, monitor, "pronunciations", config.iterations)
     while hmm.mixtures.size[1] < config.mixtures:
         hmm = replace(hmm, mixtures=hmm.mixtures.split())
         hmm = _iterate(hmm, data, said, monitor, f"{hmm.mixtures.size[1]} Gaussians", config.iterations)
     said = [_pronounced(hmm, utterances[i], s, inventory) for i, s in zip(kept, said, strict=True)]
+    hmm = _iterate(hmm, data, said, monitor, "pronunciations again", config.iterations)
     hmm = replace(hmm, bigram=estimate_bigram(hmm.table.units, [_without_pauses(s, inventory) for s in said]))
     return _in_context(hmm, data, said, monitor)
 
@@ -89,6 +94,15 @@ def _fits(utterance: Transcribed, sequence: Sequence[str], config: HmmConfig) ->
 
 def _without_pauses(sequence: Sequence[str], inventory: UnitInventory) -> tuple[str, ...]:
     return tuple(inventory.silence if unit == inventory.pause else unit for unit in sequence)
+
+
+def _with_pause(hmm: UnitHmm, inventory: UnitInventory) -> UnitHmm:
+    """Let the pause, which no first guess has, sound like the middle of silence."""
+    mixtures, pause = hmm.mixtures.copy(), hmm.table.density(inventory.pause, 0)
+    silence = hmm.table.density(inventory.silence, hmm.table.count(inventory.silence) // 2)
+    for array in (mixtures.log_weights, mixtures.means, mixtures.variances):
+        array[pause] = array[silence]
+    return replace(hmm, mixtures=mixtures)
 
 
 def _pronounced(
@@ -132,8 +146,9 @@ def _even_path(energy: NDArray[np.float32], chain: Chain, units: int) -> NDArray
     """Return a first guess of the state in each frame: silence up to the first and from the last loud frame,
     all other states spread evenly between. [shape=(T,)]
     """
-    quiet, loud = np.quantile(energy, [0.1, 0.95])
-    above = np.nonzero(energy > quiet + ONSET_SHARE * (loud - quiet))[0]
+    smooth = np.convolve(np.pad(energy, ONSET_FRAMES // 2, "edge"), np.full(ONSET_FRAMES, 1 / ONSET_FRAMES), "valid")
+    quiet, loud = np.quantile(smooth, [0.1, 0.95])
+    above = np.nonzero(smooth > quiet + ONSET_SHARE * (loud - quiet))[0]
     onset, offset = (int(above[0]), int(above[-1]) + 1) if len(above) else (0, len(energy))
     silence = int((chain.positions == 0).sum())
     speech = int(((chain.positions > 0) & (chain.positions < units - 1)).sum())

@@ -1,0 +1,67 @@
+"""What all tests share: the toy corpus, a model of it, the real recordings where they are present."""
+
+from __future__ import annotations
+
+import wave
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lipmotion.corpora.store import Corpus
+from lipmotion.pipeline.model import Model, save_model
+from lipmotion.pipeline.toy import ToySentence, toy_sentences, toy_utterances
+from lipmotion.pipeline.train import train
+from lipmotion.stats.hmm.model import HmmConfig
+
+SENTENCES = 12
+
+
+@pytest.fixture(scope="session")
+def toy_corpus(tmp_path_factory: pytest.TempPathFactory) -> Corpus:
+    """Eight sentences to train on, two to choose, two to test. Do not change it: copy it."""
+    corpus = Corpus.create(tmp_path_factory.mktemp("corpus") / "toy")
+    for utterance in toy_utterances(SENTENCES):
+        corpus.add(utterance)
+    return corpus
+
+
+@pytest.fixture(scope="session")
+def toy_sentence() -> ToySentence:
+    """The first sentence, with the exact times of its phones."""
+    return toy_sentences(3)[0]
+
+
+@pytest.fixture(scope="session")
+def toy_model(toy_corpus: Corpus) -> Model:
+    """Trained in a second on the toy corpus."""
+    return train(toy_corpus, recogniser=HmmConfig(mixtures=1, iterations=2))[0]
+
+
+@pytest.fixture(scope="session")
+def toy_model_file(toy_model: Model, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The toy model as it is saved."""
+    path = tmp_path_factory.mktemp("model") / "toy.lipmotion"
+    save_model(toy_model, path)
+    return path
+
+
+@pytest.fixture(scope="session")
+def toy_speech(toy_sentence: ToySentence, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The first sentence as a recording."""
+    path = tmp_path_factory.mktemp("speech") / "toy speech é.wav"
+    with wave.open(str(path), "wb") as file:
+        file.setnchannels(1)
+        file.setsampwidth(2)
+        file.setframerate(toy_sentence.audio.rate_hz)
+        file.writeframes(np.round(toy_sentence.audio.samples * 32767).astype("<i2").tobytes())
+    return path
+
+
+@pytest.fixture(scope="session")
+def recordings() -> Path:
+    """The real recordings; the test is skipped where they are absent."""
+    folder = Path(__file__).parents[2] / "shared" / "corpora"
+    if not folder.is_dir():
+        pytest.skip("the real recordings are not here")
+    return folder

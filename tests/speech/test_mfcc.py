@@ -1,0 +1,123 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from lipmotion.errors import InputError
+from lipmotion.speech import mfcc as module
+from lipmotion.speech.mfcc import mfcc, normalised, regression_delta
+from lipmotion.types import Audio
+from speech.mfcc_oracle import features as slow_features
+
+RATE_HZ = 16_000
+LOG_ENERGY = 12
+
+
+def noise(count: int, seed: int = 0) -> NDArray[np.float32]:
+    return np.random.default_rng(seed).normal(0, 0.1, count).astype(np.float32)
+
+
+def features(samples: NDArray[np.float32]) -> NDArray[np.float32]:
+    return mfcc(Audio(samples, RATE_HZ)).values
+
+
+@pytest.mark.parametrize("count", [400, 1600, 3333, 8000])
+def test_it_is_its_slow_twin(count: int) -> None:
+    samples = noise(count, seed=count) * np.linspace(0.2, 1, count, dtype=np.float32)
+    assert features(samples) == pytest.approx(slow_features(samples.astype(float)), abs=2e-3)
+
+
+def test_spoken_sound_is_its_slow_twin(toy_sentence) -> None:
+    samples = toy_sentence.audio.samples[6400:14_400]
+    assert features(samples) == pytest.approx(slow_features(samples.astype(float)), abs=2e-3)
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.integers(400, 40_000))
+def test_the_number_of_frames(count: int) -> None:
+    audio = Audio(noise(count), RATE_HZ)
+    result = mfcc(audio)
+    assert result.values.shape == (count // 160 + 1, 39)
+    assert result.values.dtype == np.float32
+    assert result.duration_s == audio.duration_s
+
+
+@pytest.mark.parametrize("frames", [0, 1, 2, 50, 98, 99, 100])
+def test_frame_n_is_centred_at_n_times_10_ms(frames: int) -> None:
+    """25 ms around a click: the frame itself and one on either side hear it, and no other."""
+    samples = np.zeros(RATE_HZ, np.float32)
+    samples[min(frames * 160, RATE_HZ - 1)] = 1
+    heard = np.flatnonzero(features(samples)[:, LOG_ENERGY] > 0)
+    assert heard.tolist() == [n for n in (frames - 1, frames, frames + 1) if 0 <= n <= 100]
+
+
+def test_columns_are_normalised_over_the_recording() -> None:
+    values = features(noise(RATE_HZ))
+    assert values.mean(axis=0) == pytest.approx(0, abs=1e-4)
+    assert values.std(axis=0) == pytest.approx(1, abs=1e-4)
+
+
+@pytest.mark.parametrize("gain", [1e-3, 0.5, 30.0])
+def test_loudness_changes_nothing(gain: float) -> None:
+    samples = noise(RATE_HZ)
+    assert features((gain * samples).astype(np.float32)) == pytest.approx(features(samples), abs=2e-3)
+
+
+def test_blocks_join_without_a_seam(monkeypatch: pytest.MonkeyPatch) -> None:
+    samples = noise(3 * RATE_HZ)
+    whole = features(samples)
+    monkeypatch.setattr(module, "BLOCK", 64)
+    assert features(samples) == pytest.approx(whole, abs=1e-4)
+
+
+@pytest.mark.parametrize("count", [400, 8000, 16_000, 48_000])
+def test_digital_silence_is_nothing_at_all(count: int) -> None:
+    assert not features(np.zeros(count, np.float32)).any()
+
+
+def test_silence_inside_a_recording_has_a_finite_logarithm() -> None:
+    samples = noise(RATE_HZ)
+    samples[4000:12_000] = 0
+    values = features(samples)
+    assert np.isfinite(values).all()
+    assert values[30:70, LOG_ENERGY].max() < values[:20, LOG_ENERGY].min() - 1
+
+
+@pytest.mark.parametrize("value", [0.1, -69.07755, 1e4])
+@pytest.mark.parametrize("count", [1, 2, 1000, 12_345])
+def test_a_constant_column_becomes_0(value: float, count: int) -> None:
+    assert not normalised(np.full((count, 2), value, np.float32)).any()
+
+
+@settings(deadline=None, max_examples=50)
+@given(st.integers(5, 60), st.floats(-3, 3), st.floats(-10, 10))
+def test_the_delta_of_a_ramp_is_its_slope(frames: int, slope: float, start: float) -> None:
+    ramp = (start + slope * np.arange(frames)).astype(np.float32)[:, None]
+    assert regression_delta(ramp)[2:-2] == pytest.approx(slope, abs=1e-4)
+
+
+def test_the_delta_of_a_constant_is_0_and_short_recordings_have_one() -> None:
+    assert not regression_delta(np.ones((3, 2), np.float32)).any()
+    assert regression_delta(np.array([[0.0], [1.0]], np.float32)) == pytest.approx(0.3)  # 0 0 0 1 1, then 0 0 1 1 1
+
+
+@pytest.mark.parametrize(
+    ("audio", "message"),
+    [
+        (Audio(noise(16_000), 44_100), "need 16000 Hz, found 44100 Hz; resample first"),
+        (Audio(noise(399), RATE_HZ), r"need 400 samples of one channel, found shape \(399,\)"),
+        (Audio(noise(16_000).reshape(2, 8000), RATE_HZ), r"found shape \(2, 8000\)"),
+        (
+            Audio(np.where(np.arange(800) == 7, np.nan, 0.1), RATE_HZ),
+            "finite samples, full scale 1, found a peak of nan",
+        ),
+        (Audio(np.where(np.arange(800) == 7, -np.inf, 0.1), RATE_HZ), "found a peak of inf"),
+        (Audio(1e30 * noise(800), RATE_HZ), r"found a peak of \d.*e\+29"),
+    ],
+)
+def test_it_says_what_is_wrong(audio: Audio, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        mfcc(audio)

@@ -1,0 +1,133 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from pathlib import Path
+
+import pytest
+
+from lipmotion.errors import ExportError
+from lipmotion.files import TEMPORARY, check_target, remove_unfinished, whole_file, whole_folder
+
+Context = Callable[[Path], AbstractContextManager[Path]]
+LONGEST = "x" * 250 + ".json"
+TOO_LONG = "x" * 300 + ".json"
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_a_file_appears_when_it_is_whole(tmp_path: Path) -> None:
+    target = tmp_path / "motion.json"
+    with whole_file(target) as unfinished:
+        unfinished.write_text("half")
+        assert not target.exists()
+        assert unfinished.suffix == target.suffix
+        assert unfinished.parent == target.parent
+    assert target.read_text() == "half"
+    assert names(tmp_path) == ["motion.json"]
+
+
+def fail(context: AbstractContextManager[Path], error: BaseException) -> None:
+    """Write half of something, then fail."""
+    with context as unfinished:
+        (unfinished / "entry.json" if unfinished.is_dir() else unfinished).write_text("half")
+        raise error
+
+
+def test_an_old_file_stays_until_the_new_one_is_whole(tmp_path: Path) -> None:
+    target = tmp_path / "motion.json"
+    target.write_text("old")
+    with pytest.raises(RuntimeError):
+        fail(whole_file(target), RuntimeError())
+    assert target.read_text() == "old"
+    assert names(tmp_path) == ["motion.json"]
+    with whole_file(target) as unfinished:
+        unfinished.write_text("new")
+    assert target.read_text() == "new"
+
+
+@pytest.mark.parametrize("context", [whole_file, whole_folder])
+@pytest.mark.parametrize("error", [RuntimeError(), KeyboardInterrupt()])
+def test_a_failure_leaves_nothing(tmp_path: Path, context: Context, error: BaseException) -> None:
+    with pytest.raises(type(error)):
+        fail(context(tmp_path / "one"), error)
+    assert names(tmp_path) == []
+
+
+@pytest.mark.parametrize("context", [whole_file, whole_folder])
+def test_what_the_system_refuses_is_an_export_error(tmp_path: Path, context: Context) -> None:
+    with pytest.raises(ExportError, match=r"one: cannot be written: No space left"):
+        fail(context(tmp_path / "one"), OSError(28, "No space left on device"))
+    assert names(tmp_path) == []
+
+
+def test_writers_do_not_share_a_temporary_name(tmp_path: Path) -> None:
+    with whole_file(tmp_path / "a.json") as one, whole_file(tmp_path / "a.json") as two:
+        assert one != two
+        one.touch()
+        two.touch()
+
+
+def test_the_longest_name_can_be_written(tmp_path: Path) -> None:
+    check_target(tmp_path / LONGEST)
+    with whole_file(tmp_path / LONGEST) as unfinished:
+        unfinished.touch()
+    assert names(tmp_path) == [LONGEST]
+
+
+def test_a_longer_name_is_refused_in_words(tmp_path: Path) -> None:
+    with (
+        pytest.raises(ExportError, match="cannot be written: File name too long"),
+        whole_file(tmp_path / TOO_LONG) as new,
+    ):
+        new.touch()
+    assert names(tmp_path) == []
+
+
+def test_a_folder_appears_when_it_is_whole(tmp_path: Path) -> None:
+    with whole_folder(tmp_path / "one") as unfinished:
+        (unfinished / "entry.json").touch()
+        assert not (tmp_path / "one").exists()
+    assert names(tmp_path / "one") == ["entry.json"]
+    assert names(tmp_path) == ["one"]
+
+
+def test_a_folder_does_not_replace_one_that_holds_something(tmp_path: Path) -> None:
+    (tmp_path / "one").mkdir()
+    (tmp_path / "one" / "precious").touch()
+    with pytest.raises(ExportError, match="one: cannot be written"), whole_folder(tmp_path / "one"):
+        pass
+    assert names(tmp_path) == ["one"]
+    assert names(tmp_path / "one") == ["precious"]
+
+
+@pytest.mark.parametrize("context", [whole_file, whole_folder])
+def test_the_parent_must_exist(tmp_path: Path, context: Context) -> None:
+    with (
+        pytest.raises(ExportError, match=r"missing does not exist; create it first"),
+        context(tmp_path / "missing" / "a.json"),
+    ):
+        raise AssertionError
+
+
+def test_targets_are_checked_before_work_begins(tmp_path: Path) -> None:
+    check_target(tmp_path / "new.json")
+    with pytest.raises(ExportError, match=r"is a folder; give the name of a file"):
+        check_target(tmp_path)
+    with pytest.raises(ExportError, match=r"the folder .*missing does not exist; create it first"):
+        check_target(tmp_path / "missing" / "new.json")
+    (tmp_path / "file").touch()
+    with pytest.raises(ExportError, match=r"does not exist"):
+        check_target(tmp_path / "file" / "new.json")
+    assert names(tmp_path) == ["file"]
+
+
+def test_what_a_killed_run_left_is_removed(tmp_path: Path) -> None:
+    (tmp_path / f"{TEMPORARY}1.json").touch()
+    (tmp_path / f"{TEMPORARY}2").mkdir()
+    (tmp_path / f"{TEMPORARY}2" / "entry.json").touch()
+    (tmp_path / "kept.json").touch()
+    remove_unfinished(tmp_path)
+    assert names(tmp_path) == ["kept.json"]

@@ -1,0 +1,51 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from lipmotion.errors import InputError
+from lipmotion.types import Audio, Channel, Generation, Motion, Span, Timeline, Trace, Unit
+
+
+def generation(frames: int = 101) -> Generation:
+    """A second of a line, its variance the square of the frame's number, ten states."""
+    line = np.arange(frames, dtype=float)[:, None]
+    units = Timeline((Span(0.0, 1.0, Unit("aa")),))
+    states = tuple(f"state {number}" for number in range(10))
+    trace = Trace(states, np.minimum(np.arange(frames) // 10, 9))
+    return Generation(Motion(line, 100.0, (Channel("opening"),)), line**2, units, trace)
+
+
+def test_all_parts_come_at_the_new_rate() -> None:
+    result = generation().resampled(25.0)
+    assert result.motion.rate_hz == 25.0
+    assert result.motion["opening"] == pytest.approx(np.arange(0, 101, 4))
+    assert result.variance == pytest.approx(np.arange(0, 101, 4)[:, None] ** 2)
+    assert result.units == generation().units
+    assert result.trace.states == generation().trace.states
+    assert result.trace.frames.tolist() == [min(frame // 10, 9) for frame in range(0, 101, 4)]
+
+
+@pytest.mark.parametrize("rate_hz", [24.0, 29.97, 60.0, 100.0, 441.0])
+def test_the_state_is_that_of_the_nearest_frame(rate_hz: float) -> None:
+    before, after = generation(), generation().resampled(rate_hz)
+    assert len(after.trace.frames) == len(after.variance) == len(after.motion.values)
+    for time_s, state in zip(after.motion.time_s, after.trace.frames, strict=True):
+        nearest = np.abs(before.motion.time_s - time_s)
+        assert state in before.trace.frames[nearest <= nearest.min() + 1e-9]
+
+
+def test_the_rate_it_has_changes_nothing() -> None:
+    before, after = generation(), generation().resampled(100.0)
+    assert after.motion.values == pytest.approx(before.motion.values, abs=1e-9)
+    assert after.variance == pytest.approx(before.variance, abs=1e-9)
+    assert np.array_equal(before.trace.frames, after.trace.frames)
+
+
+def test_an_impossible_rate_is_refused() -> None:
+    with pytest.raises(InputError, match="motion rate is 0 Hz"):
+        generation().resampled(0)
+
+
+def test_sound_has_a_length() -> None:
+    assert Audio(np.zeros(8000, np.float32), 16_000).duration_s == 0.5

@@ -1,0 +1,97 @@
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lipmotion.errors import InputError
+from lipmotion.types import EYE_DISTANCE, Channel, Motion
+
+CHANNELS = (Channel("opening"), Channel("jaw", "degrees"))
+
+
+def motion(rows: int = 11, rate_hz: float = 10.0) -> Motion:
+    """Two straight lines: what lies between frames is known."""
+    return Motion(np.arange(rows)[:, None] * np.array([1.0, -2.0]), rate_hz, CHANNELS)
+
+
+def test_frames_have_times_and_channels_have_names() -> None:
+    curves = motion()
+    assert curves.time_s == pytest.approx(np.arange(11) / 10)
+    assert curves.names == ("opening", "jaw")
+    assert curves["jaw"] == pytest.approx(-2 * np.arange(11))
+    assert Channel("opening").unit == EYE_DISTANCE
+
+
+def test_an_unknown_channel_is_named_with_those_there_are() -> None:
+    with pytest.raises(InputError, match="no motion channel 'width'; there are: opening, jaw"):
+        _ = motion()["width"]
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"values": np.zeros((3, 1))}, r"shape \(3, 1\), required \(T, 2\)"),
+        ({"values": np.zeros(3)}, r"shape \(3,\), required \(T, 2\)"),
+        ({"rate_hz": 0.0}, "rate is 0.0 Hz, required more than 0"),
+        ({"rate_hz": -1.0}, "rate is -1.0 Hz"),
+        ({"rate_hz": float("nan")}, "rate is nan Hz"),
+        ({"channels": (Channel("opening"), Channel("opening", "mm"))}, "names repeat: opening, opening"),
+    ],
+)
+def test_it_says_what_does_not_fit(changes: dict[str, Any], message: str) -> None:
+    good = {"values": np.zeros((3, 2)), "rate_hz": 25.0, "channels": CHANNELS}
+    with pytest.raises(InputError, match=message):
+        Motion(**(good | changes))
+
+
+def test_between_frames_it_is_linear_and_beyond_the_ends_constant() -> None:
+    values = motion().at(np.array([-1.0, 0.0, 0.25, 0.999, 1.0, 7.0]))
+    assert values[:, 0] == pytest.approx([0, 0, 2.5, 9.99, 10, 10])
+    assert values[:, 1] == pytest.approx(-2 * values[:, 0])
+
+
+@settings(deadline=None, max_examples=50)
+@given(st.integers(1, 30), st.floats(1, 120), st.lists(st.floats(-1, 5), max_size=20), st.integers(0, 1000))
+def test_at_is_what_numpy_interpolates(rows: int, rate_hz: float, time_s: list[float], seed: int) -> None:
+    curves = Motion(np.random.default_rng(seed).normal(size=(rows, 2)), rate_hz, CHANNELS)
+    found = curves.at(np.array(time_s))
+    for column, name in enumerate(curves.names):
+        assert found[:, column] == pytest.approx(np.interp(time_s, curves.time_s, curves[name]), abs=1e-9)
+
+
+@settings(deadline=None, max_examples=50)
+@given(st.integers(1, 300), st.sampled_from([24.0, 25.0, 29.97, 30.0, 60.0, 100.0]), st.floats(1, 1000))
+def test_resampling_keeps_the_duration_and_the_values(rows: int, rate_hz: float, new_hz: float) -> None:
+    curves = motion(rows, rate_hz)
+    again = curves.resampled(new_hz)
+    last_s = curves.time_s[-1]
+    assert again.rate_hz == new_hz
+    assert again.channels == curves.channels
+    assert again.time_s[-1] <= last_s + 1e-6
+    assert again.time_s[-1] + 1 / new_hz > last_s - 1e-6
+    assert again["opening"] == pytest.approx(np.minimum(again.time_s * rate_hz, rows - 1), abs=1e-6)
+
+
+def test_the_same_rate_changes_nothing() -> None:
+    curves = Motion(np.random.default_rng(0).normal(size=(277, 2)), 100.0, CHANNELS)
+    assert curves.resampled(100.0).values == pytest.approx(curves.values, abs=1e-9)
+
+
+def test_whole_multiples_keep_the_last_frame() -> None:
+    for rows in range(1, 200):
+        assert len(motion(rows, 100.0).resampled(50.0).values) == (rows - 1) // 2 + 1
+        assert len(motion(rows, 25.0).resampled(100.0).values) == 4 * (rows - 1) + 1
+
+
+def test_nothing_resampled_is_nothing() -> None:
+    assert motion(0).resampled(100.0).values.shape == (0, 2)
+
+
+@pytest.mark.parametrize("rate_hz", [0.0, -25.0, float("nan"), float("inf")])
+def test_an_impossible_rate_is_refused(rate_hz: float) -> None:
+    with pytest.raises(InputError, match=f"motion rate is {rate_hz} Hz"):
+        motion().resampled(rate_hz)

@@ -1,0 +1,66 @@
+from __future__ import annotations
+
+from dataclasses import FrozenInstanceError
+from itertools import accumulate, pairwise
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lipmotion.errors import InputError
+from lipmotion.types import Span, Timeline, Unit
+
+NAN = float("nan")
+
+
+def timeline(*edges_s: tuple[float, float]) -> Timeline[str]:
+    return Timeline(tuple(Span(start_s, end_s, f"at {start_s}") for start_s, end_s in edges_s))
+
+
+def test_a_span_has_a_length() -> None:
+    assert Span(0.25, 0.75, "aa").duration_s == 0.5
+
+
+def test_gaps_and_empty_spans_are_allowed() -> None:
+    spans = timeline((0, 1), (1, 1), (1.5, 2))
+    assert len(spans) == 3
+    assert [span.start_s for span in spans] == [0, 1, 1.5]
+    assert len(Timeline(())) == 0
+
+
+def test_rounding_is_not_an_overlap() -> None:
+    assert len(timeline((0, 0.1 + 0.2), (0.3, 1))) == 2
+
+
+@pytest.mark.parametrize(
+    ("edges_s", "message"),
+    [
+        ([(1, 0.5)], r"'at 1' ends at 0.5 s, before its start at 1 s"),
+        ([(0, 1), (0.9, 2)], r"'at 0.9' starts at 0.9 s, before the one ahead of it ends \(1 s\)"),
+        ([(1, 2), (0, 0.5)], r"'at 0' starts at 0 s"),
+        ([(NAN, 1)], "ends at 1 s"),
+        ([(0, NAN)], "ends at nan s"),
+    ],
+)
+def test_it_says_which_span_is_wrong(edges_s: list[tuple[float, float]], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        timeline(*edges_s)
+
+
+@settings(deadline=None, max_examples=50)
+@given(st.lists(st.floats(0, 5), min_size=2, max_size=8), st.floats(0, 1000))
+def test_shifting_moves_every_time_and_nothing_else(steps_s: list[float], offset_s: float) -> None:
+    spans = timeline(*pairwise(accumulate(steps_s)))
+    moved = spans.shifted(offset_s)
+    assert [span.label for span in moved] == [span.label for span in spans]
+    assert [span.start_s for span in moved] == [span.start_s + offset_s for span in spans]
+    assert [span.end_s for span in moved] == [span.end_s + offset_s for span in spans]
+
+
+def test_values_cannot_change() -> None:
+    span = Span(0.0, 1.0, Unit("aa"))
+    with pytest.raises(FrozenInstanceError):
+        span.start_s = 2.0  # type: ignore[misc]
+    with pytest.raises(FrozenInstanceError):
+        span.label.phone = "ax"  # type: ignore[misc]
+    assert span == Span(0.0, 1.0, Unit("aa", unit="", word=""))

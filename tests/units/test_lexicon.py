@@ -1,0 +1,139 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from lipmotion.errors import InputError, MissingDependencyError
+from lipmotion.units import PHONES, Lexicon, lexicon
+
+
+def said(word: str, lexicon: Lexicon | None = None) -> list[str]:
+    return [" ".join(phones) for phones in (lexicon or Lexicon()).pronunciations(word)]
+
+
+@pytest.fixture
+def lexicon_file(tmp_path: Path) -> Path:
+    return tmp_path / "words é.txt"
+
+
+@pytest.mark.parametrize(
+    ("word", "phones"),
+    [
+        ("bin", ["b ih n"]),
+        ("map", ["m ae p"]),
+        ("butter", ["b ah t axr"]),  # unstressed er
+        ("about", ["ax b aw t"]),  # a weak first vowel
+        ("mama", ["m aa m ax"]),
+        ("actors'", ["ae k t axr z"]),
+        ("now", ["n aw"]),
+    ],
+)
+def test_dictionary_words(word: str, phones: list[str]) -> None:
+    assert Lexicon().known(word)
+    assert said(word) == phones
+
+
+def test_variants_come_in_the_dictionary_s_order() -> None:
+    assert said("read") == ["r eh d", "r iy d"]
+    assert said("the") == ["dh ax", "dh iy"]
+    assert len(said("tomato")) == 2
+
+
+def test_weak_words_are_reduced_and_others_of_one_syllable_are_not() -> None:
+    assert said("of")[0] == "ax v"
+    assert said("cut")[0] == "k ah t"
+    assert said("bird") == ["b er d"]
+    assert said("her")[0] == "hh axr"
+
+
+def test_the_whole_dictionary_maps_into_the_inventory() -> None:
+    text = lexicon._dictionary().decode()
+    assert {phone.lower() for line in text.splitlines() for phone in line.split()[1:]} <= set(PHONES)
+    for line in text.splitlines()[1::997]:
+        word = line.split()[0].split("(")[0]
+        assert Lexicon().known(word)
+        assert all(set(variant) <= set(PHONES) for variant in Lexicon().pronunciations(word))
+
+
+def test_an_unknown_word_is_guessed() -> None:
+    assert not Lexicon().known("xyzzyq")
+    assert len(said("xyzzyq")) == 1
+
+
+@pytest.mark.parametrize("word", ["", " ", "a b", "(2)", "\n"])
+def test_what_is_no_word_is_not_known(word: str) -> None:
+    assert not Lexicon().known(word)
+
+
+def test_a_users_file(lexicon_file: Path) -> None:
+    lexicon_file.write_text(
+        "# my words\n\n"
+        "Lipmotion L IH1 P M OW1 SH AH0 N   # our name\n"
+        "lipmotion(2) l ih p m ow sh en\n"
+        "map M AE0 P\n"
+        "naïve  n aa iy v\n"
+        "don’t d ow n t\n",
+        encoding="utf-8",
+    )
+    mine = Lexicon.from_file(lexicon_file)
+    assert said("lipmotion", mine) == ["l ih p m ow sh ax n", "l ih p m ow sh en"]
+    assert said("map", mine) == ["m ae p"]
+    assert said("naïve", mine) == ["n aa iy v"]
+    assert said("don't", mine) == ["d ow n t"]
+    assert mine.known("lipmotion")
+    assert said("bin", mine) == said("bin")
+
+
+def test_letters_are_compared_in_one_form(lexicon_file: Path) -> None:
+    lexicon_file.write_text("CAFE\u0301 k ae f ey\n", encoding="utf-8")
+    assert Lexicon.from_file(lexicon_file).known("café")
+
+
+def test_unstressed_vowels_of_a_users_file_are_reduced(lexicon_file: Path) -> None:
+    lexicon_file.write_text("one AH0 ER0 IH0 AH1 ER2 IH IY0\n")
+    assert said("one", Lexicon.from_file(lexicon_file)) == ["ax axr ix ah er ih iy"]
+
+
+@pytest.mark.parametrize("text", ["bim B IH M\r\nbam B AE M\r\n", "\ufeffbim B IH M\nbam B AE M"])
+def test_files_of_other_systems(lexicon_file: Path, text: str) -> None:
+    lexicon_file.write_bytes(text.encode())
+    assert set(Lexicon.from_file(lexicon_file).user) == {"bim", "bam"}
+
+
+def test_an_empty_file_adds_nothing(lexicon_file: Path) -> None:
+    lexicon_file.write_text("# nothing yet\n")
+    assert Lexicon.from_file(lexicon_file) == Lexicon()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("bim B IH M\nbam B AE Q", r"words é.txt, line 2: unknown phone 'Q'; the phones are: aa ae"),
+        ("# a\n\nbam", r"line 3: a word without phones"),
+        ("bim B sil", r"line 1: unknown phone 'sil'"),
+        ("bim B IH12 M", r"line 1: unknown phone 'IH12'"),
+    ],
+)
+def test_it_says_which_line_is_wrong(lexicon_file: Path, text: str, message: str) -> None:
+    lexicon_file.write_text(text)
+    with pytest.raises(InputError, match=message):
+        Lexicon.from_file(lexicon_file)
+
+
+def test_a_file_that_is_none(tmp_path: Path, lexicon_file: Path) -> None:
+    with pytest.raises(InputError, match="no such lexicon file"):
+        Lexicon.from_file(lexicon_file)
+    with pytest.raises(InputError, match="not a readable UTF-8 lexicon"):
+        Lexicon.from_file(tmp_path)
+    lexicon_file.write_bytes(b"bim\xff B")
+    with pytest.raises(InputError, match="not a readable UTF-8 lexicon"):
+        Lexicon.from_file(lexicon_file)
+
+
+def test_without_a_dictionary_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(lexicon, "find_spec", lambda _: None)
+    monkeypatch.setattr(lexicon, "_dictionary", lexicon._dictionary.__wrapped__)
+    monkeypatch.setattr(lexicon, "_dictionary_entries", lexicon._dictionary_entries.__wrapped__)
+    with pytest.raises(MissingDependencyError, match="pip install pocketsphinx"):
+        Lexicon().known("bin")

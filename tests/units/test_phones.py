@@ -1,0 +1,69 @@
+from __future__ import annotations
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lipmotion.units import PAUSE, PHONES, RELATIVES, SILENCE, VISEME_OF, is_silent, stand_in
+
+SPOKEN = tuple(phone for phone in PHONES if not is_silent(phone))
+VOWELS = frozenset("aa ae ah ao aw ax axr ay eh er ey ih ix iy ow oy uh uw el em en".split())
+CONSONANTS = frozenset(SPOKEN) - VOWELS
+UNSAID_IN_GRID = ("er", "hh", "ng", "oy", "sh", "uh", "zh")
+"""What a model of GRID's speaker s1 must borrow."""
+
+
+def test_the_inventory() -> None:
+    assert len(PHONES) == 47
+    assert list(PHONES) == sorted(set(PHONES))
+    assert [phone for phone in PHONES if is_silent(phone)] == [SILENCE, PAUSE] == ["sil", "sp"]
+
+
+def test_relatives_are_other_phones() -> None:
+    assert set(RELATIVES) == set(PHONES)
+    for phone, relatives in RELATIVES.items():
+        assert relatives
+        assert set(relatives) <= set(PHONES) - {phone}
+        assert len(set(relatives)) == len(relatives)
+
+
+def test_silence_and_speech_are_no_relatives() -> None:
+    for phone, relatives in RELATIVES.items():
+        assert {is_silent(relative) for relative in relatives} == {is_silent(phone)}
+
+
+@pytest.mark.parametrize("phone", PHONES)
+def test_a_known_phone_stands_for_itself(phone: str) -> None:
+    assert stand_in(phone, PHONES) == phone
+
+
+@pytest.mark.parametrize("phone", PHONES)
+def test_the_first_relative_that_is_known_stands_in(phone: str) -> None:
+    for position, relative in enumerate(RELATIVES[phone]):
+        assert stand_in(phone, set(PHONES) - {phone, *RELATIVES[phone][:position]}) == relative
+
+
+@pytest.mark.parametrize("phone", SPOKEN)
+def test_any_one_known_phone_is_reached(phone: str) -> None:
+    for only in SPOKEN:
+        assert stand_in(phone, [only]) == only
+
+
+@settings(deadline=None, max_examples=100)
+@given(st.sampled_from(SPOKEN), st.sets(st.sampled_from(SPOKEN), min_size=1, max_size=8))
+def test_the_stand_in_is_known_and_always_the_same(phone: str, known: set[str]) -> None:
+    chosen = stand_in(phone, known)
+    assert chosen in known
+    assert chosen == stand_in(phone, sorted(known, reverse=True))
+
+
+@pytest.mark.parametrize("phone", UNSAID_IN_GRID)
+def test_vowels_stand_in_for_vowels(phone: str) -> None:
+    chosen = stand_in(phone, [other for other in SPOKEN if other not in UNSAID_IN_GRID])
+    assert (chosen in VOWELS) == (phone in VOWELS)
+
+
+@pytest.mark.parametrize(("phone", "closest"), [("p", "b"), ("b", "p"), ("v", "f"), ("zh", "jh"), ("er", "axr")])
+def test_what_looks_alike_stands_in(phone: str, closest: str) -> None:
+    assert stand_in(phone, [other for other in SPOKEN if other != phone]) == closest
+    assert VISEME_OF[closest] == VISEME_OF[phone] or closest in RELATIVES[phone]

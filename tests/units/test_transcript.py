@@ -1,0 +1,104 @@
+from __future__ import annotations
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lipmotion.errors import InputError
+from lipmotion.units import Lexicon, words_of
+from lipmotion.units.transcript import ONES, SCALES, TENS, number_words
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("Hello, world!", "hello world"),
+        ("twenty-one well—known", "twenty one well known"),
+        ("DON'T don’t rock'n'roll O’Neil’s", "don't don't rock'n'roll o'neil's"),
+        ("“Hello there”", "hello there"),
+        ("one\ttwo\r\nthree\n\n", "one two three"),
+        ("a_b", "a b"),
+        ("ﬁne Ｏｋ", "fine ok"),  # ligature and full-width letters
+        ("cafe\u0301 CAFÉ", "café café"),  # composed or not, a letter is the same
+        ("\ufeffhello", "hello"),
+        ("日本 ελλάδα", "日本 ελλάδα"),
+        ("[laughs] (hm) *so*", "laughs hm so"),
+        ("bin blue at f 2 now", "bin blue at f two now"),
+        ("x2", "x two"),
+        ("1,234 and 12,34", "one thousand two hundred thirty four and twelve thirty four"),
+        ("007", "zero zero seven"),
+        ("٣", "three"),
+    ],
+)
+def test_texts(text: str, words: str) -> None:
+    assert " ".join(words_of(text)) == words
+
+
+@pytest.mark.parametrize("text", ["He said 'hello'.", "‘Hello’, he said", "'hello'"])
+def test_a_quoted_word_is_looked_up_without_its_quotes(text: str) -> None:
+    (word,) = [word for word in words_of(text) if word.startswith("hello")]
+    assert Lexicon().known(word)
+    assert Lexicon().pronunciations(word) == Lexicon().pronunciations("hello")
+
+
+@pytest.mark.parametrize("text", ["", "   \n", "...", "—", "'", "’’", "🙂", "_"])
+def test_a_text_without_words_is_refused(text: str) -> None:
+    with pytest.raises(InputError, match="holds no word; give the words that are spoken"):
+        words_of(text)
+
+
+@pytest.mark.parametrize(
+    ("digits", "words"),
+    [
+        ("0", "zero"),
+        ("10", "ten"),
+        ("19", "nineteen"),
+        ("20", "twenty"),
+        ("99", "ninety nine"),
+        ("100", "one hundred"),
+        ("101", "one hundred one"),
+        ("1000", "one thousand"),
+        ("1001", "one thousand one"),
+        ("110000", "one hundred ten thousand"),
+        ("2000000", "two million"),
+        ("1000000001", "one billion one"),
+        ("1000000000000", "one" + " zero" * 12),
+        ("00", "zero zero"),
+    ],
+)
+def test_numbers(digits: str, words: str) -> None:
+    assert " ".join(number_words(digits)) == words
+
+
+def test_a_number_of_any_length_is_read_digit_by_digit() -> None:
+    assert number_words("9" * 5000) == ["nine"] * 5000
+
+
+@settings(deadline=None, max_examples=200)
+@given(st.integers(0, 10**12 - 1))
+def test_a_number_comes_back_from_its_words(number: int) -> None:
+    values = {word: n for n, word in enumerate(ONES)} | {word: 10 * n for n, word in enumerate(TENS) if n > 1}
+    scales = {name: scale for scale, name in SCALES}
+    total = part = 0
+    for word in number_words(str(number)):
+        if word == "hundred":
+            part *= 100
+        elif word in scales:
+            total, part = total + part * scales[word], 0
+        else:
+            part += values[word]
+    assert total + part == number
+
+
+@settings(deadline=None, max_examples=200)
+@given(st.text(max_size=60))
+def test_any_text_gives_words_or_says_that_there_are_none(text: str) -> None:
+    try:
+        words = words_of(text)
+    except InputError:
+        return
+    assert words
+    for word in words:
+        assert word == word.lower()
+        assert not any(character.isspace() or character.isdecimal() for character in word)
+    assert words_of(" ".join(words)) == words
