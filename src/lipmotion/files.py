@@ -32,12 +32,12 @@ def check_target(target: Path) -> None:
 def _temporary(target: Path) -> Path:
     if not target.parent.is_dir():
         raise ExportError(f"{target}: the folder {target.parent} does not exist; create it first")
-    return target.with_name(f"{TEMPORARY}{uuid.uuid4().hex[:8]}{target.suffix}")
+    return target.with_name(f"{TEMPORARY}{uuid.uuid4().hex[:8]}{target.suffix.lower()}")
 
 
 @contextmanager
 def whole_file(target: Path) -> Iterator[Path]:
-    """Give a temporary path to write to, with the target's suffix; rename it to ``target`` on success.
+    """Give a temporary path to write to, with the target's suffix (lower case); rename it to ``target`` on success.
 
     Raises ExportError: the folder does not exist, or the file cannot be written (disk full, no permission).
     """

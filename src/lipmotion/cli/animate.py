@@ -10,7 +10,9 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb."""
     parser = verbs.add_parser("animate", help="turn speech into lip motion or an animated face")
     parser.add_argument("speech", type=Path, help="audio or video file")
-    parser.add_argument("-o", "--output", nargs="+", required=True, help="FILE.mp4 .json .csv .npz; several at once")
+    parser.add_argument(
+        "-o", "--output", nargs="+", action="extend", required=True, help="FILE.mp4 .json .csv .npz, or several"
+    )
     parser.add_argument("--transcript", metavar="TEXT|FILE", help="what is said, if known")
     parser.add_argument("--lexicon", type=Path, metavar="FILE", help="pronunciations: WORD PHONE PHONE ... a line")
     parser.add_argument("--model", type=Path, help="trained model (default: the one that ships with the package)")

@@ -56,5 +56,5 @@ class Engine(ABC, Generic[ModelT]):
 
 def frame_of(time_s: float, frames: int, rate_hz: float) -> int | None:
     """Return the frame nearest to a time, or None where the recording has none."""
-    frame = int(np.floor(time_s * rate_hz + 0.5))
-    return frame if 0 <= frame < frames else None
+    frame = np.floor(time_s * rate_hz + 0.5)
+    return int(frame) if 0 <= frame < frames else None

@@ -74,18 +74,23 @@ def match(generated: NDArray[np.intp], original: NDArray[np.intp], reach: int = 
     return chosen
 
 
+def near(some: NDArray[np.intp], others: NDArray[np.intp], reach: int = REACH) -> int:
+    """Return how many of some closings have one of the others within ``reach``, whichever it is."""
+    return int((np.abs(some[:, None] - others) <= reach).any(axis=1).sum())
+
+
 def closure_figures(
     generated: Sequence[Curve], original: Sequence[Curve], threshold: float, rate_hz: float
 ) -> Closures:
     """Return the closure figures of openings, clip by clip."""
     g_closings = [closings(g, threshold) for g in generated]
     o_closings = [closings(o, threshold) for o in original]
-    pairs = [pair for g, o in zip(g_closings, o_closings, strict=True) for pair in match(g, o)]
+    both = list(zip(g_closings, o_closings, strict=True))
     g_count, o_count = sum(map(len, g_closings)), sum(map(len, o_closings))
-    errors = [g - o for g, o in pairs]
+    errors = [g_frame - o_frame for g, o in both for g_frame, o_frame in match(g, o)]
     return Closures(
-        score=len(pairs) / o_count if o_count else float("nan"),
-        precision=len(pairs) / g_count if g_count else float("nan"),
+        score=sum(near(o, g) for g, o in both) / o_count if o_count else float("nan"),
+        precision=sum(near(g, o) for g, o in both) / g_count if g_count else float("nan"),
         timing_ms=float(np.median(errors)) / rate_hz * 1000 if errors else float("nan"),
         original=o_count,
         generated=g_count,
@@ -108,8 +113,8 @@ def phone_closures(
     for g, o, clip in zip(generated, original, intervals, strict=True):
         inside = np.zeros(len(o), bool)
         for start_s, end_s in clip:
-            first = max(int(np.floor(start_s * rate_hz)) - 1, 0)
-            stop = min(int(np.ceil(end_s * rate_hz)) + 2, len(o))
+            first = max(int(np.ceil(start_s * rate_hz - 1e-6)) - 1, 0)
+            stop = min(int(np.floor(end_s * rate_hz + 1e-6)) + 2, len(o))
             inside[first:stop] = True
             if (o[first:stop] < threshold).any():
                 wanted += 1

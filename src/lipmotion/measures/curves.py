@@ -21,7 +21,8 @@ def correlation(generated: Array, original: Array) -> Array:
     """
     a, b = generated - generated.mean(axis=0), original - original.mean(axis=0)
     scale = np.sqrt((a * a).sum(axis=0) * (b * b).sum(axis=0))
-    return (a * b).sum(axis=0) / np.where(scale > 0, scale, np.inf)
+    moves = (np.ptp(generated, axis=0) > 0) & (np.ptp(original, axis=0) > 0) & (scale > 0)
+    return (a * b).sum(axis=0) / np.where(moves, scale, np.inf)
 
 
 def pooled_correlation(generated: Clips, original: Clips) -> Array:

@@ -43,21 +43,27 @@ def closing_spans(units: Timeline[Unit], frames: int) -> list[slice]:
     return spans
 
 
-def fit_closure(values: Sequence[NDArray[np.float64]], timelines: Sequence[Timeline[Unit]], column: int) -> Closure:
-    """Learn from motion in the model's space [each shape=(T, Q)] and the phones that went with it.
+def fit_closure(
+    values: Sequence[NDArray[np.float64]],
+    seen: Sequence[NDArray[np.bool_]],
+    timelines: Sequence[Timeline[Unit]],
+    column: int,
+) -> Closure:
+    """Learn from motion in the model's space [each shape=(T, Q)], its frames that were seen, and the phones with it.
 
     ``closed`` is the median over all p, b, m of the smallest opening in each; without any, the first percentile.
     """
     least = [
-        float(x[span, column].min())
-        for x, units in zip(values, timelines, strict=True)
+        float(x[span][valid[span], column].min())
+        for x, valid, units in zip(values, seen, timelines, strict=True)
         for span in closing_spans(units, len(x))
+        if valid[span].any()
     ]
-    everything = np.concatenate(values)
+    everything = np.concatenate([x[valid] for x, valid in zip(values, seen, strict=True)])
     centred = everything - everything.mean(axis=0)
     opening = centred[:, column]
     closed = float(np.median(least)) if least else float(np.percentile(everything[:, column], 1))
-    return Closure(column, closed, opening @ centred / max(float(opening @ opening), 1e-12))
+    return Closure(column, max(closed, 0.0), opening @ centred / max(float(opening @ opening), 1e-12))
 
 
 def closing_frames(

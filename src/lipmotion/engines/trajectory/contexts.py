@@ -99,9 +99,8 @@ def _rests(time_s: NDArray[np.float64], left: str, span: Span[Unit], right: str)
 def _parts(time_s: NDArray[np.float64], start_s: float, end_s: float, parts: int, edge_s: float) -> NDArray[np.intp]:
     step = min((end_s - start_s) / parts, edge_s)
     half = parts // 2
-    from_start = np.minimum((time_s - start_s) / step, half)
-    from_end = np.minimum((end_s - time_s) / step, half)
+    from_start, from_end = (time_s - start_s) / step, (end_s - time_s) / step
     before = np.floor(from_start + 1e-9)
     after = parts - np.ceil(from_end - 1e-9)
-    part = np.where(from_start < half, before, np.where(from_end < half, after, half))
+    part = np.where(from_start < half, before, np.where(from_end <= half + 1e-9, after, half))
     return np.clip(part, 0, parts - 1).astype(np.intp)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lipmotion.engines.base import Arrays, Engine, Fit, frame_of
 from lipmotion.engines.trajectory.closure import OPENING, Closure, closing_frames
-from lipmotion.engines.trajectory.contexts import LEVELS, places, with_neighbours
+from lipmotion.engines.trajectory.contexts import places, with_neighbours
 from lipmotion.engines.trajectory.model import TrajectoryModel, model_arrays, model_from_arrays
 from lipmotion.engines.trajectory.train import fit_trajectory
 from lipmotion.errors import InputError
@@ -40,10 +40,11 @@ class TrajectoryConfig:
     closures: bool = True
 
     def __post_init__(self) -> None:
-        if self.parts < 1 or self.parts % 2 == 0:
+        if self.parts < 1 or self.parts % 2 != 1:
             raise InputError(f"parts is {self.parts}, required an odd number from 1")
-        if min(self.edge_s, self.components, self.shrinkage, self.variance_shrinkage) <= 0:
-            raise InputError(f"all numbers of the configuration must be more than 0: {self}")
+        numbers = (self.edge_s, self.components, self.shrinkage, self.variance_shrinkage)
+        if not all(0 < number < float("inf") for number in numbers):
+            raise InputError(f"all numbers of the configuration must be more than 0 and finite: {self}")
 
 
 @final
@@ -92,7 +93,7 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
         return model_arrays(model)
 
     def from_arrays(self, arrays: Arrays) -> TrajectoryModel:  # noqa: D102
-        return model_from_arrays(arrays, LEVELS)
+        return model_from_arrays(arrays)
 
 
 _Pins = dict[tuple[int, int], float]

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.trajectory.closure import Closure
-from lipmotion.engines.trajectory.contexts import SPREAD_LEVELS, Place, level_names
+from lipmotion.engines.trajectory.closure import OPENING, Closure
+from lipmotion.engines.trajectory.contexts import LEVELS, SPREAD_LEVELS, Place, level_names
 from lipmotion.engines.trajectory.space import MotionSpace
 from lipmotion.errors import ModelFormatError
 from lipmotion.stats.pca import Pca
@@ -87,35 +87,48 @@ def model_arrays(model: TrajectoryModel) -> dict[str, NDArray[Any]]:
     return arrays
 
 
-def model_from_arrays(arrays: Mapping[str, NDArray[Any]], levels: int) -> TrajectoryModel:
+def model_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> TrajectoryModel:
     """Return the model again. Raises ModelFormatError: something is missing or has the wrong shape."""
     try:
-        points = None
-        if "points_mean" in arrays:
+        _check_shapes(arrays)
+        channels = tuple(Channel(str(name), str(unit)) for name, unit in arrays["channels"])
+        direct, points, closure = arrays["direct"].astype(np.intp), None, None
+        if len(direct) < len(channels):
             points = Pca(arrays["points_mean"].astype(float), arrays["points_basis"].astype(float))
-        closure = None
-        if "closure" in arrays:
+        space = MotionSpace(channels, direct, points)
+        if OPENING in space.direct_names:
             column, closed = arrays["closure"]
             closure = Closure(int(column), float(closed), arrays["closure_follow"].astype(float))
         return TrajectoryModel(
-            space=MotionSpace(
-                channels=tuple(Channel(str(name), str(unit)) for name, unit in arrays["channels"]),
-                direct=arrays["direct"].astype(np.intp),
-                points=points,
-            ),
-            levels=tuple(_level(arrays, number) for number in range(levels)),
+            space=space,
+            levels=tuple(_level(arrays, number) for number in range(LEVELS)),
             spread={str(name): row for row, name in enumerate(arrays["spread"])},
             variances=arrays["variances"].astype(np.float32),
             closure=closure,
         )
-    except (KeyError, ValueError) as error:
+    except (KeyError, ValueError, IndexError) as error:
         raise ModelFormatError(f"the trajectory model is damaged ({error}); train or download it again") from error
 
 
+def _check_shapes(arrays: Mapping[str, NDArray[Any]]) -> None:
+    direct, channels = len(arrays["direct"]), len(arrays["channels"])
+    reduced = len(arrays["points_basis"]) if direct < channels else 0
+    dimensions = direct + reduced
+    required = {
+        "variances": (len(arrays["spread"]), 3, dimensions),
+        "points_mean": (channels - direct,),
+        "points_basis": (reduced, channels - direct),
+        "closure": (2,),
+        "closure_follow": (dimensions,),
+    }
+    for number in range(LEVELS):
+        contexts = len(arrays[f"level{number}_names"])
+        required |= {f"level{number}_means": (contexts, 3, dimensions), f"level{number}_frames": (contexts,)}
+    for name, shape in required.items():
+        if name in arrays and arrays[name].shape != shape:
+            raise ValueError(f"{name} of shape {arrays[name].shape}, required {shape}")
+
+
 def _level(arrays: Mapping[str, NDArray[Any]], number: int) -> Level:
-    names = arrays[f"level{number}_names"]
-    means = arrays[f"level{number}_means"].astype(np.float32)
-    if means.ndim != 3 or len(means) != len(names):
-        raise ValueError(f"level {number}: {len(names)} names, means of shape {means.shape}")
-    rows = {str(name): row for row, name in enumerate(names)}
-    return Level(rows, means, arrays[f"level{number}_frames"])
+    rows = {str(name): row for row, name in enumerate(arrays[f"level{number}_names"])}
+    return Level(rows, arrays[f"level{number}_means"].astype(np.float32), arrays[f"level{number}_frames"])

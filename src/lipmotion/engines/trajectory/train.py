@@ -18,8 +18,8 @@ from lipmotion.types import Channel, Example
 
 PASSES = 4
 """Rounds of backfitting; more change nothing on the validation list."""
-LEAST_VARIANCE_SHARE = 1e-3
-"""No variance falls under this share of the overall one."""
+LEAST_VARIANCE_SHARE, LEAST_VARIANCE = 1e-3, 1e-12
+"""No variance falls under this share of the overall one, nor under this: some dimensions never move."""
 
 
 def fit_trajectory(
@@ -39,7 +39,7 @@ def fit_trajectory(
     components : dimensions that all point channels (``x_17``, ...) are reduced to
     shrinkage  : frames of evidence that a context must outweigh (the ridge)
     variance_shrinkage : frames that the more general variance counts for
-    Raises CorpusError: no example with motion that was seen, or examples of different channels.
+    Raises CorpusError: no example with motion that was seen in speech, or examples of different channels.
     """
     channels = _common_channels(examples)
     seen = np.concatenate([example.motion.values[example.valid] for example in examples])
@@ -48,13 +48,15 @@ def fit_trajectory(
     values: list[NDArray[np.float64]] = []
     rows: list[NDArray[np.float32]] = []
     for example in examples:
-        inner = example.valid.copy()
-        inner[[0, -1]] = False  # no dynamics there
+        inner = _inner(example.valid)
         values.append(space.reduce(example.motion.values))
         dynamics = with_dynamics(values[-1])
         where = places(example.speech.units, len(inner), parts, edge_s)
         rows.append(dynamics[inner].astype(np.float32))
         names += [level_names(place) for place, kept in zip(where, inner, strict=True) if kept]
+    covered = {name[0] for name in names}
+    if len(covered) < parts:
+        raise CorpusError(f"motion was seen in {len(covered)} of {parts} parts of a phone; learn from more speech")
     motion = np.concatenate(rows)
     _still(motion, [name == level_names(rest_place(parts)) for name in names])
     overall = motion.var(axis=0)
@@ -62,18 +64,25 @@ def fit_trajectory(
     spread, variances = _fit_variances(names, motion, overall, variance_shrinkage)
     closure = None
     if OPENING in space.direct_names:
-        timelines = [example.speech.units for example in examples]
-        closure = fit_closure(values, timelines, space.direct_names.index(OPENING))
+        masks, timelines = [e.valid for e in examples], [e.speech.units for e in examples]
+        closure = fit_closure(values, masks, timelines, space.direct_names.index(OPENING))
     return TrajectoryModel(space, tuple(levels), spread, variances, closure)
 
 
 def _common_channels(examples: Sequence[Example]) -> tuple[Channel, ...]:
-    if not any(example.valid[1:-1].any() for example in examples):
+    if not any(_inner(example.valid).any() for example in examples):
         raise CorpusError(f"none of {len(examples)} examples has motion to learn from; prepare a corpus with faces")
     found = {example.motion.channels for example in examples}
     if len(found) > 1:
         raise CorpusError("the utterances have different motion channels; train on one kind of corpus at a time")
     return found.pop()
+
+
+def _inner(valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return the frames that were seen with both neighbours: those whose dynamics are known."""
+    inner = np.zeros_like(valid)
+    inner[1:-1] = valid[:-2] & valid[1:-1] & valid[2:]
+    return inner
 
 
 def _groups(names: Sequence[str]) -> tuple[list[str], NDArray[np.intp], NDArray[np.intp]]:
@@ -118,7 +127,7 @@ def _fit_variances(
     """Return the variances around the full mean, of some levels, each shrunk towards the more general one."""
     rows: dict[str, int] = {}
     variances: list[NDArray[np.float32]] = []
-    squares = np.square(rest)
+    squares, least = np.square(rest), np.maximum(LEAST_VARIANCE_SHARE * overall, LEAST_VARIANCE)
     for position, number in enumerate(SPREAD_LEVELS):
         distinct, order, starts = _groups([name[number] for name in names])
         first = {name[number]: name for name in names}
@@ -129,5 +138,5 @@ def _fit_variances(
             general = variances[rows[first[name][general_level]]] if position else rest.var(axis=0)
             variance = (total + shrinkage * general) / (count + shrinkage)
             rows[name] = len(variances)
-            variances.append(np.maximum(variance, LEAST_VARIANCE_SHARE * overall).astype(np.float32))
+            variances.append(np.maximum(variance, least).astype(np.float32))
     return rows, np.array(variances)

@@ -1,0 +1,137 @@
+"""Rules of the design that no linter knows."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+SOURCE = Path(__file__).parents[2] / "src" / "lipmotion"
+EMPTY_NAMES = {"utils", "util", "helpers", "helper", "common", "core", "misc"}
+"""Names that say nothing: what such a module holds belongs somewhere."""
+LONGEST_MODULE, LONGEST_VERB = 400, 45
+PICKLES = {"pickle", "shelve", "marshal", "joblib", "dill"}
+Definition = ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef
+Rule = Callable[[str], Iterator[int]]
+
+
+def public(body: list[ast.stmt]) -> Iterator[Definition]:
+    """Give the public functions and classes of a module, and their public methods."""
+    for node in body:
+        if isinstance(node, Definition) and not node.name.startswith("_"):
+            yield node
+            if isinstance(node, ast.ClassDef):
+                yield from public(node.body)
+
+
+def without_docstring(text: str) -> Iterator[int]:
+    """What overrides a documented method says so with ``noqa: D102``."""
+    tree, lines = ast.parse(text), text.splitlines()
+    if not ast.get_docstring(tree):
+        yield 1
+    for node in public(tree.body):
+        signature = lines[node.lineno - 1 : max(node.body[0].lineno - 1, node.lineno)]
+        if not ast.get_docstring(node) and not any("noqa: D102" in line for line in signature):
+            yield node.lineno
+
+
+def asserted(text: str) -> Iterator[int]:
+    """Input is checked by raising an error that says what to do."""
+    return (node.lineno for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Assert))
+
+
+def pickled(text: str) -> Iterator[int]:
+    """Nothing that runs code when it is read."""
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            modules = {alias.name for alias in node.names} | {getattr(node, "module", "")}
+            if modules & PICKLES:
+                yield node.lineno
+        loads = isinstance(node, ast.Call) and ast.unparse(node.func) in ("np.load", "np.lib.format.read_array")
+        if loads and "allow_pickle=False" not in ast.unparse(node):
+            yield node.lineno
+
+
+def changeable(text: str) -> Iterator[int]:
+    """The data that flows is frozen."""
+    for node in public(ast.parse(text).body):
+        for decorator in node.decorator_list:
+            written = ast.unparse(decorator)
+            if written.startswith("dataclass") and "frozen=True" not in written:
+                yield node.lineno
+
+
+def printed(text: str) -> Iterator[int]:
+    """A library does not print."""
+    return (n.lineno for n in ast.walk(ast.parse(text)) if isinstance(n, ast.Call) and ast.unparse(n.func) == "print")
+
+
+def by_chance(text: str) -> Iterator[int]:
+    """Chance comes from ``np.random.default_rng(seed)``: no hidden state, no clock."""
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Import) and any(alias.name == "random" for alias in node.names):
+            yield node.lineno
+        drawn = isinstance(node, ast.Call) and re.fullmatch(r"np\.random\.\w+", ast.unparse(node.func))
+        if drawn and (ast.unparse(node.func) != "np.random.default_rng" or not node.args):
+            yield node.lineno
+
+
+def offences(rule: Rule, under: str = "**/*.py", but: str = "none") -> list[str]:
+    """Return file and line of everything that breaks a rule."""
+    found = []
+    for path in sorted(SOURCE.glob(under)):
+        if path.relative_to(SOURCE).parts[0] != but:
+            found += [f"{path.relative_to(SOURCE)}:{line}" for line in rule(path.read_text(encoding="utf-8"))]
+    return found
+
+
+@pytest.mark.parametrize("rule", [without_docstring, asserted, pickled, changeable, by_chance])
+def test_a_rule_is_kept(rule: Rule) -> None:
+    assert offences(rule) == []
+
+
+def test_only_the_command_line_prints() -> None:
+    assert offences(printed, but="cli") == []
+    assert offences(printed)
+
+
+OFFENCES: list[tuple[Rule, str, list[int]]] = [
+    (without_docstring, '"""A."""\ndef a(): ...\ndef _b(): ...\n', [2]),
+    (without_docstring, '"""A."""\nclass A:\n    """A."""\n    def b(self): ...\n', [4]),
+    (without_docstring, "x = 1\n", [1]),
+    (without_docstring, '"""A."""\nclass A:\n    """A."""\n    def b(self):  # noqa: D102\n        return 1\n', []),
+    (asserted, "x = 1\nassert x\n", [2]),
+    (pickled, "import pickle\n", [1]),
+    (pickled, "from pickle import loads\n", [1]),
+    (pickled, "np.load(path)\n", [1]),
+    (pickled, "np.load(path, allow_pickle=False)\njson.load(file)\n", []),
+    (changeable, "@dataclass\nclass A: ...\n", [2]),
+    (changeable, "@dataclass(eq=False)\nclass A: ...\n", [2]),
+    (changeable, "@dataclass(frozen=True)\nclass A: ...\n", []),
+    (printed, "print(1)\n", [1]),
+    (by_chance, "np.random.normal(3)\n", [1]),
+    (by_chance, "rng = np.random.default_rng()\n", [1]),
+    (by_chance, "rng = np.random.default_rng(seed)\nrng.normal(3)\n", []),
+    (by_chance, "import random\n", [1]),
+]
+
+
+@pytest.mark.parametrize(("rule", "text", "lines"), OFFENCES)
+def test_a_rule_finds_what_breaks_it(rule: Rule, text: str, lines: list[int]) -> None:
+    assert list(rule(text)) == lines
+
+
+def test_modules_are_short() -> None:
+    lines = {path: len(path.read_text(encoding="utf-8").splitlines()) for path in SOURCE.rglob("*.py")}
+    assert len(lines) > 80
+    assert [path for path, count in lines.items() if count > LONGEST_MODULE] == []
+    verbs = {path: count for path, count in lines.items() if path.parent.name == "cli" and path.stem != "main"}
+    assert [path for path, count in verbs.items() if count > LONGEST_VERB] == []
+
+
+def test_names_say_something() -> None:
+    names = {part for path in SOURCE.rglob("*.py") for part in path.relative_to(SOURCE).with_suffix("").parts}
+    assert not names & EMPTY_NAMES

@@ -1,0 +1,62 @@
+"""The import contracts of pyproject.toml hold, and each of them has been seen to fail."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+FORBIDDEN = [
+    # the contract that breaks, a module, and what it must not import
+    ("Imports only go down", "errors.py", "import lipmotion.types"),
+    ("Imports only go down", "units/phones.py", "from lipmotion.speech import read"),
+    ("Imports only go down", "types/audio.py", "import lipmotion.files"),
+    ("Imports only go down", "speech/read.py", "def late():\n    from lipmotion.vision import track"),
+    ("Imports only go down", "utils.py", "'a module on no floor'"),
+    ("Only corpora and vision may import OpenCV and MediaPipe", "pipeline/train.py", "import cv2"),
+    ("Only corpora and vision may import OpenCV and MediaPipe", "speech/read.py", "import mediapipe"),
+]
+
+
+def lint(source: Path, folder: Path) -> subprocess.CompletedProcess[str]:
+    """Check the contracts on the package in ``source``."""
+    script = shutil.which("lint-imports", path=str(Path(sys.executable).parent)) or shutil.which("lint-imports")
+    if script is None:
+        pytest.skip("import-linter is not installed")
+    command = [script, "--config", str(ROOT / "pyproject.toml"), "--no-cache"]
+    environment = os.environ | {"PYTHONPATH": str(source), "COLUMNS": "200"}
+    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+
+
+def broken(output: str) -> list[str]:
+    return re.findall(r"^(.+) BROKEN$", output, flags=re.MULTILINE)
+
+
+def test_the_contracts_hold(tmp_path: Path) -> None:
+    done = lint(ROOT / "src", tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert broken(done.stdout) == []
+
+
+def test_every_contract_is_seen_failing_below() -> None:
+    text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    contracts = re.findall(r'^\[\[tool\.importlinter\.contracts\]\]\nname = "(.+)"$', text, flags=re.MULTILINE)
+    assert contracts
+    assert set(contracts) == {contract for contract, _, _ in FORBIDDEN}
+
+
+@pytest.mark.parametrize(("contract", "module", "line"), FORBIDDEN)
+def test_a_forbidden_import_breaks_its_contract(contract: str, module: str, line: str, tmp_path: Path) -> None:
+    package = tmp_path / "src" / "lipmotion"
+    shutil.copytree(ROOT / "src" / "lipmotion", package, ignore=shutil.ignore_patterns("__pycache__", "models"))
+    with (package / module).open("a", encoding="utf-8") as file:
+        file.write(f"\n\n{line}\n")
+    done = lint(tmp_path / "src", tmp_path)
+    assert done.returncode == 1, done.stdout + done.stderr
+    assert broken(done.stdout) == [contract]

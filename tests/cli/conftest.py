@@ -1,0 +1,102 @@
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import wave
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from lipmotion.cli.main import main
+from lipmotion.pipeline.model import HEADER
+
+
+class Done(NamedTuple):
+    """What a command left: its exit code, and the lines that it printed."""
+
+    code: int
+    out: list[str]
+    err: list[str]
+
+
+Run = Callable[..., Done]
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty current folder."""
+    folder = tmp_path / "here"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    return folder
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str]) -> Run:
+    """Runs a command in this process."""
+
+    def run(*arguments: object) -> Done:
+        capsys.readouterr()
+        try:
+            code = main([str(argument) for argument in arguments])
+        except SystemExit as stop:  # argparse: help, version, wrong command line
+            code = int(str(stop.code))
+        out, err = capsys.readouterr()
+        return Done(code, out.splitlines(), err.splitlines())
+
+    return run
+
+
+@pytest.fixture
+def run_outside() -> Run:
+    """Runs a command in a process of its own, as a shell does."""
+
+    def run(*arguments: object, program: tuple[str, ...] = (sys.executable, "-m", "lipmotion.cli.main")) -> Done:
+        environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTHONUNBUFFERED")}
+        done = subprocess.run(
+            [*program, *map(str, arguments)], capture_output=True, encoding="utf-8", check=False, env=environment
+        )
+        return Done(done.returncode, done.stdout.splitlines(), done.stderr.splitlines())
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def newer_model(toy_model_file: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A model that a later lipmotion wrote."""
+    path = tmp_path_factory.mktemp("newer") / "newer.lipmotion"
+    with zipfile.ZipFile(toy_model_file) as old, zipfile.ZipFile(path, "w") as new:
+        for name in old.namelist():
+            content = old.read(name)
+            new.writestr(name, json.dumps(json.loads(content) | {"version": 2}) if name == HEADER else content)
+    return path
+
+
+@pytest.fixture
+def bad_speech(here: Path) -> dict[str, Path]:
+    """Recordings that cannot be used, by what is wrong with them."""
+    from speech.sound import write_pictures
+
+    folder = here.parent / "bad"
+    (folder / "folder").mkdir(parents=True)
+    (folder / "empty.wav").touch()
+    (folder / "text.wav").write_text("words, not sound\n" * 50)
+    write_pictures(folder / "mute.mp4")
+    with wave.open(str(folder / "short.wav"), "wb") as file:
+        file.setnchannels(1)
+        file.setsampwidth(2)
+        file.setframerate(16_000)
+        file.writeframes(bytes(1000))
+    names = {"missing": "nothing.wav", "empty": "empty.wav", "text": "text.wav", "mute": "mute.mp4"}
+    names |= {"short": "short.wav", "folder": "folder", "long name": "x" * 300 + ".wav"}
+    return {what: folder / name for what, name in names.items()}
+
+
+def is_one_error(done: Done, code: int) -> bool:
+    """Whether a command said what was wrong in one line, and nothing else."""
+    return done.code == code and done.out == [] and len(done.err) == 1 and done.err[0].startswith("lipmotion: error: ")

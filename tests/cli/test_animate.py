@@ -1,0 +1,143 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from cli.conftest import Run, is_one_error
+from lipmotion.export.base import read_motion
+from lipmotion.pipeline.animate import animate, write
+from lipmotion.pipeline.model import load_model
+
+
+@pytest.fixture
+def basics(toy_speech: Path, toy_model_file: Path) -> tuple[object, ...]:
+    return ("animate", toy_speech, "--model", toy_model_file)
+
+
+def test_motion_files(run: Run, basics: tuple[object, ...], here: Path) -> None:
+    done = run(*basics, "-o", "a.json", "a.csv", "a.npz", "--rate", "50")
+    assert done == (0, ["a.json", "a.csv", "a.npz"], [])
+    assert sorted(path.name for path in here.iterdir()) == ["a.csv", "a.json", "a.npz"]
+    assert read_motion(Path("a.json"))[0].rate_hz == 50
+
+
+@pytest.mark.usefixtures("here")
+def test_outputs_may_be_given_one_by_one(run: Run, basics: tuple[object, ...]) -> None:
+    assert run(*basics, "-o", "a.json", "-o", "a.csv") == (0, ["a.json", "a.csv"], [])
+
+
+def test_it_is_the_function_of_the_same_name(
+    run: Run, basics: tuple[object, ...], here: Path, toy_speech: Path, toy_model_file: Path
+) -> None:
+    run(*basics, "-o", "command.json")
+    model = load_model(toy_model_file)
+    write(animate(toy_speech, model=model), ["function.json"], speech=toy_speech, model=model)
+    assert (here / "command.json").read_bytes() == (here / "function.json").read_bytes()
+
+
+def test_a_video(run: Run, basics: tuple[object, ...], here: Path) -> None:
+    assert run(*basics, "-o", "a.mp4", "--fps", "5") == (0, ["a.mp4"], [])
+    assert (here / "a.mp4").stat().st_size > 5000
+
+
+@pytest.mark.parametrize("as_file", [True, False])
+def test_a_transcript(run: Run, basics: tuple[object, ...], here: Path, as_file: bool) -> None:
+    words = "See Bob, papa & mama!"
+    (here / "words.lab").write_text("\ufeff" + words, encoding="utf-8")
+    done = run(*basics, "-o", "a.json", "--transcript", "words.lab" if as_file else words)
+    assert (done.code, done.err) == (0, [])
+    units = json.loads((here / "a.json").read_text())["units"]
+    assert " ".join(unit["phone"] for unit in units) == "sil s iy b aa b p aa p ax m aa m ax sil"
+
+
+def test_an_unknown_word_is_a_warning(run: Run, basics: tuple[object, ...], here: Path, caplog) -> None:
+    assert run(*basics, "-o", "a.json", "--transcript", "see bimab papa mama").code == 0
+    assert "'bimab' is not in the dictionary; read as 'b ih m ae b'" in caplog.text
+    assert (here / "a.json").exists()
+
+
+def test_a_lexicon_file(run: Run, basics: tuple[object, ...], here: Path, caplog) -> None:
+    (here / "lexicon.txt").write_text("bimab B AA1 B\n")
+    done = run(*basics, "-o", "a.json", "--transcript", "see bimab papa mama", "--lexicon", "lexicon.txt")
+    assert (done.code, caplog.text) == (0, "")
+
+
+@pytest.mark.parametrize("what", ["missing", "empty", "text", "mute", "short", "folder", "long name"])
+def test_speech_that_cannot_be_used(
+    run: Run, toy_model_file: Path, bad_speech: dict[str, Path], here: Path, what: str
+) -> None:
+    assert is_one_error(run("animate", bad_speech[what], "--model", toy_model_file, "-o", "a.json", "a.mp4"), 3)
+    assert list(here.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("options", "code", "words"),
+    [
+        (["--rate", "0"], 3, "frame rate is 0.0, required 1 to 1000"),
+        (["--rate", "nan"], 3, "frame rate is nan"),
+        (["--rate", "-50"], 3, "frame rate is -50.0"),
+        (["--rate", "1e13"], 3, "frame rate is 10000000000000.0"),
+        (["--fps", "0"], 3, "frame rate is 0.0"),
+        (["--fps", "nan"], 3, "frame rate is nan"),
+        (["--fps", "-25"], 3, "frame rate is -25.0"),
+        (["--fps", "inf"], 3, "frame rate is inf"),
+        (["--fps", "1e-5"], 3, "frame rate is 1e-05"),
+        (["--fps", "1e9"], 3, "frame rate is 1000000000.0"),
+        (["--transcript", "missing.txt"], 3, "missing.txt: no such transcript file"),
+        (["--transcript", ""], 3, "holds no word"),
+        (["--transcript", "α" * 200], 3, "cannot guess how"),
+        (["--transcript", "9" * 5000], 5, "too short for what should be said"),
+        (["--transcript", "five " * 100], 5, "too short for what should be said"),
+        (["--lexicon", "missing.txt"], 3, "missing.txt: no such lexicon file"),
+        (["--model", "missing.lipmotion"], 3, "missing.lipmotion: no such model"),
+        (["-o", "a.xyz"], 7, "unknown format '.xyz'; required one of: .json .csv .npz .mp4"),
+        (["-o", "missing/a.json"], 7, "the folder missing does not exist; create it first"),
+        (["-o", "."], 7, "unknown format ''"),
+        (["-o", "a.csv", "x" * 300 + ".json"], 7, "cannot be written: File name too long"),
+    ],
+)
+def test_options_that_cannot_be_used(
+    run: Run, basics: tuple[object, ...], here: Path, options: list[str], code: int, words: str
+) -> None:
+    done = run(*basics, "-o", "a.json", "a.mp4", *options)
+    assert is_one_error(done, code)
+    assert words in done.err[0]
+    assert list(here.iterdir()) == []
+
+
+def test_files_that_are_not_what_they_should_be(
+    run: Run, basics: tuple[object, ...], here: Path, toy_speech: Path, newer_model: Path
+) -> None:
+    (here / "latin.txt").write_bytes("näh".encode("latin-1"))
+    (here / "empty.txt").touch()
+    (here / "lexicon.txt").write_text("bin B IH N\nbam B Q\n")
+    before = sorted(here.iterdir())
+    for options, code, words in [
+        (["--transcript", "latin.txt"], 3, "latin.txt: not a readable UTF-8 text"),
+        (["--transcript", "empty.txt"], 3, "holds no word"),
+        (["--lexicon", "lexicon.txt"], 3, "lexicon.txt, line 2: unknown phone 'Q'"),
+        (["--model", newer_model], 6, "model version 2, this lipmotion reads version 1; upgrade lipmotion"),
+        (["--model", toy_speech], 6, "not a lipmotion model"),
+        (["--model", "empty.txt"], 6, "not a lipmotion model"),
+    ]:
+        done = run(*basics, "-o", "a.json", *options)
+        assert is_one_error(done, code), done
+        assert words in done.err[0]
+        assert sorted(here.iterdir()) == before
+
+
+def test_the_recording_is_not_overwritten(run: Run, toy_model_file: Path, toy_speech: Path, here: Path) -> None:
+    (here / "speech.mp4").write_bytes(toy_speech.read_bytes())
+    done = run("animate", "speech.mp4", "--model", toy_model_file, "-o", "speech.mp4")
+    assert is_one_error(done, 7)
+    assert (here / "speech.mp4").read_bytes() == toy_speech.read_bytes()
+
+
+@pytest.mark.parametrize("options", [[], ["-o"], ["-o", "a.json", "--rate", "fast"], ["-o", "a.json", "--bogus"]])
+def test_a_wrong_command_line(run: Run, basics: tuple[object, ...], here: Path, options: list[str]) -> None:
+    done = run(*basics, *options)
+    assert done.code == 2
+    assert done.err[-1].startswith("lipmotion")
+    assert list(here.iterdir()) == []

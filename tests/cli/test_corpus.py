@@ -1,0 +1,93 @@
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cli.conftest import Run, is_one_error
+from lipmotion.corpora.store import Corpus
+from lipmotion.errors import MissingDependencyError
+from lipmotion.export.mp4 import write_mp4
+from lipmotion.pipeline import prepare
+from lipmotion.pipeline.prepare import PrepareReport
+from lipmotion.types import Audio
+
+
+def test_info(run: Run, toy_corpus: Corpus) -> None:
+    done = run("corpus", "info", toy_corpus.path)
+    assert (done.code, done.err) == (0, [])
+    said = dict(line.split(maxsplit=1) for line in done.out)
+    assert said["utterances"] == "12 (8 train, 2 val, 2 test)"
+    assert said["transcribed"] == "12"
+
+
+def test_prepare_says_what_was_done(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: dict[str, object] = {}
+
+    def done(directory: Path, output: Path, **options: object) -> PrepareReport:
+        asked.update(options, directory=directory, output=output)
+        return PrepareReport(output, "folder of videos", ("a", "b"), ("c",), {"d": "no face"}, {"a": 3}, 1.0)
+
+    monkeypatch.setattr(prepare, "prepare", done)
+    assert run("corpus", "prepare", "videos", "-o", "mine", "--workers", "2", "--no-crops") == (
+        0,
+        ["mine: 2 prepared, 1 kept (folder of videos)"],
+        ["lipmotion: note: a: no face in 3 frames, interpolated", "lipmotion: warning: left out d: no face"],
+    )
+    assert asked == {"directory": Path("videos"), "output": Path("mine"), "workers": 2, "crops": False}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (["info", "missing"], 4, "missing: no such corpus"),
+        (["info", "empty"], 4, "empty: not a corpus"),
+        (["info", "x" * 300], 3, "File name too long"),
+        (["prepare", "missing", "-o", "mine"], 3, "missing: no such folder; give a folder of videos"),
+        (["prepare", "empty", "-o", "mine"], 4, "empty: no videos in it"),
+    ],
+)
+def test_what_cannot_be_used(run: Run, here: Path, arguments: list[str], code: int, words: str) -> None:
+    (here / "empty").mkdir()
+    done = run("corpus", *arguments)
+    assert is_one_error(done, code)
+    assert words in done.err[0]
+    assert [path.name for path in here.rglob("*")] == ["empty"]
+
+
+def test_without_the_packages_for_video(run: Run, here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def missing() -> dict[str, str]:
+        raise MissingDependencyError('face tracking needs MediaPipe; pip install "lipmotion[video]"')
+
+    monkeypatch.setattr(prepare, "versions", missing)
+    (here / "videos").mkdir()
+    (here / "videos" / "a.mp4").touch()
+    assert is_one_error(run("corpus", "prepare", "videos", "-o", "mine"), 8)
+    assert not (here / "mine").exists()
+
+
+def faceless(path: Path) -> None:
+    """Write a second of grey with sound."""
+    sound = Audio(np.random.default_rng(0).normal(0, 0.1, 16_000).astype(np.float32), 16_000)
+    write_mp4(path, [np.full((120, 160, 3), 128, np.uint8)] * 25, fps=25, audio=sound)
+
+
+@pytest.mark.video
+def test_videos_that_cannot_be_used(run_outside: Run, here: Path, bad_speech: dict[str, Path]) -> None:
+    """No face, no sound, nothing in it: each is named, and where nothing is left, so is no corpus."""
+    pytest.importorskip("mediapipe")
+    (here / "videos").mkdir()
+    faceless(here / "videos" / "faceless.mp4")
+    done = run_outside("corpus", "prepare", "videos", "-o", "mine")
+    assert is_one_error(done, 4)
+    assert "none of 1 recordings is usable; the first, faceless: " in done.err[0]
+    assert "no face" in done.err[0]
+    assert [path.name for path in here.iterdir()] == ["videos"]
+
+    shutil.copy(bad_speech["mute"], here / "videos" / "mute.mp4")
+    (here / "videos" / "empty.mkv").touch()
+    done = run_outside("corpus", "prepare", "videos", "-o", "mine", "--workers", "1")
+    assert is_one_error(done, 4)
+    assert [path.name for path in here.iterdir()] == ["videos"]

@@ -1,0 +1,42 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from cli.conftest import Run, is_one_error
+from lipmotion.pipeline.model import read_header, shipped_path
+
+
+def test_a_model_says_whose_recordings_it_comes_from(run: Run, toy_model_file: Path) -> None:
+    done = run("info", toy_model_file)
+    assert (done.code, done.err) == (0, [])
+    assert done.out[0].split() == ["file", str(toy_model_file), "(0.1", "MB)"]
+    said = dict(line.split(maxsplit=1) for line in done.out if len(line.split()) > 1)
+    assert said["licence"] == "synthesised by lipmotion"
+    assert said["engine"] == "trajectory"
+    assert said["utterances"] == "8"
+    assert "parts=5" in said["configuration"]
+    assert [line.split()[0] for line in done.out[1:]] == list(read_header(toy_model_file))
+
+
+def test_the_shipped_model_is_the_default(run: Run) -> None:
+    done = run("info")
+    assert done.out == run("info", shipped_path()).out
+    assert any(line.startswith("attribution") and "GRID" in line for line in done.out)
+
+
+@pytest.mark.parametrize(
+    ("name", "code", "words"),
+    [
+        ("missing", 3, "missing: no such model"),
+        ("text", 6, "text: not a lipmotion model"),
+        (".", 3, ".: no such model"),
+        ("NEWER", 6, "model version 2, this lipmotion reads version 1; upgrade lipmotion"),
+    ],
+)
+def test_what_is_no_model(run: Run, newer_model: Path, here: Path, name: str, code: int, words: str) -> None:
+    (here / "text").write_text("words")
+    done = run("info", newer_model if name == "NEWER" else name)
+    assert is_one_error(done, code)
+    assert words in done.err[0]

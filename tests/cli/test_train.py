@@ -1,0 +1,57 @@
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from cli.conftest import Run, is_one_error
+from lipmotion.corpora.store import Corpus
+from lipmotion.pipeline.model import load_model, save_model
+from lipmotion.pipeline.train import train
+
+
+def test_a_model_and_what_it_was_made_of(run: Run, toy_corpus: Corpus, here: Path) -> None:
+    done = run("train", toy_corpus.path, "-o", "mine.lipmotion")
+    assert (done.code, done.out) == (0, ["mine.lipmotion: 8 utterances, 0.3 minutes"])
+    assert any(line.startswith("flat start") for line in done.err)  # progress
+    assert [path.name for path in here.iterdir()] == ["mine.lipmotion"]
+    save_model(train(toy_corpus)[0], here / "function.lipmotion")
+    assert (here / "mine.lipmotion").read_bytes() == (here / "function.lipmotion").read_bytes()
+
+
+def test_all_of_a_corpus(run: Run, toy_corpus: Corpus, here: Path) -> None:
+    assert run("train", toy_corpus.path, "-o", "all.lipmotion", "--split", "all").code == 0
+    assert load_model(here / "all.lipmotion").about["split"] == "all"
+
+
+def test_what_was_left_out_is_said(run: Run, toy_corpus: Corpus, here: Path) -> None:
+    corpus = Corpus.create(here / "corpus")
+    for name in toy_corpus.names("train")[:4]:
+        utterance = toy_corpus.utterance(name)
+        corpus.add(utterance if name != "toy02" else replace(utterance, words=("five",) * 100))
+    done = run("train", "corpus", "-o", "mine.lipmotion")
+    assert (done.code, done.out) == (0, ["mine.lipmotion: 3 utterances, 0.2 minutes"])
+    (warning,) = [line for line in done.err if line.startswith("lipmotion: ")]
+    assert warning.startswith("lipmotion: warning: left out toy02: ")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (["missing", "-o", "m"], 4, "missing: no such corpus; make one"),
+        (["folder", "-o", "m"], 4, "folder: not a corpus"),
+        (["CORPUS", "-o", "missing/m"], 7, "the folder missing does not exist"),
+        (["CORPUS", "-o", "folder"], 7, "folder: is a folder"),
+        (["CORPUS", "-o", "m", "--split", "tset"], 4, "no utterances of split 'tset' (there are train: 8, val: 2"),
+        (["CORPUS", "-o", "m", "--lexicon", "missing"], 3, "missing: no such lexicon file"),
+    ],
+)
+def test_what_cannot_be_used(
+    run: Run, toy_corpus: Corpus, here: Path, arguments: list[str], code: int, words: str
+) -> None:
+    (here / "folder").mkdir()
+    done = run("train", *[toy_corpus.path if argument == "CORPUS" else argument for argument in arguments])
+    assert is_one_error(done, code)
+    assert words in done.err[0]
+    assert [path.name for path in here.rglob("*")] == ["folder"]

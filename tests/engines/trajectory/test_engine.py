@@ -1,0 +1,98 @@
+import numpy as np
+import pytest
+
+from engines.synthetic import CHANNELS, OPENINGS, examples, speech, timeline
+from lipmotion.engines import engine_named
+from lipmotion.engines.trajectory.engine import TrajectoryConfig
+from lipmotion.errors import InputError
+from lipmotion.stats.em import silent_monitor
+from lipmotion.types import Constraints, Pin
+
+ENGINE = engine_named("trajectory", {})
+MODEL = ENGINE.fit(examples(), silent_monitor).model
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"parts": 0},
+        {"parts": 4},
+        {"parts": -3},
+        {"parts": 2.5},
+        {"edge_s": 0.0},
+        {"components": 0},
+        {"shrinkage": -1.0},
+        {"variance_shrinkage": 0.0},
+        {"shrinkage": float("nan")},
+        {"edge_s": float("inf")},
+        {"parts": "many"},
+    ],
+)
+def test_a_configuration_that_makes_no_sense_is_an_input_error(options):
+    with pytest.raises(InputError):
+        engine_named("trajectory", options)
+
+
+@pytest.mark.parametrize("parts", [1, 3, 7])
+def test_any_odd_number_of_parts_works(parts):
+    engine = engine_named("trajectory", {"parts": parts, "components": 2})
+    model = engine.fit(examples(4), silent_monitor).model
+    values = engine.generate(model, speech(timeline(("p", "aa", "m")))).motion.values
+    assert np.isfinite(values).all()
+
+
+def test_configuration_and_model_are_different_things():
+    assert ENGINE.config == TrajectoryConfig()
+    fit = ENGINE.fit(examples(3), silent_monitor)
+    assert fit.figures["frames"] == sum(int(e.valid.sum()) for e in examples(3))
+    assert fit.figures["contexts"] == len(fit.model.levels[-1].rows)
+
+
+def test_the_mouth_rests_in_silence():
+    """Away from speech the opening is that of silence, and still."""
+    opening = ENGINE.generate(MODEL, speech(timeline(("aa", "iy", "aa")))).motion["opening"]
+    for rest in (opening[:25], opening[-25:]):
+        assert rest == pytest.approx(np.full(25, OPENINGS["sil"]), abs=2e-3)
+        assert np.ptp(rest) < 2e-3
+
+
+def test_licking_the_lips_in_silence_is_not_learned():
+    restless = examples()
+    for example in restless[:5]:
+        example.motion.values[10:20, 0] += 0.2
+    model = ENGINE.fit(restless, silent_monitor).model
+    opening = ENGINE.generate(model, speech(timeline(("aa", "iy", "aa")))).motion["opening"]
+    assert opening[:25].max() < OPENINGS["sil"] + 0.01
+
+
+def test_variance_is_smaller_near_a_pin_and_what_is_far_stays():
+    talk = speech(timeline(("aa", "iy", "t", "uw", "s", "aa")))
+    free = ENGINE.generate(MODEL, talk)
+    pinned = ENGINE.generate(MODEL, talk, Constraints((Pin(0.9, "width", 0.7),)))
+    width = [channel.name for channel in CHANNELS].index("width")
+    assert (pinned.variance[88:93, width] < free.variance[88:93, width]).all()
+    assert pinned.motion["width"][:60] == pytest.approx(free.motion["width"][:60], abs=1e-4)
+    assert pinned.motion["opening"] == pytest.approx(free.motion["opening"], abs=1e-12)
+
+
+def test_points_cannot_be_pinned_and_the_error_says_what_can():
+    with pytest.raises(InputError, match=r"opening, width$"):
+        ENGINE.generate(MODEL, speech(timeline(("aa",))), Constraints((Pin(0.5, "x_17", 0.0),)))
+
+
+def test_a_mouth_cannot_be_pinned_further_than_shut():
+    with pytest.raises(InputError, match="at least 0"):
+        ENGINE.generate(MODEL, speech(timeline(("aa",))), Constraints((Pin(0.5, "opening", -0.1),)))
+
+
+def test_units_are_named_by_their_neighbours():
+    units = ENGINE.generate(MODEL, speech(timeline(("aa", "p")))).units
+    assert [span.label.unit for span in units] == ["sil-sil+aa", "sil-aa+p", "aa-p+sil", "p-sil+sil"]
+
+
+def test_an_edited_unit_changes_the_motion_around_it_only():
+    talk, other = (speech(timeline(("t", "aa", phone, "aa", "t", "s"))) for phone in ("iy", "uw"))
+    one, two = (ENGINE.generate(MODEL, s).motion["width"] for s in (talk, other))
+    assert np.abs(one - two)[80:90].max() > 0.05
+    assert one[:60] == pytest.approx(two[:60], abs=1e-4)
+    assert one[-60:] == pytest.approx(two[-60:], abs=1e-4)

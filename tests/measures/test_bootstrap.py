@@ -1,0 +1,57 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lipmotion.measures.bootstrap import interval
+from lipmotion.measures.curves import mean_distance, pooled_correlation
+
+
+def acc(generated, original) -> float:
+    return float(pooled_correlation(generated, original)[0])
+
+
+def clips(seed: int, count: int = 12):
+    draw = np.random.default_rng(seed)
+    original = [draw.normal(0, 1, (40, 1)) for _ in range(count)]
+    return [clip + draw.normal(0, 0.7, clip.shape) for clip in original], original
+
+
+@given(seed=st.integers(0, 10_000))
+@settings(deadline=None, max_examples=10)
+def test_the_interval_holds_the_figure_itself(seed):
+    generated, original = clips(seed)
+    low, high = interval(acc, generated, original, seed=0, draws=200)
+    assert low < acc(generated, original) < high
+    assert high - low < 0.3
+
+
+def test_the_seed_decides():
+    generated, original = clips(1)
+    one = interval(acc, generated, original, seed=5, draws=100)
+    assert interval(acc, generated, original, seed=5, draws=100) == one
+    assert interval(acc, generated, original, seed=6, draws=100) != one
+
+
+def test_clips_are_drawn_whole_and_together():
+    """Every clip has its own value, generated and original alike: a draw that parted them would show."""
+    values = [np.full((3, 1), float(n)) for n in range(5)]
+    assert interval(mean_distance, values, values, seed=0, draws=50) == (0, 0)
+
+
+def test_one_clip_has_no_spread():
+    generated, original = clips(2, count=1)
+    low, high = interval(acc, generated, original, seed=0, draws=20)
+    assert low == high == pytest.approx(acc(generated, original))
+
+
+def test_more_clips_are_surer():
+    few, many = (np.diff(interval(acc, *clips(3, count), seed=0, draws=200))[0] for count in (5, 80))
+    assert many < few / 2
+
+
+def test_95_percent_of_the_draws_lie_inside():
+    """The mean of clips that are 0 or 1, half of each: the interval is that of the binomial distribution."""
+    generated, original = [np.full((1, 1), float(n % 2)) for n in range(100)], [np.zeros((1, 1))] * 100
+    low, high = interval(mean_distance, generated, original, seed=0, draws=1000)
+    assert (low, high) == pytest.approx((0.4, 0.6), abs=0.021)

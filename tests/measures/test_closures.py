@@ -1,0 +1,136 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lipmotion.measures.closures import (
+    closed_threshold,
+    closings,
+    closure_figures,
+    match,
+    near,
+    phone_closures,
+)
+from oracles import matching
+
+FRAMES = st.lists(st.integers(0, 14), max_size=5, unique=True).map(lambda frames: np.array(sorted(frames), np.intp))
+
+
+def opening(closed: list[int], frames: int = 30) -> np.ndarray:
+    """Open at 1, closed at 0 in the frames given."""
+    curve = np.ones(frames)
+    curve[closed] = 0
+    return curve
+
+
+def test_threshold_is_a_tenth_of_the_95th_percentile_of_all_frames():
+    curves = [np.linspace(0, 1, 101), np.linspace(0, 1, 101)]
+    assert closed_threshold(curves) == pytest.approx(0.095, abs=1e-3)
+    assert closed_threshold(curves, share=0.25) == pytest.approx(0.2375, abs=1e-3)
+
+
+def test_a_closing_is_the_first_closed_frame_after_an_open_one():
+    curve = np.array([0.0, 0.0, 1.0, 0.05, 0.0, 1.0, 1.0, 0.0])
+    assert closings(curve, 0.1).tolist() == [3, 7]  # closed from the start is no closing
+    assert closings(curve, 0.05).tolist() == [4, 7]  # the threshold itself is open
+    assert closings(curve[:1], 0.1).tolist() == []
+
+
+@given(generated=FRAMES, original=FRAMES)
+@settings(deadline=None, max_examples=60)
+def test_matching_is_one_to_one_and_nearest_first(generated, original):
+    pairs = match(generated, original)
+    assert len({g for g, _ in pairs}) == len({o for _, o in pairs}) == len(pairs)
+    for g in generated:
+        for o in original:  # no two would rather have each other
+            rivals = [abs(a - b) for a, b in pairs if g == a or o == b]
+            assert abs(g - o) > 2 or (rivals and min(rivals) <= abs(g - o))
+
+
+@given(generated=FRAMES, original=FRAMES)
+@settings(deadline=None, max_examples=40)
+def test_as_many_as_possible_are_matched_as_near_as_possible(generated, original):
+    pairs = match(generated, original, reach=1)
+    found = tuple(sum(abs(g - o) == distance for g, o in pairs) for distance in range(2))
+    assert found == matching.nearest_first(generated.tolist(), original.tolist(), 1)
+
+
+def test_matching_by_hand():
+    assert match(np.array([10, 12]), np.array([11])) == [(10, 11)]
+    assert match(np.array([8, 11]), np.array([10])) == [(11, 10)]
+    assert match(np.array([7]), np.array([10])) == []
+    assert match(np.array([9, 12]), np.array([10, 11])) == [(9, 10), (12, 11)]
+
+
+@given(some=FRAMES, others=FRAMES)
+def test_near_counts_whichever_is_near(some, others):
+    assert near(some, others) == sum(any(abs(a - b) <= 2 for b in others) for a in some)
+
+
+def test_figures_by_hand():
+    original = [opening([5, 12, 20]), opening([3])]
+    generated = [opening([7, 20, 27]), opening([10])]
+    figures = closure_figures(generated, original, 0.1, 25.0)
+    assert figures.score == pytest.approx(2 / 4)
+    assert figures.precision == pytest.approx(2 / 4)
+    assert figures.timing_ms == pytest.approx(1000 * 1 / 25)  # the median of 2 frames late and on time
+    assert (figures.original, figures.generated) == (4, 4)
+
+
+def test_one_generated_closing_may_score_two_original_ones_but_is_matched_once():
+    """The score is Hofer's: a point for every original closing that has one near it."""
+    figures = closure_figures([opening([11])], [opening([10, 12])], 0.1, 25.0)
+    assert (figures.score, figures.precision) == (1, 1)
+    assert figures.timing_ms == pytest.approx(40)
+
+
+def test_a_perfect_copy():
+    curves = [opening([4, 9]), opening([17])]
+    figures = closure_figures(curves, curves, 0.1, 25.0)
+    assert (figures.score, figures.precision, figures.timing_ms) == (1, 1, 0)
+
+
+def test_a_mouth_that_never_moves_has_no_figures():
+    flat = [np.ones(20)]
+    figures = closure_figures(flat, flat, 0.1, 25.0)
+    assert (figures.original, figures.generated) == (0, 0)
+    assert np.isnan([figures.score, figures.precision, figures.timing_ms]).all()
+    lost = closure_figures(flat, [opening([5], 20)], 0.1, 25.0)
+    assert lost.score == 0
+    assert np.isnan(lost.precision)
+
+
+def test_phone_closures_by_hand():
+    """25 fps; the phones last from frame 5 to 7, 15 to 17 and 24 to 26, each with a frame before and after."""
+    phones = [[(0.2, 0.28), (0.6, 0.68), (0.96, 1.04)]]
+    original = [opening([6, 14, 20])]  # closes in the first, one frame ahead of the second, and elsewhere
+    generated = [opening([8, 12, 25])]  # one frame behind the first, misses the second; the third does not count
+    figures = phone_closures(generated, original, phones, speech_s=30.0, threshold=0.1, rate_hz=25.0)
+    assert figures.intervals == 2
+    assert figures.recall == pytest.approx(1 / 2)
+    assert figures.false_per_minute == pytest.approx(1 / 0.5)  # frame 12
+    assert figures.original_per_minute == pytest.approx(1 / 0.5)  # frame 20
+
+
+@pytest.mark.parametrize("interval_s", [(0.2, 0.28), (0.165, 0.315)])
+def test_intervals_are_taken_one_frame_longer_at_both_ends(interval_s):
+    """The frames at 0.20, 0.24 and 0.28 s lie inside, so 4 to 8 count."""
+    for frame in range(30):
+        figures = phone_closures([opening([frame])], [opening([frame])], [[interval_s]], 60.0, 0.1, 25.0)
+        assert figures.intervals == (4 <= frame <= 8)
+        assert figures.false_per_minute == (not 4 <= frame <= 8) - (frame == 0)  # closed from the start is no closing
+
+
+def test_a_mouth_that_never_opens_recalls_everything():
+    phones, original = [[(0.2, 0.28)]], [opening([6])]
+    figures = phone_closures([np.zeros(30)], original, phones, 60.0, 0.1, 25.0)
+    assert (figures.recall, figures.intervals, figures.false_per_minute) == (1, 1, 0)
+
+
+def test_phones_beyond_the_clip_and_clips_without_phones():
+    curves = [opening([6]), opening([29])]
+    figures = phone_closures(curves, curves, [[], [(1.16, 1.4), (2.0, 2.1)]], 60.0, 0.1, 25.0)
+    assert (figures.recall, figures.intervals) == (1, 1)
+    assert figures.false_per_minute == 1
+    nothing = phone_closures(curves, curves, [[], []], 0.0, 0.1, 25.0)
+    assert np.isnan([nothing.recall, nothing.false_per_minute, nothing.original_per_minute]).all()

@@ -1,0 +1,135 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lipmotion.measures.curves import (
+    correlation,
+    global_variance_ratio,
+    jerk_ratio,
+    lag_ms,
+    mean_distance,
+    normalised_rmse,
+    per_clip_correlation,
+    pooled_correlation,
+)
+
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def clips(seed: int, count: int = 3, channels: int = 2) -> list[np.ndarray]:
+    draw = np.random.default_rng(seed)
+    return [np.cumsum(draw.normal(0, 1, (int(draw.integers(40, 90)), channels)), axis=0) for _ in range(count)]
+
+
+def column(*values: float) -> np.ndarray:
+    return np.array(values, float)[:, None]
+
+
+def test_correlation_by_hand():
+    assert correlation(column(1, 2, 3), column(1, 3, 2))[0] == pytest.approx(0.5)
+
+
+@given(seed=SEEDS, gain=st.floats(0.1, 10), offset=st.floats(-5, 5))
+@settings(deadline=None, max_examples=25)
+def test_correlation_is_one_with_itself_whatever_the_scale(seed, gain, offset):
+    x = clips(seed, 1)[0]
+    assert correlation(gain * x + offset, x) == pytest.approx([1, 1])
+    assert correlation(-gain * x, x) == pytest.approx([-1, -1])
+
+
+@given(seed=SEEDS)
+@settings(deadline=None, max_examples=25)
+def test_correlation_is_that_of_numpy(seed):
+    one, two = clips(seed, 1)[0], clips(seed + 1, 1)[0]
+    count = min(len(one), len(two))
+    wanted = [np.corrcoef(one[:count, c], two[:count, c])[0, 1] for c in range(2)]
+    assert correlation(one[:count], two[:count]) == pytest.approx(wanted)
+
+
+@given(value=st.floats(-1, 1), other=st.floats(-1, 1), frames=st.integers(1, 80))
+def test_a_constant_correlates_with_nothing(value, other, frames):
+    flat = np.full((frames, 1), value)
+    assert correlation(flat, np.full((frames, 1), other))[0] == 0
+    assert correlation(flat, np.linspace(0, 1, frames)[:, None])[0] == 0
+    assert correlation(np.linspace(0, 1, frames)[:, None], flat)[0] == 0
+
+
+def test_pooled_means_are_those_of_all_frames_and_per_clip_of_each():
+    """Two clips, each perfectly followed, at two rest poses of which one is generated wrong."""
+    original = [column(0, 1, 0, 1), column(10, 11, 10, 11)]
+    generated = [column(0, 1, 0, 1), column(0, 1, 0, 1)]
+    assert per_clip_correlation(generated, original)[0] == pytest.approx(1)
+    a, b = np.concatenate(generated)[:, 0], np.concatenate(original)[:, 0]
+    assert pooled_correlation(generated, original)[0] == pytest.approx(np.corrcoef(a, b)[0, 1])
+    assert pooled_correlation(generated, original)[0] < 0.2
+
+
+def test_distance_is_the_mean_norm_not_its_square():
+    generated = [np.array([[3.0, 4.0], [0.0, 0.0]]), np.array([[0.0, 1.0]])]
+    original = [np.zeros((2, 2)), np.zeros((1, 2))]
+    assert mean_distance(generated, original) == pytest.approx((5 + 0 + 1) / 3)
+
+
+def test_error_is_in_units_of_the_channels_deviation():
+    original = [column(0, 2), column(0, 2)]
+    generated = [column(1, 2), column(0, 3)]
+    assert normalised_rmse(generated, original)[0] == pytest.approx(np.sqrt(2 / 4) / 1)
+
+
+@given(seed=SEEDS)
+@settings(deadline=None, max_examples=10)
+def test_predicting_the_mean_is_an_error_of_one_and_a_range_of_none(seed):
+    original = clips(seed)
+    flat = [np.tile(np.concatenate(original).mean(axis=0), (len(clip), 1)) for clip in original]
+    assert normalised_rmse(flat, original) == pytest.approx([1, 1])
+    assert global_variance_ratio(flat, original) == pytest.approx([0, 0], abs=1e-12)
+
+
+def test_range_is_the_ratio_of_mean_deviations():
+    original = [column(0, 2), column(0, 6)]  # deviations 1 and 3
+    generated = [column(5, 6), column(9, 10)]  # ½ each
+    assert global_variance_ratio(generated, original)[0] == pytest.approx(0.5 / 2)
+
+
+@given(seed=SEEDS, gain=st.floats(0.1, 5))
+@settings(deadline=None, max_examples=10)
+def test_scaling_scales_range_and_jerk(seed, gain):
+    original = clips(seed)
+    scaled = [gain * clip + 3 for clip in original]
+    for ratio in (global_variance_ratio, jerk_ratio):
+        assert ratio(original, original) == pytest.approx([1, 1])
+        assert ratio(scaled, original) == pytest.approx([gain, gain])
+
+
+def test_jerk_by_hand_never_looks_across_clips():
+    original = [column(0, 0, 0, 1), column(100, 100, 100, 102), column(7, 8, 9)]  # third differences 1 and 2, none
+    generated = [column(0, 0, 0, 3), column(5, 5, 5, 5), column(0, 50, 0)]
+    assert jerk_ratio(generated, original)[0] == pytest.approx(1.5 / 1.5)
+
+
+def smooth(seed: int, frames: int) -> np.ndarray:
+    draw = np.random.default_rng(seed)
+    return np.convolve(draw.normal(0, 1, frames + 60), np.hanning(9), "same")
+
+
+@given(seed=SEEDS, late=st.integers(-8, 8), rate_hz=st.sampled_from([25.0, 29.97, 100.0]))
+@settings(deadline=None, max_examples=30)
+def test_lag_is_the_shift_and_late_is_positive(seed, late, rate_hz):
+    curves = [smooth(seed, 120), smooth(seed + 1, 90)]
+    original = [curve[30:-30, None] for curve in curves]
+    generated = [curve[30 - late : len(curve) - 30 - late, None] for curve in curves]
+    assert lag_ms(generated, original, rate_hz) == pytest.approx(1000 * late / rate_hz, abs=0.1 * 1000 / rate_hz)
+
+
+def test_lag_between_frames():
+    time_s = np.arange(200) / 25
+    original, generated = np.sin(4 * time_s)[:, None], np.sin(4 * (time_s - 0.013))[:, None]
+    assert lag_ms([generated], [original], 25.0) == pytest.approx(13, abs=1.5)
+
+
+def test_lag_looks_at_the_first_channel():
+    curve = smooth(1, 100)
+    original = np.stack([curve[30:-30], np.zeros(100)], axis=1)
+    generated = np.stack([curve[27:-33], np.arange(100.0)], axis=1)
+    assert lag_ms([generated], [original], 25.0) == pytest.approx(120, abs=4)

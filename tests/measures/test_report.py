@@ -1,0 +1,91 @@
+import math
+from itertools import count
+
+import pytest
+
+from lipmotion.measures.report import table
+
+
+def figures():
+    """Figures that are all different, and every number of them as it should be printed."""
+    numbers, printed = count(1), []
+
+    def figure(form: str, scale: float = 0.001):
+        value = 100 * scale + next(numbers) * scale
+        printed.append(format(value, form))
+        return value
+
+    def channel():
+        return {
+            "acc": figure(".3f"),
+            "acc_per_clip": figure(".3f"),
+            "nrmse": figure(".3f"),
+            "global_variance": figure(".2f", 0.01),
+            "jerk": figure(".2f", 0.01),
+        }
+
+    def condition():
+        return {
+            "channels": {"opening": channel(), "width": channel()},
+            "opening_acc_95": (figure(".3f"), figure(".3f")),
+            "acc": figure(".3f"),
+            "amse": figure(".4f", 0.0001),
+            "lag_ms": figure("+.1f", 0.1),
+            "closures": {
+                "score": figure(".3f"),
+                "precision": figure(".3f"),
+                "timing_ms": figure("+.0f", 1),
+                "original": int(figure(".0f", 1)),
+                "generated": int(figure(".0f", 1)),
+            },
+            "closures_p_b_m": {
+                "recall": figure(".3f"),
+                "intervals": int(figure(".0f", 1)),
+                "false_per_minute": figure(".1f", 0.1),
+                "original_per_minute": figure(".1f", 0.1),
+            },
+            "silence": {
+                "generated": {
+                    "mean": figure(".4f", 0.0001),
+                    "std": figure(".4f", 0.0001),
+                    "frames": int(figure(".0f", 1)),
+                },
+                "original": {"mean": figure(".4f", 0.0001), "std": figure(".4f", 0.0001), "frames": 0},
+            },
+        }
+
+    result = {
+        "split": "val",
+        "clips": int(figure(".0f", 1)),
+        "closed_under": figure(".4f", 0.0001),
+        "conditions": {"audio only": condition(), "with transcript": condition()},
+    }
+    return result, printed
+
+
+def test_every_figure_is_printed_as_often_as_it_is_there():
+    result, printed = figures()
+    text = table(result)
+    assert len(set(printed)) == len(printed)
+    words = text.replace(",", " ").replace(";", " ").replace(")", " ").replace("(", " ").split()
+    missing = [number for number in printed if number not in words]
+    assert not missing
+    for name in ("split val", "audio only", "with transcript", "opening", "width"):
+        assert name in text
+
+
+def test_columns_line_up():
+    result, _ = figures()
+    lines = table(result).splitlines()
+    head = next(line for line in lines if "channel" in line)
+    rows = [line for line in lines if line.startswith(("  opening  ", "  width  "))]
+    assert len(rows) == 4
+    assert {len(row) for row in rows} == {len(head)}
+
+
+@pytest.mark.parametrize("part", ["closures", "closures_p_b_m"])
+def test_figures_that_do_not_exist_are_printed_too(part):
+    result, _ = figures()
+    condition = result["conditions"]["audio only"]
+    condition[part] = {key: 0 if isinstance(value, int) else math.nan for key, value in condition[part].items()}
+    assert "nan" in table(result)

@@ -1,0 +1,183 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lipmotion.errors import AlignmentError, InputError
+from lipmotion.pipeline.animate import animate
+from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.toy import ToySentence, toy_motion
+from lipmotion.speech.read import read_audio
+from lipmotion.types import Audio, Constraints, Generation, Motion, Pin, Span, Timeline, Unit
+from lipmotion.units import Lexicon
+
+Animate = Callable[..., Generation]
+
+
+@pytest.fixture(scope="module")
+def move(toy_model: Model, toy_sentence: ToySentence) -> Animate:
+    """Animates the toy sentence with the toy model."""
+    return lambda **options: animate(toy_sentence.audio, model=toy_model, **options)
+
+
+@pytest.fixture(scope="module")
+def transcript(toy_sentence: ToySentence) -> str:
+    return " ".join(toy_sentence.words).capitalize() + "."
+
+
+def frames_of(span: Span[Unit]) -> slice:
+    return slice(round(span.start_s * 100), round(span.end_s * 100) + 1)
+
+
+def agreement(found: Motion, sentence: ToySentence) -> float:
+    """Return the correlation of the opening with the known one."""
+    known = toy_motion(sentence.units, 100.0)
+    count = min(len(known.values), len(found.values))
+    return float(np.corrcoef(found["opening"][:count], known["opening"][:count])[0, 1])
+
+
+def test_one_row_a_frame_of_10_ms(move: Animate, toy_sentence: ToySentence) -> None:
+    result = move()
+    frames = int(toy_sentence.audio.duration_s * 100) + 1
+    assert result.motion.rate_hz == 100
+    assert result.motion.names == ("opening", "width", "outer")
+    assert result.motion.values.shape == result.variance.shape == (frames, 3)
+    assert len(result.trace.frames) == frames
+    assert result.trace.frames.max() < len(result.trace.states)
+    assert np.isfinite(result.motion.values).all()
+    assert (result.variance >= 0).all()
+    assert result.units.spans[-1].end_s == pytest.approx(toy_sentence.audio.duration_s)
+
+
+def test_the_lips_move_as_the_speakers_did(move: Animate, toy_sentence: ToySentence, transcript: str) -> None:
+    assert agreement(move().motion, toy_sentence) > 0.9
+    assert agreement(move(transcript=transcript).motion, toy_sentence) > 0.9
+    assert agreement(move(units=toy_sentence.units).motion, toy_sentence) > 0.8
+
+
+def test_a_file_its_name_and_its_samples_are_the_same(toy_model: Model, toy_speech: Path) -> None:
+    first, second, third = (
+        animate(speech, model=toy_model).motion.values
+        for speech in (toy_speech, str(toy_speech), read_audio(toy_speech))
+    )
+    assert np.array_equal(first, second)
+    assert np.array_equal(first, third)
+
+
+def test_with_a_transcript_the_words_are_known(move: Animate, toy_sentence: ToySentence, transcript: str) -> None:
+    result = move(transcript=transcript)
+    assert [(s.label.phone, s.label.word) for s in result.units] == [
+        (s.label.phone, s.label.word) for s in toy_sentence.units
+    ]
+    assert all(span.label.unit for span in result.units)
+
+
+def test_the_mouth_closes_on_p_b_m_and_rests_in_silence(move: Animate, toy_sentence: ToySentence) -> None:
+    result = move(units=toy_sentence.units)
+    opening = result.motion["opening"]
+    for span in toy_sentence.units:
+        if span.label.phone in ("p", "b", "m"):
+            assert opening[frames_of(span)].min() < 0.01
+    first, last = toy_sentence.units.spans[0], toy_sentence.units.spans[-1]
+    for silence in (opening[: round(first.end_s * 100) - 30], opening[round(last.start_s * 100) + 30 :]):
+        assert silence.max() < 0.01
+        assert silence.std() < 1e-3
+
+
+def test_in_a_silent_recording_the_mouth_is_shut_and_still(toy_model: Model) -> None:
+    opening = animate(Audio(np.zeros(32_000, np.float32), 16_000), model=toy_model).motion["opening"]
+    assert opening.max() < 0.01
+    assert np.ptp(opening) < 1e-3
+
+
+def test_what_came_out_can_be_passed_back(move: Animate) -> None:
+    result = move()
+    assert np.array_equal(move(units=result.units).motion.values, result.motion.values)
+
+
+def test_edited_units_change_the_motion_where_they_are(move: Animate, toy_sentence: ToySentence) -> None:
+    """``see`` becomes ``saw``: the mouth opens there, and nowhere else."""
+    spans = toy_sentence.units.spans
+    place = next(number for number, span in enumerate(spans) if span.label.phone == "iy")
+    wider = [*spans[:place], replace(spans[place], label=Unit("aa")), *spans[place + 1 :]]
+    before, after = move(units=toy_sentence.units), move(units=Timeline(tuple(wider)))
+    inside = frames_of(spans[place])
+    assert after.motion["opening"][inside].max() > 1.3 * before.motion["opening"][inside].max()
+    far = inside.stop + 40
+    assert after.motion.values[far:] == pytest.approx(before.motion.values[far:], abs=5e-3)
+    assert after.units.spans[place].label.phone == "aa"
+
+
+def test_units_need_no_recogniser(move: Animate) -> None:
+    with pytest.raises(InputError, match="unknown phone 'AA' at 0"):
+        move(units=Timeline((Span(0.0, 0.5, Unit("AA")),)))
+    assert move(units=Timeline(())).motion["opening"].max() < 0.01  # nothing is said
+
+
+def test_pins_are_met_exactly(move: Animate, toy_sentence: ToySentence) -> None:
+    vowel = next(span for span in toy_sentence.units if span.label.phone == "aa")
+    middle_s = round((vowel.start_s + vowel.end_s) / 2, 2)
+    pins = (Pin(middle_s, "opening", 0.05), Pin(middle_s, "width", 0.7), Pin(0.0, "opening", 0.1))
+    free, pinned = move(), move(constraints=Constraints(pins))
+    for pin in pins:
+        frame = round(pin.time_s * 100)
+        assert pinned.motion[pin.channel][frame] == pytest.approx(pin.value, abs=1e-9)
+        assert pinned.variance[frame, pinned.motion.names.index(pin.channel)] == 0
+    assert np.abs(np.diff(pinned.motion["opening"])).max() < 0.1  # the curve bends, it does not jump
+    far = round(middle_s * 100) + 60
+    assert pinned.motion.values[far:] == pytest.approx(free.motion.values[far:], abs=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("pin", "message"),
+    [
+        (Pin(0.5, "jaw", 0.1), "cannot pin 'jaw'; channels that can be pinned: opening, width, outer"),
+        (Pin(9.0, "opening", 0.1), r"pin at 9.0 s lies outside the recording \(0 to 2.76 s\)"),
+        (Pin(-0.1, "opening", 0.1), "pin at -0.1 s lies outside"),
+        (Pin(0.5, "opening", float("nan")), "has the value nan, required a finite number"),
+    ],
+)
+def test_a_pin_that_cannot_be_met(move: Animate, pin: Pin, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        move(constraints=Constraints((pin,)))
+
+
+def test_a_lexicon_says_how_words_are_said(
+    move: Animate, caplog: pytest.LogCaptureFixture, toy_sentence: ToySentence
+) -> None:
+    lexicon = Lexicon({"zyzzy": (("s", "iy"),)})
+    result = move(transcript="Zyzzy bob papa mama", lexicon=lexicon)
+    assert [s.label.phone for s in result.units] == [s.label.phone for s in toy_sentence.units]
+    assert not caplog.records
+
+
+def test_an_unknown_word_is_guessed_and_reported(move: Animate, caplog: pytest.LogCaptureFixture) -> None:
+    move(transcript="seeb bob papa mama")
+    assert [record.getMessage().split(";")[0] for record in caplog.records] == [
+        "'seeb' is not in the dictionary",
+    ]
+    assert "read as 's iy b'" in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("transcript", "error", "message"),
+    [
+        ("", InputError, "holds no word"),
+        ("näh", InputError, "how 'näh' is said"),
+        ("five " * 100, AlignmentError, "the recording is too short"),
+    ],
+)
+def test_a_transcript_that_cannot_be_used(move: Animate, transcript: str, error: type[Exception], message: str) -> None:
+    with pytest.raises(error, match=message):
+        move(transcript=transcript)
+
+
+def test_speech_that_cannot_be_used(toy_model: Model, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no such file"):
+        animate(tmp_path / "speech.wav", model=toy_model)
+    with pytest.raises(InputError, match="need 16000 Hz, found 44100 Hz"):
+        animate(Audio(np.zeros(44_100, np.float32), 44_100), model=toy_model)

@@ -1,0 +1,198 @@
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+
+from lipmotion.corpora.store import Corpus
+from lipmotion.engines import Engine
+from lipmotion.errors import AlignmentError, CorpusError
+from lipmotion.measures.report import table
+from lipmotion.pipeline.evaluate import evaluate
+from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.toy import toy_motion, toy_sentences
+from lipmotion.types import Channel, Generation, Motion, Speech, Trace, Utterance
+from lipmotion.units import Lexicon
+
+CONDITIONS = ["audio only", "with transcript"]
+FIGURES = "channels opening_acc_95 acc amse lag_ms closures closures_p_b_m silence".split()
+
+
+@dataclass(frozen=True, eq=False)
+class Medium(Engine[Mapping[float, Motion]]):
+    """Knows the motion of every recording by the recording's length."""
+
+    config: Any
+    name: ClassVar[str] = "medium"
+
+    def generate(self, model: Mapping[float, Motion], speech: Speech, _constraints: object = None) -> Generation:
+        motion = model[speech.features.duration_s]
+        frames = np.zeros(len(motion.values), np.intp)
+        return Generation(motion, np.zeros_like(motion.values), speech.units, Trace(("known",), frames))
+
+    def fit(self, examples: object, monitor: object) -> Any: ...
+    def to_arrays(self, model: object) -> Any: ...
+    def from_arrays(self, arrays: object) -> Any: ...
+
+
+@pytest.fixture(scope="module")
+def known() -> dict[float, Motion]:
+    """The true motion of the toy sentences at 100 Hz."""
+    return {sentence.audio.duration_s: toy_motion(sentence.units, 100.0) for sentence in toy_sentences(12)}
+
+
+@pytest.fixture(scope="module")
+def figures(toy_model: Model, toy_corpus: Corpus) -> dict[str, Any]:
+    return evaluate(toy_model, toy_corpus)
+
+
+def corpus_of(utterances: Iterable[Utterance], folder: Path) -> Corpus:
+    corpus = Corpus.create(folder / "corpus")
+    for utterance in utterances:
+        corpus.add(utterance)
+    return corpus
+
+
+def held_out(corpus: Corpus) -> list[Utterance]:
+    return [corpus.utterance(name) for name in corpus.names("test")]
+
+
+def test_all_figures_are_there(figures: dict[str, Any]) -> None:
+    assert (figures["split"], figures["clips"]) == ("test", 2)
+    assert list(figures["conditions"]) == CONDITIONS
+    for condition in figures["conditions"].values():
+        assert list(condition) == FIGURES
+        assert list(condition["channels"]) == ["opening", "width", "outer"]
+        for row in condition["channels"].values():
+            assert list(row) == ["acc", "acc_per_clip", "nrmse", "global_variance", "jerk"]
+    assert json.loads(json.dumps(figures)) is not None
+    for name in CONDITIONS:
+        assert name in table(figures)
+
+
+def test_the_toy_model_is_good_on_sentences_it_has_not_seen(figures: dict[str, Any]) -> None:
+    for condition in figures["conditions"].values():
+        assert condition["acc"] > 0.9
+        for row in condition["channels"].values():
+            assert 0.9 < row["acc"] <= 1
+            assert row["nrmse"] < 0.5
+            assert 0.6 < row["global_variance"] < 1.2
+        low, high = condition["opening_acc_95"]
+        assert low <= condition["channels"]["opening"]["acc"] <= high
+        assert abs(condition["lag_ms"]) < 20
+        assert condition["closures_p_b_m"]["recall"] == 1
+        assert condition["silence"]["generated"]["mean"] < 0.01
+
+
+def test_a_perfect_model_has_perfect_figures(toy_model: Model, toy_corpus: Corpus, known: dict[float, Motion]) -> None:
+    figures = evaluate(replace(toy_model, engine=Medium(None), learned=known), toy_corpus)
+    for condition in figures["conditions"].values():
+        for row in condition["channels"].values():
+            assert row == pytest.approx(
+                {"acc": 1, "acc_per_clip": 1, "nrmse": 0, "global_variance": 1, "jerk": 1}, abs=1e-4
+            )
+        assert condition["opening_acc_95"] == pytest.approx((1, 1), abs=1e-6)
+        assert condition["acc"] == pytest.approx(1, abs=1e-6)
+        assert condition["amse"] == pytest.approx(0, abs=1e-6)
+        assert condition["lag_ms"] == pytest.approx(0, abs=0.5)
+        closures = condition["closures"]
+        assert (closures["score"], closures["precision"], closures["timing_ms"]) == (1, 1, 0)
+        assert closures["original"] == closures["generated"] > 4
+        lips = condition["closures_p_b_m"]
+        assert (lips["recall"], lips["false_per_minute"]) == (1, lips["original_per_minute"])
+        assert condition["silence"]["generated"] == pytest.approx(condition["silence"]["original"], abs=1e-6)
+
+
+@pytest.mark.parametrize("late", [-8, -4, 4, 8])
+def test_a_late_model_is_late(late: int, toy_model: Model, toy_corpus: Corpus, known: dict[float, Motion]) -> None:
+    shifted = {length: replace(m, values=np.roll(m.values, late, axis=0)) for length, m in known.items()}
+    figures = evaluate(replace(toy_model, engine=Medium(None), learned=shifted), toy_corpus)
+    assert figures["conditions"]["audio only"]["lag_ms"] == pytest.approx(10 * late, abs=8)
+    assert figures["conditions"]["audio only"]["closures"]["timing_ms"] == pytest.approx(10 * late, abs=20)
+
+
+def test_frames_without_a_face_are_left_out(
+    toy_model: Model, toy_corpus: Corpus, known: dict[float, Motion], tmp_path: Path
+) -> None:
+    """What the tracker filled in where it saw nothing has no say."""
+    damaged = []
+    for utterance in held_out(toy_corpus):
+        seen = np.arange(len(utterance.track.seen)) % 25 != 7
+        values = np.where(seen[:, None], utterance.track.motion.values, 9.0)
+        motion = replace(utterance.track.motion, values=values)
+        damaged.append(replace(utterance, track=replace(utterance.track, motion=motion, seen=seen)))
+    perfect = replace(toy_model, engine=Medium(None), learned=known)
+    figures = evaluate(perfect, corpus_of(damaged, tmp_path))
+    assert figures["conditions"]["audio only"]["acc"] == pytest.approx(1, abs=1e-6)
+    assert figures["conditions"]["audio only"]["amse"] == pytest.approx(0, abs=1e-6)
+
+
+def test_closed_is_closed_by_the_training_list(toy_model: Model, toy_corpus: Corpus) -> None:
+    openings = [toy_corpus.utterance(name).track.motion["opening"] for name in toy_corpus.names("train")]
+    expected = 0.1 * np.percentile(np.concatenate(openings), 95)
+    for split in ("val", "test", None):
+        assert evaluate(toy_model, toy_corpus, split=split)["closed_under"] == pytest.approx(expected, rel=1e-5)
+
+
+def test_other_lists_and_all(toy_model: Model, toy_corpus: Corpus) -> None:
+    assert evaluate(toy_model, toy_corpus, split="val")["clips"] == 2
+    everything = evaluate(toy_model, toy_corpus, split=None)
+    assert (everything["split"], everything["clips"]) == ("all", 12)
+
+
+def test_the_seed_decides(toy_model: Model, toy_corpus: Corpus) -> None:
+    one, two, other = (
+        evaluate(toy_model, toy_corpus, split=None, seed=seed)["conditions"]["audio only"] for seed in (1, 1, 2)
+    )
+    assert one == two
+    assert one["opening_acc_95"] != other["opening_acc_95"]
+    assert one["channels"] == other["channels"]
+
+
+def test_without_transcripts_there_is_audio_only(toy_model: Model, toy_corpus: Corpus, tmp_path: Path) -> None:
+    first, second = held_out(toy_corpus)
+    untold = corpus_of([replace(first, words=None), second], tmp_path)
+    assert list(evaluate(toy_model, untold)["conditions"]) == ["audio only"]
+
+
+def test_a_lexicon_says_how_words_are_said(toy_model: Model, toy_corpus: Corpus, tmp_path: Path) -> None:
+    renamed = [
+        replace(u, words=tuple({"papa": "日本"}.get(word, word) for word in u.words or ()))
+        for u in held_out(toy_corpus)
+    ]
+    corpus = corpus_of(renamed, tmp_path)
+    told = evaluate(toy_model, corpus, lexicon=Lexicon({"日本": (("p", "aa", "p", "ax"),)}))
+    assert told["conditions"]["with transcript"]["acc"] > 0.9
+
+
+def test_an_empty_split_names_the_others(toy_model: Model, toy_corpus: Corpus) -> None:
+    with pytest.raises(CorpusError, match=r"no utterances of split 'tset' \(there are train: 8, val: 2, test: 2\)"):
+        evaluate(toy_model, toy_corpus, split="tset")
+
+
+def test_a_transcript_that_does_not_fit_is_named(toy_model: Model, toy_corpus: Corpus, tmp_path: Path) -> None:
+    first, second = held_out(toy_corpus)
+    wrong = corpus_of([first, replace(second, words=("five",) * 100)], tmp_path)
+    with pytest.raises(AlignmentError, match=rf"{second.name}: .*too short.*correct its transcript, or leave it out"):
+        evaluate(toy_model, wrong)
+
+
+def renamed(motion: Motion) -> Motion:
+    return replace(motion, channels=(Channel("jaw"), Channel("width"), Channel("pout")))
+
+
+def test_other_channels_than_lip_distances(
+    toy_model: Model, toy_corpus: Corpus, known: dict[float, Motion], tmp_path: Path
+) -> None:
+    tracks = [replace(u.track, motion=renamed(u.track.motion)) for u in held_out(toy_corpus)]
+    faces = corpus_of([replace(u, track=t) for u, t in zip(held_out(toy_corpus), tracks, strict=True)], tmp_path)
+    with pytest.raises(CorpusError, match="the corpus has no channels opening, outer"):
+        evaluate(toy_model, faces)
+    other = replace(toy_model, engine=Medium(None), learned={key: renamed(m) for key, m in known.items()})
+    with pytest.raises(CorpusError, match="the model has no channels opening, outer"):
+        evaluate(other, toy_corpus)

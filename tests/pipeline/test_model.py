@@ -1,0 +1,198 @@
+from __future__ import annotations
+
+import io
+import json
+import zipfile
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from lipmotion.errors import ExportError, InputError, ModelFormatError
+from lipmotion.pipeline import model as module
+from lipmotion.pipeline.animate import animate
+from lipmotion.pipeline.model import HEADER, VERSION, Model, load_model, read_header, save_model
+from lipmotion.types import Audio
+
+
+def npy(array: np.ndarray) -> bytes:
+    file = io.BytesIO()
+    np.lib.format.write_array(file, array)
+    return file.getvalue()
+
+
+def rewritten(source: Path, target: Path, changes: Mapping[str, bytes | None]) -> Path:
+    """Copy a model with some members replaced, added, or (None) left out."""
+    with zipfile.ZipFile(source) as old, zipfile.ZipFile(target, "w") as new:
+        members = {name: old.read(name) for name in old.namelist()} | changes
+        for name, content in members.items():
+            if content is not None:
+                new.writestr(name, content)
+    return target
+
+
+def with_header(source: Path, target: Path, **changes: object) -> Path:
+    header = read_header(source) | changes
+    return rewritten(source, target, {HEADER: json.dumps(header).encode()})
+
+
+def test_saved_and_loaded_it_moves_the_same(toy_model: Model, toy_model_file: Path, toy_speech: Path) -> None:
+    """Figures are kept at half precision, so the first save changes a little."""
+    before, after = (animate(toy_speech, model=model) for model in (toy_model, load_model(toy_model_file)))
+    assert [s.label.phone for s in before.units] == [s.label.phone for s in after.units]
+    assert np.abs(before.motion.values - after.motion.values).max() < 0.02
+
+
+def test_after_one_save_nothing_changes_any_more(toy_model_file: Path, toy_speech: Path, tmp_path: Path) -> None:
+    once = load_model(toy_model_file)
+    save_model(once, tmp_path / "again.lipmotion")
+    twice = load_model(tmp_path / "again.lipmotion")
+    assert (tmp_path / "again.lipmotion").read_bytes() == toy_model_file.read_bytes()
+    first, second = (animate(toy_speech, model=model) for model in (once, twice))
+    assert np.array_equal(first.motion.values, second.motion.values)
+    assert np.array_equal(first.variance, second.variance)
+    assert first.units == second.units
+    assert first.trace.states == second.trace.states
+    assert once.about == twice.about
+    assert once.engine == twice.engine
+
+
+def test_the_same_model_gives_the_same_bytes(toy_model: Model, toy_model_file: Path, tmp_path: Path) -> None:
+    save_model(toy_model, tmp_path / "another name")
+    assert (tmp_path / "another name").read_bytes() == toy_model_file.read_bytes()
+
+
+def test_the_file_is_plain_arrays_and_a_header(toy_model_file: Path) -> None:
+    header = read_header(toy_model_file)
+    assert (header["format"], header["version"], header["engine"]) == ("lipmotion.model", 1, "trajectory")
+    assert header["configuration"]["parts"] == 5
+    assert header["recogniser"]["mixtures"] == 1
+    assert header["licence"] == ["synthesised by lipmotion"]
+    with zipfile.ZipFile(toy_model_file) as file:
+        names = file.namelist()
+        assert names[0] == HEADER
+        assert {name.split("/")[0] for name in names[1:]} == {"phones", "engine"}
+        for name in names[1:]:
+            array = np.lib.format.read_array(io.BytesIO(file.read(name)), allow_pickle=False)
+            assert array.dtype.kind in "fiuU"
+
+
+def test_what_a_user_must_know_comes_back(toy_model: Model, tmp_path: Path) -> None:
+    about = {"corpus": ["mine"], "licence": ["CC BY 4.0"], "attribution": ["Ünal 日本"], "minutes": 1.5}
+    save_model(replace(toy_model, about=about), tmp_path / "m.lipmotion")
+    assert load_model(tmp_path / "m.lipmotion").about == about
+
+
+def test_a_model_cannot_be_saved_where_there_is_no_folder(toy_model: Model, tmp_path: Path) -> None:
+    with pytest.raises(ExportError, match="does not exist; create it first"):
+        save_model(toy_model, tmp_path / "missing" / "m.lipmotion")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("read", [load_model, read_header])
+def test_no_such_model(read, tmp_path: Path) -> None:
+    for path in (tmp_path / "m.lipmotion", tmp_path):
+        with pytest.raises(InputError, match="no such model"):
+            read(path)
+
+
+@pytest.mark.parametrize("read", [load_model, read_header])
+@pytest.mark.parametrize("version", [VERSION + 1, 0, "1", None])
+def test_another_version(read, version: object, toy_model_file: Path, tmp_path: Path) -> None:
+    path = with_header(toy_model_file, tmp_path / "m.lipmotion", version=version)
+    with pytest.raises(ModelFormatError, match=f"model version {version}, .* reads version 1; upgrade lipmotion, or"):
+        read(path)
+
+
+@pytest.mark.parametrize("read", [load_model, read_header])
+@pytest.mark.parametrize("content", [b"", b"words, not a model", b"PK\3\4", b"PK\5\6" + bytes(18)])
+def test_not_a_model(read, content: bytes, tmp_path: Path) -> None:
+    (tmp_path / "m.lipmotion").write_bytes(content)
+    with pytest.raises(
+        ModelFormatError, match=r"m.lipmotion: not a lipmotion model \(.+\); give a file that"
+    ) as caught:
+        read(tmp_path / "m.lipmotion")
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("header", [b"{", b"\xff", b"[]", b'{"format": "lipmotion.motion"}', None])
+def test_a_zip_of_something_else(header: bytes | None, toy_model_file: Path, tmp_path: Path) -> None:
+    path = rewritten(toy_model_file, tmp_path / "m.lipmotion", {HEADER: header})
+    with pytest.raises(ModelFormatError, match="not a lipmotion model"):
+        load_model(path)
+
+
+PICKLED = b"\x93NUMPY\x01\x00v\x00{'descr': '|O', 'fortran_order': False, 'shape': (1,), }".ljust(127) + b"\n"
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"phones/means.npy": None},
+        {"phones/units.npy": npy(np.array(["sil"]))},
+        {"phones/units.npy": npy(np.array(3))},
+        {"phones/means.npy": npy(np.zeros((2, 1, 39), np.float16))},
+        {"phones/means.npy": b"not an array"},
+        {"phones/means.npy": PICKLED},
+        {"engine/level3_means.npy": None},
+        {"engine/level3_means.npy": npy(np.zeros(3))},
+        {"engine/channels.npy": npy(np.array(["opening"]))},
+        {"engine/variances.npy": npy(np.array(["a"]))},
+        {"other/thing.npy": npy(np.zeros(3))},
+    ],
+)
+def test_a_part_is_missing_or_wrong(changes: dict[str, bytes | None], toy_model_file: Path, tmp_path: Path) -> None:
+    path = rewritten(toy_model_file, tmp_path / "m.lipmotion", changes)
+    with pytest.raises(ModelFormatError, match=r"damaged \(.+\); train or download") as caught:
+        load_model(path)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"engine": "coupled"}, "no engine 'coupled'; there are: trajectory"),
+        ({"configuration": {"part": 5}}, "unexpected keyword argument 'part'"),
+        ({"configuration": {"parts": 4}}, "parts is 4, required an odd number"),
+        ({"recogniser": {"state": 3}}, "unexpected keyword argument 'state'"),
+        ({"recogniser": []}, "damaged"),
+        ({"configuration": None}, "damaged"),
+    ],
+)
+def test_the_header_says_what_there_is_not(
+    changes: dict[str, object], message: str, toy_model_file: Path, tmp_path: Path
+) -> None:
+    with pytest.raises(ModelFormatError, match=message):
+        load_model(with_header(toy_model_file, tmp_path / "m.lipmotion", **changes))
+
+
+@settings(deadline=None, max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.data())
+def test_damage_is_noticed_or_harmless(data: st.DataObject, toy_model_file: Path, tmp_path: Path) -> None:
+    content = bytearray(toy_model_file.read_bytes())
+    if data.draw(st.booleans()):
+        content = content[: data.draw(st.integers(0, len(content) - 1))]
+    else:
+        for _ in range(data.draw(st.integers(1, 4))):
+            content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
+    path = tmp_path / "m.lipmotion"
+    path.write_bytes(content)
+    for read in (load_model, read_header):
+        with suppress(ModelFormatError):  # any other error would be a traceback
+            read(path)
+
+
+def test_the_shipped_model_is_read_once() -> None:
+    assert load_model() is load_model()
+
+
+def test_a_package_without_a_model_says_so(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(module, "shipped_path", lambda: tmp_path / "grid-s1.lipmotion")
+    monkeypatch.setattr(module, "_shipped", module._shipped.__wrapped__)
+    with pytest.raises(ModelFormatError, match="the package holds no model; install it again, or give one"):
+        animate(Audio(np.zeros(16_000, np.float32), 16_000))

@@ -1,0 +1,110 @@
+"""``pipeline.animate.write``: one result, several files, all or none."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+import pytest
+
+from lipmotion.errors import ExportError, InputError
+from lipmotion.export.base import read_motion
+from lipmotion.pipeline.animate import animate, write
+from lipmotion.pipeline.model import Model
+from lipmotion.types import Generation
+
+
+@pytest.fixture(scope="module")
+def result(toy_model: Model, toy_speech: Path) -> Generation:
+    return animate(toy_speech, model=toy_model)
+
+
+def test_several_files_at_once(result: Generation, toy_model: Model, toy_speech: Path, tmp_path: Path) -> None:
+    paths = [tmp_path / name for name in ("a.json", "a.csv", "a.NPZ")]
+    write(result, [paths[0], str(paths[1]), paths[2]], speech=toy_speech, model=toy_model)
+    assert sorted(tmp_path.iterdir()) == sorted(paths)
+    for path in paths:
+        motion, units = read_motion(path)
+        assert motion.names == result.motion.names
+        assert motion.rate_hz == 100
+        assert motion.values == pytest.approx(result.motion.values, abs=1e-5)
+        assert len(units) == (0 if path.suffix == ".csv" else len(result.units))
+
+
+def test_files_say_where_they_come_from(result: Generation, toy_model: Model, toy_speech: Path, tmp_path: Path) -> None:
+    about = {"corpus": ["a", "b"], "licence": ["CC BY 4.0"], "attribution": ["Anna", "Ünal"], "minutes": 3}
+    write(result, [tmp_path / "a.json"], speech=toy_speech, model=replace(toy_model, about=about))
+    document = json.loads((tmp_path / "a.json").read_text(encoding="utf-8"))
+    assert document["source"] == {"file": toy_speech.name}
+    assert document["model"] == {"corpus": "a; b", "licence": "CC BY 4.0", "attribution": "Anna; Ünal"}
+
+
+def test_another_rate(result: Generation, toy_model: Model, tmp_path: Path) -> None:
+    write(result, [tmp_path / "a.json", tmp_path / "a.csv"], model=toy_model, rate_hz=30)
+    for name in ("a.json", "a.csv"):
+        motion, _ = read_motion(tmp_path / name)
+        assert motion.rate_hz == 30
+        assert motion.values == pytest.approx(result.motion.resampled(30).values, abs=1e-5)
+
+
+def test_a_video_with_its_sound(result: Generation, toy_speech: Path, tmp_path: Path) -> None:
+    write(result, [tmp_path / "a.mp4"], speech=toy_speech, fps=10)
+    with av.open(str(tmp_path / "a.mp4")) as container:
+        video, sound = container.streams.video[0], container.streams.audio[0]
+        assert video.average_rate == 10
+        assert video.frames == pytest.approx(result.motion.time_s[-1] * 10, abs=1.5)
+        assert float(sound.duration * sound.time_base) == pytest.approx(result.motion.time_s[-1], abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("bad", "options", "error", "message"),
+    [
+        ("a.xyz", {}, ExportError, r"a.xyz: unknown format '.xyz'; required one of: .json .csv .npz .mp4"),
+        ("a", {}, ExportError, r"unknown format ''"),
+        ("missing/a.json", {}, ExportError, r"the folder .*missing does not exist; create it first"),
+        ("folder.json", {}, ExportError, r"folder.json: is a folder"),
+        ("a.mp4", {"speech": None}, ExportError, r"a video needs the recording: write\(..., speech=FILE\)"),
+        ("a.json", {"rate_hz": 0.0}, InputError, r"frame rate is 0.0, required 1 to 1000 a second"),
+        ("a.json", {"rate_hz": float("nan")}, InputError, r"frame rate is nan"),
+        ("a.json", {"rate_hz": 1e12}, InputError, r"frame rate is 1000000000000.0"),
+        ("a.mp4", {"fps": -25.0}, InputError, r"frame rate is -25.0"),
+        ("a.mp4", {"fps": float("inf")}, InputError, r"frame rate is inf"),
+        ("a.mp4", {"fps": 1e-5}, InputError, r"frame rate is 1e-05"),
+    ],
+)
+def test_nothing_is_written_unless_everything_can_be(
+    bad: str,
+    options: dict[str, Any],
+    error: type[Exception],
+    message: str,
+    result: Generation,
+    toy_model: Model,
+    toy_speech: Path,
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "folder.json").mkdir()
+    with pytest.raises(error, match=message):
+        write(result, [tmp_path / "good.csv", tmp_path / bad], **({"speech": toy_speech, "model": toy_model} | options))
+    assert [path.name for path in tmp_path.iterdir()] == ["folder.json"]
+
+
+def test_the_recording_is_not_overwritten(result: Generation, toy_speech: Path, tmp_path: Path) -> None:
+    recording = tmp_path / "speech.mp4"
+    shutil.copy(toy_speech, recording)
+    (tmp_path / "link.mp4").symlink_to(recording)
+    for name in ("speech.mp4", "link.mp4"):
+        with pytest.raises(ExportError, match="is the recording itself; give another name"):
+            write(result, [tmp_path / name], speech=recording)
+    assert recording.read_bytes() == toy_speech.read_bytes()
+
+
+def test_values_that_are_not_finite_leave_no_file(result: Generation, toy_model: Model, tmp_path: Path) -> None:
+    broken = replace(result, motion=replace(result.motion, values=np.full_like(result.motion.values, np.nan)))
+    with pytest.raises(ExportError, match="not finite"):
+        write(broken, [tmp_path / "a.json"], model=toy_model)
+    assert list(tmp_path.iterdir()) == []
