@@ -107,6 +107,16 @@ def test_options_that_cannot_be_used(
     assert list(here.iterdir()) == []
 
 
+@pytest.mark.parametrize(
+    ("options", "code"), [(["-o", "missing/a.json"], 7), (["-o", "a.json", "--rate", "0"], 3), (["-o", "a.xyz"], 7)]
+)
+@pytest.mark.usefixtures("here")
+def test_outputs_are_checked_before_work_begins(run: Run, options: list[str], code: int) -> None:
+    done = run("animate", "missing.wav", "--model", "missing.lipmotion", *options)
+    assert is_one_error(done, code)
+    assert "no such" not in done.err[0]
+
+
 def test_files_that_are_not_what_they_should_be(
     run: Run, basics: tuple[object, ...], here: Path, toy_speech: Path, newer_model: Path
 ) -> None:

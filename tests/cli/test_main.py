@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 
@@ -82,9 +83,9 @@ def test_a_reader_that_has_gone_is_no_error(arguments: list[str]) -> None:
         "-c",
         "import sys; sys.stdin.read(); from lipmotion.cli.main import main; sys.exit(main())",
     ]
-    with subprocess.Popen(
-        [*program, *arguments], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env={}
-    ) as process:
+    buffered = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+    pipe = subprocess.PIPE
+    with subprocess.Popen([*program, *arguments], stdin=pipe, stdout=pipe, stderr=pipe, env=buffered) as process:
         assert process.stdin is not None
         assert process.stdout is not None
         assert process.stderr is not None

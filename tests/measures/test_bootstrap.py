@@ -51,7 +51,9 @@ def test_more_clips_are_surer():
 
 
 def test_95_percent_of_the_draws_lie_inside():
-    """The mean of clips that are 0 or 1, half of each: the interval is that of the binomial distribution."""
-    generated, original = [np.full((1, 1), float(n % 2)) for n in range(100)], [np.zeros((1, 1))] * 100
-    low, high = interval(mean_distance, generated, original, seed=0, draws=1000)
-    assert (low, high) == pytest.approx((0.4, 0.6), abs=0.021)
+    """The mean of 200 values is nearly normal: 1.96 standard errors to either side."""
+    values = np.abs(np.random.default_rng(4).normal(5, 1, 200))
+    generated, original = [np.full((1, 1), value) for value in values], [np.zeros((1, 1))] * 200
+    low, high = interval(mean_distance, generated, original, seed=0)
+    assert (low + high) / 2 == pytest.approx(values.mean(), abs=0.02)
+    assert high - low == pytest.approx(2 * 1.96 * values.std() / np.sqrt(200), rel=0.07)

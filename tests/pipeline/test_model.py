@@ -76,6 +76,7 @@ def test_the_file_is_plain_arrays_and_a_header(toy_model_file: Path) -> None:
     with zipfile.ZipFile(toy_model_file) as file:
         names = file.namelist()
         assert names[0] == HEADER
+        assert {info.date_time for info in file.infolist()} == {(1980, 1, 1, 0, 0, 0)}
         assert {name.split("/")[0] for name in names[1:]} == {"phones", "engine"}
         for name in names[1:]:
             array = np.lib.format.read_array(io.BytesIO(file.read(name)), allow_pickle=False)

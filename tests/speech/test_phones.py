@@ -8,6 +8,7 @@ import pytest
 from lipmotion.errors import AlignmentError, CorpusError
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.toy import WORDS, ToySentence, toy_sentences
+from lipmotion.speech import phones as module
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.phones import SHORT_PAUSE_S, align, recognise, train_phones
 from lipmotion.speech.synthesise import synthesise
@@ -56,6 +57,17 @@ def test_the_words_are_found_where_they_are(hmm: UnitHmm, sentences: list[ToySen
         errors_s += [a.start_s - b.start_s for a, b in zip(found, sentence.units, strict=True)][1:]
     assert np.mean(np.abs(errors_s)) < 0.03
     assert np.percentile(np.abs(errors_s), 90) < 0.05
+
+
+def test_frame_n_reaches_from_half_a_frame_before_to_half_a_frame_after(
+    hmm: UnitHmm, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bounds = np.array([0, 10, 12, 40, 60, 101])
+    monkeypatch.setattr(module, "decode_units", lambda *_: (("sil", "p", "sil", "aa", "sil"), bounds))
+    found = recognise(hmm, mfcc(Audio(np.sin(np.arange(16_100)).astype(np.float32), 16_000)))
+    assert [span.start_s for span in found] == pytest.approx([0, 0.095, 0.115, 0.395, 0.595])
+    assert covers(found, 16_100 / 16_000)
+    assert phones(found) == ["sil", "p", "sil", "aa", "sil"]
 
 
 def test_unknown_sentences_are_recognised(hmm: UnitHmm, sentences: list[ToySentence]) -> None:

@@ -73,7 +73,8 @@ def test_a_users_file(lexicon_file: Path) -> None:
         "lipmotion(2) l ih p m ow sh en\n"
         "map M AE0 P\n"
         "naïve  n aa iy v\n"
-        "don’t d ow n t\n",
+        "don’t d ow n t\n"
+        "'em ax m\n",
         encoding="utf-8",
     )
     mine = Lexicon.from_file(lexicon_file)
@@ -81,6 +82,7 @@ def test_a_users_file(lexicon_file: Path) -> None:
     assert said("map", mine) == ["m ae p"]
     assert said("naïve", mine) == ["n aa iy v"]
     assert said("don't", mine) == ["d ow n t"]
+    assert said("em", mine) == ["ax m"]
     assert mine.known("lipmotion")
     assert said("bin", mine) == said("bin")
 

@@ -43,18 +43,21 @@ def test_the_first_relative_that_is_known_stands_in(phone: str) -> None:
         assert stand_in(phone, set(PHONES) - {phone, *RELATIVES[phone][:position]}) == relative
 
 
-@pytest.mark.parametrize("phone", SPOKEN)
-def test_any_one_known_phone_is_reached(phone: str) -> None:
-    for only in SPOKEN:
-        assert stand_in(phone, [only]) == only
+def steps_to(phone: str) -> dict[str, int]:
+    """Return over how many relatives every other phone is reached."""
+    steps = {phone: 0}
+    while reached := {r for p in steps for r in RELATIVES[p]} - set(steps):
+        steps |= dict.fromkeys(reached, max(steps.values()) + 1)
+    return steps
 
 
 @settings(deadline=None, max_examples=100)
 @given(st.sampled_from(SPOKEN), st.sets(st.sampled_from(SPOKEN), min_size=1, max_size=8))
-def test_the_stand_in_is_known_and_always_the_same(phone: str, known: set[str]) -> None:
-    chosen = stand_in(phone, known)
+def test_the_nearest_known_relative_stands_in(phone: str, known: set[str]) -> None:
+    chosen, steps = stand_in(phone, known), steps_to(phone)
     assert chosen in known
     assert chosen == stand_in(phone, sorted(known, reverse=True))
+    assert steps.get(chosen, 99) == min(steps.get(other, 99) for other in known)  # nobody nearer is passed over
 
 
 @pytest.mark.parametrize("phone", UNSAID_IN_GRID)

@@ -18,8 +18,7 @@ EXIT_CODES = """exit codes: 0 done, 1 a bug, 2 wrong command line, 3 unusable in
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; return its exit code."""
-    logging.basicConfig(format="lipmotion: %(levelname)s: %(message)s", level=logging.WARNING)
-    logging.addLevelName(logging.WARNING, "warning")
+    logging.basicConfig(format="lipmotion: warning: %(message)s", level=logging.WARNING)
     try:
         _run(arguments)
     except LipMotionError as error:

@@ -43,28 +43,21 @@ class Lexicon:
             word, *phones = line.split("#")[0].split() or [""]
             if not word:
                 continue
-            word = re.sub(r"\(\d+\)$", "", plain(word))
+            word = re.sub(r"\(\d+\)$", "", plain(word)).strip("'")  # as in ``words_of``
             user[word] = (*user.get(word, ()), _user_phones(phones, f"{path}, line {number}"))
         return cls(user)
 
     def known(self, word: str) -> bool:
         """Whether the word is in the user's file or in the dictionary."""
-        return any(form in self.user or _dictionary_entries(form) for form in _forms(word))
+        return word in self.user or bool(_dictionary_entries(word))
 
     def pronunciations(self, word: str) -> tuple[Pronunciation, ...]:
         """Return every pronunciation of a lower-case word; of an unknown one, the spelling rules' guess."""
-        for form in _forms(word):
-            if form in self.user:
-                return self.user[form]
-            variants = [_with_reduced_vowels(form, entry) for entry in _dictionary_entries(form)]
-            if variants:
-                return tuple(dict.fromkeys(variants))
-        return (_with_reduced_vowels(word, guess(word)),)
-
-
-def _forms(word: str) -> tuple[str, ...]:
-    """Return what to look up: a closing quotation mark looks like the apostrophe of ``actors'``."""
-    return (word, word.rstrip("'")) if word.endswith("'") else (word,)
+        if word in self.user:
+            return self.user[word]
+        entries = _dictionary_entries(word)
+        variants = [_with_reduced_vowels(word, entry) for entry in entries]
+        return tuple(dict.fromkeys(variants)) or (_with_reduced_vowels(word, guess(word)),)
 
 
 def _lines(path: Path) -> list[str]:

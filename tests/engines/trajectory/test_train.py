@@ -3,7 +3,7 @@ import pytest
 
 from engines.synthetic import examples
 from lipmotion.engines.trajectory import train
-from lipmotion.engines.trajectory.contexts import SPREAD_LEVELS, level_names, places
+from lipmotion.engines.trajectory.contexts import SPREAD_LEVELS, level_names, places, rest_place
 from lipmotion.stats.em import silent_monitor
 
 OPTIONS = {"parts": 3, "edge_s": 0.08, "components": 2, "shrinkage": 10.0, "variance_shrinkage": 20.0}
@@ -48,6 +48,16 @@ def test_variances_shrink_towards_the_more_general_ones():
         rows = [tight.variances[tight.spread[name]] for name in names]
         assert rows[1] == pytest.approx(rows[0], rel=1e-3)
         assert rows[2] == pytest.approx(rows[0], rel=1e-3)
+
+
+def test_what_the_mouth_does_in_silence_away_from_speech_is_not_learned():
+    calm, restless = examples(4), examples(4)
+    for example in restless:
+        example.motion.values[5:25:2, 0] += 0.1
+    models = [train.fit_trajectory(corpus, **OPTIONS, monitor=silent_monitor) for corpus in (calm, restless)]
+    one, two = (model.statistics(rest_place(3)) for model in models)
+    assert two[0][:, 0] == pytest.approx(one[0][:, 0], abs=2e-3)
+    assert two[1][:, 0] == pytest.approx(one[1][:, 0], rel=0.05)
 
 
 def test_a_channel_that_never_moves_keeps_a_variance():

@@ -116,6 +116,17 @@ def test_the_old_models_stay_as_they_were():
     assert np.array_equal(hmm.mixtures.means, before)
 
 
+def test_no_state_may_last_longer_than_its_limit():
+    """Else the closure of a stop takes the silence before it for its own."""
+    who = speaker(1)
+    data = [np.repeat(who.say(np.random.default_rng(n), ("sil", "a", "sil"))[0], 12, axis=0) for n in range(3)]
+    hmm = known_hmm(who)
+    better, _ = baum_welch(hmm, data, [("sil", "a", "sil")] * 3)
+    lasting = {name: 1 / -np.expm1(float(stay)) for name, stay in zip(hmm.table.names, better.log_stay, strict=True)}
+    assert [lasting[f"a.{state}"] for state in range(3)] == pytest.approx([train.LONGEST_STATE] * 3, rel=1e-4)
+    assert train.LONGEST_STATE < lasting["sil.0"] < train.LONGEST_SILENCE
+
+
 def coarticulated(count: int):
     """Utterances in which the start of ``a`` depends on the unit before it."""
     who = speaker(1)

@@ -8,6 +8,7 @@ import pytest
 from lipmotion.errors import CorpusError
 from lipmotion.stats.bigram import estimate_bigram
 from lipmotion.stats.em import silent_monitor
+from lipmotion.stats.hmm import train
 from lipmotion.stats.hmm.align import align_units, choose_pronunciations
 from lipmotion.stats.hmm.decode import decode_units
 from lipmotion.stats.hmm.model import HmmConfig
@@ -51,6 +52,20 @@ def test_pauses_are_found_where_they_were_made(trained):
     for utterance, units in zip(transcribed, said, strict=True):
         chosen = choose_pronunciations(hmm, utterance.features, utterance.words, PAUSE)
         assert tuple(unit for part in chosen for unit in part.units) == units
+
+
+def test_pauses_are_found_at_the_first_choice_already(monkeypatch):
+    """A pause sounds like silence before any was heard; else a unit beside it learns to sound like both."""
+    chosen = []
+
+    def choose(*arguments):
+        chosen.append(choose_pronunciations(*arguments))
+        return chosen[-1]
+
+    monkeypatch.setattr(train, "choose_pronunciations", choose)
+    transcribed, said, _ = recordings(0, 20, speaker(0, spread=0.8), pauses=True)
+    train.train_hmm(transcribed, INVENTORY, CONFIG, silent_monitor)
+    assert [tuple(unit for part in parts for unit in part.units) for parts in chosen[:20]] == said
 
 
 def test_new_sentences_are_recognised(trained):
