@@ -56,8 +56,10 @@ def run(capsys: pytest.CaptureFixture[str]) -> Run:
 def run_outside() -> Run:
     """Runs a command in a process of its own, as a shell does."""
 
-    def run(*arguments: object, program: tuple[str, ...] = (sys.executable, "-m", "lipmotion.cli.main")) -> Done:
-        environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTHONUNBUFFERED")}
+    module = (sys.executable, "-m", "lipmotion.cli.main")
+
+    def run(*arguments: object, program: tuple[str, ...] = module, encoding: str = "utf-8") -> Done:
+        environment = os.environ | {"PYTHONIOENCODING": encoding}
         done = subprocess.run(
             [*program, *map(str, arguments)], capture_output=True, encoding="utf-8", check=False, env=environment
         )

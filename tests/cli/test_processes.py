@@ -17,6 +17,14 @@ def test_speech_in_motion_out(run_outside: Run, toy_speech: Path, toy_model_file
     assert sorted(path.name for path in here.iterdir()) == ["a.npz", "ä.json"]
 
 
+def test_a_terminal_that_does_not_know_the_letters(
+    run_outside: Run, toy_speech: Path, toy_model_file: Path, here: Path
+) -> None:
+    done = run_outside("animate", toy_speech, "--model", toy_model_file, "-o", "ä.json", encoding="ascii")
+    assert done == (0, ["\\xe4.json"], [])
+    assert [path.name for path in here.iterdir()] == ["ä.json"]
+
+
 @pytest.mark.usefixtures("here")
 def test_an_unknown_word_is_one_warning(run_outside: Run, toy_speech: Path, toy_model_file: Path) -> None:
     words = "see bimab papa mama"

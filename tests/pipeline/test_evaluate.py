@@ -170,6 +170,17 @@ def test_a_lexicon_says_how_words_are_said(toy_model: Model, toy_corpus: Corpus,
     assert told["conditions"]["with transcript"]["acc"] > 0.9
 
 
+def test_guessed_words_are_reported(
+    toy_model: Model, toy_corpus: Corpus, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    changed = [
+        replace(u, words=tuple({"papa": "pahpa"}.get(word, word) for word in u.words or ()))
+        for u in held_out(toy_corpus)
+    ]
+    evaluate(toy_model, corpus_of(changed, tmp_path))
+    assert [record.getMessage().split()[0] for record in caplog.records] == ["'pahpa'"]
+
+
 def test_an_empty_split_names_the_others(toy_model: Model, toy_corpus: Corpus) -> None:
     with pytest.raises(CorpusError, match=r"no utterances of split 'tset' \(there are train: 8, val: 2, test: 2\)"):
         evaluate(toy_model, toy_corpus, split="tset")

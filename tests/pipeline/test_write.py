@@ -44,6 +44,13 @@ def test_files_say_where_they_come_from(result: Generation, toy_model: Model, to
     assert document["model"] == {"corpus": "a; b", "licence": "CC BY 4.0", "attribution": "Anna; Ünal"}
 
 
+def test_a_recording_may_have_any_name(result: Generation, toy_model: Model, tmp_path: Path) -> None:
+    write(result, [tmp_path / "a.json", tmp_path / "a.npz"], speech="Ünal 音 caf\udce9.wav", model=toy_model)
+    document = json.loads((tmp_path / "a.json").read_text(encoding="utf-8"))
+    assert document["source"] == {"file": "Ünal 音 caf\\udce9.wav"}
+    assert len(read_motion(tmp_path / "a.npz")[1]) == len(result.units)
+
+
 def test_another_rate(result: Generation, toy_model: Model, tmp_path: Path) -> None:
     write(result, [tmp_path / "a.json", tmp_path / "a.csv"], model=toy_model, rate_hz=30)
     for name in ("a.json", "a.csv"):

@@ -1,16 +1,18 @@
 from __future__ import annotations
 
-from itertools import pairwise
+from itertools import groupby, pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from lipmotion.errors import AlignmentError, CorpusError
-from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.toy import WORDS, ToySentence, toy_sentences
 from lipmotion.speech import phones as module
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.phones import SHORT_PAUSE_S, align, recognise, train_phones
+from lipmotion.speech.read import read_audio
 from lipmotion.speech.synthesise import synthesise
 from lipmotion.stats.em import silent_monitor
 from lipmotion.stats.hmm.model import HmmConfig, UnitHmm
@@ -161,3 +163,19 @@ def test_transcripts_that_do_not_fit_are_left_out(sentences: list[ToySentence]) 
     assert np.array_equal(hmm.mixtures.means, train_phones(good, Lexicon(), SMALL, silent_monitor).mixtures.means)
     with pytest.raises(CorpusError, match="none of 1 utterances has a transcript that fits into its recording"):
         train_phones([bad], Lexicon(), SMALL, silent_monitor)
+
+
+@pytest.mark.recordings
+def test_words_of_real_recordings_are_found_where_others_found_them(recordings: Path) -> None:
+    """GRID's own word times, of twelve sentences."""
+    grid, errors_s = recordings / "grid-s1", []
+    for name in (grid / "test.txt").read_text().split()[::4][:12]:
+        rows = [line.split() for line in (grid / "align" / f"{name}.align").read_text().splitlines()]
+        words = [(int(start) / 25_000, word) for start, _, word in rows if word not in (SILENCE, PAUSE)]
+        features = mfcc(read_audio(grid / "clips" / f"{name}.mkv"))
+        found = align(load_model().phones, features, [word for _, word in words], Lexicon())
+        spoken = groupby((span for span in found if span.label.word), key=lambda span: span.label.word)
+        starts_s = [next(spans).start_s for _, spans in spoken]
+        errors_s += [a - b for a, (b, _) in zip(starts_s, words, strict=True)]
+    assert np.mean(np.abs(errors_s)) < 0.05
+    assert abs(np.median(errors_s)) < 0.03

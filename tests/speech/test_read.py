@@ -3,6 +3,7 @@ from __future__ import annotations
 import shutil
 import wave
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -130,6 +131,16 @@ def test_it_says_what_is_wrong(tmp_path: Path, make: Callable[[Path], object], m
     make(tmp_path / "a.wav")
     with pytest.raises(InputError, match=message):
         read_audio(tmp_path / "a.wav")
+
+
+@pytest.mark.parametrize(("name", "codec"), [(name, codec) for name, codec, _ in CONTAINERS])
+@pytest.mark.parametrize("share", [0.01, 0.3, 0.9])
+def test_a_recording_cut_short_is_shorter_or_refused(tmp_path: Path, name: str, codec: str, share: float) -> None:
+    path = write_sound(tmp_path / name, tone(16_000), 16_000, codec)
+    content = path.read_bytes()
+    path.write_bytes(content[: round(share * len(content))])
+    with suppress(InputError):  # any other error would be a traceback
+        assert read_audio(path).duration_s < 1.1
 
 
 def test_a_tenth_of_a_second_is_enough(tmp_path: Path) -> None:

@@ -106,11 +106,14 @@ def _write_motion(
         generation = generation.resampled(rate_hz)
     about = (model or load_model()).about
     named = {key: _text(about[key]) for key in ("name", "corpus", "licence", "attribution") if about.get(key)}
-    write_motion(path, generation, source={"file": Path(speech).name} if speech else {}, model=named)
+    source = {"file": _text(Path(speech).name)} if speech else {}
+    write_motion(path, generation, source=source, model=named)
 
 
 def _text(value: object) -> str:
-    return "; ".join(map(str, value)) if isinstance(value, list) else str(value)
+    """Return what can be written as UTF-8: a file's name may be of any bytes."""
+    text = "; ".join(map(str, value)) if isinstance(value, list) else str(value)
+    return text.encode("utf-8", "backslashreplace").decode("utf-8")
 
 
 def _write_video(generation: Generation, path: Path, speech: Path, fps: float) -> None:

@@ -16,6 +16,7 @@ from lipmotion.measures.bootstrap import interval
 from lipmotion.measures.closures import closed_threshold, closure_figures, phone_closures
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.train import labels_of
+from lipmotion.pipeline.transcribe import report_guesses
 from lipmotion.speech.phones import recognise
 from lipmotion.types import Motion, Speech, Timeline, Unit, Utterance
 from lipmotion.units import Lexicon, is_silent
@@ -56,6 +57,7 @@ def evaluate(
         raise CorpusError(f"{corpus.path}: no utterances of split {split!r} (there are {found})")
     utterances = [corpus.utterance(name) for name in names]
     _check_channels("corpus", utterances[0].track.motion)
+    report_guesses([word for utterance in utterances for word in utterance.words or ()], lexicon)
     reference = [_reference(utterance, model, lexicon) for utterance in utterances]
     threshold = closed_threshold([_openings(u) for u in _training(corpus) or utterances])
     conditions = {"audio only": [recognise(model.phones, u.features) for u in utterances]}

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from lipmotion.stats.em import Monitor
 from lipmotion.stats.hmm.align import align_units, choose_pronunciations
 from lipmotion.stats.hmm.decode import decode_units
+from lipmotion.stats.hmm.loudness import loud_frames
 from lipmotion.stats.hmm.model import HmmConfig, UnitHmm
 from lipmotion.stats.hmm.train import Transcribed, UnitInventory, train_hmm
 from lipmotion.types import FRAME_RATE_HZ, Features, Span, Timeline, Unit
@@ -17,6 +18,8 @@ from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent, stand_in
 
 LOG_ENERGY = 12
 """The column of the features that holds the log energy."""
+LOUD_FRAMES = 5
+"""The energy is averaged over so many frames before it rules silence out."""
 SHORT_PAUSE_S = 0.2
 """Silence shorter than this is a pause between words."""
 
@@ -45,8 +48,9 @@ def align(hmm: UnitHmm, features: Features, words: Sequence[str], lexicon: Lexic
     variants = [lexicon.pronunciations(word) for word in words]
     known = [unit for unit in hmm.table.units if not is_silent(unit)]
     heard = [[tuple(stand_in(p, known) for p in variant) for variant in choices] for choices in variants]
-    said = choose_pronunciations(hmm, features.values, heard, PAUSE)
-    bounds = align_units(hmm, features.values, [unit for part in said for unit in part.units])
+    loud = loud_frames(features.values[:, LOG_ENERGY], LOUD_FRAMES)
+    said = choose_pronunciations(hmm, features.values, heard, PAUSE, loud)
+    bounds = align_units(hmm, features.values, [unit for part in said for unit in part.units], loud)
     labels = [
         (phone, words[part.word] if part.word >= 0 else "")
         for part in said

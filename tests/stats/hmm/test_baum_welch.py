@@ -5,6 +5,8 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from lipmotion.stats.em import silent_monitor
 from lipmotion.stats.hmm import train
@@ -57,7 +59,7 @@ def test_a_high_variance_floor_does_not_break_the_rise():
 
 def test_the_e_step_agrees_with_the_enumeration_of_all_paths(monkeypatch):
     monkeypatch.setattr(train, "LEAST_POSTERIOR", 0.0)
-    monkeypatch.setattr(train, "BATCH", 2)
+    monkeypatch.setattr(train, "CELLS", 100)
     hmm, draw = random_hmm(1, contexts=6), np.random.default_rng(1)
     said = [("a",), ("sil", "b"), ("a", "sp"), ("b", "a")]
     data = [draw.normal(0, 1.5, (frames, 2)).astype(np.float32) for frames in (7, 8, 5, 7)]
@@ -82,13 +84,26 @@ def test_the_e_step_agrees_with_the_enumeration_of_all_paths(monkeypatch):
     assert keep == pytest.approx(np.clip(stays[visits > 0] / visits[visits > 0], 0.05, 11 / 12), abs=1e-4)
 
 
-def test_the_size_of_batches_changes_nothing(monkeypatch):
+@pytest.mark.parametrize("cells", [1, 5_000, 20_000])
+def test_the_size_of_batches_changes_nothing(monkeypatch, cells):
     hmm, data, said = disturbed(6, 1.0)
     better, log_likelihood = baum_welch(hmm, data, said)
-    monkeypatch.setattr(train, "BATCH", 4)
+    monkeypatch.setattr(train, "CELLS", cells)
     same, figure = baum_welch(hmm, data, said)
     assert figure == pytest.approx(log_likelihood, abs=1e-9)
     assert np.array_equal(same.mixtures.means, better.mixtures.means)
+
+
+@given(sizes=st.lists(st.tuples(st.integers(1, 300), st.integers(1, 60)), min_size=1, max_size=20))
+def test_long_utterances_do_not_fill_the_memory(sizes):
+    frames, states = zip(*sizes, strict=True)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(train, "CELLS", 20_000)
+        batches = list(train._batches(frames, states))
+    assert sorted(i for batch in batches for i in batch) == list(range(len(sizes)))
+    for batch in batches:
+        padded = len(batch) * max(frames[i] for i in batch) * max(states[i] for i in batch)
+        assert len(batch) == 1 or padded <= 20_000
 
 
 def test_order_of_utterances_changes_nothing():

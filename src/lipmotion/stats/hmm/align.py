@@ -45,26 +45,30 @@ def chain_of(hmm: UnitHmm, units: Sequence[str]) -> Chain:
 
 
 def state_path(
-    hmm: UnitHmm, features: NDArray[np.float32], units: Sequence[str]
+    hmm: UnitHmm, features: NDArray[np.float32], units: Sequence[str], loud: NDArray[np.bool_] | None = None
 ) -> tuple[tuple[tuple[str, int], ...], NDArray[np.intp]]:
     """Return the states of a unit sequence (``Chain.names``) and which of them holds in each frame [shape=(T,)].
 
     features : [shape=(T, D)]
+    loud     : [shape=(T,)], frames that cannot be silence
     Raises AlignmentError: fewer frames than states.
     """
     chain = chain_of(hmm, units)
     used, local = np.unique(chain.densities, return_inverse=True)
-    path = _chain_network(hmm, chain, local).best_path(hmm.mixtures.log_likelihood(features, used))
+    path = _chain_network(hmm, chain, local).best_path(hmm.log_emission(features, used, loud))
     return chain.names, path
 
 
-def align_units(hmm: UnitHmm, features: NDArray[np.float32], units: Sequence[str]) -> NDArray[np.intp]:
+def align_units(
+    hmm: UnitHmm, features: NDArray[np.float32], units: Sequence[str], loud: NDArray[np.bool_] | None = None
+) -> NDArray[np.intp]:
     """Return the first frame of each unit, and the frame count at the end [shape=(len(units) + 1,)].
 
     features : [shape=(T, D)]
+    loud     : [shape=(T,)], frames that cannot be silence
     Raises AlignmentError: fewer frames than states.
     """
-    _, path = state_path(hmm, features, units)
+    _, path = state_path(hmm, features, units, loud)
     positions = chain_of(hmm, units).positions[path]
     return np.append(np.searchsorted(positions, np.arange(len(units))), len(features))
 
@@ -91,12 +95,17 @@ class Said(NamedTuple):
 
 
 def choose_pronunciations(
-    hmm: UnitHmm, features: NDArray[np.float32], words: Sequence[Sequence[Sequence[str]]], pause: str
+    hmm: UnitHmm,
+    features: NDArray[np.float32],
+    words: Sequence[Sequence[Sequence[str]]],
+    pause: str,
+    loud: NDArray[np.bool_] | None = None,
 ) -> list[Said]:
     """Choose how each word was said, and where there was a pause.
 
     words : for each word, its possible pronunciations
     pause : the unit that may stand between words; silence (the first free unit) surrounds them all
+    loud  : [shape=(T,)], frames that cannot be silence
     The states without context decide, so that a pronunciation's ends need not know its neighbours.
     Raises AlignmentError: the words do not fit into the frames.
     """
@@ -122,7 +131,7 @@ def choose_pronunciations(
     for state, move in open_ends:
         builder.final(state, move)
     plain = np.arange(len(hmm.log_stay), dtype=np.intp)
-    path = builder.build().best_path(hmm.mixtures.log_likelihood(features, plain))
+    path = builder.build().best_path(hmm.log_emission(features, plain, loud))
     return [said for _, said in sorted({owners[state] for state in path})]
 
 

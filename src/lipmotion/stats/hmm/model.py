@@ -14,6 +14,9 @@ from lipmotion.stats.bigram import Bigram
 from lipmotion.stats.hmm.states import StateTable
 from lipmotion.stats.mixture import Mixtures
 
+LOUD_SILENCE = 30.0
+"""What the log density of silence loses in a loud frame."""
+
 
 @dataclass(frozen=True)
 class HmmConfig:
@@ -58,6 +61,22 @@ class UnitHmm:
     def move(self, unit: str, state: int) -> float:
         """Return log P(leave this state)."""
         return float(np.log(-np.expm1(self.stay(unit, state))))
+
+    def log_emission(
+        self, features: NDArray[np.float32], chosen: NDArray[np.intp], loud: NDArray[np.bool_] | None
+    ) -> NDArray[np.float32]:
+        """Return the log density of every frame under some densities [shape=(T, G')], for forced alignment.
+
+        features : [shape=(T, D)]
+        chosen   : [shape=(G',)], the densities wanted
+        loud     : [shape=(T,)], frames that cannot be silence. A voice that the models do not know is, to them,
+                   hardly more like speech than like silence; its energy says which
+        """
+        log_density = self.mixtures.log_likelihood(features, chosen)
+        if loud is not None:
+            free = [self.table.density(unit, k) for unit in self.table.free for k in range(self.table.count(unit))]
+            log_density[np.ix_(loud, np.isin(chosen, free))] -= LOUD_SILENCE
+        return log_density
 
 
 def hmm_arrays(hmm: UnitHmm) -> dict[str, NDArray[Any]]:

@@ -14,19 +14,19 @@ from lipmotion.kernels.forward_backward import IMPOSSIBLE, chain_posteriors
 from lipmotion.stats.bigram import estimate_bigram
 from lipmotion.stats.em import Monitor
 from lipmotion.stats.hmm.align import Chain, chain_of, choose_pronunciations, state_path
+from lipmotion.stats.hmm.loudness import loud_frames
 from lipmotion.stats.hmm.model import HmmConfig, UnitHmm
 from lipmotion.stats.hmm.states import StateTable, plain_states
 from lipmotion.stats.mixture import Mixtures, single_gaussian
 
-BATCH = 64
-"""Utterances whose posteriors are computed together."""
+CELLS = 2_000_000
+"""Frames × utterances × states whose posteriors are computed together: 16 MB an array, some hundred in all."""
 LEAST_POSTERIOR = 1e-3
 """State posteriors under this are left out of the statistics."""
-ONSET_SHARE = 0.5
-"""For the flat start, speech is where the log energy has risen this far from its 10th to its 95th percentile."""
 ONSET_FRAMES = 21
-"""The log energy is averaged over so many frames for that. Without it a click or a breath is the end of speech, and
-the state before it takes the silence for its own: the last words of GRID then ended up to 0.8 s late."""
+"""For the flat start, speech is where the energy is loud, averaged over so many frames. Without averaging a click or
+a breath is the end of speech, and the state before it takes the silence for its own: the last words of GRID then
+ended up to 0.8 s late."""
 LONGEST_SILENCE, LONGEST_STATE = 200.0, 12.0
 """Most frames that a state of silence, or of any other unit, may last on average. Without the second limit the
 closure of a stop that begins every other sentence takes the silence before it for its own."""
@@ -146,9 +146,7 @@ def _even_path(energy: NDArray[np.float32], chain: Chain, units: int) -> NDArray
     """Return a first guess of the state in each frame: silence up to the first and from the last loud frame,
     all other states spread evenly between. [shape=(T,)]
     """
-    smooth = np.convolve(np.pad(energy, ONSET_FRAMES // 2, "edge"), np.full(ONSET_FRAMES, 1 / ONSET_FRAMES), "valid")
-    quiet, loud = np.quantile(smooth, [0.1, 0.95])
-    above = np.nonzero(smooth > quiet + ONSET_SHARE * (loud - quiet))[0]
+    above = np.nonzero(loud_frames(energy, ONSET_FRAMES))[0]
     onset, offset = (int(above[0]), int(above[-1]) + 1) if len(above) else (0, len(energy))
     silence = int((chain.positions == 0).sum())
     speech = int(((chain.positions > 0) & (chain.positions < units - 1)).sum())
@@ -201,11 +199,24 @@ def _maximised(hmm: UnitHmm, statistics: _Statistics, data: Sequence[NDArray[np.
 def expect(hmm: UnitHmm, data: Sequence[NDArray[np.float32]], sequences: Sequence[tuple[str, ...]]) -> _Statistics:
     """Return what the utterances say about every state (the E-step)."""
     statistics = _Statistics(hmm)
-    order = sorted(range(len(data)), key=lambda i: len(data[i]))
-    for start in range(0, len(order), BATCH):
-        batch = order[start : start + BATCH]
-        statistics.add([data[i] for i in batch], [chain_of(hmm, sequences[i]) for i in batch])
+    chains = [chain_of(hmm, sequence) for sequence in sequences]
+    for batch in _batches([len(x) for x in data], [len(chain.plain) for chain in chains]):
+        statistics.add([data[i] for i in batch], [chains[i] for i in batch])
     return statistics
+
+
+def _batches(frames: Sequence[int], states: Sequence[int]) -> Iterator[list[int]]:
+    """Give utterances in groups of like length, padded to no more than ``CELLS`` unless one alone is larger."""
+    batch: list[int] = []
+    most = 0
+    for i in sorted(range(len(frames)), key=lambda i: frames[i]):
+        most = max(most, states[i])
+        if batch and frames[i] * most * (len(batch) + 1) > CELLS:
+            yield batch
+            batch, most = [], states[i]
+        batch.append(i)
+    if batch:
+        yield batch
 
 
 class _Statistics:
