@@ -151,3 +151,21 @@ def test_a_wrong_command_line(run: Run, basics: tuple[object, ...], here: Path, 
     assert done.code == 2
     assert done.err[-1].startswith("lipmotion")
     assert list(here.iterdir()) == []
+
+
+def test_edited_units_are_used(run: Run, basics: tuple[object, ...], here: Path) -> None:
+    run(*basics, "-o", "a.json")
+    text = (here / "a.json").read_text(encoding="utf-8")
+    document = json.loads(text)
+    document["units"][1]["phone"] = "aa"
+    (here / "edited.json").write_text(json.dumps(document), encoding="utf-8")
+    assert run(*basics, "-o", "b.json", "--units", "edited.json", "--channels", "opening").code == 0
+    after = json.loads((here / "b.json").read_text(encoding="utf-8"))
+    assert [unit["phone"] for unit in after["units"]] == [unit["phone"] for unit in document["units"]]
+    assert [channel["name"] for channel in after["channels"]] == ["opening"]
+
+
+def test_units_that_cannot_be_used(run: Run, basics: tuple[object, ...], here: Path) -> None:
+    done = run(*basics, "-o", "a.json", "--units", "missing.json")
+    assert (done.code, len(done.err)) == (3, 1)
+    assert not (here / "a.json").exists()

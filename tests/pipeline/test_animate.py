@@ -181,3 +181,14 @@ def test_speech_that_cannot_be_used(toy_model: Model, tmp_path: Path) -> None:
         animate(tmp_path / "speech.wav", model=toy_model)
     with pytest.raises(InputError, match="need 16000 Hz, found 44100 Hz"):
         animate(Audio(np.zeros(44_100, np.float32), 44_100), model=toy_model)
+
+
+def test_files_may_stand_for_model_and_transcript(
+    toy_model: Model, toy_model_file: Path, toy_speech: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "said.txt").write_text("see papa")
+    by_file = animate(str(toy_speech), model=str(toy_model_file), transcript=tmp_path / "said.txt")
+    assert next(span.label.word for span in by_file.units if span.label.word) == "see"
+    assert by_file.units == animate(toy_speech, model=toy_model, transcript="see papa").units
+    with pytest.raises(InputError, match="no such transcript file"):
+        animate(toy_speech, model=toy_model, transcript=tmp_path / "other.txt")

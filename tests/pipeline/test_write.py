@@ -115,3 +115,16 @@ def test_values_that_are_not_finite_leave_no_file(result: Generation, toy_model:
     with pytest.raises(ExportError, match="not finite"):
         write(broken, [tmp_path / "a.json"], model=toy_model)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_some_channels_to_one_file(result: Generation, toy_model: Model, tmp_path: Path) -> None:
+    write(result, str(tmp_path / "a.csv"), model=toy_model, channels=["width", "opening"])
+    motion, _ = read_motion(str(tmp_path / "a.csv"))
+    assert motion.names == ("width", "opening")
+    assert motion["opening"] == pytest.approx(result.motion["opening"], abs=1e-5)
+
+
+def test_an_unknown_channel_writes_nothing(result: Generation, toy_model: Model, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no motion channel 'smile'"):
+        write(result, [tmp_path / "a.csv"], model=toy_model, channels=["smile"])
+    assert not list(tmp_path.iterdir())

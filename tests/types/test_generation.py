@@ -49,3 +49,15 @@ def test_an_impossible_rate_is_refused() -> None:
 
 def test_sound_has_a_length() -> None:
     assert Audio(np.zeros(8000, np.float32), 16_000).duration_s == 0.5
+
+
+def test_channels_are_selected_in_order() -> None:
+    before = generation()
+    names = before.motion.names[::-1][:2]
+    after = before.selected(names)
+    assert after.motion.names == names
+    for name in names:
+        assert np.array_equal(after.motion[name], before.motion[name])
+    assert after.variance.shape == after.motion.values.shape
+    with pytest.raises(InputError, match="no motion channel 'smile'"):
+        before.selected(["smile"])

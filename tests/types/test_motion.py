@@ -27,7 +27,7 @@ def test_frames_have_times_and_channels_have_names() -> None:
 
 
 def test_an_unknown_channel_is_named_with_those_there_are() -> None:
-    with pytest.raises(InputError, match="no motion channel 'width'; there are: opening, jaw"):
+    with pytest.raises(InputError, match="no motion channel 'width' among 2: opening, jaw"):
         _ = motion()["width"]
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from lipmotion.errors import InputError
+from lipmotion.pipeline.transcribe import read_transcript
 
 
 def text_or_file(argument: str) -> str:
@@ -17,10 +18,7 @@ def text_or_file(argument: str) -> str:
         if path.suffix == ".txt" and " " not in argument:
             raise InputError(f"{argument}: no such transcript file")
         return argument
-    try:
-        return path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{argument}: not a readable UTF-8 text ({error})") from error
+    return read_transcript(path)
 
 
 def _is_file(path: Path) -> bool:

@@ -30,10 +30,11 @@ class Corpus:
         self._index = index
 
     @classmethod
-    def open(cls, path: Path) -> Corpus:
+    def open(cls, path: str | Path) -> Corpus:
         """Return an existing corpus. Raises CorpusError: missing, not a corpus, or of a newer version."""
+        path = Path(path)
         if not path.is_dir():
-            raise CorpusError(f"{path}: no such corpus; make one: lipmotion prepare RECORDINGS -o {path}")
+            raise CorpusError(f"{path}: no such corpus; make one: lipmotion corpus prepare RECORDINGS -o {path}")
         return cls(path, _read_manifest(path / MANIFEST))
 
     @classmethod

@@ -52,11 +52,12 @@ def write_motion(path: Path, generation: Generation, *, source: dict[str, str], 
         chosen.write(temporary, generation, source, model)
 
 
-def read_motion(path: Path) -> tuple[Motion, Timeline[Unit]]:
+def read_motion(path: str | Path) -> tuple[Motion, Timeline[Unit]]:
     """Read what ``write_motion`` wrote; a ``.csv`` has no units, so its timeline is empty.
 
     Raises InputError: unknown suffix, no such file, or not a motion file.
     """
+    path = Path(path)
     chosen = _FORMATS.get(path.suffix.lower())
     if chosen is None:
         raise InputError(f"{path}: cannot read motion from {_suffix(path)}; use one of {', '.join(MOTION_SUFFIXES)}")

@@ -9,7 +9,7 @@ from lipmotion.errors import ExportError, InputError
 from lipmotion.export.base import MOTION_SUFFIXES, write_motion
 from lipmotion.files import check_target
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.pipeline.transcribe import transcribe
+from lipmotion.pipeline.transcribe import read_transcript, transcribe
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.read import read_audio
 from lipmotion.types import Audio, Constraints, Generation, Speech, Timeline, Unit
@@ -25,56 +25,63 @@ SLOWEST_HZ, FASTEST_HZ = 1.0, 1000.0
 def animate(
     speech: str | Path | Audio,
     *,
-    transcript: str | None = None,
+    transcript: str | Path | None = None,
     units: Timeline[Unit] | None = None,
-    model: Model | None = None,
+    model: Model | str | Path | None = None,
     lexicon: Lexicon | None = None,
     constraints: Constraints | None = None,
 ) -> Generation:
     """Return the lip motion that goes with speech.
 
     speech      : an audio or video file, or samples at 16 kHz
-    transcript  : what is said, if known: the phones are then aligned instead of recognised
+    transcript  : what is said, if known, or a Path to a text file: phones are then aligned instead of recognised
     units       : phones in time, for instance edited ones of an earlier result; nothing is recognised then
-    model       : from ``load_model``; the shipped one by default
+    model       : from ``load_model``, or its file; the shipped one by default
     lexicon     : pronunciations of words that the dictionary does not have
     constraints : values that the motion must take
     Raises InputError: the recording, the transcript or a constraint is not usable.
     Raises AlignmentError: the transcript does not fit into the recording.
     """
-    chosen = model or load_model()
+    chosen = model if isinstance(model, Model) else load_model(model)
     features = mfcc(speech if isinstance(speech, Audio) else read_audio(Path(speech)))
     if units is None:
-        words = words_of(transcript) if transcript is not None else None
+        text = read_transcript(transcript) if isinstance(transcript, Path) else transcript
+        words = words_of(text) if text is not None else None
         units = transcribe(chosen.phones, features, words, lexicon or Lexicon())
     return chosen.engine.generate(chosen.learned, Speech(features, units), constraints)
 
 
 def write(
     generation: Generation,
-    outputs: Sequence[str | Path],
+    outputs: str | Path | Sequence[str | Path],
     *,
     speech: str | Path | None = None,
     model: Model | None = None,
+    channels: Sequence[str] | None = None,
     rate_hz: float | None = None,
     fps: float = 25.0,
 ) -> None:
-    """Write one result to several files, each in the format of its suffix.
+    """Write one result to one or several files, each in the format of its suffix.
 
-    outputs : ``.json``, ``.csv``, ``.npz`` (motion) or ``.mp4`` (the drawn face, with sound)
-    speech  : the recording it came from; a video needs it
-    rate_hz : frames per second of motion files; the model's own 100 by default
-    fps     : frames per second of videos
+    outputs  : ``.json``, ``.csv``, ``.npz`` (motion) or ``.mp4`` (the drawn face, with sound)
+    speech   : the recording it came from; a video needs it
+    channels : those to write to motion files, in this order; all by default
+    rate_hz  : frames per second of motion files; the model's own 100 by default
+    fps      : frames per second of videos
     Raises ExportError: unknown suffix, no such folder, or a file that cannot be written.
-    Raises InputError: a frame rate that is not from 1 to 1000. All are checked before the first is written.
+    Raises InputError: a frame rate that is not from 1 to 1000, or an unknown channel.
+    All of that is checked before the first file is written.
     """
-    paths = [Path(output) for output in outputs]
+    paths = [Path(output) for output in ([outputs] if isinstance(outputs, str | Path) else outputs)]
     check_outputs(paths, speech, rate_hz=rate_hz, fps=fps)
+    written = generation.selected(channels) if channels is not None else generation
+    if rate_hz is not None:
+        written = written.resampled(rate_hz)
     for path in paths:
         if path.suffix.lower() == VIDEO_SUFFIX:
             _write_video(generation, path, Path(str(speech)), fps)
         else:
-            _write_motion(generation, path, speech, model, rate_hz)
+            _write_motion(written, path, speech, model)
 
 
 def check_outputs(
@@ -99,11 +106,7 @@ def check_outputs(
             raise ExportError(f"{path}: is the recording itself; give another name")
 
 
-def _write_motion(
-    generation: Generation, path: Path, speech: str | Path | None, model: Model | None, rate_hz: float | None
-) -> None:
-    if rate_hz is not None:
-        generation = generation.resampled(rate_hz)
+def _write_motion(generation: Generation, path: Path, speech: str | Path | None, model: Model | None) -> None:
     about = (model or load_model()).about
     named = {key: _text(about[key]) for key in ("name", "corpus", "licence", "attribution") if about.get(key)}
     source = {"file": _text(Path(speech).name)} if speech else {}

@@ -47,7 +47,7 @@ class Model:
     about: Mapping[str, Any]
 
 
-def save_model(model: Model, path: Path) -> None:
+def save_model(model: Model, path: str | Path) -> None:
     """Write a model: a zip of plain arrays and a JSON header, never pickle.
 
     Raises ExportError: the file cannot be written.
@@ -62,20 +62,21 @@ def save_model(model: Model, path: Path) -> None:
         "recogniser": asdict(model.phones.config),
         **model.about,
     }
-    with whole_file(path) as unfinished, zipfile.ZipFile(unfinished, "w") as file:
+    with whole_file(Path(path)) as unfinished, zipfile.ZipFile(unfinished, "w") as file:
         _put(file, HEADER, json.dumps(header, indent=1, ensure_ascii=False).encode())
         for name, array in sorted(arrays.items()):
             with file.open(_member(f"{name}.npy"), "w") as member:
                 np.lib.format.write_array(member, np.ascontiguousarray(array), allow_pickle=False)
 
 
-def load_model(path: Path | None = None) -> Model:
+def load_model(path: str | Path | None = None) -> Model:
     """Return a model; the one that ships with the package by default.
 
     Raises InputError: no such file.  Raises ModelFormatError: not a model, damaged, or of a newer version.
     """
     if path is None:
         return _shipped()
+    path = Path(path)
     if not path.is_file():
         raise InputError(f"{path}: no such model; train one (lipmotion train) or leave --model out")
     return _read(path)

@@ -76,7 +76,7 @@ class _Outcome:
 
 
 def prepare(
-    directory: Path, output: Path, *, workers: int | None = None, crops: bool = True, progress: bool = True
+    directory: str | Path, output: str | Path, *, workers: int | None = None, crops: bool = True, progress: bool = True
 ) -> PrepareReport:
     """Turn a folder of recordings into a corpus, or add them to one.
 
@@ -91,6 +91,7 @@ def prepare(
     Raises InputError, CorpusError: no recordings, none of them usable, or ``output`` is something else.
     Raises MissingDependencyError: MediaPipe or OpenCV is not installed. Raises ExportError: the disk is full.
     """
+    directory, output = Path(directory), Path(output)
     start_s = time.monotonic()
     found = discover(directory)
     packages = versions()

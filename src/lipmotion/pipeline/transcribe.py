@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
+from pathlib import Path
 
+from lipmotion.errors import InputError
 from lipmotion.speech.phones import align, recognise
 from lipmotion.stats.hmm.model import UnitHmm
 from lipmotion.types import Features, Timeline, Unit
@@ -23,6 +25,16 @@ def transcribe(phones: UnitHmm, features: Features, words: Sequence[str] | None,
         return recognise(phones, features)
     report_guesses(words, lexicon)
     return align(phones, features, words, lexicon)
+
+
+def read_transcript(path: Path) -> str:
+    """Return the text of a file. Raises InputError: no such file, or not UTF-8 text."""
+    try:
+        return path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError as error:
+        raise InputError(f"{path}: no such transcript file") from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: not a readable UTF-8 text ({error})") from error
 
 
 def report_guesses(words: Sequence[str], lexicon: Lexicon) -> None:

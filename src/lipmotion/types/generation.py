@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -76,6 +77,13 @@ class Generation:
     variance: NDArray[np.float64]
     units: Timeline[Unit]
     trace: Trace
+
+    def selected(self, names: Sequence[str]) -> Generation:
+        """Return the result with these channels only, in this order. Raises InputError: no such channel."""
+        columns = [self.motion.column(name) for name in names]
+        channels = tuple(self.motion.channels[column] for column in columns)
+        motion = Motion(self.motion.values[:, columns], self.motion.rate_hz, channels)
+        return replace(self, motion=motion, variance=self.variance[:, columns])
 
     def resampled(self, rate_hz: float) -> Generation:
         """Return the same result at another rate: values between frames, the state of the nearest frame.

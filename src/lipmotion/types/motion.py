@@ -55,10 +55,15 @@ class Motion:
 
     def __getitem__(self, name: str) -> NDArray[np.float64]:
         """Return one channel's curve [shape=(T,)]. Raises InputError: no such channel."""
-        if name not in self.names:
-            raise InputError(f"no motion channel {name!r}; there are: {', '.join(self.names)}")
-        curve: NDArray[np.float64] = self.values[:, self.names.index(name)]
+        curve: NDArray[np.float64] = self.values[:, self.column(name)]
         return curve
+
+    def column(self, name: str) -> int:
+        """Return which column of ``values`` a channel is. Raises InputError: no such channel."""
+        if name not in self.names:
+            some = ", ".join(self.names[:6]) + (", ..." if len(self.names) > 6 else "")
+            raise InputError(f"no motion channel {name!r} among {len(self.names)}: {some}")
+        return self.names.index(name)
 
     def at(self, time_s: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the values at other times [shape=(len(time_s), P)].

@@ -32,14 +32,14 @@ class Lexicon:
     user: dict[str, tuple[Pronunciation, ...]] = field(default_factory=dict)
 
     @classmethod
-    def from_file(cls, path: Path) -> Lexicon:
+    def from_file(cls, path: str | Path) -> Lexicon:
         """Read ``word PHONE PHONE ...`` lines, one pronunciation a line; ``#`` starts a comment.
 
         Phones are ARPAbet in either case, with or without stress digits, or the project's own names.
         Raises InputError: no such file, not UTF-8, no phones after a word, or an unknown phone (with its line).
         """
         user: dict[str, tuple[Pronunciation, ...]] = {}
-        for number, line in enumerate(_lines(path), start=1):
+        for number, line in enumerate(_lines(Path(path)), start=1):
             word, *phones = line.split("#")[0].split() or [""]
             if not word:
                 continue
