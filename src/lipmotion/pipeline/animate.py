@@ -65,6 +65,7 @@ def write(
 
     outputs  : ``.json``, ``.csv``, ``.npz`` (motion) or ``.mp4`` (the drawn face, with sound)
     speech   : the recording it came from; a video needs it
+    model    : what made the result; motion files then name its corpus and licence
     channels : those to write to motion files, in this order; all by default
     rate_hz  : frames per second of motion files; the model's own 100 by default
     fps      : frames per second of videos
@@ -107,7 +108,7 @@ def check_outputs(
 
 
 def _write_motion(generation: Generation, path: Path, speech: str | Path | None, model: Model | None) -> None:
-    about = (model or load_model()).about
+    about = model.about if model else {}
     named = {key: _text(about[key]) for key in ("name", "corpus", "licence", "attribution") if about.get(key)}
     source = {"file": _text(Path(speech).name)} if speech else {}
     write_motion(path, generation, source=source, model=named)

@@ -129,7 +129,7 @@ def _figures(clips: Sequence[Clip], threshold: float, seed: int) -> dict[str, An
         }
         for i, name in enumerate(DISTANCES)
     }
-    bilabial = [[(start, end) for start, end, phone in clip.spoken if phone in BILABIAL] for clip in clips]
+    bilabial = [_on_kept_frames(clip, BILABIAL, rate_hz) for clip in clips]
     other_s = sum(end - start for clip in clips for start, end, phone in clip.spoken if phone not in BILABIAL)
     return {
         "channels": per_channel,
@@ -144,6 +144,16 @@ def _figures(clips: Sequence[Clip], threshold: float, seed: int) -> dict[str, An
             "original": _silence(clips, [clip.original for clip in clips]),
         },
     }
+
+
+def _on_kept_frames(clip: Clip, phones: Sequence[str], rate_hz: float) -> list[tuple[float, float]]:
+    """Return when some phones are said, on a clock that stands still while no face is seen."""
+    clock_s = np.arange(len(clip.time_s)) / rate_hz
+    return [
+        (float(np.interp(start_s, clip.time_s, clock_s)), float(np.interp(end_s, clip.time_s, clock_s)))
+        for start_s, end_s, phone in clip.spoken
+        if phone in phones
+    ]
 
 
 def _opening_acc(generated: curves.Clips, original: curves.Clips) -> float:

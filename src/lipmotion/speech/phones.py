@@ -18,7 +18,7 @@ from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent, stand_in
 
 LOG_ENERGY = 12
 """The column of the features that holds the log energy."""
-LOUD_FRAMES = 5
+LOUD_FRAMES = 11
 """The energy is averaged over so many frames before it rules silence out."""
 SHORT_PAUSE_S = 0.2
 """Silence shorter than this is a pause between words."""

@@ -14,7 +14,7 @@ from lipmotion.stats.bigram import Bigram
 from lipmotion.stats.hmm.states import StateTable
 from lipmotion.stats.mixture import Mixtures
 
-LOUD_SILENCE = 30.0
+LOUD_SILENCE = 8.0
 """What the log density of silence loses in a loud frame."""
 
 

@@ -1,0 +1,65 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lipmotion.stats.hmm.align import align_units, choose_pronunciations
+from lipmotion.stats.hmm.loudness import loud_frames
+from stats.hmm.synthetic import PAUSE, SILENCE, known_hmm, speaker
+
+
+def energy(seed: int = 0) -> np.ndarray:
+    """Forty quiet frames, sixty loud ones, forty quiet ones."""
+    return np.repeat([0.0, 10.0, 0.0], [40, 60, 40]) + np.random.default_rng(seed).normal(0, 0.5, 140)
+
+
+@given(gain=st.floats(0.01, 100), offset=st.floats(-50, 50))
+def test_loud_is_relative_to_the_recording(gain, offset):
+    loud = np.nonzero(loud_frames(gain * energy() + offset, 5))[0]
+    assert (loud[0], loud[-1]) == pytest.approx((40, 99), abs=1)
+    assert len(loud) == loud[-1] - loud[0] + 1
+
+
+def test_clicks_shorter_than_the_smoothing_are_not_loud():
+    clicks = energy()
+    clicks[[10, 120]] = 12.0
+    assert loud_frames(clicks, 1)[[10, 120]].all()
+    assert not loud_frames(clicks, 5)[[10, 120]].any()
+
+
+@pytest.mark.parametrize("frames", [1, 2, 3])
+def test_the_shortest_recordings_and_those_that_never_change(frames):
+    assert not loud_frames(np.full(frames, -3.0), 21).any()
+
+
+def stranger():
+    """A voice that sounds more like the models' silence than like any of their units, and is as loud as theirs."""
+    who = speaker(spread=2.0)
+    features, edges = who.say(np.random.default_rng(3), (SILENCE, "a", "b", SILENCE))
+    spoken = slice(edges[1], edges[3])
+    features[spoken] = features[spoken] * 0.1 + who.means[SILENCE][0]
+    loud = np.zeros(len(features), bool)
+    loud[spoken] = True
+    return known_hmm(who), features, edges, loud
+
+
+def test_loud_frames_are_not_aligned_with_silence():
+    hmm, features, edges, loud = stranger()
+    units = (SILENCE, "a", "b", SILENCE)
+    without, bounds = align_units(hmm, features, units), align_units(hmm, features, units, loud)
+    assert without[3] - without[1] < 8
+    assert (bounds[1], bounds[3]) == (edges[1], edges[3])
+
+
+def test_loud_frames_are_not_chosen_as_pauses():
+    hmm, features, _, loud = stranger()
+    words = ((("a",),), (("b",),))
+    free, bound = (choose_pronunciations(hmm, features, words, PAUSE, mask) for mask in (None, loud))
+    assert PAUSE in [unit for part in free for unit in part.units]
+    assert PAUSE not in [unit for part in bound for unit in part.units]
+
+
+def test_no_loud_frames_change_nothing():
+    hmm, features, _, loud = stranger()
+    units = (SILENCE, "a", "b", SILENCE)
+    assert np.array_equal(align_units(hmm, features, units, loud & False), align_units(hmm, features, units))
