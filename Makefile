@@ -35,7 +35,8 @@ model: $(VENV)/dev
 	mkdir -p $(BUILD)
 	$(BIN)/lipmotion corpus prepare $(GRID) -o $(BUILD)/grid-s1
 	$(BIN)/lipmotion train $(BUILD)/grid-s1 -o $(BUILD)/grid-s1-train.lipmotion
-	$(BIN)/lipmotion evaluate $(BUILD)/grid-s1-train.lipmotion $(BUILD)/grid-s1 --split test -o docs/results/grid-s1-test.json
+	for split in val test; do \
+	  $(BIN)/lipmotion evaluate $(BUILD)/grid-s1-train.lipmotion $(BUILD)/grid-s1 --split $$split -o docs/results/grid-s1-$$split.json; done
 	$(BIN)/lipmotion train $(BUILD)/grid-s1 --split all -o src/lipmotion/models/grid-s1.lipmotion
 
 requirements:
