@@ -51,8 +51,6 @@ def window_indices(n: int) -> range:
 def mel_powers_of(samples: Array, n: int) -> list[float]:
     """Return what each filter lets through of frame n."""
     emphasised = [sample(samples, i) - 0.97 * sample(samples, i - 1) for i in window_indices(n)]
-    if n == 0:
-        emphasised[0] = sample(samples, -200)  # where the reflected signal begins, nothing comes before
     hamming = [0.54 - 0.46 * math.cos(2 * math.pi * k / 399) for k in range(400)]
     padded = np.zeros(512)
     padded[:400] = [value * weight for value, weight in zip(emphasised, hamming, strict=True)]

@@ -69,8 +69,8 @@ def normalised(values: NDArray[np.float32]) -> NDArray[np.float32]:
 
 def _static(samples: NDArray[np.float32]) -> NDArray[np.float32]:
     half = WINDOW // 2
-    padded = np.pad(samples, half, mode="reflect")
-    emphasised = np.concatenate([padded[:1], padded[1:] - np.float32(PRE_EMPHASIS) * padded[:-1]])
+    before = np.pad(samples, (half + 1, half), mode="reflect")  # one more, for the first difference
+    padded, emphasised = before[1:], before[1:] - np.float32(PRE_EMPHASIS) * before[:-1]
     count = int(len(samples) / SPEECH_RATE_HZ * FRAME_RATE_HZ + 1e-9) + 1
     mel = np.empty((count, FILTERS), np.float32)
     energy = np.empty(count, np.float32)
