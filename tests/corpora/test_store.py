@@ -146,7 +146,7 @@ def test_names_must_be_those_of_folders(corpus, name):
 
 
 def test_a_missing_corpus(tmp_path):
-    with pytest.raises(CorpusError, match="no such corpus; make one: lipmotion prepare"):
+    with pytest.raises(CorpusError, match="no such corpus; make one: lipmotion corpus prepare"):
         Corpus.open(tmp_path / "none")
 
 
