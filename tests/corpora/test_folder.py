@@ -94,3 +94,9 @@ def test_nothing_to_find(tmp_path):
     touch(tmp_path, "speech.wav")
     with pytest.raises(CorpusError, match=r"no videos in it; required: files ending in one of .*\.mp4"):
         discover(tmp_path)
+
+
+def test_a_video_is_not_a_folder(tmp_path):
+    touch(tmp_path, "a.mp4")
+    with pytest.raises(InputError, match="is a file; give the folder"):
+        discover(tmp_path / "a.mp4")

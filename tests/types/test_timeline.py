@@ -64,3 +64,10 @@ def test_values_cannot_change() -> None:
     with pytest.raises(FrozenInstanceError):
         span.label.phone = "ax"  # type: ignore[misc]
     assert span == Span(0.0, 1.0, Unit("aa", unit="", word=""))
+
+
+def test_spans_have_positions() -> None:
+    timeline = Timeline((Span(0.0, 0.1, "a"), Span(0.1, 0.3, "b")))
+    assert (timeline[0].label, timeline[-1].label) == ("a", "b")
+    with pytest.raises(IndexError):
+        timeline[2]

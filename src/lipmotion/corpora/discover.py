@@ -15,6 +15,8 @@ def discover(directory: Path) -> Recordings:
 
     Raises InputError: no such folder. Raises CorpusError: no videos in it, or its lists contradict each other.
     """
+    if directory.is_file():
+        raise InputError(f"{directory}: is a file; give the folder of videos that it is in")
     if not directory.is_dir():
         raise InputError(f"{directory}: no such folder; give a folder of videos")
     found = read_grid(directory) or read_folder(directory)

@@ -60,6 +60,9 @@ class Timeline(Generic[LabelT]):
     def __len__(self) -> int:
         return len(self.spans)
 
+    def __getitem__(self, position: int) -> Span[LabelT]:
+        return self.spans[position]
+
     def shifted(self, offset_s: float) -> Timeline[LabelT]:
         """Return the same labels, every time moved by ``offset_s`` seconds."""
         return Timeline(tuple(replace(s, start_s=s.start_s + offset_s, end_s=s.end_s + offset_s) for s in self.spans))
