@@ -11,27 +11,40 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from lipmotion.errors import ExportError
+from lipmotion.errors import ExportError, InputError
 
 TEMPORARY = ".part-"
 """Names of unfinished files start with this; a killed run may leave one, the next removes it."""
 
 
+def check_source(path: Path, kind: str) -> None:
+    """Raise InputError unless ``path`` is a file with something in it; ``kind`` says what it should be."""
+    if path.is_dir():
+        raise InputError(f"{path}: is a folder; give one {kind}")
+    if not path.is_file():
+        raise InputError(f"{path}: no such file")
+    if path.stat().st_size == 0:
+        raise InputError(f"{path}: the file is empty; give a {kind}")
+
+
 def check_target(target: Path) -> None:
     """Raise ExportError unless a file can be put there: before work begins, not after it."""
     try:
-        is_folder, has_parent = target.is_dir(), target.parent.is_dir()
+        is_folder = target.is_dir()
     except OSError as error:  # a name too long
         raise ExportError(f"{target}: cannot be written: {error.strerror or error}") from error
     if is_folder:
         raise ExportError(f"{target}: is a folder; give the name of a file in it")
-    if not has_parent:
+    _check_parent(target)
+
+
+def _check_parent(target: Path) -> None:
+    if not target.parent.is_dir():
         raise ExportError(f"{target}: the folder {target.parent} does not exist; create it first")
 
 
 def _temporary(target: Path) -> Path:
-    if not target.parent.is_dir():
-        raise ExportError(f"{target}: the folder {target.parent} does not exist; create it first")
+    _check_parent(target)
     return target.with_name(f"{TEMPORARY}{uuid.uuid4().hex[:8]}{target.suffix.lower()}")
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from lipmotion.errors import InputError
 from lipmotion.pipeline.transcribe import read_transcript
 
 
@@ -14,11 +13,8 @@ def text_or_file(argument: str) -> str:
     Raises InputError: it looks like a file's name but there is none, or the file is not UTF-8 text.
     """
     path = Path(argument)
-    if not _is_file(path):
-        if path.suffix == ".txt" and " " not in argument:
-            raise InputError(f"{argument}: no such transcript file")
-        return argument
-    return read_transcript(path)
+    looks_like_one = path.suffix == ".txt" and " " not in argument
+    return read_transcript(path) if looks_like_one or _is_file(path) else argument
 
 
 def _is_file(path: Path) -> bool:

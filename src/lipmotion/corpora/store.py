@@ -64,6 +64,14 @@ class Corpus:
         """Return the names of all utterances, or of one split, sorted."""
         return tuple(sorted(name for name, entry in self._index.items() if split in (None, entry["split"])))
 
+    def required(self, split: str | None) -> tuple[str, ...]:
+        """Return the names of one split, or of all. Raises CorpusError: there are none."""
+        names = self.names(split)
+        if not names:
+            found = ", ".join(f"{name}: {count}" for name, count in self.splits.items())
+            raise CorpusError(f"{self.path}: no utterances of split {split!r} (there are {found})")
+        return names
+
     def summary(self) -> dict[str, str]:
         """Return what a user wants to know of the corpus, by name."""
         seconds = sum(float(entry["duration_s"]) for entry in self._index.values())

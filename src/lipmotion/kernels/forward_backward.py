@@ -27,15 +27,13 @@ def chain_posteriors(
     Source: the standard recursions, in the log domain.  Cost: O(T·U·S).
     """
     T, U, S = log_emission.shape
-    inside = states[:, None] > np.arange(S)
-    emission = np.where(inside, log_emission, IMPOSSIBLE)
     alpha = np.full((T, U, S), IMPOSSIBLE)
-    alpha[0, :, 0] = emission[0, :, 0]
+    alpha[0, :, 0] = log_emission[0, :, 0]
     for t in range(1, T):
         arrive = alpha[t - 1] + log_stay
         moved = (alpha[t - 1] + log_move)[:, :-1]
         arrive[:, 1:] = np.logaddexp(arrive[:, 1:], moved)
-        np.maximum(arrive + emission[t], IMPOSSIBLE, out=alpha[t])
+        np.maximum(arrive + log_emission[t], IMPOSSIBLE, out=alpha[t])
     rows = np.arange(U)
     leave = np.full((U, S), IMPOSSIBLE)
     leave[rows, states - 1] = log_move[rows, states - 1]
@@ -45,7 +43,7 @@ def chain_posteriors(
     stay = np.zeros((U, S))
     for t in range(T - 1, -1, -1):
         if t + 1 < T:
-            onward = emission[t + 1] + beta[t + 1]
+            onward = log_emission[t + 1] + beta[t + 1]
             kept = log_stay + onward
             reach = kept.copy()
             reach[:, :-1] = np.logaddexp(kept[:, :-1], log_move[:, :-1] + onward[:, 1:])

@@ -19,10 +19,10 @@ from lipmotion.pipeline.train import labels_of
 from lipmotion.pipeline.transcribe import report_guesses
 from lipmotion.speech.phones import recognise
 from lipmotion.types import Motion, Speech, Timeline, Unit, Utterance
-from lipmotion.units import Lexicon, is_silent
+from lipmotion.units import VISEMES, Lexicon, is_silent
 
 DISTANCES = ("opening", "width", "outer")
-BILABIAL = ("p", "b", "m")
+BILABIAL = VISEMES["bi"]
 SILENCE_MARGIN_S = 0.3
 """The mouth may still close, or already open, this close to speech."""
 
@@ -51,11 +51,7 @@ def evaluate(
     Raises AlignmentError: a transcript does not fit into its recording.
     """
     lexicon = lexicon or Lexicon()
-    names = corpus.names(split)
-    if not names:
-        found = ", ".join(f"{name}: {count}" for name, count in corpus.splits.items())
-        raise CorpusError(f"{corpus.path}: no utterances of split {split!r} (there are {found})")
-    utterances = [corpus.utterance(name) for name in names]
+    utterances = [corpus.utterance(name) for name in corpus.required(split)]
     _check_channels("corpus", utterances[0].track.motion)
     report_guesses([word for utterance in utterances for word in utterance.words or ()], lexicon)
     reference = [_reference(utterance, model, lexicon) for utterance in utterances]

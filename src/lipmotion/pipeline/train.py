@@ -14,8 +14,8 @@ from lipmotion.corpora.store import Corpus
 from lipmotion.engines import Engine, engine_named
 from lipmotion.errors import AlignmentError, CorpusError, InputError
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.pipeline.transcribe import report_guesses
-from lipmotion.speech.phones import align, recognise, train_phones
+from lipmotion.pipeline.transcribe import phones_in_time, report_guesses
+from lipmotion.speech.phones import train_phones
 from lipmotion.stats.em import Monitor, silent_monitor
 from lipmotion.stats.hmm.model import HmmConfig, UnitHmm
 from lipmotion.stats.resample import to_model_frames
@@ -62,10 +62,9 @@ def train(
     """
     lexicon = lexicon or Lexicon()
     engine = engine or engine_named("trajectory", {})
-    chosen = tuple(names) if names is not None else corpus.names(split)
+    chosen = tuple(names) if names is not None else corpus.required(split)
     if not chosen:
-        found = ", ".join(f"{name}: {count}" for name, count in corpus.splits.items())
-        raise CorpusError(f"{corpus.path}: no utterances of split {split!r} (there are {found})")
+        raise CorpusError(f"{corpus.path}: an empty list of names was given; name at least one utterance")
     utterances = [corpus.utterance(name) for name in chosen]
     phones = _phones(utterances, lexicon, recogniser or HmmConfig(), monitor)
     examples, skipped = _examples(utterances, phones, lexicon)
@@ -78,9 +77,7 @@ def train(
 def labels_of(utterance: Utterance, phones: UnitHmm, lexicon: Lexicon) -> Timeline[Unit]:
     """Return the phones of an utterance: aligned if its words are known, else recognised."""
     features = Features(np.asarray(utterance.features.values), utterance.features.duration_s)
-    if utterance.words is None:
-        return recognise(phones, features)
-    return align(phones, features, utterance.words, lexicon)
+    return phones_in_time(phones, features, utterance.words, lexicon)
 
 
 def model_motion(track: Track, frames: int) -> tuple[Motion, Any]:

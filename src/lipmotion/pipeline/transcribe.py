@@ -21,9 +21,16 @@ def transcribe(phones: UnitHmm, features: Features, words: Sequence[str] | None,
     words : what is said in it, lower case, or None
     Raises AlignmentError: the words do not fit into the recording.
     """
+    report_guesses(words or (), lexicon)
+    return phones_in_time(phones, features, words, lexicon)
+
+
+def phones_in_time(
+    phones: UnitHmm, features: Features, words: Sequence[str] | None, lexicon: Lexicon
+) -> Timeline[Unit]:
+    """Return the same without a word about guesses, for many recordings."""
     if words is None:
         return recognise(phones, features)
-    report_guesses(words, lexicon)
     return align(phones, features, words, lexicon)
 
 

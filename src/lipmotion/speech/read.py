@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
+from lipmotion.files import check_source
 from lipmotion.types import Audio
 
 SPEECH_RATE_HZ = 16_000
@@ -27,7 +28,7 @@ def read_audio(path: Path, rate_hz: int = SPEECH_RATE_HZ) -> Audio:
     """
     import av
 
-    check_file(path)
+    check_source(path, "recording")
     try:
         with av.open(str(path)) as container:
             if not container.streams.audio:
@@ -39,16 +40,6 @@ def read_audio(path: Path, rate_hz: int = SPEECH_RATE_HZ) -> Audio:
         raise InputError(f"{path}: not a readable recording ({_reason(error)}); give an audio or video file") from error
     samples = _from_time_zero(np.concatenate(pieces) if pieces else np.zeros(0, np.float32), start_s, rate_hz)
     return _checked(path, Audio(samples, rate_hz))
-
-
-def check_file(path: Path) -> None:
-    """Raise InputError unless ``path`` is a file with something in it."""
-    if path.is_dir():
-        raise InputError(f"{path}: is a folder; give one recording")
-    if not path.is_file():
-        raise InputError(f"{path}: no such file")
-    if path.stat().st_size == 0:
-        raise InputError(f"{path}: the file is empty; give a recording")
 
 
 def _decode(container: Any, rate_hz: int) -> tuple[list[NDArray[np.float32]], float]:

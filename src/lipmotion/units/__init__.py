@@ -1,11 +1,12 @@
 """What is spoken: phones, visemes, words. Data and look-ups, no audio."""
 
 from lipmotion.units.lexicon import Lexicon, Pronunciation
-from lipmotion.units.phones import PAUSE, PHONES, RELATIVES, SILENCE, is_silent, stand_in
+from lipmotion.units.phones import LIP_CLOSING, PAUSE, PHONES, RELATIVES, SILENCE, is_silent, stand_in
 from lipmotion.units.transcript import words_of
 from lipmotion.units.visemes import VISEME_OF, VISEMES
 
 __all__ = [
+    "LIP_CLOSING",
     "PAUSE",
     "PHONES",
     "RELATIVES",

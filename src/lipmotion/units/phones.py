@@ -12,6 +12,9 @@ PAUSE = "sp"
 
 PHONES: tuple[str, ...] = tuple(sorted(VISEME_OF))
 
+LIP_CLOSING: tuple[str, ...] = (*VISEMES["bi"], "em")
+"""The phones in which the lips meet."""
+
 RELATIVES: dict[str, tuple[str, ...]] = {
     # A phone that a corpus never says borrows the sound of the first of these that it does say.
     "aa": ("ao", "ah"),

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
+from lipmotion.files import check_source
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +49,7 @@ def open_video(path: Path) -> Iterator[Video]:
     """
     import av
 
-    _check_file(path)
+    check_source(path, "video")
     try:
         container = av.open(str(path))
     except (av.FFmpegError, ValueError) as error:
@@ -61,15 +62,6 @@ def open_video(path: Path) -> Iterator[Video]:
         rates = [float(rate) for rate in (stream.guessed_rate, stream.average_rate) if rate]
         with closing(_frames(container, path)) as frames:  # decoding from a closed container would crash
             yield Video(frames, tuple(rates))
-
-
-def _check_file(path: Path) -> None:
-    if path.is_dir():
-        raise InputError(f"{path}: is a folder; give one video")
-    if not path.is_file():
-        raise InputError(f"{path}: no such file")
-    if path.stat().st_size == 0:
-        raise InputError(f"{path}: the file is empty; give a video")
 
 
 def _frames(container: Any, path: Path) -> Generator[Frame, None, None]:

@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.types import FRAME_RATE_HZ, Timeline, Unit
-from lipmotion.units import VISEMES
+from lipmotion.units import LIP_CLOSING
 
 OPENING = "opening"
-LIP_CLOSING = frozenset((*VISEMES["bi"], "em"))
 REACH_S = 0.02
 """The lips may meet this long before or after the phone's own time: alignments are no better."""
 

@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.types import Timeline, Unit
+from lipmotion.units import LIP_CLOSING
 
 BLEND_S = 0.06
 """A gesture grows and fades over this long, centred on the boundaries of its phone."""
 TUCKS: Mapping[str, float] = {"f": 1.0, "v": 1.0}
 """The lower lip touches the upper teeth."""
-CLOSURES: Mapping[str, float] = {"p": 1.0, "b": 1.0, "m": 1.0, "em": 1.0}
+CLOSURES: Mapping[str, float] = dict.fromkeys(LIP_CLOSING, 1.0)
 """The lips touch; a tuck next to one of these is over before it begins."""
 TIP_RAISES: Mapping[str, float] = {"th": 1.0, "dh": 1.0, "l": 0.8, "el": 0.8, "t": 0.4, "d": 0.4, "n": 0.4, "en": 0.4}
 """The tip of the tongue: between the teeth, or behind the upper ones, where less of it shows."""

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError
 from lipmotion.faces.character.articulation import CLOSURES, TIP_RAISES, TUCKS, weight
 from lipmotion.types import Motion, Timeline, Unit
+from lipmotion.units import is_silent
 
 Curve = NDArray[np.float64]
 
@@ -25,7 +26,6 @@ TUCKED_GAP = (0.03, 0.055)
 """Between the upper lip and a lower lip on the teeth: enough to show them."""
 DRAWN = ("opening", "width", "outer", "y_152")
 """The channels that are drawn."""
-SILENCES = frozenset({"sil", "sp"})
 
 
 class MouthPose(NamedTuple):
@@ -121,7 +121,7 @@ def _rest_frames(motion: Motion, units: Timeline[Unit]) -> NDArray[np.bool_]:
     time_s = motion.time_s
     rest = np.zeros(len(time_s), dtype=bool)
     for span in units:
-        if span.label.phone in SILENCES:
+        if is_silent(span.label.phone):
             rest |= (span.start_s <= time_s) & (time_s < span.end_s)
     if rest.any():
         return rest
