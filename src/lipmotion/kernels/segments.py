@@ -44,5 +44,7 @@ def _traced(label: NDArray[np.intp], began: NDArray[np.bool_], hold: int) -> lis
         while not began[end, current]:
             end -= 1
         end -= hold
+        if segments and segments[-1][1] == current:  # split by rounding alone, where a change is free
+            segments.pop()
         segments.append((end, current))
     return segments[::-1]
