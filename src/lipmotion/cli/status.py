@@ -1,4 +1,4 @@
-"""Status lines for programs that run this one: JSON on standard error, as Rhubarb Lip Sync's ``--machineReadable``."""
+"""Status for programs that run this one: JSON lines on standard error, those of Rhubarb's ``--machineReadable``."""
 
 from __future__ import annotations
 
@@ -15,29 +15,27 @@ from lipmotion.files import as_text
 
 @contextmanager
 def status_lines(speech: Path) -> Iterator[Callable[[float], None]]:
-    """Say that the work starts, and how it ended; give a function that says how much is done, from 0 to 1.
+    """Say that work starts and how it ended; give a function to say how much is done, 0 to 1. Warnings are events, too.
 
-    A failure is said as such, and the program ends with its exit code. Warnings become events ``log``.
+    A failure is said as such, and the program ends with its exit code.
     """
-    root, warnings = logging.getLogger(), _Warnings()
-    handlers, root.handlers = root.handlers, [warnings]
-    name = as_text(speech)
+    root, name = logging.getLogger(), as_text(speech)
+    handlers, root.handlers = root.handlers, [_Events()]
     try:
         _say("start", "Info", f'Application startup. Input file: "{name}".', file=name)
         yield lambda done: _say("progress", "Trace", f"Progress: {done:.0%}", value=done)
         _say("success", "Info", "Application terminating normally.")
-    except BrokenPipeError:  # nobody is there to be told
-        raise
     except (LipMotionError, OSError) as error:
-        _say(
-            "failure", "Fatal", f"Application terminating with error: {as_text(str(error))}", reason=as_text(str(error))
-        )
-        sys.exit(error.exit_code if isinstance(error, LipMotionError) else InputError.exit_code)
+        if isinstance(error, BrokenPipeError):  # nobody is there to be told
+            raise
+        reason = as_text(str(error))
+        _say("failure", "Fatal", f"Application terminating with error: {reason}", reason=reason)
+        sys.exit(getattr(error, "exit_code", InputError.exit_code))
     finally:
         root.handlers = handlers
 
 
-class _Warnings(logging.Handler):
+class _Events(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         _say("log", record.levelname.capitalize(), record.getMessage())
 

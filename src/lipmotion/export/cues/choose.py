@@ -11,7 +11,7 @@ from lipmotion.export.cues.sheet import CueSheet, drawn_shapes, frames_in, sheet
 from lipmotion.kernels.segments import best_segments
 from lipmotion.types import Generation
 
-CHANGE = 0.5
+CHANGE = 0.35
 """What a change of shape costs, in the unit of ``evidence``: one that lasts must be worth it."""
 HOLD_S = 2 / 24
 

@@ -17,7 +17,7 @@ COST_RATE_HZ = 24.0
 ALLOWED, OTHER, MISPLACED = 0.5, 1.5, 3.0
 """A shape that passes for the sound; one that does not; one that belongs to other sounds only (``SPECIAL``)."""
 SPECIAL = "AGHX"
-OPENING_WEIGHT, SPREAD_WEIGHT = 4.0, 0.5
+OPENING_WEIGHT, SPREAD_WEIGHT = 6.0, 0.5
 MUST_CLOSE, MUST_BITE = 10_000.0, 100.0
 """Of every p b m and f v one frame must show the shape. Where the hold leaves room for one only, p b m have it."""
 WIDEST = 1.2

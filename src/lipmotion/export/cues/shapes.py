@@ -72,7 +72,7 @@ _LOOKS: tuple[tuple[str, tuple[Look, ...]], ...] = (
     ("aa", (Look(1, "D", "C"),)),
     ("ay", (Look(0.6, "D", "C"), Look(0.4, "B", "C"))),
     ("aw", (Look(0.6, "D", "C"), Look(0.4, "E", "F"))),
-    ("ae eh ah", (Look(1, "C", "BD"),)),
+    ("ae eh ah", (Look(1, "C", "D"),)),
     ("ey", (Look(0.6, "C", "BD"), Look(0.4, "B", "C"))),
     ("iy ih ix ax y", (Look(1, "B", "C"),)),
     ("r", (Look(1, "BE", "F"),)),
