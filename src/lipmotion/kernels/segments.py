@@ -22,7 +22,7 @@ def best_segments(cost: NDArray[np.float64], hold: int, change: float) -> list[t
         return []
     hold = min(hold, frames)
     best = np.full(frames + 1, np.inf)
-    best[0] = -change
+    best[0] = 0.0
     label = np.zeros(frames + 1, np.intp)
     began = np.zeros((frames + 1, cost.shape[1]), bool)
     open_segments = np.full(cost.shape[1], np.inf)
