@@ -16,7 +16,9 @@ if TYPE_CHECKING:
     from lipmotion.corpora.store import Corpus
     from lipmotion.engines import engine_named
     from lipmotion.export.base import read_motion
+    from lipmotion.export.cues.sheet import CueSheet
     from lipmotion.pipeline.animate import animate, write
+    from lipmotion.pipeline.cues import cues, write_cues
     from lipmotion.pipeline.evaluate import evaluate
     from lipmotion.pipeline.model import Model, load_model, save_model
     from lipmotion.pipeline.prepare import prepare
@@ -28,6 +30,7 @@ __all__ = [
     "Audio",
     "Constraints",
     "Corpus",
+    "CueSheet",
     "Generation",
     "Lexicon",
     "Model",
@@ -37,6 +40,7 @@ __all__ = [
     "Timeline",
     "Unit",
     "animate",
+    "cues",
     "engine_named",
     "evaluate",
     "load_model",
@@ -45,13 +49,16 @@ __all__ = [
     "save_model",
     "train",
     "write",
+    "write_cues",
 ]
 
 _HOMES = {
     "Corpus": "lipmotion.corpora.store",
+    "CueSheet": "lipmotion.export.cues.sheet",
     "Lexicon": "lipmotion.units",
     "Model": "lipmotion.pipeline.model",
     "animate": "lipmotion.pipeline.animate",
+    "cues": "lipmotion.pipeline.cues",
     "engine_named": "lipmotion.engines",
     "evaluate": "lipmotion.pipeline.evaluate",
     "load_model": "lipmotion.pipeline.model",
@@ -60,6 +67,7 @@ _HOMES = {
     "save_model": "lipmotion.pipeline.model",
     "train": "lipmotion.pipeline.train",
     "write": "lipmotion.pipeline.animate",
+    "write_cues": "lipmotion.pipeline.cues",
 }
 
 

@@ -27,8 +27,11 @@ def check_source(path: Path, kind: str) -> None:
         raise InputError(f"{path}: the file is empty; give a {kind}")
 
 
-def check_target(target: Path) -> None:
-    """Raise ExportError unless a file can be put there: before work begins, not after it."""
+def check_target(target: Path, source: str | Path | None = None) -> None:
+    """Raise ExportError unless a file can be put there: before work begins, not after it.
+
+    source : a recording that must not be overwritten
+    """
     try:
         is_folder = target.is_dir()
     except OSError as error:  # a name too long
@@ -36,6 +39,13 @@ def check_target(target: Path) -> None:
     if is_folder:
         raise ExportError(f"{target}: is a folder; give the name of a file in it")
     _check_parent(target)
+    if source is not None and target.exists() and Path(source).exists() and target.samefile(source):
+        raise ExportError(f"{target}: is the recording itself; give another name")
+
+
+def as_text(path: str | Path) -> str:
+    """Return what can be written as UTF-8: a file's name may be of any bytes."""
+    return str(path).encode("utf-8", "backslashreplace").decode("utf-8")
 
 
 def _check_parent(target: Path) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export.base import MOTION_SUFFIXES, write_motion
-from lipmotion.files import check_target
+from lipmotion.files import as_text, check_target
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.transcribe import read_transcript, transcribe
 from lipmotion.speech.mfcc import mfcc
@@ -100,24 +100,20 @@ def check_outputs(
     for path in map(Path, outputs):
         if path.suffix.lower() not in suffixes:
             raise ExportError(f"{path}: unknown format {path.suffix!r}; required one of: {' '.join(suffixes)}")
-        check_target(path)
+        check_target(path, speech)
         if path.suffix.lower() == VIDEO_SUFFIX and speech is None:
             raise ExportError(f"{path}: a video needs the recording: write(..., speech=FILE)")
-        if speech is not None and path.exists() and Path(speech).exists() and path.samefile(speech):
-            raise ExportError(f"{path}: is the recording itself; give another name")
 
 
 def _write_motion(generation: Generation, path: Path, speech: str | Path | None, model: Model | None) -> None:
     about = model.about if model else {}
     named = {key: _text(about[key]) for key in ("name", "corpus", "licence", "attribution") if about.get(key)}
-    source = {"file": _text(Path(speech).name)} if speech else {}
+    source = {"file": as_text(Path(speech).name)} if speech else {}
     write_motion(path, generation, source=source, model=named)
 
 
 def _text(value: object) -> str:
-    """Return what can be written as UTF-8: a file's name may be of any bytes."""
-    text = "; ".join(map(str, value)) if isinstance(value, list) else str(value)
-    return text.encode("utf-8", "backslashreplace").decode("utf-8")
+    return as_text("; ".join(map(str, value)) if isinstance(value, list) else str(value))
 
 
 def _write_video(generation: Generation, path: Path, speech: Path, fps: float) -> None:

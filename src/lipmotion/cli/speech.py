@@ -1,0 +1,31 @@
+"""Arguments of every verb that turns speech into motion."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+
+def add_speech_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the recording, and what ``lipmotion.animate`` may be told about it."""
+    parser.add_argument("speech", type=Path, help="audio or video file")
+    parser.add_argument("--transcript", metavar="TEXT|FILE", help="what is said, if known")
+    parser.add_argument("--lexicon", type=Path, metavar="FILE", help="pronunciations: WORD PHONE PHONE ... a line")
+    parser.add_argument("--units", type=Path, metavar="FILE", help="phones of an earlier .json or .npz, edited or not")
+    parser.add_argument("--model", type=Path, help="trained model (default: the one that ships with the package)")
+
+
+def speech_arguments(options: argparse.Namespace) -> dict[str, Any]:
+    """Return them as ``lipmotion.animate`` takes them, files read."""
+    from lipmotion.cli.texts import text_or_file
+    from lipmotion.export.base import read_motion
+    from lipmotion.pipeline.model import load_model
+    from lipmotion.units import Lexicon
+
+    return {
+        "transcript": text_or_file(options.transcript) if options.transcript is not None else None,
+        "lexicon": Lexicon.from_file(options.lexicon) if options.lexicon else None,
+        "model": load_model(options.model),
+        "units": read_motion(options.units)[1] if options.units else None,
+    }

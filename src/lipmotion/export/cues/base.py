@@ -1,0 +1,34 @@
+"""Cue files, by format."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from lipmotion.errors import ExportError
+from lipmotion.export.cues import moho_dat, rhubarb_json, rhubarb_tsv, rhubarb_xml
+from lipmotion.export.cues.sheet import CueSheet
+from lipmotion.files import whole_file
+
+CUE_FORMATS: dict[str, Callable[[CueSheet, str], str]] = {
+    "tsv": rhubarb_tsv.text,
+    "xml": rhubarb_xml.text,
+    "json": rhubarb_json.text,
+    "dat": moho_dat.text,
+}
+"""Cues and the name of the recording → the text of a file, by format; a file's suffix is its format's name."""
+
+
+def format_of(path: Path) -> str:
+    """Return the format that a file's suffix names. Raises ExportError: none."""
+    name = path.suffix.lower().removeprefix(".")
+    if name not in CUE_FORMATS:
+        known = " ".join(f".{known}" for known in CUE_FORMATS)
+        raise ExportError(f"{path}: unknown cue format {path.suffix!r}; required one of: {known}")
+    return name
+
+
+def write_cue_file(path: Path, sheet: CueSheet, sound_file: str, form: str) -> None:
+    """Write cues to a file, whole or not at all. Raises ExportError: the file cannot be written."""
+    with whole_file(path) as temporary:
+        temporary.write_text(CUE_FORMATS[form](sheet, sound_file), encoding="utf-8", newline="\n")

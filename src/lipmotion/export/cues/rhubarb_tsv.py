@@ -1,0 +1,11 @@
+"""``tsv``: a line a cue, its start and its shape; the last line is the end, at rest."""
+
+from __future__ import annotations
+
+from lipmotion.export.cues.sheet import CueSheet
+
+
+def text(sheet: CueSheet, _sound_file: str) -> str:
+    """Return the file's text."""
+    rows = [(cue.start_s, cue.label) for cue in sheet.cues]
+    return "".join(f"{time_s:.2f}\t{shape}\n" for time_s, shape in [*rows, (sheet.duration_s, sheet.rest)])

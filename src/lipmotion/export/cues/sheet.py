@@ -1,0 +1,72 @@
+"""Cues: which shape the mouth has from when to when."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from lipmotion.export.cues.shapes import REST, SHAPES, fallback
+from lipmotion.types import Span, Timeline
+
+
+@dataclass(frozen=True)
+class CueSheet:
+    """The cues of one recording.
+
+    cues  : shapes without gaps from 0 to the end, at least one; times are whole hundredths of a second
+    fps   : the frame rate that they were chosen for; ``int(fps * start_s)`` is a cue's first frame, the first is 0
+    drawn : the shapes that the character has
+    """
+
+    cues: Timeline[str]
+    fps: float
+    drawn: str
+
+    @property
+    def rest(self) -> str:
+        """The mouth before and after speech."""
+        return fallback(REST, self.drawn)
+
+    @property
+    def duration_s(self) -> float:
+        """Length in seconds."""
+        return self.cues.spans[-1].end_s
+
+
+def drawn_shapes(optional: str) -> str:
+    """Return the basic shapes and these optional ones."""
+    return "".join(name for name, shape in SHAPES.items() if not shape.fallback or name in optional)
+
+
+def start_s(frame: int, fps: float) -> float:
+    """Return the first hundredth of a second in which a frame is shown.
+
+    Rounded up, not to the nearest: who computes ``int(fps * start)``, as Rhubarb and Moho's files do, gets the
+    frame back. Frame 1 at 24 a second, 0.0417 s, is 0.05 s; rounded to 0.04 s it would be in frame 0.
+    """
+    hundredths = int(np.ceil(frame / fps * 100 - 1e-6))
+    return (hundredths + (int(fps * (hundredths / 100)) < frame)) / 100
+
+
+def frames_in(duration_s: float, fps: float) -> int:
+    """Return how many frames begin before the end, which is cut to hundredths of a second."""
+    end_s = whole_hundredths(duration_s)
+    frames = int(np.ceil(end_s * fps))
+    while frames and start_s(frames - 1, fps) >= end_s:
+        frames -= 1
+    return frames
+
+
+def whole_hundredths(duration_s: float) -> float:
+    """Return a duration cut to hundredths of a second."""
+    return int(duration_s * 100 + 1e-6) / 100
+
+
+def sheet_of(segments: Sequence[tuple[int, str]], duration_s: float, fps: float, drawn: str) -> CueSheet:
+    """Return the cue sheet of segments (first frame, shape); without any, the mouth is at rest."""
+    starts = [start_s(frame, fps) for frame, _ in segments] or [0.0]
+    shapes = [shape for _, shape in segments] or [fallback(REST, drawn)]
+    ends = [*starts[1:], whole_hundredths(duration_s)]
+    return CueSheet(Timeline(tuple(map(Span, starts, ends, shapes))), fps, drawn)

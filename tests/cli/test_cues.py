@@ -1,0 +1,150 @@
+from __future__ import annotations
+
+import json
+import logging
+from pathlib import Path
+
+import pytest
+
+from cli.conftest import Done, Run, is_one_error
+from lipmotion.pipeline.animate import animate
+from lipmotion.pipeline.cues import cue_text, cues, write_cues
+from lipmotion.pipeline.model import load_model
+
+
+@pytest.fixture
+def basics(toy_speech: Path, toy_model_file: Path) -> tuple[object, ...]:
+    return ("cues", toy_speech, "--model", toy_model_file)
+
+
+def events(done: Done) -> list[dict[str, object]]:
+    return [json.loads(line) for line in done.err]
+
+
+@pytest.mark.parametrize("form", ["tsv", "xml", "json", "dat"])
+def test_without_a_file_it_is_printed(
+    run: Run, basics: tuple[object, ...], here: Path, toy_speech: Path, toy_model_file: Path, form: str
+) -> None:
+    done = run(*basics, "-f", form)
+    sheet = cues(animate(toy_speech, model=load_model(toy_model_file)))
+    assert done == (0, cue_text(sheet, speech=toy_speech, form=form).splitlines(), [])
+    assert list(here.iterdir()) == []
+
+
+@pytest.mark.usefixtures("here")
+def test_tsv_is_the_default(run: Run, basics: tuple[object, ...]) -> None:
+    assert run(*basics) == run(*basics, "--format", "tsv")
+
+
+def test_it_is_the_functions_of_the_same_names(
+    run: Run, basics: tuple[object, ...], here: Path, toy_speech: Path, toy_model_file: Path
+) -> None:
+    done = run(*basics, "-o", "a.tsv", "a.xml", "-o", "a.json", "a.dat", "--fps", "30", "--hold", "4", "--shapes", "GX")
+    assert done == (0, ["a.tsv", "a.xml", "a.json", "a.dat"], [])
+    sheet = cues(animate(toy_speech, model=load_model(toy_model_file)), fps=30, hold_frames=4, shapes="GX")
+    write_cues(sheet, ["b.tsv", "b.xml", "b.json", "b.dat"], speech=toy_speech)
+    for form in ("tsv", "xml", "json", "dat"):
+        assert (here / f"a.{form}").read_bytes() == (here / f"b.{form}").read_bytes()
+
+
+def test_a_format_whatever_the_suffix(run: Run, basics: tuple[object, ...], here: Path) -> None:
+    assert run(*basics, "-o", "mouth.txt", "-f", "dat") == (0, ["mouth.txt"], [])
+    assert (here / "mouth.txt").read_text().startswith("MohoSwitch1\n1 ")
+
+
+def test_transcript_and_edited_phones(run: Run, basics: tuple[object, ...], here: Path) -> None:
+    said = run(*basics, "--transcript", "see bob papa mama")
+    run("animate", *basics[1:], "--transcript", "see bob papa mama", "-o", "a.json")
+    assert run(*basics, "--units", "a.json").out == said.out
+    document = json.loads((here / "a.json").read_text())
+    document["units"] = [unit | {"phone": "sil"} for unit in document["units"]]
+    (here / "b.json").write_text(json.dumps(document))
+    assert [line.split("\t")[1] for line in run(*basics, "--units", "b.json").out] == ["X", "X"]
+
+
+@pytest.mark.parametrize(
+    ("options", "code", "words"),
+    [
+        (["--fps", "0"], 3, "frame rate is 0.0, required 1 to 60"),
+        (["--fps", "nan"], 3, "frame rate is nan"),
+        (["--hold", "0"], 3, "hold is 0 frames"),
+        (["--shapes", "XYZ"], 3, "optional shapes are 'XYZ'"),
+        (["-o", "a.tsv", "a.txt"], 7, "unknown cue format '.txt'"),
+        (["-o", "a.tsv", "missing/a.dat"], 7, "the folder missing does not exist"),
+        (["--model", "missing.lipmotion"], 3, "no such model"),
+        (["-o", "a.tsv", "--transcript", "missing.txt"], 3, "no such transcript file"),
+    ],
+)
+@pytest.mark.parametrize("machine", [False, True])
+def test_what_cannot_be_done(
+    run: Run, basics: tuple[object, ...], here: Path, options: list[str], code: int, words: str, machine: bool
+) -> None:
+    done = run(*basics, *options, *["--machine-readable"] * machine)
+    if machine:
+        assert (done.code, done.out) == (code, [])
+        assert words in str(events(done)[-1]["reason"])
+    else:
+        assert is_one_error(done, code)
+        assert words in done.err[0]
+    assert list(here.iterdir()) == []
+
+
+@pytest.mark.parametrize("what", ["missing", "empty", "text", "mute", "short", "folder"])
+def test_speech_that_cannot_be_used(run: Run, toy_model_file: Path, bad_speech: dict[str, Path], what: str) -> None:
+    basics = ("cues", bad_speech[what], "--model", toy_model_file)
+    assert is_one_error(run(*basics), 3)
+    done = run(*basics, "--machineReadable")
+    assert (done.code, done.out) == (3, [])
+    start, *_, failure = events(done)
+    assert (start["type"], start["file"]) == ("start", str(bad_speech[what]))
+    assert failure["type"] == "failure"
+    assert failure["log"] == {
+        "level": "Fatal",
+        "message": f"Application terminating with error: {failure['reason']}",
+    }
+
+
+@pytest.mark.parametrize("option", ["--machine-readable", "--machineReadable"])
+@pytest.mark.usefixtures("here")
+def test_status_lines(run: Run, basics: tuple[object, ...], toy_speech: Path, option: str) -> None:
+    done = run(*basics, "-f", "json", option)
+    assert done.code == 0
+    assert json.loads("\n".join(done.out))["mouthCues"]
+    start, *progress, success = events(done)
+    assert start == {
+        "type": "start",
+        "file": str(toy_speech),
+        "log": {"level": "Info", "message": f'Application startup. Input file: "{toy_speech}".'},
+    }
+    assert success == {"type": "success", "log": {"level": "Info", "message": "Application terminating normally."}}
+    values = [float(str(event["value"])) for event in progress]
+    assert values == sorted(values)
+    assert (values[0], values[-1]) == (0.0, 1.0)
+    for event in progress:
+        assert event["type"] == "progress"
+        assert event["log"] == {"level": "Trace", "message": f"Progress: {event['value']:.0%}"}
+
+
+@pytest.mark.usefixtures("here")
+def test_warnings_are_status_lines_too(run: Run, basics: tuple[object, ...]) -> None:
+    handlers = list(logging.getLogger().handlers)
+    done = run(*basics, "--machine-readable", "--transcript", "see bimab papa mama")
+    (said,) = [event["log"] for event in events(done) if event["type"] == "log"]
+    assert said["level"] == "Warning"
+    assert "'bimab' is not in the dictionary" in said["message"]
+    assert logging.getLogger().handlers == handlers
+
+
+def test_other_processes_can_read_it(run_outside: Run, basics: tuple[object, ...]) -> None:
+    """As an add-on runs it: ASCII only, whatever the terminal's letters are."""
+    done = run_outside(*basics, "-f", "json", "--machineReadable", encoding="ascii")
+    assert done.code == 0
+    assert json.loads("\n".join(done.out))["metadata"]["soundFile"] == str(basics[1])
+    assert [event["type"] for event in events(done)][-1] == "success"
+    assert run_outside(*basics, "-f", "xml", encoding="ascii").out[0].startswith("<?xml")
+
+
+@pytest.mark.parametrize("options", [["-f", "csv"], ["--hold", "2.5"], ["--bogus"], ["-o"]])
+def test_a_wrong_command_line(run: Run, basics: tuple[object, ...], here: Path, options: list[str]) -> None:
+    assert run(*basics, *options).code == 2
+    assert list(here.iterdir()) == []

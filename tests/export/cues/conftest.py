@@ -1,0 +1,29 @@
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import accumulate
+
+import numpy as np
+
+from lipmotion.pipeline.toy import toy_motion
+from lipmotion.types import Generation, Motion, Span, Timeline, Trace, Unit
+
+
+def timeline(phones: Sequence[tuple[str, float]]) -> Timeline[Unit]:
+    """Phones one after the other, each with its duration in seconds."""
+    ends = list(accumulate(duration_s for _, duration_s in phones))
+    starts = [0.0, *ends[:-1]]
+    return Timeline(tuple(Span(*times, Unit(phone)) for *times, (phone, _) in zip(starts, ends, phones, strict=True)))
+
+
+def result(units: Timeline[Unit], motion: Motion | None = None) -> Generation:
+    """A result with these phones; its motion is the toy face's, unless another is given."""
+    motion = motion or toy_motion(units, 100.0)
+    trace = Trace(("a",), np.zeros(len(motion.values), np.intp))
+    return Generation(motion, np.ones_like(motion.values), units, trace)
+
+
+def spoken(text: str, duration_s: float = 0.1, silence_s: float = 0.3) -> Generation:
+    """Phones of equal length between silences, as the toy face says them."""
+    said = [(phone, duration_s) for phone in text.split()]
+    return result(timeline([("sil", silence_s), *said, ("sil", silence_s)]))

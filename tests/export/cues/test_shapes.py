@@ -1,0 +1,48 @@
+from __future__ import annotations
+
+import pytest
+
+from lipmotion.export.cues.shapes import ANY_OPEN, LOOKS, OPTIONAL, SHAPES, fallback, looks_of
+from lipmotion.units import LIP_CLOSING, PHONES, VISEMES, is_silent
+
+BLAIR = "AI E O U FV L MBP WQ etc rest".split()
+"""The names that OpenToonz knows."""
+
+
+def test_every_phone_but_h_has_a_look() -> None:
+    assert set(PHONES) - set(LOOKS) == {"hh"}
+    assert set(LOOKS) <= set(PHONES)
+    assert looks_of("hh") == looks_of("a phone of another language") == ANY_OPEN
+
+
+@pytest.mark.parametrize("phone", PHONES)
+def test_the_parts_of_a_phone_are_the_whole(phone: str) -> None:
+    assert sum(look.share for look in looks_of(phone)) == pytest.approx(1)
+    for look in looks_of(phone):
+        assert look.best
+        assert set(look.best + look.allowed) <= set(SHAPES)
+        assert not set(look.best) & set(look.allowed)
+
+
+def shown(name: str) -> set[str]:
+    return {phone for phone in PHONES if any(name in look.best for look in looks_of(phone))}
+
+
+def test_the_special_shapes_belong_to_their_sounds() -> None:
+    assert shown("A") == set(LIP_CLOSING)
+    assert shown("G") == set(VISEMES["ld"])
+    assert shown("H") == {"l", "el"}
+    assert shown("X") == {phone for phone in PHONES if is_silent(phone)}
+
+
+def test_names_of_preston_blair() -> None:
+    names = [shape.blair for shape in SHAPES.values()]
+    assert len(set(names)) == len(names)
+    assert set(BLAIR) - set(names) == {"WQ"}
+    assert set(names) <= set(BLAIR)
+
+
+def test_optional_shapes_fall_back_as_rhubarb_does() -> None:
+    assert OPTIONAL == "GHX"
+    assert [fallback(name, "ABCDEF") for name in "ABCDEFGHX"] == list("ABCDEFACA")
+    assert [fallback(name, "ABCDEFX") for name in "GHX"] == ["A", "C", "X"]
