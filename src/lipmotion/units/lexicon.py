@@ -82,13 +82,20 @@ def _user_phones(phones: list[str], where: str) -> Pronunciation:
     return tuple(result)
 
 
+def english_data() -> Path:
+    """Return where pocketsphinx keeps its dictionary and models. Raises MissingDependencyError: it is missing."""
+    spec = find_spec("pocketsphinx")  # its data files are read, the package itself is not imported
+    if spec is None or not spec.submodule_search_locations:
+        raise MissingDependencyError(
+            "the pronunciation dictionary and the phone models of many voices come with pocketsphinx: "
+            "pip install pocketsphinx"
+        )
+    return Path(spec.submodule_search_locations[0]) / "model" / "en-us"
+
+
 @cache
 def _dictionary() -> bytes:
-    spec = find_spec("pocketsphinx")  # its data file is read, the package itself is not imported
-    if spec is None or not spec.submodule_search_locations:
-        raise MissingDependencyError("the pronunciation dictionary comes with pocketsphinx: pip install pocketsphinx")
-    folder = Path(spec.submodule_search_locations[0])
-    return b"\n" + (folder / "model" / "en-us" / "cmudict-en-us.dict").read_bytes()
+    return b"\n" + (english_data() / "cmudict-en-us.dict").read_bytes()
 
 
 @cache
