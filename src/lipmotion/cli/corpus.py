@@ -11,9 +11,9 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb."""
     parser = verbs.add_parser("corpus", help="prepare recordings for training")
     actions = parser.add_subparsers(title="actions", required=True, metavar="ACTION")
-    prepare = actions.add_parser("prepare", help="track faces and compute features of a folder of videos")
+    prepare = actions.add_parser("prepare", help="make a corpus of a folder of recordings")
     prepare.add_argument(
-        "recordings", type=Path, help="folder: GRID's layout, or videos with optional .txt transcripts"
+        "recordings", type=Path, help="folder: videos, or sounds with motion; with labels or not (docs/corpora.md)"
     )
     prepare.add_argument("-o", "--output", type=Path, required=True, metavar="CORPUS")
     prepare.add_argument("--workers", type=int, help="processes (default: one a core)")

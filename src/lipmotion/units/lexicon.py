@@ -22,6 +22,13 @@ WEAK_WORDS = frozenset("a an the of and from was but than that's her were your f
 """Words of one syllable that are unstressed in running speech."""
 
 
+def phone_named(label: str) -> str | None:
+    """Return the phone that a label means, or None. ARPAbet in either case, stressed or not, or the project's own."""
+    name = re.sub(r"\d$", "", label.lower())
+    name = REDUCED.get(name, name) if label.endswith("0") else name
+    return name if name in PHONES else None
+
+
 @dataclass(frozen=True)
 class Lexicon:
     """Pronunciations of words.
@@ -56,8 +63,8 @@ class Lexicon:
         if word in self.user:
             return self.user[word]
         entries = _dictionary_entries(word)
-        variants = [_with_reduced_vowels(word, entry) for entry in entries]
-        return tuple(dict.fromkeys(variants)) or (_with_reduced_vowels(word, guess(word)),)
+        variants = [with_reduced_vowels(word, entry) for entry in entries]
+        return tuple(dict.fromkeys(variants)) or (with_reduced_vowels(word, guess(word)),)
 
 
 def _lines(path: Path) -> list[str]:
@@ -74,9 +81,8 @@ def _user_phones(phones: list[str], where: str) -> Pronunciation:
         raise InputError(f"{where}: a word without phones; write the word, then its phones")
     result = []
     for phone in phones:
-        name = re.sub(r"\d$", "", phone.lower())
-        name = REDUCED.get(name, name) if phone.endswith("0") else name
-        if name not in PHONES or is_silent(name):
+        name = phone_named(phone)
+        if name is None or is_silent(name):
             raise InputError(f"{where}: unknown phone {phone!r}; the phones are: {' '.join(PHONES)}")
         result.append(name)
     return tuple(result)
@@ -105,7 +111,7 @@ def _dictionary_entries(word: str) -> tuple[Pronunciation, ...]:
     return tuple(entries)
 
 
-def _with_reduced_vowels(word: str, phones: Pronunciation) -> Pronunciation:
+def with_reduced_vowels(word: str, phones: Pronunciation) -> Pronunciation:
     """Mark the unstressed AH, ER and IH. The dictionary has no stress, so a rule decides.
 
     A word of one syllable keeps its vowel unless it is a weak word. In a longer word these three are
