@@ -17,12 +17,11 @@ from lipmotion.corpora.base import AUDIO_SUFFIXES, Curves, Recording, Recordings
 from lipmotion.corpora.labels import labels_beside
 from lipmotion.corpora.splits import LISTS, with_splits
 from lipmotion.errors import InputError
-from lipmotion.types import Channel, Motion
+from lipmotion.types import WEIGHT, Channel, Motion
 
 KIND = "FACEGOOD blendshape weights"
 NAMES, VALUES = "*_bs_name.npy", "bs_value_"
 RATE_HZ = 30.0
-UNIT = "weight"
 
 
 def read_facegood(directory: Path) -> Recordings | None:
@@ -63,7 +62,7 @@ def channels_in(path: Path) -> tuple[Channel, ...]:
         raise InputError(
             f"{path}: an array of {names.dtype} of shape {names.shape}, required one row of different texts"
         )
-    return tuple(Channel(str(name), UNIT) for name in names)
+    return tuple(Channel(str(name), WEIGHT) for name in names)
 
 
 def read_array(curves: Curves) -> Motion:

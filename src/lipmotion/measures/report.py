@@ -18,7 +18,8 @@ def table(figures: Mapping[str, Any]) -> str:
         for channel, row in condition["channels"].items():
             lines.append(
                 f"  {channel:{size}}{_number(row['acc'], '7.3f')}{_number(row['acc_per_clip'], '10.3f')}"
-                f"{_number(row['nrmse'], '7.3f')}{_number(row['global_variance'], '10.2f')}{_number(row['jerk'], '7.2f')}"
+                f"{_number(row['nrmse'], '7.3f')}{_number(row['global_variance'], '10.2f')}"
+                f"{_number(row['jerk'], '7.2f')}"
             )
         lines += _rest(condition)
     return "\n".join(lines)
@@ -49,5 +50,5 @@ def _rest(condition: Mapping[str, Any]) -> list[str]:
 
 def _number(value: float | None, form: str) -> str:
     """Return a figure as text, a dash in the same width where there is none."""
-    width = form.split(".")[0].strip("+")
+    width = form.partition(".")[0].strip("+")
     return f"{'–':>{width or 0}}" if value is None else format(value, form)

@@ -58,8 +58,8 @@ def evaluate(
     Compared are the lip distances or, in a corpus without them, every channel that moves in the recordings; figures
     of closing, and of silence, need the channel ``opening``. What cannot be computed is None.
     The reference for what is speech and where its p, b, m are is the labelled phones, else the forced alignment, or
-    recognition where nothing is transcribed. The mouth counts as closed relative to the corpus's own training list (without
-    one: to the split itself).
+    recognition where nothing is transcribed. The mouth counts as closed relative to the corpus's own training list
+    (without one: to the split itself).
     Raises CorpusError: no utterances of this split, or a model without the channels compared.
     Raises AlignmentError: a transcript does not fit into its recording.
     """
@@ -121,8 +121,8 @@ def _compared(utterances: Sequence[Utterance]) -> tuple[tuple[str, ...], tuple[s
     moves = [extent > STILL_SHARE * widest[channel.unit] for channel, extent in zip(channels, high - low, strict=True)]
     if not any(moves):
         raise CorpusError(f"none of {len(names)} motion channels moves in these {len(utterances)} utterances")
-    moving, still = (tuple(n for n, m in zip(names, moves, strict=True) if m is kind) for kind in (True, False))
-    return moving, still
+    moving = tuple(name for name, moved in zip(names, moves, strict=True) if moved)
+    return moving, tuple(name for name in names if name not in moving)
 
 
 def _training(corpus: Corpus, speakers: Sequence[str]) -> list[Utterance]:
@@ -137,7 +137,7 @@ def _check_channels(motion: Motion, compared: Sequence[str]) -> None:
     missing = [name for name in compared if name not in motion.names]
     if missing:
         raise CorpusError(
-            f"the model has no channels {', '.join(missing[:6])}, which the corpus has: it learned another kind of motion"
+            f"the model has no channels {', '.join(missing[:6])}, which the corpus has: it learned other motion"
         )
 
 
@@ -188,7 +188,7 @@ def _figures(clips: Sequence[Clip], compared: Sequence[str], threshold: float | 
         "acc": float(acc.mean()),
         "amse": curves.mean_distance(generated, original),
         "leading": compared[leading],
-        "lag_ms": curves.lag_ms(*([c[:, [leading]] for c in side] for side in (generated, original)), rate_hz),
+        "lag_ms": curves.lag_ms(_column(generated, leading), _column(original, leading), rate_hz),
     }
     if threshold is None:
         return figures
@@ -198,13 +198,12 @@ def _figures(clips: Sequence[Clip], compared: Sequence[str], threshold: float | 
 def _opening_figures(clips: Sequence[Clip], column: int, threshold: float, rate_hz: float, seed: int) -> dict[str, Any]:
     """Return what only the opening of the mouth can tell."""
     generated, original = [clip.generated[:, column] for clip in clips], [clip.original[:, column] for clip in clips]
-    opening = generated, original
     bilabial = [_on_kept_frames(clip, BILABIAL, rate_hz) for clip in clips]
     other_s = sum(end - start for clip in clips for start, end, phone in clip.spoken if phone not in BILABIAL)
     return {
-        "opening_acc_95": interval(_pooled_acc, generated, original, seed),
-        "closures": asdict(closure_figures(*opening, threshold, rate_hz)),
-        "closures_p_b_m": asdict(phone_closures(*opening, bilabial, other_s, threshold, rate_hz)),
+        "opening_acc_95": interval(_acc, generated, original, seed),
+        "closures": asdict(closure_figures(generated, original, threshold, rate_hz)),
+        "closures_p_b_m": asdict(phone_closures(generated, original, bilabial, other_s, threshold, rate_hz)),
         "silence": {
             "generated": _silence(clips, generated),
             "original": _silence(clips, original),
@@ -222,7 +221,11 @@ def _on_kept_frames(clip: Clip, phones: Sequence[str], rate_hz: float) -> list[t
     ]
 
 
-def _pooled_acc(generated: curves.Clips, original: curves.Clips) -> float:
+def _column(side: curves.Clips, column: int) -> list[NDArray[np.float64]]:
+    return [clip[:, column : column + 1] for clip in side]
+
+
+def _acc(generated: curves.Clips, original: curves.Clips) -> float:
     return float(curves.pooled_correlation([g[:, None] for g in generated], [o[:, None] for o in original])[0])
 
 

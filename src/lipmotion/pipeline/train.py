@@ -60,7 +60,8 @@ def train(
     engine     : with its configuration; the trajectory engine by default
     recogniser : configuration of the phone models
     Phones that are labelled are taken as they are. Utterances without a transcript are recognised, by the phone models
-    of the others or, where there are none, by those of the shipped model.  Nothing here is random: the same corpus gives the same model.
+    of the others or, where there are none, by those of the shipped model.
+    Nothing here is random: the same corpus gives the same model.
     Raises CorpusError: no such utterances, or nothing in them to learn from.
     """
     lexicon = lexicon or Lexicon()

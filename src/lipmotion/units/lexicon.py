@@ -99,16 +99,25 @@ def _dictionary() -> bytes:
 
 @cache
 def _dictionary_entries(word: str) -> tuple[Pronunciation, ...]:
-    """Search the sorted text itself: faster than reading 134,000 lines for one sentence."""
-    text, entries = _dictionary(), []
-    for variant in range(1, 10):
-        key = f"\n{word} " if variant == 1 else f"\n{word}({variant}) "
-        start = text.find(key.encode())
-        if start < 0:
-            break
-        line = text[start + len(key.encode()) : text.index(b"\n", start + 1)].decode()
-        entries.append(tuple(line.lower().split()))
+    """Search the sorted text itself, by halves: faster than reading 134,000 lines for one sentence."""
+    text, wanted, entries = _dictionary(), word.encode(), []
+    low, high = 0, len(text) - 1  # each at the line break before a line
+    while low < high:
+        middle = text.rindex(b"\n", 0, (low + high) // 2 + 1)
+        if _head(text, middle) < wanted:
+            low = text.index(b"\n", middle + 1)
+        else:
+            high = middle
+    while low + 1 < len(text) and _head(text, low) == wanted:
+        end = text.index(b"\n", low + 1)
+        entries.append(tuple(text[low:end].decode().lower().split()[1:]))
+        low = end
     return tuple(entries)
+
+
+def _head(text: bytes, line_break: int) -> bytes:
+    """Return the word of the line after a line break, without the number of its variant."""
+    return text[line_break + 1 : text.index(b" ", line_break)].partition(b"(")[0]
 
 
 def with_reduced_vowels(word: str, phones: Pronunciation) -> Pronunciation:

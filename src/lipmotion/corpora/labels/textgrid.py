@@ -31,7 +31,7 @@ def interval_tiers(text: str, where: str) -> list[Tier]:
     where : the file's name, for messages
     Raises InputError: not a whole TextGrid.
     """
-    tokens = ((kind, match[kind]) for match in TOKEN.finditer(text) if (kind := match.lastgroup))
+    tokens = _tokens(text)
     tiers: list[Tier] = []
     place = "the header"
     try:
@@ -51,6 +51,12 @@ def interval_tiers(text: str, where: str) -> list[Tier]:
     except _DamagedError as error:
         raise InputError(f"{where}: {place} is damaged: {error}; save it again in Praat") from error
     return tiers
+
+
+def _tokens(text: str) -> Iterator[tuple[str, str]]:
+    for match in TOKEN.finditer(text):
+        if match.lastgroup:
+            yield match.lastgroup, match[match.lastgroup]
 
 
 def _label(tokens: Iterator[tuple[str, str]], kind: str, place: str) -> Label:
