@@ -30,8 +30,8 @@ def run(options: argparse.Namespace) -> None:
         covered = f"phones {prompt.phones:2}/{found.phones}  diphones {prompt.diphones:4}/{found.diphones}"
         print(f"{number:4}  {covered}  {prompt.text}")
     last = found.chosen[-1] if found.chosen else None
-    covered = f"{last.diphones / found.diphones:.0%} of the diphones" if last else "nothing new in them"
-    print(f"{len(found.chosen)} of {found.sentences} sentences: {covered} that these sentences hold")
+    covered = f"{last.diphones / found.diphones:.0%} of all their diphones" if last else "they add nothing"
+    print(f"{len(found.chosen)} of {found.sentences} sentences: {covered}")
     if found.left_out:
         words = sorted(set(found.left_out.values()))
         some = ", ".join(words[:10]) + (", ..." if len(words) > 10 else "")

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 
 def table(figures: Mapping[str, Any]) -> str:
     """Return the figures of ``lipmotion.evaluate`` as text."""
@@ -46,6 +48,15 @@ def _rest(condition: Mapping[str, Any]) -> list[str]:
         f"  silence: opening {_number(quiet['mean'], '.4f')} ± {_number(quiet['std'], '.4f')} "
         f"(original {_number(original['mean'], '.4f')} ± {_number(original['std'], '.4f')}, {quiet['frames']} frames)",
     ]
+
+
+def without_nan(figures: Any) -> Any:
+    """Return nested figures with None in the place of every number that is not finite: JSON knows no other."""
+    if isinstance(figures, dict):
+        return {key: without_nan(value) for key, value in figures.items()}
+    if isinstance(figures, list | tuple):
+        return type(figures)(map(without_nan, figures))
+    return None if isinstance(figures, float) and not np.isfinite(figures) else figures
 
 
 def _number(value: float | None, form: str) -> str:

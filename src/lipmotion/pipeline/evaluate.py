@@ -14,6 +14,7 @@ from lipmotion.errors import AlignmentError, CorpusError
 from lipmotion.measures import curves
 from lipmotion.measures.bootstrap import interval
 from lipmotion.measures.closures import closed_threshold, closure_figures, phone_closures
+from lipmotion.measures.report import without_nan
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.train import labels_of
 from lipmotion.pipeline.transcribe import report_guesses
@@ -24,8 +25,6 @@ from lipmotion.units import VISEMES, Lexicon, is_silent
 OPENING = "opening"
 DISTANCES = (OPENING, "width", "outer")
 """What is compared where faces were tracked; all other channels follow from points near these."""
-STILL_SHARE = 0.01
-"""A channel is still if its range is under this share of the widest one's of the same unit."""
 BILABIAL = VISEMES["bi"]
 SILENCE_MARGIN_S = 0.3
 """The mouth may still close, or already open, this close to speech."""
@@ -93,15 +92,6 @@ def evaluate(
     return plain
 
 
-def without_nan(figures: Any) -> Any:
-    """Return nested figures with None in the place of every number that is not finite: JSON knows no other."""
-    if isinstance(figures, dict):
-        return {key: without_nan(value) for key, value in figures.items()}
-    if isinstance(figures, list | tuple):
-        return type(figures)(map(without_nan, figures))
-    return None if isinstance(figures, float) and not np.isfinite(figures) else figures
-
-
 def _compared(utterances: Sequence[Utterance]) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return the channels to compare, and those left out because they are still.
 
@@ -113,13 +103,9 @@ def _compared(utterances: Sequence[Utterance]) -> tuple[tuple[str, ...], tuple[s
     names = utterances[0].track.motion.names
     if set(names) >= set(DISTANCES):
         return DISTANCES, ()
-    low = np.min([np.asarray(u.track.motion.values).min(axis=0) for u in utterances], axis=0)
-    high = np.max([np.asarray(u.track.motion.values).max(axis=0) for u in utterances], axis=0)
-    widest: dict[str, float] = {}
-    for channel, extent in zip(channels, high - low, strict=True):
-        widest[channel.unit] = max(widest.get(channel.unit, 0.0), float(extent))
-    moves = [extent > STILL_SHARE * widest[channel.unit] for channel, extent in zip(channels, high - low, strict=True)]
-    if not any(moves):
+    originals = [np.asarray(utterance.track.motion.values, float) for utterance in utterances]
+    moves = curves.moving(originals, [channel.unit for channel in channels])
+    if not moves.any():
         raise CorpusError(f"none of {len(names)} motion channels moves in these {len(utterances)} utterances")
     moving = tuple(name for name, moved in zip(names, moves, strict=True) if moved)
     return moving, tuple(name for name in names if name not in moving)
