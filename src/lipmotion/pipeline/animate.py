@@ -75,6 +75,9 @@ def write(
     """
     paths = [Path(output) for output in ([outputs] if isinstance(outputs, str | Path) else outputs)]
     check_outputs(paths, speech, rate_hz=rate_hz, fps=fps)
+    videos = [path for path in paths if path.suffix.lower() == VIDEO_SUFFIX]
+    if videos and "opening" not in generation.motion.names:
+        raise ExportError(f"{videos[0]}: the motion has no channel 'opening' to draw a face from; write motion files")
     written = generation.selected(channels) if channels is not None else generation
     if rate_hz is not None:
         written = written.resampled(rate_hz)

@@ -157,6 +157,16 @@ def test_names_of_phones(phone, stress):
     assert phone_named(phone + "x9") is None
 
 
+def test_a_file_that_cannot_be_read(tmp_path, monkeypatch):
+    def refused(path: Path) -> bytes:
+        raise PermissionError(13, "Permission denied")
+
+    (tmp_path / "a.lab").touch()
+    monkeypatch.setattr(Path, "read_bytes", refused)
+    with pytest.raises(InputError, match=r"a\.lab: cannot be read: Permission denied"):
+        labels_beside(tmp_path / "a.mp4")
+
+
 def test_files_beside_a_recording(tmp_path):
     recording = tmp_path / "a.mp4"
     assert labels_beside(recording).words is None
