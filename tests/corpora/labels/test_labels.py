@@ -158,7 +158,7 @@ def test_names_of_phones(phone, stress):
 
 
 def test_a_file_that_cannot_be_read(tmp_path, monkeypatch):
-    def refused(path: Path) -> bytes:
+    def refused(_path: Path) -> bytes:
         raise PermissionError(13, "Permission denied")
 
     (tmp_path / "a.lab").touch()
