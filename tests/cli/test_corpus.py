@@ -45,7 +45,7 @@ def test_prepare_says_what_was_done(run: Run, monkeypatch: pytest.MonkeyPatch) -
         (["info", "missing"], 4, "missing: no such corpus"),
         (["info", "empty"], 4, "empty: not a corpus"),
         (["info", "x" * 300], 3, "File name too long"),
-        (["prepare", "missing", "-o", "mine"], 3, "missing: no such folder; give a folder of videos"),
+        (["prepare", "missing", "-o", "mine"], 3, "missing: no such folder; give a folder of recordings"),
         (["prepare", "empty", "-o", "mine"], 4, "empty: no videos in it"),
     ],
 )

@@ -1,4 +1,4 @@
-"""``lipmotion corpus prepare|info``: recordings to a corpus, and what is in one."""
+"""``lipmotion corpus prepare|info|prompts``: recordings to a corpus, what is in one, what to record."""
 
 from __future__ import annotations
 
@@ -6,15 +6,15 @@ import argparse
 import sys
 from pathlib import Path
 
+from lipmotion.cli import prompts
+
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb."""
     parser = verbs.add_parser("corpus", help="prepare recordings for training")
     actions = parser.add_subparsers(title="actions", required=True, metavar="ACTION")
-    prepare = actions.add_parser("prepare", help="track faces and compute features of a folder of videos")
-    prepare.add_argument(
-        "recordings", type=Path, help="folder: GRID's layout, or videos with optional .txt transcripts"
-    )
+    prepare = actions.add_parser("prepare", help="make a corpus of a folder of recordings")
+    prepare.add_argument("recordings", type=Path, help="folder of videos, or of sounds with motion (docs/corpora.md)")
     prepare.add_argument("-o", "--output", type=Path, required=True, metavar="CORPUS")
     prepare.add_argument("--workers", type=int, help="processes (default: one a core)")
     prepare.add_argument("--no-crops", dest="crops", action="store_false", help="do not keep mouth images")
@@ -22,6 +22,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     info = actions.add_parser("info", help="say what is in a corpus")
     info.add_argument("corpus", type=Path)
     info.set_defaults(run=run_info)
+    prompts.add(actions)
 
 
 def run_prepare(options: argparse.Namespace) -> None:

@@ -12,6 +12,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser.add_argument("model", type=Path)
     parser.add_argument("corpus", type=Path)
     parser.add_argument("--split", default="test", help="train, val, test or all (default: test)")
+    parser.add_argument("--speaker", action="append", default=[], metavar="NAME", help="this one only (repeatable)")
     parser.add_argument("--lexicon", type=Path, metavar="FILE", help="pronunciations: WORD PHONE PHONE ... a line")
     parser.add_argument("-o", "--output", type=Path, metavar="FILE.json", help="write all figures here as well")
     parser.set_defaults(run=run)
@@ -31,9 +32,9 @@ def run(options: argparse.Namespace) -> None:
     if options.output:
         check_target(options.output)
     lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
-    split = None if options.split == "all" else options.split
-    figures = evaluate(load_model(options.model), Corpus.open(options.corpus), split=split, lexicon=lexicon)
+    chosen = {"split": None if options.split == "all" else options.split, "speakers": options.speaker}
+    figures = evaluate(load_model(options.model), Corpus.open(options.corpus), **chosen, lexicon=lexicon)
     print(table(figures))
     if options.output:
         with whole_file(options.output) as unfinished:
-            unfinished.write_text(json.dumps(figures, indent=1) + "\n")
+            unfinished.write_text(json.dumps(figures, indent=1, allow_nan=False) + "\n")

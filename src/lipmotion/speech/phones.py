@@ -3,24 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import cycle
 
-from lipmotion.speech.mfcc import LOG_ENERGY
+from lipmotion.speech.mfcc import LOG_ENERGY, mfcc
 from lipmotion.stats.em import Monitor
 from lipmotion.stats.hmm.model import HmmConfig, UnitHmm
 from lipmotion.stats.hmm.train import Transcribed, UnitInventory, train_hmm
-from lipmotion.types import Features
+from lipmotion.types import Audio
 from lipmotion.units import PAUSE, SILENCE, Lexicon
+
+TURNS = (1.0, 0.88, 1.0, 0.94, 1.12, 1.06)
 
 
 def train_phones(
-    spoken: Sequence[tuple[Features, tuple[str, ...]]], lexicon: Lexicon, config: HmmConfig, monitor: Monitor
+    spoken: Sequence[tuple[Audio, tuple[str, ...]]], lexicon: Lexicon, config: HmmConfig, monitor: Monitor
 ) -> UnitHmm:
     """Train phone models from recordings and the words said in them.
 
+    The recordings take turns in being warped, as if by vocal tracts of other lengths: one voice is then no longer
+    all that the models know.
     Raises CorpusError: no transcript fits into its recording.
+    Source: Jaitly & Hinton 2013 (vocal tract length perturbation), without random draws or more data.
     """
     utterances = [
-        Transcribed(features.values, tuple(lexicon.pronunciations(word) for word in words))
-        for features, words in spoken
+        Transcribed(mfcc(audio, warp).values, tuple(lexicon.pronunciations(word) for word in words))
+        for (audio, words), warp in zip(spoken, cycle(TURNS), strict=False)
     ]
     return train_hmm(utterances, UnitInventory(SILENCE, PAUSE, LOG_ENERGY), config, monitor)
