@@ -19,6 +19,7 @@ from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.train import labels_of
 from lipmotion.pipeline.transcribe import report_guesses
 from lipmotion.speech.recogniser import Recogniser
+from lipmotion.speech.recogniser import recogniser as cached_recogniser
 from lipmotion.types import Motion, Speech, Timeline, Unit, Utterance
 from lipmotion.units import VISEMES, Lexicon, is_silent
 
@@ -47,12 +48,14 @@ def evaluate(
     split: str | None = "test",
     speakers: Sequence[str] = (),
     lexicon: Lexicon | None = None,
+    recogniser: str = "auto",
     seed: int = 0,
 ) -> dict[str, Any]:
     """Return all figures of docs/measures.md: audio only and, where there are transcripts, with them.
 
     split    : ``train``, ``val`` or ``test``; None: everything
     speakers : theirs only; all by default
+    recogniser : as in ``animate``
 
     Compared are the lip distances or, in a corpus without them, every channel that moves in the recordings; figures
     of closing, and of silence, need the channel ``opening``. What cannot be computed is None.
@@ -66,11 +69,12 @@ def evaluate(
     utterances = [corpus.utterance(name) for name in corpus.required(split, speakers)]
     compared, still = _compared(utterances)
     report_guesses([word for utterance in utterances for word in utterance.words or ()], lexicon)
-    reference = [_reference(utterance, model, lexicon) for utterance in utterances]
+    phones = cached_recogniser(model.phones, recogniser)
+    reference = [_reference(utterance, phones, lexicon) for utterance in utterances]
     threshold = None
     if OPENING in compared:
         threshold = closed_threshold([_openings(u) for u in _training(corpus, speakers) or utterances])
-    conditions = {"audio only": [recognise(model.phones, u.features) for u in utterances]}
+    conditions = {"audio only": [phones.recognise(u.audio, u.features) for u in utterances]}
     if all(utterance.words or utterance.phones for utterance in utterances):
         conditions["with transcript"] = reference
     figures = {
@@ -127,9 +131,9 @@ def _check_channels(motion: Motion, compared: Sequence[str]) -> None:
         )
 
 
-def _reference(utterance: Utterance, model: Model, lexicon: Lexicon) -> Timeline[Unit]:
+def _reference(utterance: Utterance, phones: Recogniser, lexicon: Lexicon) -> Timeline[Unit]:
     try:
-        return labels_of(utterance, model.phones, lexicon)
+        return labels_of(utterance, phones, lexicon)
     except AlignmentError as error:
         raise AlignmentError(f"{utterance.name}: {error}; correct its transcript, or leave it out") from error
 

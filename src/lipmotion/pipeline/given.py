@@ -11,7 +11,7 @@ from lipmotion.corpora.base import Curves, Recording
 from lipmotion.corpora.facegood import read_array
 from lipmotion.errors import InputError
 from lipmotion.export.base import read_motion
-from lipmotion.speech.phones import SHORT_PAUSE_S
+from lipmotion.speech.recogniser import SHORT_PAUSE_S
 from lipmotion.types import Span, Timeline, Track, Unit
 from lipmotion.units import PAUSE, SILENCE, is_silent
 

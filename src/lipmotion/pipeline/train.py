@@ -99,9 +99,7 @@ def model_motion(track: Track, frames: int) -> tuple[Motion, Any]:
 
 
 def _phones(utterances: Sequence[Utterance], lexicon: Lexicon, config: HmmConfig, monitor: Monitor) -> UnitHmm:
-    spoken = [
-        (u.audio, u.words) for u in utterances if u.phones is None and u.words and _can_be_said(u.words, lexicon)
-    ]
+    spoken = [(u.audio, u.words) for u in utterances if u.phones is None and u.words and _can_be_said(u.words, lexicon)]
     labelled = [(u.audio, _runs(u.phones)) for u in utterances if u.phones is not None]
     if not spoken and not labelled:
         LOG.warning("no transcripts in the corpus: its phones are recognised by the shipped model")

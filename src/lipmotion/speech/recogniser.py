@@ -23,8 +23,10 @@ from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent, stand_in
 
 KINDS = ("auto", "own", "general")
 """Own models only, the general ones only, or both, the own ones as far as they know the voice."""
-TRUST_RANGE = 8.0
-"""Own models that explain a voice worse than their training data by this much (log density a frame) are not heard."""
+FOREIGN, FAMILIAR = -9.0, -5.0
+"""Own models that explain a recording this much worse than their training data (``Voice.fit``) are not heard at all;
+up to this much worse, as much as the general ones. Another speaker in the same studio costs GRID's models 4 to 6, other
+voices in other rooms 7 to 15."""
 LOUD_FRAMES = 11
 """The energy is averaged over so many frames before it rules silence out."""
 SHORT_PAUSE_S = 0.2
@@ -97,7 +99,7 @@ class Recogniser:
         voice = fitted(self.own, audio, features)
         if self.kind == "own":
             return self.own, heard(self.own, voice.features.values)
-        trust = min(max(1 + voice.fit / TRUST_RANGE, 0.0), 1.0)
+        trust = min(max((voice.fit - FOREIGN) / (FAMILIAR - FOREIGN), 0.0), 1.0)
         return self._joint.hmm, joint_evidence(self._joint, voice.features.values, trust, general_features(audio))
 
 

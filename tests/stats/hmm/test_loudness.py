@@ -4,6 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lipmotion.stats.hmm.align import align_units, choose_pronunciations
+from lipmotion.stats.hmm.evidence import heard, never_silent
 from lipmotion.stats.hmm.loudness import loud_frames
 from stats.hmm.synthetic import PAUSE, SILENCE, known_hmm, speaker
 
@@ -46,7 +47,8 @@ def stranger():
 def test_loud_frames_are_not_aligned_with_silence():
     hmm, features, edges, loud = stranger()
     units = (SILENCE, "a", "b", SILENCE)
-    without, bounds = align_units(hmm, features, units), align_units(hmm, features, units, loud)
+    evidence = heard(hmm, features)
+    without, bounds = (align_units(hmm, given, units) for given in (evidence, never_silent(hmm, evidence, loud)))
     assert without[3] - without[1] < 8
     assert (bounds[1], bounds[3]) == (edges[1], edges[3])
 
@@ -54,7 +56,10 @@ def test_loud_frames_are_not_aligned_with_silence():
 def test_loud_frames_are_not_chosen_as_pauses():
     hmm, features, _, loud = stranger()
     words = ((("a",),), (("b",),))
-    free, bound = (choose_pronunciations(hmm, features, words, PAUSE, mask) for mask in (None, loud))
+    evidence = heard(hmm, features)
+    free, bound = (
+        choose_pronunciations(hmm, given, words, PAUSE) for given in (evidence, never_silent(hmm, evidence, loud))
+    )
     assert PAUSE in [unit for part in free for unit in part.units]
     assert PAUSE not in [unit for part in bound for unit in part.units]
 
@@ -62,4 +67,6 @@ def test_loud_frames_are_not_chosen_as_pauses():
 def test_no_loud_frames_change_nothing():
     hmm, features, _, loud = stranger()
     units = (SILENCE, "a", "b", SILENCE)
-    assert np.array_equal(align_units(hmm, features, units, loud & False), align_units(hmm, features, units))
+    evidence = heard(hmm, features)
+    unchanged = never_silent(hmm, evidence, loud & False)
+    assert np.array_equal(align_units(hmm, unchanged, units), align_units(hmm, evidence, units))

@@ -47,7 +47,9 @@ class GeneralModel:
         result = np.empty((len(features), len(PHONES) * STATES), np.float32)
         for start in range(0, len(features), BLOCK):
             frames = features[start : start + BLOCK]
-            total = sum(self._stream(number, frames[:, stream]) for number, stream in enumerate(STREAMS))
+            total = np.zeros((len(frames), result.shape[1]), np.float32)
+            for number, stream in enumerate(STREAMS):
+                total += self._stream(number, frames[:, stream])
             result[start : start + BLOCK] = total - total.max(axis=1, keepdims=True)
         return result
 

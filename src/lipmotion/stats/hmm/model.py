@@ -79,7 +79,7 @@ def hmm_arrays(hmm: UnitHmm) -> dict[str, NDArray[Any]]:
         "variances": hmm.mixtures.variances.astype(np.float16),
         "log_stay": hmm.log_stay,
         "bigram": hmm.bigram.log_probability,
-        "typical_fit": np.array(hmm.typical_fit),
+        "typical_fit": np.array([hmm.typical_fit]),
     }
 
 
@@ -92,7 +92,7 @@ def hmm_from_arrays(arrays: Mapping[str, NDArray[Any]], config: HmmConfig) -> Un
         mixtures = Mixtures(*(arrays[key].astype(np.float32) for key in ("log_weights", "means", "variances")))
         bigram = Bigram(table.units, arrays["bigram"].astype(np.float32))
         return UnitHmm(
-            config, table, mixtures, arrays["log_stay"].astype(np.float32), bigram, float(arrays["typical_fit"])
+            config, table, mixtures, arrays["log_stay"].astype(np.float32), bigram, float(arrays["typical_fit"][0])
         )
     except (KeyError, ValueError) as error:
         raise ModelFormatError(f"the phone models are damaged ({error}); train or download the model again") from error
@@ -104,7 +104,7 @@ def _check_shapes(arrays: Mapping[str, NDArray[Any]]) -> None:
     required = {
         "counts": (units,),
         "bigram": (units, units),
-        "typical_fit": (),
+        "typical_fit": (1,),
         "log_stay": (int(arrays["counts"].sum()),),
         "log_weights": each[:2],
         "means": each,
