@@ -14,6 +14,7 @@ from lipmotion.pipeline import train as module
 from lipmotion.pipeline.model import Model, save_model
 from lipmotion.pipeline.toy import toy_sentences
 from lipmotion.pipeline.train import labels_of, model_motion, train
+from lipmotion.speech.recogniser import Recogniser
 from lipmotion.stats.hmm.model import HmmConfig
 from lipmotion.types import Channel, Motion, Timeline, Track, Unit, Utterance
 from lipmotion.units import Lexicon
@@ -75,8 +76,13 @@ def test_untranscribed_utterances_are_recognised_and_used(toy_corpus: Corpus, tm
     mixed = corpus_of(utterances, tmp_path)
     model, report = train(mixed, recogniser=SMALL)
     assert report.used == TRAINED
-    found = [span.label.phone for span in labels_of(mixed.utterance("toy05"), model.phones, Lexicon())]
-    known = [span.label.phone for span in labels_of(toy_corpus.utterance("toy05"), model.phones, Lexicon())]
+    found = [
+        span.label.phone for span in labels_of(mixed.utterance("toy05"), Recogniser(model.phones, "own"), Lexicon())
+    ]
+    known = [
+        span.label.phone
+        for span in labels_of(toy_corpus.utterance("toy05"), Recogniser(model.phones, "own"), Lexicon())
+    ]
     assert np.mean([phone in found for phone in known]) > 0.8
 
 
@@ -98,7 +104,7 @@ def test_labelled_phones_are_used_as_they_are(
     assert report.used == TRAINED
     assert report.skipped == {}
     assert set(model.phones.table.units) == set(toy_model.phones.table.units)
-    assert labels_of(given[0], model.phones, Lexicon()) == given[0].phones
+    assert labels_of(given[0], Recogniser(model.phones, "own"), Lexicon()) == given[0].phones
 
 
 def test_labelled_and_transcribed_utterances_together(toy_corpus: Corpus, tmp_path: Path) -> None:
@@ -107,7 +113,7 @@ def test_labelled_and_transcribed_utterances_together(toy_corpus: Corpus, tmp_pa
     assert (report.used, report.skipped) == (TRAINED, {})
     truth = labelled(toy_corpus.utterance("toy11"))
     assert truth.phones is not None
-    heard = [s.label.phone for s in labels_of(replace(truth, phones=None), model.phones, Lexicon())]
+    heard = [s.label.phone for s in labels_of(replace(truth, phones=None), Recogniser(model.phones, "own"), Lexicon())]
     assert np.mean([span.label.phone in heard for span in truth.phones]) > 0.8
 
 

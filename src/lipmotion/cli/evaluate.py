@@ -35,11 +35,8 @@ def run(options: argparse.Namespace) -> None:
     if options.output:
         check_target(options.output)
     lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
-    chosen = {
-        "split": None if options.split == "all" else options.split,
-        "speakers": options.speaker,
-        "recogniser": options.recogniser,
-    }
+    split = None if options.split == "all" else options.split
+    chosen = {"split": split, "speakers": options.speaker, "recogniser": options.recogniser}
     figures = evaluate(load_model(options.model), Corpus.open(options.corpus), **chosen, lexicon=lexicon)
     print(table(figures))
     if options.output:

@@ -13,6 +13,9 @@ from lipmotion.types import Audio
 from lipmotion.units import PAUSE, SILENCE, Lexicon
 
 TURNS = (1.0, 0.88, 1.0, 0.94, 1.12, 1.06)
+"""Warps of the recordings, in turns."""
+WARPED_FROM = 60
+"""With fewer recordings than this there is too little to learn one voice from, let alone several."""
 
 
 def train_phones(
@@ -20,13 +23,14 @@ def train_phones(
 ) -> UnitHmm:
     """Train phone models from recordings and the words said in them.
 
-    The recordings take turns in being warped, as if by vocal tracts of other lengths: one voice is then no longer
+    Many recordings take turns in being warped, as if by vocal tracts of other lengths: one voice is then no longer
     all that the models know.
     Raises CorpusError: no transcript fits into its recording.
     Source: Jaitly & Hinton 2013 (vocal tract length perturbation), without random draws or more data.
     """
+    turns = TURNS if len(spoken) >= WARPED_FROM else (1.0,)
     utterances = [
         Transcribed(mfcc(audio, warp).values, tuple(lexicon.pronunciations(word) for word in words))
-        for (audio, words), warp in zip(spoken, cycle(TURNS), strict=False)
+        for (audio, words), warp in zip(spoken, cycle(turns), strict=False)
     ]
     return train_hmm(utterances, UnitInventory(SILENCE, PAUSE, LOG_ENERGY), config, monitor)
