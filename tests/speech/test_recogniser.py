@@ -8,17 +8,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion.errors import AlignmentError
+from lipmotion.errors import AlignmentError, InputError
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.toy import WORDS, ToySentence, toy_sentences
 from lipmotion.speech import recogniser as module
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.read import read_audio
-from lipmotion.speech.recogniser import SHORT_PAUSE_S, Recogniser
+from lipmotion.speech.recogniser import FAMILIAR, FOREIGN, KINDS, SHORT_PAUSE_S, Recogniser, recogniser
 from lipmotion.speech.synthesise import synthesise
+from lipmotion.speech.voice import Voice
 from lipmotion.stats.hmm.model import UnitHmm
 from lipmotion.types import Audio, Timeline, Unit
-from lipmotion.units import PAUSE, SILENCE, Lexicon
+from lipmotion.units import PAUSE, PHONES, SILENCE, Lexicon, words_of
 
 
 @pytest.fixture(scope="module")
@@ -163,3 +164,64 @@ def test_words_of_real_recordings_are_found_where_others_found_them(recordings: 
         errors_s += [a - b for a, (b, _) in zip(starts_s, words, strict=True)]
     assert np.mean(np.abs(errors_s)) < 0.05
     assert abs(np.median(errors_s)) < 0.03
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_gives_phones_from_start_to_end(hmm: UnitHmm, sentences: list[ToySentence], kind: str) -> None:
+    sentence = sentences[0]
+    found = recognise(hmm, sentence.audio, kind)
+    assert covers(found, sentence.audio.duration_s)
+    assert set(phones(found)) <= set(PHONES)
+    aligned = align(hmm, sentence.audio, sentence.words, Lexicon(), kind)
+    errors_s = [a.start_s - b.start_s for a, b in zip(aligned, sentence.units, strict=True)]
+    assert np.median(np.abs(errors_s)) < 0.03
+
+
+def test_an_unknown_kind() -> None:
+    with pytest.raises(InputError, match="unknown recogniser 'best'; required one of: auto, own, general"):
+        Recogniser(load_model().phones, "best")
+
+
+def test_the_own_models_are_heard_as_far_as_they_know_the_voice(
+    hmm: UnitHmm, sentences: list[ToySentence], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    trusted = []
+    real = module.joint_evidence
+    monkeypatch.setattr(module, "joint_evidence", lambda *given: trusted.append(given[2]) or real(*given))
+    audio = sentences[0].audio
+    for fit, wanted in ((0.0, 1.0), (FAMILIAR, 1.0), ((FAMILIAR + FOREIGN) / 2, 0.5), (FOREIGN, 0.0), (-99.0, 0.0)):
+        monkeypatch.setattr(module, "fitted", lambda *_, fit=fit: Voice(mfcc(audio), 1.0, fit))
+        recognise(hmm, audio, "auto")
+        assert trusted[-1] == pytest.approx(wanted)
+
+
+def test_noises_are_silence_and_silences_are_one(hmm: UnitHmm, monkeypatch: pytest.MonkeyPatch) -> None:
+    bounds = np.array([0, 10, 30, 40, 60, 80, 101])
+    labels = ("+spn+", "sil", "aa", "+nsn+", "sil", "+spn+")
+    monkeypatch.setattr(module, "decode_units", lambda *_: (labels, bounds))
+    found = recognise(hmm, Audio(np.sin(np.arange(16_100)).astype(np.float32), 16_000), "general")
+    assert phones(found) == ["sil", "aa", "sil"]
+    assert [span.start_s for span in found] == pytest.approx([0, 0.295, 0.395])
+
+
+def test_recognisers_are_kept(hmm: UnitHmm) -> None:
+    assert recogniser(hmm) is recogniser(hmm)
+    assert recogniser(hmm, "own") is not recogniser(hmm)
+
+
+@pytest.mark.recordings
+def test_speakers_and_words_that_no_model_of_ours_has_heard(recordings: Path) -> None:
+    """The general models find about twice as many phones as those of one GRID speaker."""
+    share = {}
+    for kind in ("own", "auto"):
+        right = count = 0
+        for name in ("61-70968-0000.flac", "sense_and_sensibility_01_austen_64kb-0880.wav"):
+            audio = read_audio(recordings / "speech-open" / name)
+            text = (recordings / "speech-open" / name).with_suffix(".txt" if name.endswith("wav") else ".lab")
+            spoken = phones(align(load_model().phones, audio, words_of(text.read_text()), Lexicon(), "general"))
+            matcher = SequenceMatcher(None, spoken, phones(recognise(load_model().phones, audio, kind)), autojunk=False)
+            right += sum(block.size for block in matcher.get_matching_blocks())
+            count += len(spoken)
+        share[kind] = right / count
+    assert share["auto"] > 0.5
+    assert share["auto"] > share["own"] + 0.15
