@@ -43,7 +43,7 @@ def mfcc(audio: Audio, warp: float = 1.0) -> Features:
     Source: Xie & Liu 2007, §5.1; details in the project's conventions.
     """
     samples = checked_samples(audio)
-    static = np.concatenate([log_mel(samples, _filters(warp)) @ _cosine(), _log_energy(samples)], axis=1)
+    static = np.concatenate([log_mel(samples, _filters(warp)) @ _cosine(), log_energy(samples)[:, None]], axis=1)
     delta = regression_delta(static)
     values = np.concatenate([static, delta, regression_delta(delta)], axis=1)
     return Features(normalised(values), audio.duration_s)
@@ -94,11 +94,12 @@ def log_mel(samples: NDArray[np.float32], filters: NDArray[np.float32]) -> NDArr
     return _log_power(power)
 
 
-def _log_energy(samples: NDArray[np.float32]) -> NDArray[np.float32]:
+def log_energy(samples: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return the logarithm of the energy around every frame, floored 80 dB under the loudest [shape=(T,)]."""
     padded = _padded(samples)[1:]
-    energy = np.empty((_frame_count(samples), 1), np.float32)
+    energy = np.empty(_frame_count(samples), np.float32)
     for block in _blocks(len(energy)):
-        energy[block, 0] = np.square(_frames(padded, block)).sum(axis=1)
+        energy[block] = np.square(_frames(padded, block)).sum(axis=1)
     return _log_power(energy)
 
 

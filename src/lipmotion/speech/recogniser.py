@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError
 from lipmotion.speech.general.front_end import general_features
 from lipmotion.speech.joint import NOISES, Joint, joined, joint_evidence
-from lipmotion.speech.mfcc import LOG_ENERGY
+from lipmotion.speech.mfcc import LOG_ENERGY, log_energy
 from lipmotion.speech.voice import fitted
 from lipmotion.stats.hmm.align import align_units, choose_pronunciations
 from lipmotion.stats.hmm.decode import UnitLoop, decode_units, unit_loop
-from lipmotion.stats.hmm.evidence import Evidence, heard, never_silent
-from lipmotion.stats.hmm.loudness import loud_frames
+from lipmotion.stats.hmm.evidence import Evidence, always_silent, heard, never_silent
+from lipmotion.stats.hmm.loudness import loud_frames, quiet_frames
 from lipmotion.stats.hmm.model import UnitHmm
 from lipmotion.types import FRAME_RATE_HZ, Audio, Features, Span, Timeline, Unit
 from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent, stand_in
@@ -94,6 +94,10 @@ class Recogniser:
         return unit_loop(hmm, [unit for unit in hmm.table.units if unit != PAUSE])
 
     def _evidence(self, audio: Audio, features: Features) -> tuple[UnitHmm, Evidence]:
+        hmm, evidence = self._said(audio, features)
+        return hmm, always_silent(hmm, evidence, quiet_frames(log_energy(audio.samples)))
+
+    def _said(self, audio: Audio, features: Features) -> tuple[UnitHmm, Evidence]:
         if self.kind == "general":
             return self._joint.hmm, joint_evidence(self._joint, features.values, 0.0, general_features(audio))
         voice = fitted(self.own, audio, features)

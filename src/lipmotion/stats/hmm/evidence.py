@@ -12,6 +12,8 @@ from lipmotion.stats.hmm.model import UnitHmm
 
 LOUD_SILENCE = 8.0
 """What the log density of silence loses in a loud frame."""
+QUIET_SPEECH = 1000.0
+"""What the log densities of all else lose in a quiet one."""
 
 Chosen = NDArray[np.intp] | None
 """The densities wanted; None: all."""
@@ -39,13 +41,26 @@ def never_silent(hmm: UnitHmm, evidence: Evidence, loud: NDArray[np.bool_]) -> E
 
     A voice that the models do not know is, to them, hardly more like speech than like silence; its energy says which.
     """
-    table = hmm.table
-    free = [table.density(unit, state) for unit in table.free for state in range(table.count(unit))]
+    return _without(evidence, loud, _silent_densities(hmm), LOUD_SILENCE)
+
+
+def always_silent(hmm: UnitHmm, evidence: Evidence, quiet: NDArray[np.bool_]) -> Evidence:
+    """Return evidence that makes all but silence improbable in quiet frames [shape=(T,)]."""
+    return _without(evidence, quiet, ~_silent_densities(hmm), QUIET_SPEECH)
+
+
+def _silent_densities(hmm: UnitHmm) -> NDArray[np.bool_]:
+    free = [hmm.table.density(unit, state) for unit in hmm.table.free for state in range(hmm.table.count(unit))]
+    return np.isin(np.arange(len(hmm.table.names)), free)
+
+
+def _without(evidence: Evidence, frames: NDArray[np.bool_], densities: NDArray[np.bool_], loss: float) -> Evidence:
+    """Return evidence in which some densities lose something in some frames."""
 
     def log_density(first: int, end: int, chosen: Chosen) -> NDArray[np.float32]:
         values = evidence.log_density(first, end, chosen)
-        silent = np.isin(np.arange(len(table.names)) if chosen is None else chosen, free)
-        values[np.ix_(loud[first:end], silent)] -= LOUD_SILENCE
+        lost = densities if chosen is None else densities[chosen]
+        values[np.ix_(frames[first:end], lost)] -= loss
         return values
 
     return Evidence(evidence.frames, log_density)
