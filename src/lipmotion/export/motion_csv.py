@@ -19,9 +19,11 @@ def write(path: Path, generation: Generation, _source: Mapping[str, str], _model
     for name in motion.names:
         if set(name) & set(',"\r\n'):
             raise ExportError(f"the channel name {name!r} does not fit in a table; write .json or .npz")
-    times = [f"{time_s:.9f}".rstrip("0").rstrip(".") for time_s in motion.time_s.tolist()]
-    lines = [f"{time_s},{row}" for time_s, row in zip(times, rows(motion.values), strict=True)]
-    path.write_text("\n".join([",".join(["time_s", *motion.names]), *lines, ""]), encoding="utf-8")
+    with path.open("w", encoding="utf-8") as file:
+        file.write(",".join(["time_s", *motion.names]) + "\n")
+        for time_s, row in zip(motion.time_s.tolist(), rows(motion.values), strict=True):
+            shortest = f"{time_s:.9f}".rstrip("0").rstrip(".")
+            file.write(f"{shortest},{row}\n")
 
 
 def read(path: Path) -> tuple[Motion, Timeline[Unit]]:

@@ -16,8 +16,11 @@ def write(path: Path, generation: Generation, source: Mapping[str, str], model: 
     """Write one JSON object: format, version, rate_hz, channels, values, units, source, model."""
     before = json.dumps(header(generation), ensure_ascii=False)
     after = json.dumps(labels(generation, source, model), ensure_ascii=False)
-    values = ",\n".join([f"[{row}]" for row in rows(generation.motion.values)])
-    path.write_text(f'{before[:-1]}, "values": [\n{values}\n], {after[1:]}\n', encoding="utf-8")
+    with path.open("w", encoding="utf-8") as file:
+        file.write(f'{before[:-1]}, "values": [\n')
+        for number, row in enumerate(rows(generation.motion.values)):
+            file.write(f",\n[{row}]" if number else f"[{row}]")
+        file.write(f"\n], {after[1:]}\n")
 
 
 def read(path: Path) -> tuple[Motion, Timeline[Unit]]:

@@ -54,6 +54,7 @@ def animate(
         text = read_transcript(transcript) if isinstance(transcript, Path) else transcript
         words = words_of(text) if text is not None else None
         units = transcribe(phones, audio, features, words, lexicon or Lexicon())
+    del audio  # of a long recording it is much
     return chosen.engine.generate(chosen.learned, Speech(features, units), constraints)
 
 

@@ -49,7 +49,7 @@ def fit_trajectory(
     rows: list[NDArray[np.float32]] = []
     for example in examples:
         inner = _inner(example.valid)
-        values.append(space.reduce(example.motion.values))
+        values.append(space.reduce(example.motion.values.astype(float)))
         dynamics = with_dynamics(values[-1])
         where = places(example.speech.units, len(inner), parts, edge_s)
         rows.append(dynamics[inner].astype(np.float32))
