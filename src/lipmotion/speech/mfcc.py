@@ -40,13 +40,19 @@ def mfcc(audio: Audio) -> Features:
         raise InputError(f"speech features need {SPEECH_RATE_HZ} Hz, found {audio.rate_hz} Hz; resample first")
     if audio.samples.ndim != 1 or len(audio.samples) < WINDOW:
         raise InputError(f"speech features need {WINDOW} samples of one channel, found shape {audio.samples.shape}")
-    peak = float(np.abs(audio.samples).max())
+    peak = float(np.maximum(audio.samples.max(), -audio.samples.min()))  # no copy of an hour
     if not peak < LOUDEST:
         raise InputError(f"speech features need finite samples, full scale 1, found a peak of {peak:g}")
-    static = _static(audio.samples.astype(np.float32))
-    delta = regression_delta(static)
-    values = np.concatenate([static, delta, regression_delta(delta)], axis=1)
-    return Features(normalised(values), audio.duration_s)
+    return Features(normalised(_with_deltas(_static(audio.samples))), audio.duration_s)
+
+
+def _with_deltas(static: NDArray[np.float32]) -> NDArray[np.float32]:
+    width = static.shape[1]
+    values = np.empty((len(static), 3 * width), np.float32)
+    values[:, :width] = static
+    for first in (width, 2 * width):
+        values[:, first : first + width] = regression_delta(values[:, first - width : first])
+    return values
 
 
 def regression_delta(values: NDArray[np.float32], reach: int = 2) -> NDArray[np.float32]:
@@ -63,28 +69,35 @@ def regression_delta(values: NDArray[np.float32], reach: int = 2) -> NDArray[np.
 def normalised(values: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return the columns with mean 0 and standard deviation 1; a constant column becomes 0."""
     deviation = values.std(axis=0)
-    scaled = (values - values.mean(axis=0)) / np.where(deviation > 1e-6, deviation, 1).astype(np.float32)
-    return np.where(np.ptp(values, axis=0) > 0, scaled, np.float32(0))  # the mean of a constant is rounded
+    scaled = values - values.mean(axis=0)
+    scaled /= np.where(deviation > 1e-6, deviation, 1).astype(np.float32)
+    scaled[:, np.ptp(values, axis=0) == 0] = 0  # the mean of a constant is rounded
+    return scaled
 
 
 def _static(samples: NDArray[np.float32]) -> NDArray[np.float32]:
-    half = WINDOW // 2
-    before = np.pad(samples, (half + 1, half), mode="reflect")  # one more, for the first difference
-    padded, emphasised = before[1:], before[1:] - np.float32(PRE_EMPHASIS) * before[:-1]
     count = int(len(samples) / SPEECH_RATE_HZ * FRAME_RATE_HZ + 1e-9) + 1
     mel = np.empty((count, FILTERS), np.float32)
     energy = np.empty(count, np.float32)
     for start in range(0, count, BLOCK):
         block = slice(start, min(start + BLOCK, count))
-        mel[block] = _mel_power(_frames(emphasised, block))
-        energy[block] = np.square(_frames(padded, block)).sum(axis=1)
+        heard = _heard(samples, block)
+        mel[block] = _mel_power(_frames(heard[1:] - np.float32(PRE_EMPHASIS) * heard[:-1]))
+        energy[block] = np.square(_frames(heard[1:])).sum(axis=1)
     cepstra = _log_power(mel) @ _cosine()
     return np.concatenate([cepstra, _log_power(energy)[:, None]], axis=1)
 
 
-def _frames(samples: NDArray[np.float32], block: slice) -> NDArray[np.float32]:
-    first, last = block.start * HOP, (block.stop - 1) * HOP + WINDOW
-    return sliding_window_view(samples[first:last], WINDOW)[::HOP]
+def _heard(samples: NDArray[np.float32], block: slice) -> NDArray[np.float32]:
+    """Return the samples of a block of frames, and the one before; beyond both ends they are reflected."""
+    half = WINDOW // 2
+    first, last = block.start * HOP - half - 1, (block.stop - 1) * HOP + half
+    inside = samples[max(first, 0) : min(last, len(samples))].astype(np.float32)
+    return np.pad(inside, (max(-first, 0), max(last - len(samples), 0)), mode="reflect")
+
+
+def _frames(samples: NDArray[np.float32]) -> NDArray[np.float32]:
+    return sliding_window_view(samples, WINDOW)[::HOP]
 
 
 def _mel_power(frames: NDArray[np.float32]) -> NDArray[np.float32]:
