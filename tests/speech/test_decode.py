@@ -171,7 +171,7 @@ def test_other_channels_are_averaged_silently(
     assert not caplog.text
 
 
-NAMES = ["-o.wav", "a b.wav", "it's \"it\".wav", "new\nline.wav", "😀 音 é.wav", "12:30.wav", "http:x.wav", "%03d?*.wav"]
+NAMES = ["-o.wav", "a b.wav", 'it\'s "it".wav', "new\nline.wav", "😀 音 é.wav", "12:30.wav", "http:x.wav", "%03d?*.wav"]
 
 
 @pytest.mark.parametrize("name", [*NAMES, os.fsdecode(b"\xff\xfe.wav")])

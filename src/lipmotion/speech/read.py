@@ -24,7 +24,7 @@ CANCELLED = 0.05
 USABLE = 0.5
 """A damaged recording is refused when less than this share of its sound can be decoded."""
 CUT_SHORT = 0.9
-"""A recording is called cut short when it holds less than this share of the duration that it states; some only guess."""
+"""A recording is called cut short when it holds less than this share of the duration that it states."""
 
 
 def read_audio(path: Path, rate_hz: int = SPEECH_RATE_HZ) -> Audio:
