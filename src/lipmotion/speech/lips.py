@@ -48,10 +48,9 @@ def fit_opening_speed(examples: Iterable[tuple[Features, Array]]) -> Array:
         inputs = _surroundings(features)[: len(measured)]
         inputs -= inputs.mean(axis=0)
         target = measured[: len(inputs)] / max(float(measured.std()), 1e-9)
-        products = products + inputs.T @ inputs
-        targets = targets + inputs.T @ target
-    weights: Array = np.linalg.solve(products, targets)
-    return weights
+        products += inputs.T @ inputs
+        targets += inputs.T @ target
+    return np.asarray(np.linalg.solve(products, targets), float)
 
 
 def _surroundings(features: Features) -> Array:

@@ -61,8 +61,10 @@ class _Sighting:
         """Take out some of the frames that show a face [shape=(number of them,)]; return how many."""
         for index in np.flatnonzero(self.seen)[wrong]:
             self.seen[index] = False
-        for values in (self.points, self.mouths, self.crops):
-            values[:] = [value for value, is_wrong in zip(values, wrong, strict=False) if not is_wrong]  # type: ignore
+        right = np.flatnonzero(~wrong)
+        self.points = [self.points[n] for n in right]
+        self.mouths = [self.mouths[n] for n in right]
+        self.crops = [self.crops[n] for n in right] if self.crops else []
         return int(wrong.sum())
 
 
