@@ -59,7 +59,7 @@ class Follower:
         if is_cut or self._scenes[-1].away > LOST_FRAMES:
             self._begin_scene()
         face = self._scenes[-1].next_face(image)
-        if face is None and self._scenes[-1].is_elsewhere:  # the mesh went over to something else
+        if face is None and self._scenes[-1].is_elsewhere:
             self._begin_scene()
             face = self._scenes[-1].next_face(image)
         self._found.append(None if face is None else len(self._scenes) - 1)
@@ -100,7 +100,7 @@ class _Scene:
 
     looks        : the face, every so often
     away         : frames since it was last found, 0 before it was
-    is_elsewhere : the faces of the last frame are not where it could be
+    is_elsewhere : the mesh, which follows one face, has gone over to another
     """
 
     def __init__(self, known: Sequence[Array]) -> None:
@@ -113,6 +113,7 @@ class _Scene:
         self._seen = 0
         self._open = ExitStack()
         self._mesh: FaceMesh | None = None
+        self._is_crowd = False
 
     def close(self) -> None:
         self._open.close()
@@ -143,7 +144,7 @@ class _Scene:
     def _same_face(self, image: Image, last: Array) -> Array | None:
         faces = self._faces(image)
         near = [face for face in faces if self._could_be(face, last)]
-        self.is_elsewhere = bool(faces) and not near
+        self.is_elsewhere = bool(faces) and not near and not self._is_crowd
         return min(near, key=lambda face: _distance(face, last), default=None)
 
     def _could_be(self, face: Array, last: Array) -> bool:
@@ -161,7 +162,7 @@ class _Scene:
         faces = crowd.faces(image)
         if len(faces) < 2:
             return []
-        self._mesh = crowd
+        self._mesh, self._is_crowd = crowd, True
         return faces
 
     def _claim(self, image: Image, face: Array) -> tuple[bool, float]:
