@@ -75,7 +75,7 @@ def newer_model(toy_model_file: Path, tmp_path_factory: pytest.TempPathFactory) 
     with zipfile.ZipFile(toy_model_file) as old, zipfile.ZipFile(path, "w") as new:
         for name in old.namelist():
             content = old.read(name)
-            new.writestr(name, json.dumps(json.loads(content) | {"version": 2}) if name == HEADER else content)
+            new.writestr(name, json.dumps(json.loads(content) | {"version": 3}) if name == HEADER else content)
     return path
 
 

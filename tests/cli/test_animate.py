@@ -128,7 +128,7 @@ def test_files_that_are_not_what_they_should_be(
         (["--transcript", "latin.txt"], 3, "latin.txt: not a readable UTF-8 text"),
         (["--transcript", "empty.txt"], 3, "holds no word"),
         (["--lexicon", "lexicon.txt"], 3, "lexicon.txt, line 2: unknown phone 'Q'"),
-        (["--model", newer_model], 6, "model version 2, this lipmotion reads version 1; upgrade lipmotion"),
+        (["--model", newer_model], 6, "model version 3, this lipmotion reads version 2; upgrade lipmotion"),
         (["--model", toy_speech], 6, "not a lipmotion model"),
         (["--model", "empty.txt"], 6, "not a lipmotion model"),
     ]:

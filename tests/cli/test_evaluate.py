@@ -31,7 +31,7 @@ def test_other_lists(run: Run, toy_corpus: Corpus, toy_model_file: Path) -> None
     [
         (["missing", "CORPUS"], 3, "missing: no such model"),
         (["text", "CORPUS"], 6, "text: not a lipmotion model"),
-        (["NEWER", "CORPUS"], 6, "model version 2"),
+        (["NEWER", "CORPUS"], 6, "model version 3"),
         (["MODEL", "missing"], 4, "missing: no such corpus"),
         (["MODEL", "CORPUS", "--split", "tset"], 4, "no utterances of split 'tset'"),
         (["MODEL", "CORPUS", "-o", "missing/a.json"], 7, "the folder missing does not exist"),

@@ -32,7 +32,7 @@ def test_the_shipped_model_is_the_default(run: Run) -> None:
         ("missing", 3, "missing: no such model"),
         ("text", 6, "text: not a lipmotion model"),
         (".", 3, ".: no such model"),
-        ("NEWER", 6, "model version 2, this lipmotion reads version 1; upgrade lipmotion"),
+        ("NEWER", 6, "model version 3, this lipmotion reads version 2; upgrade lipmotion"),
     ],
 )
 def test_what_is_no_model(run: Run, newer_model: Path, here: Path, name: str, code: int, words: str) -> None:

@@ -36,6 +36,20 @@ def test_what_was_left_out_is_said(run: Run, toy_corpus: Corpus, here: Path) -> 
     assert warning.startswith("lipmotion: warning: left out toy02: ")
 
 
+def test_speakers_are_chosen(run: Run, toy_corpus: Corpus, here: Path) -> None:
+    corpus = Corpus.create(here / "corpus")
+    for name, speaker in zip(toy_corpus.names("train"), ("anna", "anna", "ben", "ben", "carl"), strict=False):
+        corpus.add(replace(toy_corpus.utterance(name), speaker=speaker))
+    done = run("train", "corpus", "-o", "m", "--speaker", "anna", "--speaker", "ben")
+    assert (done.code, done.out) == (0, ["m: 4 utterances, 0.2 minutes"])
+    assert load_model(here / "m").about["speakers"] == ["anna", "ben"]
+    assert run("evaluate", "m", "corpus", "--speaker", "carl", "--split", "train").out[0].startswith("split train: 1 ")
+    assert (
+        "speakers     anna (2, 0.1 minutes), ben (2, 0.1 minutes), carl (1, 0.0 minutes)"
+        in run("corpus", "info", "corpus").out
+    )
+
+
 @pytest.mark.parametrize(
     ("arguments", "code", "words"),
     [
@@ -44,6 +58,7 @@ def test_what_was_left_out_is_said(run: Run, toy_corpus: Corpus, here: Path) -> 
         (["CORPUS", "-o", "missing/m"], 7, "the folder missing does not exist"),
         (["CORPUS", "-o", "folder"], 7, "folder: is a folder"),
         (["CORPUS", "-o", "m", "--split", "tset"], 4, "no utterances of split 'tset' (there are train: 8, val: 2"),
+        (["CORPUS", "-o", "m", "--speaker", "dora"], 4, "no speaker 'dora' (there are: no speaker by name)"),
         (["CORPUS", "-o", "m", "--lexicon", "missing"], 3, "missing: no such lexicon file"),
     ],
 )

@@ -52,7 +52,7 @@ def test_videos_of_the_same_name_are_reported(tmp_path):
     touch(tmp_path, "a.mp4", "a.mkv", "b.mp4")
     found = discover(tmp_path)
     assert [item.name for item in found.items] == ["b"]
-    assert "2 videos share this name" in found.problems["a"]
+    assert "2 recordings share this name" in found.problems["a"]
 
 
 def test_lists_give_the_splits_and_are_not_transcripts(tmp_path):
@@ -92,11 +92,62 @@ def test_nothing_to_find(tmp_path):
     with pytest.raises(InputError, match="no such folder"):
         discover(tmp_path / "none")
     touch(tmp_path, "speech.wav")
-    with pytest.raises(CorpusError, match=r"no videos in it; required: files ending in one of .*\.mp4"):
+    with pytest.raises(
+        CorpusError, match=r"no videos in it, and no sounds with motion .*; required: files ending in one of .*\.mp4"
+    ):
         discover(tmp_path)
 
 
 def test_a_video_is_not_a_folder(tmp_path):
     touch(tmp_path, "a.mp4")
-    with pytest.raises(InputError, match="is a file; give the folder"):
+    with pytest.raises(InputError, match="is a file; give the folder of recordings"):
         discover(tmp_path / "a.mp4")
+
+
+def test_sounds_with_motion_beside_them(tmp_path):
+    touch(tmp_path, "a.wav", "a.csv", "b.flac", "b.npz", "c.WAV", "c.json", "alone.wav", "d.wav", "d.csv", "d.json")
+    found = discover(tmp_path)
+    assert found.kind == "folder of sounds with motion"
+    assert [(item.file.name, item.curves and item.curves.file.name) for item in found.items] == [
+        ("a.wav", "a.csv"),
+        ("b.flac", "b.npz"),
+        ("c.WAV", "c.json"),
+    ]
+    assert "2 motion files beside it" in found.problems["d"]
+
+
+def test_a_video_is_tracked_whatever_lies_beside_it(tmp_path):
+    touch(tmp_path, "a.mp4", "a.csv", "b.wav", "b.csv")
+    found = discover(tmp_path)
+    assert found.kind == "folder of videos, and of sounds with motion"
+    assert [item.curves is None for item in found.items] == [True, False]
+
+
+def test_a_folder_is_a_speaker(tmp_path):
+    touch(tmp_path, "anna/a.mp4", "anna/day 2/a.mp4", "ben/a.mp4", "c.mp4", "ben/s.wav", "ben/s.json")
+    (tmp_path / "test.txt").write_text("ben/a\n")
+    found = discover(tmp_path)
+    assert [(item.name, item.speaker, item.split) for item in found.items] == [
+        ("anna-a", "anna", "train"),
+        ("anna-day 2-a", "anna", "train"),
+        ("ben-a", "ben", "test"),
+        ("ben-s", "ben", "train"),
+        ("c", "", "train"),
+    ]
+
+
+def test_names_stay_unique(tmp_path):
+    touch(tmp_path, "anna/a.mp4", "anna-a.mp4", "ben/a.mp4")
+    found = discover(tmp_path)
+    assert [item.name for item in found.items] == ["ben-a"]
+    assert "2 recordings share this name" in found.problems["anna-a"]
+
+
+def test_labels_are_kept_and_bad_ones_are_reported(tmp_path):
+    touch(tmp_path, "a.mp4", "b.mp4", "c.mp4")
+    (tmp_path / "a.lab").write_text("0 1000000 t\n1000000 2000000 uw\n")
+    (tmp_path / "b.lab").write_text("0 1000000 t\n500000 2000000 uw\n")
+    found = discover(tmp_path)
+    assert [item.name for item in found.items] == ["a", "c"]
+    assert [span.label.phone for span in found.items[0].phones] == ["t", "uw"]
+    assert "line 2 starts at 0.05 s" in found.problems["b"]

@@ -37,7 +37,7 @@ def test_reads_the_layout(grid):
     assert [item.name for item in found.items] == ["brwa3s", "lgazzp", "swiz9n"]
     assert found.items[0].words == ("bin", "red")  # what was said, not what the name spells
     assert found.items[1].words == ("lay", "green", "at", "z", "zero", "please")
-    assert found.items[0].video == grid / "clips" / "brwa3s.mkv"
+    assert found.items[0].file == grid / "clips" / "brwa3s.mkv"
     assert {item.split for item in found.items} == {"train"}
     assert found.items[0].rights["attribution"].startswith("GRID corpus (Cooke, Barker, Cunningham, Shao 2006)")
     assert found.problems == {}
@@ -85,3 +85,14 @@ def test_the_real_thing():
     assert {split: splits.count(split) for split in splits} == {"train": 452, "val": 22, "test": 50}
     assert sum(item.words == sentence(item.name) for item in found.items) >= 520
     assert all(item.words is not None and len(item.words) == 6 for item in found.items)
+
+
+@pytest.mark.parametrize(
+    ("folder", "speaker"),
+    [("s1", "s1"), ("grid-s1", "s1"), ("GRID_S23", "s23"), ("bikes1", ""), ("s100", ""), ("s0", ""), ("clips", "")],
+)
+def test_speakers_by_their_folders(tmp_path, folder, speaker):
+    (tmp_path / folder).mkdir()
+    (tmp_path / folder / "brwa3s.mpg").touch()
+    (item,) = discover(tmp_path / folder).items
+    assert item.speaker == speaker

@@ -12,7 +12,7 @@ import pytest
 from lipmotion.corpora.entry import quantised, read_entry
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import CorpusError, ExportError, InputError
-from lipmotion.types import Audio, Channel, Features, Motion, Track, Utterance
+from lipmotion.types import Audio, Channel, Features, Motion, Span, Timeline, Track, Unit, Utterance
 
 
 def utterance(name: str = "one", split: str = "train", crops: bool = True) -> Utterance:
@@ -160,8 +160,8 @@ def test_not_a_corpus(tmp_path, content):
 
 def test_a_newer_version(corpus):
     manifest = corpus.path / "corpus.json"
-    manifest.write_text(manifest.read_text().replace('"version": 1', '"version": 2'))
-    with pytest.raises(CorpusError, match="corpus version 2, this lipmotion reads version 1; upgrade lipmotion"):
+    manifest.write_text(manifest.read_text().replace('"version": 2', '"version": 3'))
+    with pytest.raises(CorpusError, match="corpus version 3, this lipmotion reads versions up to 2; upgrade lipmotion"):
         Corpus.open(corpus.path)
 
 
@@ -201,3 +201,68 @@ def test_reading_needs_no_video_packages(corpus):
         f"Corpus.open(Path({str(corpus.path)!r})).utterance('one').track.crops.sum()"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def phones() -> Timeline[Unit]:
+    return Timeline((Span(0.0, 0.25, Unit("sil")), Span(0.25, 1.0, Unit("aa"))))
+
+
+def test_speaker_and_phones_survive_the_round_trip(tmp_path):
+    corpus = Corpus.create(tmp_path / "corpus")
+    corpus.add(replace(utterance(), speaker="anna", phones=phones()))
+    for each in (corpus, Corpus.open(corpus.path)):
+        assert each.utterance("one").speaker == "anna"
+        assert each.utterance("one").phones == phones()
+
+
+def test_speakers(tmp_path):
+    corpus = Corpus.create(tmp_path / "corpus")
+    for name, split, speaker in (
+        ("a", "train", "anna"),
+        ("b", "test", "anna"),
+        ("c", "train", "ben"),
+        ("d", "val", ""),
+    ):
+        corpus.add(replace(utterance(name, split), speaker=speaker))
+    assert corpus.speakers == {"": (1, 1.0), "anna": (2, 2.0), "ben": (1, 1.0)}
+    assert corpus.names(speakers=["anna"]) == ("a", "b")
+    assert corpus.names("train", ["anna", "ben"]) == ("a", "c")
+    assert corpus.required("test", ["anna"]) == ("b",)
+    with pytest.raises(
+        CorpusError, match=r"no utterances of split 'val' by anna \(there are train: 1, val: 0, test: 1"
+    ):
+        corpus.required("val", ["anna"])
+    with pytest.raises(CorpusError, match=r"no speaker 'bob' \(there are: anna, ben\)"):
+        corpus.required(None, ["anna", "bob"])
+    assert corpus.summary()["speakers"] == "unknown (1, 0.0 minutes), anna (2, 0.0 minutes), ben (1, 0.0 minutes)"
+    assert corpus.summary()["motion"] == "2 channels (opening, jaw) at 25 Hz"
+    assert corpus.summary()["labelled"] == "0 with phones in time"
+
+
+def test_the_first_version_is_read_and_can_be_added_to(corpus):
+    """It knew neither speakers nor labelled phones."""
+    manifest = corpus.path / "corpus.json"
+    content = json.loads(manifest.read_text())
+    content["version"] = 1
+    for row in content["utterances"].values():
+        del row["speaker"]
+    manifest.write_text(json.dumps(content))
+    for name in corpus.names():
+        entry = read_entry(corpus.folder(name))
+        del entry["speaker"], entry["phones"]
+        (corpus.folder(name) / "entry.json").write_text(json.dumps(entry))
+    old = Corpus.open(corpus.path)
+    assert (old.utterance("one").speaker, old.utterance("one").phones) == ("", None)
+    assert old.names("train") == ("one", "two")
+    assert old.summary()["speakers"] == "unknown (3, 0.1 minutes)"
+    old.add(replace(utterance("four"), speaker="anna"))
+    assert json.loads(manifest.read_text())["version"] == 2
+    assert Corpus.open(corpus.path).speakers == {"": (3, 3.0), "anna": (1, 1.0)}
+
+
+@pytest.mark.parametrize("rows", [[[0, 1]], [[0.5, 0.2, "aa"]], "aa", [["x", 1, "aa"]]])
+def test_damaged_phones(corpus, rows):
+    path = corpus.folder("one") / "entry.json"
+    path.write_text(json.dumps(read_entry(corpus.folder("one")) | {"phones": rows}))
+    with pytest.raises(CorpusError, match="not a whole utterance"):
+        corpus.utterance("one")

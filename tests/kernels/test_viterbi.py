@@ -33,6 +33,11 @@ def random_emission(seed: int, frames: int, densities: int) -> np.ndarray:
     return np.random.default_rng([seed, 1]).normal(-20, 4, (frames, densities)).astype(np.float32)
 
 
+def asked(log_emission: np.ndarray):
+    """Return the densities as the kernel asks for them, and how many frames there are."""
+    return lambda first, end: log_emission[first:end], len(log_emission)
+
+
 @pytest.fixture(params=[1, 2, 3, 5, 2048])
 def block(request, monkeypatch) -> int:
     monkeypatch.setattr(viterbi, "BLOCK", request.param)
@@ -45,7 +50,7 @@ def block(request, monkeypatch) -> int:
 def test_agrees_with_the_enumeration_of_all_paths(seed, frames):
     arrays, arcs = random_network(seed, states=3 + seed % 2, densities=3, density_of_arcs=0.5)
     log_emission = random_emission(seed, frames, 3)
-    path, score = viterbi.best_path(log_emission, **arrays)
+    path, score = viterbi.best_path(*asked(log_emission), **arrays)
     ends = arrays["log_initial"], arrays["log_final"]
     wanted, best = paths.best_path(log_emission, arrays["emission"], arcs, *ends)
     if np.isinf(best):
@@ -62,9 +67,9 @@ def test_blocks_change_nothing(seed, frames, block):
     log_emission = random_emission(seed, frames, 4)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(viterbi, "BLOCK", 1000)
-        whole, score = viterbi.best_path(log_emission, **arrays)
+        whole, score = viterbi.best_path(*asked(log_emission), **arrays)
         patch.setattr(viterbi, "BLOCK", block)
-        path, in_blocks = viterbi.best_path(log_emission, **arrays)
+        path, in_blocks = viterbi.best_path(*asked(log_emission), **arrays)
     assert np.array_equal(path, whole)
     assert in_blocks == pytest.approx(score, abs=1e-3)
     if np.isfinite(score):  # and the score is that of the path
@@ -92,13 +97,13 @@ def left_to_right(states: int) -> dict:
 @pytest.mark.usefixtures("block")
 @pytest.mark.parametrize("frames", [1, 2, 3, 4, 6, 7])
 def test_a_network_longer_than_the_recording_is_impossible(frames):
-    _, score = viterbi.best_path(np.zeros((frames, 8), np.float32), **left_to_right(8))
+    _, score = viterbi.best_path(*asked(np.zeros((frames, 8), np.float32)), **left_to_right(8))
     assert score == -np.inf
 
 
 @pytest.mark.usefixtures("block")
 def test_the_only_path_is_found():
-    path, score = viterbi.best_path(np.zeros((8, 8), np.float32), **left_to_right(8))
+    path, score = viterbi.best_path(*asked(np.zeros((8, 8), np.float32)), **left_to_right(8))
     assert path.tolist() == list(range(8))
     assert score == pytest.approx(-3.5)
 
@@ -108,6 +113,6 @@ def test_hours_lose_no_precision():
     log_emission = np.full((30_000, 2), -80.0, np.float32)
     log_emission[:17_000, 0] += 0.25
     log_emission[17_000:, 1] += 0.25
-    path, score = viterbi.best_path(log_emission, **chain)
+    path, score = viterbi.best_path(*asked(log_emission), **chain)
     assert path.argmax() == 17_000
     assert score == pytest.approx(30_000 * -79.75 - 29_999 * 0.5, rel=1e-6)

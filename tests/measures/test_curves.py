@@ -9,6 +9,7 @@ from lipmotion.measures.curves import (
     jerk_ratio,
     lag_ms,
     mean_distance,
+    moving,
     normalised_rmse,
     per_clip_correlation,
     pooled_correlation,
@@ -133,3 +134,13 @@ def test_lag_looks_at_the_first_channel():
     original = np.stack([curve[30:-30], np.zeros(100)], axis=1)
     generated = np.stack([curve[27:-33], np.arange(100.0)], axis=1)
     assert lag_ms([generated], [original], 25.0) == pytest.approx(120, abs=4)
+
+
+def test_channels_that_move():
+    """Judged beside those of the same unit, over all clips together."""
+    wave = np.sin(np.arange(50) / 5)[:, None]
+    clips = [wave * (1, 0.5, 0.009, 0, 90) + (0, 0, 0, 7, 0), np.tile([0, 0, 0, 7, 0.0], (9, 1))]
+    assert moving(clips, ["m", "m", "m", "m", "degrees"]).tolist() == [True, True, False, False, True]
+    assert moving([wave * (1e-9, 0)], ["m", "degrees"]).tolist() == [True, False]
+    steps = [np.full((5, 1), 1.0), np.full((5, 1), 2.0)]
+    assert moving(steps, ["m"]).tolist() == [True]

@@ -1,9 +1,8 @@
-import math
 from itertools import count
 
 import pytest
 
-from lipmotion.measures.report import table
+from lipmotion.measures.report import table, without_nan
 
 
 def figures():
@@ -30,6 +29,7 @@ def figures():
             "opening_acc_95": (figure(".3f"), figure(".3f")),
             "acc": figure(".3f"),
             "amse": figure(".4f", 0.0001),
+            "leading": "opening",
             "lag_ms": figure("+.1f", 0.1),
             "closures": {
                 "score": figure(".3f"),
@@ -58,6 +58,7 @@ def figures():
         "split": "val",
         "clips": int(figure(".0f", 1)),
         "closed_under": figure(".4f", 0.0001),
+        "still_channels": [],
         "conditions": {"audio only": condition(), "with transcript": condition()},
     }
     return result, printed
@@ -87,5 +88,26 @@ def test_columns_line_up():
 def test_figures_that_do_not_exist_are_printed_too(part):
     result, _ = figures()
     condition = result["conditions"]["audio only"]
-    condition[part] = {key: 0 if isinstance(value, int) else math.nan for key, value in condition[part].items()}
-    assert "nan" in table(result)
+    condition[part] = {key: 0 if isinstance(value, int) else None for key, value in condition[part].items()}
+    assert "–" in table(result)
+
+
+def test_motion_without_an_opening_has_a_shorter_table():
+    result, _ = figures()
+    result |= {"closed_under": None, "still_channels": ["brow", "ear"]}
+    condition = result["conditions"]["audio only"]
+    for part in ("closures", "closures_p_b_m", "silence", "opening_acc_95"):
+        del condition[part]
+    condition["channels"] = {"a_rather_long_name": condition["channels"]["width"]}
+    condition["leading"] = "a_rather_long_name"
+    del result["conditions"]["with transcript"]
+    lines = table(result).splitlines()
+    assert lines[:2] == ["split val: 101 clips", "left out, for they do not move: brow, ear"]
+    assert len(lines[4]) == len(lines[5])
+    assert len(lines) == 7
+    assert "lag of a_rather_long_name" in lines[6]
+
+
+def test_what_json_does_not_know_becomes_none():
+    nested = {"a": float("nan"), "b": [1.5, float("inf"), (-float("inf"), 2)], "c": "nan", "d": None, "e": True}
+    assert without_nan(nested) == {"a": None, "b": [1.5, None, (None, 2)], "c": "nan", "d": None, "e": True}

@@ -16,11 +16,11 @@ from lipmotion.measures.report import table
 from lipmotion.pipeline.evaluate import evaluate
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.toy import toy_motion, toy_sentences
-from lipmotion.types import Channel, Generation, Motion, Speech, Trace, Utterance
+from lipmotion.types import Channel, Generation, Motion, Speech, Timeline, Trace, Unit, Utterance
 from lipmotion.units import Lexicon
 
 CONDITIONS = ["audio only", "with transcript"]
-FIGURES = "channels opening_acc_95 acc amse lag_ms closures closures_p_b_m silence".split()
+FIGURES = "channels acc amse leading lag_ms opening_acc_95 closures closures_p_b_m silence".split()
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,16 +194,83 @@ def test_a_transcript_that_does_not_fit_is_named(toy_model: Model, toy_corpus: C
 
 
 def renamed(motion: Motion) -> Motion:
-    return replace(motion, channels=(Channel("jaw"), Channel("width"), Channel("pout")))
+    """The same curves under other names, beside one that stands still and one that hardly moves."""
+    time_s = motion.time_s[:, None]
+    values = np.concatenate([motion.values, 0 * time_s + 0.3, 1e-6 * np.sin(time_s)], axis=1)
+    return replace(motion, values=values, channels=tuple(map(Channel, ("jaw", "width", "pout", "brow", "noise"))))
+
+
+def renamed_utterance(utterance: Utterance) -> Utterance:
+    return replace(utterance, track=replace(utterance.track, motion=renamed(utterance.track.motion)))
+
+
+def labelled(utterance: Utterance, names: dict[str, str]) -> Timeline[Unit]:
+    """The true phones of a toy utterance, some of them under other names."""
+    (units,) = (s.units for s in toy_sentences(12) if s.name == utterance.name)
+    return Timeline(tuple(replace(s, label=Unit(names.get(s.label.phone, s.label.phone))) for s in units))
 
 
 def test_other_channels_than_lip_distances(
     toy_model: Model, toy_corpus: Corpus, known: dict[float, Motion], tmp_path: Path
 ) -> None:
-    tracks = [replace(u.track, motion=renamed(u.track.motion)) for u in held_out(toy_corpus)]
-    faces = corpus_of([replace(u, track=t) for u, t in zip(held_out(toy_corpus), tracks, strict=True)], tmp_path)
-    with pytest.raises(CorpusError, match="the corpus has no channels opening, outer"):
+    """Every channel that moves is compared, and what only an opening can tell is left out."""
+    faces = corpus_of([renamed_utterance(u) for u in held_out(toy_corpus)], tmp_path)
+    other = replace(toy_model, engine=Medium(None), learned={key: renamed(m) for key, m in known.items()})
+    figures = evaluate(other, faces)
+    assert figures["closed_under"] is None
+    assert figures["still_channels"] == ["brow", "noise"]
+    for condition in figures["conditions"].values():
+        assert list(condition) == FIGURES[:5]
+        assert list(condition["channels"]) == ["jaw", "width", "pout"]
+        assert condition["acc"] == pytest.approx(1, abs=1e-6)
+        assert condition["leading"] in ("jaw", "pout")
+        assert condition["lag_ms"] == pytest.approx(0, abs=0.5)
+    json.dumps(figures, allow_nan=False)
+    assert "left out, for they do not move: brow, noise" in table(figures)
+
+
+def test_a_model_of_other_motion_is_refused(
+    toy_model: Model, toy_corpus: Corpus, known: dict[float, Motion], tmp_path: Path
+) -> None:
+    faces = corpus_of([renamed_utterance(u) for u in held_out(toy_corpus)], tmp_path)
+    with pytest.raises(CorpusError, match="the model has no channels jaw, pout, which the corpus has"):
         evaluate(toy_model, faces)
     other = replace(toy_model, engine=Medium(None), learned={key: renamed(m) for key, m in known.items()})
     with pytest.raises(CorpusError, match="the model has no channels opening, outer"):
         evaluate(other, toy_corpus)
+
+
+def test_two_kinds_of_motion_at_once_are_refused(toy_model: Model, toy_corpus: Corpus, tmp_path: Path) -> None:
+    first, second = held_out(toy_corpus)
+    with pytest.raises(CorpusError, match="different motion channels"):
+        evaluate(toy_model, corpus_of([first, renamed_utterance(second)], tmp_path))
+
+
+def test_motion_that_never_moves_is_refused(toy_model: Model, toy_corpus: Corpus, tmp_path: Path) -> None:
+    frozen = [renamed_utterance(u) for u in held_out(toy_corpus)]
+    motions = [replace(u.track.motion, values=np.ones_like(u.track.motion.values)) for u in frozen]
+    frozen = [replace(u, track=replace(u.track, motion=m)) for u, m in zip(frozen, motions, strict=True)]
+    with pytest.raises(CorpusError, match="none of 5 motion channels moves in these 2 utterances"):
+        evaluate(toy_model, corpus_of(frozen, tmp_path))
+
+
+def test_one_speaker(toy_model: Model, toy_corpus: Corpus, tmp_path: Path) -> None:
+    first, second = held_out(toy_corpus)
+    both = corpus_of([replace(first, speaker="anna"), replace(second, speaker="ben")], tmp_path)
+    alone = corpus_of([first], tmp_path / "alone")
+    one = evaluate(toy_model, both, speakers=["anna"])
+    assert one["clips"] == 1
+    assert one == evaluate(toy_model, alone)
+    assert evaluate(toy_model, both, speakers=["anna", "ben"]) == evaluate(toy_model, both)
+
+
+def test_labelled_phones_are_the_reference(toy_model: Model, toy_corpus: Corpus, tmp_path: Path) -> None:
+    """Labels that call the p, b and m something else: then there is nothing to close in."""
+    untold = [replace(u, words=None, phones=labelled(u, {"p": "t", "b": "d", "m": "n"})) for u in held_out(toy_corpus)]
+    figures = evaluate(toy_model, corpus_of(untold, tmp_path))
+    assert list(figures["conditions"]) == CONDITIONS
+    for condition in figures["conditions"].values():
+        assert condition["closures_p_b_m"]["intervals"] == 0
+        assert condition["closures_p_b_m"]["recall"] is None
+    json.dumps(figures, allow_nan=False)
+    assert "recall – of 0" in table(figures)

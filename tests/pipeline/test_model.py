@@ -69,7 +69,7 @@ def test_the_same_model_gives_the_same_bytes(toy_model: Model, toy_model_file: P
 
 def test_the_file_is_plain_arrays_and_a_header(toy_model_file: Path) -> None:
     header = read_header(toy_model_file)
-    assert (header["format"], header["version"], header["engine"]) == ("lipmotion.model", 1, "trajectory")
+    assert (header["format"], header["version"], header["engine"]) == ("lipmotion.model", VERSION, "trajectory")
     assert header["configuration"]["parts"] == 5
     assert header["recogniser"]["mixtures"] == 1
     assert header["licence"] == ["synthesised by lipmotion"]
@@ -103,10 +103,11 @@ def test_no_such_model(read, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("read", [load_model, read_header])
-@pytest.mark.parametrize("version", [VERSION + 1, 0, "1", None])
+@pytest.mark.parametrize("version", [VERSION + 1, 0, str(VERSION), None])
 def test_another_version(read, version: object, toy_model_file: Path, tmp_path: Path) -> None:
     path = with_header(toy_model_file, tmp_path / "m.lipmotion", version=version)
-    with pytest.raises(ModelFormatError, match=f"model version {version}, .* reads version 1; upgrade lipmotion, or"):
+    wanted = f"model version {version}, .* reads version {VERSION}; upgrade lipmotion, or"
+    with pytest.raises(ModelFormatError, match=wanted):
         read(path)
 
 

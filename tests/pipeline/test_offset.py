@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import shutil
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from lipmotion.pipeline import offset as module
 from lipmotion.pipeline.offset import clip_scores, offsets, sync
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.read import read_audio
-from lipmotion.types import Audio, Channel, Motion, Track, Utterance
+from lipmotion.types import Audio, Channel, Motion, Span, Timeline, Track, Unit, Utterance
 from lipmotion.vision.track import track
 
 RATE_HZ = 16_000
@@ -88,6 +89,23 @@ def test_early_sound_gets_a_beginning(corpus: Corpus) -> None:
     assert moved.audio.duration_s == pytest.approx(late.audio.duration_s + 0.1)
     np.testing.assert_array_equal(moved.audio.samples[1600:], late.audio.samples)
     assert float(moved.source["offset_removed_ms"]) == -100
+
+
+@pytest.mark.parametrize(("late_s", "expected"), [(0.5, [0.0, 0.7, 2.5]), (-0.5, [0.0, 1.7, 3.5])])
+def test_labels_move_with_the_sound(corpus: Corpus, late_s: float, expected: list[float]) -> None:
+    bounds = [0.0, 0.4, 1.2, 3.0]
+    spans = tuple(Span(a, b, Unit(phone)) for (a, b), phone in zip(pairwise(bounds), ("sil", "aa", "m"), strict=True))
+    moved = module._moved(replace(corpus.utterance("here0"), phones=Timeline(spans)), late_s)
+    found = list(moved.phones)
+    assert [found[0].start_s, found[-1].start_s, found[-1].end_s] == pytest.approx(expected)
+    assert found[-1].end_s == pytest.approx(moved.audio.duration_s)
+
+
+def test_curves_without_lips_are_passed_over(corpus: Corpus) -> None:
+    one = corpus.utterance("here0")
+    jaw = Track(Motion(np.zeros((75, 1)), 25.0, (Channel("jaw"),)), np.ones(75, bool))
+    corpus.add(replace(one, name="jaw", track=jaw))
+    assert set(offsets(corpus).clips) == set(corpus.names()) - {"jaw"}
 
 
 def test_lips_that_do_not_follow_are_left_alone(corpus: Corpus) -> None:

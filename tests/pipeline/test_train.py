@@ -12,9 +12,11 @@ from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError
 from lipmotion.pipeline import train as module
 from lipmotion.pipeline.model import Model, save_model
+from lipmotion.pipeline.toy import toy_sentences
 from lipmotion.pipeline.train import labels_of, model_motion, train
+from lipmotion.speech.recogniser import Recogniser
 from lipmotion.stats.hmm.model import HmmConfig
-from lipmotion.types import Channel, Motion, Track, Utterance
+from lipmotion.types import Channel, Motion, Timeline, Track, Unit, Utterance
 from lipmotion.units import Lexicon
 
 SMALL = HmmConfig(mixtures=1, iterations=2)
@@ -74,9 +76,58 @@ def test_untranscribed_utterances_are_recognised_and_used(toy_corpus: Corpus, tm
     mixed = corpus_of(utterances, tmp_path)
     model, report = train(mixed, recogniser=SMALL)
     assert report.used == TRAINED
-    found = [span.label.phone for span in labels_of(mixed.utterance("toy05"), model.phones, Lexicon())]
-    known = [span.label.phone for span in labels_of(toy_corpus.utterance("toy05"), model.phones, Lexicon())]
+    found = [
+        span.label.phone for span in labels_of(mixed.utterance("toy05"), Recogniser(model.phones, "own"), Lexicon())
+    ]
+    known = [
+        span.label.phone
+        for span in labels_of(toy_corpus.utterance("toy05"), Recogniser(model.phones, "own"), Lexicon())
+    ]
     assert np.mean([phone in found for phone in known]) > 0.8
+
+
+def labelled(utterance: Utterance) -> Utterance:
+    """The true phones in the place of the words."""
+    (units,) = (s.units for s in toy_sentences(12) if s.name == utterance.name)
+    phones = Timeline(tuple(replace(s, label=Unit(s.label.phone)) for s in units))
+    return replace(utterance, words=None, phones=phones)
+
+
+def test_labelled_phones_are_used_as_they_are(
+    toy_corpus: Corpus, toy_model: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nothing is aligned, no transcript is needed, and phone models are trained on what is labelled."""
+    monkeypatch.setattr(module, "phones_in_time", None)
+    given = [labelled(utterance) for utterance in some(toy_corpus, 8)]
+    given[0] = replace(given[0], words=("not", "what", "is", "said"))
+    model, report = train(corpus_of(given, tmp_path), recogniser=SMALL)
+    assert report.used == TRAINED
+    assert report.skipped == {}
+    assert set(model.phones.table.units) == set(toy_model.phones.table.units)
+    assert labels_of(given[0], Recogniser(model.phones, "own"), Lexicon()) == given[0].phones
+
+
+def test_labelled_and_transcribed_utterances_together(toy_corpus: Corpus, tmp_path: Path) -> None:
+    both = [u if number % 2 else labelled(u) for number, u in enumerate(some(toy_corpus, 8))]
+    model, report = train(corpus_of(both, tmp_path), recogniser=SMALL)
+    assert (report.used, report.skipped) == (TRAINED, {})
+    truth = labelled(toy_corpus.utterance("toy11"))
+    assert truth.phones is not None
+    heard = [s.label.phone for s in labels_of(replace(truth, phones=None), Recogniser(model.phones, "own"), Lexicon())]
+    assert np.mean([span.label.phone in heard for span in truth.phones]) > 0.8
+
+
+def test_one_speaker(toy_corpus: Corpus, tmp_path: Path) -> None:
+    names = ("anna", "ben", "ben", "anna", "anna")
+    corpus = corpus_of([replace(u, speaker=n) for u, n in zip(some(toy_corpus), names, strict=True)], tmp_path)
+    model, report = train(corpus, speakers=["anna"], recogniser=SMALL)
+    assert report.used == ("toy00", "toy03", "toy04")
+    assert model.about["speakers"] == ["anna"]
+    model, report = train(corpus, speakers=["ben", "anna"], recogniser=SMALL)
+    assert len(report.used) == 5
+    assert "speakers" not in train(corpus, recogniser=SMALL)[0].about
+    with pytest.raises(CorpusError, match="no speaker 'carl'"):
+        train(corpus, speakers=["carl"])
 
 
 def test_a_transcript_that_does_not_fit_is_skipped_and_reported(toy_corpus: Corpus, tmp_path: Path) -> None:

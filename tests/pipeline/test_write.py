@@ -128,3 +128,13 @@ def test_an_unknown_channel_writes_nothing(result: Generation, toy_model: Model,
     with pytest.raises(InputError, match="no motion channel 'smile'"):
         write(result, [tmp_path / "a.csv"], model=toy_model, channels=["smile"])
     assert not list(tmp_path.iterdir())
+
+
+def test_motion_that_cannot_be_drawn_leaves_no_file(
+    result: Generation, toy_model: Model, toy_speech: Path, tmp_path: Path
+) -> None:
+    """Blendshapes have no opening; that is said before the first file is written."""
+    shapes = result.selected(["width"])
+    with pytest.raises(ExportError, match=r"a\.mp4: the motion has no channel 'opening' to draw a face from"):
+        write(shapes, [tmp_path / "a.csv", tmp_path / "a.mp4"], speech=toy_speech, model=toy_model)
+    assert not list(tmp_path.iterdir())

@@ -139,3 +139,13 @@ def test_without_a_dictionary_it_says_what_to_install(monkeypatch: pytest.Monkey
     monkeypatch.setattr(lexicon, "_dictionary_entries", lexicon._dictionary_entries.__wrapped__)
     with pytest.raises(MissingDependencyError, match="pip install pocketsphinx"):
         Lexicon().known("bin")
+
+
+def test_the_dictionary_is_searched_as_if_line_by_line() -> None:
+    """Words at both ends, with variants, beside longer ones, and none at all."""
+    lines = [line.split() for line in lexicon._dictionary().decode().lower().splitlines() if line]
+    words = [lines[0][0], lines[1][0], lines[-1][0], "a", "aa", "the", "tomato", "read", "zzz", "!", "日本", "hello("]
+    words += [line[0].partition("(")[0] for line in lines[:: len(lines) // 40]]
+    for word in words:
+        expected = tuple(tuple(line[1:]) for line in lines if line[0].partition("(")[0] == word)
+        assert lexicon._dictionary_entries(word) == expected

@@ -1,4 +1,4 @@
-"""``lipmotion corpus prepare|info|sync``: recordings to a corpus, what is in one, and its sound put in step."""
+"""``lipmotion corpus prepare|info|sync|prompts``: recordings to a corpus, what is in one, sound and lips in step."""
 
 from __future__ import annotations
 
@@ -6,15 +6,15 @@ import argparse
 import sys
 from pathlib import Path
 
+from lipmotion.cli import prompts
+
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb."""
     parser = verbs.add_parser("corpus", help="prepare recordings for training")
     actions = parser.add_subparsers(title="actions", required=True, metavar="ACTION")
-    prepare = actions.add_parser("prepare", help="track faces and compute features of a folder of videos")
-    prepare.add_argument(
-        "recordings", type=Path, help="folder: GRID's layout, or videos with optional .txt transcripts"
-    )
+    prepare = actions.add_parser("prepare", help="make a corpus of a folder of recordings")
+    prepare.add_argument("recordings", type=Path, help="folder of videos, or of sounds with motion (docs/corpora.md)")
     prepare.add_argument("-o", "--output", type=Path, required=True, metavar="CORPUS")
     prepare.add_argument("--workers", type=int, help="processes (default: one a core)")
     prepare.add_argument("--no-crops", dest="crops", action="store_false", help="do not keep mouth images")
@@ -25,6 +25,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     sync = actions.add_parser("sync", help="move the sound of a corpus to where the lips are")
     sync.add_argument("corpus", type=Path)
     sync.set_defaults(run=run_sync)
+    prompts.add(actions)
 
 
 def run_prepare(options: argparse.Namespace) -> None:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from lipmotion.cli.speech import add_recogniser_argument
+
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb."""
@@ -12,7 +14,9 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser.add_argument("model", type=Path)
     parser.add_argument("corpus", type=Path)
     parser.add_argument("--split", default="test", help="train, val, test or all (default: test)")
+    parser.add_argument("--speaker", action="append", default=[], metavar="NAME", help="this one only (repeatable)")
     parser.add_argument("--lexicon", type=Path, metavar="FILE", help="pronunciations: WORD PHONE PHONE ... a line")
+    add_recogniser_argument(parser)
     parser.add_argument("-o", "--output", type=Path, metavar="FILE.json", help="write all figures here as well")
     parser.set_defaults(run=run)
 
@@ -32,8 +36,9 @@ def run(options: argparse.Namespace) -> None:
         check_target(options.output)
     lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
     split = None if options.split == "all" else options.split
-    figures = evaluate(load_model(options.model), Corpus.open(options.corpus), split=split, lexicon=lexicon)
+    chosen = {"split": split, "speakers": options.speaker, "recogniser": options.recogniser}
+    figures = evaluate(load_model(options.model), Corpus.open(options.corpus), **chosen, lexicon=lexicon)
     print(table(figures))
     if options.output:
         with whole_file(options.output) as unfinished:
-            unfinished.write_text(json.dumps(figures, indent=1) + "\n")
+            unfinished.write_text(json.dumps(figures, indent=1, allow_nan=False) + "\n")

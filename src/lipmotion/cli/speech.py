@@ -13,7 +13,14 @@ def add_speech_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--transcript", metavar="TEXT|FILE", help="what is said, if known")
     parser.add_argument("--lexicon", type=Path, metavar="FILE", help="pronunciations: WORD PHONE PHONE ... a line")
     parser.add_argument("--units", type=Path, metavar="FILE", help="phones of an earlier .json or .npz, edited or not")
+    add_recogniser_argument(parser)
     parser.add_argument("--model", type=Path, help="trained model (default: the one that ships with the package)")
+
+
+def add_recogniser_argument(parser: argparse.ArgumentParser) -> None:
+    """Add the choice of phone models."""
+    explained = "whose phone models: auto, own (the model's), general (those of many voices) (default: auto)"
+    parser.add_argument("--recogniser", default="auto", metavar="WHOSE", help=explained)
 
 
 def speech_arguments(options: argparse.Namespace) -> dict[str, Any]:
@@ -27,5 +34,6 @@ def speech_arguments(options: argparse.Namespace) -> dict[str, Any]:
         "transcript": text_or_file(options.transcript) if options.transcript is not None else None,
         "lexicon": Lexicon.from_file(options.lexicon) if options.lexicon else None,
         "model": load_model(options.model),
+        "recogniser": options.recogniser,
         "units": read_motion(options.units)[1] if options.units else None,
     }

@@ -13,6 +13,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser.add_argument("corpus", type=Path)
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="MODEL")
     parser.add_argument("--split", default="train", help="train, val, test or all (default: train)")
+    parser.add_argument("--speaker", action="append", default=[], metavar="NAME", help="this one only (repeatable)")
     parser.add_argument("--lexicon", type=Path, metavar="FILE", help="pronunciations: WORD PHONE PHONE ... a line")
     parser.set_defaults(run=run)
 
@@ -28,7 +29,8 @@ def run(options: argparse.Namespace) -> None:
     check_target(options.output)
     split = None if options.split == "all" else options.split
     lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
-    model, report = train(Corpus.open(options.corpus), split=split, lexicon=lexicon, monitor=_show)
+    chosen = {"split": split, "speakers": options.speaker}
+    model, report = train(Corpus.open(options.corpus), **chosen, lexicon=lexicon, monitor=_show)
     save_model(model, options.output)
     for name, reason in report.skipped.items():
         print(f"lipmotion: warning: left out {name}: {reason}", file=sys.stderr)

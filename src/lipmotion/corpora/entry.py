@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.files import whole_folder
-from lipmotion.types import Audio, Channel, Features, Motion, Track, Utterance
+from lipmotion.types import Audio, Channel, Features, Motion, Span, Timeline, Track, Unit, Utterance
 
 ENTRY = "entry.json"
 KEYS = frozenset(
     "name words split audio_rate_hz duration_s rate_hz frames unseen_frames channels crops source settings".split()
 )
-"""What every description holds."""
+"""What every description holds. ``speaker`` and ``phones`` came with version 2 of the corpus; without them: unknown."""
 FULL_SCALE = 32_768
 """16-bit samples per unit of amplitude: recordings of 16 bits come back exactly."""
 
@@ -76,6 +76,8 @@ def read_utterance(folder: Path) -> Utterance:
             words=None if entry["words"] is None else tuple(entry["words"]),
             split=entry["split"],
             source=entry["source"],
+            speaker=entry.get("speaker", ""),
+            phones=_timeline(entry.get("phones")),
         )
     except (OSError, EOFError, ValueError, KeyError, TypeError) as error:
         raise _damaged(folder, error) from error
@@ -99,6 +101,8 @@ def _description(utterance: Utterance, settings: dict[str, str]) -> dict[str, An
         "name": utterance.name,
         "words": utterance.words,
         "split": utterance.split,
+        "speaker": utterance.speaker,
+        "phones": None if utterance.phones is None else [[s.start_s, s.end_s, s.label.phone] for s in utterance.phones],
         "audio_rate_hz": utterance.audio.rate_hz,
         "duration_s": utterance.audio.duration_s,
         "rate_hz": motion.rate_hz,
@@ -110,6 +114,13 @@ def _description(utterance: Utterance, settings: dict[str, str]) -> dict[str, An
         "source": utterance.source,
         "settings": settings,
     }
+
+
+def _timeline(rows: Any) -> Timeline[Unit] | None:
+    """Return phones in time. Raises ValueError: not rows of start, end and phone, in order."""
+    if rows is None:
+        return None
+    return Timeline(tuple(Span(float(start_s), float(end_s), Unit(str(phone))) for start_s, end_s, phone in rows))
 
 
 def _load(folder: Path, name: str) -> NDArray[Any]:

@@ -1,48 +1,75 @@
-"""A plain folder of videos, with transcripts beside them where they are known."""
+"""A folder of videos, or of sounds with motion beside them; with labels beside both where they are known."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from lipmotion.corpora.base import Recording, Recordings, videos
+from lipmotion.corpora.base import AUDIO_SUFFIXES, Curves, Recording, Recordings, videos
+from lipmotion.corpora.labels import Labels, labels_beside
 from lipmotion.corpora.splits import LISTS, with_splits
 from lipmotion.errors import InputError
-from lipmotion.units import words_of
 
-KIND = "folder of videos"
+VIDEOS, SOUNDS, BOTH = "folder of videos", "folder of sounds with motion", "folder of videos, and of sounds with motion"
+MOTION_SUFFIXES = (".csv", ".json", ".npz")
+"""Motion files that ``animate`` writes and ``read_motion`` reads."""
 
 
 def read_folder(directory: Path) -> Recordings:
-    """Return the videos in a folder and its sub-folders.
+    """Return the recordings in a folder and its sub-folders: videos, and sounds with a motion file of the same name.
 
-    ``take1.mp4`` may have its words in ``take1.txt``. A video in a sub-folder is named ``sub-take1``.
+    Beside ``take1.mp4`` may lie what was said: ``take1.txt``, ``take1.TextGrid``, ``take1.lab``.  What lies in a
+    sub-folder ``anna`` is spoken by anna, and is named ``anna-take1``.
     """
     by_name: dict[str, list[Path]] = {}
-    for path in videos(directory.rglob("*")):
+    for path in sorted(directory.rglob("*")):
         inner = path.relative_to(directory)
-        if not any(part.startswith(".") for part in inner.parts):
+        if not any(part.startswith(".") for part in inner.parts) and (_has_motion(path) or videos([path])):
             by_name.setdefault("-".join(inner.with_suffix("").parts), []).append(path)
+    lists = frozenset(directory / name for name in LISTS)
     items, problems = [], {}
     for name, paths in by_name.items():
         try:
-            items.append(Recording(name, _only(paths), _words(paths[0].with_suffix(".txt"), directory)))
+            items.append(_recording(name, _only(paths), directory, lists))
         except InputError as error:
             problems[name] = str(error)
     items.sort(key=lambda item: item.name)
-    return with_splits(Recordings(KIND, tuple(items), problems), directory)
+    return with_splits(Recordings(_kind(by_name), tuple(items), problems), directory)
+
+
+def _recording(name: str, path: Path, directory: Path, lists: frozenset[Path]) -> Recording:
+    labels: Labels = labels_beside(path, ignored=lists)
+    curves = None
+    if _is_sound(path):
+        beside = motion_files(path)
+        if len(beside) > 1:
+            raise InputError(f"{path}: {len(beside)} motion files beside it: {', '.join(map(str, beside))}; keep one")
+        curves = Curves(beside[0])
+    folders = path.relative_to(directory).parts[:-1]
+    speaker = folders[0] if folders else ""
+    return Recording(name, path, labels.words, speaker=speaker, phones=labels.phones, curves=curves)
+
+
+def motion_files(sound: Path) -> list[Path]:
+    """Return the motion files beside a sound that have its name."""
+    return [path for suffix in MOTION_SUFFIXES if (path := sound.with_suffix(suffix)).is_file()]
+
+
+def _is_sound(path: Path) -> bool:
+    return path.suffix.lower() in AUDIO_SUFFIXES
+
+
+def _has_motion(path: Path) -> bool:
+    return _is_sound(path) and path.is_file() and bool(motion_files(path))
 
 
 def _only(paths: list[Path]) -> Path:
     if len(paths) > 1:
-        raise InputError(f"{len(paths)} videos share this name: {', '.join(map(str, paths))}; rename all but one")
+        raise InputError(f"{len(paths)} recordings share this name: {', '.join(map(str, paths))}; rename all but one")
     return paths[0]
 
 
-def _words(path: Path, directory: Path) -> tuple[str, ...] | None:
-    if not path.is_file() or (path.parent == directory and path.name in LISTS):
-        return None
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-        return words_of(text) if text.strip() else None
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}: the transcript is not UTF-8 text; save it as UTF-8") from error
+def _kind(by_name: dict[str, list[Path]]) -> str:
+    sounds = {_is_sound(path) for paths in by_name.values() for path in paths}
+    if len(sounds) > 1:
+        return BOTH
+    return SOUNDS if True in sounds else VIDEOS

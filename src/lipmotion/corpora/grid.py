@@ -36,13 +36,19 @@ def read_grid(directory: Path) -> Recordings | None:
     files = videos((clips if clips.is_dir() else directory).iterdir())
     if 2 * sum(sentence(path.stem) is not None for path in files) <= len(files):
         return None
-    items, problems = [], {}
+    items, problems, speaker = [], {}, speaker_of(directory.resolve().name)
     for path in files:
         try:
-            items.append(Recording(path.stem, path, _words(directory, path), rights=RIGHTS))
+            items.append(Recording(path.stem, path, _words(directory, path), rights=RIGHTS, speaker=speaker))
         except InputError as error:
             problems[path.stem] = str(error)
     return with_splits(Recordings(KIND, tuple(items), problems), directory)
+
+
+def speaker_of(folder: str) -> str:
+    """Return the speaker that a folder is named after (``s1``, ``grid-s1``), or an empty text."""
+    found = re.search(r"(?:^|[^a-z0-9])(s[1-9]\d?)$", folder.lower())
+    return found[1] if found else ""
 
 
 def sentence(name: str) -> tuple[str, ...] | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,9 @@ from lipmotion.files import TEMPORARY, remove_unfinished, whole_file
 from lipmotion.types import Utterance
 
 FORMAT = "lipmotion.corpus"
-VERSION = 1
+VERSION = 2
+"""2: speakers, labelled phones, motion of any kind. Version 1 is read: its speakers and phones are unknown."""
+READ_VERSIONS = (1, 2)
 MANIFEST = "corpus.json"
 UTTERANCES = "utterances"
 
@@ -60,16 +63,38 @@ class Corpus:
         """How many utterances there are of train, val and test."""
         return {split: len(self.names(split)) for split in SPLITS}
 
-    def names(self, split: str | None = None) -> tuple[str, ...]:
-        """Return the names of all utterances, or of one split, sorted."""
-        return tuple(sorted(name for name, entry in self._index.items() if split in (None, entry["split"])))
+    @property
+    def speakers(self) -> dict[str, tuple[int, float]]:
+        """How many utterances, and how many seconds, there are of each speaker, sorted; "" where it is not known."""
+        spoken: dict[str, list[float]] = {}
+        for entry in self._index.values():
+            spoken.setdefault(entry.get("speaker", ""), []).append(float(entry["duration_s"]))
+        return {speaker: (len(seconds), sum(seconds)) for speaker, seconds in sorted(spoken.items())}
 
-    def required(self, split: str | None) -> tuple[str, ...]:
-        """Return the names of one split, or of all. Raises CorpusError: there are none."""
-        names = self.names(split)
+    def names(self, split: str | None = None, speakers: Sequence[str] = ()) -> tuple[str, ...]:
+        """Return the names of all utterances, or of one split, or of some speakers, sorted."""
+        return tuple(
+            sorted(
+                name
+                for name, entry in self._index.items()
+                if split in (None, entry["split"]) and (not speakers or entry.get("speaker", "") in speakers)
+            )
+        )
+
+    def required(self, split: str | None, speakers: Sequence[str] = ()) -> tuple[str, ...]:
+        """Return the names of one split, or of all, of some speakers or of all.
+
+        Raises CorpusError: there are none, or no such speaker.
+        """
+        unknown = sorted(set(speakers) - set(self.speakers))
+        if unknown:
+            known = ", ".join(filter(None, self.speakers)) or "no speaker by name"
+            raise CorpusError(f"{self.path}: no speaker {unknown[0]!r} (there are: {known})")
+        names = self.names(split, speakers)
         if not names:
-            found = ", ".join(f"{name}: {count}" for name, count in self.splits.items())
-            raise CorpusError(f"{self.path}: no utterances of split {split!r} (there are {found})")
+            found = ", ".join(f"{each}: {len(self.names(each, speakers))}" for each in SPLITS)
+            who = f" by {', '.join(speakers)}" if speakers else ""
+            raise CorpusError(f"{self.path}: no utterances of split {split!r}{who} (there are {found})")
         return names
 
     def summary(self) -> dict[str, str]:
@@ -83,8 +108,14 @@ class Corpus:
             "corpus": str(self.path),
             "utterances": f"{len(self)} ({', '.join(f'{count} {split}' for split, count in self.splits.items())})",
             "transcribed": str(sum(entry["words"] is not None for entry in sources)),
+            "labelled": f"{sum(entry.get('phones') is not None for entry in sources)} with phones in time",
             "minutes": f"{seconds / 60:.1f}",
+            "speakers": ", ".join(
+                f"{speaker or 'unknown'} ({count}, {spoken_s / 60:.1f} minutes)"
+                for speaker, (count, spoken_s) in self.speakers.items()
+            ),
             "frames": f"{frames}, {unseen} without a face",
+            "motion": "; ".join(sorted({_motion(entry) for entry in sources})),
             "attribution": "; ".join(rights) or "none stated",
         }
 
@@ -137,7 +168,14 @@ def _make_folder(path: Path) -> None:
 
 
 def _summary(entry: dict[str, Any]) -> dict[str, Any]:
-    return {key: entry[key] for key in ("split", "duration_s", "frames", "unseen_frames")}
+    kept = {key: entry[key] for key in ("split", "duration_s", "frames", "unseen_frames")}
+    return kept | {"speaker": entry.get("speaker", "")}
+
+
+def _motion(entry: dict[str, Any]) -> str:
+    names = [channel["name"] for channel in entry["channels"]]
+    some = ", ".join(names[:3]) + (", ..." if len(names) > 3 else "")
+    return f"{len(names)} channels ({some}) at {entry['rate_hz']:g} Hz"
 
 
 def _read_manifest(path: Path) -> dict[str, dict[str, Any]]:
@@ -148,9 +186,9 @@ def _read_manifest(path: Path) -> dict[str, dict[str, Any]]:
         raise CorpusError(f"{path.parent}: not a corpus (no readable {MANIFEST}); give a prepared corpus") from error
     if found != FORMAT:
         raise CorpusError(f"{path}: format is {found!r}, required {FORMAT!r}; give a prepared corpus")
-    if version != VERSION:
+    if version not in READ_VERSIONS:
         raise CorpusError(
-            f"{path}: corpus version {version}, this lipmotion reads version {VERSION}; "
+            f"{path}: corpus version {version}, this lipmotion reads versions up to {VERSION}; "
             "upgrade lipmotion, or prepare the recordings again into a new folder"
         )
     index: dict[str, dict[str, Any]] = content["utterances"]

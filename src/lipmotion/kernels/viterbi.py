@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
+LogEmission = Callable[[int, int], NDArray[np.float32]]
+"""Gives the log densities of the frames from one up to another [shape=(frames, G)], the same at every call."""
 BLOCK = 2048
 """Frames whose scores are kept at a time; earlier ones are computed again from checkpoints."""
 
 
 def best_path(
-    log_emission: NDArray[np.float32],
+    log_emission: LogEmission,
+    count: int,
     emission: NDArray[np.intp],
     arc_from: NDArray[np.intp],
     arc_log: NDArray[np.float32],
@@ -20,29 +25,29 @@ def best_path(
 ) -> tuple[NDArray[np.intp], float]:
     """Return the most probable path and its log probability (-inf: no path).
 
-    log_emission : [shape=(T, G)], of G emission densities
+    log_emission : of G emission densities; asked for at most ``BLOCK`` + 1 frames at a time, for each at most twice
+    count        : frames, T
     emission     : [shape=(S,)], the density of each of S states
     arc_from     : [shape=(E,)], the source states of all arcs, sorted by target
     arc_log      : [shape=(E,)]
     arc_start    : [shape=(S,)], where each target's arcs begin; every state has at least one
     log_initial, log_final : [shape=(S,)]
     Returns path [shape=(T,)], score.
-    Cost: O(T·E) time, O((T / BLOCK + BLOCK)·S) memory.
+    Cost: O(T·E) time, O((T / BLOCK + BLOCK)·(S + G)) memory.
     """
     arcs = (emission, arc_from, arc_log, arc_start)
-    count = len(log_emission)
     starts = range(0, count, BLOCK)
-    first = (log_initial + log_emission[0, emission])[None]
+    first = (log_initial + log_emission(0, 1)[0, emission])[None]
     checkpoints, score = [first[0]], 0.0
     for start in starts[1:]:
-        delta, shift = _scores(checkpoints[-1], log_emission[start - BLOCK : start + 1], *arcs)
+        delta, shift = _scores(checkpoints[-1], log_emission(start - BLOCK, start + 1), *arcs)
         checkpoints.append(delta[-1])
         score += shift
     path = np.empty(count, np.intp)
     state = -1
     for start, checkpoint in zip(reversed(starts), reversed(checkpoints), strict=True):
         stop = min(start + BLOCK + 1, count)
-        delta, shift = _scores(checkpoint, log_emission[start:stop], *arcs)
+        delta, shift = _scores(checkpoint, log_emission(start, stop), *arcs)
         if state < 0:
             last = delta[-1] + log_final
             state = int(last.argmax())

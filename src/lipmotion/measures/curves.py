@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Clips = Sequence[Array]
+STILL_SHARE = 0.01
+"""Curves that move less than this, beside others of the same unit, are rounding or noise."""
 
 
 def correlation(generated: Array, original: Array) -> Array:
@@ -23,6 +25,14 @@ def correlation(generated: Array, original: Array) -> Array:
     scale = np.sqrt((a * a).sum(axis=0) * (b * b).sum(axis=0))
     moves = (np.ptp(generated, axis=0) > 0) & (np.ptp(original, axis=0) > 0) & (scale > 0)
     return (a * b).sum(axis=0) / np.where(moves, scale, np.inf)
+
+
+def moving(original: Clips, units: Sequence[str]) -> NDArray[np.bool_]:
+    """Return which channels move [shape=(P,)]: by more than ``STILL_SHARE`` of the widest of their unit."""
+    values = np.concatenate(original)
+    extents: Array = np.ptp(values, axis=0)
+    widest = {unit: max(e for e, other in zip(extents, units, strict=True) if other == unit) for unit in set(units)}
+    return extents > STILL_SHARE * np.array([widest[unit] for unit in units])
 
 
 def pooled_correlation(generated: Clips, original: Clips) -> Array:

@@ -5,32 +5,61 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 
 def table(figures: Mapping[str, Any]) -> str:
     """Return the figures of ``lipmotion.evaluate`` as text."""
-    lines = [f"split {figures['split']}: {figures['clips']} clips; closed under {figures['closed_under']:.4f}"]
+    closed, still = figures["closed_under"], figures["still_channels"]
+    lines = [f"split {figures['split']}: {figures['clips']} clips"]
+    lines[0] += f"; closed under {closed:.4f}" if closed is not None else ""
+    lines += [f"left out, for they do not move: {', '.join(still)}"] if still else []
     for name, condition in figures["conditions"].items():
-        lines += ["", name, f"  {'channel':9}{'ACC':>7}{'per clip':>10}{'nRMSE':>7}{'variance':>10}{'jerk':>7}"]
+        size = max(9, *map(len, condition["channels"]))
+        lines += ["", name, f"  {'channel':{size}}{'ACC':>7}{'per clip':>10}{'nRMSE':>7}{'variance':>10}{'jerk':>7}"]
         for channel, row in condition["channels"].items():
             lines.append(
-                f"  {channel:9}{row['acc']:7.3f}{row['acc_per_clip']:10.3f}{row['nrmse']:7.3f}"
-                f"{row['global_variance']:10.2f}{row['jerk']:7.2f}"
+                f"  {channel:{size}}{_number(row['acc'], '7.3f')}{_number(row['acc_per_clip'], '10.3f')}"
+                f"{_number(row['nrmse'], '7.3f')}{_number(row['global_variance'], '10.2f')}"
+                f"{_number(row['jerk'], '7.2f')}"
             )
         lines += _rest(condition)
     return "\n".join(lines)
 
 
 def _rest(condition: Mapping[str, Any]) -> list[str]:
+    lines = [
+        f"  mean ACC {condition['acc']:.3f}; AMSE {condition['amse']:.4f}; "
+        f"lag of {condition['leading']} {condition['lag_ms']:+.1f} ms"
+    ]
+    if "closures" not in condition:
+        return lines
     low, high = condition["opening_acc_95"]
     closures, phones = condition["closures"], condition["closures_p_b_m"]
     quiet, original = condition["silence"]["generated"], condition["silence"]["original"]
     return [
-        f"  opening ACC 95 % interval {low:.3f} to {high:.3f}; mean ACC {condition['acc']:.3f}; "
-        f"AMSE {condition['amse']:.4f}; lag {condition['lag_ms']:+.1f} ms",
-        f"  closures: score {closures['score']:.3f} of {closures['original']}, precision {closures['precision']:.3f} "
-        f"of {closures['generated']}, timing {closures['timing_ms']:+.0f} ms",
-        f"  p b m: recall {phones['recall']:.3f} of {phones['intervals']}, false closures "
-        f"{phones['false_per_minute']:.1f} a minute (original {phones['original_per_minute']:.1f})",
-        f"  silence: opening {quiet['mean']:.4f} ± {quiet['std']:.4f} "
-        f"(original {original['mean']:.4f} ± {original['std']:.4f}, {quiet['frames']} frames)",
+        f"  opening ACC 95 % interval {low:.3f} to {high:.3f};{lines[0][1:]}",
+        f"  closures: score {_number(closures['score'], '.3f')} of {closures['original']}, precision "
+        f"{_number(closures['precision'], '.3f')} of {closures['generated']}, timing "
+        f"{_number(closures['timing_ms'], '+.0f')} ms",
+        f"  p b m: recall {_number(phones['recall'], '.3f')} of {phones['intervals']}, false closures "
+        f"{_number(phones['false_per_minute'], '.1f')} a minute (original "
+        f"{_number(phones['original_per_minute'], '.1f')})",
+        f"  silence: opening {_number(quiet['mean'], '.4f')} ± {_number(quiet['std'], '.4f')} "
+        f"(original {_number(original['mean'], '.4f')} ± {_number(original['std'], '.4f')}, {quiet['frames']} frames)",
     ]
+
+
+def without_nan(figures: Any) -> Any:
+    """Return nested figures with None in the place of every number that is not finite: JSON knows no other."""
+    if isinstance(figures, dict):
+        return {key: without_nan(value) for key, value in figures.items()}
+    if isinstance(figures, list | tuple):
+        return type(figures)(map(without_nan, figures))
+    return None if isinstance(figures, float) and not np.isfinite(figures) else figures
+
+
+def _number(value: float | None, form: str) -> str:
+    """Return a figure as text, a dash in the same width where there is none."""
+    width = form.partition(".")[0].strip("+")
+    return f"{'–':>{width or 0}}" if value is None else format(value, form)

@@ -12,6 +12,7 @@ from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.transcribe import read_transcript, transcribe
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.read import read_audio
+from lipmotion.speech.recogniser import recogniser as cached_recogniser
 from lipmotion.types import Audio, Constraints, Generation, Speech, Timeline, Unit
 from lipmotion.units import Lexicon, words_of
 
@@ -30,6 +31,7 @@ def animate(
     model: Model | str | Path | None = None,
     lexicon: Lexicon | None = None,
     constraints: Constraints | None = None,
+    recogniser: str = "auto",
 ) -> Generation:
     """Return the lip motion that goes with speech.
 
@@ -39,15 +41,19 @@ def animate(
     model       : from ``load_model``, or its file; the shipped one by default
     lexicon     : pronunciations of words that the dictionary does not have
     constraints : values that the motion must take
+    recogniser  : ``own``: the model's own phone models; ``general``: those of many voices; ``auto``: both, the own ones
+                  as far as they know this voice
     Raises InputError: the recording, the transcript or a constraint is not usable.
     Raises AlignmentError: the transcript does not fit into the recording.
     """
     chosen = model if isinstance(model, Model) else load_model(model)
-    features = mfcc(speech if isinstance(speech, Audio) else read_audio(Path(speech)))
+    phones = cached_recogniser(chosen.phones, recogniser)
+    audio = speech if isinstance(speech, Audio) else read_audio(Path(speech))
+    features = mfcc(audio)
     if units is None:
         text = read_transcript(transcript) if isinstance(transcript, Path) else transcript
         words = words_of(text) if text is not None else None
-        units = transcribe(chosen.phones, features, words, lexicon or Lexicon())
+        units = transcribe(phones, audio, features, words, lexicon or Lexicon())
     return chosen.engine.generate(chosen.learned, Speech(features, units), constraints)
 
 
@@ -75,6 +81,9 @@ def write(
     """
     paths = [Path(output) for output in ([outputs] if isinstance(outputs, str | Path) else outputs)]
     check_outputs(paths, speech, rate_hz=rate_hz, fps=fps)
+    videos = [path for path in paths if path.suffix.lower() == VIDEO_SUFFIX]
+    if videos and "opening" not in generation.motion.names:
+        raise ExportError(f"{videos[0]}: the motion has no channel 'opening' to draw a face from; write motion files")
     written = generation.selected(channels) if channels is not None else generation
     if rate_hz is not None:
         written = written.resampled(rate_hz)

@@ -14,14 +14,18 @@ from lipmotion.errors import AlignmentError, CorpusError
 from lipmotion.measures import curves
 from lipmotion.measures.bootstrap import interval
 from lipmotion.measures.closures import closed_threshold, closure_figures, phone_closures
+from lipmotion.measures.report import without_nan
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.train import labels_of
 from lipmotion.pipeline.transcribe import report_guesses
-from lipmotion.speech.phones import recognise
+from lipmotion.speech.recogniser import Recogniser
+from lipmotion.speech.recogniser import recogniser as cached_recogniser
 from lipmotion.types import Motion, Speech, Timeline, Unit, Utterance
 from lipmotion.units import VISEMES, Lexicon, is_silent
 
-DISTANCES = ("opening", "width", "outer")
+OPENING = "opening"
+DISTANCES = (OPENING, "width", "outer")
+"""What is compared where faces were tracked; all other channels follow from points near these."""
 BILABIAL = VISEMES["bi"]
 SILENCE_MARGIN_S = 0.3
 """The mouth may still close, or already open, this close to speech."""
@@ -29,7 +33,7 @@ SILENCE_MARGIN_S = 0.3
 
 @dataclass(frozen=True, eq=False)
 class Clip:
-    """One utterance: original and generated distances at the camera's rate, frames without a face left out."""
+    """One utterance: original and generated curves at the recording's own rate, frames without a face left out."""
 
     original: NDArray[np.float64]
     generated: NDArray[np.float64]
@@ -38,80 +42,122 @@ class Clip:
 
 
 def evaluate(
-    model: Model, corpus: Corpus, *, split: str | None = "test", lexicon: Lexicon | None = None, seed: int = 0
+    model: Model,
+    corpus: Corpus,
+    *,
+    split: str | None = "test",
+    speakers: Sequence[str] = (),
+    lexicon: Lexicon | None = None,
+    recogniser: str = "auto",
+    seed: int = 0,
 ) -> dict[str, Any]:
     """Return all figures of docs/measures.md: audio only and, where there are transcripts, with them.
 
-    split : ``train``, ``val`` or ``test``; None: everything
+    split    : ``train``, ``val`` or ``test``; None: everything
+    speakers : theirs only; all by default
+    recogniser : as in ``animate``
 
-    The reference for what is speech and where its p, b, m are is the forced alignment, or recognition where
-    nothing is transcribed. The mouth counts as closed relative to the corpus's own training list (without
-    one: to the split itself).
-    Raises CorpusError: no utterances of this split, or corpus or model without the channels compared.
+    Compared are the lip distances or, in a corpus without them, every channel that moves in the recordings; figures
+    of closing, and of silence, need the channel ``opening``. What cannot be computed is None.
+    The reference for what is speech and where its p, b, m are is the labelled phones, else the forced alignment, or
+    recognition where nothing is transcribed. The mouth counts as closed relative to the corpus's own training list
+    (without one: to the split itself).
+    Raises CorpusError: no utterances of this split, or a model without the channels compared.
     Raises AlignmentError: a transcript does not fit into its recording.
     """
     lexicon = lexicon or Lexicon()
-    utterances = [corpus.utterance(name) for name in corpus.required(split)]
-    _check_channels("corpus", utterances[0].track.motion)
+    utterances = [corpus.utterance(name) for name in corpus.required(split, speakers)]
+    compared, still = _compared(utterances)
     report_guesses([word for utterance in utterances for word in utterance.words or ()], lexicon)
-    reference = [_reference(utterance, model, lexicon) for utterance in utterances]
-    threshold = closed_threshold([_openings(u) for u in _training(corpus) or utterances])
-    conditions = {"audio only": [recognise(model.phones, u.features) for u in utterances]}
-    if all(utterance.words for utterance in utterances):
+    phones = cached_recogniser(model.phones, recogniser)
+    reference = [_reference(utterance, phones, lexicon) for utterance in utterances]
+    threshold = None
+    if OPENING in compared:
+        threshold = closed_threshold([_openings(u) for u in _training(corpus, speakers) or utterances])
+    conditions = {"audio only": [phones.recognise(u.audio, u.features) for u in utterances]}
+    if all(utterance.words or utterance.phones for utterance in utterances):
         conditions["with transcript"] = reference
-    return {
+    figures = {
         "split": split or "all",
         "clips": len(utterances),
         "closed_under": threshold,
+        "still_channels": list(still),
         "conditions": {
             name: _figures(
-                [_clip(model, *row) for row in zip(utterances, units, reference, strict=True)], threshold, seed
+                [_clip(model, compared, *row) for row in zip(utterances, units, reference, strict=True)],
+                compared,
+                threshold,
+                seed,
             )
             for name, units in conditions.items()
         },
     }
+    plain: dict[str, Any] = without_nan(figures)
+    return plain
 
 
-def _training(corpus: Corpus) -> list[Utterance]:
-    return [corpus.utterance(name) for name in corpus.names("train")]
+def _compared(utterances: Sequence[Utterance]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the channels to compare, and those left out because they are still.
+
+    Raises CorpusError: the utterances have different channels, or nothing moves.
+    """
+    channels = utterances[0].track.motion.channels
+    if any(utterance.track.motion.channels != channels for utterance in utterances):
+        raise CorpusError("the utterances have different motion channels; evaluate one kind, with --speaker or --split")
+    names = utterances[0].track.motion.names
+    if set(names) >= set(DISTANCES):
+        return DISTANCES, ()
+    originals = [np.asarray(utterance.track.motion.values, float) for utterance in utterances]
+    moves = curves.moving(originals, [channel.unit for channel in channels])
+    if not moves.any():
+        raise CorpusError(f"none of {len(names)} motion channels moves in these {len(utterances)} utterances")
+    moving = tuple(name for name, moved in zip(names, moves, strict=True) if moved)
+    return moving, tuple(name for name in names if name not in moving)
+
+
+def _training(corpus: Corpus, speakers: Sequence[str]) -> list[Utterance]:
+    return [corpus.utterance(name) for name in corpus.names("train", speakers)]
 
 
 def _openings(utterance: Utterance) -> NDArray[np.float64]:
-    return np.asarray(utterance.track.motion["opening"], float)[np.asarray(utterance.track.seen)]
+    return np.asarray(utterance.track.motion[OPENING], float)[np.asarray(utterance.track.seen)]
 
 
-def _check_channels(owner: str, motion: Motion) -> None:
-    missing = [name for name in DISTANCES if name not in motion.names]
+def _check_channels(motion: Motion, compared: Sequence[str]) -> None:
+    missing = [name for name in compared if name not in motion.names]
     if missing:
-        raise CorpusError(f"the {owner} has no channels {', '.join(missing)}: these figures compare lip distances")
+        raise CorpusError(
+            f"the model has no channels {', '.join(missing[:6])}, which the corpus has: it learned other motion"
+        )
 
 
-def _reference(utterance: Utterance, model: Model, lexicon: Lexicon) -> Timeline[Unit]:
+def _reference(utterance: Utterance, phones: Recogniser, lexicon: Lexicon) -> Timeline[Unit]:
     try:
-        return labels_of(utterance, model.phones, lexicon)
+        return labels_of(utterance, phones, lexicon)
     except AlignmentError as error:
         raise AlignmentError(f"{utterance.name}: {error}; correct its transcript, or leave it out") from error
 
 
-def _clip(model: Model, utterance: Utterance, units: Timeline[Unit], reference: Timeline[Unit]) -> Clip:
+def _clip(
+    model: Model, compared: Sequence[str], utterance: Utterance, units: Timeline[Unit], reference: Timeline[Unit]
+) -> Clip:
     motion = utterance.track.motion
     seen = np.asarray(utterance.track.seen)
     time_s = (np.arange(len(motion.values)) / motion.rate_hz)[seen]
     generated = model.engine.generate(model.learned, Speech(utterance.features, units)).motion
-    _check_channels("model", generated)
+    _check_channels(generated, compared)
     spoken = tuple((s.start_s, s.end_s, s.label.phone) for s in reference if not is_silent(s.label.phone))
     return Clip(
-        original=np.stack([motion[name][seen] for name in DISTANCES], axis=1).astype(float),
-        generated=np.stack([np.interp(time_s, generated.time_s, generated[name]) for name in DISTANCES], axis=1),
+        original=np.stack([motion[name][seen] for name in compared], axis=1).astype(float),
+        generated=np.stack([np.interp(time_s, generated.time_s, generated[name]) for name in compared], axis=1),
         time_s=time_s,
         spoken=spoken,
     )
 
 
-def _figures(clips: Sequence[Clip], threshold: float, seed: int) -> dict[str, Any]:
+def _figures(clips: Sequence[Clip], compared: Sequence[str], threshold: float | None, seed: int) -> dict[str, Any]:
     generated, original = [clip.generated for clip in clips], [clip.original for clip in clips]
     rate_hz = float(1 / np.median(np.diff(clips[0].time_s)))
-    opening = [g[:, 0] for g in generated], [o[:, 0] for o in original]
     acc, clip_acc = curves.pooled_correlation(generated, original), curves.per_clip_correlation(generated, original)
     error, variance = curves.normalised_rmse(generated, original), curves.global_variance_ratio(generated, original)
     jerk = curves.jerk_ratio(generated, original)
@@ -123,21 +169,34 @@ def _figures(clips: Sequence[Clip], threshold: float, seed: int) -> dict[str, An
             "global_variance": float(variance[i]),
             "jerk": float(jerk[i]),
         }
-        for i, name in enumerate(DISTANCES)
+        for i, name in enumerate(compared)
     }
+    spread = np.concatenate(original).std(axis=0)
+    leading = compared.index(OPENING) if OPENING in compared else int(spread.argmax())
+    figures = {
+        "channels": per_channel,
+        "acc": float(acc.mean()),
+        "amse": curves.mean_distance(generated, original),
+        "leading": compared[leading],
+        "lag_ms": curves.lag_ms(_column(generated, leading), _column(original, leading), rate_hz),
+    }
+    if threshold is None:
+        return figures
+    return figures | _opening_figures(clips, compared.index(OPENING), threshold, rate_hz, seed)
+
+
+def _opening_figures(clips: Sequence[Clip], column: int, threshold: float, rate_hz: float, seed: int) -> dict[str, Any]:
+    """Return what only the opening of the mouth can tell."""
+    generated, original = [clip.generated[:, column] for clip in clips], [clip.original[:, column] for clip in clips]
     bilabial = [_on_kept_frames(clip, BILABIAL, rate_hz) for clip in clips]
     other_s = sum(end - start for clip in clips for start, end, phone in clip.spoken if phone not in BILABIAL)
     return {
-        "channels": per_channel,
-        "opening_acc_95": interval(_opening_acc, generated, original, seed),
-        "acc": float(acc.mean()),
-        "amse": curves.mean_distance(generated, original),
-        "lag_ms": curves.lag_ms(generated, original, rate_hz),
-        "closures": asdict(closure_figures(*opening, threshold, rate_hz)),
-        "closures_p_b_m": asdict(phone_closures(*opening, bilabial, other_s, threshold, rate_hz)),
+        "opening_acc_95": interval(_acc, generated, original, seed),
+        "closures": asdict(closure_figures(generated, original, threshold, rate_hz)),
+        "closures_p_b_m": asdict(phone_closures(generated, original, bilabial, other_s, threshold, rate_hz)),
         "silence": {
-            "generated": _silence(clips, [clip.generated for clip in clips]),
-            "original": _silence(clips, [clip.original for clip in clips]),
+            "generated": _silence(clips, generated),
+            "original": _silence(clips, original),
         },
     }
 
@@ -152,13 +211,17 @@ def _on_kept_frames(clip: Clip, phones: Sequence[str], rate_hz: float) -> list[t
     ]
 
 
-def _opening_acc(generated: curves.Clips, original: curves.Clips) -> float:
-    return float(curves.pooled_correlation([g[:, :1] for g in generated], [o[:, :1] for o in original])[0])
+def _column(side: curves.Clips, column: int) -> list[NDArray[np.float64]]:
+    return [clip[:, column : column + 1] for clip in side]
+
+
+def _acc(generated: curves.Clips, original: curves.Clips) -> float:
+    return float(curves.pooled_correlation([g[:, None] for g in generated], [o[:, None] for o in original])[0])
 
 
 def _silence(clips: Sequence[Clip], values: curves.Clips) -> dict[str, float]:
     """Return mean and standard deviation of the opening in silence away from speech."""
-    quiet = np.concatenate([v[_away_from_speech(clip), 0] for clip, v in zip(clips, values, strict=True)])
+    quiet = np.concatenate([v[_away_from_speech(clip)] for clip, v in zip(clips, values, strict=True)])
     if not len(quiet):
         return {"mean": float("nan"), "std": float("nan"), "frames": 0}
     return {"mean": float(quiet.mean()), "std": float(quiet.std()), "frames": len(quiet)}

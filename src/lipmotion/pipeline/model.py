@@ -22,7 +22,7 @@ from lipmotion.files import whole_file
 from lipmotion.stats.hmm.model import HmmConfig, UnitHmm, hmm_arrays, hmm_from_arrays
 
 FORMAT = "lipmotion.model"
-VERSION = 1
+VERSION = 2
 SHIPPED = "grid-s1.lipmotion"
 HEADER = "header.json"
 OLDEST_DATE = (1980, 1, 1, 0, 0, 0)

@@ -14,10 +14,12 @@ from lipmotion.measures.offset import Offset, offset, pooled_offset, shift_score
 from lipmotion.speech.lips import opening_speed, speed
 from lipmotion.speech.mfcc import WINDOW, mfcc
 from lipmotion.stats.resample import to_model_frames
-from lipmotion.types import FRAME_RATE_HZ, Audio, Utterance
+from lipmotion.types import FRAME_RATE_HZ, Audio, Timeline, Unit, Utterance
 
 REACH_S = 0.4
 """Offsets are looked for this far either way."""
+OPENING = "opening"
+"""The channel that is compared with the sound."""
 REMOVED_MS = "offset_removed_ms"
 """The key of an utterance's source that tells by how much its sound was moved."""
 LEAST_MOVE_S = 0.005
@@ -29,7 +31,7 @@ class CorpusOffsets:
     """How late the sound of a corpus is, now.
 
     clips       : by utterance
-    collections : by collection (one camera set-up, as a rule), all its clips together
+    collections : by collection and speaker (one camera set-up, as a rule), all the clips together
     members     : the utterances of each collection
     """
 
@@ -61,7 +63,7 @@ def clip_scores(utterance: Utterance) -> NDArray[np.float64]:
     motion = utterance.track.motion
     predicted = opening_speed(utterance.features)
     opening, valid = to_model_frames(
-        np.asarray(motion["opening"], float)[:, None],
+        np.asarray(motion[OPENING], float)[:, None],
         np.asarray(utterance.track.seen),
         motion.rate_hz,
         len(predicted),
@@ -71,7 +73,7 @@ def clip_scores(utterance: Utterance) -> NDArray[np.float64]:
 
 
 def offsets(corpus: Corpus) -> CorpusOffsets:
-    """Return how late the sound of each utterance and of each collection is.
+    """Return how late the sound of each utterance and of each collection is; only those with an ``opening`` count.
 
     The zero is that of the GRID corpus, whose lips the map behind it knows.
     Raises CorpusError: an utterance is damaged.
@@ -80,8 +82,9 @@ def offsets(corpus: Corpus) -> CorpusOffsets:
     members: dict[str, list[str]] = {}
     for name in corpus.names():
         utterance = corpus.utterance(name)
-        scores[name] = clip_scores(utterance)
-        members.setdefault(utterance.source.get("collection", ""), []).append(name)
+        if OPENING in utterance.track.motion.names:
+            scores[name] = clip_scores(utterance)
+            members.setdefault(_group(utterance), []).append(name)
     return CorpusOffsets(
         clips={name: offset(score, FRAME_RATE_HZ) for name, score in scores.items()},
         collections={
@@ -119,7 +122,20 @@ def _moved(utterance: Utterance, late_s: float) -> Utterance:
     moved = Audio(np.ascontiguousarray(samples), audio.rate_hz)
     total_ms = float(utterance.source.get(REMOVED_MS, 0)) + 1000 * shift / audio.rate_hz
     source = utterance.source | {REMOVED_MS: f"{total_ms:.1f}"}
-    return replace(utterance, audio=moved, features=mfcc(moved), source=source)
+    phones = utterance.phones and _phones_moved(utterance.phones, shift / audio.rate_hz)
+    return replace(utterance, audio=moved, features=mfcc(moved), source=source, phones=phones)
+
+
+def _phones_moved(phones: Timeline[Unit], late_s: float) -> Timeline[Unit]:
+    """Return labels in time that begin with the sound again."""
+    spans = [replace(span, start_s=max(span.start_s, 0.0)) for span in phones.shifted(-late_s) if span.end_s > 0]
+    return Timeline((replace(spans[0], start_s=0.0), *spans[1:]))
+
+
+def _group(utterance: Utterance) -> str:
+    """Return the collection; speakers of one are recorded apart, as a rule."""
+    collection = utterance.source.get("collection", "")
+    return f"{collection} {utterance.speaker}".strip()
 
 
 def _late(seconds: float) -> str:

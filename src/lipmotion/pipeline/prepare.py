@@ -26,9 +26,10 @@ from lipmotion.corpora.discover import discover
 from lipmotion.corpora.entry import quantised, read_entry, write_utterance
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import CorpusError, ExportError, InputError, MissingDependencyError
+from lipmotion.pipeline.given import DIGESTS, digest, given_phones, given_track
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.read import read_audio
-from lipmotion.types import Utterance
+from lipmotion.types import Track, Utterance
 from lipmotion.vision.packages import versions
 from lipmotion.vision.track import track
 
@@ -84,7 +85,7 @@ def prepare(
 ) -> PrepareReport:
     """Turn a folder of recordings into a corpus, or add them to one.
 
-    directory : GRID's layout, or any folder of videos (``corpora.discover`` says which)
+    directory : GRID's or FACEGOOD's layout, or any folder of videos or of sounds with motion (docs/corpora.md)
     output    : the corpus; utterances in it that are up to date are kept, so a stopped run goes on where it stopped
     workers   : processes, by default one a core. With more than one, a script must call this under
                 ``if __name__ == "__main__":``, as for every process pool
@@ -93,16 +94,16 @@ def prepare(
     A recording that cannot be used is reported and left out. The corpus does not depend on ``workers``, nor on how
     often it was interrupted.
     Raises InputError, CorpusError: no recordings, none of them usable, or ``output`` is something else.
-    Raises MissingDependencyError: MediaPipe or OpenCV is not installed. Raises ExportError: the disk is full.
+    Raises MissingDependencyError: there are videos, and MediaPipe or OpenCV is not installed.
+    Raises ExportError: the disk is full.
     """
     directory, output = Path(directory), Path(output)
     start_s = time.monotonic()
     found = discover(directory)
-    packages = versions()
+    packages = versions() if any(item.curves is None for item in found.items) else {}
     is_new = not output.exists()
     corpus = Corpus.create(output)
-    settings = {"recipe": RECIPE, "tracker": f"mediapipe {packages['mediapipe']}", "crops": "yes" if crops else "no"}
-    jobs = [_job(item, directory.resolve(), corpus, packages, settings) for item in found.items]
+    jobs = [_job(item, directory.resolve(), corpus, packages, crops) for item in found.items]
     try:
         outcomes = list(_with_progress(_outcomes(jobs, workers or os.cpu_count() or 1), len(jobs), progress))
     finally:
@@ -134,16 +135,19 @@ def _report(corpus: Corpus, found: Recordings, outcomes: list[_Outcome], seconds
     )
 
 
-def _job(
-    recording: Recording, directory: Path, corpus: Corpus, packages: dict[str, str], settings: dict[str, str]
-) -> _Job:
+def _job(recording: Recording, directory: Path, corpus: Corpus, packages: dict[str, str], crops: bool) -> _Job:
     collection = "/".join(directory.parts[-2:]).strip("/")
     name = recording.name
-    if _is_taken(corpus.folder(name), recording.video, collection):
+    if _is_taken(corpus.folder(name), recording.file, collection):
         name = f"{collection.replace('/', '-')}-{name}"
+    if recording.curves is None:
+        settings = {"tracker": f"mediapipe {packages['mediapipe']}", "crops": "yes" if crops else "no"}
+    else:
+        settings, packages = {"tracker": "none: motion was given"}, {"av": metadata.version("av")}
+    settings["recipe"] = RECIPE
     source = {
         "collection": collection,
-        "file": recording.video.name,
+        "file": recording.file.name,
         "lipmotion": metadata.version("lipmotion"),
         **packages,
         **recording.rights,
@@ -171,8 +175,9 @@ def _sha256(path: Path) -> str:
 def _process(job: _Job) -> _Outcome:
     name = job.recording.name
     try:
-        source = job.source | {"sha256": _sha256(job.recording.video), "bytes": str(job.recording.video.stat().st_size)}
-        entry = _kept(job, source["sha256"])
+        sound = job.recording.file
+        source = job.source | {"sha256": _sha256(sound), "bytes": str(sound.stat().st_size)} | digest(job.recording)
+        entry = _kept(job, source)
         if entry is not None:
             return _Outcome(name, kept=True, unseen=int(entry["unseen_frames"]), notes=tuple(entry.get("notes", ())))
         utterance = _utterance(job, source)
@@ -182,33 +187,43 @@ def _process(job: _Job) -> _Outcome:
     except InputError as error:
         return _Outcome(name, problem=str(error))
     except Exception as error:  # one strange file must not stop the rest
-        return _Outcome(name, problem=f"{job.recording.video}: {type(error).__name__}: {error}")
+        return _Outcome(name, problem=f"{job.recording.file}: {type(error).__name__}: {error}")
     return _Outcome(name, unseen=int((~utterance.track.seen).sum()), notes=utterance.track.notes)
 
 
-def _kept(job: _Job, sha256: str) -> dict[str, Any] | None:
+def _kept(job: _Job, source: dict[str, str]) -> dict[str, Any] | None:
     """Return the description of an utterance that is up to date, None if there is none."""
     try:
         entry = read_entry(job.folder)
     except CorpusError:
         return None
     words = None if job.recording.words is None else list(job.recording.words)
-    wanted = (sha256, words, job.recording.split, job.settings)
-    found = (entry["source"].get("sha256"), entry["words"], entry["split"], entry["settings"])
+    digests = [source.get(key) for key in DIGESTS]
+    wanted = (digests, words, job.recording.split, job.recording.speaker, job.settings)
+    made_of = [entry["source"].get(key) for key in DIGESTS]
+    found = (made_of, entry["words"], entry["split"], entry.get("speaker", ""), entry["settings"])
     return entry if found == wanted else None
 
 
 def _utterance(job: _Job, source: dict[str, str]) -> Utterance:
-    audio = quantised(read_audio(job.recording.video))
+    audio = quantised(read_audio(job.recording.file))
     return Utterance(
         name=job.recording.name,
         audio=audio,
         features=mfcc(audio),
-        track=track(job.recording.video, crops=job.settings["crops"] == "yes"),
+        track=_track(job, audio.duration_s),
         words=job.recording.words,
         split=job.recording.split,
         source=source,
+        speaker=job.recording.speaker,
+        phones=given_phones(job.recording, audio.duration_s),
     )
+
+
+def _track(job: _Job, duration_s: float) -> Track:
+    if job.recording.curves is not None:
+        return given_track(job.recording.curves, duration_s)
+    return track(job.recording.file, crops=job.settings["crops"] == "yes")
 
 
 def _with_progress(outcomes: Iterator[_Outcome], count: int, progress: bool) -> Iterator[_Outcome]:

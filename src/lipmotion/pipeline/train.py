@@ -6,6 +6,7 @@ import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib import metadata
+from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -16,11 +17,12 @@ from lipmotion.errors import AlignmentError, CorpusError, InputError
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.transcribe import phones_in_time, report_guesses
 from lipmotion.speech.phones import train_phones
+from lipmotion.speech.recogniser import Recogniser
 from lipmotion.stats.em import Monitor, silent_monitor
 from lipmotion.stats.hmm.model import HmmConfig, UnitHmm
 from lipmotion.stats.resample import to_model_frames
 from lipmotion.types import FRAME_RATE_HZ, Example, Features, Motion, Speech, Timeline, Track, Unit, Utterance
-from lipmotion.units import Lexicon
+from lipmotion.units import Lexicon, is_silent
 
 LOG = logging.getLogger("lipmotion")
 
@@ -44,6 +46,7 @@ def train(
     *,
     split: str | None = "train",
     names: Sequence[str] | None = None,
+    speakers: Sequence[str] = (),
     engine: Engine[Any] | None = None,
     recogniser: HmmConfig | None = None,
     lexicon: Lexicon | None = None,
@@ -54,30 +57,36 @@ def train(
     corpus     : from ``prepare``
     split      : the list to train on; None: all utterances
     names      : these utterances only, whatever their list (learning curves)
+    speakers   : theirs only; all by default
     engine     : with its configuration; the trajectory engine by default
     recogniser : configuration of the phone models
-    Utterances without a transcript are recognised, by the phone models of the transcribed ones or, where there
-    are none, by those of the shipped model.  Nothing here is random: the same corpus gives the same model.
+    Phones that are labelled are taken as they are. Utterances without a transcript are recognised, by the phone models
+    of the others or, where there are none, by those of the shipped model.
+    Nothing here is random: the same corpus gives the same model.
     Raises CorpusError: no such utterances, or nothing in them to learn from.
     """
     lexicon = lexicon or Lexicon()
     engine = engine or engine_named("trajectory", {})
-    chosen = tuple(names) if names is not None else corpus.required(split)
+    chosen = tuple(names) if names is not None else corpus.required(split, speakers)
     if not chosen:
         raise CorpusError(f"{corpus.path}: an empty list of names was given; name at least one utterance")
     utterances = [corpus.utterance(name) for name in chosen]
     phones = _phones(utterances, lexicon, recogniser or HmmConfig(), monitor)
-    examples, skipped = _examples(utterances, phones, lexicon)
+    examples, skipped = _examples(utterances, Recogniser(phones), lexicon)
     fit = engine.fit(examples, monitor)
     used = tuple(example.name for example in examples)
     about = _about(corpus, utterances, "given names" if names is not None else split or "all", len(used))
+    if speakers:
+        about["speakers"] = sorted(set(speakers))
     return Model(phones, engine, fit.model, about), TrainReport(used, skipped, fit.figures)
 
 
-def labels_of(utterance: Utterance, phones: UnitHmm, lexicon: Lexicon) -> Timeline[Unit]:
-    """Return the phones of an utterance: aligned if its words are known, else recognised."""
+def labels_of(utterance: Utterance, phones: Recogniser, lexicon: Lexicon) -> Timeline[Unit]:
+    """Return the phones of an utterance: labelled, else aligned if its words are known, else recognised."""
+    if utterance.phones is not None:
+        return utterance.phones
     features = Features(np.asarray(utterance.features.values), utterance.features.duration_s)
-    return phones_in_time(phones, features, utterance.words, lexicon)
+    return phones_in_time(phones, utterance.audio, features, utterance.words, lexicon)
 
 
 def model_motion(track: Track, frames: int) -> tuple[Motion, Any]:
@@ -90,13 +99,22 @@ def model_motion(track: Track, frames: int) -> tuple[Motion, Any]:
 
 
 def _phones(utterances: Sequence[Utterance], lexicon: Lexicon, config: HmmConfig, monitor: Monitor) -> UnitHmm:
-    spoken = [(u.features, u.words) for u in utterances if u.words and _can_be_said(u.words, lexicon)]
-    if not spoken:
+    spoken = [(u.audio, u.words) for u in utterances if u.phones is None and u.words and _can_be_said(u.words, lexicon)]
+    labelled = [(u.audio, _runs(u.phones)) for u in utterances if u.phones is not None]
+    if not spoken and not labelled:
         LOG.warning("no transcripts in the corpus: its phones are recognised by the shipped model")
         return load_model().phones
     said = dict.fromkeys(word for _, words in spoken for word in words)
     report_guesses(tuple(said), lexicon)
-    return train_phones(spoken, lexicon, config, monitor)
+    runs = {" ".join(run): (run,) for _, found in labelled for run in found}
+    as_words = [(audio, tuple(map(" ".join, found))) for audio, found in labelled]
+    return train_phones([*spoken, *as_words], Lexicon(lexicon.user | runs), config, monitor)
+
+
+def _runs(phones: Timeline[Unit]) -> list[tuple[str, ...]]:
+    """Return the phones spoken between one silence and the next: each is a word that can be said in one way."""
+    names = (span.label.phone for span in phones)
+    return [tuple(run) for silent, run in groupby(names, key=is_silent) if not silent]
 
 
 def _can_be_said(words: Sequence[str], lexicon: Lexicon) -> bool:
@@ -107,7 +125,7 @@ def _can_be_said(words: Sequence[str], lexicon: Lexicon) -> bool:
 
 
 def _examples(
-    utterances: Sequence[Utterance], phones: UnitHmm, lexicon: Lexicon
+    utterances: Sequence[Utterance], phones: Recogniser, lexicon: Lexicon
 ) -> tuple[list[Example], dict[str, str]]:
     examples: list[Example] = []
     skipped: dict[str, str] = {}

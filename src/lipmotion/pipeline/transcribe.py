@@ -7,31 +7,33 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from lipmotion.errors import InputError
-from lipmotion.speech.phones import align, recognise
-from lipmotion.stats.hmm.model import UnitHmm
-from lipmotion.types import Features, Timeline, Unit
+from lipmotion.speech.recogniser import Recogniser
+from lipmotion.types import Audio, Features, Timeline, Unit
 from lipmotion.units import Lexicon
 
 LOG = logging.getLogger("lipmotion")
 
 
-def transcribe(phones: UnitHmm, features: Features, words: Sequence[str] | None, lexicon: Lexicon) -> Timeline[Unit]:
+def transcribe(
+    phones: Recogniser, audio: Audio, features: Features, words: Sequence[str] | None, lexicon: Lexicon
+) -> Timeline[Unit]:
     """Return the phones of a recording.
 
-    words : what is said in it, lower case, or None
+    features : of the audio, from ``mfcc``
+    words    : what is said in it, lower case, or None
     Raises AlignmentError: the words do not fit into the recording.
     """
     report_guesses(words or (), lexicon)
-    return phones_in_time(phones, features, words, lexicon)
+    return phones_in_time(phones, audio, features, words, lexicon)
 
 
 def phones_in_time(
-    phones: UnitHmm, features: Features, words: Sequence[str] | None, lexicon: Lexicon
+    phones: Recogniser, audio: Audio, features: Features, words: Sequence[str] | None, lexicon: Lexicon
 ) -> Timeline[Unit]:
     """Return the same without a word about guesses, for many recordings."""
     if words is None:
-        return recognise(phones, features)
-    return align(phones, features, words, lexicon)
+        return phones.recognise(audio, features)
+    return phones.align(audio, features, words, lexicon)
 
 
 def read_transcript(path: Path) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cache
 
 import numpy as np
@@ -17,25 +18,37 @@ HOP = 160  # 10 ms
 FFT_SIZE = 512
 FILTERS = 26
 CEPSTRA = 12
+LOG_ENERGY = 12
+"""The column of the features that holds the log energy."""
 LIFTER = 22
 PRE_EMPHASIS = 0.97
 DYNAMIC_RANGE = 1e-8
 """Powers are floored this far below the loudest of the recording (80 dB): digital silence has a logarithm."""
 LOUDEST = 1e6
 """Samples beyond are damage, whatever their full scale was; their squares would not be finite."""
+KNEE_HZ = 6500.0
+"""Frequencies are warped in full up to here, or until they are as high as this."""
 BLOCK = 4096
 """Frames transformed at a time: memory stays bounded for any length."""
 
 
-def mfcc(audio: Audio) -> Features:
+def mfcc(audio: Audio, warp: float = 1.0) -> Features:
     """Return 39 normalised features a frame: c1–c12, log energy, their Δ and ΔΔ.
 
+    warp : factor by which frequencies are stretched before the filters, to make vocal tracts of other lengths alike
     Frame n is centred at n · 10 ms, the signal reflected at both ends: T = floor(duration · 100) + 1.
     Mean and variance are normalised over the recording.
     Raises InputError: the rate is not 16 kHz, the recording is shorter than one window, or not one channel of
     finite samples.
     Source: Xie & Liu 2007, §5.1; details in the project's conventions.
     """
+    samples = checked_samples(audio)
+    static = np.concatenate([log_mel(samples, _filters(warp)) @ _cosine(), log_energy(samples)[:, None]], axis=1)
+    return Features(normalised(_with_deltas(static)), audio.duration_s)
+
+
+def checked_samples(audio: Audio) -> NDArray[np.float32]:
+    """Return samples that features can be computed of. Raises InputError: as ``mfcc`` says."""
     if audio.rate_hz != SPEECH_RATE_HZ:
         raise InputError(f"speech features need {SPEECH_RATE_HZ} Hz, found {audio.rate_hz} Hz; resample first")
     if audio.samples.ndim != 1 or len(audio.samples) < WINDOW:
@@ -43,7 +56,7 @@ def mfcc(audio: Audio) -> Features:
     peak = float(np.maximum(audio.samples.max(), -audio.samples.min()))  # no copy of an hour
     if not peak < LOUDEST:
         raise InputError(f"speech features need finite samples, full scale 1, found a peak of {peak:g}")
-    return Features(normalised(_with_deltas(_static(audio.samples))), audio.duration_s)
+    return audio.samples.astype(np.float32, copy=False)
 
 
 def _with_deltas(static: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -75,35 +88,47 @@ def normalised(values: NDArray[np.float32]) -> NDArray[np.float32]:
     return scaled
 
 
-def _static(samples: NDArray[np.float32]) -> NDArray[np.float32]:
-    count = int(len(samples) / SPEECH_RATE_HZ * FRAME_RATE_HZ + 1e-9) + 1
-    mel = np.empty((count, FILTERS), np.float32)
-    energy = np.empty(count, np.float32)
-    for start in range(0, count, BLOCK):
-        block = slice(start, min(start + BLOCK, count))
+def log_mel(samples: NDArray[np.float32], filters: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return the log power in every filter, floored 80 dB under the loudest [shape=(T, F)].
+
+    filters : weights of the powers from 0 to 8 kHz [shape=(257, F)]
+    """
+    window = np.hamming(WINDOW).astype(np.float32)
+    power = np.empty((_frame_count(samples), filters.shape[1]), np.float32)
+    for block in _blocks(len(power)):
         heard = _heard(samples, block)
-        mel[block] = _mel_power(_frames(heard[1:] - np.float32(PRE_EMPHASIS) * heard[:-1]))
-        energy[block] = np.square(_frames(heard[1:])).sum(axis=1)
-    cepstra = _log_power(mel) @ _cosine()
-    return np.concatenate([cepstra, _log_power(energy)[:, None]], axis=1)
+        emphasised = heard[1:] - np.float32(PRE_EMPHASIS) * heard[:-1]
+        spectrum = np.fft.rfft(_frames(emphasised) * window, FFT_SIZE)
+        power[block] = (np.square(spectrum.real) + np.square(spectrum.imag)) @ filters
+    return _log_power(power)
+
+
+def log_energy(samples: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return the logarithm of the energy around every frame, floored 80 dB under the loudest [shape=(T,)]."""
+    energy = np.empty(_frame_count(samples), np.float32)
+    for block in _blocks(len(energy)):
+        energy[block] = np.square(_frames(_heard(samples, block)[1:])).sum(axis=1)
+    return _log_power(energy)
 
 
 def _heard(samples: NDArray[np.float32], block: slice) -> NDArray[np.float32]:
     """Return the samples of a block of frames, and the one before; beyond both ends they are reflected."""
     half = WINDOW // 2
     first, last = block.start * HOP - half - 1, (block.stop - 1) * HOP + half
-    inside = samples[max(first, 0) : min(last, len(samples))].astype(np.float32)
+    inside = samples[max(first, 0) : min(last, len(samples))]
     return np.pad(inside, (max(-first, 0), max(last - len(samples), 0)), mode="reflect")
+
+
+def _frame_count(samples: NDArray[np.float32]) -> int:
+    return int(len(samples) / SPEECH_RATE_HZ * FRAME_RATE_HZ + 1e-9) + 1
+
+
+def _blocks(frames: int) -> Iterator[slice]:
+    return (slice(start, min(start + BLOCK, frames)) for start in range(0, frames, BLOCK))
 
 
 def _frames(samples: NDArray[np.float32]) -> NDArray[np.float32]:
     return sliding_window_view(samples, WINDOW)[::HOP]
-
-
-def _mel_power(frames: NDArray[np.float32]) -> NDArray[np.float32]:
-    spectrum = np.fft.rfft(frames * np.hamming(WINDOW).astype(np.float32), FFT_SIZE)
-    power: NDArray[np.float32] = (np.square(spectrum.real) + np.square(spectrum.imag)) @ _filters()
-    return power
 
 
 def _log_power(power: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -113,13 +138,19 @@ def _log_power(power: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 @cache
-def _filters() -> NDArray[np.float32]:
-    """Triangles, equally spaced in mel from 0 to 8 kHz [shape=(257, 26)]."""
-    bins = _mel(np.arange(FFT_SIZE // 2 + 1) * SPEECH_RATE_HZ / FFT_SIZE)
+def _filters(warp: float) -> NDArray[np.float32]:
+    """Triangles, equally spaced in mel from 0 to 8 kHz, of warped frequencies [shape=(257, 26)]."""
+    bins = _mel(_warped(np.arange(FFT_SIZE // 2 + 1) * SPEECH_RATE_HZ / FFT_SIZE, warp))
     edges = np.linspace(0, _mel(np.array(SPEECH_RATE_HZ / 2)), FILTERS + 2)
     rising = (bins[:, None] - edges[:-2]) / (edges[1:-1] - edges[:-2])
     falling = (edges[2:] - bins[:, None]) / (edges[2:] - edges[1:-1])
     return np.maximum(0, np.minimum(rising, falling)).astype(np.float32)
+
+
+def _warped(hertz: NDArray[np.float64], warp: float) -> NDArray[np.float64]:
+    """Return stretched frequencies: by ``warp`` up to a knee, then a straight line to 8 kHz, which stays."""
+    knee, top = KNEE_HZ * min(1.0, 1 / warp), SPEECH_RATE_HZ / 2
+    return np.where(hertz <= knee, hertz * warp, warp * knee + (top - warp * knee) * (hertz - knee) / (top - knee))
 
 
 def _mel(hertz: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -3,13 +3,14 @@
 from lipmotion.types.audio import Audio
 from lipmotion.types.features import FRAME_RATE_HZ, Features
 from lipmotion.types.generation import Constraints, Example, Generation, Pin, Speech, Trace
-from lipmotion.types.motion import EYE_DISTANCE, Channel, Motion
+from lipmotion.types.motion import EYE_DISTANCE, WEIGHT, Channel, Motion
 from lipmotion.types.timeline import Span, Timeline, Unit
 from lipmotion.types.utterance import Track, Utterance
 
 __all__ = [
     "EYE_DISTANCE",
     "FRAME_RATE_HZ",
+    "WEIGHT",
     "Audio",
     "Channel",
     "Constraints",

@@ -11,6 +11,8 @@ from lipmotion.errors import InputError
 
 EYE_DISTANCE = "eye_distance"
 """The unit of all tracked distances: that between the outer eye corners."""
+WEIGHT = "weight"
+"""The unit of blendshapes: 0 is absent, 1 is whole; never less than 0."""
 
 
 @dataclass(frozen=True)

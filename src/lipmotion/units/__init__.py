@@ -1,6 +1,6 @@
 """What is spoken: phones, visemes, words. Data and look-ups, no audio."""
 
-from lipmotion.units.lexicon import Lexicon, Pronunciation
+from lipmotion.units.lexicon import Lexicon, Pronunciation, phone_named, with_reduced_vowels
 from lipmotion.units.phones import LIP_CLOSING, PAUSE, PHONES, RELATIVES, SILENCE, is_silent, stand_in
 from lipmotion.units.transcript import words_of
 from lipmotion.units.visemes import VISEME_OF, VISEMES
@@ -16,6 +16,8 @@ __all__ = [
     "Lexicon",
     "Pronunciation",
     "is_silent",
+    "phone_named",
     "stand_in",
+    "with_reduced_vowels",
     "words_of",
 ]

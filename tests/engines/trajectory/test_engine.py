@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -6,7 +8,7 @@ from lipmotion.engines import engine_named
 from lipmotion.engines.trajectory.engine import TrajectoryConfig
 from lipmotion.errors import InputError
 from lipmotion.stats.em import silent_monitor
-from lipmotion.types import Constraints, Pin
+from lipmotion.types import WEIGHT, Channel, Constraints, Pin
 
 ENGINE = engine_named("trajectory", {})
 MODEL = ENGINE.fit(examples(), silent_monitor).model
@@ -96,3 +98,39 @@ def test_an_edited_unit_changes_the_motion_around_it_only():
     assert np.abs(one - two)[80:90].max() > 0.05
     assert one[:60] == pytest.approx(two[:60], abs=1e-4)
     assert one[-60:] == pytest.approx(two[-60:], abs=1e-4)
+
+
+def weighted():
+    """The same motion as weights of blendshapes that are mostly 0, and one that is always 0.3."""
+    channels = tuple(Channel(name, WEIGHT) for name in ("jaw", "funnel", "still"))
+    for number, one in enumerate(examples()):
+        opening = one.motion["opening"]
+        shapes = [np.maximum(opening - 0.1, 0), np.maximum(0.5 - one.motion["width"], 0), 0 * opening + 0.3]
+        yield replace(
+            one, name=f"{number}", motion=replace(one.motion, values=np.stack(shapes, axis=1), channels=channels)
+        )
+
+
+def test_blendshapes_without_an_opening():
+    """No closing is pinned; weights are followed, never negative, and what never moves stays where it is."""
+    model = ENGINE.fit(list(weighted()), silent_monitor).model
+    assert model.closure is None
+    kept = ENGINE.from_arrays(ENGINE.to_arrays(model))
+    spoken = speech(timeline(("t", "aa", "p", "uw", "s", "aa", "m", "iy")))
+    result = ENGINE.generate(kept, spoken)
+    assert result.motion.values.min() >= 0
+    assert result.motion["jaw"].max() > 0.1
+    assert result.motion["funnel"].max() > 0.04
+    np.testing.assert_allclose(result.motion["still"], 0.3, atol=1e-3)
+    pressed = ENGINE.generate(kept, spoken, Constraints((Pin(0.9, "jaw", 0.25),)))
+    assert pressed.motion["jaw"][90] == 0.25
+    with pytest.raises(InputError, match=r"sets jaw to -0\.1, required at least 0"):
+        ENGINE.generate(kept, spoken, Constraints((Pin(0.9, "jaw", -0.1),)))
+
+
+def test_a_mouth_at_rest_without_an_opening():
+    """In silence the pose is the median one there, whatever the channels are."""
+    model = ENGINE.fit(list(weighted()), silent_monitor).model
+    quiet = ENGINE.generate(model, speech(timeline(()))).motion
+    np.testing.assert_allclose(quiet["jaw"], 0, atol=1e-3)
+    np.testing.assert_allclose(quiet["funnel"], 0, atol=1e-3)

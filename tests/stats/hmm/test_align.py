@@ -3,6 +3,7 @@ import pytest
 
 from lipmotion.errors import AlignmentError
 from lipmotion.stats.hmm.align import align_units, chain_of, choose_pronunciations, state_path
+from lipmotion.stats.hmm.evidence import heard
 from oracles import sequences
 from stats.hmm.synthetic import PAUSE, SILENCE, known_hmm, random_hmm, recordings, speaker
 
@@ -27,20 +28,22 @@ def test_no_segmentation_is_better(seed):
     features = np.random.default_rng(seed).normal(0, 1.5, (10, 2)).astype(np.float32)
     units = ("sil", "b") if seed % 2 else ("a", "b")
     _, wanted, _ = sequences.best(hmm, features, [units])
-    assert align_units(hmm, features, units).tolist() == wanted
+    assert align_units(hmm, heard(hmm, features), units).tolist() == wanted
 
 
 def test_known_boundaries_are_found():
     who = speaker()
     transcribed, said, edges = recordings(3, 8, who)
     for utterance, units, where in zip(transcribed, said, edges, strict=True):
-        assert align_units(known_hmm(who), utterance.features, units) == pytest.approx(where, abs=1)
+        assert align_units(known_hmm(who), heard(known_hmm(who), utterance.features), units) == pytest.approx(
+            where, abs=1
+        )
 
 
 def test_the_path_moves_one_state_at_a_time():
     hmm = random_hmm(6)
     features = np.random.default_rng(6).normal(0, 1.5, (40, 2)).astype(np.float32)
-    names, path = state_path(hmm, features, ("sil", "a", "b", "sil"))
+    names, path = state_path(hmm, heard(hmm, features), ("sil", "a", "b", "sil"))
     assert (path[0], path[-1]) == (0, len(names) - 1)
     assert set(np.diff(path)) <= {0, 1}
 
@@ -48,8 +51,14 @@ def test_the_path_moves_one_state_at_a_time():
 def test_too_short_a_recording_says_so():
     hmm = random_hmm(7)
     with pytest.raises(AlignmentError, match="12 states in 11 frames"):
-        align_units(hmm, np.zeros((11, 2), np.float32), ("sil", "a", "b", "sil"))
-    assert align_units(hmm, np.zeros((12, 2), np.float32), ("sil", "a", "b", "sil")).tolist() == [0, 3, 6, 9, 12]
+        align_units(hmm, heard(hmm, np.zeros((11, 2), np.float32)), ("sil", "a", "b", "sil"))
+    assert align_units(hmm, heard(hmm, np.zeros((12, 2), np.float32)), ("sil", "a", "b", "sil")).tolist() == [
+        0,
+        3,
+        6,
+        9,
+        12,
+    ]
 
 
 WORDS = ((("a",), ("b", "c")), (("d",),), (("c", "e"), ("b",), ("e", "e")))
@@ -66,24 +75,26 @@ def test_the_pronunciation_and_the_pauses_that_were_said_are_chosen(first, last,
         wanted.append((word, variant, WORDS[word][variant]))
     wanted.append((-1, 0, (SILENCE,)))
     features, _ = who.say(np.random.default_rng(first + 2 * last), [unit for part in wanted for unit in part[2]])
-    assert choose_pronunciations(known_hmm(who), features, WORDS, PAUSE) == wanted
+    assert choose_pronunciations(known_hmm(who), heard(known_hmm(who), features), WORDS, PAUSE) == wanted
 
 
 def test_order_of_the_variants_changes_nothing():
     who = speaker()
     features, _ = who.say(np.random.default_rng(5), (SILENCE, "b", "c", "d", "e", "e", SILENCE))
-    straight = choose_pronunciations(known_hmm(who), features, WORDS, PAUSE)
-    back = choose_pronunciations(known_hmm(who), features, [word[::-1] for word in WORDS], PAUSE)
+    straight = choose_pronunciations(known_hmm(who), heard(known_hmm(who), features), WORDS, PAUSE)
+    back = choose_pronunciations(known_hmm(who), heard(known_hmm(who), features), [word[::-1] for word in WORDS], PAUSE)
     assert [part.units for part in back] == [part.units for part in straight]
 
 
 def test_words_that_do_not_fit_say_so():
     who = speaker()
     with pytest.raises(AlignmentError, match="too short"):
-        choose_pronunciations(known_hmm(who), np.zeros((14, 4), np.float32), WORDS, PAUSE)
+        choose_pronunciations(known_hmm(who), heard(known_hmm(who), np.zeros((14, 4), np.float32)), WORDS, PAUSE)
 
 
 def test_no_words_are_silence():
     who = speaker()
     features, _ = who.say(np.random.default_rng(5), (SILENCE,))
-    assert [part.units for part in choose_pronunciations(known_hmm(who), features, (), PAUSE)] == [(SILENCE,)] * 2
+    assert [
+        part.units for part in choose_pronunciations(known_hmm(who), heard(known_hmm(who), features), (), PAUSE)
+    ] == [(SILENCE,)] * 2

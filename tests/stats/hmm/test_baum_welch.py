@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from lipmotion.stats.em import silent_monitor
 from lipmotion.stats.hmm import train
 from lipmotion.stats.hmm.align import chain_of
+from lipmotion.stats.hmm.evidence import heard
 from lipmotion.stats.hmm.model import HmmConfig
 from lipmotion.stats.hmm.train import baum_welch, expect
 from oracles import chains
@@ -151,7 +152,7 @@ def coarticulated(count: int):
         x = utterance.features.copy()
         path = chain_of(known_hmm(who), units)
         first = {position for position, unit in enumerate(units) if unit == "a" and units[position - 1] == "d"}
-        nearest = train.state_path(known_hmm(who), x, units)[1]
+        nearest = train.state_path(known_hmm(who), heard(known_hmm(who), x), units)[1]
         for position in first:
             x[(path.positions[nearest] == position) & (nearest % 3 == 0)] += [0, 0, 1.5, 0]
         data.append(x)

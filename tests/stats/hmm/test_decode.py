@@ -3,7 +3,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from lipmotion.stats.hmm.decode import decode_units
+from lipmotion.stats.hmm.decode import decode_units, unit_loop
+from lipmotion.stats.hmm.evidence import heard
 from lipmotion.stats.hmm.model import HmmConfig
 from oracles import sequences
 from stats.hmm.synthetic import SILENCE, UNITS, known_hmm, random_hmm, sentences, speaker
@@ -12,7 +13,7 @@ INVENTORY = (SILENCE, "a", "b")
 
 
 def decoded(hmm, features, inventory=INVENTORY):
-    units, bounds = decode_units(hmm, features, inventory)
+    units, bounds = decode_units(unit_loop(hmm, inventory), heard(hmm, features))
     return units, bounds.tolist()
 
 

@@ -4,7 +4,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lipmotion.stats.hmm.align import align_units, choose_pronunciations
-from lipmotion.stats.hmm.loudness import loud_frames
+from lipmotion.stats.hmm.evidence import always_silent, heard, never_silent
+from lipmotion.stats.hmm.loudness import QUIET, QUIET_REACH, loud_frames, quiet_frames
 from stats.hmm.synthetic import PAUSE, SILENCE, known_hmm, speaker
 
 
@@ -46,7 +47,8 @@ def stranger():
 def test_loud_frames_are_not_aligned_with_silence():
     hmm, features, edges, loud = stranger()
     units = (SILENCE, "a", "b", SILENCE)
-    without, bounds = align_units(hmm, features, units), align_units(hmm, features, units, loud)
+    evidence = heard(hmm, features)
+    without, bounds = (align_units(hmm, given, units) for given in (evidence, never_silent(hmm, evidence, loud)))
     assert without[3] - without[1] < 8
     assert (bounds[1], bounds[3]) == (edges[1], edges[3])
 
@@ -54,7 +56,10 @@ def test_loud_frames_are_not_aligned_with_silence():
 def test_loud_frames_are_not_chosen_as_pauses():
     hmm, features, _, loud = stranger()
     words = ((("a",),), (("b",),))
-    free, bound = (choose_pronunciations(hmm, features, words, PAUSE, mask) for mask in (None, loud))
+    evidence = heard(hmm, features)
+    free, bound = (
+        choose_pronunciations(hmm, given, words, PAUSE) for given in (evidence, never_silent(hmm, evidence, loud))
+    )
     assert PAUSE in [unit for part in free for unit in part.units]
     assert PAUSE not in [unit for part in bound for unit in part.units]
 
@@ -62,4 +67,33 @@ def test_loud_frames_are_not_chosen_as_pauses():
 def test_no_loud_frames_change_nothing():
     hmm, features, _, loud = stranger()
     units = (SILENCE, "a", "b", SILENCE)
-    assert np.array_equal(align_units(hmm, features, units, loud & False), align_units(hmm, features, units))
+    evidence = heard(hmm, features)
+    unchanged = never_silent(hmm, evidence, loud & False)
+    assert np.array_equal(align_units(hmm, unchanged, units), align_units(hmm, evidence, units))
+
+
+def test_quiet_frames_are_far_under_the_loud_ones_and_away_from_them():
+    level = np.full(200, -QUIET - 1)
+    level[50:120] = 0
+    level[70:76] = -QUIET - 9  # the closure of a stop
+    quiet = quiet_frames(level.astype(np.float32))
+    assert quiet[: 50 - QUIET_REACH].all()
+    assert quiet[120 + QUIET_REACH :].all()
+    assert not quiet[50 - QUIET_REACH : 120 + QUIET_REACH].any()
+
+
+@pytest.mark.parametrize("frames", [1, 5, 40])
+def test_nothing_is_quiet_where_nothing_is_loud(frames):
+    assert not quiet_frames(np.full(frames, -9.0, np.float32)).any()
+
+
+def test_quiet_frames_are_silence_whatever_they_sound_like():
+    hmm, features, _, loud = stranger()
+    quiet = np.zeros(len(features), bool)
+    quiet[:4] = True
+    values = always_silent(hmm, heard(hmm, features), quiet).log_density(2, 6, None)
+    free = [hmm.table.density(SILENCE, 0), hmm.table.density(PAUSE, 0)]
+    assert set(values[:2].argmax(axis=1)) <= {hmm.table.density(SILENCE, k) for k in range(3)} | set(free)
+    plain = heard(hmm, features).log_density(2, 6, None)
+    assert np.array_equal(values[2:], plain[2:])
+    assert np.array_equal(values[:, free], plain[:, free])

@@ -3,6 +3,7 @@ import pytest
 
 from lipmotion.errors import ModelFormatError
 from lipmotion.stats.hmm.align import align_units
+from lipmotion.stats.hmm.evidence import heard
 from lipmotion.stats.hmm.model import hmm_arrays, hmm_from_arrays
 from stats.hmm.synthetic import random_hmm
 
@@ -17,7 +18,9 @@ def test_models_come_back_from_arrays():
     features = np.random.default_rng(1).normal(0, 1.5, (30, 2)).astype(np.float32)
     assert back.mixtures.log_likelihood(features) == pytest.approx(hmm.mixtures.log_likelihood(features), abs=0.1)
     units = ("sil", "a", "b", "sil")
-    assert np.array_equal(align_units(back, features, units), align_units(hmm, features, units))
+    assert np.array_equal(
+        align_units(back, heard(back, features), units), align_units(hmm, heard(hmm, features), units)
+    )
 
 
 def test_arrays_hold_no_objects():

@@ -10,7 +10,8 @@ from lipmotion.stats.bigram import estimate_bigram
 from lipmotion.stats.em import silent_monitor
 from lipmotion.stats.hmm import train
 from lipmotion.stats.hmm.align import align_units, choose_pronunciations
-from lipmotion.stats.hmm.decode import decode_units
+from lipmotion.stats.hmm.decode import decode_units, unit_loop
+from lipmotion.stats.hmm.evidence import heard
 from lipmotion.stats.hmm.model import HmmConfig
 from lipmotion.stats.hmm.train import LONGEST_SILENCE, LONGEST_STATE, Transcribed, train_hmm
 from stats.hmm.synthetic import INVENTORY, PAUSE, SILENCE, UNITS, recordings, sentences, speaker
@@ -40,7 +41,7 @@ def test_no_iteration_of_any_stage_lowers_the_likelihood(trained):
 def test_boundaries_are_found_within_two_frames(trained):
     hmm, _, transcribed, said, edges, _ = trained
     errors = [
-        align_units(hmm, utterance.features, units) - where
+        align_units(hmm, heard(hmm, utterance.features), units) - where
         for utterance, units, where in zip(transcribed, said, edges, strict=True)
     ]
     assert np.abs(np.concatenate(errors)).max() <= 2
@@ -50,7 +51,7 @@ def test_boundaries_are_found_within_two_frames(trained):
 def test_pauses_are_found_where_they_were_made(trained):
     hmm, _, transcribed, said, _, _ = trained
     for utterance, units in zip(transcribed, said, strict=True):
-        chosen = choose_pronunciations(hmm, utterance.features, utterance.words, PAUSE)
+        chosen = choose_pronunciations(hmm, heard(hmm, utterance.features), utterance.words, PAUSE)
         assert tuple(unit for part in chosen for unit in part.units) == units
 
 
@@ -74,7 +75,7 @@ def test_new_sentences_are_recognised(trained):
     for number, words in enumerate(sentences(99, 15)):
         units = (SILENCE, *(unit for word in words for unit in word), SILENCE)
         features, edges = who.say(np.random.default_rng([99, number]), units)
-        found, bounds = decode_units(hmm, features, (SILENCE, *UNITS))
+        found, bounds = decode_units(unit_loop(hmm, (SILENCE, *UNITS)), heard(hmm, features))
         assert found == units, f"{set(pairwise(units)) - seen} were never seen in training"
         assert bounds == pytest.approx(edges, abs=2)
 
@@ -85,8 +86,8 @@ def test_the_order_of_utterances_changes_nothing_that_matters():
     back = train_hmm(transcribed[::-1], INVENTORY, CONFIG, silent_monitor)
     assert back.table == straight.table
     for utterance, units in zip(transcribed, said, strict=True):
-        bounds = align_units(straight, utterance.features, units)
-        assert np.array_equal(align_units(back, utterance.features, units), bounds)
+        bounds = align_units(straight, heard(straight, utterance.features), units)
+        assert np.array_equal(align_units(back, heard(back, utterance.features), units), bounds)
 
 
 def test_the_same_data_give_the_same_models():
@@ -106,9 +107,12 @@ def test_names_of_units_change_nothing():
     hmm, again = (train_hmm(data, INVENTORY, CONFIG, silent_monitor) for data in (transcribed, renamed))
     for utterance, units in zip(transcribed, said, strict=True):
         new = tuple(other.get(unit, unit) for unit in units)
-        assert np.array_equal(align_units(again, utterance.features, new), align_units(hmm, utterance.features, units))
-        found, bounds = decode_units(hmm, utterance.features, (SILENCE, *UNITS))
-        same, where = decode_units(again, utterance.features, (SILENCE, *other.values()))
+        assert np.array_equal(
+            align_units(again, heard(again, utterance.features), new),
+            align_units(hmm, heard(hmm, utterance.features), units),
+        )
+        found, bounds = decode_units(unit_loop(hmm, (SILENCE, *UNITS)), heard(hmm, utterance.features))
+        same, where = decode_units(unit_loop(again, (SILENCE, *other.values())), heard(again, utterance.features))
         assert same == tuple(other.get(unit, unit) for unit in found)
         assert np.array_equal(where, bounds)
 
@@ -125,7 +129,7 @@ def test_the_pronunciation_said_is_learned():
         said.append(tuple(units))
     hmm = train_hmm(transcribed, INVENTORY, CONFIG, silent_monitor)
     for utterance, units in zip(transcribed, said, strict=True):
-        chosen = choose_pronunciations(hmm, utterance.features, utterance.words, PAUSE)
+        chosen = choose_pronunciations(hmm, heard(hmm, utterance.features), utterance.words, PAUSE)
         assert tuple(unit for part in chosen for unit in part.units) == units
 
 
@@ -146,7 +150,7 @@ def test_clicks_in_the_silence_behind_the_last_word_do_not_become_part_of_it():
         edges.append([*where[:-1], where[-1] + 60])
     hmm = train_hmm(transcribed, INVENTORY, CONFIG, silent_monitor)
     errors = [
-        np.abs(align_units(hmm, utterance.features, units) - where).max()
+        np.abs(align_units(hmm, heard(hmm, utterance.features), units) - where).max()
         for utterance, units, where in zip(transcribed, said, edges, strict=True)
     ]
     assert max(errors) <= 3

@@ -17,7 +17,18 @@ from lipmotion.engines.trajectory.train import fit_trajectory
 from lipmotion.errors import InputError
 from lipmotion.kernels.banded import normal_equations, pin, solve
 from lipmotion.stats.em import Monitor
-from lipmotion.types import FRAME_RATE_HZ, Constraints, Example, Generation, Motion, Speech, Timeline, Trace, Unit
+from lipmotion.types import (
+    FRAME_RATE_HZ,
+    WEIGHT,
+    Constraints,
+    Example,
+    Generation,
+    Motion,
+    Speech,
+    Timeline,
+    Trace,
+    Unit,
+)
 
 
 @dataclass(frozen=True)
@@ -82,6 +93,8 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
             opening = values[:, model.closure.column]
             np.maximum(opening, 0, out=opening)  # a smooth curve through a closure may overshoot
         motion, spread = model.space.restore(values, variance)
+        weights = [channel.unit == WEIGHT for channel in model.space.channels]
+        motion[:, weights] = np.maximum(motion[:, weights], 0)
         return Generation(
             Motion(motion, FRAME_RATE_HZ, model.space.channels),
             spread,
@@ -113,9 +126,11 @@ def _resolved(constraints: Constraints | None, model: TrajectoryModel, frames: i
             raise InputError(f"pin at {wanted.time_s} s lies outside the recording (0 to {last_s:.2f} s)")
         if not np.isfinite(wanted.value):
             raise InputError(f"pin at {wanted.time_s} s has the value {wanted.value}, required a finite number")
-        if wanted.channel == OPENING and wanted.value < 0:
-            raise InputError(f"pin at {wanted.time_s} s opens the mouth by {wanted.value}, required at least 0")
-        pins[frame, names.index(wanted.channel)] = wanted.value
+        column = names.index(wanted.channel)
+        never_negative = wanted.channel == OPENING or model.space.channels[model.space.direct[column]].unit == WEIGHT
+        if never_negative and wanted.value < 0:
+            raise InputError(f"pin at {wanted.time_s} s sets {wanted.channel} to {wanted.value}, required at least 0")
+        pins[frame, column] = wanted.value
     return pins
 
 

@@ -93,7 +93,7 @@ def _check(motion: Motion, fps: float) -> None:
     if not 0 < fps < np.inf:
         raise InputError(f"the frame rate is {fps}, required more than 0")
     if "opening" not in motion.names:
-        names = ", ".join(motion.names) or "no channels"
+        names = ", ".join(motion.names[:6]) + (", ..." if len(motion.names) > 6 else "") or "no channels"
         raise InputError(f"no channel 'opening' to draw a face from; the motion has: {names}")
     if not len(motion.values):
         raise InputError("the motion has no frames; there is nothing to draw")

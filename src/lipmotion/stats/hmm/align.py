@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.stats.hmm.evidence import Evidence
 from lipmotion.stats.hmm.model import UnitHmm
 from lipmotion.stats.hmm.network import Network, NetworkBuilder
 
@@ -45,32 +46,26 @@ def chain_of(hmm: UnitHmm, units: Sequence[str]) -> Chain:
 
 
 def state_path(
-    hmm: UnitHmm, features: NDArray[np.float32], units: Sequence[str], loud: NDArray[np.bool_] | None = None
+    hmm: UnitHmm, evidence: Evidence, units: Sequence[str]
 ) -> tuple[tuple[tuple[str, int], ...], NDArray[np.intp]]:
     """Return the states of a unit sequence (``Chain.names``) and which of them holds in each frame [shape=(T,)].
 
-    features : [shape=(T, D)]
-    loud     : [shape=(T,)], frames that cannot be silence
     Raises AlignmentError: fewer frames than states.
     """
     chain = chain_of(hmm, units)
     used, local = np.unique(chain.densities, return_inverse=True)
-    path = _chain_network(hmm, chain, local).best_path(hmm.log_emission(features, used, loud))
+    path = _chain_network(hmm, chain, local).best_path(evidence, used)
     return chain.names, path
 
 
-def align_units(
-    hmm: UnitHmm, features: NDArray[np.float32], units: Sequence[str], loud: NDArray[np.bool_] | None = None
-) -> NDArray[np.intp]:
+def align_units(hmm: UnitHmm, evidence: Evidence, units: Sequence[str]) -> NDArray[np.intp]:
     """Return the first frame of each unit, and the frame count at the end [shape=(len(units) + 1,)].
 
-    features : [shape=(T, D)]
-    loud     : [shape=(T,)], frames that cannot be silence
     Raises AlignmentError: fewer frames than states.
     """
-    _, path = state_path(hmm, features, units, loud)
+    _, path = state_path(hmm, evidence, units)
     positions = chain_of(hmm, units).positions[path]
-    return np.append(np.searchsorted(positions, np.arange(len(units))), len(features))
+    return np.append(np.searchsorted(positions, np.arange(len(units))), evidence.frames)
 
 
 def _chain_network(hmm: UnitHmm, chain: Chain, emission: NDArray[np.intp]) -> Network:
@@ -95,17 +90,12 @@ class Said(NamedTuple):
 
 
 def choose_pronunciations(
-    hmm: UnitHmm,
-    features: NDArray[np.float32],
-    words: Sequence[Sequence[Sequence[str]]],
-    pause: str,
-    loud: NDArray[np.bool_] | None = None,
+    hmm: UnitHmm, evidence: Evidence, words: Sequence[Sequence[Sequence[str]]], pause: str
 ) -> list[Said]:
     """Choose how each word was said, and where there was a pause.
 
     words : for each word, its possible pronunciations
     pause : the unit that may stand between words; silence (the first free unit) surrounds them all
-    loud  : [shape=(T,)], frames that cannot be silence
     The states without context decide, so that a pronunciation's ends need not know its neighbours.
     Raises AlignmentError: the words do not fit into the frames.
     """
@@ -131,7 +121,7 @@ def choose_pronunciations(
     for state, move in open_ends:
         builder.final(state, move)
     plain = np.arange(len(hmm.log_stay), dtype=np.intp)
-    path = builder.build().best_path(hmm.log_emission(features, plain, loud))
+    path = builder.build().best_path(evidence, plain)
     return [said for _, said in sorted({owners[state] for state in path})]
 
 

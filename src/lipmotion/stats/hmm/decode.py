@@ -3,27 +3,37 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.stats.hmm.evidence import Evidence
 from lipmotion.stats.hmm.model import UnitHmm
-from lipmotion.stats.hmm.network import NetworkBuilder
+from lipmotion.stats.hmm.network import Network, NetworkBuilder
 from lipmotion.stats.hmm.states import Context
 
 Row = dict[Context, int]
 """One state of a unit: its node for each neighbour that has one of its own, under None that for all others."""
 
 
-def decode_units(
-    hmm: UnitHmm, features: NDArray[np.float32], inventory: Sequence[str]
-) -> tuple[tuple[str, ...], NDArray[np.intp]]:
-    """Return the units said, and the first frame of each with the frame count at the end.
+@dataclass(frozen=True, eq=False)
+class UnitLoop:
+    """Every unit behind every other: what recognition searches.
 
-    features  : [shape=(T, D)]
-    inventory : the units to choose from, silence (the first free unit) among them
-    Viterbi over context-dependent states with the bigram (Hofer 2008, Eq. 5). A recording begins and ends
-    in silence, which costs nothing there, or in a unit beside it.
+    owners  : the unit of each node
+    entries : the nodes of first states
+    """
+
+    network: Network
+    owners: tuple[str, ...]
+    entries: frozenset[int]
+
+
+def unit_loop(hmm: UnitHmm, inventory: Sequence[str]) -> UnitLoop:
+    """Return the loop over an inventory, silence (the first free unit) among it.
+
+    A recording begins and ends in silence, which costs nothing there, or in a unit beside it.
     """
     silence = hmm.table.free[0]
     builder = NetworkBuilder()
@@ -37,8 +47,18 @@ def decode_units(
         else:
             builder.initial(_node(rows[unit][0], silence), _language(hmm, silence, unit))
             builder.final(_node(rows[unit][-1], silence), _leave(hmm, unit, silence, rows))
-    path = builder.build().best_path(hmm.mixtures.log_likelihood(features))
-    return _units_of(path, {entry for unit_rows in rows.values() for entry in unit_rows[0].values()}, owners)
+    entries = frozenset(entry for unit_rows in rows.values() for entry in unit_rows[0].values())
+    return UnitLoop(builder.build(), tuple(owners), entries)
+
+
+def decode_units(loop: UnitLoop, evidence: Evidence) -> tuple[tuple[str, ...], NDArray[np.intp]]:
+    """Return the units said, and the first frame of each with the frame count at the end.
+
+    Viterbi over context-dependent states with the bigram (Hofer 2008, Eq. 5).
+    """
+    path = loop.network.best_path(evidence)
+    starts = [t for t in range(len(path)) if t == 0 or (path[t] != path[t - 1] and path[t] in loop.entries)]
+    return tuple(loop.owners[path[t]] for t in starts), np.array([*starts, len(path)], np.intp)
 
 
 def _language(hmm: UnitHmm, unit: str, following: str) -> float:
@@ -106,9 +126,3 @@ def _leave(hmm: UnitHmm, unit: str, following: str, rows: dict[str, list[Row]]) 
     """Return the price of going from a unit to another: the bigram, unless the node that is left has paid it."""
     price = 0.0 if following in rows[unit][-1] else _language(hmm, unit, following)
     return hmm.move(unit, len(rows[unit]) - 1) + price
-
-
-def _units_of(path: NDArray[np.intp], entries: set[int], owners: list[str]) -> tuple[tuple[str, ...], NDArray[np.intp]]:
-    """Return the units along a path: one begins where a first state is entered from another state."""
-    starts = [t for t in range(len(path)) if t == 0 or (path[t] != path[t - 1] and path[t] in entries)]
-    return tuple(owners[path[t]] for t in starts), np.array([*starts, len(path)], np.intp)

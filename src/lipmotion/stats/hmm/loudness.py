@@ -1,8 +1,9 @@
-"""Where a recording is too loud for silence."""
+"""Where a recording is too loud for silence, or too quiet for speech."""
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 LOUD_SHARE = 0.5
@@ -19,3 +20,19 @@ def loud_frames(log_energy: NDArray[np.float32], smoothing: int) -> NDArray[np.b
     smooth = np.convolve(padded, np.full(smoothing, 1 / smoothing), "valid")
     quiet, loud = np.quantile(smooth, [0.1, 0.95])
     return smooth > quiet + LOUD_SHARE * (loud - quiet)
+
+
+QUIET = 35 * np.log(10) / 10
+"""Speech is not heard this far under the loud frames of a recording: 35 dB, as a logarithm of energy."""
+QUIET_REACH = 10
+"""A frame is quiet only if all frames this near are: the closure of a stop is part of speech."""
+
+
+def quiet_frames(log_energy: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """Return which frames are too quiet for speech [shape=(T,)].
+
+    log_energy : [shape=(T,)], natural logarithm
+    """
+    padded = np.pad(log_energy, QUIET_REACH, "edge")
+    around = sliding_window_view(padded, 2 * QUIET_REACH + 1).max(axis=1)
+    return around < np.quantile(log_energy, 0.95) - QUIET

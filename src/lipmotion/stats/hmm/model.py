@@ -14,9 +14,6 @@ from lipmotion.stats.bigram import Bigram
 from lipmotion.stats.hmm.states import StateTable
 from lipmotion.stats.mixture import Mixtures
 
-LOUD_SILENCE = 8.0
-"""What the log density of silence loses in a loud frame."""
-
 
 @dataclass(frozen=True)
 class HmmConfig:
@@ -45,7 +42,8 @@ class HmmConfig:
 class UnitHmm:
     """Models of all units: tied states, their densities, how long each lasts, and which unit follows which.
 
-    log_stay : float32 array [shape=(G,)], of the densities without context; log P(keep the state)
+    log_stay    : float32 array [shape=(G,)], of the densities without context; log P(keep the state)
+    typical_fit : mean ``fit`` of the recordings that the models were trained on
     """
 
     config: HmmConfig
@@ -53,6 +51,7 @@ class UnitHmm:
     mixtures: Mixtures
     log_stay: NDArray[np.float32]
     bigram: Bigram
+    typical_fit: float = 0.0
 
     def stay(self, unit: str, state: int) -> float:
         """Return log P(keep this state one frame longer)."""
@@ -62,21 +61,10 @@ class UnitHmm:
         """Return log P(leave this state)."""
         return float(np.log(-np.expm1(self.stay(unit, state))))
 
-    def log_emission(
-        self, features: NDArray[np.float32], chosen: NDArray[np.intp], loud: NDArray[np.bool_] | None
-    ) -> NDArray[np.float32]:
-        """Return the log density of every frame under some densities [shape=(T, G')], for forced alignment.
-
-        features : [shape=(T, D)]
-        chosen   : [shape=(G',)], the densities wanted
-        loud     : [shape=(T,)], frames that cannot be silence. A voice that the models do not know is, to them,
-                   hardly more like speech than like silence; its energy says which
-        """
-        log_density = self.mixtures.log_likelihood(features, chosen)
-        if loud is not None:
-            free = [self.table.density(unit, k) for unit in self.table.free for k in range(self.table.count(unit))]
-            log_density[np.ix_(loud, np.isin(chosen, free))] -= LOUD_SILENCE
-        return log_density
+    def fit(self, features: NDArray[np.float32]) -> float:
+        """Return the mean log density of frames [shape=(T, D)], each under what fits it best, without context."""
+        plain = np.arange(len(self.log_stay), dtype=np.intp)
+        return float(self.mixtures.log_likelihood(features, plain).max(axis=1).mean())
 
 
 def hmm_arrays(hmm: UnitHmm) -> dict[str, NDArray[Any]]:
@@ -91,6 +79,7 @@ def hmm_arrays(hmm: UnitHmm) -> dict[str, NDArray[Any]]:
         "variances": hmm.mixtures.variances.astype(np.float16),
         "log_stay": hmm.log_stay,
         "bigram": hmm.bigram.log_probability,
+        "typical_fit": np.array([hmm.typical_fit]),
     }
 
 
@@ -102,7 +91,9 @@ def hmm_from_arrays(arrays: Mapping[str, NDArray[Any]], config: HmmConfig) -> Un
         table = StateTable(tuple(units), tuple(counts), tuple(names), tuple(free))
         mixtures = Mixtures(*(arrays[key].astype(np.float32) for key in ("log_weights", "means", "variances")))
         bigram = Bigram(table.units, arrays["bigram"].astype(np.float32))
-        return UnitHmm(config, table, mixtures, arrays["log_stay"].astype(np.float32), bigram)
+        return UnitHmm(
+            config, table, mixtures, arrays["log_stay"].astype(np.float32), bigram, float(arrays["typical_fit"][0])
+        )
     except (KeyError, ValueError) as error:
         raise ModelFormatError(f"the phone models are damaged ({error}); train or download the model again") from error
 
@@ -113,6 +104,7 @@ def _check_shapes(arrays: Mapping[str, NDArray[Any]]) -> None:
     required = {
         "counts": (units,),
         "bigram": (units, units),
+        "typical_fit": (1,),
         "log_stay": (int(arrays["counts"].sum()),),
         "log_weights": each[:2],
         "means": each,

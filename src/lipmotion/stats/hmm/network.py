@@ -9,6 +9,10 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError
 from lipmotion.kernels.viterbi import best_path
+from lipmotion.stats.hmm.evidence import Evidence
+
+KEPT_FRAMES = 12_000
+"""Two minutes: up to here densities are computed once and kept; those of longer recordings twice, by blocks."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,10 +26,20 @@ class Network:
     log_initial: NDArray[np.float32]
     log_final: NDArray[np.float32]
 
-    def best_path(self, log_emission: NDArray[np.float32]) -> NDArray[np.intp]:
-        """Return the best path's states [shape=(T,)]. Raises AlignmentError: none reaches the end."""
+    def best_path(self, evidence: Evidence, chosen: NDArray[np.intp] | None = None) -> NDArray[np.intp]:
+        """Return the best path's states [shape=(T,)].
+
+        chosen : the densities that ``emission`` counts; all by default
+        Raises AlignmentError: no path reaches the end.
+        """
+        kept = evidence.log_density(0, evidence.frames, chosen) if evidence.frames <= KEPT_FRAMES else None
+
+        def log_emission(first: int, end: int) -> NDArray[np.float32]:
+            return evidence.log_density(first, end, chosen) if kept is None else kept[first:end]
+
         path, score = best_path(
             log_emission,
+            evidence.frames,
             self.emission,
             self.arc_from,
             self.arc_log,
@@ -35,7 +49,7 @@ class Network:
         )
         if not np.isfinite(score):
             raise AlignmentError(
-                f"no path through {len(self.emission)} states in {len(log_emission)} frames of 10 ms: "
+                f"no path through {len(self.emission)} states in {evidence.frames} frames of 10 ms: "
                 "the recording is too short for what should be said in it"
             )
         return path

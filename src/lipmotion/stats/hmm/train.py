@@ -14,6 +14,7 @@ from lipmotion.kernels.forward_backward import IMPOSSIBLE, chain_posteriors
 from lipmotion.stats.bigram import estimate_bigram
 from lipmotion.stats.em import Monitor
 from lipmotion.stats.hmm.align import Chain, chain_of, choose_pronunciations, state_path
+from lipmotion.stats.hmm.evidence import heard
 from lipmotion.stats.hmm.loudness import loud_frames
 from lipmotion.stats.hmm.model import HmmConfig, UnitHmm
 from lipmotion.stats.hmm.states import StateTable, plain_states
@@ -80,6 +81,7 @@ def train_hmm(
     said = [_pronounced(hmm, utterances[i], s, inventory) for i, s in zip(kept, said, strict=True)]
     hmm = _iterate(hmm, data, said, monitor, "pronunciations again", config.iterations)
     hmm = replace(hmm, bigram=estimate_bigram(hmm.table.units, [_without_pauses(s, inventory) for s in said]))
+    hmm = replace(hmm, typical_fit=float(np.mean([hmm.fit(x) for x in data])))
     return _in_context(hmm, data, said, monitor)
 
 
@@ -112,7 +114,7 @@ def _pronounced(
     known = set(hmm.table.units)
     words = [[v for v in variants if set(v) <= known] or variants[:1] for variants in utterance.words]
     try:
-        chosen = choose_pronunciations(hmm, utterance.features, words, inventory.pause)
+        chosen = choose_pronunciations(hmm, heard(hmm, utterance.features), words, inventory.pause)
     except AlignmentError:
         return before
     sequence = tuple(unit for said in chosen for unit in said.units)
@@ -322,7 +324,7 @@ def _frequent_contexts(
     frames: Counter[tuple[str, int]] = Counter()
     for x, sequence in zip(data, sequences, strict=True):
         if len(x) >= sum(hmm.table.count(unit) for unit in sequence):
-            names, path = state_path(hmm, x, sequence)
+            names, path = state_path(hmm, heard(hmm, x), sequence)
             frames.update(names[position] for position in path)
     chosen = {name: plain for (name, plain), count in frames.items() if count >= hmm.config.context_frames}
     return {name: chosen[name] for name in sorted(chosen) if name not in hmm.table.names}

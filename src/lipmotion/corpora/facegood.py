@@ -1,0 +1,102 @@
+"""Sounds with bare arrays of blendshape weights, as FACEGOOD-Audio2Face publishes them.
+
+``NAME.wav``, ``bs_value_NAME.npy`` (frames × channels, 30 a second), and the channels' names in one
+``*_bs_name.npy``.
+"""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.corpora.base import AUDIO_SUFFIXES, Curves, Recording, Recordings
+from lipmotion.corpora.labels import labels_beside
+from lipmotion.corpora.splits import LISTS, with_splits
+from lipmotion.errors import InputError
+from lipmotion.types import WEIGHT, Channel, Motion
+
+KIND = "FACEGOOD blendshape weights"
+NAMES, VALUES = "*_bs_name.npy", "bs_value_"
+RATE_HZ = 30.0
+
+
+def read_facegood(directory: Path) -> Recordings | None:
+    """Return the recordings of such a folder, or None if it holds no list of names or no arrays.
+
+    Raises InputError: the list of names is damaged, or there are several.
+    """
+    arrays, lists = sorted(directory.glob(f"{VALUES}*.npy")), sorted(directory.glob(NAMES))
+    if not arrays or not lists:
+        return None
+    if len(lists) > 1:
+        raise InputError(f"{directory}: {len(lists)} lists of channel names ({NAMES}); keep the one that belongs here")
+    channels = channels_in(lists[0])
+    sounds: dict[str, list[Path]] = {}
+    for path in directory.iterdir():
+        if path.suffix.lower() in AUDIO_SUFFIXES:
+            sounds.setdefault(path.stem, []).append(path)
+    ignored, rights = frozenset(directory / name for name in LISTS), _rights(directory)
+    items, problems = [], {}
+    for path in arrays:
+        name = path.stem.removeprefix(VALUES)
+        found = sounds.get(name, [])
+        try:
+            if len(found) != 1:
+                raise InputError(f"{path}: {len(found)} sounds named {name}, required one: {name}.wav")
+            labels = labels_beside(found[0], ignored=ignored)
+            curves = Curves(path, RATE_HZ, channels)
+            items.append(Recording(name, found[0], labels.words, rights=rights, phones=labels.phones, curves=curves))
+        except InputError as error:
+            problems[name] = str(error)
+    return with_splits(Recordings(KIND, tuple(items), problems), directory)
+
+
+def channels_in(path: Path) -> tuple[Channel, ...]:
+    """Return the channels that a list of names gives. Raises InputError: not a row of different texts."""
+    names = _load(path)
+    if names.dtype.kind != "U" or names.ndim != 1 or len(set(names.tolist())) != len(names):
+        raise InputError(
+            f"{path}: an array of {names.dtype} of shape {names.shape}, required one row of different texts"
+        )
+    return tuple(Channel(str(name), WEIGHT) for name in names)
+
+
+def read_array(curves: Curves) -> Motion:
+    """Return the motion of a bare array.
+
+    Raises InputError: not an array of numbers, a row of which has one for each channel.
+    """
+    values = _load(curves.file)
+    if values.dtype.kind not in "fiu" or values.ndim != 2 or values.shape[1] != len(curves.channels):
+        raise InputError(
+            f"{curves.file}: an array of {values.dtype} of shape {values.shape}, "
+            f"required numbers of shape (frames, {len(curves.channels)})"
+        )
+    if not np.isfinite(values).all():
+        raise InputError(f"{curves.file}: holds values that are not finite; interpolate them first")
+    return Motion(values.astype(np.float64), curves.rate_hz or RATE_HZ, curves.channels)
+
+
+def _load(path: Path) -> NDArray[Any]:
+    """Read an array, never pickled objects; Python 2 wrote sizes as ``116L``, of which NumPy warns."""
+    try:
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", message="Reading `.npy`", category=UserWarning)
+            array: NDArray[Any] = np.load(path, allow_pickle=False)
+    except (OSError, EOFError, ValueError) as error:
+        raise InputError(f"{path}: not an array of numbers or texts ({error}); save it with numpy.save") from error
+    return array
+
+
+def _rights(directory: Path) -> dict[str, str]:
+    """Return what a LICENSE file says in its first line, and in the line of its copyright."""
+    path = directory / "LICENSE"
+    if not path.is_file():
+        return {}
+    lines = [line.strip() for line in path.read_text(encoding="utf-8", errors="replace").splitlines() if line.strip()]
+    owners = [line for line in lines if line.lower().startswith("copyright")]
+    return {"licence": lines[0]} | ({"attribution": owners[0]} if owners else {}) if lines else {}

@@ -1,0 +1,155 @@
+"""Labels as they stand in a file, and the phones or words that they are."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from lipmotion.errors import InputError
+from lipmotion.types import Span, Timeline, Unit
+from lipmotion.units import PHONES, SILENCE, is_silent, phone_named, with_reduced_vowels, words_of
+
+SILENCES = frozenset(["", *"sil sp spn pau ssil nsn h# #h # _ - silence <sil> <p:> {sil} [sil] <eps>".split()])
+"""What other tools call silence, pauses and noise that is not speech."""
+PHONES_SHARE = 0.75
+"""Labels of which this share are phones are phones, and the others are mistakes."""
+ROUNDING_S = 1e-3
+"""Times are written with three digits or more."""
+IN_CONTEXT = re.compile(r"[^-+]*-([^-+]+)\+.*")
+"""HTK's and HTS's names of a phone between its neighbours: ``t-iy+n``, ``x^sil-hh+iy=t@...``."""
+STATE = re.compile(r"\[(\d+)\]$")
+REDUCED = frozenset({"ax", "axr", "ix"})
+
+
+@dataclass(frozen=True)
+class Label:
+    """One label: its time, its text, and where it stands (for messages). An unknown end is infinite."""
+
+    start_s: float
+    end_s: float
+    text: str
+    place: str
+
+
+@dataclass(frozen=True)
+class Tier:
+    """Labels that belong together, and what to call them in messages."""
+
+    name: str
+    labels: tuple[Label, ...]
+
+
+def is_of_phones(tier: Tier) -> bool:
+    """Whether a tier says by its name that it holds phones, or nearly all that is spoken in it are phones."""
+    spoken = [label for label in tier.labels if not _is_silence(label.text)]
+    if not spoken or is_named_words(tier):
+        return False
+    if re.search(r"phone|segment|\bmau\b", tier.name.lower()):
+        return True
+    return sum(_phone(label.text) is not None for label in spoken) >= PHONES_SHARE * len(spoken)
+
+
+def is_named_words(tier: Tier) -> bool:
+    """Whether a tier's name says that it holds words."""
+    return re.search(r"\bwords?\b|transcript|\bort", tier.name.lower()) is not None
+
+
+def words_in(tier: Tier, where: str) -> tuple[str, ...]:
+    """Return the words of a tier, silence left out. Raises InputError: labels overlap, or there is no word."""
+    _check_order(tier, where)
+    said = " ".join(label.text for label in tier.labels if not _is_silence(label.text))
+    try:
+        return words_of(said)
+    except InputError as error:
+        raise InputError(f"{where}: {tier.name} holds no word; remove the file if the words are not known") from error
+
+
+def phones_in(tier: Tier, words: Tier | None, where: str) -> Timeline[Unit]:
+    """Return the phones of a tier in time.
+
+    words : the words of the same recording in time, if known: where the phones mark no stress, the lexicon's rule
+            says word by word which vowels are reduced
+    Raises InputError: a label that is no phone, or labels that overlap or leave a gap.
+    """
+    _check_order(tier, where)
+    for before, label in zip(tier.labels, tier.labels[1:], strict=False):
+        if label.start_s > before.end_s + ROUNDING_S:
+            raise InputError(
+                f"{where}: {label.place} starts at {label.start_s:g} s, the one before it ends at {before.end_s:g} s; "
+                "phones must follow each other without a gap: label silence as sil"
+            )
+    labels = _without_states(tier.labels)
+    phones = [_required_phone(label, where) for label in labels]
+    marked = any(re.search(r"\d$", label.text) for label in labels) or REDUCED & set(phones)
+    if words is not None and not marked:
+        phones = _reduced(labels, phones, words)
+    starts_s = [label.start_s for label in labels]
+    ends_s = [*starts_s[1:], labels[-1].end_s]
+    return Timeline(tuple(Span(*row) for row in zip(starts_s, ends_s, map(Unit, phones), strict=True)))
+
+
+def _check_order(tier: Tier, where: str) -> None:
+    end_s = 0.0
+    for label in tier.labels:
+        if label.end_s < label.start_s:
+            raise InputError(
+                f"{where}: {label.place} ends at {label.end_s:g} s, before its start at {label.start_s:g} s"
+            )
+        if label.start_s < end_s - ROUNDING_S:
+            raise InputError(
+                f"{where}: {label.place} starts at {label.start_s:g} s, before the one ahead of it ends ({end_s:g} s); "
+                "labels must not overlap"
+            )
+        end_s = label.end_s
+
+
+def _is_silence(text: str) -> bool:
+    return (_inner(text) or text).lower() in SILENCES
+
+
+def _inner(text: str) -> str | None:
+    match = IN_CONTEXT.fullmatch(text)
+    return match[1] if match else None
+
+
+def _phone(text: str) -> str | None:
+    name = phone_named(text) or phone_named(_inner(text) or "")
+    return SILENCE if name is None and _is_silence(text) else name
+
+
+def _required_phone(label: Label, where: str) -> str:
+    phone = _phone(label.text)
+    if phone is None:
+        raise InputError(
+            f"{where}: {label.place} is {label.text[:40]!r}, which is no phone; the phones are: {' '.join(PHONES)}"
+        )
+    return phone
+
+
+def _without_states(labels: Sequence[Label]) -> list[Label]:
+    """Return whole phones where a file labels their states: ``...[2]``, ``...[3]``, ... are one phone."""
+    whole: list[Label] = []
+    last = -1
+    for label in labels:
+        match = STATE.search(label.text)
+        state = int(match[1]) if match else -1
+        name = STATE.sub("", label.text)
+        if whole and state > last >= 0 and whole[-1].text == name:
+            whole[-1] = Label(whole[-1].start_s, label.end_s, name, whole[-1].place)
+        else:
+            whole.append(Label(label.start_s, label.end_s, name, label.place))
+        last = state
+    return whole
+
+
+def _reduced(labels: Sequence[Label], phones: Sequence[str], words: Tier) -> list[str]:
+    """Return the phones, unstressed vowels reduced in every word by the lexicon's rule."""
+    result = list(phones)
+    middles_s = [(label.start_s + label.end_s) / 2 for label in labels]
+    for word in words.labels:
+        inside = [i for i, s in enumerate(middles_s) if word.start_s <= s < word.end_s and not is_silent(phones[i])]
+        reduced = with_reduced_vowels(word.text.lower(), tuple(phones[i] for i in inside))
+        for i, phone in zip(inside, reduced, strict=True):
+            result[i] = phone
+    return result

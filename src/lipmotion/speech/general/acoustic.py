@@ -1,0 +1,122 @@
+"""Acoustic models of 40 English phones and two kinds of noise, trained on many voices."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import MissingDependencyError
+from lipmotion.units.lexicon import english_data
+
+PHONES = (
+    "+NSN+ +SPN+ AA AE AH AO AW AY B CH D DH EH ER EY F G HH IH IY JH K L M N NG OW OY P R S SH SIL T TH UH UW V W Y Z"
+    " ZH"
+).split()
+"""In the order of the files; the first two are noise and noise of the mouth."""
+STATES = 3
+STREAMS = (slice(0, 13), slice(13, 26), slice(26, 39))
+"""Cepstra, Δ and ΔΔ have codebooks of their own."""
+GAUSSIANS = 128
+WEIGHT_STEP = 1024 * float(np.log(1.0001))
+"""Mixture weights are kept as bytes: negative logarithms in such steps."""
+BLOCK = 128
+"""Frames computed at a time: their 5,376 Gaussians fit into the cache."""
+LEAST_VARIANCE = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class GeneralModel:
+    """Phone-tied mixtures: every phone has 128 Gaussians a stream, every state weights of its own.
+
+    forms, constants : what x, x² are multiplied by, and what is added, per stream [shapes=(26, P·128), (P·128,)]
+    weights          : [shape=(P, 128, 3)] per stream
+    """
+
+    forms: tuple[NDArray[np.float32], ...]
+    constants: tuple[NDArray[np.float32], ...]
+    weights: tuple[NDArray[np.float32], ...]
+
+    def log_density(self, features: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return the log density of every frame under every state, its best one taken off [shape=(T, P·3)].
+
+        features : from ``general_features`` [shape=(T, 39)]
+        """
+        result = np.empty((len(features), len(PHONES) * STATES), np.float32)
+        for start in range(0, len(features), BLOCK):
+            frames = features[start : start + BLOCK]
+            total = np.zeros((len(frames), result.shape[1]), np.float32)
+            for number, stream in enumerate(STREAMS):
+                total += self._stream(number, frames[:, stream])
+            result[start : start + BLOCK] = total - total.max(axis=1, keepdims=True)
+        return result
+
+    def _stream(self, number: int, x: NDArray[np.float32]) -> NDArray[np.float32]:
+        logs = np.concatenate([x, x * x], axis=1) @ self.forms[number] + self.constants[number]
+        logs = logs.reshape(len(x), len(PHONES), GAUSSIANS)
+        best = logs.max(axis=2, keepdims=True)
+        mixed = np.matmul(np.exp(logs - best).transpose(1, 0, 2), self.weights[number]).transpose(1, 0, 2)
+        return (np.log(np.maximum(mixed, np.float32(1e-30))) + best).reshape(len(x), -1)
+
+
+def column(phone: str, state: int, states: int) -> int:
+    """Return where the density of a phone's state is found; phones with other counts of states share theirs.
+
+    phone : of our inventory, or one of the two noises
+    """
+    return PHONES.index(SPELT_OTHERWISE.get(phone, phone.upper())) * STATES + (2 * state + 1) * STATES // (2 * states)
+
+
+SPELT_OTHERWISE = {"ax": "AH", "axr": "ER", "ix": "IH", "el": "L", "em": "M", "en": "N", "sp": "SIL"}
+
+
+@cache
+def general_model() -> GeneralModel:
+    """Return the models, read once. Raises MissingDependencyError: they are not installed, or are not these."""
+    folder = english_data() / "en-us"
+    try:
+        means, variances = (_gaussians((folder / name).read_bytes()) for name in ("means", "variances"))
+        weights = _weights((folder / "sendump").read_bytes())
+    except (OSError, ValueError) as error:
+        raise MissingDependencyError(
+            f"pocketsphinx's phone models are not those of its version 5 ({error}): pip install 'pocketsphinx>=5.1'"
+        ) from error
+    forms, constants = [], []
+    for stream in STREAMS:
+        mean, precision = means[:, stream], 1 / np.maximum(variances[:, stream], LEAST_VARIANCE)
+        forms.append(np.concatenate([mean * precision, precision / -2], axis=1).transpose(1, 0, 2))
+        size = stream.stop - stream.start
+        log_norm = size * np.log(2 * np.pi) - np.log(precision).sum(axis=1) + (mean * mean * precision).sum(axis=1)
+        constants.append(log_norm / -2)
+    return GeneralModel(
+        tuple(np.ascontiguousarray(form.reshape(len(form), -1), np.float32) for form in forms),
+        tuple(constant.reshape(-1).astype(np.float32) for constant in constants),
+        tuple(np.ascontiguousarray(weight, np.float32) for weight in weights),
+    )
+
+
+def _gaussians(content: bytes) -> NDArray[np.float64]:
+    """Return means or variances [shape=(phones, 39, 128)] of a file in Sphinx's format."""
+    numbers = content[content.index(b"endhdr\n") + len(b"endhdr\n") :]
+    expected = np.array([0x11223344, len(PHONES), len(STREAMS), GAUSSIANS, 13, 13, 13], "<i4").tobytes()
+    if not numbers.startswith(expected):
+        raise ValueError("an unexpected header")
+    values = np.frombuffer(numbers, "<f4", offset=len(expected) + 4, count=len(PHONES) * GAUSSIANS * 39)
+    by_phone = values.astype(float).reshape(len(PHONES), len(STREAMS), GAUSSIANS, 13)
+    return by_phone.transpose(0, 1, 3, 2).reshape(len(PHONES), 39, GAUSSIANS)
+
+
+def _weights(content: bytes) -> list[NDArray[np.float64]]:
+    """Return the mixture weights of the states without context, which come first [each shape=(phones, 128, 3)]."""
+    position = 0
+    while length := int.from_bytes(content[position : position + 4], "little"):
+        position += 4 + length
+    gaussians, states = np.frombuffer(content, "<i4", 2, position + 4)
+    steps = np.frombuffer(content, np.uint8, offset=position + 12)
+    if gaussians != GAUSSIANS or len(steps) != len(STREAMS) * gaussians * states:
+        raise ValueError("unexpected weights")
+    kept = steps.reshape(len(STREAMS), gaussians, states)[:, :, : len(PHONES) * STATES]
+    weights = np.exp(kept.astype(float) * -WEIGHT_STEP).reshape(len(STREAMS), gaussians, len(PHONES), STATES)
+    return list(weights.transpose(0, 2, 1, 3))

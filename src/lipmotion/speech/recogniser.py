@@ -1,0 +1,140 @@
+"""Phones in time out of sound."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property, lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import InputError
+from lipmotion.speech.general.front_end import general_features
+from lipmotion.speech.joint import NOISES, Joint, joined, joint_evidence
+from lipmotion.speech.mfcc import LOG_ENERGY, log_energy
+from lipmotion.speech.voice import fitted
+from lipmotion.stats.hmm.align import align_units, choose_pronunciations
+from lipmotion.stats.hmm.decode import UnitLoop, decode_units, unit_loop
+from lipmotion.stats.hmm.evidence import Evidence, always_silent, heard, never_silent
+from lipmotion.stats.hmm.loudness import loud_frames, quiet_frames
+from lipmotion.stats.hmm.model import UnitHmm
+from lipmotion.types import FRAME_RATE_HZ, Audio, Features, Span, Timeline, Unit
+from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent, stand_in
+
+KINDS = ("auto", "own", "general")
+"""Own models only, the general ones only, or both, the own ones as far as they know the voice."""
+FOREIGN, FAMILIAR = -9.0, -5.0
+"""Own models that explain a recording this much worse than their training data (``Voice.fit``) are not heard at all;
+up to this much worse, as much as the general ones. Another speaker in the same studio costs GRID's models 4 to 6, other
+voices in other rooms 7 to 15."""
+LOUD_FRAMES = 11
+"""The energy is averaged over so many frames before it rules silence out."""
+SHORT_PAUSE_S = 0.2
+"""Silence shorter than this is a pause between words."""
+
+
+class Recogniser:
+    """Forced alignment and recognition with a model's own phone models and those of many voices.
+
+    own  : the phone models of a corpus
+    kind : one of ``KINDS``
+    Raises InputError: another kind.
+    """
+
+    def __init__(self, own: UnitHmm, kind: str = "auto"):
+        if kind not in KINDS:
+            raise InputError(f"unknown recogniser {kind!r}; required one of: {', '.join(KINDS)}")
+        self.own = own
+        self.kind = kind
+
+    def recognise(self, audio: Audio, features: Features) -> Timeline[Unit]:
+        """Return the phones that were most probably said, in time: Viterbi with a back-off bigram.
+
+        features : of the audio, as ``mfcc`` gives them
+        Digital silence, of which all normalised features are 0, is silence.
+        Raises MissingDependencyError: general models are wanted and pocketsphinx is not installed.
+        Source: Hofer 2008, Eq. 5.
+        """
+        if not features.values.any():
+            return _timeline([(SILENCE, "")], np.array([0, len(features.values)]), features.duration_s)
+        _, evidence = self._evidence(audio, features)
+        phones, bounds = decode_units(self._loop, evidence)
+        labels = [(SILENCE if phone in NOISES else phone, "") for phone in phones]
+        return _timeline(labels, bounds, features.duration_s)
+
+    def align(self, audio: Audio, features: Features, words: Sequence[str], lexicon: Lexicon) -> Timeline[Unit]:
+        """Return the phones of a known transcript in time.
+
+        Which pronunciation was used, and where there were pauses, follows from the sound. A phone that the models
+        have never heard borrows the sound of the nearest one that they have (``units.RELATIVES``).
+        Raises AlignmentError: the transcript does not fit into the recording.
+        Raises MissingDependencyError: as ``recognise``.
+        """
+        hmm, evidence = self._evidence(audio, features)
+        evidence = never_silent(hmm, evidence, loud_frames(features.values[:, LOG_ENERGY], LOUD_FRAMES))
+        variants = [lexicon.pronunciations(word) for word in words]
+        known = [unit for unit in hmm.table.units if not is_silent(unit)]
+        sounds = [[tuple(stand_in(p, known) for p in variant) for variant in choices] for choices in variants]
+        said = choose_pronunciations(hmm, evidence, sounds, PAUSE)
+        bounds = align_units(hmm, evidence, [unit for part in said for unit in part.units])
+        labels = [
+            (phone, words[part.word] if part.word >= 0 else "")
+            for part in said
+            for phone in (variants[part.word][part.variant] if part.word >= 0 else part.units)
+        ]
+        return _timeline(labels, bounds, features.duration_s)
+
+    @cached_property
+    def _joint(self) -> Joint:
+        return joined(self.own)
+
+    @cached_property
+    def _loop(self) -> UnitLoop:
+        hmm = self.own if self.kind == "own" else self._joint.hmm
+        return unit_loop(hmm, [unit for unit in hmm.table.units if unit != PAUSE])
+
+    def _evidence(self, audio: Audio, features: Features) -> tuple[UnitHmm, Evidence]:
+        hmm, evidence = self._said(audio, features)
+        return hmm, always_silent(hmm, evidence, quiet_frames(log_energy(audio.samples)))
+
+    def _said(self, audio: Audio, features: Features) -> tuple[UnitHmm, Evidence]:
+        if self.kind == "general":
+            return self._joint.hmm, joint_evidence(self._joint, features.values, 0.0, general_features(audio))
+        voice = fitted(self.own, audio, features)
+        if self.kind == "own":
+            return self.own, heard(self.own, voice.features.values)
+        trust = min(max((voice.fit - FOREIGN) / (FAMILIAR - FOREIGN), 0.0), 1.0)
+        return self._joint.hmm, joint_evidence(self._joint, voice.features.values, trust, general_features(audio))
+
+
+@lru_cache(maxsize=4)
+def recogniser(own: UnitHmm, kind: str = "auto") -> Recogniser:
+    """Return the recogniser of some models; the last few are kept with the networks that they search."""
+    return Recogniser(own, kind)
+
+
+def _timeline(labels: list[tuple[str, str]], bounds: NDArray[np.intp], duration_s: float) -> Timeline[Unit]:
+    """Frame n covers (n ± ½) · 10 ms. Silence at both ends is silence however short, between words a pause."""
+    labels, bounds = _one_silence(labels, bounds)
+    edges = np.clip((bounds - 0.5) / FRAME_RATE_HZ, 0, duration_s)
+    edges[-1] = duration_s
+    spans = []
+    for i, ((phone, word), start_s, end_s) in enumerate(
+        zip(labels, edges[:-1].tolist(), edges[1:].tolist(), strict=True)
+    ):
+        name = phone
+        if is_silent(phone):
+            inside = 0 < i < len(labels) - 1
+            name = PAUSE if inside and end_s - start_s < SHORT_PAUSE_S else SILENCE
+        spans.append(Span(start_s, end_s, Unit(name, word=word)))
+    return Timeline(tuple(spans))
+
+
+def _one_silence(
+    labels: list[tuple[str, str]], bounds: NDArray[np.intp]
+) -> tuple[list[tuple[str, str]], NDArray[np.intp]]:
+    """Join silences that follow one another: noise beside silence is silence."""
+    first = [
+        i for i, (phone, _) in enumerate(labels) if i == 0 or not (is_silent(phone) and is_silent(labels[i - 1][0]))
+    ]
+    return [labels[i] for i in first], np.append(bounds[first], bounds[-1])

@@ -1,0 +1,52 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from cli.conftest import Run, is_one_error
+from lipmotion.corpora.store import Corpus
+from lipmotion.pipeline.prompts import prompts
+
+
+def test_sentences_with_what_they_cover(run: Run) -> None:
+    done = run("corpus", "prompts", "--count", "3")
+    found = prompts(count=3)
+    assert (done.code, done.err) == (0, [])
+    assert [line.split(None, 5)[5] for line in done.out[:3]] == [prompt.text for prompt in found.chosen]
+    last = found.chosen[-1]
+    assert f"phones {last.phones}/{found.phones}  diphones {last.diphones:4}/{found.diphones}" in done.out[2]
+    assert done.out[3].startswith(
+        f"3 of {found.sentences} sentences: {last.diphones / found.diphones:.0%} of all their diphones"
+    )
+
+
+def test_options(run: Run, here: Path, toy_corpus: Corpus) -> None:
+    (here / "mine.txt").write_text("Two qwrtzx.\nFive.\nPapa vxvx.\n")
+    (here / "lexicon.txt").write_text("qwrtzx zh oy\n")
+    done = run("corpus", "prompts", "--text", "mine.txt", "--lexicon", "lexicon.txt", "--have", toy_corpus.path)
+    assert done.out[0].endswith("Two qwrtzx.")
+    assert done.err == ["lipmotion: warning: left out 1 sentences for their words: vxvx"]
+
+
+def test_nothing_new(run: Run, here: Path, toy_corpus: Corpus) -> None:
+    words = toy_corpus.utterance("toy00").words
+    (here / "mine.txt").write_text(" ".join(words or ()))
+    done = run("corpus", "prompts", "--text", "mine.txt", "--have", toy_corpus.path)
+    assert (done.code, done.out) == (0, ["0 of 1 sentences: they add nothing"])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (["--text", "missing.txt"], 3, "missing.txt: no such transcript file"),
+        (["--have", "missing"], 4, "missing: no such corpus"),
+        (["--count", "0"], 3, "0 prompts asked for, required at least 1"),
+        (["--lexicon", "missing"], 3, "missing: no such lexicon file"),
+    ],
+)
+def test_what_cannot_be_used(run: Run, here: Path, arguments: list[str], code: int, words: str) -> None:
+    done = run("corpus", "prompts", *arguments)
+    assert is_one_error(done, code)
+    assert words in done.err[0]
+    assert not list(here.iterdir())

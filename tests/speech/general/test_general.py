@@ -1,0 +1,134 @@
+"""The general models against what pocketsphinx itself says of its files and of sound."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pocketsphinx import Decoder
+
+from lipmotion.errors import InputError, MissingDependencyError
+from lipmotion.pipeline.toy import ToySentence
+from lipmotion.speech.general import acoustic
+from lipmotion.speech.general.acoustic import GAUSSIANS, PHONES, STATES, column, general_model
+from lipmotion.speech.general.front_end import general_features
+from lipmotion.speech.general.language import english_bigram
+from lipmotion.speech.synthesise import synthesise
+from lipmotion.types import Audio
+from lipmotion.units import PHONES as OURS
+
+
+def vowels() -> Audio:
+    return synthesise([("sil", 0.3), ("iy", 0.4), ("s", 0.3), ("aa", 0.4), ("sil", 0.3)])[0]
+
+
+def test_densities_are_mixtures_of_gaussians() -> None:
+    """One frame, one state, by the definition."""
+    model, features = general_model(), general_features(vowels())
+    frames = np.array([35, 60, 90])
+    every = np.empty((3, len(PHONES) * STATES))
+    for row, frame in enumerate(frames):
+        for phone in range(len(PHONES)):
+            total = np.zeros(STATES)
+            for stream, part in enumerate(acoustic.STREAMS):
+                x = features[frame, part].astype(float)
+                block = slice(phone * GAUSSIANS, (phone + 1) * GAUSSIANS)
+                form, constant = model.forms[stream][:, block].astype(float), model.constants[stream][block]
+                precision = -2 * form[13:]
+                mean = form[:13] / precision
+                norm = 0.5 * (np.log(precision).sum(axis=0) - 13 * np.log(2 * np.pi))
+                assert constant == pytest.approx(norm - 0.5 * (mean * mean * precision).sum(axis=0), rel=1e-5, abs=1e-3)
+                log_gaussian = norm - 0.5 * (np.square(x[:, None] - mean) * precision).sum(axis=0)
+                total += np.log((np.exp(log_gaussian)[:, None] * model.weights[stream][phone]).sum(axis=0) + 1e-300)
+            every[row, phone * STATES : (phone + 1) * STATES] = total
+    found = model.log_density(features)[frames]
+    close = every - every.max(axis=1, keepdims=True) > -60  # far below the best one, float32 has other floors
+    assert found[close] == pytest.approx((every - every.max(axis=1, keepdims=True))[close], abs=2e-2)
+
+
+def test_mixture_weights_sum_to_one() -> None:
+    for weights in general_model().weights:
+        assert weights.sum(axis=1) == pytest.approx(1, abs=0.08)  # bytes are steps of 10 %
+
+
+@pytest.mark.parametrize("block", [1, 7, 1000])
+def test_blocks_change_nothing(block: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    features = general_features(vowels())
+    wanted = general_model().log_density(features)
+    monkeypatch.setattr(acoustic, "BLOCK", block)
+    assert general_model().log_density(features) == pytest.approx(wanted, abs=2e-3)
+
+
+def test_vowels_are_told_apart() -> None:
+    density = general_model().log_density(general_features(vowels()))
+
+    def best(start_s: float, end_s: float, phones: tuple[str, ...]) -> str:
+        frames = density[round(start_s * 100) : round(end_s * 100)]
+        return max(phones, key=lambda phone: frames[:, column(phone, 1, 3)].sum())
+
+    assert best(0.4, 0.6, ("iy", "aa", "uw", "s", "sil")) == "iy"
+    assert best(0.75, 0.95, ("iy", "aa", "uw", "s", "sil")) == "s"
+    assert best(1.1, 1.3, ("iy", "aa", "uw", "s", "sil")) == "aa"
+    assert best(0.05, 0.25, ("iy", "aa", "s", "sil")) == "sil"
+
+
+def test_every_phone_has_a_column() -> None:
+    columns = [column(phone, state, 3) for phone in OURS for state in range(3)]
+    assert min(columns) >= 2 * STATES  # the noises are nobody's
+    assert {PHONES[c // STATES] for c in columns} == set(PHONES[2:])
+    assert [column("b", state, 5) % 3 for state in range(5)] == [0, 0, 1, 2, 2]
+    assert column("sp", 0, 1) == column("sil", 1, 3)
+
+
+def test_features_are_those_of_the_recognised_sound_at_any_level() -> None:
+    audio = vowels()
+    louder = Audio(audio.samples * np.float32(3), audio.rate_hz)
+    assert general_features(louder) == pytest.approx(general_features(audio), abs=1e-3)
+    assert general_features(audio).shape == (171, 39)
+    assert np.abs(general_features(audio)[:, :13].mean(axis=0)).max() < 1e-3
+    with pytest.raises(InputError, match="16000 Hz"):
+        general_features(Audio(np.zeros(8000, np.float32), 8000))
+
+
+def test_the_bigram_is_that_of_the_phone_model() -> None:
+    units = (*OURS, "+nsn+")
+    bigram = english_bigram(units)
+    assert bigram.sum(axis=1) == pytest.approx(1)
+    s, t, ng = units.index("s"), units.index("t"), units.index("ng")
+    assert bigram[s, t] > 0.1 > bigram[t, s] * 0.5
+    assert bigram[units.index("sil"), ng] < 0.002
+    assert bigram[s, units.index("ax")] > bigram[s, units.index("ah")]
+
+
+def test_another_pocketsphinx_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path) -> None:
+    (tmp_path / "en-us").mkdir()
+    general_model.cache_clear()
+    monkeypatch.setattr(acoustic, "english_data", lambda: tmp_path)
+    with pytest.raises(MissingDependencyError, match="not those of its version 5"):
+        general_model()
+    for name in ("means", "variances", "sendump"):
+        (tmp_path / "en-us" / name).write_bytes(b"s3\nendhdr\n" + bytes(64))
+    with pytest.raises(MissingDependencyError, match="unexpected header"):
+        general_model()
+
+
+def test_pocketsphinx_s_own_alignment_agrees(toy_sentence: ToySentence) -> None:
+    """Its decoder, with its own features and search, puts the phones of a sentence where our densities do."""
+    from lipmotion.pipeline.model import load_model
+    from lipmotion.speech.joint import joined, joint_evidence
+    from lipmotion.stats.hmm.align import align_units
+
+    sample = (toy_sentence.audio.samples * 32767).astype("<i2").tobytes()
+    decoder = Decoder(lm=None, loglevel="FATAL", beam=1e-80, wbeam=1e-60, pbeam=1e-80)
+    decoder.set_align_text(" ".join(toy_sentence.words))
+    for again in (True, False):
+        decoder.start_utt()
+        decoder.process_raw(sample, full_utt=True)
+        decoder.end_utt()
+        if again:
+            decoder.set_alignment()
+    theirs = [(p.name.lower(), p.start / 100) for word in decoder.get_alignment() for p in word if p.name != "SIL"]
+    joint = joined(load_model().phones)
+    general = general_features(toy_sentence.audio)
+    units = ["sil", *(name for name, _ in theirs), "sil"]
+    bounds = align_units(joint.hmm, joint_evidence(joint, general, 0.0, general), units)[1:-2] / 100
+    assert np.median(np.abs(bounds - [start_s for _, start_s in theirs])) <= 0.03

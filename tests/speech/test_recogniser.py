@@ -1,0 +1,227 @@
+from __future__ import annotations
+
+from collections.abc import Sequence
+from difflib import SequenceMatcher
+from itertools import groupby
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lipmotion.errors import AlignmentError, InputError
+from lipmotion.pipeline.model import Model, load_model
+from lipmotion.pipeline.toy import WORDS, ToySentence, toy_sentences
+from lipmotion.speech import recogniser as module
+from lipmotion.speech.mfcc import mfcc
+from lipmotion.speech.read import read_audio
+from lipmotion.speech.recogniser import FAMILIAR, FOREIGN, KINDS, SHORT_PAUSE_S, Recogniser, recogniser
+from lipmotion.speech.synthesise import synthesise
+from lipmotion.speech.voice import Voice
+from lipmotion.stats.hmm.model import UnitHmm
+from lipmotion.types import Audio, Timeline, Unit
+from lipmotion.units import PAUSE, PHONES, SILENCE, Lexicon, words_of
+
+
+@pytest.fixture(scope="module")
+def sentences() -> list[ToySentence]:
+    return toy_sentences(12)
+
+
+@pytest.fixture(scope="module")
+def hmm(toy_model: Model) -> UnitHmm:
+    return toy_model.phones
+
+
+def align(hmm: UnitHmm, audio: Audio, words: Sequence[str], lexicon: Lexicon, kind: str = "own") -> Timeline[Unit]:
+    return Recogniser(hmm, kind).align(audio, mfcc(audio), words, lexicon)
+
+
+def recognise(hmm: UnitHmm, audio: Audio, kind: str = "own") -> Timeline[Unit]:
+    return Recogniser(hmm, kind).recognise(audio, mfcc(audio))
+
+
+def phones(units: Timeline[Unit]) -> list[str]:
+    return [span.label.phone for span in units]
+
+
+def with_pause(duration_s: float) -> Audio:
+    """Say ``papa mama`` with a pause between the words."""
+    said = [(phone, 0.17 if phone[0] == "a" else 0.105) for word in ("papa", "mama") for phone in WORDS[word]]
+    return synthesise([("sil", 0.4), *said[:4], ("sil", duration_s), *said[4:], ("sil", 0.5)])[0]
+
+
+def covers(units: Timeline[Unit], duration_s: float) -> bool:
+    """Do the spans follow one another without a gap, from 0 to the end?"""
+    edges_s = [0.0, *(span.end_s for span in units)]
+    return edges_s == [*(span.start_s for span in units), duration_s]
+
+
+def test_the_words_are_found_where_they_are(hmm: UnitHmm, sentences: list[ToySentence]) -> None:
+    errors_s = []
+    for sentence in sentences:
+        found = align(hmm, sentence.audio, sentence.words, Lexicon())
+        assert phones(found) == phones(sentence.units)
+        assert [span.label.word for span in found] == [span.label.word for span in sentence.units]
+        assert covers(found, sentence.audio.duration_s)
+        errors_s += [a.start_s - b.start_s for a, b in zip(found, sentence.units, strict=True)][1:]
+    assert np.mean(np.abs(errors_s)) < 0.03
+    assert np.percentile(np.abs(errors_s), 90) < 0.05
+
+
+def test_frame_n_reaches_from_half_a_frame_before_to_half_a_frame_after(
+    hmm: UnitHmm, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bounds = np.array([0, 10, 12, 40, 60, 101])
+    monkeypatch.setattr(module, "decode_units", lambda *_: (("sil", "p", "sil", "aa", "sil"), bounds))
+    found = recognise(hmm, Audio(np.sin(np.arange(16_100)).astype(np.float32), 16_000))
+    assert [span.start_s for span in found] == pytest.approx([0, 0.095, 0.115, 0.395, 0.595])
+    assert covers(found, 16_100 / 16_000)
+    assert phones(found) == ["sil", "p", "sil", "aa", "sil"]
+
+
+def test_unknown_sentences_are_recognised(hmm: UnitHmm, sentences: list[ToySentence]) -> None:
+    for sentence in sentences:
+        found = recognise(hmm, sentence.audio)
+        assert covers(found, sentence.audio.duration_s)
+        assert set(phones(found)) <= set(hmm.table.units)
+        if sentence.split == "test":
+            assert SequenceMatcher(None, phones(found), phones(sentence.units)).ratio() > 0.9
+        assert all(span.label.word == "" for span in found)
+
+
+def test_silence_at_both_ends_is_silence_however_short(hmm: UnitHmm, sentences: list[ToySentence]) -> None:
+    sentence = sentences[0]
+    start, stop = sentence.units.spans[0].end_s - 0.08, sentence.units.spans[-1].start_s + 0.08
+    samples = sentence.audio.samples[round(start * 16_000) : round(stop * 16_000)]
+    audio = Audio(samples, 16_000)
+    aligned = align(hmm, audio, sentence.words, Lexicon())
+    assert phones(aligned)[0] == phones(aligned)[-1] == SILENCE
+    assert aligned.spans[0].duration_s < SHORT_PAUSE_S
+    recognised = phones(recognise(hmm, audio))
+    assert PAUSE not in (recognised[0], recognised[-1])
+
+
+def test_a_short_pause_between_words_is_a_pause(hmm: UnitHmm) -> None:
+    found = recognise(hmm, with_pause(0.18))
+    pauses = [span for span in found if span.label.phone == PAUSE]
+    assert len(pauses) == 1
+    assert pauses[0].duration_s < SHORT_PAUSE_S
+    assert phones(found)[5] == PAUSE
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_a_long_pause_between_words_is_silence(hmm: UnitHmm, known: bool) -> None:
+    audio = with_pause(0.5)
+    found = align(hmm, audio, ("papa", "mama"), Lexicon()) if known else recognise(hmm, audio)
+    assert phones(found) == [SILENCE, *WORDS["papa"], SILENCE, *WORDS["mama"], SILENCE]
+    assert found.spans[5].label.word == ""
+    assert found.spans[5].duration_s == pytest.approx(0.5, abs=0.12)
+
+
+def test_the_sound_decides_between_pronunciations(hmm: UnitHmm, sentences: list[ToySentence]) -> None:
+    sentence = sentences[0]  # see bob papa mama
+    both = Lexicon({"bob": (("t", "uw", "t"), ("b", "aa", "b"))})
+    found = align(hmm, sentence.audio, sentence.words, both)
+    assert [span.label.phone for span in found if span.label.word == "bob"] == ["b", "aa", "b"]
+
+
+def test_a_phone_never_heard_borrows_a_relative_s_sound(hmm: UnitHmm, sentences: list[ToySentence]) -> None:
+    sentence = sentences[0]
+    assert not {"z", "g"} & set(hmm.table.units)
+    found = align(hmm, sentence.audio, sentence.words, Lexicon({"see": (("z", "ih"),)}))
+    assert phones(found)[1:3] == ["z", "ih"]  # named as in the lexicon
+    errors_s = [a.start_s - b.start_s for a, b in zip(found, sentence.units, strict=True)]
+    assert np.abs(errors_s).max() < 0.1
+
+
+def test_digital_silence_is_silence(hmm: UnitHmm) -> None:
+    found = recognise(hmm, Audio(np.zeros(16_000, np.float32), 16_000))
+    assert phones(found) == [SILENCE]
+    assert covers(found, 1.0)
+
+
+def test_no_words_are_silence(hmm: UnitHmm, sentences: list[ToySentence]) -> None:
+    found = align(hmm, sentences[0].audio, (), Lexicon())
+    assert set(phones(found)) == {SILENCE}
+
+
+def test_too_many_words_for_the_sound(hmm: UnitHmm, sentences: list[ToySentence]) -> None:
+    with pytest.raises(AlignmentError, match=r"in \d+ frames of 10 ms: the recording is too short"):
+        align(hmm, sentences[0].audio, ["baby"] * 50, Lexicon())
+
+
+@pytest.mark.recordings
+def test_words_of_real_recordings_are_found_where_others_found_them(recordings: Path) -> None:
+    """GRID's own word times, of twelve sentences."""
+    grid, errors_s = recordings / "grid-s1", []
+    for name in (grid / "test.txt").read_text().split()[::4][:12]:
+        rows = [line.split() for line in (grid / "align" / f"{name}.align").read_text().splitlines()]
+        words = [(int(start) / 25_000, word) for start, _, word in rows if word not in (SILENCE, PAUSE)]
+        audio = read_audio(grid / "clips" / f"{name}.mkv")
+        found = align(load_model().phones, audio, [word for _, word in words], Lexicon(), "auto")
+        spoken = groupby((span for span in found if span.label.word), key=lambda span: span.label.word)
+        starts_s = [next(spans).start_s for _, spans in spoken]
+        errors_s += [a - b for a, (b, _) in zip(starts_s, words, strict=True)]
+    assert np.mean(np.abs(errors_s)) < 0.05
+    assert abs(np.median(errors_s)) < 0.03
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_gives_phones_from_start_to_end(hmm: UnitHmm, sentences: list[ToySentence], kind: str) -> None:
+    sentence = sentences[0]
+    found = recognise(hmm, sentence.audio, kind)
+    assert covers(found, sentence.audio.duration_s)
+    assert set(phones(found)) <= set(PHONES)
+    aligned = align(hmm, sentence.audio, sentence.words, Lexicon(), kind)
+    errors_s = [a.start_s - b.start_s for a, b in zip(aligned, sentence.units, strict=True)]
+    assert np.median(np.abs(errors_s)) < 0.03
+
+
+def test_an_unknown_kind() -> None:
+    with pytest.raises(InputError, match="unknown recogniser 'best'; required one of: auto, own, general"):
+        Recogniser(load_model().phones, "best")
+
+
+def test_the_own_models_are_heard_as_far_as_they_know_the_voice(
+    hmm: UnitHmm, sentences: list[ToySentence], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    trusted = []
+    real = module.joint_evidence
+    monkeypatch.setattr(module, "joint_evidence", lambda *given: trusted.append(given[2]) or real(*given))
+    audio = sentences[0].audio
+    for fit, wanted in ((0.0, 1.0), (FAMILIAR, 1.0), ((FAMILIAR + FOREIGN) / 2, 0.5), (FOREIGN, 0.0), (-99.0, 0.0)):
+        monkeypatch.setattr(module, "fitted", lambda *_, fit=fit: Voice(mfcc(audio), 1.0, fit))
+        recognise(hmm, audio, "auto")
+        assert trusted[-1] == pytest.approx(wanted)
+
+
+def test_noises_are_silence_and_silences_are_one(hmm: UnitHmm, monkeypatch: pytest.MonkeyPatch) -> None:
+    bounds = np.array([0, 10, 30, 40, 60, 80, 101])
+    labels = ("+spn+", "sil", "aa", "+nsn+", "sil", "+spn+")
+    monkeypatch.setattr(module, "decode_units", lambda *_: (labels, bounds))
+    found = recognise(hmm, Audio(np.sin(np.arange(16_100)).astype(np.float32), 16_000), "general")
+    assert phones(found) == ["sil", "aa", "sil"]
+    assert [span.start_s for span in found] == pytest.approx([0, 0.295, 0.395])
+
+
+def test_recognisers_are_kept(hmm: UnitHmm) -> None:
+    assert recogniser(hmm) is recogniser(hmm)
+    assert recogniser(hmm, "own") is not recogniser(hmm)
+
+
+@pytest.mark.recordings
+def test_speakers_and_words_that_no_model_of_ours_has_heard(recordings: Path) -> None:
+    """The general models find about twice as many phones as those of one GRID speaker."""
+    share = {}
+    for kind in ("own", "auto"):
+        right = count = 0
+        for name in ("61-70968-0000.flac", "sense_and_sensibility_01_austen_64kb-0880.wav"):
+            audio = read_audio(recordings / "speech-open" / name)
+            text = (recordings / "speech-open" / name).with_suffix(".txt" if name.endswith("wav") else ".lab")
+            spoken = phones(align(load_model().phones, audio, words_of(text.read_text()), Lexicon(), "general"))
+            matcher = SequenceMatcher(None, spoken, phones(recognise(load_model().phones, audio, kind)), autojunk=False)
+            right += sum(block.size for block in matcher.get_matching_blocks())
+            count += len(spoken)
+        share[kind] = right / count
+    assert share["auto"] > 0.5
+    assert share["auto"] > share["own"] + 0.15
