@@ -10,6 +10,7 @@ import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from lipmotion.errors import ExportError, InputError
 
@@ -25,6 +26,17 @@ def check_source(path: Path, kind: str) -> None:
         raise InputError(f"{path}: no such file")
     if path.stat().st_size == 0:
         raise InputError(f"{path}: the file is empty; give a {kind}")
+
+
+def open_media(path: Path) -> Any:
+    """Return an open PyAV container; close it. Raises what PyAV raises.
+
+    The name is taken as a file's whatever is in it (``12:30.wav`` is no protocol), and a playlist among the
+    recordings opens nothing that is not a file.
+    """
+    import av
+
+    return av.open(f"file:{path}", options={"protocol_whitelist": "file"})
 
 
 def check_target(target: Path, source: str | Path | None = None) -> None:

@@ -10,7 +10,7 @@ from cli.conftest import Run, is_one_error
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import MissingDependencyError
 from lipmotion.export.mp4 import write_mp4
-from lipmotion.pipeline import prepare
+from lipmotion.pipeline import offset, prepare
 from lipmotion.pipeline.prepare import PrepareReport
 from lipmotion.types import Audio
 
@@ -21,6 +21,18 @@ def test_info(run: Run, toy_corpus: Corpus) -> None:
     said = dict(line.split(maxsplit=1) for line in done.out)
     assert said["utterances"] == "12 (8 train, 2 val, 2 test)"
     assert said["transcribed"] == "12"
+    assert said["offset"].startswith("toy: ") or said["offset"].startswith("corpus: ")
+
+
+def test_sync(run: Run, toy_corpus: Corpus, here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shutil.copytree(toy_corpus.path, here / "mine")
+    monkeypatch.setattr(offset, "sync", lambda _corpus: {"studio": 0.12})
+    assert run("corpus", "sync", "mine") == (0, ["studio: sound moved by -120 ms"], [])
+    monkeypatch.setattr(offset, "sync", lambda _corpus: {})
+    assert run("corpus", "sync", "mine").out == [
+        "mine: nothing to move: the sound is in step, or it is not known how late it is"
+    ]
+    assert is_one_error(run("corpus", "sync", "missing"), 4)
 
 
 def test_prepare_says_what_was_done(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -28,13 +40,19 @@ def test_prepare_says_what_was_done(run: Run, monkeypatch: pytest.MonkeyPatch) -
 
     def done(directory: Path, output: Path, **options: object) -> PrepareReport:
         asked.update(options, directory=directory, output=output)
-        return PrepareReport(output, "folder of videos", ("a", "b"), ("c",), {"d": "no face"}, {"a": 3}, 1.0)
+        return PrepareReport(
+            output, "folder of videos", ("a", "b"), ("c",), {"d": "no face"}, {"a": 3}, 1.0, {"b": ("cut at 1.00 s",)}
+        )
 
     monkeypatch.setattr(prepare, "prepare", done)
     assert run("corpus", "prepare", "videos", "-o", "mine", "--workers", "2", "--no-crops") == (
         0,
         ["mine: 2 prepared, 1 kept (folder of videos)"],
-        ["lipmotion: note: a: no face in 3 frames, interpolated", "lipmotion: warning: left out d: no face"],
+        [
+            "lipmotion: warning: b: cut at 1.00 s",
+            "lipmotion: note: a: no face in 3 frames, interpolated",
+            "lipmotion: warning: left out d: no face",
+        ],
     )
     assert asked == {"directory": Path("videos"), "output": Path("mine"), "workers": 2, "crops": False}
 

@@ -51,7 +51,8 @@ def tracked(monkeypatch) -> list[str]:
         if "strange" in path.stem:
             raise ZeroDivisionError("what is this")
         images = np.zeros((25, 56, 72, 3), np.uint8) if crops else None
-        return Track(Motion(np.ones((25, 1)), 25.0, (Channel("opening"),)), np.arange(25) > 1, images)
+        notes = ("cut at 0.50 s",) if "cut" in path.stem else ()
+        return Track(Motion(np.ones((25, 1)), 25.0, (Channel("opening"),)), np.arange(25) > 1, images, notes)
 
     monkeypatch.setattr(module, "track", track)
     monkeypatch.setattr(module, "versions", lambda: {"mediapipe": "0", "opencv": "4", "av": "1"})
@@ -79,6 +80,15 @@ def test_recordings_become_a_corpus(studio, tmp_path):
     assert found.source["bytes"] == "32044"
     assert len(found.source["sha256"]) == 64
     assert found.source["mediapipe"] == "0"
+
+
+@pytest.mark.usefixtures("tracked")
+def test_what_is_odd_about_a_video_is_told_and_kept(studio, tmp_path):
+    speak(studio / "cut.mp4", 9)
+    for _ in range(2):  # prepared, then kept
+        report = prepare(studio, tmp_path / "corpus", workers=1)
+        assert report.notes == {"cut": ("cut at 0.50 s",)}
+    assert Corpus.open(report.corpus).utterance("cut").track.notes == ("cut at 0.50 s",)
 
 
 @pytest.mark.usefixtures("tracked")

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 LEVEL = 0.25
 ONSET_S = 0.3
+LAYOUTS = ("", "mono", "stereo", "2.1", "quad", "5.0", "5.1", "6.1", "7.1")
+"""By number of channels."""
 
 
 def tone(rate_hz: int, duration_s: float = 1.0, channels: int = 1) -> NDArray[np.float32]:
@@ -21,24 +23,62 @@ def tone(rate_hz: int, duration_s: float = 1.0, channels: int = 1) -> NDArray[np
     return np.tile(samples.astype(np.float32), (channels, 1))
 
 
+def babble(rate_hz: int, duration_s: float = 2.0) -> NDArray[np.float32]:
+    """Return eighty tones from 150 to 3000 Hz that swell and fade, the same sound at any rate [shape=(1, N)]."""
+    random = np.random.default_rng(1)
+    time_s = np.arange(round(rate_hz * duration_s)) / rate_hz
+    hertz, phases = random.uniform(150, 3000, 80), random.uniform(0, 2 * np.pi, 80)
+    waves = sum(np.sin(2 * np.pi * tone * time_s + phase) for tone, phase in zip(hertz, phases, strict=True))
+    loudness = 0.2 + np.abs(np.sin(2 * np.pi * 1.3 * time_s) * np.sin(2 * np.pi * 2.9 * time_s + 0.5))
+    return (0.02 * waves * loudness).astype(np.float32)[None]
+
+
 def write_sound(
-    path: Path, samples: NDArray[np.float32], rate_hz: int, codec: str, *, start_s: float = 0.0, video: bool = False
+    path: Path,
+    samples: NDArray[np.float32],
+    rate_hz: int,
+    codec: str,
+    *,
+    start_s: float = 0.0,
+    video: bool = False,
+    hole_s: tuple[float, float] = (0.0, 0.0),
+    cover: bool = False,
+    options: dict[str, str] | None = None,
 ) -> Path:
-    """Write samples [shape=(channels, N)]; with ``video``, beside a second of pictures that begins at 0 s."""
-    layout = "stereo" if len(samples) == 2 else "mono"
+    """Write samples [shape=(channels, N)].
+
+    video  : beside a second of pictures that begins at 0 s
+    hole_s : from when to when nothing is written, the time stamps going on
+    cover  : with the picture of an album
+    """
+    layout = LAYOUTS[len(samples)]
     with av.open(str(path), "w") as container:
         pictures = _picture_stream(container) if video else None  # all streams before the first packet
-        stream: Any = container.add_stream(codec, rate=rate_hz, layout=layout)
+        stream: Any = container.add_stream(codec, rate=rate_hz, layout=layout, options=options or {})
+        if cover:
+            _add_cover(container)
         if pictures is not None:
             _add_pictures(container, pictures)
-        frame = av.AudioFrame.from_ndarray(np.ascontiguousarray(samples), format="fltp", layout=layout)
+        packed = np.ascontiguousarray(samples.T).reshape(1, -1)  # PyAV cannot fill eight planes
+        frame = av.AudioFrame.from_ndarray(packed, format="flt", layout=layout)
         frame.rate, frame.pts, frame.time_base = rate_hz, round(start_s * rate_hz), Fraction(1, rate_hz)
-        size = stream.codec_context.frame_size or None
+        size = stream.codec_context.frame_size or (480 if max(hole_s) else None)
         resampler = av.AudioResampler(format=stream.format.name, rate=rate_hz, layout=layout, frame_size=size)
         for part in [*resampler.resample(frame), *resampler.resample(None)]:
-            container.mux(stream.encode(part))
+            if not hole_s[0] <= part.pts / rate_hz < hole_s[1]:
+                container.mux(stream.encode(part))
         container.mux(stream.encode())
     return path
+
+
+def _add_cover(container: Any) -> None:
+    stream = container.add_stream("png", rate=1)
+    stream.width = stream.height = 64
+    stream.pix_fmt, stream.disposition = "rgb24", av.stream.Disposition.attached_pic
+    frame = av.VideoFrame.from_ndarray(np.full((64, 64, 3), 90, np.uint8), format="rgb24")
+    frame.pts, frame.time_base = 0, Fraction(1, 1)
+    for packet in [*stream.encode(frame), *stream.encode()]:
+        container.mux(packet)
 
 
 def write_pictures(path: Path) -> Path:

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -71,6 +73,17 @@ def test_blocks_join_without_a_seam(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = features(samples)
     monkeypatch.setattr(module, "BLOCK", 64)
     assert features(samples) == pytest.approx(whole, abs=1e-4)
+
+
+def test_memory_beside_the_result_is_bounded() -> None:
+    samples = noise(20 * 60 * RATE_HZ)
+    tracemalloc.start()
+    try:
+        result = features(samples)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak - result.nbytes < 70e6 < samples.nbytes
 
 
 @pytest.mark.parametrize("count", [400, 8000, 16_000, 48_000])

@@ -22,6 +22,7 @@ def write_video(tmp_path: Path) -> WriteVideo:
         rotation: int = 0,
         picture: NDArray[np.uint8] | None = None,
         pixel_shape: tuple[int, int] = (1, 1),
+        codec: str = "libx264",
     ) -> Path:
         from fractions import Fraction
 
@@ -29,8 +30,9 @@ def write_video(tmp_path: Path) -> WriteVideo:
 
         path = tmp_path / name
         with av.open(str(path), "w") as container:
-            stream = container.add_stream("libx264", rate=rate, options={"qp": "0"})
-            stream.width, stream.height, stream.pix_fmt = *size, "yuv420p"
+            stream = container.add_stream(codec, rate=rate, options={"qp": "0"})
+            stream.width, stream.height = size
+            stream.pix_fmt = "yuvj420p" if codec == "mjpeg" else "yuv420p"
             stream.codec_context.time_base = Fraction(1, rate)
             stream.codec_context.sample_aspect_ratio = Fraction(*pixel_shape)
             if rotation:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -100,3 +101,26 @@ def test_truncated_later_ends_there(write_video):
     whole = path.read_bytes()
     path.write_bytes(whole[: len(whole) * 2 // 3])
     assert 1 <= len(all_frames(path)) < 100
+
+
+def test_damaged_packets_are_left_out_and_counted(write_video):
+    picture = np.random.default_rng(0).integers(0, 255, (48, 64, 3)).astype(np.uint8)
+    path = write_video("clip.avi", ticks=range(100), picture=picture, codec="mjpeg")
+    content = bytearray(path.read_bytes())
+    starts = [n for n in range(len(content) - 3) if content[n : n + 3] == b"\xff\xd8\xff"]
+    for start in starts[40:50]:
+        content[start : start + 20] = bytes(20)
+    path.write_bytes(content)
+    with open_video(path) as video:
+        times_s = [frame.time_s for frame in video.frames]
+        assert len(times_s) == 90
+        assert video.damaged == 10
+    np.testing.assert_allclose(times_s, np.delete(np.arange(100), range(40, 50)) / 25, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["12:30.mp4", "-a.mp4", "é 音 😀.mp4"])
+@pytest.mark.skipif(os.name == "nt", reason="such names cannot be given there")
+def test_any_name_is_a_files(write_video, tmp_path, monkeypatch, name):
+    monkeypatch.chdir(tmp_path)
+    write_video().rename(tmp_path / name)
+    assert len(all_frames(Path(name))) == 10

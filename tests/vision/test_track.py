@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.vision import track as module
+from lipmotion.vision import follow
 from lipmotion.vision.landmarks import JAW_POINTS, LIP_POINTS, TRACKED_POINTS
 from lipmotion.vision.track import CHANNELS, motion_values, track
 
@@ -28,8 +28,10 @@ def face(opening: float) -> NDArray[np.float64]:
 class ScriptedMesh:
     """Stands for the face mesh: one answer a frame, None for no face."""
 
-    def __init__(self, answers: Sequence[NDArray[np.float64] | None]) -> None:
-        self.answers = iter(answers)
+    last: NDArray[np.float64] | None = None
+
+    def __init__(self, answers: Iterator[NDArray[np.float64] | None], most: int) -> None:
+        self.answers, self.most = answers, most
 
     def __enter__(self) -> ScriptedMesh:
         return self
@@ -37,14 +39,19 @@ class ScriptedMesh:
     def __exit__(self, *_: object) -> None:
         pass
 
-    def points(self, _image: NDArray[np.uint8]) -> NDArray[np.float64] | None:
-        return next(self.answers)
+    def faces(self, _image: NDArray[np.uint8]) -> list[NDArray[np.float64]]:
+        if self.most == 1:
+            ScriptedMesh.last = next(self.answers)
+        return [] if self.last is None else [self.last]
 
 
 @pytest.fixture
 def scripted(monkeypatch):
+    pytest.importorskip("cv2")
+
     def script(answers: Sequence[NDArray[np.float64] | None]) -> None:
-        monkeypatch.setattr(module, "FaceMesh", lambda: ScriptedMesh(answers))
+        answered = iter(answers)
+        monkeypatch.setattr(follow, "FaceMesh", lambda most=1: ScriptedMesh(answered, most))
 
     return script
 

@@ -1,4 +1,4 @@
-"""``lipmotion corpus prepare|info|prompts``: recordings to a corpus, what is in one, what to record."""
+"""``lipmotion corpus prepare|info|sync|prompts``: recordings to a corpus, what is in one, sound and lips in step."""
 
 from __future__ import annotations
 
@@ -22,6 +22,9 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     info = actions.add_parser("info", help="say what is in a corpus")
     info.add_argument("corpus", type=Path)
     info.set_defaults(run=run_info)
+    sync = actions.add_parser("sync", help="move the sound of a corpus to where the lips are")
+    sync.add_argument("corpus", type=Path)
+    sync.set_defaults(run=run_sync)
     prompts.add(actions)
 
 
@@ -31,6 +34,8 @@ def run_prepare(options: argparse.Namespace) -> None:
 
     report = prepare(options.recordings, options.output, workers=options.workers, crops=options.crops)
     print(f"{report.corpus}: {len(report.prepared)} prepared, {len(report.kept)} kept ({report.kind})")
+    for name, notes in report.notes.items():
+        print(f"lipmotion: warning: {name}: {'; '.join(notes)}", file=sys.stderr)
     for name, frames in report.unseen.items():
         print(f"lipmotion: note: {name}: no face in {frames} frames, interpolated", file=sys.stderr)
     for name, reason in report.failed.items():
@@ -38,8 +43,25 @@ def run_prepare(options: argparse.Namespace) -> None:
 
 
 def run_info(options: argparse.Namespace) -> None:
-    """Print what ``lipmotion.Corpus`` says of itself."""
+    """Print what ``lipmotion.Corpus`` says of itself, and how late its sound is."""
     from lipmotion.corpora.store import Corpus
+    from lipmotion.pipeline.offset import offsets
 
-    for name, value in Corpus.open(options.corpus).summary().items():
+    corpus = Corpus.open(options.corpus)
+    for name, value in corpus.summary().items():
         print(f"{name:12} {value}")
+    for line in offsets(corpus).lines():
+        print(f"{'offset':12} {line}")
+
+
+def run_sync(options: argparse.Namespace) -> None:
+    """Call ``lipmotion.pipeline.offset.sync``."""
+    from lipmotion.corpora.store import Corpus
+    from lipmotion.pipeline.offset import sync
+
+    corpus = Corpus.open(options.corpus)
+    moved = sync(corpus)
+    for collection, late_s in moved.items():
+        print(f"{collection or corpus.path}: sound moved by {-1000 * late_s:+.0f} ms")
+    if not moved:
+        print(f"{corpus.path}: nothing to move: the sound is in step, or it is not known how late it is")

@@ -72,7 +72,7 @@ def read_utterance(folder: Path) -> Utterance:
             name=entry["name"],
             audio=audio,
             features=Features(_load(folder, "features"), audio.duration_s),
-            track=Track(motion, np.array(_load(folder, "seen")), crops),
+            track=Track(motion, np.array(_load(folder, "seen")), crops, tuple(entry.get("notes", ()))),
             words=None if entry["words"] is None else tuple(entry["words"]),
             split=entry["split"],
             source=entry["source"],
@@ -110,6 +110,7 @@ def _description(utterance: Utterance, settings: dict[str, str]) -> dict[str, An
         "unseen_frames": int((~seen).sum()),
         "channels": [asdict(channel) for channel in motion.channels],
         "crops": utterance.track.crops is not None,
+        "notes": utterance.track.notes,
         "source": utterance.source,
         "settings": settings,
     }

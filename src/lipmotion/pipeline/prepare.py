@@ -14,9 +14,10 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from importlib import metadata
 from pathlib import Path
+from typing import Any
 
 from tqdm import tqdm
 
@@ -32,7 +33,7 @@ from lipmotion.types import Track, Utterance
 from lipmotion.vision.packages import versions
 from lipmotion.vision.track import track
 
-RECIPE = "2"
+RECIPE = "3"
 """Raised whenever the same video would give other numbers: older utterances are then made again."""
 
 
@@ -47,6 +48,7 @@ class PrepareReport:
     failed   : recordings that could not be used, name to reason
     unseen   : utterances with frames without a face, name to the number of those frames
     seconds  : wall time
+    notes    : what is odd about a video (cuts, damage, a covered mouth), name to remarks
     """
 
     corpus: Path
@@ -56,6 +58,7 @@ class PrepareReport:
     failed: dict[str, str]
     unseen: dict[str, int]
     seconds: float
+    notes: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -74,6 +77,7 @@ class _Outcome:
     kept: bool = False
     unseen: int = 0
     problem: str = ""
+    notes: tuple[str, ...] = ()
 
 
 def prepare(
@@ -127,6 +131,7 @@ def _report(corpus: Corpus, found: Recordings, outcomes: list[_Outcome], seconds
         failed=dict(sorted(problems.items())),
         unseen={outcome.name: outcome.unseen for outcome in good if outcome.unseen},
         seconds=seconds,
+        notes={outcome.name: outcome.notes for outcome in good if outcome.notes},
     )
 
 
@@ -172,9 +177,9 @@ def _process(job: _Job) -> _Outcome:
     try:
         sound = job.recording.file
         source = job.source | {"sha256": _sha256(sound), "bytes": str(sound.stat().st_size)} | digest(job.recording)
-        unseen = _kept_unseen(job, source)
-        if unseen is not None:
-            return _Outcome(name, kept=True, unseen=unseen)
+        entry = _kept(job, source)
+        if entry is not None:
+            return _Outcome(name, kept=True, unseen=int(entry["unseen_frames"]), notes=tuple(entry.get("notes", ())))
         utterance = _utterance(job, source)
         write_utterance(job.folder, utterance, job.settings)
     except (MissingDependencyError, ExportError):
@@ -183,11 +188,11 @@ def _process(job: _Job) -> _Outcome:
         return _Outcome(name, problem=str(error))
     except Exception as error:  # one strange file must not stop the rest
         return _Outcome(name, problem=f"{job.recording.file}: {type(error).__name__}: {error}")
-    return _Outcome(name, unseen=int((~utterance.track.seen).sum()))
+    return _Outcome(name, unseen=int((~utterance.track.seen).sum()), notes=utterance.track.notes)
 
 
-def _kept_unseen(job: _Job, source: dict[str, str]) -> int | None:
-    """Return the frames without a face of an utterance that is up to date, None if there is none."""
+def _kept(job: _Job, source: dict[str, str]) -> dict[str, Any] | None:
+    """Return the description of an utterance that is up to date, None if there is none."""
     try:
         entry = read_entry(job.folder)
     except CorpusError:
@@ -197,7 +202,7 @@ def _kept_unseen(job: _Job, source: dict[str, str]) -> int | None:
     wanted = (digests, words, job.recording.split, job.recording.speaker, job.settings)
     made_of = [entry["source"].get(key) for key in DIGESTS]
     found = (made_of, entry["words"], entry["split"], entry.get("speaker", ""), entry["settings"])
-    return int(entry["unseen_frames"]) if found == wanted else None
+    return entry if found == wanted else None
 
 
 def _utterance(job: _Job, source: dict[str, str]) -> Utterance:

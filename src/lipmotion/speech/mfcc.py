@@ -44,9 +44,7 @@ def mfcc(audio: Audio, warp: float = 1.0) -> Features:
     """
     samples = checked_samples(audio)
     static = np.concatenate([log_mel(samples, _filters(warp)) @ _cosine(), log_energy(samples)[:, None]], axis=1)
-    delta = regression_delta(static)
-    values = np.concatenate([static, delta, regression_delta(delta)], axis=1)
-    return Features(normalised(values), audio.duration_s)
+    return Features(normalised(_with_deltas(static)), audio.duration_s)
 
 
 def checked_samples(audio: Audio) -> NDArray[np.float32]:
@@ -55,10 +53,19 @@ def checked_samples(audio: Audio) -> NDArray[np.float32]:
         raise InputError(f"speech features need {SPEECH_RATE_HZ} Hz, found {audio.rate_hz} Hz; resample first")
     if audio.samples.ndim != 1 or len(audio.samples) < WINDOW:
         raise InputError(f"speech features need {WINDOW} samples of one channel, found shape {audio.samples.shape}")
-    peak = float(np.abs(audio.samples).max())
+    peak = float(np.maximum(audio.samples.max(), -audio.samples.min()))  # no copy of an hour
     if not peak < LOUDEST:
         raise InputError(f"speech features need finite samples, full scale 1, found a peak of {peak:g}")
-    return audio.samples.astype(np.float32)
+    return audio.samples.astype(np.float32, copy=False)
+
+
+def _with_deltas(static: NDArray[np.float32]) -> NDArray[np.float32]:
+    width = static.shape[1]
+    values = np.empty((len(static), 3 * width), np.float32)
+    values[:, :width] = static
+    for first in (width, 2 * width):
+        values[:, first : first + width] = regression_delta(values[:, first - width : first])
+    return values
 
 
 def regression_delta(values: NDArray[np.float32], reach: int = 2) -> NDArray[np.float32]:
@@ -75,8 +82,10 @@ def regression_delta(values: NDArray[np.float32], reach: int = 2) -> NDArray[np.
 def normalised(values: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return the columns with mean 0 and standard deviation 1; a constant column becomes 0."""
     deviation = values.std(axis=0)
-    scaled = (values - values.mean(axis=0)) / np.where(deviation > 1e-6, deviation, 1).astype(np.float32)
-    return np.where(np.ptp(values, axis=0) > 0, scaled, np.float32(0))  # the mean of a constant is rounded
+    scaled = values - values.mean(axis=0)
+    scaled /= np.where(deviation > 1e-6, deviation, 1).astype(np.float32)
+    scaled[:, np.ptp(values, axis=0) == 0] = 0  # the mean of a constant is rounded
+    return scaled
 
 
 def log_mel(samples: NDArray[np.float32], filters: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -84,27 +93,30 @@ def log_mel(samples: NDArray[np.float32], filters: NDArray[np.float32]) -> NDArr
 
     filters : weights of the powers from 0 to 8 kHz [shape=(257, F)]
     """
-    padded = _padded(samples)
-    emphasised = padded[1:] - np.float32(PRE_EMPHASIS) * padded[:-1]
     window = np.hamming(WINDOW).astype(np.float32)
     power = np.empty((_frame_count(samples), filters.shape[1]), np.float32)
     for block in _blocks(len(power)):
-        spectrum = np.fft.rfft(_frames(emphasised, block) * window, FFT_SIZE)
+        heard = _heard(samples, block)
+        emphasised = heard[1:] - np.float32(PRE_EMPHASIS) * heard[:-1]
+        spectrum = np.fft.rfft(_frames(emphasised) * window, FFT_SIZE)
         power[block] = (np.square(spectrum.real) + np.square(spectrum.imag)) @ filters
     return _log_power(power)
 
 
 def log_energy(samples: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return the logarithm of the energy around every frame, floored 80 dB under the loudest [shape=(T,)]."""
-    padded = _padded(samples)[1:]
     energy = np.empty(_frame_count(samples), np.float32)
     for block in _blocks(len(energy)):
-        energy[block] = np.square(_frames(padded, block)).sum(axis=1)
+        energy[block] = np.square(_frames(_heard(samples, block)[1:])).sum(axis=1)
     return _log_power(energy)
 
 
-def _padded(samples: NDArray[np.float32]) -> NDArray[np.float32]:
-    return np.pad(samples, (WINDOW // 2 + 1, WINDOW // 2), mode="reflect")  # one more, for the first difference
+def _heard(samples: NDArray[np.float32], block: slice) -> NDArray[np.float32]:
+    """Return the samples of a block of frames, and the one before; beyond both ends they are reflected."""
+    half = WINDOW // 2
+    first, last = block.start * HOP - half - 1, (block.stop - 1) * HOP + half
+    inside = samples[max(first, 0) : min(last, len(samples))]
+    return np.pad(inside, (max(-first, 0), max(last - len(samples), 0)), mode="reflect")
 
 
 def _frame_count(samples: NDArray[np.float32]) -> int:
@@ -115,9 +127,8 @@ def _blocks(frames: int) -> Iterator[slice]:
     return (slice(start, min(start + BLOCK, frames)) for start in range(0, frames, BLOCK))
 
 
-def _frames(samples: NDArray[np.float32], block: slice) -> NDArray[np.float32]:
-    first, last = block.start * HOP, (block.stop - 1) * HOP + WINDOW
-    return sliding_window_view(samples[first:last], WINDOW)[::HOP]
+def _frames(samples: NDArray[np.float32]) -> NDArray[np.float32]:
+    return sliding_window_view(samples, WINDOW)[::HOP]
 
 
 def _log_power(power: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from pathlib import Path
 from typing import Any
 
@@ -9,12 +10,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.files import check_source
+from lipmotion.files import check_source, open_media
+from lipmotion.speech.decode import Decoded, decode
 from lipmotion.types import Audio
+
+LOG = logging.getLogger("lipmotion")
 
 SPEECH_RATE_HZ = 16_000
 SHORTEST_S = 0.1
 """Recordings under this hold no sentence; the features need 25 ms around every frame."""
+CANCELLED = 0.05
+"""The mean of the channels must keep this share of the loudest channel's energy; else they cancel one another."""
+USABLE = 0.5
+"""A damaged recording is refused when less than this share of its sound can be decoded."""
+CUT_SHORT = 0.9
+"""A recording is called cut short when it holds less than this share of the duration that it states."""
 
 
 def read_audio(path: Path, rate_hz: int = SPEECH_RATE_HZ) -> Audio:
@@ -23,55 +33,70 @@ def read_audio(path: Path, rate_hz: int = SPEECH_RATE_HZ) -> Audio:
     path    : audio or video file, anything FFmpeg decodes
     rate_hz : rate to resample to
     Time 0 is the start of the container, so sound and picture of a video agree: a track that starts later
-    is preceded by silence, one that starts earlier is cut.
-    Raises InputError: no such file, empty, not a recording, no sound track, too short, or samples not finite.
+    is preceded by silence, one that starts earlier is cut. In a file without video it is the first sample.
+    Holes in the sound (damage, lost packets) become silence, so that what follows keeps its time. Where the channels
+    cancel one another, as with one of them inverted, the loudest is taken. Both are logged as warnings.
+    Memory: the samples returned, and an eighth more.
+    Raises InputError: no such file, empty, not a recording, no sound track, less than half of it decodable, too short,
+    or samples not finite.
     """
+    check_source(path, "recording")
+    sound = _decoded(path, rate_hz, None)
+    if sound.mean_energy < CANCELLED * max(sound.energies, default=0.0):
+        loudest = int(np.argmax(sound.energies))
+        LOG.warning(
+            "%s: its %d channels cancel one another in their mean; channel %d, the loudest, is used",
+            path,
+            len(sound.energies),
+            loudest + 1,
+        )
+        sound = _decoded(path, rate_hz, loudest)
+    _report_damage(path, sound)
+    return _checked(path, Audio(sound.samples, rate_hz))
+
+
+def _decoded(path: Path, rate_hz: int, channel: int | None) -> Decoded:
     import av
 
-    check_source(path, "recording")
     try:
-        with av.open(str(path)) as container:
-            if not container.streams.audio:
-                raise InputError(f"{path}: has no sound track; give a recording with sound")
-            pieces, start_s = _decode(container, rate_hz)
+        with open_media(path) as container:
+            _first_track(path, container)
+            return decode(container, rate_hz, channel)
     except (av.FFmpegError, ValueError) as error:
         if isinstance(error, InputError):
             raise
         raise InputError(f"{path}: not a readable recording ({_reason(error)}); give an audio or video file") from error
-    samples = _from_time_zero(np.concatenate(pieces) if pieces else np.zeros(0, np.float32), start_s, rate_hz)
-    return _checked(path, Audio(samples, rate_hz))
 
 
-def _decode(container: Any, rate_hz: int) -> tuple[list[NDArray[np.float32]], float]:
-    import av
-
-    stream = container.streams.audio[0]
-    resampler = av.AudioResampler(format="fltp", rate=rate_hz)
-    pieces: list[NDArray[np.float32]] = []
-    start_s: float | None = None
-    for frame in container.decode(stream):
-        if start_s is None and frame.pts is not None:
-            start_s = float(frame.pts * frame.time_base) - (container.start_time or 0) / 1e6
-        frame.pts = None
-        pieces += [resampled.to_ndarray().mean(axis=0) for resampled in resampler.resample(frame)]
-    if start_s is not None:
-        pieces += [resampled.to_ndarray().mean(axis=0) for resampled in resampler.resample(None)]
-    return pieces, start_s or 0.0
+def _first_track(path: Path, container: Any) -> None:
+    if not container.streams.audio:
+        raise InputError(f"{path}: has no sound track; give a recording with sound")
+    if len(container.streams.audio) > 1:
+        LOG.info("%s: the first of %d sound tracks is used", path, len(container.streams.audio))
 
 
-def _from_time_zero(samples: NDArray[np.float32], start_s: float, rate_hz: int) -> NDArray[np.float32]:
-    offset = round(start_s * rate_hz)
-    if offset < 0:
-        return samples[-offset:]
-    return np.concatenate([np.zeros(offset, np.float32), samples]) if offset else samples
+def _report_damage(path: Path, sound: Decoded) -> None:
+    held_s = len(sound.samples) / sound.rate_hz - sound.silence_s
+    found = f"{sound.damaged} of {sound.packets} packets of sound cannot be decoded"
+    if sound.damaged > (1 - USABLE) * sound.packets:
+        raise InputError(f"{path}: damaged: {found}; required: at least half of them; export the recording again")
+    if sound.damaged or sound.silence_s >= SHORTEST_S:
+        LOG.warning("%s: damaged: %s; holes of %.2f s became silence", path, found, sound.silence_s)
+    if held_s < CUT_SHORT * sound.stated_s:
+        LOG.warning("%s: cut short: it states %.1f s of sound and holds %.1f s", path, sound.stated_s, held_s)
 
 
 def _checked(path: Path, audio: Audio) -> Audio:
     if audio.duration_s < SHORTEST_S:
         raise InputError(f"{path}: holds {audio.duration_s * 1000:.0f} ms of sound, required at least 100 ms")
-    if not np.isfinite(audio.samples).all():
+    if not _is_finite(audio.samples):
         raise InputError(f"{path}: holds samples that are not finite (NaN or infinite); export the recording again")
     return audio
+
+
+def _is_finite(samples: NDArray[np.float32]) -> bool:
+    """Extremes show it, and need no array of their own."""
+    return bool(np.isfinite(samples.min()) and np.isfinite(samples.max()))
 
 
 def _reason(error: Exception) -> str:

@@ -20,14 +20,16 @@ class Track:
     motion   : any channels, at the rate they were recorded. Of a video: ``opening``, ``width``, ``outer`` and the lip
                and jaw points (``x_17``, ``y_17``, ``z_17``: face-mesh point 17), head motion removed, lengths in eye
                distances
-    seen     : bool array [shape=(T,)], False where no face was found (motion interpolated there); given curves are
-               seen everywhere
+    seen     : bool array [shape=(T,)], False where the face cannot be measured (motion interpolated there); given
+               curves are seen everywhere
     crops    : uint8 array [shape=(T, 56, 72, 3)], RGB mouth images, or None
+    notes    : what a user should know of the video, in words (cuts, damage, a covered mouth)
     """
 
     motion: Motion
     seen: NDArray[np.bool_]
     crops: NDArray[np.uint8] | None = None
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.files import check_source
+from lipmotion.files import check_source, open_media
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,16 +27,20 @@ class Frame:
     image: NDArray[np.uint8]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Video:
     """An open video.
 
     frames          : the pictures, decoded as they are asked for
     stated_rates_hz : the frame rates that the container states, the most trustworthy first
+    stated_s        : the duration that the container states, 0 if none
+    damaged         : packets and pictures found damaged so far, which are left out
     """
 
     frames: Iterator[Frame]
     stated_rates_hz: tuple[float, ...]
+    stated_s: float
+    damaged: int = 0
 
 
 @contextmanager
@@ -44,43 +48,73 @@ def open_video(path: Path) -> Iterator[Video]:
     """Open the first video stream of a file; memory use does not grow with its length.
 
     Time 0 is the container's start, as in ``speech.read``, so sound and picture agree.
-    Raises InputError: no such file, empty, not a video, no video stream, or damaged before its first picture.
-    A file damaged later ends where the damage starts.
+    Raises InputError: no such file, empty, not a video, no video stream, or no picture that can be decoded.
+    What is damaged later is left out and counted.
     """
     import av
 
     check_source(path, "video")
     try:
-        container = av.open(str(path))
+        container = open_media(path)
     except (av.FFmpegError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"{path}: not a readable video ({reason}); give a video file") from error
     with container:
-        if not container.streams.video:
+        stream = _moving_pictures(container)
+        if stream is None:
             raise InputError(f"{path}: has no video stream; give a video that shows the speaker's face")
-        stream = container.streams.video[0]
         rates = [float(rate) for rate in (stream.guessed_rate, stream.average_rate) if rate]
-        with closing(_frames(container, path)) as frames:  # decoding from a closed container would crash
-            yield Video(frames, tuple(rates))
+        video = Video(iter(()), tuple(rates), _stated_s(container, stream))
+        with closing(_frames(container, stream, path, video)) as frames:  # decoding from a closed one would crash
+            video.frames = frames
+            yield video
 
 
-def _frames(container: Any, path: Path) -> Generator[Frame, None, None]:
+def _moving_pictures(container: Any) -> Any | None:
+    """Return the first video stream that is not the cover of an album."""
     import av
 
+    cover = av.stream.Disposition.attached_pic
+    return next((stream for stream in container.streams.video if not stream.disposition & cover), None)
+
+
+def _stated_s(container: Any, stream: Any) -> float:
+    if stream.duration:
+        return float(stream.duration * stream.time_base)
+    return (container.duration or 0) / 1e6
+
+
+def _frames(container: Any, stream: Any, path: Path, video: Video) -> Generator[Frame, None, None]:
     start_s = (container.start_time or 0) / 1e6
-    pixel_shape = container.streams.video[0].sample_aspect_ratio
+    pixel_shape = stream.sample_aspect_ratio
     last_s = float("-inf")
-    try:
-        for picture in container.decode(video=0):
-            if picture.time is None or picture.time - start_s <= last_s:
-                continue  # without a time, or shown twice: it cannot be placed
-            last_s = picture.time - start_s
-            yield Frame(last_s, _upright(picture, float(pixel_shape or 1)))
-    except av.FFmpegError as error:
-        if last_s == float("-inf"):
-            raise InputError(f"{path}: no picture can be decoded ({error.strerror}); export the video again") from error
+    for picture in _pictures(container, stream, video):
+        if picture.time is None or picture.time - start_s <= last_s:
+            continue  # without a time, or shown twice: it cannot be placed
+        last_s = picture.time - start_s
+        yield Frame(last_s, _upright(picture, float(pixel_shape or 1)))
     if last_s == float("-inf"):
-        raise InputError(f"{path}: holds no picture; export the video again")
+        raise InputError(f"{path}: holds no picture that can be decoded; export the video again")
+
+
+def _pictures(container: Any, stream: Any, video: Video) -> Iterator[Any]:
+    """Yield the pictures that are whole."""
+    import av
+
+    packets = container.demux(stream)
+    while True:
+        try:
+            for picture in next(packets).decode():
+                if picture.is_corrupt:
+                    video.damaged += 1
+                else:
+                    yield picture
+        except StopIteration:
+            return
+        except av.EOFError:
+            return
+        except av.FFmpegError:
+            video.damaged += 1
 
 
 def _upright(picture: Any, pixel_shape: float) -> NDArray[np.uint8]:

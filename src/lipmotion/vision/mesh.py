@@ -17,13 +17,15 @@ from lipmotion.vision.packages import import_face_mesh
 
 
 class FaceMesh:
-    """Finds the face in the frames of one clip, in order; it follows the face from frame to frame.
+    """Finds the faces in the frames of one clip, in order; it follows them from frame to frame.
 
+    most : how many faces to look for; with one, the plainest is kept
     Use it as a context manager. Raises MissingDependencyError: MediaPipe is not installed.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, most: int = 1) -> None:
         self._module = import_face_mesh()
+        self._most = most
         self._mesh: Any = None
 
     def __enter__(self) -> FaceMesh:
@@ -33,19 +35,18 @@ class FaceMesh:
         if self._mesh is not None:
             self._mesh.close()
 
-    def points(self, image: NDArray[np.uint8]) -> NDArray[np.float64] | None:
-        """Return the points of one frame, or None where there is no face.
+    def faces(self, image: NDArray[np.uint8]) -> list[NDArray[np.float64]]:
+        """Return the points of every face in one frame.
 
         image : uint8 array [shape=(H, W, 3)], RGB
-        Returns array [shape=(len(TRACKED_POINTS), 3)], px, x to the right, y down, z away from the camera.
+        Returns arrays [shape=(len(TRACKED_POINTS), 3)], px, x to the right, y down, z away from the camera.
         """
-        faces = self._process(image).multi_face_landmarks
-        if not faces:
-            return None
-        landmarks = faces[0].landmark
         height, width = image.shape[:2]
-        kept = (landmarks[index] for index in TRACKED_POINTS)
-        return np.array([(point.x, point.y, point.z) for point in kept]) * (width, height, width)
+        return [
+            np.array([(point.x, point.y, point.z) for point in (face.landmark[index] for index in TRACKED_POINTS)])
+            * (width, height, width)
+            for face in self._process(image).multi_face_landmarks or ()
+        ]
 
     def _process(self, image: NDArray[np.uint8]) -> Any:
         with warnings.catch_warnings():
@@ -53,7 +54,7 @@ class FaceMesh:
             if self._mesh is not None:
                 return self._mesh.process(image)
             with quiet_stderr():  # the graph logs while it starts, up to its first result
-                self._mesh = self._module.FaceMesh(max_num_faces=1, refine_landmarks=True)
+                self._mesh = self._module.FaceMesh(max_num_faces=self._most, refine_landmarks=True)
                 return self._mesh.process(image)
 
 

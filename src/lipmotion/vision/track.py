@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.types import Channel, Motion, Track
-from lipmotion.vision.frames import open_video
+from lipmotion.vision.follow import Follower
+from lipmotion.vision.frames import Video, open_video
 from lipmotion.vision.landmarks import DISTANCES, EYE_CORNERS, JAW_POINTS, LIP_POINTS, TRACKED_POINTS
-from lipmotion.vision.mesh import FaceMesh
+from lipmotion.vision.looks import mouth_of, strange_mouths
 from lipmotion.vision.mouth import mouth_crop
 from lipmotion.vision.pose import head_frame
 from lipmotion.vision.timing import at_constant_rate, frame_count, nearest, nominal_rate_hz
@@ -21,6 +22,10 @@ Array = NDArray[np.float64]
 
 UNSEEN_LIMIT = 0.2
 """A clip is refused when more than this share of its frames shows no face."""
+USABLE = 0.5
+"""A clip is refused when its pictures reach less than this share of the duration that it states."""
+SHORT_S = 0.5
+"""Pictures that end this much before the stated duration are reported."""
 STRETCH_LIMIT = 2.0
 """A clip is refused when its time stamps span more than this many times the frames that it holds."""
 
@@ -34,12 +39,33 @@ CHANNELS = tuple(
 
 @dataclass(eq=False)
 class _Sighting:
-    """What was found in the frames so far; ``points`` and ``crops`` only of those that show a face."""
+    """What was found in the frames so far; ``points``, ``mouths`` and ``crops`` only of those that show the face."""
 
     times_s: list[float] = field(default_factory=list)
     seen: list[bool] = field(default_factory=list)
     points: list[Array] = field(default_factory=list)
+    mouths: list[NDArray[np.uint8]] = field(default_factory=list)
     crops: list[NDArray[np.uint8]] = field(default_factory=list)
+
+    def add(self, time_s: float, image: NDArray[np.uint8], points: Array | None, keep_crop: bool) -> None:
+        self.times_s.append(time_s)
+        self.seen.append(points is not None)
+        if points is not None:
+            crop = mouth_crop(image, points[[COLUMN[i] for i in EYE_CORNERS], :2])
+            self.points.append(points)
+            self.mouths.append(mouth_of(crop))
+            if keep_crop:
+                self.crops.append(crop)
+
+    def leave_out(self, wrong: NDArray[np.bool_]) -> int:
+        """Take out some of the frames that show a face [shape=(number of them,)]; return how many."""
+        for index in np.flatnonzero(self.seen)[wrong]:
+            self.seen[index] = False
+        right = np.flatnonzero(~wrong)
+        self.points = [self.points[n] for n in right]
+        self.mouths = [self.mouths[n] for n in right]
+        self.crops = [self.crops[n] for n in right] if self.crops else []
+        return int(wrong.sum())
 
 
 def track(path: Path, *, crops: bool = True) -> Track:
@@ -48,25 +74,39 @@ def track(path: Path, *, crops: bool = True) -> Track:
     path  : a video that shows one face, more or less from the front
     crops : cut out the mouth images as well
     Returns a Track at the video's nominal frame rate, frame n at n / rate seconds after the container's start, not
-    smoothed. Frames that were dropped, or show no face, are interpolated, marked in ``seen``, and have the mouth image
-    of the nearest frame with a face.
-    Raises InputError: not a video, damaged, or no face in more than ``UNSEEN_LIMIT`` of the frames.
+    smoothed. Frames that were dropped or damaged, show no face, somebody else or something before the mouth, are
+    interpolated, marked in ``seen``, and have the mouth image of the nearest frame that is seen. Of several people the
+    largest and most central is followed. What was odd is told in ``notes``.
+    Raises InputError: not a video, damaged or cut short before half of it, or the face in too few of the frames.
     Raises MissingDependencyError: MediaPipe or OpenCV is not installed.
     """
     sighting = _Sighting()
-    with open_video(path) as video, FaceMesh() as mesh:
+    with open_video(path) as video, Follower() as follower:
         for frame in video.frames:
-            points = mesh.points(frame.image)
-            sighting.times_s.append(frame.time_s)
-            sighting.seen.append(points is not None)
-            if points is not None:
-                sighting.points.append(points)
-                if crops:
-                    sighting.crops.append(mouth_crop(frame.image, points[[COLUMN[i] for i in EYE_CORNERS], :2]))
+            sighting.add(frame.time_s, frame.image, follower.points(frame.image), crops)
+    others = sighting.leave_out(~follower.person()[sighting.seen])
+    covered = sighting.leave_out(strange_mouths(np.stack(sighting.mouths))) if sighting.mouths else 0
     times_s = np.array(sighting.times_s)
     rate_hz = nominal_rate_hz(times_s, video.stated_rates_hz)
-    _check(path, np.array(sighting.seen), frame_count(times_s, rate_hz), rate_hz)
-    return _assembled(sighting, rate_hz, frame_count(times_s, rate_hz))
+    notes = (
+        *_damage(video, times_s, rate_hz),
+        *(f"cut at {times_s[index]:.2f} s" for index in follower.cuts()),
+        *([f"another face, or one that is not recognised, in {others} frames"] if others else []),
+        *([f"the mouth is covered, or the picture damaged, in {covered} frames"] if covered else []),
+    )
+    _check(path, sighting, video, rate_hz, notes)
+    return replace(_assembled(sighting, rate_hz, frame_count(times_s, rate_hz)), notes=notes)
+
+
+def _damage(video: Video, times_s: Array, rate_hz: float) -> list[str]:
+    notes = []
+    end_s = float(times_s[-1]) + 1 / rate_hz
+    if video.damaged:
+        expected = round(max(video.stated_s, end_s) * rate_hz)
+        notes.append(f"damaged: {len(times_s)} of about {expected} frames can be decoded")
+    if end_s < video.stated_s - SHORT_S:
+        notes.append(f"cut short: pictures up to {end_s:.2f} s of {video.stated_s:.2f} s")
+    return notes
 
 
 def motion_values(points: Array) -> Array:
@@ -88,11 +128,19 @@ def _distance(flat: Array, pair: tuple[int, int]) -> Array:
     return distance
 
 
-def _check(path: Path, seen: NDArray[np.bool_], count: int, rate_hz: float) -> None:
+def _check(path: Path, sighting: _Sighting, video: Video, rate_hz: float, notes: tuple[str, ...]) -> None:
+    times_s, seen = np.array(sighting.times_s), np.array(sighting.seen)
+    count = frame_count(times_s, rate_hz)
+    told = f" ({'; '.join(notes)})" if notes else ""
+    if count < USABLE * video.stated_s * rate_hz:
+        raise InputError(
+            f"{path}: pictures for {count / rate_hz:.1f} of {video.stated_s:.1f} s; required at least half{told}; "
+            "export the video again"
+        )
     unseen = int((~seen).sum())
     if unseen > UNSEEN_LIMIT * len(seen):
         raise InputError(
-            f"{path}: no face in {unseen} of {len(seen)} frames; required: a face in at least "
+            f"{path}: no face in {unseen} of {len(seen)} frames{told}; required: a face in at least "
             f"{1 - UNSEEN_LIMIT:.0%} of them, one person, from the front"
         )
     if count > STRETCH_LIMIT * len(seen):

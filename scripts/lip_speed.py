@@ -1,0 +1,58 @@
+"""Fit the map from sound to lip speed that tells the offset of sound and video.
+
+    python scripts/lip_speed.py CORPUS [--split train]
+
+CORPUS is a prepared corpus whose sound and video are in step. Writes src/lipmotion/models/lip-speed.json.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+import lipmotion
+from lipmotion.speech.lips import AROUND, STATIC, WEIGHTS, fit_opening_speed, speed
+from lipmotion.stats.resample import to_model_frames
+from lipmotion.types import FRAME_RATE_HZ, Features
+
+
+def main() -> None:
+    """Write the weights, with whose recordings they come from."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("corpus")
+    parser.add_argument("--split", default="train")
+    options = parser.parse_args()
+    corpus = lipmotion.Corpus.open(options.corpus)
+    names = corpus.required(options.split)
+    weights = fit_opening_speed(examples(corpus, names))
+    sources = [corpus.utterance(name).source for name in names]
+    content = {
+        "about": f"c1-c12 and log energy, {len(AROUND)} frames around, to the speed of the lips' opening",
+        "clips": len(names),
+        "licence": sorted({source.get("licence", "") for source in sources}),
+        "attribution": sorted({source.get("attribution", "") for source in sources}),
+        "weights": [float(f"{weight:.4g}") for weight in weights],
+    }
+    target = Path(__file__).parents[1] / "src" / "lipmotion" / "models" / WEIGHTS
+    target.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+    print(f"{target}: {STATIC * len(AROUND)} weights from {len(names)} clips")
+
+
+def examples(corpus: lipmotion.Corpus, names: tuple[str, ...]) -> Iterator[tuple[Features, np.ndarray]]:
+    """Yield features and lip speed of the clips whose face is seen throughout."""
+    for name in names:
+        utterance = corpus.utterance(name)
+        motion, seen = utterance.track.motion, np.asarray(utterance.track.seen)
+        if seen.all():
+            opening = np.asarray(motion["opening"], float)[:, None]
+            frames = len(utterance.features.values)
+            values, valid = to_model_frames(opening, seen, motion.rate_hz, frames, FRAME_RATE_HZ)
+            yield utterance.features, speed(values[valid, 0])
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,89 @@
+"""How late the sound of a video is, from two curves that should move together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+LEAST_SCORE = 0.5
+"""Under this correlation an offset is not known."""
+LEAST_MARGIN = 0.15
+"""Nor where another maximum is nearly as high as the best."""
+PEAK_S = 0.12
+"""A maximum further than this from the best is another one."""
+LEAST_SHARE = 0.5
+"""A shift counts when at least this share of the frames can be compared."""
+DRAWS = 500
+
+
+@dataclass(frozen=True)
+class Offset:
+    """How late the sound is.
+
+    late_s : seconds; negative: early
+    score  : correlation of the two curves there
+    margin : by how much it exceeds the best of any other place
+    low_s, high_s : 95 % interval where several clips were pooled, else both ``late_s``
+    """
+
+    late_s: float
+    score: float
+    margin: float
+    low_s: float
+    high_s: float
+
+    @property
+    def known(self) -> bool:
+        """Whether the curves agree enough, and at one place only."""
+        return self.score > LEAST_SCORE and self.margin > LEAST_MARGIN
+
+
+def shift_scores(predicted: Array, measured: Array, valid: NDArray[np.bool_], reach: int) -> Array:
+    """Return the correlation of predicted[t + k] with measured[t] for k = -reach … reach [shape=(2·reach + 1,)].
+
+    predicted, measured : curves [shape=(T,)] at one rate;  valid : where ``measured`` holds [shape=(T,)]
+    0 where too few frames overlap, or one curve is constant.
+    """
+    return np.array([_score(predicted, measured, valid, shift) for shift in range(-reach, reach + 1)])
+
+
+def offset(scores: Array, rate_hz: float) -> Offset:
+    """Return where the scores [shape=(2·reach + 1,)] are highest, refined by a parabola."""
+    late_s, score, margin = _highest(scores, rate_hz)
+    return Offset(late_s, score, margin, late_s, late_s)
+
+
+def pooled_offset(scores: Sequence[Array], rate_hz: float, seed: int = 0) -> Offset:
+    """Return the offset that clips share: the maximum of their mean scores, with a bootstrap interval over clips."""
+    clips = np.stack(scores)
+    late_s, score, margin = _highest(clips.mean(axis=0), rate_hz)
+    draw = np.random.default_rng(seed)
+    draws = [_highest(clips[draw.integers(len(clips), size=len(clips))].mean(axis=0), rate_hz)[0] for _ in range(DRAWS)]
+    low_s, high_s = np.percentile(draws, [2.5, 97.5])
+    return Offset(late_s, score, margin, float(low_s), float(high_s))
+
+
+def _score(predicted: Array, measured: Array, valid: NDArray[np.bool_], shift: int) -> float:
+    count = min(len(predicted) - shift, len(measured))
+    first = max(-shift, 0)
+    compared = valid[first:count]
+    if compared.sum() < max(LEAST_SHARE * len(measured), 2):
+        return 0.0
+    a, b = predicted[first + shift : count + shift][compared], measured[first:count][compared]
+    a, b = a - a.mean(), b - b.mean()
+    power = float(np.sqrt((a * a).sum() * (b * b).sum()))
+    return float((a * b).sum()) / power if power > 0 else 0.0
+
+
+def _highest(scores: Array, rate_hz: float) -> tuple[float, float, float]:
+    best = int(np.clip(scores.argmax(), 1, len(scores) - 2))
+    before, at, after = scores[best - 1 : best + 2]
+    curvature = before - 2 * at + after
+    place = best + (0.5 * (before - after) / curvature if curvature < 0 else 0.0)
+    elsewhere = np.abs(np.arange(len(scores)) - place) > PEAK_S * rate_hz
+    return (place - len(scores) // 2) / rate_hz, float(at), float(at - scores[elsewhere].max(initial=-1.0))

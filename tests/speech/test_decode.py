@@ -1,0 +1,256 @@
+"""Every container and codec that PyAV can write, at odd rates and channel counts, with holes and damage."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tracemalloc
+import wave
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from lipmotion.errors import InputError
+from lipmotion.speech.read import read_audio
+from speech.sound import babble, write_pictures, write_sound
+
+Samples = NDArray[np.float32]
+MS = 16
+"""Samples a millisecond."""
+
+EXACT = [
+    # suffix, codec: no delay, no padding, nothing lost but bits
+    *[("wav", f"pcm_{form}") for form in ("u8", "s16le", "s24le", "s32le", "f32le", "f64le", "alaw", "mulaw")],
+    *[("aiff", "pcm_s16be"), ("aiff", "pcm_s24be"), ("au", "pcm_s16be"), ("caf", "pcm_s16le"), ("w64", "pcm_s16le")],
+    *[("avi", "pcm_s16le"), ("mkv", "pcm_s16le"), ("mov", "pcm_s16le"), ("flac", "flac"), ("ogg", "flac")],
+    *[("mkv", "flac"), ("m4a", "alac"), ("wv", "wavpack"), ("tta", "tta")],
+]
+CODED = [
+    # suffix, codec, samples that a whole last frame may add, samples of delay that the container does not record
+    ("mp3", "libmp3lame", 0, 0),
+    ("mkv", "libmp3lame", 0, 0),
+    ("ogg", "libopus", 0, 0),
+    ("opus", "libopus", 0, 0),
+    ("webm", "libopus", 0, 0),
+    ("mkv", "libopus", 0, 0),
+    ("ogg", "vorbis", 2048, 0),
+    ("webm", "vorbis", 2048, 0),
+    ("mp4", "aac", 1024, 0),
+    ("m4a", "aac", 1024, 0),
+    ("mov", "aac", 1024, 0),
+    ("mkv", "aac", 1024, 0),
+    ("mkv", "ac3", 1536, 0),
+    ("wav", "adpcm_ima_wav", 2048, 0),
+    ("aac", "aac", 2048, 1024),
+    ("ts", "aac", 2048, 1024),
+    ("flv", "aac", 2048, 1024),
+    ("avi", "libmp3lame", 2304, 1105),
+    ("mp2", "mp2", 1152, 480),
+    ("mpg", "mp2", 1152, 480),
+    ("ts", "mp2", 1152, 480),
+    ("mpg", "ac3", 1536, 256),
+    ("ac3", "ac3", 1536, 256),
+]
+EXPERIMENTAL = {"vorbis": {"strict": "experimental"}}
+
+
+def late_by(samples: Samples, original: Samples) -> tuple[int, float]:
+    """Return by how many samples the first is late, and how much they are alike then."""
+    count = 2 ** (len(samples) + len(original)).bit_length()
+    spectrum = np.fft.rfft(samples, count) * np.conj(np.fft.rfft(original, count))
+    shift = int(np.fft.irfft(spectrum).argmax())
+    shift -= count if shift > count // 2 else 0
+    one, two = samples[max(shift, 0) :], original[max(-shift, 0) :]
+    both = min(len(one), len(two))
+    return shift, float(np.corrcoef(one[:both], two[:both])[0, 1])
+
+
+@pytest.fixture(scope="module")
+def original() -> Samples:
+    return babble(16_000)[0]
+
+
+@pytest.mark.parametrize("rate_hz", [16_000, 44_100])
+@pytest.mark.parametrize(("suffix", "codec"), EXACT)
+def test_uncompressed_and_lossless(tmp_path: Path, original: Samples, suffix: str, codec: str, rate_hz: int) -> None:
+    audio = read_audio(write_sound(tmp_path / f"a.{suffix}", babble(rate_hz), rate_hz, codec))
+    shift, alike = late_by(audio.samples, original)
+    assert (shift, abs(audio.duration_s - 2) < 1e-3) == (0, True)
+    assert alike > 0.999
+
+
+@pytest.mark.parametrize(("suffix", "codec", "padding", "delay"), CODED)
+def test_coded(tmp_path: Path, original: Samples, suffix: str, codec: str, padding: int, delay: int) -> None:
+    """No delay where the container records it; elsewhere the codec's own, no more."""
+    options = EXPERIMENTAL.get(codec)
+    sound = babble(48_000) if codec != "vorbis" else np.tile(babble(48_000), (2, 1))
+    audio = read_audio(write_sound(tmp_path / f"a.{suffix}", sound, 48_000, codec, options=options))
+    shift, alike = late_by(audio.samples, original)
+    assert shift == pytest.approx(delay / 3, abs=MS)
+    assert -0.001 < audio.duration_s - 2 < padding / 48_000 + 0.001
+    assert alike > (0.95 if delay else 0.99)  # a delay of a third of a sample is left in it
+
+
+@pytest.mark.parametrize("suffix", ["webm", "mkv", "ogg"])
+def test_opus_made_from_16_khz_keeps_its_time(tmp_path: Path, original: Samples, suffix: str) -> None:
+    audio = read_audio(write_sound(tmp_path / f"a.{suffix}", babble(16_000), 16_000, "libopus"))
+    assert abs(late_by(audio.samples, original)[0]) <= MS
+
+
+@pytest.mark.parametrize("rate_hz", [8000, 11_025, 22_050, 32_000, 96_000, 192_000, 384_000])
+@pytest.mark.parametrize(("suffix", "codec"), [("wav", "pcm_s16le"), ("flac", "flac")])
+def test_any_rate(tmp_path: Path, original: Samples, suffix: str, codec: str, rate_hz: int) -> None:
+    audio = read_audio(write_sound(tmp_path / f"a.{suffix}", babble(rate_hz), rate_hz, codec))
+    shift, alike = late_by(audio.samples, original)
+    assert (shift, abs(audio.duration_s - 2) < 1e-3) == (0, True)
+    assert alike > 0.999
+
+
+@pytest.mark.parametrize("channels", range(1, 9))
+@pytest.mark.parametrize(("suffix", "codec"), [("wav", "pcm_s16le"), ("flac", "flac"), ("m4a", "aac")])
+def test_one_to_eight_channels(tmp_path: Path, original: Samples, suffix: str, codec: str, channels: int) -> None:
+    sound = np.tile(babble(48_000), (channels, 1))
+    audio = read_audio(write_sound(tmp_path / f"a.{suffix}", sound, 48_000, codec))
+    shift, alike = late_by(audio.samples, original)
+    assert shift == 0
+    assert alike > 0.97  # of 2.1, AAC keeps the low tones of the third channel only
+
+
+def test_more_channels_than_have_a_name(tmp_path: Path, original: Samples) -> None:
+    with wave.open(str(tmp_path / "a.wav"), "wb") as file:
+        file.setnchannels(12)
+        file.setsampwidth(2)
+        file.setframerate(16_000)
+        file.writeframes((np.tile(original[:, None], 12) * 32767).astype("<i2").tobytes())
+    assert late_by(read_audio(tmp_path / "a.wav").samples, original)[1] > 0.999
+
+
+@pytest.mark.parametrize(("suffix", "codec"), [("mp3", "libmp3lame"), ("flac", "flac")])
+def test_the_cover_of_an_album_changes_nothing(tmp_path: Path, suffix: str, codec: str) -> None:
+    plain = read_audio(write_sound(tmp_path / f"a.{suffix}", babble(44_100), 44_100, codec))
+    covered = read_audio(write_sound(tmp_path / f"b.{suffix}", babble(44_100), 44_100, codec, cover=True))
+    with av.open(str(tmp_path / f"b.{suffix}")) as container:
+        assert container.streams.video
+    assert np.array_equal(plain.samples, covered.samples)
+
+
+def test_the_first_of_several_tracks(tmp_path: Path, original: Samples) -> None:
+    with av.open(str(tmp_path / "a.mka"), "w") as container:
+        streams = [container.add_stream("pcm_s16le", rate=16_000, layout="mono") for _ in range(2)]
+        for stream, sound in zip(streams, (original, 0.5 * original[::-1]), strict=True):
+            pcm = (sound * 32767).astype(np.int16)[None]
+            frame = av.AudioFrame.from_ndarray(pcm, format="s16", layout="mono")
+            frame.rate, frame.pts = 16_000, 0
+            for packet in [*stream.encode(frame), *stream.encode()]:
+                container.mux(packet)
+    assert late_by(read_audio(tmp_path / "a.mka").samples, original)[1] > 0.999
+
+
+@pytest.mark.parametrize("weights", [(1, -1), (0.8, -1), (0, 0, 0, 0, 1, 0), (1, -1, 1, -1, 1, -1, 1, -1)])
+def test_channels_that_cancel_give_way_to_the_loudest(
+    tmp_path: Path, original: Samples, weights: tuple[float, ...], caplog: pytest.LogCaptureFixture
+) -> None:
+    sound = np.array(weights, np.float32)[:, None] * original
+    audio = read_audio(write_sound(tmp_path / "a.wav", sound, 16_000, "pcm_f32le"))
+    loudest = int(np.argmax(np.abs(weights)))
+    assert np.allclose(audio.samples, sound[loudest], atol=1e-6)
+    assert f"a.wav: its {len(weights)} channels cancel one another in their mean; channel {loudest + 1}" in caplog.text
+
+
+@pytest.mark.parametrize("weights", [(1, 0), (1, -0.3), (1, 0, 0)])
+def test_other_channels_are_averaged_silently(
+    tmp_path: Path, original: Samples, weights: tuple[float, ...], caplog: pytest.LogCaptureFixture
+) -> None:
+    sound = np.array(weights, np.float32)[:, None] * original
+    audio = read_audio(write_sound(tmp_path / "a.wav", sound, 16_000, "pcm_f32le"))
+    assert np.allclose(audio.samples, sound.mean(axis=0), atol=1e-6)
+    assert not caplog.text
+
+
+NAMES = ["-o.wav", "a b.wav", 'it\'s "it".wav', "new\nline.wav", "😀 音 é.wav", "12:30.wav", "http:x.wav", "%03d?*.wav"]
+
+
+@pytest.mark.parametrize("name", [*NAMES, os.fsdecode(b"\xff\xfe.wav")])
+@pytest.mark.skipif(os.name == "nt", reason="such names cannot be given there")
+def test_any_name_is_a_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_sound(tmp_path / "plain.wav", babble(16_000), 16_000, "pcm_s16le").rename(tmp_path / name)
+    assert read_audio(Path(name)).duration_s == 2
+
+
+def test_a_playlist_opens_nothing_from_elsewhere(tmp_path: Path) -> None:
+    (tmp_path / "a.m3u8").write_text("#EXTM3U\n#EXT-X-TARGETDURATION:2\n#EXTINF:2,\nhttp://localhost:9/a.ts\n")
+    with pytest.raises(InputError, match=r"a\.m3u8: "):
+        read_audio(tmp_path / "a.m3u8")
+
+
+@pytest.mark.parametrize(("suffix", "codec"), [("mkv", "pcm_s16le"), ("mkv", "libopus"), ("mp4", "aac")])
+def test_a_hole_keeps_what_follows_in_time(
+    tmp_path: Path, original: Samples, suffix: str, codec: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    hole_s = (0.7, 1.1)
+    path = write_sound(tmp_path / f"a.{suffix}", babble(48_000), 48_000, codec, hole_s=hole_s)
+    audio = read_audio(path)
+    after = slice(round(1.2 * 16_000), None)
+    assert abs(late_by(audio.samples[after], original[after])[0]) <= 2 * MS
+    assert np.abs(audio.samples[round(0.76 * 16_000) : round(1.04 * 16_000)]).max() < 0.01
+    assert "damaged: 0 of" in caplog.text
+    assert "became silence" in caplog.text
+
+
+def test_damaged_packets_are_left_out_and_reported(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    content = bytearray(write_sound(tmp_path / "a.flac", babble(16_000, 10.0), 16_000, "flac").read_bytes())
+    middle = len(content) // 2
+    content[middle : middle + 9000] = np.random.default_rng(0).bytes(9000)
+    (tmp_path / "a.flac").write_bytes(content)
+    audio = read_audio(tmp_path / "a.flac")
+    assert 8 < audio.duration_s < 10.5
+    assert "a.flac: damaged: " in caplog.text
+
+
+def test_a_recording_cut_short_is_named(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    path = write_sound(tmp_path / "a.flac", babble(16_000, 4.0), 16_000, "flac")
+    content = path.read_bytes()
+    path.write_bytes(content[: len(content) // 2])
+    audio = read_audio(path)
+    assert audio.duration_s == pytest.approx(2, abs=0.5)
+    assert f"a.flac: cut short: it states 4.0 s of sound and holds {audio.duration_s:.1f} s" in caplog.text
+
+
+def test_time_stamps_that_jump_far_do_not_fill_the_memory(tmp_path: Path) -> None:
+    path = write_sound(tmp_path / "a.mkv", babble(48_000), 48_000, "flac", start_s=90_000, video=True)
+    with pytest.raises(InputError, match=r"a\.mkv: the time stamps of its sound jump by 90000 s"):
+        read_audio(path)
+
+
+def test_a_video_without_sound_and_a_sound_without_video(tmp_path: Path) -> None:
+    from lipmotion.vision.frames import open_video
+
+    with pytest.raises(InputError, match="has no sound track; give a recording with sound"):
+        read_audio(write_pictures(tmp_path / "mute.mp4"))
+    sound = write_sound(tmp_path / "blind.mp3", babble(44_100), 44_100, "libmp3lame", cover=True)
+    with pytest.raises(InputError, match="has no video stream"), open_video(sound):
+        pass
+
+
+@pytest.mark.parametrize(("suffix", "codec"), [("wav", "pcm_s16le"), ("aac", "aac")])
+def test_memory_is_that_of_the_result(tmp_path: Path, suffix: str, codec: str) -> None:
+    path = write_sound(tmp_path / f"a.{suffix}", np.tile(babble(16_000, 20), (2, 15)), 16_000, codec)  # 5 minutes
+    tracemalloc.start()
+    try:
+        audio = read_audio(path)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert audio.duration_s > 299
+    assert peak < 1.3 * audio.samples.nbytes + 1e6
+
+
+def test_eight_channels_do_not_crash_a_process(tmp_path: Path) -> None:
+    path = write_sound(tmp_path / "a.flac", np.tile(babble(48_000), (8, 1)), 48_000, "flac")
+    code = f"from pathlib import Path; from lipmotion.speech.read import read_audio; read_audio(Path({str(path)!r}))"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -1,0 +1,151 @@
+"""The follower on scripted faces: the picture tells them apart, no tracker is needed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from lipmotion.vision import follow
+from lipmotion.vision.follow import JUMP, LOST_FRAMES, Follower
+from lipmotion.vision.landmarks import EYE_CORNERS, TRACKED_POINTS
+
+pytestmark = pytest.mark.video
+
+HEIGHT, WIDTH = 240, 320
+EYES = [TRACKED_POINTS.index(index) for index in EYE_CORNERS]
+Face = tuple[str, float, float, float]  # who, x and y between the eyes, distance between them
+
+
+def picture(faces: Sequence[Face], place: int = 0) -> NDArray[np.uint8]:
+    """Return a place with people in it, each with a look of his or her own."""
+    image = np.kron(np.random.default_rng(place).uniform(0, 80, (6, 8, 3)), np.ones((40, 40, 1)))
+    for who, x, y, unit in faces:
+        look = np.random.default_rng(ord(who.lower())).uniform(90, 255, (8, 12, 3))
+        size = round(1.5 * unit / 12)
+        drawn = np.kron(look, np.ones((size, size, 1)))
+        top, left = round(y - 0.5 * unit), round(x - 0.75 * unit)
+        part = image[top : top + drawn.shape[0], left : left + drawn.shape[1]]
+        part[:] = drawn[: part.shape[0], : part.shape[1]]
+    return image.astype(np.uint8)
+
+
+def points(face: Face) -> NDArray[np.float64]:
+    _, x, y, unit = face
+    found = np.full((len(TRACKED_POINTS), 3), (x, y, 0.0))
+    found[EYES] = [(x - unit / 2, y, 0), (x + unit / 2, y, 0)]
+    return found
+
+
+class Mesh:
+    """Finds the faces of the frame that is being shown, at most so many, in their order; not those in capitals."""
+
+    shown: Sequence[Face] = ()
+
+    def __init__(self, most: int = 1) -> None:
+        self.most = most
+
+    def __enter__(self) -> Mesh:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def faces(self, _image: NDArray[np.uint8]) -> list[NDArray[np.float64]]:
+        return [points(face) for face in Mesh.shown if face[0].islower()][: self.most]
+
+
+Show = Callable[[Sequence[tuple[Sequence[Face], int]]], tuple[Follower, list[float | None]]]
+
+
+@pytest.fixture
+def show(monkeypatch: pytest.MonkeyPatch) -> Show:
+    """Shows frames (faces, place); returns the follower, and where the face was followed to."""
+    pytest.importorskip("cv2")
+    monkeypatch.setattr(follow, "FaceMesh", Mesh)
+
+    def run(frames: Sequence[tuple[Sequence[Face], int]]) -> tuple[Follower, list[float | None]]:
+        followed: list[float | None] = []
+        with Follower() as follower:
+            for faces, place in frames:
+                Mesh.shown = faces
+                found = follower.points(picture(faces, place))
+                followed.append(None if found is None else float(found[EYES, 0].mean()))
+        return follower, followed
+
+    return run
+
+
+ANNA, BELLA = ("a", 150.0, 100.0, 64.0), ("b", 150.0, 100.0, 64.0)
+
+
+def moved(face: Face, by: float) -> Face:
+    return (face[0], face[1] + by, *face[2:])
+
+
+def test_a_moving_face_is_one_scene(show: Show) -> None:
+    follower, followed = show([([moved(ANNA, n)], 0) for n in range(30)])
+    assert followed == [150.0 + n for n in range(30)]
+    assert follower.person().all()
+    assert follower.cuts() == []
+
+
+def test_a_frame_without_a_face_is_nobodys(show: Show) -> None:
+    follower, followed = show([([] if n in (0, 7) else [ANNA], 0) for n in range(12)])
+    assert [n for n, x in enumerate(followed) if x is None] == [0, 7]
+    assert follower.person().tolist() == [n not in (0, 7) for n in range(12)]
+    assert follower.cuts() == []
+
+
+def test_the_one_shown_longest_is_the_person(show: Show) -> None:
+    follower, _ = show([([BELLA], 1)] * 8 + [([ANNA], 0)] * 20 + [([BELLA], 1)] * 5)
+    assert follower.person().tolist() == [False] * 8 + [True] * 20 + [False] * 5
+    assert follower.cuts() == [8, 28]
+
+
+def test_she_is_known_again_elsewhere(show: Show) -> None:
+    near = ("a", 120.0, 110.0, 96.0)
+    follower, _ = show([([ANNA], 0)] * 10 + [([near], 2)] * 6 + [([BELLA], 1)] * 5 + [([ANNA], 0)] * 4)
+    assert follower.person().tolist() == [True] * 16 + [False] * 5 + [True] * 4
+    assert follower.cuts() == [10, 16, 21]
+
+
+def test_a_face_that_jumps_is_looked_at_again(show: Show) -> None:
+    """Without a cut in the picture, the mesh goes over to somebody else."""
+    there = moved(BELLA, 1.5 * JUMP * 64)
+    follower, _ = show([([ANNA], 0)] * 12 + [([there], 0)] * 4 + [([ANNA], 0)] * 4)
+    assert follower.person().tolist() == [True] * 12 + [False] * 4 + [True] * 4
+
+
+def test_away_for_long_is_compared_again(show: Show) -> None:
+    gone = [([], 0)] * (LOST_FRAMES + 2)
+    follower, _ = show([([ANNA], 0)] * 12 + gone + [([moved(BELLA, 15)], 0)] * 6)
+    assert follower.person().tolist() == [True] * 12 + [False] * (len(gone) + 6)
+    follower, _ = show([([ANNA], 0)] * 12 + gone + [([moved(ANNA, 15)], 0)] * 6)
+    assert follower.person().tolist() == [True] * 12 + [False] * len(gone) + [True] * 6
+
+
+def test_of_several_the_largest_then_the_middle_one(show: Show) -> None:
+    small, large = ("b", 80.0, 100.0, 40.0), ("a", 240.0, 100.0, 64.0)
+    assert set(show([([small, large], 0)] * 5)[1]) == {240.0}
+    middle, edge = ("a", 160.0, 100.0, 48.0), ("b", 40.0, 100.0, 48.0)
+    assert set(show([([edge, middle], 0)] * 5)[1]) == {160.0}
+
+
+def test_of_several_the_same_throughout_in_any_order(show: Show) -> None:
+    one, other = ("a", 80.0, 100.0, 48.0), ("b", 230.0, 100.0, 64.0)
+    frames = [([one, other] if n % 2 else [other, one], 0) for n in range(12)]
+    frames[7] = ([one, ("B", *other[1:])], 0)
+    follower, followed = show(frames)
+    assert set(followed) == {230.0, None}
+    assert np.flatnonzero(~follower.person()).tolist() == [7]
+
+
+def test_after_a_cut_to_several_the_known_one_is_taken(show: Show) -> None:
+    wide = [("b", 90.0, 100.0, 64.0), ("a", 240.0, 100.0, 48.0)]
+    follower, followed = show([([ANNA], 0)] * 8 + [(wide, 3)] * 8)
+    assert followed[8:] == [240.0] * 8
+    assert follower.person().all()
+    assert follower.cuts() == [8]

@@ -1,0 +1,242 @@
+"""What happens to a track when the video is not as one would wish: against the track of the untouched clip."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from lipmotion.errors import InputError
+from lipmotion.types import Track
+from lipmotion.vision.landmarks import EYE_CORNERS, TRACKED_POINTS
+from lipmotion.vision.mesh import FaceMesh
+from lipmotion.vision.track import track
+from vision.variants import Image, covered, frames_of, half_size, side_by_side, write_frames, zoomed
+
+pytestmark = [pytest.mark.video, pytest.mark.recordings]
+
+COUNT = 75
+MIDDLE = range(30, 40)
+
+
+@pytest.fixture(scope="module")
+def source(recordings: Path) -> Path:
+    pytest.importorskip("mediapipe")
+    return recordings / "grid-s1" / "clips" / "brwa3s.mkv"
+
+
+@pytest.fixture(scope="module")
+def frames(source: Path) -> list[Image]:
+    return frames_of(source)
+
+
+@pytest.fixture(scope="module")
+def usual(source: Path) -> Track:
+    return track(source, crops=False)
+
+
+@pytest.fixture(scope="module")
+def stranger(recordings: Path) -> tuple[list[Image], Track]:
+    pytest.importorskip("mediapipe")
+    path = recordings / "grid-others" / "swwp2s.mpg"
+    return frames_of(path), track(path, crops=False)
+
+
+@pytest.fixture(scope="module")
+def mouths(frames: list[Image]) -> list[tuple[NDArray[np.float64], float]]:
+    """Where the mouth is in every frame, and the distance between the eyes."""
+    column = {index: n for n, index in enumerate(TRACKED_POINTS)}
+    with FaceMesh() as mesh:
+        faces = [mesh.faces(image)[0] for image in frames]
+    right, left = (column[index] for index in EYE_CORNERS)
+    return [(face[column[13], :2], float(np.linalg.norm(face[right, :2] - face[left, :2]))) for face in faces]
+
+
+def alike(found: Track, usual: Track, at: NDArray[np.intp] | slice = slice(None)) -> float:
+    """Return the correlation of the two openings, at frames of the usual one that are seen in the other."""
+    time_s = usual.motion.time_s[at]
+    opening = np.interp(time_s, found.motion.time_s, found.motion["opening"])
+    seen = np.interp(time_s, found.motion.time_s, found.seen.astype(float)) > 0.99
+    return float(np.corrcoef(opening[seen], usual.motion["opening"][at][seen])[0, 1])
+
+
+def unseen(found: Track) -> list[int]:
+    return np.flatnonzero(~found.seen).tolist()
+
+
+def test_variable_frame_rate(tmp_path: Path, frames: list[Image], usual: Track) -> None:
+    draw = np.random.default_rng(0)
+    kept = [n for n in range(COUNT) if draw.random() > 0.25 or n in (0, COUNT - 1)]
+    found = track(write_frames(tmp_path / "a.mp4", [frames[n] for n in kept], ticks=kept), crops=False)
+    assert found.motion.rate_hz == 25
+    assert unseen(found) == sorted(set(range(COUNT)) - set(kept))
+    assert alike(found, usual) > 0.99
+
+
+def test_frames_out_of_step(tmp_path: Path, frames: list[Image], usual: Track) -> None:
+    times_s = np.arange(COUNT) / 25 + np.r_[0, np.random.default_rng(0).uniform(-0.008, 0.008, COUNT - 1)]
+    ticks = np.round(times_s * 90_000).astype(int).tolist()
+    found = track(write_frames(tmp_path / "a.mkv", frames, ticks=ticks, ticks_hz=90_000), crops=False)
+    assert (found.motion.rate_hz, unseen(found)) == (25, [])
+    assert alike(found, usual) > 0.97
+
+
+@pytest.mark.parametrize(("rate", "least"), [(24, 0.96), (30, 0.97), (60, 0.98)])
+def test_other_rates_by_repeating_or_dropping(
+    tmp_path: Path, frames: list[Image], usual: Track, rate: int, least: float
+) -> None:
+    shown = [frames[min(round(n * 25 / rate), COUNT - 1)] for n in range(3 * rate)]
+    found = track(write_frames(tmp_path / "a.mp4", shown, rate=rate, ticks_hz=rate), crops=False)
+    assert (found.motion.rate_hz, len(found.seen), unseen(found)) == (rate, 3 * rate, [])
+    assert alike(found, usual) > least
+
+
+@pytest.mark.parametrize("rotation", [90, 180, 270])
+def test_phones_held_sideways(tmp_path: Path, frames: list[Image], usual: Track, rotation: int) -> None:
+    turned = [np.rot90(frame, -rotation // 90) for frame in frames]
+    found = track(write_frames(tmp_path / "a.mp4", turned, rotation=rotation), crops=False)
+    assert unseen(found) == []
+    assert alike(found, usual) > 0.99
+
+
+@pytest.mark.parametrize(
+    ("name", "codec", "options", "pixels"),
+    [
+        ("a.mp4", "libx264", {"bf": "3", "crf": "8"}, "yuv420p"),
+        ("a.avi", "mpeg4", {}, "yuv420p"),
+        ("a.avi", "mjpeg", {}, "yuvj420p"),
+        ("a.mpg", "mpeg2video", {"flags": "+ildct+ilme", "top": "1"}, "yuv420p"),
+        ("a.ts", "mpeg2video", {"bf": "2"}, "yuv420p"),
+        ("a.webm", "libvpx", {"crf": "8", "b": "4M"}, "yuv420p"),
+    ],
+)
+def test_codecs(
+    tmp_path: Path, frames: list[Image], usual: Track, name: str, codec: str, options: dict[str, str], pixels: str
+) -> None:
+    path = write_frames(tmp_path / name, frames, codec=codec, options=options, pixels=pixels)
+    found = track(path, crops=False)
+    assert (found.motion.rate_hz, len(found.seen), unseen(found)) == (25, COUNT, [])
+    assert alike(found, usual) > 0.99
+
+
+def test_odd_and_portrait_sizes(tmp_path: Path, frames: list[Image], usual: Track) -> None:
+    odd = write_frames(tmp_path / "a.mkv", [frame[:287, :359] for frame in frames], pixels="yuv444p")
+    portrait = write_frames(tmp_path / "b.mp4", [frame[:, 100:262] for frame in frames])
+    for path in (odd, portrait):
+        found = track(path, crops=False)
+        assert unseen(found) == []
+        assert alike(found, usual) > 0.99
+
+
+def test_first_packet_later_than_zero(tmp_path: Path, frames: list[Image], usual: Track) -> None:
+    found = track(write_frames(tmp_path / "a.ts", frames, ticks=range(125, 125 + COUNT)), crops=False)
+    assert (len(found.seen), unseen(found)) == (COUNT, [])
+    assert alike(found, usual) > 0.99
+
+
+def test_dropped_frames_are_unseen(tmp_path: Path, frames: list[Image], usual: Track) -> None:
+    kept = [n for n in range(COUNT) if n not in MIDDLE]
+    found = track(write_frames(tmp_path / "a.mp4", [frames[n] for n in kept], ticks=kept), crops=False)
+    assert unseen(found) == list(MIDDLE)
+    assert alike(found, usual) > 0.99
+
+
+@pytest.mark.parametrize("kind", ["grey", "noise"])
+def test_ruined_frames_are_unseen(tmp_path: Path, frames: list[Image], usual: Track, kind: str) -> None:
+    draw = np.random.default_rng(0)
+    ruin = np.full_like(frames[0], 128) if kind == "grey" else draw.integers(0, 255, frames[0].shape).astype(np.uint8)
+    found = track(write_frames(tmp_path / "a.mp4", [ruin if n in MIDDLE else f for n, f in enumerate(frames)]))
+    assert unseen(found) == list(MIDDLE)
+    assert alike(found, usual) > 0.99
+
+
+@pytest.mark.parametrize("by", ["box", "hand"])
+def test_something_before_the_mouth(
+    tmp_path: Path, frames: list[Image], usual: Track, mouths: list[tuple[NDArray[np.float64], float]], by: str
+) -> None:
+    hidden = range(30, 45)
+    shown = [
+        covered(frame, place, 0.45 * unit, by=by) if n in hidden else frame
+        for n, (frame, (place, unit)) in enumerate(zip(frames, mouths, strict=True))
+    ]
+    found = track(write_frames(tmp_path / "a.mp4", shown), crops=False)
+    assert unseen(found) == list(hidden)
+    assert alike(found, usual) > 0.99
+    assert any("15 frames" in note for note in found.notes)
+
+
+def test_a_cut_to_somebody_else(
+    tmp_path: Path, frames: list[Image], usual: Track, stranger: tuple[list[Image], Track]
+) -> None:
+    found = track(write_frames(tmp_path / "a.mp4", [*frames[:65], *stranger[0][65:75]]), crops=False)
+    assert unseen(found) == list(range(65, 75))
+    assert alike(found, usual) > 0.99
+    assert found.notes == ("cut at 2.60 s", "another face, or one that is not recognised, in 10 frames")
+
+
+def test_somebody_else_between(
+    tmp_path: Path, frames: list[Image], usual: Track, stranger: tuple[list[Image], Track]
+) -> None:
+    shown = [stranger[0][n] if n in MIDDLE else frame for n, frame in enumerate(frames)]
+    found = track(write_frames(tmp_path / "a.mp4", shown), crops=False)
+    assert unseen(found) == list(MIDDLE)
+    assert alike(found, usual) > 0.99
+    assert found.notes[:2] == ("cut at 1.20 s", "cut at 1.60 s")
+
+
+def test_half_of_it_somebody_else_is_refused(
+    tmp_path: Path, frames: list[Image], stranger: tuple[list[Image], Track]
+) -> None:
+    path = write_frames(tmp_path / "a.mp4", [*frames[:38], *stranger[0][38:75]])
+    with pytest.raises(InputError, match=r"no face in 37 of 75 frames \(cut at 1\.52 s; another face"):
+        track(path, crops=False)
+
+
+def test_a_jump_cut_to_the_same_person_is_followed(tmp_path: Path, frames: list[Image], usual: Track) -> None:
+    found = track(write_frames(tmp_path / "a.mp4", [*frames[:38], *zoomed(frames[38:])]), crops=False)
+    assert unseen(found) == []
+    assert alike(found, usual) > 0.98
+    assert found.notes == ("cut at 1.52 s",)
+
+
+@pytest.mark.parametrize("is_left", [True, False])
+def test_of_two_people_the_larger_is_followed(
+    tmp_path: Path, frames: list[Image], usual: Track, stranger: tuple[list[Image], Track], is_left: bool
+) -> None:
+    for large, small, expected in ((frames, stranger[0], usual), (stranger[0], frames, stranger[1])):
+        pair = (large, half_size(small)) if is_left else (half_size(small), large)
+        found = track(write_frames(tmp_path / "a.mp4", side_by_side(*pair)), crops=False)
+        assert unseen(found) == []
+        assert alike(found, expected) > 0.98
+
+
+def test_two_alike_are_not_mixed_up(
+    tmp_path: Path, frames: list[Image], usual: Track, stranger: tuple[list[Image], Track]
+) -> None:
+    """Of two faces of nearly one size, side by side, one is followed throughout."""
+    path = write_frames(tmp_path / "a.mp4", side_by_side(frames, stranger[0]))
+    found = track(path, crops=False)
+    likenesses = [alike(found, one) for one in (usual, stranger[1])]
+    assert max(likenesses) > 0.98
+    assert unseen(found) == []
+
+
+def test_damage_is_told(tmp_path: Path, frames: list[Image], usual: Track) -> None:
+    content = write_frames(tmp_path / "a.mkv", frames).read_bytes()
+    (tmp_path / "a.mkv").write_bytes(content[: round(0.7 * len(content))])
+    found = track(tmp_path / "a.mkv", crops=False)
+    assert found.notes[0].startswith("cut short: pictures up to ")
+    assert alike(found, usual, slice(len(found.seen) - 4)) > 0.99
+    (tmp_path / "a.mkv").write_bytes(content[: round(0.3 * len(content))])
+    with pytest.raises(InputError, match=r"pictures for 0\.\d of 3\.0 s; required at least half"):
+        track(tmp_path / "a.mkv", crops=False)
+
+
+def test_a_clip_of_the_corpus_with_ruined_pictures(recordings: Path) -> None:
+    """Grey pictures of the decoder's before the first whole one, some of which look like a face."""
+    pytest.importorskip("mediapipe")
+    found = track(recordings / "grid-s1" / "clips" / "bwwuzn.mkv", crops=False)
+    assert unseen(found) == list(range(12))
+    assert found.notes[0] == "cut at 0.48 s"

@@ -1,0 +1,78 @@
+"""A real clip made into what people record: written with other rates, codecs, cuts, neighbours and damage."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import numpy as np
+from numpy.typing import NDArray
+
+Image = NDArray[np.uint8]
+
+
+def frames_of(path: Path) -> list[Image]:
+    """Return every picture of a video."""
+    with av.open(str(path)) as container:
+        return [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
+
+
+def write_frames(
+    path: Path,
+    frames: Sequence[Image],
+    *,
+    ticks: Sequence[int] | None = None,
+    ticks_hz: int = 25,
+    rate: int = 25,
+    codec: str = "libx264",
+    options: dict[str, str] | None = None,
+    pixels: str = "yuv420p",
+    rotation: int = 0,
+) -> Path:
+    """Write pictures; ``ticks`` are their times in 1 / ``ticks_hz`` s, by default one after the other."""
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream(codec, rate=rate, options={"crf": "8"} if options is None else options)
+        stream.height, stream.width = frames[0].shape[:2]
+        stream.pix_fmt, stream.codec_context.time_base = pixels, Fraction(1, ticks_hz)
+        if codec != "libx264":
+            stream.bit_rate = 6_000_000
+        if rotation:
+            stream.set_display_rotation(rotation)
+        for n, image in enumerate(frames):
+            frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(image), format="rgb24")
+            frame.pts, frame.time_base = n if ticks is None else ticks[n], Fraction(1, ticks_hz)
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode())
+    return path
+
+
+def side_by_side(left: Sequence[Image], right: Sequence[Image]) -> list[Image]:
+    """Return two clips in one picture."""
+    return [np.concatenate(pair, axis=1) for pair in zip(left, right, strict=False)]
+
+
+def half_size(frames: Sequence[Image]) -> list[Image]:
+    """Return the pictures at half their size, on black."""
+    height, width = frames[0].shape[0] // 4, frames[0].shape[1] // 4
+    return [np.pad(frame[::2, ::2], ((height, height), (width, width), (0, 0))) for frame in frames]
+
+
+def zoomed(frames: Sequence[Image]) -> list[Image]:
+    """Return the middle of the pictures, twice as large."""
+    return [np.kron(frame[100:244, 70:250], np.ones((2, 2, 1), np.uint8)) for frame in frames]
+
+
+def covered(image: Image, mouth: NDArray[np.float64], reach: float, *, by: str) -> Image:
+    """Return the picture with something before the mouth: a ``box``, or the like of a ``hand``."""
+    image = image.copy()
+    (x, y), half = mouth.astype(int), int(reach)
+    place = slice(max(y - half, 0), y + half), slice(x - half, x + half)
+    height, width = image[place].shape[:2]
+    if by == "box":
+        image[place] = 0
+    else:
+        shade = np.add.outer(np.linspace(-25, 10, height), 12 * np.sin(np.linspace(0, 4 * np.pi, width)))[..., None]
+        image[place] = np.clip(image[y - 2 * half, x] + shade, 0, 255)
+    return image
