@@ -14,7 +14,7 @@ from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.phones import SHORT_PAUSE_S, align, recognise, train_phones
 from lipmotion.speech.read import read_audio
 from lipmotion.speech.synthesise import synthesise
-from lipmotion.stats.em import silent_monitor
+from lipmotion.types.progress import silent_monitor
 from lipmotion.stats.hmm.model import HmmConfig, UnitHmm
 from lipmotion.types import Audio, Features, Timeline, Unit
 from lipmotion.units import PAUSE, SILENCE, Lexicon

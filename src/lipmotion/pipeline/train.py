@@ -6,20 +6,36 @@ import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib import metadata
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import Engine, engine_named
-from lipmotion.errors import AlignmentError, CorpusError, InputError
+from lipmotion.errors import CorpusError, InputError
+from lipmotion.pipeline.fingerprint import fingerprint
+from lipmotion.pipeline.labels import labelled
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.transcribe import phones_in_time, report_guesses
 from lipmotion.speech.phones import train_phones
-from lipmotion.stats.em import Monitor, silent_monitor
+from lipmotion.stats.checkpoint import NOTHING_KEPT, Checkpoint
 from lipmotion.stats.hmm.model import HmmConfig, UnitHmm
 from lipmotion.stats.resample import to_model_frames
-from lipmotion.types import FRAME_RATE_HZ, Example, Features, Motion, Speech, Timeline, Track, Unit, Utterance
+from lipmotion.types import (
+    FRAME_RATE_HZ,
+    Example,
+    Features,
+    Monitor,
+    Motion,
+    Speech,
+    Timeline,
+    Track,
+    Unit,
+    Utterance,
+    part_of,
+    silent_monitor,
+)
 from lipmotion.units import Lexicon
 
 LOG = logging.getLogger("lipmotion")
@@ -48,6 +64,7 @@ def train(
     recogniser: HmmConfig | None = None,
     lexicon: Lexicon | None = None,
     monitor: Monitor = silent_monitor,
+    work: Path | None = None,
 ) -> tuple[Model, TrainReport]:
     """Train phone models on what is transcribed, then the motion of everything.
 
@@ -56,6 +73,9 @@ def train(
     names      : these utterances only, whatever their list (learning curves)
     engine     : with its configuration; the trajectory engine by default
     recogniser : configuration of the phone models
+    monitor    : hears how far it is, and which utterances are left out
+    work       : a folder that keeps what is finished, so that the same call goes on from there after it was stopped
+                 (``files.unfinished_work`` gives one); the model is the same to the byte
     Utterances without a transcript are recognised, by the phone models of the transcribed ones or, where there
     are none, by those of the shipped model.  Nothing here is random: the same corpus gives the same model.
     Raises CorpusError: no such utterances, or nothing in them to learn from.
@@ -65,10 +85,12 @@ def train(
     chosen = tuple(names) if names is not None else corpus.required(split)
     if not chosen:
         raise CorpusError(f"{corpus.path}: an empty list of names was given; name at least one utterance")
+    recogniser = recogniser or HmmConfig()
     utterances = [corpus.utterance(name) for name in chosen]
-    phones = _phones(utterances, lexicon, recogniser or HmmConfig(), monitor)
-    examples, skipped = _examples(utterances, phones, lexicon)
-    fit = engine.fit(examples, monitor)
+    checkpoint = Checkpoint(work, fingerprint(corpus, chosen, engine, recogniser, lexicon)) if work else NOTHING_KEPT
+    phones = _phones(utterances, lexicon, recogniser, part_of(monitor, 0, 0.8, "learning phones: "), checkpoint)
+    examples, skipped = _examples(utterances, phones, lexicon, part_of(monitor, 0.8, 0.9), checkpoint)
+    fit = engine.fit(examples, part_of(monitor, 0.9, 1, "learning motion: "), checkpoint)
     used = tuple(example.name for example in examples)
     about = _about(corpus, utterances, "given names" if names is not None else split or "all", len(used))
     return Model(phones, engine, fit.model, about), TrainReport(used, skipped, fit.figures)
@@ -89,14 +111,16 @@ def model_motion(track: Track, frames: int) -> tuple[Motion, Any]:
     return replace(motion, values=values, rate_hz=FRAME_RATE_HZ), valid
 
 
-def _phones(utterances: Sequence[Utterance], lexicon: Lexicon, config: HmmConfig, monitor: Monitor) -> UnitHmm:
+def _phones(
+    utterances: Sequence[Utterance], lexicon: Lexicon, config: HmmConfig, monitor: Monitor, checkpoint: Checkpoint
+) -> UnitHmm:
     spoken = [(u.features, u.words) for u in utterances if u.words and _can_be_said(u.words, lexicon)]
     if not spoken:
         LOG.warning("no transcripts in the corpus: its phones are recognised by the shipped model")
         return load_model().phones
     said = dict.fromkeys(word for _, words in spoken for word in words)
     report_guesses(tuple(said), lexicon)
-    return train_phones(spoken, lexicon, config, monitor)
+    return train_phones(spoken, lexicon, config, monitor, checkpoint)
 
 
 def _can_be_said(words: Sequence[str], lexicon: Lexicon) -> bool:
@@ -107,15 +131,13 @@ def _can_be_said(words: Sequence[str], lexicon: Lexicon) -> bool:
 
 
 def _examples(
-    utterances: Sequence[Utterance], phones: UnitHmm, lexicon: Lexicon
+    utterances: Sequence[Utterance], phones: UnitHmm, lexicon: Lexicon, monitor: Monitor, checkpoint: Checkpoint
 ) -> tuple[list[Example], dict[str, str]]:
     examples: list[Example] = []
     skipped: dict[str, str] = {}
-    for utterance in utterances:
-        try:
-            units = labels_of(utterance, phones, lexicon)
-        except (AlignmentError, InputError) as error:
-            skipped[utterance.name] = str(error)
+    for utterance, units in labelled(utterances, lambda u: labels_of(u, phones, lexicon), monitor, checkpoint):
+        if isinstance(units, str):
+            skipped[utterance.name] = units
             continue
         motion, valid = model_motion(utterance.track, len(utterance.features.values))
         examples.append(Example(utterance.name, Speech(utterance.features, units), motion, valid))

@@ -7,13 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.stats.em import Monitor
+from lipmotion.stats.checkpoint import NOTHING_KEPT, Checkpoint
 from lipmotion.stats.hmm.align import align_units, choose_pronunciations
 from lipmotion.stats.hmm.decode import decode_units
 from lipmotion.stats.hmm.loudness import loud_frames
 from lipmotion.stats.hmm.model import HmmConfig, UnitHmm
 from lipmotion.stats.hmm.train import Transcribed, UnitInventory, train_hmm
-from lipmotion.types import FRAME_RATE_HZ, Features, Span, Timeline, Unit
+from lipmotion.types import FRAME_RATE_HZ, Features, Monitor, Span, Timeline, Unit
 from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent, stand_in
 
 LOG_ENERGY = 12
@@ -25,7 +25,11 @@ SHORT_PAUSE_S = 0.2
 
 
 def train_phones(
-    spoken: Sequence[tuple[Features, tuple[str, ...]]], lexicon: Lexicon, config: HmmConfig, monitor: Monitor
+    spoken: Sequence[tuple[Features, tuple[str, ...]]],
+    lexicon: Lexicon,
+    config: HmmConfig,
+    monitor: Monitor,
+    checkpoint: Checkpoint = NOTHING_KEPT,
 ) -> UnitHmm:
     """Train phone models from recordings and the words said in them.
 
@@ -35,7 +39,7 @@ def train_phones(
         Transcribed(features.values, tuple(lexicon.pronunciations(word) for word in words))
         for features, words in spoken
     ]
-    return train_hmm(utterances, UnitInventory(SILENCE, PAUSE, LOG_ENERGY), config, monitor)
+    return train_hmm(utterances, UnitInventory(SILENCE, PAUSE, LOG_ENERGY), config, monitor, checkpoint)
 
 
 def align(hmm: UnitHmm, features: Features, words: Sequence[str], lexicon: Lexicon) -> Timeline[Unit]:

@@ -4,6 +4,7 @@ from lipmotion.types.audio import Audio
 from lipmotion.types.features import FRAME_RATE_HZ, Features
 from lipmotion.types.generation import Constraints, Example, Generation, Pin, Speech, Trace
 from lipmotion.types.motion import EYE_DISTANCE, Channel, Motion
+from lipmotion.types.progress import Item, Monitor, Progress, counted, part_of, silent_monitor
 from lipmotion.types.timeline import Span, Timeline, Unit
 from lipmotion.types.utterance import Track, Utterance
 
@@ -16,8 +17,11 @@ __all__ = [
     "Example",
     "Features",
     "Generation",
+    "Item",
+    "Monitor",
     "Motion",
     "Pin",
+    "Progress",
     "Span",
     "Speech",
     "Timeline",
@@ -25,4 +29,7 @@ __all__ = [
     "Track",
     "Unit",
     "Utterance",
+    "counted",
+    "part_of",
+    "silent_monitor",
 ]

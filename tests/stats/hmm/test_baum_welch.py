@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lipmotion.stats.em import silent_monitor
+from lipmotion.types.progress import silent_monitor
 from lipmotion.stats.hmm import train
 from lipmotion.stats.hmm.align import chain_of
 from lipmotion.stats.hmm.model import HmmConfig

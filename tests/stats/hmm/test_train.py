@@ -7,7 +7,7 @@ import pytest
 
 from lipmotion.errors import CorpusError
 from lipmotion.stats.bigram import estimate_bigram
-from lipmotion.stats.em import silent_monitor
+from lipmotion.types.progress import silent_monitor
 from lipmotion.stats.hmm import train
 from lipmotion.stats.hmm.align import align_units, choose_pronunciations
 from lipmotion.stats.hmm.decode import decode_units
