@@ -14,9 +14,9 @@ from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.phones import SHORT_PAUSE_S, align, recognise, train_phones
 from lipmotion.speech.read import read_audio
 from lipmotion.speech.synthesise import synthesise
-from lipmotion.types.progress import silent_monitor
 from lipmotion.stats.hmm.model import HmmConfig, UnitHmm
 from lipmotion.types import Audio, Features, Timeline, Unit
+from lipmotion.types.progress import silent_monitor
 from lipmotion.units import PAUSE, SILENCE, Lexicon
 
 SMALL = HmmConfig(mixtures=1, iterations=2)
@@ -147,10 +147,10 @@ def test_too_many_words_for_the_sound(hmm: UnitHmm, sentences: list[ToySentence]
 def test_training_is_reported_and_does_not_get_worse(sentences: list[ToySentence]) -> None:
     steps: list[tuple[str, float]] = []
     spoken = [(mfcc(sentence.audio), sentence.words) for sentence in sentences[:4]]
-    hmm = train_phones(spoken, Lexicon(), SMALL, lambda step, value: steps.append((step, value)))
+    hmm = train_phones(spoken, Lexicon(), SMALL, lambda event: steps.append((event.stage, event.figure)))
     assert {"flat start", "pronunciations"} <= {step for step, _ in steps}
     for stage in ("flat start", "pronunciations"):
-        values = [value for step, value in steps if step == stage]
+        values = [value for step, value in steps if step == stage and value is not None]
         assert all(before <= after + 1e-6 for before, after in pairwise(values))
     said = {phone for sentence in sentences[:4] for word in sentence.words for phone in WORDS[word]}
     assert set(hmm.table.units) == said | {SILENCE, PAUSE}

@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from lipmotion.cli.progress import add_option, reporting
+
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb."""
@@ -14,6 +16,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser.add_argument("--split", default="test", help="train, val, test or all (default: test)")
     parser.add_argument("--lexicon", type=Path, metavar="FILE", help="pronunciations: WORD PHONE PHONE ... a line")
     parser.add_argument("-o", "--output", type=Path, metavar="FILE.json", help="write all figures here as well")
+    add_option(parser)
     parser.set_defaults(run=run)
 
 
@@ -28,12 +31,14 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.pipeline.model import load_model
     from lipmotion.units import Lexicon
 
-    if options.output:
-        check_target(options.output)
-    lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
-    split = None if options.split == "all" else options.split
-    figures = evaluate(load_model(options.model), Corpus.open(options.corpus), split=split, lexicon=lexicon)
-    print(table(figures))
-    if options.output:
-        with whole_file(options.output) as unfinished:
-            unfinished.write_text(json.dumps(figures, indent=1) + "\n")
+    with reporting(options) as report:
+        if options.output:
+            check_target(options.output)
+        lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
+        split = None if options.split == "all" else options.split
+        model, corpus = load_model(options.model), Corpus.open(options.corpus)
+        figures = evaluate(model, corpus, split=split, lexicon=lexicon, monitor=report.hear)
+        if options.output:
+            with whole_file(options.output) as unfinished:
+                unfinished.write_text(json.dumps(figures, indent=1) + "\n")
+        report.finish(table(figures), figures=figures)

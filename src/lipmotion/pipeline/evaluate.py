@@ -18,7 +18,7 @@ from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.train import labels_of
 from lipmotion.pipeline.transcribe import report_guesses
 from lipmotion.speech.phones import recognise
-from lipmotion.types import Motion, Speech, Timeline, Unit, Utterance
+from lipmotion.types import Monitor, Motion, Speech, Timeline, Unit, Utterance, counted, part_of, silent_monitor
 from lipmotion.units import VISEMES, Lexicon, is_silent
 
 DISTANCES = ("opening", "width", "outer")
@@ -38,11 +38,18 @@ class Clip:
 
 
 def evaluate(
-    model: Model, corpus: Corpus, *, split: str | None = "test", lexicon: Lexicon | None = None, seed: int = 0
+    model: Model,
+    corpus: Corpus,
+    *,
+    split: str | None = "test",
+    lexicon: Lexicon | None = None,
+    seed: int = 0,
+    monitor: Monitor = silent_monitor,
 ) -> dict[str, Any]:
     """Return all figures of docs/measures.md: audio only and, where there are transcripts, with them.
 
-    split : ``train``, ``val`` or ``test``; None: everything
+    split   : ``train``, ``val`` or ``test``; None: everything
+    monitor : hears how far it is
 
     The reference for what is speech and where its p, b, m are is the forced alignment, or recognition where
     nothing is transcribed. The mouth counts as closed relative to the corpus's own training list (without
@@ -54,9 +61,11 @@ def evaluate(
     utterances = [corpus.utterance(name) for name in corpus.required(split)]
     _check_channels("corpus", utterances[0].track.motion)
     report_guesses([word for utterance in utterances for word in utterance.words or ()], lexicon)
-    reference = [_reference(utterance, model, lexicon) for utterance in utterances]
+    heard = counted(utterances, "finding the phones", part_of(monitor, 0, 0.2))
+    reference = [_reference(utterance, model, lexicon) for utterance in heard]
     threshold = closed_threshold([_openings(u) for u in _training(corpus) or utterances])
-    conditions = {"audio only": [recognise(model.phones, u.features) for u in utterances]}
+    heard = counted(utterances, "recognising the phones", part_of(monitor, 0.2, 0.9))
+    conditions = {"audio only": [recognise(model.phones, u.features) for u in heard]}
     if all(utterance.words for utterance in utterances):
         conditions["with transcript"] = reference
     return {

@@ -10,29 +10,29 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, replace
 from importlib import metadata
 from pathlib import Path
 
-from tqdm import tqdm
-
 from lipmotion.corpora.base import Recording, Recordings
 from lipmotion.corpora.discover import discover
 from lipmotion.corpora.entry import quantised, read_entry, write_utterance
-from lipmotion.corpora.store import Corpus
+from lipmotion.corpora.store import UTTERANCES, Corpus
 from lipmotion.errors import CorpusError, ExportError, InputError, MissingDependencyError
+from lipmotion.files import locked, remove_unfinished
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.read import read_audio
-from lipmotion.types import Utterance
+from lipmotion.types import Item, Monitor, Progress, Utterance, silent_monitor
 from lipmotion.vision.packages import versions
 from lipmotion.vision.track import track
 
 RECIPE = "2"
 """Raised whenever the same video would give other numbers: older utterances are then made again."""
+STAGE = "preparing recordings"
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,12 @@ class _Outcome:
 
 
 def prepare(
-    directory: str | Path, output: str | Path, *, workers: int | None = None, crops: bool = True, progress: bool = True
+    directory: str | Path,
+    output: str | Path,
+    *,
+    workers: int | None = None,
+    crops: bool = True,
+    monitor: Monitor = silent_monitor,
 ) -> PrepareReport:
     """Turn a folder of recordings into a corpus, or add them to one.
 
@@ -85,24 +90,28 @@ def prepare(
     workers   : processes, by default one a core. With more than one, a script must call this under
                 ``if __name__ == "__main__":``, as for every process pool
     crops     : keep the mouth images
-    progress  : show a progress bar, if stderr is a terminal
+    monitor   : hears how far it is, and what becomes of every recording
     A recording that cannot be used is reported and left out. The corpus does not depend on ``workers``, nor on how
     often it was interrupted.
     Raises InputError, CorpusError: no recordings, none of them usable, or ``output`` is something else.
-    Raises MissingDependencyError: MediaPipe or OpenCV is not installed. Raises ExportError: the disk is full.
+    Raises MissingDependencyError: MediaPipe or OpenCV is not installed.
+    Raises ExportError: the disk is full, or another process is preparing into the same corpus.
     """
     directory, output = Path(directory), Path(output)
     start_s = time.monotonic()
     found = discover(directory)
     packages = versions()
     is_new = not output.exists()
-    corpus = Corpus.create(output)
-    settings = {"recipe": RECIPE, "tracker": f"mediapipe {packages['mediapipe']}", "crops": "yes" if crops else "no"}
-    jobs = [_job(item, directory.resolve(), corpus, packages, settings) for item in found.items]
-    try:
-        outcomes = list(_with_progress(_outcomes(jobs, workers or os.cpu_count() or 1), len(jobs), progress))
-    finally:
-        corpus.refresh()
+    with locked(output):
+        corpus = Corpus.create(output)
+        settings = {
+            "recipe": RECIPE,
+            "tracker": f"mediapipe {packages['mediapipe']}",
+            "crops": "yes" if crops else "no",
+        }
+        jobs = [_job(item, directory.resolve(), corpus, packages, settings) for item in found.items]
+        with _listed(corpus), closing(_outcomes(jobs, workers or os.cpu_count() or 1)) as coming:
+            outcomes = _heard(found, coming, len(jobs), monitor)
     report = _report(corpus, found, outcomes, time.monotonic() - start_s)
     if not report.prepared and not report.kept:
         if is_new:
@@ -206,12 +215,39 @@ def _utterance(job: _Job, source: dict[str, str]) -> Utterance:
     )
 
 
-def _with_progress(outcomes: Iterator[_Outcome], count: int, progress: bool) -> Iterator[_Outcome]:
-    shown = progress and sys.stderr is not None and sys.stderr.isatty()
-    yield from tqdm(outcomes, total=count, unit="clip", disable=not shown)
+def _heard(found: Recordings, coming: Iterator[_Outcome], count: int, monitor: Monitor) -> list[_Outcome]:
+    """Return all outcomes; each is reported as soon as it is known."""
+    for name, problem in found.problems.items():
+        monitor(Item(name, "skipped", problem))
+    outcomes: list[_Outcome] = []
+    monitor(Progress(STAGE, 0, count, 0.0))
+    for outcome in coming:
+        outcomes.append(outcome)
+        kind = "skipped" if outcome.problem else "kept" if outcome.kept else "prepared"
+        monitor(Item(outcome.name, kind, outcome.problem))
+        monitor(Progress(STAGE, len(outcomes), count, len(outcomes) / count))
+    return outcomes
 
 
-def _outcomes(jobs: Sequence[_Job], workers: int) -> Iterator[_Outcome]:
+@contextmanager
+def _listed(corpus: Corpus) -> Iterator[None]:
+    """Whatever happens inside, have the corpus list what is finished, and leave nothing that is not."""
+    try:
+        yield
+    except ExportError as error:
+        with suppress(ExportError):
+            corpus.refresh()
+        raise ExportError(f"{error}; {len(corpus)} utterances are finished and kept") from error
+    except BaseException:
+        corpus.refresh()
+        raise
+    else:
+        corpus.refresh()
+    finally:
+        remove_unfinished(corpus.path / UTTERANCES)
+
+
+def _outcomes(jobs: Sequence[_Job], workers: int) -> Generator[_Outcome, None, None]:
     """Yield the outcomes as they come; with one worker, in this process."""
     workers = min(workers, len(jobs))
     if workers <= 1:
@@ -219,7 +255,9 @@ def _outcomes(jobs: Sequence[_Job], workers: int) -> Iterator[_Outcome]:
         return
     with _pool(workers) as pool:
         try:
-            for future in as_completed([pool.submit(_process, job) for job in jobs]):
+            with _signals_held():
+                futures = [pool.submit(_process, job) for job in jobs]
+            for future in as_completed(futures):
                 yield future.result()
         except BrokenProcessPool as error:
             raise CorpusError(
@@ -238,14 +276,30 @@ def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
     except BaseException:
         pool.shutdown(wait=False, cancel_futures=True)
         for process in set(multiprocessing.active_children()) - others:
-            process.terminate()
+            process.kill()
         raise
     finally:
         pool.shutdown()
 
 
+@contextmanager
+def _signals_held() -> Iterator[None]:
+    """Hold Ctrl-C and ``kill`` back for a moment, and from processes that are started meanwhile for ever.
+
+    The terminal sends Ctrl-C to all of them, but only the first one, which ends the others, should act on it.
+    """
+    if sys.platform == "win32":
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def _start_worker() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that started this one
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # where signals cannot be held back
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 

@@ -33,7 +33,7 @@ def write_archive(
         file.writestr(_member(HEADER, method), json.dumps(header, indent=1, ensure_ascii=False).encode())
         for name, array in sorted(arrays.items()):
             with file.open(_member(f"{name}.npy", method), "w", force_zip64=array.nbytes >= LARGE) as member:
-                np.lib.format.write_array(member, np.ascontiguousarray(array), allow_pickle=False)
+                np.lib.format.write_array(member, np.asarray(array, order="C"), allow_pickle=False)
 
 
 def read_archive_header(path: Path) -> Any:

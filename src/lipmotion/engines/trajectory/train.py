@@ -120,8 +120,8 @@ def _backfit(
     kept = checkpoint.load(_CHECKPOINT)
     if kept is not None:
         means, rest, done = [kept[f"means{number}"] for number in range(LEVELS)], kept["rest"], int(kept["done"])
+    monitor(Progress(_STAGE, done, PASSES, done / PASSES))
     for number in range(done, PASSES):
-        monitor(Progress(_STAGE, number, PASSES, number / PASSES))
         _backfit_once(groups, counts, means, rest, shrinkage)
         state = {f"means{level}": mean for level, mean in enumerate(means)}
         checkpoint.save(_CHECKPOINT, {**state, "rest": rest, "done": np.array(number + 1)})
@@ -134,7 +134,7 @@ def _backfit(
     return levels, rest
 
 
-_CHECKPOINT, _STAGE = "motion", "motion unexplained"
+_CHECKPOINT, _STAGE = "motion", "contexts"
 
 
 def _backfit_once(

@@ -83,7 +83,8 @@ def train_hmm(
     steps = training.steps()
     done, state = _restored(checkpoint, config) or (0, training.flat_start([sequences[i] for i in kept]))
     for number, (stage, step) in enumerate(steps[done:], start=done):
-        monitor(Progress(stage, number, len(steps), number / len(steps)))
+        if number == done or stage != steps[number - 1][0]:
+            monitor(Progress(stage, number, len(steps), number / len(steps)))
         state, figure = step(state)
         _keep(checkpoint, number + 1, state)
         monitor(Progress(stage, number + 1, len(steps), (number + 1) / len(steps), figure))
