@@ -58,7 +58,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as folder:
         for job in jobs(Path(folder)):
             if options.job in (None, job.name):
-                tally = kill_often(job, Path(folder), options.kills, random.Random(options.seed))
+                tally = kill_often(job, Path(folder), options.kills, random.Random(options.seed))  # noqa: S311
                 failed = show(job, options.kills, tally) or failed
     return int(failed)
 
@@ -88,9 +88,7 @@ def kill_often(job: Job, folder: Path, kills: int, chance: random.Random) -> Tal
         if finished.returncode != 0:
             tally.problems.append(f"{number}: could not go on: {finished.stderr}")
         elif content(here) != whole:
-            tally.problems.append(
-                f"{number}: other bytes, or something left: {sorted(set(content(here)) ^ set(whole))}"
-            )
+            tally.problems.append(f"{number}: other bytes, or other files: {sorted(set(content(here)) ^ set(whole))}")
         else:
             tally.counts["same bytes after going on"] += 1
         shutil.rmtree(here)

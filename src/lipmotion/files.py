@@ -211,7 +211,10 @@ def unfinished_work(target: Path) -> Iterator[Path]:
     try:
         with locked(folder):
             remove_unfinished(folder)
-            yield folder
+            try:
+                yield folder
+            except ExportError as error:
+                raise ExportError(f"{error}; what is finished is kept in {folder}") from error
             for path in folder.iterdir():
                 if path.name != LOCK:
                     _remove(path)

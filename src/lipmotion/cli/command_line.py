@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import errno
 import io
 import logging
 import sys
@@ -25,6 +26,10 @@ def run(arguments: Sequence[str] | None, stopper: Stopper) -> None:
     try:
         options = _parser().parse_args(arguments, argparse.Namespace(stopper=stopper))
         options.run(options)
+    except OSError as error:
+        if error.errno == errno.ENOSPC and error.filename is None:
+            raise refused(error) from error
+        raise
     finally:
         if sys.stdout is not None:
             _flush()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from lipmotion.cli.progress import add_option, reporting
+from lipmotion.cli.options import add_machine_readable
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -19,7 +19,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     prepare.add_argument("-o", "--output", type=Path, required=True, metavar="CORPUS")
     prepare.add_argument("--workers", type=int, help="processes (default: one a core)")
     prepare.add_argument("--no-crops", dest="crops", action="store_false", help="do not keep mouth images")
-    add_option(prepare)
+    add_machine_readable(prepare)
     prepare.set_defaults(run=run_prepare)
     info = actions.add_parser("info", help="say what is in a corpus")
     info.add_argument("corpus", type=Path)
@@ -28,16 +28,13 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run_prepare(options: argparse.Namespace) -> None:
     """Call ``lipmotion.prepare``."""
+    from lipmotion.cli.progress import reporting
     from lipmotion.pipeline.prepare import prepare
 
     given = {"workers": options.workers, "crops": options.crops}
     with reporting(options) as report:
         done = prepare(options.recordings, options.output, **given, monitor=report.hear)
-        for name, frames in done.unseen.items():
-            report.warn(f"{name}: no face in {frames} frames, interpolated")
-        counts = {"prepared": len(done.prepared), "kept": len(done.kept), "skipped": len(done.failed)}
-        text = f"{done.corpus}: {len(done.prepared)} prepared, {len(done.kept)} kept, {len(done.failed)} left out"
-        report.finish(f"{text} ({done.kind})", corpus=str(done.corpus), kind=done.kind, **counts)
+        report.finish(str(done), corpus=str(done.corpus), kind=done.kind, **done.counts)
 
 
 def run_info(options: argparse.Namespace) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from lipmotion.cli.progress import add_option, reporting
+from lipmotion.cli.options import add_machine_readable
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -16,7 +16,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser.add_argument("--split", default="test", help="train, val, test or all (default: test)")
     parser.add_argument("--lexicon", type=Path, metavar="FILE", help="pronunciations: WORD PHONE PHONE ... a line")
     parser.add_argument("-o", "--output", type=Path, metavar="FILE.json", help="write all figures here as well")
-    add_option(parser)
+    add_machine_readable(parser)
     parser.set_defaults(run=run)
 
 
@@ -24,6 +24,7 @@ def run(options: argparse.Namespace) -> None:
     """Call ``lipmotion.evaluate`` and print its figures."""
     import json
 
+    from lipmotion.cli.progress import reporting
     from lipmotion.corpora.store import Corpus
     from lipmotion.files import check_target, whole_file
     from lipmotion.measures.report import table

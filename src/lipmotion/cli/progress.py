@@ -29,13 +29,6 @@ class Report(Protocol):
         """Say what came of it: ``text`` to a person, ``figures`` to a program."""
 
 
-def add_option(parser: argparse.ArgumentParser) -> None:
-    """Add ``--machine-readable``."""
-    parser.add_argument(
-        "--machine-readable", action="store_true", help="one JSON object a line on standard output, and nothing else"
-    )
-
-
 @contextmanager
 def reporting(options: argparse.Namespace) -> Iterator[Report]:
     """Give what the work reports to, while it lasts; to a program, say also how it started and why it failed."""
@@ -79,8 +72,8 @@ class _Terminal:
         self._stopper.check()
         if isinstance(event, Progress):
             self._draw(event)
-        elif event.outcome == "skipped":
-            self.warn(f"left out {event.name}: {event.reason}")
+        elif event.reason:
+            self.warn(f"{event.outcome} {event.name}: {event.reason}")
 
     def warn(self, text: str) -> None:
         line = f"lipmotion: warning: {' '.join(text.split())}"
@@ -132,10 +125,8 @@ class _Lines:
         self._stopper.check()
         if isinstance(event, Progress):
             self._say("progress", stage=event.stage, step=event.step, steps=event.steps, value=round(event.share, 4))
-        elif event.outcome == "skipped":
-            self._say("skipped", name=event.name, reason=event.reason)
         else:
-            self._say("item", name=event.name, outcome=event.outcome)
+            self._say("item", name=event.name, outcome=event.outcome, reason=event.reason)
 
     def warn(self, text: str) -> None:
         self._say("warning", message=text)

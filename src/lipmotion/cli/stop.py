@@ -34,6 +34,7 @@ class Stopper:
     def __init__(self) -> None:
         self.code: int | None = None
         self._since_s = 0.0
+        self._hooks = sys.excepthook, sys.unraisablehook
         self._before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
 
     def listen(self) -> None:
@@ -45,6 +46,8 @@ class Stopper:
 
     def leave(self, *, for_good: bool) -> None:
         """End; ``for_good``: the process is over, and a late signal must not show a traceback."""
+        if not for_good:
+            sys.excepthook, sys.unraisablehook = self._hooks
         if threading.current_thread() is threading.main_thread():
             for number, before in self._before.items():
                 if before is not None and before is not signal.SIG_IGN:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from lipmotion.cli.progress import add_option, reporting
+from lipmotion.cli.options import add_machine_readable
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -15,12 +15,13 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="MODEL")
     parser.add_argument("--split", default="train", help="train, val, test or all (default: train)")
     parser.add_argument("--lexicon", type=Path, metavar="FILE", help="pronunciations: WORD PHONE PHONE ... a line")
-    add_option(parser)
+    add_machine_readable(parser)
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:
     """Call ``lipmotion.train`` and ``lipmotion.save_model``."""
+    from lipmotion.cli.progress import reporting
     from lipmotion.corpora.store import Corpus
     from lipmotion.files import unfinished_work
     from lipmotion.pipeline.model import save_model
@@ -35,6 +36,6 @@ def run(options: argparse.Namespace) -> None:
             model, result = train(corpus, split=split, lexicon=lexicon, monitor=report.hear, work=work)
             save_model(model, options.output)
         used, minutes = len(result.used), model.about["minutes"]
-        text = f"{options.output}: {used} utterances, {minutes} minutes, {len(result.skipped)} left out"
+        text = f"{options.output}: {used} utterances, {minutes} minutes, {len(result.skipped)} skipped"
         text += f"\nuse it: lipmotion animate SPEECH -o FILE --model {options.output}"
         report.finish(text, model=str(options.output), used=used, minutes=minutes, skipped=len(result.skipped))

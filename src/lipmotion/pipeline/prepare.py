@@ -56,6 +56,15 @@ class PrepareReport:
     unseen: dict[str, int]
     seconds: float
 
+    @property
+    def counts(self) -> dict[str, int]:
+        """How many recordings were prepared, kept and skipped."""
+        return {"prepared": len(self.prepared), "kept": len(self.kept), "skipped": len(self.failed)}
+
+    def __str__(self) -> str:
+        counts = ", ".join(f"{count} {what}" for what, count in self.counts.items())
+        return f"{self.corpus}: {counts} ({self.kind})"
+
 
 @dataclass(frozen=True)
 class _Job:
@@ -224,7 +233,8 @@ def _heard(found: Recordings, coming: Iterator[_Outcome], count: int, monitor: M
     for outcome in coming:
         outcomes.append(outcome)
         kind = "skipped" if outcome.problem else "kept" if outcome.kept else "prepared"
-        monitor(Item(outcome.name, kind, outcome.problem))
+        unseen = f"no face in {outcome.unseen} frames, interpolated" if outcome.unseen else ""
+        monitor(Item(outcome.name, kind, outcome.problem or unseen))
         monitor(Progress(STAGE, len(outcomes), count, len(outcomes) / count))
     return outcomes
 

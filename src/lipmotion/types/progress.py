@@ -31,7 +31,7 @@ class Item:
     """What became of one recording.
 
     outcome : ``prepared``, ``kept`` (was there already) or ``skipped``
-    reason  : why it was skipped
+    reason  : why it was skipped, or what else there is to know of it
     """
 
     name: str
