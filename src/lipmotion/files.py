@@ -19,6 +19,11 @@ from typing import IO
 
 from lipmotion.errors import ExportError, InputError
 
+if sys.platform == "win32":
+    import msvcrt
+else:
+    import fcntl
+
 TEMPORARY = ".part-"
 """Names of unfinished files start with this; a killed run may leave one, the next removes it."""
 LOCK = f"{TEMPORARY}lock"
@@ -177,8 +182,6 @@ def _held(path: Path) -> IO[bytes]:
 if sys.platform == "win32":
 
     def _lock(file: IO[bytes]) -> None:
-        import msvcrt
-
         file.seek(1 << 30)  # what is locked cannot be read, and the owner's number should be
         try:
             msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
@@ -188,8 +191,6 @@ if sys.platform == "win32":
 else:
 
     def _lock(file: IO[bytes]) -> None:
-        import fcntl
-
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
