@@ -1,6 +1,6 @@
 """Kill ``corpus prepare`` and ``train`` at random moments, go on, and compare every byte with an uninterrupted run.
 
-    python benchmarks/kills.py [--kills 100] [--seed 0] [--job prepare|train]
+    python benchmarks/kills.py [--kills 100] [--seed 0] [--job prepare|train|share]
 
 Ctrl-C (SIGINT), ``kill`` (SIGTERM) and ``kill -9`` (SIGKILL) are sent to the first process alone or to all of them, at
 moments spread over the whole duration of an uninterrupted run; every other run is killed a second time. The recordings
@@ -29,7 +29,7 @@ LINE = "lipmotion: stopped; run the same command again to go on"
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGKILL)
 LOCK = ".part-lock"
 """May be left where the signal came between making and holding it: it never blocks, and the next run removes it."""
-CLIPS = 6
+CLIPS, MANY = 6, 96  # of so many utterances, enough are for training to be shared between two processes
 PATIENCE_S = 300
 
 
@@ -54,7 +54,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--kills", type=int, default=100, help="runs killed of each job (default: 100)")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--job", choices=("prepare", "train"))
+    parser.add_argument("--job", choices=("prepare", "train", "share"))
     options = parser.parse_args()
     failed = False
     with tempfile.TemporaryDirectory() as folder:
@@ -66,14 +66,19 @@ def main() -> int:
 
 
 def jobs(folder: Path) -> Iterator[Job]:
-    """Make the recordings, give the one job; make a corpus of them, give the other."""
-    from lipmotion.pipeline.toy import write_toy_recordings
+    """Give the jobs: preparing recordings, training on them, training on more in two processes."""
+    from lipmotion.corpora.store import Corpus
+    from lipmotion.pipeline.toy import toy_utterances, write_toy_recordings
 
     write_toy_recordings(folder / "recordings", sentences=CLIPS)
     prepare = ("corpus", "prepare", str(folder / "recordings"), "-o", "corpus", "--workers", "2")
     yield Job("prepare", prepare)
     run(prepare, folder)
     yield Job("train", ("train", str(folder / "corpus"), "-o", "m.lipmotion"))
+    large = Corpus.create(folder / "large")
+    for utterance in toy_utterances(MANY):
+        large.add(utterance)
+    yield Job("share", ("train", str(large.path), "-o", "m.lipmotion", "--workers", "2"))
 
 
 def kill_often(job: Job, folder: Path, kills: int, chance: random.Random) -> Tally:

@@ -45,12 +45,12 @@ def test_evaluate(toy_corpus: Corpus, toy_model_file: Path, here: Path) -> None:
 
 
 @pytest.mark.parametrize("limit", [LIMIT, 100_000, 140_000])
-def test_train_says_what_is_kept_and_goes_on(run: Run, toy_corpus: Corpus, here: Path, limit: int) -> None:
+def test_train_says_what_is_kept_and_goes_on(run_outside: Run, toy_corpus: Corpus, here: Path, limit: int) -> None:
     code, line = run_limited("train", toy_corpus.path, "-o", "m.lipmotion", limit=limit)
     assert (code, "cannot be written: " in line) == (7, True)
     assert "make room, then run it again; what is finished is kept in m.lipmotion.unfinished" in line
     left = [str(path.relative_to(here)) for path in here.rglob("*") if path.is_file()]
     assert not [path for path in left if ".part-" in path]
-    assert run("train", toy_corpus.path, "-o", "m.lipmotion").code == 0
-    run("train", toy_corpus.path, "-o", "whole.lipmotion")
+    assert run_outside("train", toy_corpus.path, "-o", "m.lipmotion").code == 0
+    run_outside("train", toy_corpus.path, "-o", "whole.lipmotion")
     assert (here / "m.lipmotion").read_bytes() == (here / "whole.lipmotion").read_bytes()

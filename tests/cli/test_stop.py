@@ -93,8 +93,10 @@ def test_while_packages_are_imported(number: signal.Signals, toy_speech: Path, h
 
 
 @BOTH
-def test_training_stopped_in_the_middle_goes_on(number: signal.Signals, toy_corpus, here: Path, run: Run) -> None:
-    run("train", toy_corpus.path, "-o", "whole.lipmotion")
+def test_training_stopped_in_the_middle_goes_on(
+    number: signal.Signals, toy_corpus, here: Path, run_outside: Run
+) -> None:
+    run_outside("train", toy_corpus.path, "-o", "whole.lipmotion")
     command = [sys.executable, "-m", "lipmotion.cli.main", "train", str(toy_corpus.path), "-o", "m.lipmotion"]
     with subprocess.Popen([*command, "--machine-readable"], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         assert process.stdout is not None
@@ -112,7 +114,7 @@ def test_training_stopped_in_the_middle_goes_on(number: signal.Signals, toy_corp
     assert f"another lipmotion (process {process.pid}) is at work on it" in second.stderr
     assert sorted(path.name for path in here.iterdir()) == ["m.lipmotion.unfinished", "whole.lipmotion"]
     assert [path.name for path in (here / "m.lipmotion.unfinished").iterdir()] == ["phones.checkpoint"]
-    assert run("train", toy_corpus.path, "-o", "m.lipmotion").code == 0
+    assert run_outside("train", toy_corpus.path, "-o", "m.lipmotion").code == 0
     assert (here / "m.lipmotion").read_bytes() == (here / "whole.lipmotion").read_bytes()
     assert sorted(path.name for path in here.iterdir()) == ["m.lipmotion", "whole.lipmotion"]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
@@ -11,6 +12,7 @@ import pytest
 
 from lipmotion.corpora.store import Corpus
 from lipmotion.pipeline import labels
+from lipmotion.pipeline import train as module
 from lipmotion.pipeline.model import Model, save_model
 from lipmotion.pipeline.train import train
 from lipmotion.stats.hmm.model import HmmConfig
@@ -136,3 +138,19 @@ def test_a_damaged_checkpoint_is_not_used(corpus: Corpus, work: Path, tmp_path: 
     path = work / f"{name}.checkpoint"
     path.write_bytes(path.read_bytes()[:-500])
     assert content(run(corpus, work), tmp_path) == whole
+
+
+@pytest.mark.parametrize("stop", [0, 6, 12])
+def test_in_two_processes(
+    corpus: Corpus, work: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stop: int
+) -> None:
+    """The model is the same to the bit, stopped or not."""
+    whole = content(run(corpus), tmp_path)
+    monkeypatch.setattr(module, "FEWEST", 1)
+    monkeypatch.setattr(labels, "AT_A_TIME", 2)
+    before = set(multiprocessing.active_children())
+    if stop:
+        with pytest.raises(Stopped):
+            train(corpus, recogniser=CONFIG, work=work, monitor=stopping_after(stop), workers=2)
+        assert set(multiprocessing.active_children()) == before
+    assert content(train(corpus, recogniser=CONFIG, work=work, workers=2)[0], tmp_path) == whole

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 from pathlib import Path
 
 from lipmotion.cli.options import add_machine_readable
@@ -15,12 +16,15 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="MODEL")
     parser.add_argument("--split", default="train", help="train, val, test or all (default: train)")
     parser.add_argument("--lexicon", type=Path, metavar="FILE", help="pronunciations: WORD PHONE PHONE ... a line")
+    parser.add_argument("--workers", type=int, help="processes (default: one a core)")
     add_machine_readable(parser)
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:
     """Call ``lipmotion.train`` and ``lipmotion.save_model``."""
+    os.environ.setdefault("OMP_NUM_THREADS", "1")  # the processes share the cores, not the matrix products in each
+
     from lipmotion.cli.progress import reporting
     from lipmotion.corpora.store import Corpus
     from lipmotion.files import unfinished_work
@@ -28,14 +32,16 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.pipeline.train import train
     from lipmotion.units import Lexicon
 
-    split = None if options.split == "all" else options.split
+    workers = options.workers or os.cpu_count() or 1
     with reporting(options) as report:
-        corpus = Corpus.open(options.corpus)
+        corpus, split = Corpus.open(options.corpus), None if options.split == "all" else options.split
         lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
         with unfinished_work(options.output) as work:
-            model, result = train(corpus, split=split, lexicon=lexicon, monitor=report.hear, work=work)
+            model, result = train(corpus, split=split, lexicon=lexicon, monitor=report.hear, work=work, workers=workers)
             save_model(model, options.output)
-        used, minutes = len(result.used), model.about["minutes"]
-        text = f"{options.output}: {used} utterances, {minutes} minutes, {len(result.skipped)} skipped"
-        text += f"\nuse it: lipmotion animate SPEECH -o FILE --model {options.output}"
-        report.finish(text, model=str(options.output), used=used, minutes=minutes, skipped=len(result.skipped))
+        figures = {"used": len(result.used), "minutes": model.about["minutes"], "skipped": len(result.skipped)}
+        text = (
+            "{used} utterances, {minutes} minutes, {skipped} skipped\nuse it: lipmotion animate SPEECH -o FILE --model"
+        )
+        text = f"{options.output}: {text.format(**figures)} {options.output}"
+        report.finish(text, model=str(options.output), **figures)

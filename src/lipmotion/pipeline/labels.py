@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -10,7 +12,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError, InputError
 from lipmotion.stats.checkpoint import Checkpoint
-from lipmotion.types import Item, Monitor, Progress, Span, Timeline, Unit, Utterance
+from lipmotion.types import Each, Item, Monitor, Progress, Span, Timeline, Unit, Utterance
 
 AT_A_TIME = 32
 """Utterances that are labelled between one checkpoint and the next."""
@@ -20,24 +22,41 @@ Labelled = Timeline[Unit] | str
 
 
 def labelled(
-    utterances: Sequence[Utterance], label: Label, monitor: Monitor, checkpoint: Checkpoint
+    utterances: Sequence[Utterance], label: Label, monitor: Monitor, checkpoint: Checkpoint, each: Each
 ) -> Iterator[tuple[Utterance, Labelled]]:
     """Give every utterance with its phones.
 
     label : gives them; raises AlignmentError or InputError where it cannot
+    each  : shares the work
     """
-    for start in range(0, len(utterances), AT_A_TIME):
-        some, stage = utterances[start : start + AT_A_TIME], f"labels-{start // AT_A_TIME}"
-        arrays = checkpoint.load(stage)
-        found = _unpacked(arrays) if arrays is not None else [_labelled(utterance, label) for utterance in some]
+    parts = [utterances[start : start + AT_A_TIME] for start in range(0, len(utterances), AT_A_TIME)]
+    kept = [checkpoint.load(_stage(number)) for number in range(len(parts))]
+    missing = [list(map(_without_pictures, part)) for part, arrays in zip(parts, kept, strict=True) if arrays is None]
+    made = iter(each(partial(_all_labelled, label=label), missing))
+    done = 0
+    for number, (part, arrays) in enumerate(zip(parts, kept, strict=True)):
+        found = _unpacked(arrays) if arrays is not None else next(made)
         if arrays is None:
-            checkpoint.save(stage, _packed(found))
-        for utterance, phones in zip(some, found, strict=True):
+            checkpoint.save(_stage(number), _packed(found))
+        for utterance, phones in zip(part, found, strict=True):
             if isinstance(phones, str):
                 monitor(Item(utterance.name, "skipped", phones))
             yield utterance, phones
-        done = start + len(some)
+        done += len(part)
         monitor(Progress("finding the phones in the sound", done, len(utterances), done / len(utterances)))
+
+
+def _stage(number: int) -> str:
+    return f"labels-{number}"
+
+
+def _without_pictures(utterance: Utterance) -> Utterance:
+    """Return what can be sent to another process fast."""
+    return replace(utterance, track=replace(utterance.track, crops=None))
+
+
+def _all_labelled(utterances: Sequence[Utterance], label: Label) -> list[Labelled]:
+    return [_labelled(utterance, label) for utterance in utterances]
 
 
 def _labelled(utterance: Utterance, label: Label) -> Labelled:

@@ -3,17 +3,11 @@
 from __future__ import annotations
 
 import hashlib
-import multiprocessing
 import os
 import shutil
-import signal
-import sys
-import threading
 import time
-from collections.abc import Generator, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import closing, contextmanager, suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from importlib import metadata
 from pathlib import Path
@@ -24,6 +18,7 @@ from lipmotion.corpora.entry import quantised, read_entry, write_utterance
 from lipmotion.corpora.store import UTTERANCES, Corpus
 from lipmotion.errors import CorpusError, ExportError, InputError, MissingDependencyError
 from lipmotion.files import locked, remove_unfinished
+from lipmotion.pipeline.workers import working
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.read import read_audio
 from lipmotion.types import Item, Monitor, Progress, Utterance, silent_monitor
@@ -119,8 +114,8 @@ def prepare(
             "crops": "yes" if crops else "no",
         }
         jobs = [_job(item, directory.resolve(), corpus, packages, settings) for item in found.items]
-        with _listed(corpus), closing(_outcomes(jobs, workers or os.cpu_count() or 1)) as coming:
-            outcomes = _heard(found, coming, len(jobs), monitor)
+        with _listed(corpus), working(min(workers or os.cpu_count() or 1, len(jobs))) as team:
+            outcomes = _heard(found, team.as_they_come(_process, jobs), len(jobs), monitor)
     report = _report(corpus, found, outcomes, time.monotonic() - start_s)
     if not report.prepared and not report.kept:
         if is_new:
@@ -255,66 +250,3 @@ def _listed(corpus: Corpus) -> Iterator[None]:
         corpus.refresh()
     finally:
         remove_unfinished(corpus.path / UTTERANCES)
-
-
-def _outcomes(jobs: Sequence[_Job], workers: int) -> Generator[_Outcome, None, None]:
-    """Yield the outcomes as they come; with one worker, in this process."""
-    workers = min(workers, len(jobs))
-    if workers <= 1:
-        yield from map(_process, jobs)
-        return
-    with _pool(workers) as pool:
-        try:
-            with _signals_held():
-                futures = [pool.submit(_process, job) for job in jobs]
-            for future in as_completed(futures):
-                yield future.result()
-        except BrokenProcessPool as error:
-            raise CorpusError(
-                "a worker process died (out of memory? or a script that calls prepare() outside of "
-                '`if __name__ == "__main__":`); what is finished is kept: prepare again, with fewer workers'
-            ) from error
-
-
-@contextmanager
-def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
-    """Give a pool whose processes end when it is left in a hurry, or when this process is killed."""
-    others = set(multiprocessing.active_children())
-    pool = ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), _start_worker)
-    try:
-        yield pool
-    except BaseException:
-        pool.shutdown(wait=False, cancel_futures=True)
-        for process in set(multiprocessing.active_children()) - others:
-            process.kill()
-        raise
-    finally:
-        pool.shutdown()
-
-
-@contextmanager
-def _signals_held() -> Iterator[None]:
-    """Hold Ctrl-C and ``kill`` back for a moment, and from processes that are started meanwhile for ever.
-
-    The terminal sends Ctrl-C to all of them, but only the first one, which ends the others, should act on it.
-    """
-    if sys.platform == "win32":
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-def _start_worker() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # where signals cannot be held back
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-    os._exit(1)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -18,12 +19,14 @@ from lipmotion.pipeline.fingerprint import fingerprint
 from lipmotion.pipeline.labels import labelled
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.transcribe import phones_in_time, report_guesses
+from lipmotion.pipeline.workers import working
 from lipmotion.speech.phones import train_phones
 from lipmotion.stats.checkpoint import NOTHING_KEPT, Checkpoint
 from lipmotion.stats.hmm.model import HmmConfig, UnitHmm
 from lipmotion.stats.resample import to_model_frames
 from lipmotion.types import (
     FRAME_RATE_HZ,
+    Each,
     Example,
     Features,
     Monitor,
@@ -39,6 +42,8 @@ from lipmotion.types import (
 from lipmotion.units import Lexicon
 
 LOG = logging.getLogger("lipmotion")
+FEWEST = 32
+"""Utterances that are worth a process of their own."""
 
 
 @dataclass(frozen=True)
@@ -65,6 +70,7 @@ def train(
     lexicon: Lexicon | None = None,
     monitor: Monitor = silent_monitor,
     work: Path | None = None,
+    workers: int = 1,
 ) -> tuple[Model, TrainReport]:
     """Train phone models on what is transcribed, then the motion of everything.
 
@@ -76,6 +82,8 @@ def train(
     monitor    : hears how far it is, and which utterances are left out
     work       : a folder that keeps what is finished, so that the same call goes on from there after it was stopped
                  (``files.unfinished_work`` gives one); the model is the same to the byte
+    workers    : processes that share the work, fewer if the corpus is small; the model does not depend on it. With more
+                 than one, a script must call this under ``if __name__ == "__main__":``, as for every process pool
     Utterances without a transcript are recognised, by the phone models of the transcribed ones or, where there
     are none, by those of the shipped model.  Nothing here is random: the same corpus gives the same model.
     Raises CorpusError: no such utterances, or nothing in them to learn from.
@@ -88,8 +96,10 @@ def train(
     recogniser = recogniser or HmmConfig()
     utterances = [corpus.utterance(name) for name in chosen]
     checkpoint = Checkpoint(work, fingerprint(corpus, chosen, engine, recogniser, lexicon)) if work else NOTHING_KEPT
-    phones = _phones(utterances, lexicon, recogniser, part_of(monitor, 0, 0.8, "learning phones: "), checkpoint)
-    examples, skipped = _examples(utterances, phones, lexicon, part_of(monitor, 0.8, 0.9), checkpoint)
+    with working(min(workers, len(chosen) // FEWEST)) as team:
+        monitors = part_of(monitor, 0, 0.8, "learning phones: "), part_of(monitor, 0.8, 0.9)
+        phones = _phones(utterances, lexicon, recogniser, monitors[0], checkpoint, team.each)
+        examples, skipped = _examples(utterances, phones, lexicon, monitors[1], checkpoint, team.each)
     fit = engine.fit(examples, part_of(monitor, 0.9, 1, "learning motion: "), checkpoint)
     used = tuple(example.name for example in examples)
     about = _about(corpus, utterances, "given names" if names is not None else split or "all", len(used))
@@ -112,7 +122,12 @@ def model_motion(track: Track, frames: int) -> tuple[Motion, Any]:
 
 
 def _phones(
-    utterances: Sequence[Utterance], lexicon: Lexicon, config: HmmConfig, monitor: Monitor, checkpoint: Checkpoint
+    utterances: Sequence[Utterance],
+    lexicon: Lexicon,
+    config: HmmConfig,
+    monitor: Monitor,
+    checkpoint: Checkpoint,
+    each: Each,
 ) -> UnitHmm:
     spoken = [(u.features, u.words) for u in utterances if u.words and _can_be_said(u.words, lexicon)]
     if not spoken:
@@ -120,7 +135,7 @@ def _phones(
         return load_model().phones
     said = dict.fromkeys(word for _, words in spoken for word in words)
     report_guesses(tuple(said), lexicon)
-    return train_phones(spoken, lexicon, config, monitor, checkpoint)
+    return train_phones(spoken, lexicon, config, monitor, checkpoint, each)
 
 
 def _can_be_said(words: Sequence[str], lexicon: Lexicon) -> bool:
@@ -131,11 +146,17 @@ def _can_be_said(words: Sequence[str], lexicon: Lexicon) -> bool:
 
 
 def _examples(
-    utterances: Sequence[Utterance], phones: UnitHmm, lexicon: Lexicon, monitor: Monitor, checkpoint: Checkpoint
+    utterances: Sequence[Utterance],
+    phones: UnitHmm,
+    lexicon: Lexicon,
+    monitor: Monitor,
+    checkpoint: Checkpoint,
+    each: Each,
 ) -> tuple[list[Example], dict[str, str]]:
     examples: list[Example] = []
     skipped: dict[str, str] = {}
-    for utterance, units in labelled(utterances, lambda u: labels_of(u, phones, lexicon), monitor, checkpoint):
+    label = partial(labels_of, phones=phones, lexicon=lexicon)
+    for utterance, units in labelled(utterances, label, monitor, checkpoint, each):
         if isinstance(units, str):
             skipped[utterance.name] = units
             continue

@@ -13,7 +13,7 @@ from lipmotion.stats.hmm.decode import decode_units
 from lipmotion.stats.hmm.loudness import loud_frames
 from lipmotion.stats.hmm.model import HmmConfig, UnitHmm
 from lipmotion.stats.hmm.train import Transcribed, UnitInventory, train_hmm
-from lipmotion.types import FRAME_RATE_HZ, Features, Monitor, Span, Timeline, Unit
+from lipmotion.types import FRAME_RATE_HZ, Each, Features, Monitor, Span, Timeline, Unit
 from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent, stand_in
 
 LOG_ENERGY = 12
@@ -30,6 +30,7 @@ def train_phones(
     config: HmmConfig,
     monitor: Monitor,
     checkpoint: Checkpoint = NOTHING_KEPT,
+    each: Each = map,
 ) -> UnitHmm:
     """Train phone models from recordings and the words said in them.
 
@@ -39,7 +40,7 @@ def train_phones(
         Transcribed(features.values, tuple(lexicon.pronunciations(word) for word in words))
         for features, words in spoken
     ]
-    return train_hmm(utterances, UnitInventory(SILENCE, PAUSE, LOG_ENERGY), config, monitor, checkpoint)
+    return train_hmm(utterances, UnitInventory(SILENCE, PAUSE, LOG_ENERGY), config, monitor, checkpoint, each)
 
 
 def align(hmm: UnitHmm, features: Features, words: Sequence[str], lexicon: Lexicon) -> Timeline[Unit]:

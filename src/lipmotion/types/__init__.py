@@ -1,6 +1,7 @@
 """The data that flows. Plain frozen values; nothing here computes more than a look-up."""
 
 from lipmotion.types.audio import Audio
+from lipmotion.types.each import Each
 from lipmotion.types.features import FRAME_RATE_HZ, Features
 from lipmotion.types.generation import Constraints, Example, Generation, Pin, Speech, Trace
 from lipmotion.types.motion import EYE_DISTANCE, Channel, Motion
@@ -14,6 +15,7 @@ __all__ = [
     "Audio",
     "Channel",
     "Constraints",
+    "Each",
     "Example",
     "Features",
     "Generation",

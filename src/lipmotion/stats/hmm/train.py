@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,13 +14,15 @@ from lipmotion.errors import AlignmentError, CorpusError
 from lipmotion.stats.bigram import estimate_bigram
 from lipmotion.stats.checkpoint import NOTHING_KEPT, Checkpoint
 from lipmotion.stats.hmm.align import Chain, chain_of, choose_pronunciations, state_path
-from lipmotion.stats.hmm.baum_welch import Statistics, adapt_contexts, baum_welch, longest, maximised
+from lipmotion.stats.hmm.baum_welch import Statistics, adapt_contexts, baum_welch, heard, longest, maximised
 from lipmotion.stats.hmm.loudness import loud_frames
 from lipmotion.stats.hmm.model import HmmConfig, UnitHmm, hmm_arrays, hmm_from_arrays
 from lipmotion.stats.hmm.states import plain_states
 from lipmotion.stats.mixture import single_gaussian
-from lipmotion.types import Monitor, Progress
+from lipmotion.types import Each, Monitor, Progress
 
+AT_A_TIME = 32
+"""Utterances whose pronunciations are chosen together, by one worker."""
 ONSET_FRAMES = 21
 """For the flat start, speech is where the energy is loud, averaged over so many frames. Without averaging a click or
 a breath is the end of speech, and the state before it takes the silence for its own: the last words of GRID then
@@ -64,12 +67,14 @@ def train_hmm(
     config: HmmConfig,
     monitor: Monitor,
     checkpoint: Checkpoint = NOTHING_KEPT,
+    each: Each = map,
 ) -> UnitHmm:
     """Train models of every unit that the utterances say.
 
     Stages: flat start with the first pronunciations; choice of pronunciations and pauses; mixtures by
     splitting; the choice again; states in context. Each stage is embedded Baum–Welch over whole utterances.
     checkpoint : after every step, all that the next one needs is kept there
+    each       : shares the work; the result is the same to the bit
     Raises CorpusError: no utterance, or none long enough for its transcript.
     """
     sequences = [_first_guess(u, inventory) for u in utterances]
@@ -79,7 +84,7 @@ def train_hmm(
             f"none of {len(utterances)} utterances has a transcript that fits into its recording; "
             "check that transcripts and recordings belong together"
         )
-    training = _Training([utterances[i] for i in kept], inventory, config)
+    training = _Training([utterances[i] for i in kept], inventory, config, each)
     steps = training.steps()
     done, state = _restored(checkpoint, config) or (0, training.flat_start([sequences[i] for i in kept]))
     for number, (stage, step) in enumerate(steps[done:], start=done):
@@ -111,8 +116,10 @@ def _restored(checkpoint: Checkpoint, config: HmmConfig) -> tuple[int, _State] |
 class _Training:
     """The steps of training, each from one state to the next, over the same utterances."""
 
-    def __init__(self, utterances: Sequence[Transcribed], inventory: UnitInventory, config: HmmConfig) -> None:
-        self._utterances, self._inventory, self._config = utterances, inventory, config
+    def __init__(
+        self, utterances: Sequence[Transcribed], inventory: UnitInventory, config: HmmConfig, each: Each
+    ) -> None:
+        self._utterances, self._inventory, self._config, self._each = utterances, inventory, config, each
         self._data = [utterance.features for utterance in utterances]
 
     def flat_start(self, sequences: Sequence[tuple[str, ...]]) -> _State:
@@ -136,18 +143,19 @@ class _Training:
         return [(stage, step) for stage, steps in stages.items() for step in steps]
 
     def _improve(self, state: _State) -> tuple[_State, float]:
-        hmm, log_likelihood = baum_welch(state.hmm, self._data, state.said)
+        hmm, log_likelihood = baum_welch(state.hmm, self._data, state.said, self._each)
         return replace(state, hmm=hmm), log_likelihood
 
     def _pronounce_with_pause(self, state: _State) -> tuple[_State, None]:
         return self._pronounce(replace(state, hmm=_with_pause(state.hmm, self._inventory)))
 
     def _pronounce(self, state: _State) -> tuple[_State, None]:
-        said = [
-            _pronounced(state.hmm, utterance, before, self._inventory)
-            for utterance, before in zip(self._utterances, state.said, strict=True)
-        ]
-        return replace(state, said=tuple(said)), None
+        jobs = (
+            _Heard(state.hmm, self._utterances[start : start + AT_A_TIME], state.said[start : start + AT_A_TIME])
+            for start in range(0, len(state.said), AT_A_TIME)
+        )
+        said = self._each(partial(_pronounced_all, inventory=self._inventory), jobs)
+        return replace(state, said=tuple(units for some in said for units in some)), None
 
     def _find_contexts(self, state: _State) -> tuple[_State, float]:
         """Give states in contexts with enough data densities of their own, the same as without context at first."""
@@ -157,7 +165,7 @@ class _Training:
         return replace(state, hmm=_with_contexts(hmm, contexts)), len(contexts)
 
     def _adapt(self, state: _State) -> tuple[_State, float | None]:
-        hmm, log_likelihood = adapt_contexts(state.hmm, self._data, state.said)
+        hmm, log_likelihood = adapt_contexts(state.hmm, self._data, state.said, self._each)
         return replace(state, hmm=hmm), log_likelihood
 
 
@@ -185,6 +193,20 @@ def _with_pause(hmm: UnitHmm, inventory: UnitInventory) -> UnitHmm:
     for array in (mixtures.log_weights, mixtures.means, mixtures.variances):
         array[pause] = array[silence]
     return replace(hmm, mixtures=mixtures)
+
+
+@dataclass(frozen=True, eq=False)
+class _Heard:
+    """Some utterances, the models that they are heard with, and the units that were assumed before."""
+
+    hmm: UnitHmm
+    utterances: Sequence[Transcribed]
+    before: Sequence[tuple[str, ...]]
+
+
+def _pronounced_all(heard: _Heard, inventory: UnitInventory) -> list[tuple[str, ...]]:
+    pairs = zip(heard.utterances, heard.before, strict=True)
+    return [_pronounced(heard.hmm, utterance, before, inventory) for utterance, before in pairs]
 
 
 def _pronounced(
@@ -220,7 +242,7 @@ def _flat_start(
         chain = chain_of(hmm, sequence)
         posterior = np.zeros((len(x), len(chain.plain)))
         posterior[np.arange(len(x)), _even_path(x[:, inventory.energy], chain, len(sequence))] = 1
-        statistics.collect(x, chain, posterior, np.zeros(len(chain.plain)))
+        statistics.add(x, heard(chain, posterior, np.zeros(len(chain.plain))))
     return replace(hmm, mixtures=maximised(hmm, statistics, data))
 
 
