@@ -40,8 +40,6 @@ def run(options: argparse.Namespace) -> None:
             model, result = train(corpus, split=split, lexicon=lexicon, monitor=report.hear, work=work, workers=workers)
             save_model(model, options.output)
         figures = {"used": len(result.used), "minutes": model.about["minutes"], "skipped": len(result.skipped)}
-        text = (
-            "{used} utterances, {minutes} minutes, {skipped} skipped\nuse it: lipmotion animate SPEECH -o FILE --model"
-        )
-        text = f"{options.output}: {text.format(**figures)} {options.output}"
+        text = ", ".join(f"{value} {name}" for name, value in figures.items())
+        text = f"{options.output}: {text}; use it: lipmotion animate SPEECH -o FILE --model {options.output}"
         report.finish(text, model=str(options.output), **figures)
