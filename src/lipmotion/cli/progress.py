@@ -91,10 +91,11 @@ class _Terminal:
             return
         from tqdm import tqdm
 
+        stage = f"{event.stage} ({event.step}/{event.steps})"
         if self._bar is None:
             layout = "{desc} {percentage:3.0f}% |{bar:20}| {elapsed}, left {remaining}"
-            self._bar = tqdm(total=1.0, initial=event.share, bar_format=layout, dynamic_ncols=True)
-        self._bar.set_description_str(f"{event.stage} ({event.step}/{event.steps})", refresh=False)
+            self._bar = tqdm(total=1.0, initial=event.share, desc=stage, bar_format=layout, dynamic_ncols=True)
+        self._bar.set_description_str(stage, refresh=False)
         self._bar.update(event.share - self._bar.n)
         self._bar.refresh()
 
