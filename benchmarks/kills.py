@@ -125,7 +125,7 @@ def run(arguments: tuple[str, ...], here: Path) -> subprocess.CompletedProcess[s
 def kill_once(job: Job, here: Path, chance: random.Random, duration_s: float, tally: Tally) -> None:
     """Start the job, kill it at some moment, and look at what it says and leaves."""
     number, to_all = chance.choice(SIGNALS), chance.random() < 0.5
-    moment_s = chance.uniform(0, duration_s)
+    moment_s, before = chance.uniform(0, duration_s), leftovers(here)
     pipe = subprocess.PIPE
     with subprocess.Popen(
         [*COMMAND, *job.arguments], cwd=here, stdout=pipe, stderr=pipe, text=True, start_new_session=True
@@ -138,24 +138,30 @@ def kill_once(job: Job, here: Path, chance: random.Random, duration_s: float, ta
         _, said = process.communicate(timeout=PATIENCE_S)
     name = f"{signal.Signals(number).name} to {'all' if to_all else 'the first'}"
     tally.counts[name] += 1
-    problem = judged(number, process.returncode, said, [] if number == signal.SIGKILL else leftovers(here), tally)
+    left = [] if number == signal.SIGKILL else [path for path in leftovers(here) if path not in before]
+    problem = judged(number, process.returncode, said, left, tally)
     if problem:
         tally.problems.append(f"{name} after {moment_s:.3f} s: {problem}")
 
 
 def judged(number: int, code: int, said: str, left: list[str], tally: Tally) -> str:
     """Return what is wrong with how a killed run ended, empty if nothing is."""
+    if "runpy" in said:
+        tally.counts["before Python had begun with the program"] += 1
+        return ""
     if code == 0:
         tally.counts["had ended already"] += 1
     elif code == -number:
-        tally.counts["killed, or not yet begun"] += 1
+        tally.counts["killed at once"] += 1
     elif code != 128 + number:
         return f"exit code {code}: {said}"
     elif said.splitlines() != [LINE]:
         return f"said {said!r}"
     else:
         tally.counts["stopped with one line"] += 1
-    return f"left {left}" if left else f"said {said!r}" if "Traceback" in said else ""
+    if number != signal.SIGKILL and "Traceback" in said:  # a process whose parent is gone may well complain
+        return f"said {said!r}"
+    return f"left {left}" if left else ""
 
 
 def leftovers(here: Path) -> list[str]:

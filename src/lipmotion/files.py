@@ -212,6 +212,7 @@ def unfinished_work(target: Path) -> Iterator[Path]:
     try:
         with locked(folder):
             remove_unfinished(folder)
+            _sweep(target)
             try:
                 yield folder
             except ExportError as error:
