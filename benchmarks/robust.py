@@ -26,7 +26,7 @@ from pathlib import Path
 import numpy as np
 
 from lipmotion import animate, load_model
-from lipmotion.corpora.grid import words_of_name
+from lipmotion.corpora.grid import sentence
 from lipmotion.pipeline.model import Model
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.read import read_audio
@@ -67,7 +67,7 @@ def others(corpora: Path, model: Model, _: Path | None) -> None:
     for kind in KINDS:
         found: dict[str, list[float]] = {"audio only": [], "with transcript": []}
         for clip in clips:
-            for condition, words in (("audio only", None), ("with transcript", " ".join(words_of_name(clip.stem)))):
+            for condition, words in (("audio only", None), ("with transcript", " ".join(sentence(clip.stem) or ()))):
                 motion = animate(clip, transcript=words, model=model, recogniser=kind).motion
                 seen, recorded = tracks[clip].seen, tracks[clip].motion
                 generated = np.interp(recorded.time_s, motion.time_s, motion["opening"])
@@ -176,7 +176,16 @@ def hour(corpora: Path, _: Model, model_file: Path | None) -> None:
         del samples, reading
         chosen = ["--model", str(model_file)] if model_file else []
         for suffix in (".npz", ".json"):
-            command = [sys.executable, "-m", "lipmotion.cli.main", "animate", str(path), "-o", f"{path}{suffix}", *chosen]
+            command = [
+                sys.executable,
+                "-m",
+                "lipmotion.cli.main",
+                "animate",
+                str(path),
+                "-o",
+                f"{path}{suffix}",
+                *chosen,
+            ]
             taken_s = seconds(lambda: subprocess.run(command, check=True, stdout=subprocess.DEVNULL))  # noqa: B023
             peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
             show(f"an hour to {suffix}: peak so far", megabytes=round(peak), seconds=round(taken_s, 1))

@@ -6,8 +6,8 @@ from hypothesis import strategies as st
 from engines.synthetic import PHONES, examples, speech
 from lipmotion.engines import engine_named
 from lipmotion.engines.trajectory.closure import Closure, closing_frames, closing_spans, fit_closure
-from lipmotion.stats.em import silent_monitor
 from lipmotion.types import Constraints, Pin, Span, Timeline, Unit
+from lipmotion.types.progress import silent_monitor
 
 ENGINE = engine_named("trajectory", {})
 MODEL = ENGINE.fit(examples(), silent_monitor).model

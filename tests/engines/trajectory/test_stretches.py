@@ -6,8 +6,8 @@ import pytest
 from engines.synthetic import PHONES, examples, speech, timeline
 from lipmotion.engines import engine_named
 from lipmotion.engines.trajectory import engine as module
-from lipmotion.stats.em import silent_monitor
 from lipmotion.types import Constraints, Pin
+from lipmotion.types.progress import silent_monitor
 
 ENGINE = engine_named("trajectory", {})
 MODEL = ENGINE.fit(examples(), silent_monitor).model

@@ -16,13 +16,14 @@ from lipmotion.engines.trajectory.model import TrajectoryModel, model_arrays, mo
 from lipmotion.engines.trajectory.train import fit_trajectory
 from lipmotion.errors import InputError
 from lipmotion.kernels.banded import normal_equations, pin, solve
-from lipmotion.stats.em import Monitor
+from lipmotion.stats.checkpoint import NOTHING_KEPT, Checkpoint
 from lipmotion.types import (
     FRAME_RATE_HZ,
     WEIGHT,
     Constraints,
     Example,
     Generation,
+    Monitor,
     Motion,
     Speech,
     Timeline,
@@ -70,10 +71,12 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
     config: TrajectoryConfig
     name: ClassVar[str] = "trajectory"
 
-    def fit(self, examples: Sequence[Example], monitor: Monitor) -> Fit[TrajectoryModel]:  # noqa: D102
+    def fit(  # noqa: D102
+        self, examples: Sequence[Example], monitor: Monitor, checkpoint: Checkpoint = NOTHING_KEPT
+    ) -> Fit[TrajectoryModel]:
         options = asdict(self.config)
         del options["closures"]  # of generation
-        model = fit_trajectory(examples, **options, monitor=monitor)
+        model = fit_trajectory(examples, **options, monitor=monitor, checkpoint=checkpoint)
         frames = sum(int(example.valid.sum()) for example in examples)
         return Fit(model, {"frames": frames, "contexts": len(model.levels[-1].rows)})
 

@@ -67,16 +67,19 @@ class UnitHmm:
         return float(self.mixtures.log_likelihood(features, plain).max(axis=1).mean())
 
 
-def hmm_arrays(hmm: UnitHmm) -> dict[str, NDArray[Any]]:
-    """Return the models as arrays, Gaussians at half precision; the configuration is not among them."""
+def hmm_arrays(hmm: UnitHmm, precision: type[np.floating[Any]] = np.float16) -> dict[str, NDArray[Any]]:
+    """Return the models as arrays; the configuration is not among them.
+
+    precision : of the Gaussians: half is enough to recognise with, float32 is all there is
+    """
     return {
         "units": np.array(hmm.table.units),
         "counts": np.array(hmm.table.counts, np.int32),
         "names": np.array(hmm.table.names),
         "free": np.array(hmm.table.free),
-        "log_weights": hmm.mixtures.log_weights.astype(np.float16),
-        "means": hmm.mixtures.means.astype(np.float16),
-        "variances": hmm.mixtures.variances.astype(np.float16),
+        "log_weights": hmm.mixtures.log_weights.astype(precision),
+        "means": hmm.mixtures.means.astype(precision),
+        "variances": hmm.mixtures.variances.astype(precision),
         "log_stay": hmm.log_stay,
         "bigram": hmm.bigram.log_probability,
         "typical_fit": np.array([hmm.typical_fit]),
