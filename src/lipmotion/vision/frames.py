@@ -27,7 +27,6 @@ class Frame:
     image: NDArray[np.uint8]
 
 
-@dataclass(eq=False)
 class Video:
     """An open video.
 
@@ -37,10 +36,11 @@ class Video:
     damaged         : packets and pictures found damaged so far, which are left out
     """
 
-    frames: Iterator[Frame]
-    stated_rates_hz: tuple[float, ...]
-    stated_s: float
-    damaged: int = 0
+    def __init__(self, frames: Iterator[Frame], stated_rates_hz: tuple[float, ...], stated_s: float):
+        self.frames = frames
+        self.stated_rates_hz = stated_rates_hz
+        self.stated_s = stated_s
+        self.damaged = 0
 
 
 @contextmanager
