@@ -12,7 +12,7 @@ import platform
 import shutil
 import sys
 import uuid
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any
@@ -32,10 +32,13 @@ UNFINISHED = ".unfinished"
 """What a folder of unfinished work adds to the name of the file that the work is for."""
 
 
+LARGEST_TEXT = 1 << 26
+"""Bytes of a text that is read whole: more than all the words that anyone says in a year."""
+
+
 def check_source(path: Path, kind: str) -> None:
     """Raise InputError unless ``path`` is a file with something in it; ``kind`` says what it should be."""
-    if path.is_dir():
-        raise InputError(f"{path}: is a folder; give one {kind}")
+    check_regular(path, kind)
     if not path.is_file():
         raise InputError(f"{path}: no such file")
     if path.stat().st_size == 0:
@@ -53,6 +56,31 @@ def open_media(path: Path) -> Any:
     return av.open(f"file:{path}", options={"protocol_whitelist": "file"})
 
 
+def check_regular(path: Path, kind: str) -> None:
+    """Raise InputError for a folder, and for a pipe or a device, which may never end. What is missing passes."""
+    if path.is_dir():
+        raise InputError(f"{path}: is a folder; give one {kind}")
+    if path.exists() and not path.is_file():
+        raise InputError(f"{path}: is a pipe or a device, required a file; save the {kind} first")
+
+
+def text_in(path: Path, kind: str) -> str:
+    """Return the text of a file, without a byte order mark.
+
+    Raises InputError: no such file, not a file, larger than ``LARGEST_TEXT``, or not UTF-8.
+    """
+    check_regular(path, f"{kind} file")
+    try:
+        size = path.stat().st_size
+        if size > LARGEST_TEXT:
+            raise InputError(f"{path}: {size} bytes, required at most {LARGEST_TEXT}: is it a {kind}?")
+        return path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError as error:
+        raise InputError(f"{path}: no such {kind} file") from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: not a readable UTF-8 {kind} ({error}); save it as UTF-8 text") from error
+
+
 def check_target(target: Path, source: str | Path | None = None) -> None:
     """Raise ExportError unless a file can be put there: before work begins, not after it.
 
@@ -67,6 +95,14 @@ def check_target(target: Path, source: str | Path | None = None) -> None:
     _check_parent(target)
     if source is not None and target.exists() and Path(source).exists() and target.samefile(source):
         raise ExportError(f"{target}: is the recording itself; give another name")
+
+
+def check_distinct(targets: Sequence[Path]) -> None:
+    """Raise ExportError if two outputs are one file."""
+    places = [target.parent.resolve() / target.name for target in targets]
+    for number, place in enumerate(places):
+        if place in places[:number]:
+            raise ExportError(f"{targets[number]}: is given twice; give every output another name")
 
 
 def as_text(path: str | Path) -> str:

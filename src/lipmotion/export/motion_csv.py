@@ -12,6 +12,9 @@ from lipmotion.errors import ExportError, InputError
 from lipmotion.export.rounded import rows
 from lipmotion.types import Channel, Generation, Motion, Timeline, Unit
 
+LONGEST_S = 1e6
+"""More than eleven days of motion are a mistake."""
+
 
 def write(path: Path, generation: Generation, _source: Mapping[str, str], _model: Mapping[str, str]) -> None:
     """Write a header and one line a frame. Raises ExportError: a channel's name would break the header."""
@@ -44,6 +47,8 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
 def _rate(time_s: NDArray[np.float64]) -> float:
     if len(time_s) < 2:
         raise InputError("the table has fewer than two rows, so its frame rate is unknown; use .json or .npz")
+    if not np.abs(time_s).max() < LONGEST_S:
+        raise InputError(f"the column time_s holds times that are none, required seconds up to {LONGEST_S:.0f}")
     step_s = (time_s[-1] - time_s[0]) / (len(time_s) - 1)
     if time_s[0] != 0 or not step_s > 0 or np.abs(np.diff(time_s) - step_s).max() > 1e-6:
         raise InputError("the column time_s must begin at 0 and rise in even steps")

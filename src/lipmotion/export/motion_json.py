@@ -27,6 +27,6 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
     """Read it back. Raises InputError: not JSON, or not a motion document."""
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise InputError(f"not JSON ({error}); export it again") from error
     return parse(document, document.get("values") if isinstance(document, dict) else None)

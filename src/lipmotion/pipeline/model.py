@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from functools import cache
 from importlib import resources
 from pathlib import Path
@@ -108,12 +108,23 @@ def _read(path: Path) -> Model:
             part, _, key = name.partition("/")
             arrays[part][key] = array
         engine = engine_named(header["engine"], header["configuration"])
-        phones = hmm_from_arrays(arrays["phones"], HmmConfig(**header["recogniser"]))
+        phones = hmm_from_arrays(arrays["phones"], _numbers(header["recogniser"]))
         learned = engine.from_arrays(arrays["engine"])
+    except ModelFormatError as error:
+        raise ModelFormatError(f"{path}: {error}") from error
     except UNREADABLE as error:
         raise ModelFormatError(f"{path}: the model is damaged ({error}); train or download it again") from error
     about = {key: value for key, value in header.items() if key not in _OWN_KEYS}
     return Model(phones, engine, learned, about)
+
+
+def _numbers(options: Mapping[str, Any]) -> HmmConfig:
+    """Return a configuration. Raises TypeError: an unknown option, or one that is no number."""
+    config = HmmConfig(**options)
+    for option in fields(config):
+        if type(getattr(config, option.name)) not in (int, float):
+            raise TypeError(f"{option.name} is {getattr(config, option.name)!r}, required a number")
+    return config
 
 
 _OWN_KEYS = ("format", "version", "engine", "configuration", "recogniser")

@@ -108,6 +108,8 @@ def prepare(
     """
     directory, output = Path(directory), Path(output)
     start_s = time.monotonic()
+    if workers is not None and workers < 1:
+        raise InputError(f"{workers} processes, required at least 1; leave it out for one a core")
     found = discover(directory)
     packages = versions() if any(item.curves is None for item in found.items) else {}
     is_new = not output.exists()

@@ -41,8 +41,8 @@ class Motion:
     def __post_init__(self) -> None:
         if self.values.ndim != 2 or self.values.shape[1] != len(self.channels):
             raise InputError(f"motion values have shape {self.values.shape}, required (T, {len(self.channels)})")
-        if not self.rate_hz > 0:
-            raise InputError(f"motion rate is {self.rate_hz} Hz, required more than 0")
+        if not 0 < self.rate_hz < float("inf"):
+            raise InputError(f"motion rate is {self.rate_hz} Hz, required more than 0 and finite")
         if len(set(self.names)) != len(self.channels):
             raise InputError(f"motion channel names repeat: {', '.join(self.names)}")
 

@@ -14,7 +14,7 @@ from lipmotion.engines.trajectory.closure import OPENING, Closure, closing_frame
 from lipmotion.engines.trajectory.contexts import places, with_neighbours
 from lipmotion.engines.trajectory.model import TrajectoryModel, model_arrays, model_from_arrays
 from lipmotion.engines.trajectory.train import fit_trajectory
-from lipmotion.errors import InputError
+from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.kernels.banded import normal_equations, pin, solve
 from lipmotion.stats.checkpoint import NOTHING_KEPT, Checkpoint
 from lipmotion.types import (
@@ -117,7 +117,15 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
         return model_arrays(model)
 
     def from_arrays(self, arrays: Arrays) -> TrajectoryModel:  # noqa: D102
-        return model_from_arrays(arrays)
+        model = model_from_arrays(arrays)
+        parts = self.config.parts
+        missing = next((part for part in range(parts) if f"*:{part}" not in model.spread), None)
+        if missing is not None:
+            raise ModelFormatError(
+                f"the trajectory model is damaged (no variances of part {missing}, required {parts} parts); "
+                "train or download it again"
+            )
+        return model
 
 
 STRETCH, MARGIN = 6000, 500
