@@ -42,7 +42,8 @@ def test_speakers_are_chosen(run: Run, toy_corpus: Corpus, here: Path) -> None:
     for name, speaker in zip(toy_corpus.names("train"), ("anna", "anna", "ben", "ben", "carl"), strict=False):
         corpus.add(replace(toy_corpus.utterance(name), speaker=speaker))
     done = run("train", "corpus", "-o", "m", "--speaker", "anna", "--speaker", "ben")
-    assert (done.code, done.out) == (0, ["m: 4 utterances, 0.2 minutes"])
+    assert done.code == 0
+    assert done.out[0].startswith("m: 4 used, 0.2 minutes, 0 skipped; ")
     assert load_model(here / "m").about["speakers"] == ["anna", "ben"]
     assert run("evaluate", "m", "corpus", "--speaker", "carl", "--split", "train").out[0].startswith("split train: 1 ")
     assert (

@@ -41,7 +41,7 @@ def best_path(
     checkpoints, score = [first[0]], 0.0
     for start in starts[1:]:
         delta, shift = _scores(checkpoints[-1], log_emission(start - BLOCK, start + 1), *arcs)
-        checkpoints.append(delta[-1])
+        checkpoints.append(delta[-1].copy())  # a view would keep the whole block
         score += shift
     path = np.empty(count, np.intp)
     state = -1
