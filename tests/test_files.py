@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from pathlib import Path
@@ -7,7 +10,16 @@ from pathlib import Path
 import pytest
 
 from lipmotion.errors import ExportError
-from lipmotion.files import TEMPORARY, check_target, remove_unfinished, whole_file, whole_folder
+from lipmotion.files import (
+    LOCK,
+    TEMPORARY,
+    check_target,
+    locked,
+    remove_unfinished,
+    unfinished_work,
+    whole_file,
+    whole_folder,
+)
 
 Context = Callable[[Path], AbstractContextManager[Path]]
 LONGEST = "x" * 250 + ".json"
@@ -131,3 +143,83 @@ def test_what_a_killed_run_left_is_removed(tmp_path: Path) -> None:
     (tmp_path / "kept.json").touch()
     remove_unfinished(tmp_path)
     assert names(tmp_path) == ["kept.json"]
+
+
+def test_what_a_killed_process_left_of_a_target_is_removed_with_the_next(tmp_path: Path) -> None:
+    target = tmp_path / "motion.json"
+    program = (
+        "import os, pathlib, sys\n"
+        "from lipmotion.files import whole_file\n"
+        "with whole_file(pathlib.Path(sys.argv[1])) as unfinished:\n"
+        "    unfinished.write_text('half')\n"
+        "    os._exit(1)\n"
+    )
+    subprocess.run([sys.executable, "-c", program, str(target)], check=False)
+    assert len(names(tmp_path)) == 1
+    with whole_file(tmp_path / "other.json") as other, whole_file(target) as mine:
+        assert len(names(tmp_path)) == 0
+        other.touch()
+        mine.touch()
+        with whole_file(target) as same:  # a process that lives is left alone
+            same.touch()
+        assert mine.exists()
+    assert names(tmp_path) == ["motion.json", "other.json"]
+
+
+HOLD = (
+    "import pathlib, sys\n"
+    "from lipmotion.files import locked\n"
+    "with locked(pathlib.Path(sys.argv[1])):\n"
+    "    print('held', flush=True)\n"
+    "    sys.stdin.read()\n"
+)
+
+
+def test_a_folder_is_held_by_one_process_and_let_go_of_when_it_is_killed(tmp_path: Path) -> None:
+    folder = tmp_path / "new" / "work"
+    pipe = subprocess.PIPE
+    with subprocess.Popen([sys.executable, "-c", HOLD, str(folder)], stdin=pipe, stdout=pipe) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == b"held\n"
+        with pytest.raises(ExportError, match=rf"work: another lipmotion \(process {process.pid}\) is at work on it"):
+            locked(folder).__enter__()
+        process.kill()
+    assert names(folder) == [LOCK]  # it stays, and does not block
+    with locked(folder):
+        assert (folder / LOCK).read_text() == str(os.getpid())
+    assert names(folder) == []
+
+
+def test_a_folder_that_cannot_be_made_is_an_export_error(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(ExportError, match="file: cannot be written"), locked(tmp_path / "file"):
+        raise AssertionError
+
+
+def test_finished_work_leaves_no_folder(tmp_path: Path) -> None:
+    with unfinished_work(tmp_path / "model") as folder:
+        (folder / "stage").touch()
+        assert names(tmp_path) == ["model.unfinished"]
+    assert names(tmp_path) == []
+
+
+def test_unfinished_work_is_found_again(tmp_path: Path) -> None:
+    def interrupted() -> None:
+        with unfinished_work(tmp_path / "model") as folder:
+            (folder / "stage").touch()
+            (folder / f"{TEMPORARY}half").touch()
+            raise KeyboardInterrupt
+
+    for _ in range(2):
+        with pytest.raises(KeyboardInterrupt):
+            interrupted()
+    with unfinished_work(tmp_path / "model") as folder:
+        assert names(folder) == [LOCK, "stage"]
+
+
+def test_work_without_a_result_leaves_nothing(tmp_path: Path) -> None:
+    with pytest.raises(RuntimeError), unfinished_work(tmp_path / "model"):
+        raise RuntimeError
+    assert names(tmp_path) == []
+    with pytest.raises(ExportError, match="does not exist"), unfinished_work(tmp_path / "missing" / "model"):
+        raise AssertionError

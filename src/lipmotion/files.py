@@ -5,26 +5,43 @@ Everything is written under a temporary name beside its target and renamed at th
 
 from __future__ import annotations
 
+import errno
+import hashlib
+import os
+import platform
 import shutil
+import sys
 import uuid
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from lipmotion.errors import ExportError, InputError
+
+if sys.platform == "win32":
+    import msvcrt
+else:
+    import fcntl
 
 TEMPORARY = ".part-"
 """Names of unfinished files start with this; a killed run may leave one, the next removes it."""
 PLAYLISTS = (b"#EXTM3U", b"ffconcat version", b"<MPD")
 PLAYLIST_BYTES = 512
 """Playlists say so within their first bytes. FFmpeg would wait for their addresses, for ever if they are live."""
+LOCK = f"{TEMPORARY}lock"
+"""The file that a process holds while it works on a folder."""
+UNFINISHED = ".unfinished"
+"""What a folder of unfinished work adds to the name of the file that the work is for."""
+
+
+LARGEST_TEXT = 1 << 26
+"""Bytes of a text that is read whole: more than all the words that anyone says in a year."""
 
 
 def check_source(path: Path, kind: str) -> None:
     """Raise InputError unless ``path`` is a file with something in it; ``kind`` says what it should be."""
-    if path.is_dir():
-        raise InputError(f"{path}: is a folder; give one {kind}")
+    check_regular(path, kind)
     if not path.is_file():
         raise InputError(f"{path}: no such file")
     if path.stat().st_size == 0:
@@ -46,6 +63,31 @@ def open_media(path: Path) -> Any:
     return av.open(f"file:{path}", options={"protocol_whitelist": "file"})
 
 
+def check_regular(path: Path, kind: str) -> None:
+    """Raise InputError for a folder, and for a pipe or a device, which may never end. What is missing passes."""
+    if path.is_dir():
+        raise InputError(f"{path}: is a folder; give one {kind}")
+    if path.exists() and not path.is_file():
+        raise InputError(f"{path}: is a pipe or a device, required a file; save the {kind} first")
+
+
+def text_in(path: Path, kind: str) -> str:
+    """Return the text of a file, without a byte order mark.
+
+    Raises InputError: no such file, not a file, larger than ``LARGEST_TEXT``, or not UTF-8.
+    """
+    check_regular(path, f"{kind} file")
+    try:
+        size = path.stat().st_size
+        if size > LARGEST_TEXT:
+            raise InputError(f"{path}: {size} bytes, required at most {LARGEST_TEXT}: is it a {kind}?")
+        return path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError as error:
+        raise InputError(f"{path}: no such {kind} file") from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: not a readable UTF-8 {kind} ({error}); save it as UTF-8 text") from error
+
+
 def check_target(target: Path, source: str | Path | None = None) -> None:
     """Raise ExportError unless a file can be put there: before work begins, not after it.
 
@@ -62,6 +104,14 @@ def check_target(target: Path, source: str | Path | None = None) -> None:
         raise ExportError(f"{target}: is the recording itself; give another name")
 
 
+def check_distinct(targets: Sequence[Path]) -> None:
+    """Raise ExportError if two outputs are one file."""
+    places = [target.parent.resolve() / target.name for target in targets]
+    for number, place in enumerate(places):
+        if place in places[:number]:
+            raise ExportError(f"{targets[number]}: is given twice; give every output another name")
+
+
 def as_text(path: str | Path) -> str:
     """Return what can be written as UTF-8: a file's name may be of any bytes."""
     return str(path).encode("utf-8", "backslashreplace").decode("utf-8")
@@ -74,7 +124,35 @@ def _check_parent(target: Path) -> None:
 
 def _temporary(target: Path) -> Path:
     _check_parent(target)
-    return target.with_name(f"{TEMPORARY}{uuid.uuid4().hex[:8]}{target.suffix.lower()}")
+    return target.with_name(f"{_prefix(target)}{os.getpid()}-{uuid.uuid4().hex[:8]}{target.suffix.lower()}")
+
+
+def _prefix(target: Path) -> str:
+    """Return how temporary names for this target begin on this machine."""
+    name = f"{platform.node()}/{target.name}".encode(errors="surrogatepass")
+    return f"{TEMPORARY}{hashlib.sha256(name).hexdigest()[:8]}-"
+
+
+def _sweep(target: Path) -> None:
+    """Remove what killed runs of this machine left of a file."""
+    prefix = _prefix(target)
+    with suppress(OSError):  # a folder that may be written to, but not listed
+        for left in target.parent.glob(f"{prefix}*"):
+            if not _is_alive(left.name[len(prefix) :].split("-")[0]):
+                _remove(left)
+
+
+def _is_alive(process: str) -> bool:
+    """Whether a process may still be at work. Windows deletes no file that is open, so there nobody need be asked."""
+    if sys.platform == "win32" or not process.isdigit():
+        return sys.platform != "win32"
+    try:
+        os.kill(int(process), 0)
+    except ProcessLookupError:
+        return False
+    except OSError:
+        return True  # somebody else's
+    return True
 
 
 @contextmanager
@@ -84,13 +162,15 @@ def whole_file(target: Path) -> Iterator[Path]:
     Raises ExportError: the folder does not exist, or the file cannot be written (disk full, no permission).
     """
     temporary = _temporary(target)
+    _sweep(target)
     try:
         yield temporary
         temporary.replace(target)
     except OSError as error:
-        raise ExportError(f"{target}: cannot be written: {error.strerror or error}") from error
+        raise _refused(target, error) from error
     finally:
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):
+            temporary.unlink()
 
 
 @contextmanager
@@ -105,15 +185,120 @@ def whole_folder(target: Path) -> Iterator[Path]:
         yield temporary
         temporary.replace(target)
     except OSError as error:
-        raise ExportError(f"{target}: cannot be written: {error.strerror or error}") from error
+        raise _refused(target, error) from error
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
+
+
+def _refused(target: Path, error: OSError) -> ExportError:
+    full = (
+        error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG) or error.errno is None
+    )  # None: NumPy, on a short write
+    reason = error.strerror or ("No space left on device" if full else str(error))
+    return ExportError(f"{target}: cannot be written: {reason}{'; make room, then run it again' if full else ''}")
+
+
+@contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Hold a folder, made if needed, for this process alone.
+
+    The system itself lets go of it when the process ends, however it ends: a lock that was left never blocks.
+    Raises ExportError: another process holds it, or it cannot be made.
+    """
+    path = folder / LOCK
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        file = _held(path)
+    except OSError as error:
+        raise _refused(folder, error) from error
+    try:
+        yield
+    finally:
+        if sys.platform == "win32":
+            file.close()
+        path.unlink(missing_ok=True)
+        file.close()
+
+
+def _held(path: Path) -> IO[bytes]:
+    while True:
+        file = path.open("a+b", buffering=0)
+        try:
+            _lock(file)
+            if os.path.samestat(os.fstat(file.fileno()), path.stat()):
+                break
+        except BlockingIOError as error:
+            file.seek(0)
+            owner = file.read().decode(errors="replace") or "unknown"
+            file.close()
+            raise ExportError(
+                f"{path.parent}: another lipmotion (process {owner}) is at work on it; wait for it, or stop it"
+            ) from error
+        except FileNotFoundError:
+            pass
+        file.close()  # whoever held it has just deleted it
+    with suppress(OSError):  # a full disk
+        file.truncate(0)
+        file.write(str(os.getpid()).encode())
+    return file
+
+
+if sys.platform == "win32":
+
+    def _lock(file: IO[bytes]) -> None:
+        file.seek(1 << 30)  # what is locked cannot be read, and the owner's number should be
+        try:
+            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+        except OSError as error:
+            raise BlockingIOError from error
+
+else:
+
+    def _lock(file: IO[bytes]) -> None:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise
+        except OSError:  # some network file systems know no locks
+            pass
+
+
+@contextmanager
+def unfinished_work(target: Path) -> Iterator[Path]:
+    """Give a folder beside ``target`` for what is finished of the work on it, held for this process alone.
+
+    It is deleted when the block ends well; after an error, or when the process is killed, a later run finds in it
+    what this one left.
+    Raises ExportError: the file could not be put there, or another process is at work on it.
+    """
+    check_target(target)
+    folder = target.with_name(target.name + UNFINISHED)
+    try:
+        with locked(folder):
+            remove_unfinished(folder)
+            _sweep(target)
+            try:
+                yield folder
+            except ExportError as error:
+                raise ExportError(f"{error}; what is finished is kept in {folder}") from error
+            for path in folder.iterdir():
+                if path.name != LOCK:
+                    _remove(path)
+    finally:
+        with suppress(OSError):  # there is something in it to go on from
+            folder.rmdir()
 
 
 def remove_unfinished(folder: Path) -> None:
     """Delete what a killed run left behind in ``folder``."""
     for path in folder.glob(f"{TEMPORARY}*"):
-        if path.is_dir():
-            shutil.rmtree(path, ignore_errors=True)
-        else:
-            path.unlink(missing_ok=True)
+        if path.name != LOCK:
+            _remove(path)
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        with suppress(OSError):
+            path.unlink()

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import pytest
 
 from lipmotion.cli.main import main
-from lipmotion.pipeline.model import HEADER
+from lipmotion.stats.archive import HEADER
 
 
 class Done(NamedTuple):

@@ -125,7 +125,7 @@ def test_files_that_are_not_what_they_should_be(
     (here / "lexicon.txt").write_text("bin B IH N\nbam B Q\n")
     before = sorted(here.iterdir())
     for options, code, words in [
-        (["--transcript", "latin.txt"], 3, "latin.txt: not a readable UTF-8 text"),
+        (["--transcript", "latin.txt"], 3, "latin.txt: not a readable UTF-8 transcript"),
         (["--transcript", "empty.txt"], 3, "holds no word"),
         (["--lexicon", "lexicon.txt"], 3, "lexicon.txt, line 2: unknown phone 'Q'"),
         (["--model", newer_model], 6, "model version 3, this lipmotion reads version 2; upgrade lipmotion"),

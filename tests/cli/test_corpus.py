@@ -12,7 +12,7 @@ from lipmotion.errors import MissingDependencyError
 from lipmotion.export.mp4 import write_mp4
 from lipmotion.pipeline import offset, prepare
 from lipmotion.pipeline.prepare import PrepareReport
-from lipmotion.types import Audio
+from lipmotion.types import Audio, Item, Progress
 
 
 def test_info(run: Run, toy_corpus: Corpus) -> None:
@@ -35,10 +35,17 @@ def test_sync(run: Run, toy_corpus: Corpus, here: Path, monkeypatch: pytest.Monk
     assert is_one_error(run("corpus", "sync", "missing"), 4)
 
 
+EVENTS = (Item("a", "prepared"), Progress("preparing recordings", 1, 2, 0.5), Item("d", "skipped", "no face"))
+
+
 def test_prepare_says_what_was_done(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: dict[str, object] = {}
 
     def done(directory: Path, output: Path, **options: object) -> PrepareReport:
+        monitor = options.pop("monitor")
+        assert callable(monitor)
+        for event in EVENTS:
+            monitor(event)
         asked.update(options, directory=directory, output=output)
         return PrepareReport(
             output, "folder of videos", ("a", "b"), ("c",), {"d": "no face"}, {"a": 3}, 1.0, {"b": ("cut at 1.00 s",)}
@@ -47,12 +54,8 @@ def test_prepare_says_what_was_done(run: Run, monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr(prepare, "prepare", done)
     assert run("corpus", "prepare", "videos", "-o", "mine", "--workers", "2", "--no-crops") == (
         0,
-        ["mine: 2 prepared, 1 kept (folder of videos)"],
-        [
-            "lipmotion: warning: b: cut at 1.00 s",
-            "lipmotion: note: a: no face in 3 frames, interpolated",
-            "lipmotion: warning: left out d: no face",
-        ],
+        ["mine: 2 prepared, 1 kept, 1 skipped (folder of videos)"],
+        ["lipmotion: warning: skipped d: no face"],
     )
     assert asked == {"directory": Path("videos"), "output": Path("mine"), "workers": 2, "crops": False}
 
@@ -99,13 +102,15 @@ def test_videos_that_cannot_be_used(run_outside: Run, here: Path, bad_speech: di
     (here / "videos").mkdir()
     faceless(here / "videos" / "faceless.mp4")
     done = run_outside("corpus", "prepare", "videos", "-o", "mine")
-    assert is_one_error(done, 4)
-    assert "none of 1 recordings is usable; the first, faceless: " in done.err[0]
-    assert "no face" in done.err[0]
+    assert (done.code, done.out, len(done.err)) == (4, [], 2)
+    assert done.err[0].startswith("lipmotion: warning: skipped faceless: ")
+    assert "lipmotion: error: " in done.err[1]
+    assert "none of 1 recordings is usable; the first, faceless: " in done.err[1]
+    assert "no face" in done.err[1]
     assert [path.name for path in here.iterdir()] == ["videos"]
 
     shutil.copy(bad_speech["mute"], here / "videos" / "mute.mp4")
     (here / "videos" / "empty.mkv").touch()
     done = run_outside("corpus", "prepare", "videos", "-o", "mine", "--workers", "1")
-    assert is_one_error(done, 4)
+    assert (done.code, done.out, len(done.err)) == (4, [], 4)
     assert [path.name for path in here.iterdir()] == ["videos"]

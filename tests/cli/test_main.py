@@ -10,6 +10,7 @@ from cli.conftest import Run
 from lipmotion.cli import info, main
 from lipmotion.errors import AlignmentError, LipMotionError, MissingDependencyError
 
+STOPPED = "lipmotion: stopped; run the same command again to go on"
 VERBS = ["animate", "corpus", "train", "evaluate", "info"]
 
 
@@ -53,7 +54,7 @@ def test_a_wrong_command_line(run: Run, arguments: list[str]) -> None:
             3,
             "lipmotion: error: [Errno 13] Permission denied: 'a.json'",
         ),
-        (KeyboardInterrupt(), 130, "lipmotion: interrupted"),
+        (KeyboardInterrupt(), 130, STOPPED),
     ],
 )
 def test_an_error_is_one_line(

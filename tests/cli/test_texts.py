@@ -34,5 +34,5 @@ def test_a_file_that_is_not_there() -> None:
 
 def test_a_file_that_is_not_text(here: Path) -> None:
     (here / "words.txt").write_bytes(b"\xff\xfe")
-    with pytest.raises(InputError, match=r"words.txt: not a readable UTF-8 text"):
+    with pytest.raises(InputError, match=r"words.txt: not a readable UTF-8 transcript"):
         text_or_file("words.txt")

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from engines.synthetic import CHANNELS, RATE_HZ, example, examples, motion, speech, timeline
 from lipmotion.engines import ENGINES, engine_named
 from lipmotion.errors import CorpusError, InputError, ModelFormatError
-from lipmotion.stats.em import silent_monitor
 from lipmotion.types import Constraints, Features, Pin, Span, Speech, Timeline, Unit
+from lipmotion.types.progress import silent_monitor
 from lipmotion.units import PHONES
 
 SENTENCE = ("t", "aa", "p", "iy", "m", "uw", "s", "aa")

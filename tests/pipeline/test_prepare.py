@@ -15,9 +15,10 @@ import pytest
 from lipmotion.corpora.entry import read_entry
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import CorpusError, ExportError, InputError, MissingDependencyError
+from lipmotion.files import locked
 from lipmotion.pipeline import prepare as module
 from lipmotion.pipeline.prepare import prepare
-from lipmotion.types import Channel, Motion, Track
+from lipmotion.types import Channel, Item, Motion, Progress, Track
 
 
 def speak(path: Path, seed: int) -> None:
@@ -225,16 +226,33 @@ def test_another_speaker_may_use_the_same_names(studio, tmp_path):
 
 
 @pytest.mark.usefixtures("tracked")
-def test_progress_is_shown_on_a_terminal_only(studio, tmp_path, capsys, monkeypatch):
-    prepare(studio, tmp_path / "one", workers=1)
+def test_what_becomes_of_every_recording_is_told_at_once(studio, tmp_path, capsys):
+    speak(studio / "broken.mp4", 5)
+    (studio / "empty.mp4").touch()
+    prepare(studio, tmp_path / "corpus", workers=1, crops=False)
+    (studio / "b.txt").write_text("Goodbye.")
+    events: list[Progress | Item] = []
+    prepare(studio, tmp_path / "corpus", workers=1, crops=False, monitor=events.append)
+    found = {event.name: event.outcome for event in events if isinstance(event, Item)}
+    assert found == {"a": "kept", "b": "prepared", "broken": "skipped", "c": "kept", "empty": "skipped"}
+    reasons = {event.name: event.reason for event in events if isinstance(event, Item)}
+    assert reasons["b"] == "no face in 2 frames, interpolated"
+    assert "no face in 25 of 25 frames" in reasons["broken"]
+    progress = [event for event in events if isinstance(event, Progress)]
+    assert [event.step for event in progress] == list(range(progress[0].steps + 1))
+    assert progress[-1].share == 1
     assert capsys.readouterr() == ("", "")
-    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
-    prepare(studio, tmp_path / "two", workers=1)
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    assert "3/3" in captured.err
-    prepare(studio, tmp_path / "three", workers=1, progress=False)
-    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.usefixtures("tracked")
+def test_two_at_a_time_are_refused(studio, tmp_path):
+    with locked(tmp_path / "corpus"):
+        (tmp_path / "corpus" / ".part-of-the-other").touch()
+        with pytest.raises(ExportError, match=rf"corpus: another lipmotion \(process {os.getpid()}\) is at work on it"):
+            prepare(studio, tmp_path / "corpus", workers=1)
+        assert (tmp_path / "corpus" / ".part-of-the-other").exists()
+    assert len(prepare(studio, tmp_path / "corpus", workers=1).prepared) == 3
+    assert [path.name for path in sorted((tmp_path / "corpus").iterdir())] == ["corpus.json", "utterances"]
 
 
 @pytest.fixture

@@ -41,7 +41,7 @@ def test_from_videos_to_figures(some_of_grid: Path, tmp_path: Path) -> None:
     pytest.importorskip("mediapipe")
     from lipmotion.pipeline.prepare import prepare
 
-    report = prepare(some_of_grid, tmp_path / "corpus", progress=False)
+    report = prepare(some_of_grid, tmp_path / "corpus")
     assert not report.failed
     corpus = Corpus.open(tmp_path / "corpus")
     assert (corpus.splits["train"], corpus.splits["test"]) == (TRAIN, TEST)

@@ -50,9 +50,9 @@ def test_the_same_corpus_gives_the_same_model(toy_corpus: Corpus, toy_model_file
 
 def test_every_stage_is_reported(toy_corpus: Corpus) -> None:
     steps: list[str] = []
-    train(toy_corpus, names=TRAINED[:3], recogniser=SMALL, monitor=lambda step, _: steps.append(step))
-    assert list(dict.fromkeys(steps))[:2] == ["flat start", "pronunciations"]
-    assert "motion unexplained" in steps
+    train(toy_corpus, names=TRAINED[:3], recogniser=SMALL, monitor=lambda event: steps.append(event.stage))
+    assert list(dict.fromkeys(steps))[:2] == ["learning phones: flat start", "learning phones: pronunciations"]
+    assert "learning motion: contexts" in steps
 
 
 def test_other_lists_all_and_given_names(toy_corpus: Corpus) -> None:

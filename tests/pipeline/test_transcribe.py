@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import re
+
 import pytest
 
 from lipmotion.errors import AlignmentError, InputError
@@ -65,6 +67,40 @@ def test_what_the_user_s_lexicon_knows_is_not_reported(
 def test_nothing_is_reported_when_nothing_is_guessed(caplog: pytest.LogCaptureFixture) -> None:
     report_guesses(("see", "bob's", "hello"), Lexicon())
     assert not caplog.records
+
+
+WRONG = ("squash", "six", "fish", "chefs")
+
+
+def test_a_transcript_of_something_else_is_doubted(
+    toy_model: Model, audio: Audio, features: Features, caplog: pytest.LogCaptureFixture
+) -> None:
+    transcribe(Recogniser(toy_model.phones, "auto"), audio, features, WRONG, Lexicon())
+    (record,) = caplog.records
+    assert (record.name, record.levelname) == ("lipmotion", "WARNING")
+    told = r"the transcript seems not to be what is said \(.* at -\d+\.\d, required -4\.2 or more\); check it, or .*"
+    assert re.fullmatch(told, record.getMessage())
+
+
+def test_the_right_one_is_not(
+    toy_model: Model, toy_sentence: ToySentence, audio: Audio, features: Features, caplog: pytest.LogCaptureFixture
+) -> None:
+    for words in (toy_sentence.words, None):
+        transcribe(Recogniser(toy_model.phones, "auto"), audio, features, words, Lexicon())
+    assert not caplog.records
+
+
+def test_without_general_models_nothing_is_doubted(
+    phones: Recogniser, audio: Audio, features: Features, caplog: pytest.LogCaptureFixture
+) -> None:
+    transcribe(phones, audio, features, WRONG, Lexicon())
+    assert not caplog.records
+
+
+def test_a_long_word_is_not_repeated_in_full(caplog: pytest.LogCaptureFixture) -> None:
+    report_guesses(("ab" * 5000,), Lexicon())
+    (record,) = caplog.records
+    assert len(record.getMessage()) < 300
 
 
 def test_it_says_what_is_wrong(phones: Recogniser, audio: Audio, features: Features) -> None:

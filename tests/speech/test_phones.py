@@ -8,8 +8,8 @@ import pytest
 from lipmotion.errors import CorpusError
 from lipmotion.pipeline.toy import WORDS, ToySentence, toy_sentences
 from lipmotion.speech.phones import train_phones
-from lipmotion.stats.em import silent_monitor
 from lipmotion.stats.hmm.model import HmmConfig
+from lipmotion.types.progress import silent_monitor
 from lipmotion.units import PAUSE, SILENCE, Lexicon
 
 SMALL = HmmConfig(mixtures=1, iterations=2)
@@ -23,10 +23,10 @@ def sentences() -> list[ToySentence]:
 def test_training_is_reported_and_does_not_get_worse(sentences: list[ToySentence]) -> None:
     steps: list[tuple[str, float]] = []
     spoken = [(sentence.audio, sentence.words) for sentence in sentences[:4]]
-    hmm = train_phones(spoken, Lexicon(), SMALL, lambda step, value: steps.append((step, value)))
+    hmm = train_phones(spoken, Lexicon(), SMALL, lambda event: steps.append((event.stage, event.figure)))
     assert {"flat start", "pronunciations"} <= {step for step, _ in steps}
     for stage in ("flat start", "pronunciations"):
-        values = [value for step, value in steps if step == stage]
+        values = [value for step, value in steps if step == stage and value is not None]
         assert all(before <= after + 1e-6 for before, after in pairwise(values))
     said = {phone for sentence in sentences[:4] for word in sentence.words for phone in WORDS[word]}
     assert set(hmm.table.units) == said | {SILENCE, PAUSE}

@@ -126,7 +126,7 @@ def test_it_says_which_line_is_wrong(lexicon_file: Path, text: str, message: str
 def test_a_file_that_is_none(tmp_path: Path, lexicon_file: Path) -> None:
     with pytest.raises(InputError, match="no such lexicon file"):
         Lexicon.from_file(lexicon_file)
-    with pytest.raises(InputError, match="not a readable UTF-8 lexicon"):
+    with pytest.raises(InputError, match="is a folder; give one lexicon file"):
         Lexicon.from_file(tmp_path)
     lexicon_file.write_bytes(b"bim\xff B")
     with pytest.raises(InputError, match="not a readable UTF-8 lexicon"):

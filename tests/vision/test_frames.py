@@ -125,3 +125,9 @@ def test_any_name_is_a_files(write_video, tmp_path, monkeypatch, name):
     monkeypatch.chdir(tmp_path)
     write_video().rename(tmp_path / name)
     assert len(all_frames(Path(name))) == 10
+
+
+@pytest.mark.parametrize("shape", [(30, 1), (1, 30)])
+def test_pixels_that_would_fill_the_memory(write_video, shape):
+    with pytest.raises(InputError, match=r"pictures of \d+ × 48 pixels, required 16 to 8192; scale the video"):
+        all_frames(write_video(size=(320, 48), pixel_shape=shape))

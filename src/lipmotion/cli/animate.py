@@ -26,7 +26,7 @@ def run(options: argparse.Namespace) -> None:
 
     check_outputs(options.output, options.speech, rate_hz=options.rate, fps=options.fps)
     told = speech_arguments(options)
-    channels = options.channels.split(",") if options.channels else None
+    channels = options.channels.split(",") if options.channels is not None else None
     result = animate(options.speech, **told)
     about = {"speech": options.speech, "model": told["model"], "channels": channels}
     write(result, options.output, rate_hz=options.rate, fps=options.fps, **about)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 
 from lipmotion.cli import contents, prompts, sync
+from lipmotion.cli.options import add_machine_readable
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -18,6 +18,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     prepare.add_argument("-o", "--output", type=Path, required=True, metavar="CORPUS")
     prepare.add_argument("--workers", type=int, help="processes (default: one a core)")
     prepare.add_argument("--no-crops", dest="crops", action="store_false", help="do not keep mouth images")
+    add_machine_readable(prepare)
     prepare.set_defaults(run=run_prepare)
     contents.add(actions)
     sync.add(actions)
@@ -26,13 +27,10 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run_prepare(options: argparse.Namespace) -> None:
     """Call ``lipmotion.prepare``."""
+    from lipmotion.cli.progress import reporting
     from lipmotion.pipeline.prepare import prepare
 
-    report = prepare(options.recordings, options.output, workers=options.workers, crops=options.crops)
-    print(f"{report.corpus}: {len(report.prepared)} prepared, {len(report.kept)} kept ({report.kind})")
-    for name, notes in report.notes.items():
-        print(f"lipmotion: warning: {name}: {'; '.join(notes)}", file=sys.stderr)
-    for name, frames in report.unseen.items():
-        print(f"lipmotion: note: {name}: no face in {frames} frames, interpolated", file=sys.stderr)
-    for name, reason in report.failed.items():
-        print(f"lipmotion: warning: left out {name}: {reason}", file=sys.stderr)
+    given = {"workers": options.workers, "crops": options.crops}
+    with reporting(options) as report:
+        done = prepare(options.recordings, options.output, **given, monitor=report.hear)
+        report.finish(str(done), corpus=str(done.corpus), kind=done.kind, **done.counts)

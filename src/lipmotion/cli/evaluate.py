@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from lipmotion.cli.options import add_machine_readable
 from lipmotion.cli.speech import add_recogniser_argument
 
 
@@ -18,6 +19,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser.add_argument("--lexicon", type=Path, metavar="FILE", help="pronunciations: WORD PHONE PHONE ... a line")
     add_recogniser_argument(parser)
     parser.add_argument("-o", "--output", type=Path, metavar="FILE.json", help="write all figures here as well")
+    add_machine_readable(parser)
     parser.set_defaults(run=run)
 
 
@@ -25,6 +27,7 @@ def run(options: argparse.Namespace) -> None:
     """Call ``lipmotion.evaluate`` and print its figures."""
     import json
 
+    from lipmotion.cli.progress import reporting
     from lipmotion.corpora.store import Corpus
     from lipmotion.files import check_target, whole_file
     from lipmotion.measures.report import table
@@ -32,13 +35,14 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.pipeline.model import load_model
     from lipmotion.units import Lexicon
 
-    if options.output:
-        check_target(options.output)
-    lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
-    split = None if options.split == "all" else options.split
-    chosen = {"split": split, "speakers": options.speaker, "recogniser": options.recogniser}
-    figures = evaluate(load_model(options.model), Corpus.open(options.corpus), **chosen, lexicon=lexicon)
-    print(table(figures))
-    if options.output:
-        with whole_file(options.output) as unfinished:
-            unfinished.write_text(json.dumps(figures, indent=1, allow_nan=False) + "\n")
+    with reporting(options) as report:
+        if options.output:
+            check_target(options.output)
+        lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
+        split = None if options.split == "all" else options.split
+        chosen = {"split": split, "speakers": options.speaker, "lexicon": lexicon, "recogniser": options.recogniser}
+        figures = evaluate(load_model(options.model), Corpus.open(options.corpus), **chosen, monitor=report.hear)
+        if options.output:
+            with whole_file(options.output) as unfinished:
+                unfinished.write_text(json.dumps(figures, indent=1, allow_nan=False) + "\n")
+        report.finish(table(figures), figures=figures)

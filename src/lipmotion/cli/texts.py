@@ -14,11 +14,12 @@ def text_or_file(argument: str) -> str:
     """
     path = Path(argument)
     looks_like_one = path.suffix == ".txt" and " " not in argument
-    return read_transcript(path) if looks_like_one or _is_file(path) else argument
+    return read_transcript(path) if looks_like_one or _is_there(path) else argument
 
 
-def _is_file(path: Path) -> bool:
+def _is_there(path: Path) -> bool:
+    """Whether there is a file of that name, or a pipe or a device; a word may be a folder's name."""
     try:
-        return path.is_file()
-    except OSError:  # too long for a file's name
+        return path.exists() and not path.is_dir()
+    except (OSError, ValueError):  # too long for a file's name, or with a character that none can have
         return False

@@ -3,39 +3,45 @@
 from __future__ import annotations
 
 import argparse
-import sys
+import os
 from pathlib import Path
+
+from lipmotion.cli.options import add_machine_readable
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb."""
-    parser = verbs.add_parser("train", help="train a model on a prepared corpus")
+    parser = verbs.add_parser("train", help="train a model on a prepared corpus; again, to go on after a stop")
     parser.add_argument("corpus", type=Path)
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="MODEL")
     parser.add_argument("--split", default="train", help="train, val, test or all (default: train)")
     parser.add_argument("--speaker", action="append", default=[], metavar="NAME", help="this one only (repeatable)")
     parser.add_argument("--lexicon", type=Path, metavar="FILE", help="pronunciations: WORD PHONE PHONE ... a line")
+    parser.add_argument("--workers", type=int, help="processes (default: one a core)")
+    add_machine_readable(parser)
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:
     """Call ``lipmotion.train`` and ``lipmotion.save_model``."""
+    os.environ.setdefault("OMP_NUM_THREADS", "1")  # the processes share the cores, not the matrix products in each
+
+    from lipmotion.cli.progress import reporting
     from lipmotion.corpora.store import Corpus
-    from lipmotion.files import check_target
+    from lipmotion.files import unfinished_work
     from lipmotion.pipeline.model import save_model
     from lipmotion.pipeline.train import train
     from lipmotion.units import Lexicon
 
-    check_target(options.output)
-    split = None if options.split == "all" else options.split
-    lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
-    chosen = {"split": split, "speakers": options.speaker}
-    model, report = train(Corpus.open(options.corpus), **chosen, lexicon=lexicon, monitor=_show)
-    save_model(model, options.output)
-    for name, reason in report.skipped.items():
-        print(f"lipmotion: warning: left out {name}: {reason}", file=sys.stderr)
-    print(f"{options.output}: {len(report.used)} utterances, {model.about['minutes']} minutes")
-
-
-def _show(step: str, value: float) -> None:
-    print(f"{step:24} {value:10.3f}", file=sys.stderr)
+    workers = options.workers or os.cpu_count() or 1
+    with reporting(options) as report:
+        split = None if options.split == "all" else options.split
+        lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
+        chosen = {"split": split, "speakers": options.speaker, "lexicon": lexicon, "workers": workers}
+        with unfinished_work(options.output) as work:
+            model, result = train(Corpus.open(options.corpus), **chosen, monitor=report.hear, work=work)
+            save_model(model, options.output)
+        figures = {"used": len(result.used), "minutes": model.about["minutes"], "skipped": len(result.skipped)}
+        text = ", ".join(f"{value} {name}" for name, value in figures.items())
+        text = f"{options.output}: {text}; use it: lipmotion animate SPEECH -o FILE --model {options.output}"
+        report.finish(text, model=str(options.output), **figures)

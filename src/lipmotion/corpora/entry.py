@@ -11,15 +11,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.corpora.splits import SPLITS
 from lipmotion.errors import CorpusError, InputError
-from lipmotion.files import whole_folder
-from lipmotion.types import Audio, Channel, Features, Motion, Span, Timeline, Track, Unit, Utterance
+from lipmotion.files import check_regular, text_in, whole_folder
+from lipmotion.types import FRAME_RATE_HZ, Audio, Channel, Features, Motion, Span, Timeline, Track, Unit, Utterance
 
 ENTRY = "entry.json"
 KEYS = frozenset(
     "name words split audio_rate_hz duration_s rate_hz frames unseen_frames channels crops source settings".split()
 )
 """What every description holds. ``speaker`` and ``phones`` came with version 2 of the corpus; without them: unknown."""
+KINDS = {"audio": "i", "features": "f", "motion": "f", "seen": "b", "crops": "u"}
+"""The kinds of number in each array."""
 FULL_SCALE = 32_768
 """16-bit samples per unit of amplitude: recordings of 16 bits come back exactly."""
 
@@ -29,13 +32,18 @@ def quantised(audio: Audio) -> Audio:
     return Audio(_as_float(_as_int16(audio.samples)), audio.rate_hz)
 
 
+def is_name(name: str) -> bool:
+    """Whether an utterance can be named so: as a visible folder, and nowhere else."""
+    return bool(name) and name == Path(name).name and not name.startswith(".") and "\0" not in name
+
+
 def write_utterance(folder: Path, utterance: Utterance, settings: dict[str, str]) -> None:
     """Write one utterance; ``folder`` appears whole, in the place of one that is there.
 
     settings : what the result depends on besides the source; kept to see whether it is up to date
     Raises InputError: the name cannot be a folder's. Raises ExportError: it cannot be written.
     """
-    if not utterance.name or utterance.name != Path(utterance.name).name or utterance.name.startswith("."):
+    if not is_name(utterance.name):
         raise InputError(f"an utterance cannot be named {utterance.name!r}: required: the name of a visible folder")
     with whole_folder(folder) as unfinished:
         for name, array in _arrays(utterance).items():
@@ -49,11 +57,15 @@ def write_utterance(folder: Path, utterance: Utterance, settings: dict[str, str]
 def read_entry(folder: Path) -> dict[str, Any]:
     """Return the description of an utterance. Raises CorpusError: missing or damaged."""
     try:
-        entry = json.loads((folder / ENTRY).read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+        entry = json.loads(text_in(folder / ENTRY, "description"))
+    except (OSError, ValueError, RecursionError) as error:
         raise _damaged(folder, error) from error
     if not isinstance(entry, dict) or not entry.keys() >= KEYS:
         raise _damaged(folder, KeyError(f"{ENTRY} holds other keys than {', '.join(sorted(KEYS))}"))
+    try:
+        _check_entry(entry)
+    except ValueError as error:
+        raise _damaged(folder, error) from error
     return entry
 
 
@@ -66,20 +78,24 @@ def read_utterance(folder: Path) -> Utterance:
     try:
         audio = Audio(_as_float(_load(folder, "audio")), entry["audio_rate_hz"])
         channels = tuple(Channel(**channel) for channel in entry["channels"])
-        motion = Motion(_load(folder, "motion").astype(np.float64), entry["rate_hz"], channels)
+        values, features, seen = _load(folder, "motion"), _load(folder, "features"), np.array(_load(folder, "seen"))
+        if not np.isfinite(values).all() or not np.isfinite(features).all():
+            raise ValueError("motion or features hold values that are not finite")
+        motion = Motion(values.astype(np.float64), entry["rate_hz"], channels)
         crops = _load(folder, "crops") if entry["crops"] else None
+        _check_arrays(audio, features, motion, seen, crops)
         return Utterance(
             name=entry["name"],
             audio=audio,
-            features=Features(_load(folder, "features"), audio.duration_s),
-            track=Track(motion, np.array(_load(folder, "seen")), crops, tuple(entry.get("notes", ()))),
+            features=Features(features, audio.duration_s),
+            track=Track(motion, seen, crops, tuple(entry.get("notes", ()))),
             words=None if entry["words"] is None else tuple(entry["words"]),
             split=entry["split"],
             source=entry["source"],
             speaker=entry.get("speaker", ""),
             phones=_timeline(entry.get("phones")),
         )
-    except (OSError, EOFError, ValueError, KeyError, TypeError) as error:
+    except (OSError, EOFError, ValueError, KeyError, TypeError, OverflowError) as error:
         raise _damaged(folder, error) from error
 
 
@@ -116,6 +132,52 @@ def _description(utterance: Utterance, settings: dict[str, str]) -> dict[str, An
     }
 
 
+def _check_entry(entry: dict[str, Any]) -> None:
+    """Raise ValueError for values that a description cannot have."""
+    fitting = {
+        "name": isinstance(entry["name"], str),
+        "speaker": isinstance(entry.get("speaker", ""), str),
+        "split": entry["split"] in SPLITS,
+        "words": entry["words"] is None or _is_texts(entry["words"]),
+        "source": isinstance(entry["source"], dict) and _is_texts(list(entry["source"].values())),
+        "notes": _is_texts(entry.get("notes", [])),
+        "settings": isinstance(entry["settings"], dict),
+        "channels": isinstance(entry["channels"], list) and all(map(_is_channel, entry["channels"])),
+        "audio_rate_hz": isinstance(entry["audio_rate_hz"], int) and entry["audio_rate_hz"] > 0,
+    }
+    fitting |= {key: _is_count(entry[key]) for key in ("duration_s", "rate_hz", "frames", "unseen_frames")}
+    for key, fits in fitting.items():
+        if not fits:
+            raise ValueError(f"{ENTRY} says {str(entry.get(key))[:60]!r} of {key}")
+
+
+def _is_texts(value: Any) -> bool:
+    return isinstance(value, list) and all(isinstance(item, str) for item in value)
+
+
+def _is_channel(value: Any) -> bool:
+    return isinstance(value, dict) and value.keys() == {"name", "unit"} and _is_texts(list(value.values()))
+
+
+def _is_count(value: Any) -> bool:
+    return isinstance(value, int | float) and 0 <= value < float("inf")
+
+
+def _check_arrays(
+    audio: Audio, features: NDArray[Any], motion: Motion, seen: NDArray[np.bool_], crops: NDArray[np.uint8] | None
+) -> None:
+    """Raise ValueError if arrays do not belong together."""
+    frames = len(motion.values)
+    if audio.samples.ndim != 1 or features.ndim != 2 or seen.shape != (frames,) or not frames:
+        shapes = ", ".join(str(array.shape) for array in (audio.samples, features, motion.values, seen))
+        raise ValueError(f"sound, features, motion and seen of shapes {shapes}")
+    expected = int(audio.duration_s * FRAME_RATE_HZ + 1e-9) + 1
+    if len(features) != expected:
+        raise ValueError(f"{len(features)} frames of features, required {expected} for {audio.duration_s:.2f} s")
+    if crops is not None and (crops.ndim != 4 or len(crops) != frames):
+        raise ValueError(f"mouth images of shape {crops.shape} for {frames} frames of motion")
+
+
 def _timeline(rows: Any) -> Timeline[Unit] | None:
     """Return phones in time. Raises ValueError: not rows of start, end and phone, in order."""
     if rows is None:
@@ -124,7 +186,17 @@ def _timeline(rows: Any) -> Timeline[Unit] | None:
 
 
 def _load(folder: Path, name: str) -> NDArray[Any]:
-    array: NDArray[Any] = np.load(folder / f"{name}.npy", mmap_mode="r", allow_pickle=False)
+    """Map an array into memory: a file shorter than its header says is noticed before anything is allocated."""
+    path = folder / f"{name}.npy"
+    check_regular(path, "array")
+    try:
+        array: NDArray[Any] = np.lib.format.open_memmap(path, mode="r")
+    except (OSError, ValueError):
+        raise
+    except Exception as error:  # the header is read as a piece of Python, which fails in many ways
+        raise ValueError(f"{path.name}: not an array ({type(error).__name__}: {error})") from error
+    if array.dtype.kind not in KINDS[name]:
+        raise ValueError(f"{path.name} holds {array.dtype}, required one of the kinds {KINDS[name]!r}")
     return array
 
 

@@ -17,6 +17,8 @@ from lipmotion.corpora.base import AUDIO_SUFFIXES, Curves, Recording, Recordings
 from lipmotion.corpora.labels import labels_beside
 from lipmotion.corpora.splits import LISTS, with_splits
 from lipmotion.errors import InputError
+from lipmotion.files import check_regular
+from lipmotion.stats.archive import array_in
 from lipmotion.types import WEIGHT, Channel, Motion
 
 KIND = "FACEGOOD blendshape weights"
@@ -83,13 +85,13 @@ def read_array(curves: Curves) -> Motion:
 
 def _load(path: Path) -> NDArray[Any]:
     """Read an array, never pickled objects; Python 2 wrote sizes as ``116L``, of which NumPy warns."""
+    check_regular(path, "array")
     try:
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", message="Reading `.npy`", category=UserWarning)
-            array: NDArray[Any] = np.load(path, allow_pickle=False)
-    except (OSError, EOFError, ValueError) as error:
+            return array_in(path.read_bytes())
+    except (OSError, ValueError) as error:
         raise InputError(f"{path}: not an array of numbers or texts ({error}); save it with numpy.save") from error
-    return array
 
 
 def _rights(directory: Path) -> dict[str, str]:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from lipmotion.corpora.entry import read_entry, read_utterance, write_utterance
+from lipmotion.corpora.entry import is_name, read_entry, read_utterance, write_utterance
 from lipmotion.corpora.splits import SPLITS
 from lipmotion.errors import CorpusError, ExportError
-from lipmotion.files import TEMPORARY, remove_unfinished, whole_file
+from lipmotion.files import TEMPORARY, remove_unfinished, text_in, whole_file
 from lipmotion.types import Utterance
 
 FORMAT = "lipmotion.corpus"
@@ -180,9 +181,9 @@ def _motion(entry: dict[str, Any]) -> str:
 
 def _read_manifest(path: Path) -> dict[str, dict[str, Any]]:
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = json.loads(text_in(path, "manifest"))
         found, version = content["format"], content["version"]
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise CorpusError(f"{path.parent}: not a corpus (no readable {MANIFEST}); give a prepared corpus") from error
     if found != FORMAT:
         raise CorpusError(f"{path}: format is {found!r}, required {FORMAT!r}; give a prepared corpus")
@@ -191,5 +192,16 @@ def _read_manifest(path: Path) -> dict[str, dict[str, Any]]:
             f"{path}: corpus version {version}, this lipmotion reads versions up to {VERSION}; "
             "upgrade lipmotion, or prepare the recordings again into a new folder"
         )
-    index: dict[str, dict[str, Any]] = content["utterances"]
+    try:
+        index: dict[str, dict[str, Any]] = content["utterances"]
+        damaged = next((name for name, entry in index.items() if not is_name(name) or not _is_listed(entry)), None)
+    except (KeyError, TypeError, AttributeError, ValueError) as error:
+        raise CorpusError(f"{path}: the list of utterances is damaged ({error!r}); prepare the corpus again") from error
+    if damaged is not None:
+        raise CorpusError(f"{path}: the utterance {damaged!r} is not listed as one; prepare the corpus again")
     return index
+
+
+def _is_listed(entry: dict[str, Any]) -> bool:
+    numbers = [float(entry[key]) for key in ("duration_s", "frames", "unseen_frames")]
+    return entry["split"] in SPLITS and isinstance(entry.get("speaker", ""), str) and all(map(math.isfinite, numbers))

@@ -10,8 +10,8 @@ from typing import Any, ClassVar, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.stats.em import Monitor
-from lipmotion.types import Constraints, Example, Generation, Speech
+from lipmotion.stats.checkpoint import NOTHING_KEPT, Checkpoint
+from lipmotion.types import Constraints, Example, Generation, Monitor, Speech
 
 ModelT = TypeVar("ModelT")
 Arrays = Mapping[str, NDArray[Any]]
@@ -32,8 +32,10 @@ class Engine(ABC, Generic[ModelT]):
     config: Any
 
     @abstractmethod
-    def fit(self, examples: Sequence[Example], monitor: Monitor) -> Fit[ModelT]:
+    def fit(self, examples: Sequence[Example], monitor: Monitor, checkpoint: Checkpoint = NOTHING_KEPT) -> Fit[ModelT]:
         """Learn from speech with its motion.
+
+        checkpoint : keeps what is finished of long work; going on from there gives the same bytes
 
         Raises CorpusError: no example, or none with motion that was seen.
         """

@@ -10,7 +10,7 @@ import numpy as np
 
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export import motion_csv, motion_json, motion_npz
-from lipmotion.files import whole_file
+from lipmotion.files import check_regular, whole_file
 from lipmotion.types import Generation, Motion, Timeline, Unit
 
 About = Mapping[str, str]
@@ -61,6 +61,7 @@ def read_motion(path: str | Path) -> tuple[Motion, Timeline[Unit]]:
     chosen = _FORMATS.get(path.suffix.lower())
     if chosen is None:
         raise InputError(f"{path}: cannot read motion from {_suffix(path)}; use one of {', '.join(MOTION_SUFFIXES)}")
+    check_regular(path, "motion file")
     try:
         motion, units = chosen.read(path)
         if not np.isfinite(motion.values).all():

@@ -49,7 +49,7 @@ def parse(document: Any, values: Any) -> tuple[Motion, Timeline[Unit]]:
         raise
     except KeyError as error:
         raise InputError(f"the motion document has no {error}; export it again") from error
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"the motion document is damaged ({error}); export it again") from error
 
 
@@ -66,9 +66,16 @@ def _check(document: Any) -> None:
 
 
 def _array(values: Any, channels: int) -> NDArray[np.float64]:
+    if isinstance(values, np.ndarray) and values.dtype.kind not in "fiu":
+        raise InputError(f"the motion document has values of {values.dtype}, required numbers; export it again")
     array = np.asarray(values, dtype=np.float64)
     return array.reshape(0, channels) if array.size == 0 else array
 
 
 def _span(row: Any) -> Span[Unit]:
-    return Span(float(row["start_s"]), float(row["end_s"]), Unit(str(row["phone"]), str(row["unit"])))
+    span = Span(float(row["start_s"]), float(row["end_s"]), Unit(str(row["phone"]), str(row["unit"])))
+    if not span.start_s >= 0 or span.end_s == float("inf"):
+        raise InputError(
+            f"the unit {span.label.phone!r} lasts from {span.start_s} to {span.end_s} s, required: finite times from 0"
+        )
+    return span

@@ -12,6 +12,9 @@ from lipmotion.errors import ExportError, InputError
 from lipmotion.export.rounded import rows
 from lipmotion.types import Channel, Generation, Motion, Timeline, Unit
 
+LONGEST_S = 1e6
+"""More than eleven days of motion are a mistake."""
+
 
 def write(path: Path, generation: Generation, _source: Mapping[str, str], _model: Mapping[str, str]) -> None:
     """Write a header and one line a frame. Raises ExportError: a channel's name would break the header."""
@@ -19,9 +22,11 @@ def write(path: Path, generation: Generation, _source: Mapping[str, str], _model
     for name in motion.names:
         if set(name) & set(',"\r\n'):
             raise ExportError(f"the channel name {name!r} does not fit in a table; write .json or .npz")
-    times = [f"{time_s:.9f}".rstrip("0").rstrip(".") for time_s in motion.time_s.tolist()]
-    lines = [f"{time_s},{row}" for time_s, row in zip(times, rows(motion.values), strict=True)]
-    path.write_text("\n".join([",".join(["time_s", *motion.names]), *lines, ""]), encoding="utf-8")
+    with path.open("w", encoding="utf-8") as file:
+        file.write(",".join(["time_s", *motion.names]) + "\n")
+        for time_s, row in zip(motion.time_s.tolist(), rows(motion.values), strict=True):
+            shortest = f"{time_s:.9f}".rstrip("0").rstrip(".")
+            file.write(f"{shortest},{row}\n")
 
 
 def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
@@ -42,6 +47,8 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
 def _rate(time_s: NDArray[np.float64]) -> float:
     if len(time_s) < 2:
         raise InputError("the table has fewer than two rows, so its frame rate is unknown; use .json or .npz")
+    if not np.abs(time_s).max() < LONGEST_S:
+        raise InputError(f"the column time_s holds times that are none, required seconds up to {LONGEST_S:.0f}")
     step_s = (time_s[-1] - time_s[0]) / (len(time_s) - 1)
     if time_s[0] != 0 or not step_s > 0 or np.abs(np.diff(time_s) - step_s).max() > 1e-6:
         raise InputError("the column time_s must begin at 0 and rise in even steps")

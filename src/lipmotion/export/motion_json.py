@@ -16,14 +16,17 @@ def write(path: Path, generation: Generation, source: Mapping[str, str], model: 
     """Write one JSON object: format, version, rate_hz, channels, values, units, source, model."""
     before = json.dumps(header(generation), ensure_ascii=False)
     after = json.dumps(labels(generation, source, model), ensure_ascii=False)
-    values = ",\n".join([f"[{row}]" for row in rows(generation.motion.values)])
-    path.write_text(f'{before[:-1]}, "values": [\n{values}\n], {after[1:]}\n', encoding="utf-8")
+    with path.open("w", encoding="utf-8") as file:
+        file.write(f'{before[:-1]}, "values": [\n')
+        for number, row in enumerate(rows(generation.motion.values)):
+            file.write(f",\n[{row}]" if number else f"[{row}]")
+        file.write(f"\n], {after[1:]}\n")
 
 
 def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
     """Read it back. Raises InputError: not JSON, or not a motion document."""
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise InputError(f"not JSON ({error}); export it again") from error
     return parse(document, document.get("values") if isinstance(document, dict) else None)

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import json
+import zipfile
 from collections.abc import Mapping
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 
 from lipmotion.errors import InputError
 from lipmotion.export.document import header, labels, parse
+from lipmotion.stats.archive import UNREADABLE, array_in, check_archive
 from lipmotion.types import Generation, Motion, Timeline, Unit
 
 
@@ -23,8 +24,12 @@ def write(path: Path, generation: Generation, source: Mapping[str, str], model: 
 def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
     """Read it back. Raises InputError: not an .npz file, or not a motion document."""
     try:
-        with np.load(path, allow_pickle=False) as arrays:
-            values, document = arrays["values"], json.loads(str(arrays["document"]))
-    except (ValueError, KeyError, EOFError, BadZipFile, TypeError) as error:
+        with zipfile.ZipFile(path) as file:
+            check_archive(file)
+            values = array_in(file.read("values.npy"))
+            document = json.loads(str(array_in(file.read("document.npy"))))
+    except OSError:
+        raise
+    except UNREADABLE as error:
         raise InputError(f"not a motion file ({error}); export it again") from error
     return parse(document, values)

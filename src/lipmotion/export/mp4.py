@@ -79,6 +79,8 @@ def _encode(temporary: Path, path: Path, frames: Iterator[Frame], rate: Fraction
             for stream in (video, sound):
                 container.mux(stream.encode(None))
     except av.FFmpegError as error:
+        if isinstance(error, OSError):  # a full disk
+            raise
         raise ExportError(f"{path}: cannot be encoded: {error}") from error
 
 

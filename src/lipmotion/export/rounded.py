@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,11 +12,16 @@ DECIMALS = 5
 """A hundred-thousandth of the distance between the eyes is about a micrometre."""
 
 
-def rows(values: NDArray[np.float64]) -> list[str]:
-    """Return each row of values [shape=(T, P)] as text, numbers parted by commas, rounded to ``DECIMALS``.
+BLOCK = 2000
+"""Rows formatted at a time: as text, an hour of all channels would fill the memory."""
+
+
+def rows(values: NDArray[np.floating[Any]]) -> Iterator[str]:
+    """Give each row of values [shape=(T, P)] as text, numbers parted by commas, rounded to ``DECIMALS``.
 
     Cost: one formatting call a row, a fifth of a microsecond a number; half of what ``json.dumps`` takes.
     """
     form = ",".join([f"%.{DECIMALS}f"] * values.shape[1])
-    positive_zeros = np.round(values, DECIMALS) + 0.0
-    return [form % tuple(row) for row in positive_zeros.tolist()]
+    for start in range(0, len(values), BLOCK):
+        positive_zeros = np.round(values[start : start + BLOCK].astype(float), DECIMALS) + 0.0
+        yield from (form % tuple(row) for row in positive_zeros.tolist())

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from pathlib import Path
 
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export.base import MOTION_SUFFIXES, write_motion
-from lipmotion.files import as_text, check_target
+from lipmotion.files import as_text, check_distinct, check_target
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.transcribe import read_transcript, transcribe
 from lipmotion.speech.mfcc import mfcc
@@ -21,6 +22,9 @@ SOUND_RATE_HZ = 48_000
 """The sound track of a rendered video."""
 SLOWEST_HZ, FASTEST_HZ = 1.0, 1000.0
 """Frame rates that files are written at; a mistyped one must not fill the memory."""
+LATE_S = 0.1
+"""Units may end this long after the sound: editors round."""
+LOG = logging.getLogger("lipmotion")
 
 
 def animate(
@@ -50,11 +54,27 @@ def animate(
     phones = cached_recogniser(chosen.phones, recogniser)
     audio = speech if isinstance(speech, Audio) else read_audio(Path(speech))
     features = mfcc(audio)
-    if units is None:
+    if units is not None:
+        _check_units(units, audio.duration_s)
+    else:
         text = read_transcript(transcript) if isinstance(transcript, Path) else transcript
         words = words_of(text) if text is not None else None
         units = transcribe(phones, audio, features, words, lexicon or Lexicon())
+    del audio  # of a long recording it is much
     return chosen.engine.generate(chosen.learned, Speech(features, units), constraints)
+
+
+def _check_units(units: Timeline[Unit], duration_s: float) -> None:
+    if not len(units):
+        raise InputError(
+            "the units are an empty list (a .csv has none); give those of a .json or .npz, or leave them out"
+        )
+    if units[-1].end_s > duration_s + LATE_S:
+        LOG.warning(
+            "the units go on to %.2f s, the recording ends at %.2f s: are they those of another?",
+            units[-1].end_s,
+            duration_s,
+        )
 
 
 def write(
@@ -106,6 +126,7 @@ def check_outputs(
         if hertz is not None and not SLOWEST_HZ <= hertz <= FASTEST_HZ:
             raise InputError(f"the frame rate is {hertz}, required {SLOWEST_HZ:.0f} to {FASTEST_HZ:.0f} a second")
     suffixes = (*MOTION_SUFFIXES, VIDEO_SUFFIX)
+    check_distinct([Path(path) for path in outputs])
     for path in map(Path, outputs):
         if path.suffix.lower() not in suffixes:
             raise ExportError(f"{path}: unknown format {path.suffix!r}; required one of: {' '.join(suffixes)}")

@@ -9,7 +9,7 @@ import numpy as np
 
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export.cues import CUE_FORMATS, OPTIONAL, CueSheet, choose_cues, format_of, write_cue_file
-from lipmotion.files import as_text, check_target
+from lipmotion.files import as_text, check_distinct, check_target
 from lipmotion.types import Generation
 
 FASTEST_FPS = 60.0
@@ -71,6 +71,7 @@ def check_cue_outputs(outputs: Sequence[Path], speech: str | Path, form: str | N
     """Raise ExportError unless every output can be written."""
     if form is not None and form not in CUE_FORMATS:
         raise ExportError(f"unknown cue format {form!r}; required one of: {' '.join(CUE_FORMATS)}")
+    check_distinct(outputs)
     for path in outputs:
         if form is None:
             format_of(path)

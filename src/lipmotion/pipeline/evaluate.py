@@ -20,7 +20,7 @@ from lipmotion.pipeline.train import labels_of
 from lipmotion.pipeline.transcribe import report_guesses
 from lipmotion.speech.recogniser import Recogniser
 from lipmotion.speech.recogniser import recogniser as cached_recogniser
-from lipmotion.types import Motion, Speech, Timeline, Unit, Utterance
+from lipmotion.types import Monitor, Motion, Speech, Timeline, Unit, Utterance, counted, part_of, silent_monitor
 from lipmotion.units import VISEMES, Lexicon, is_silent
 
 OPENING = "opening"
@@ -50,12 +50,14 @@ def evaluate(
     lexicon: Lexicon | None = None,
     recogniser: str = "auto",
     seed: int = 0,
+    monitor: Monitor = silent_monitor,
 ) -> dict[str, Any]:
     """Return all figures of docs/measures.md: audio only and, where there are transcripts, with them.
 
     split    : ``train``, ``val`` or ``test``; None: everything
     speakers : theirs only; all by default
     recogniser : as in ``animate``
+    monitor  : hears how far it is
 
     Compared are the lip distances or, in a corpus without them, every channel that moves in the recordings; figures
     of closing, and of silence, need the channel ``opening``. What cannot be computed is None.
@@ -70,11 +72,13 @@ def evaluate(
     compared, still = _compared(utterances)
     report_guesses([word for utterance in utterances for word in utterance.words or ()], lexicon)
     phones = cached_recogniser(model.phones, recogniser)
-    reference = [_reference(utterance, phones, lexicon) for utterance in utterances]
+    heard = counted(utterances, "finding the phones", part_of(monitor, 0, 0.4))
+    reference = [_reference(utterance, phones, lexicon) for utterance in heard]
     threshold = None
     if OPENING in compared:
         threshold = closed_threshold([_openings(u) for u in _training(corpus, speakers) or utterances])
-    conditions = {"audio only": [phones.recognise(u.audio, u.features) for u in utterances]}
+    heard = counted(utterances, "recognising the phones", part_of(monitor, 0.4, 0.9))
+    conditions = {"audio only": [phones.recognise(u.audio, u.features) for u in heard]}
     if all(utterance.words or utterance.phones for utterance in utterances):
         conditions["with transcript"] = reference
     figures = {

@@ -2,33 +2,23 @@
 
 from __future__ import annotations
 
-import io
-import json
-import zipfile
-import zlib
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines import Engine, engine_named
 from lipmotion.errors import InputError, ModelFormatError
-from lipmotion.files import whole_file
+from lipmotion.stats.archive import UNREADABLE, read_archive, read_archive_header, write_archive
 from lipmotion.stats.hmm.model import HmmConfig, UnitHmm, hmm_arrays, hmm_from_arrays
 
 FORMAT = "lipmotion.model"
 VERSION = 2
 SHIPPED = "grid-s1.lipmotion"
-HEADER = "header.json"
-OLDEST_DATE = (1980, 1, 1, 0, 0, 0)
-"""The date of everything in the file: the same model gives the same bytes."""
-UNREADABLE = (OSError, EOFError, KeyError, ValueError, TypeError, RuntimeError, zlib.error, zipfile.BadZipFile)
-"""What reading a damaged zip, or one of something else, may raise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,11 +52,7 @@ def save_model(model: Model, path: str | Path) -> None:
         "recogniser": asdict(model.phones.config),
         **model.about,
     }
-    with whole_file(Path(path)) as unfinished, zipfile.ZipFile(unfinished, "w") as file:
-        _put(file, HEADER, json.dumps(header, indent=1, ensure_ascii=False).encode())
-        for name, array in sorted(arrays.items()):
-            with file.open(_member(f"{name}.npy"), "w") as member:
-                np.lib.format.write_array(member, np.ascontiguousarray(array), allow_pickle=False)
+    write_archive(Path(path), header, arrays)
 
 
 def load_model(path: str | Path | None = None) -> Model:
@@ -87,8 +73,7 @@ def read_header(path: Path) -> dict[str, Any]:
     if not path.is_file():
         raise InputError(f"{path}: no such model")
     try:
-        with zipfile.ZipFile(path) as file:
-            header = json.loads(file.read(HEADER))
+        header = read_archive_header(path)
     except UNREADABLE as error:
         raise ModelFormatError(
             f"{path}: not a lipmotion model ({error}); give a file that `lipmotion train` wrote"
@@ -119,29 +104,27 @@ def _read(path: Path) -> Model:
     header = read_header(path)
     arrays: dict[str, dict[str, NDArray[Any]]] = {"phones": {}, "engine": {}}
     try:
-        with zipfile.ZipFile(path) as file:
-            for name in file.namelist():
-                if name != HEADER:
-                    part, _, key = name.removesuffix(".npy").partition("/")
-                    member = io.BytesIO(file.read(name))  # whole, so that its checksum is compared first
-                    arrays[part][key] = np.lib.format.read_array(member, allow_pickle=False)
+        for name, array in read_archive(path).items():
+            part, _, key = name.partition("/")
+            arrays[part][key] = array
         engine = engine_named(header["engine"], header["configuration"])
-        phones = hmm_from_arrays(arrays["phones"], HmmConfig(**header["recogniser"]))
+        phones = hmm_from_arrays(arrays["phones"], _numbers(header["recogniser"]))
         learned = engine.from_arrays(arrays["engine"])
+    except ModelFormatError as error:
+        raise ModelFormatError(f"{path}: {error}") from error
     except UNREADABLE as error:
         raise ModelFormatError(f"{path}: the model is damaged ({error}); train or download it again") from error
     about = {key: value for key, value in header.items() if key not in _OWN_KEYS}
     return Model(phones, engine, learned, about)
 
 
+def _numbers(options: Mapping[str, Any]) -> HmmConfig:
+    """Return a configuration. Raises TypeError: an unknown option, or one that is no number."""
+    config = HmmConfig(**options)
+    for option in fields(config):
+        if type(getattr(config, option.name)) not in (int, float):
+            raise TypeError(f"{option.name} is {getattr(config, option.name)!r}, required a number")
+    return config
+
+
 _OWN_KEYS = ("format", "version", "engine", "configuration", "recogniser")
-
-
-def _member(name: str) -> zipfile.ZipInfo:
-    info = zipfile.ZipInfo(name, OLDEST_DATE)
-    info.compress_type = zipfile.ZIP_DEFLATED
-    return info
-
-
-def _put(file: zipfile.ZipFile, name: str, content: bytes) -> None:
-    file.writestr(_member(name), content)

@@ -3,38 +3,33 @@
 from __future__ import annotations
 
 import hashlib
-import multiprocessing
 import os
 import shutil
-import signal
-import sys
-import threading
 import time
-from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from tqdm import tqdm
-
 from lipmotion.corpora.base import Recording, Recordings
 from lipmotion.corpora.discover import discover
 from lipmotion.corpora.entry import quantised, read_entry, write_utterance
-from lipmotion.corpora.store import Corpus
+from lipmotion.corpora.store import UTTERANCES, Corpus
 from lipmotion.errors import CorpusError, ExportError, InputError, MissingDependencyError
+from lipmotion.files import locked, remove_unfinished
 from lipmotion.pipeline.given import DIGESTS, digest, given_phones, given_track
+from lipmotion.pipeline.workers import working
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.read import read_audio
-from lipmotion.types import Track, Utterance
+from lipmotion.types import Item, Monitor, Progress, Track, Utterance, silent_monitor
 from lipmotion.vision.packages import versions
 from lipmotion.vision.track import track
 
 RECIPE = "3"
 """Raised whenever the same video would give other numbers: older utterances are then made again."""
+STAGE = "preparing recordings"
 
 
 @dataclass(frozen=True)
@@ -60,6 +55,15 @@ class PrepareReport:
     seconds: float
     notes: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
+    @property
+    def counts(self) -> dict[str, int]:
+        """How many recordings were prepared, kept and skipped."""
+        return {"prepared": len(self.prepared), "kept": len(self.kept), "skipped": len(self.failed)}
+
+    def __str__(self) -> str:
+        counts = ", ".join(f"{count} {what}" for what, count in self.counts.items())
+        return f"{self.corpus}: {counts} ({self.kind})"
+
 
 @dataclass(frozen=True)
 class _Job:
@@ -81,7 +85,12 @@ class _Outcome:
 
 
 def prepare(
-    directory: str | Path, output: str | Path, *, workers: int | None = None, crops: bool = True, progress: bool = True
+    directory: str | Path,
+    output: str | Path,
+    *,
+    workers: int | None = None,
+    crops: bool = True,
+    monitor: Monitor = silent_monitor,
 ) -> PrepareReport:
     """Turn a folder of recordings into a corpus, or add them to one.
 
@@ -90,24 +99,25 @@ def prepare(
     workers   : processes, by default one a core. With more than one, a script must call this under
                 ``if __name__ == "__main__":``, as for every process pool
     crops     : keep the mouth images
-    progress  : show a progress bar, if stderr is a terminal
+    monitor   : hears how far it is, and what becomes of every recording
     A recording that cannot be used is reported and left out. The corpus does not depend on ``workers``, nor on how
     often it was interrupted.
     Raises InputError, CorpusError: no recordings, none of them usable, or ``output`` is something else.
     Raises MissingDependencyError: there are videos, and MediaPipe or OpenCV is not installed.
-    Raises ExportError: the disk is full.
+    Raises ExportError: the disk is full, or another process is preparing into the same corpus.
     """
     directory, output = Path(directory), Path(output)
     start_s = time.monotonic()
+    if workers is not None and workers < 1:
+        raise InputError(f"{workers} processes, required at least 1; leave it out for one a core")
     found = discover(directory)
     packages = versions() if any(item.curves is None for item in found.items) else {}
     is_new = not output.exists()
-    corpus = Corpus.create(output)
-    jobs = [_job(item, directory.resolve(), corpus, packages, crops) for item in found.items]
-    try:
-        outcomes = list(_with_progress(_outcomes(jobs, workers or os.cpu_count() or 1), len(jobs), progress))
-    finally:
-        corpus.refresh()
+    with locked(output):
+        corpus = Corpus.create(output)
+        jobs = [_job(item, directory.resolve(), corpus, packages, crops) for item in found.items]
+        with _listed(corpus), working(min(workers or os.cpu_count() or 1, len(jobs))) as team:
+            outcomes = _heard(found, team.as_they_come(_process, jobs), len(jobs), monitor)
     report = _report(corpus, found, outcomes, time.monotonic() - start_s)
     if not report.prepared and not report.kept:
         if is_new:
@@ -226,51 +236,34 @@ def _track(job: _Job, duration_s: float) -> Track:
     return track(job.recording.file, crops=job.settings["crops"] == "yes")
 
 
-def _with_progress(outcomes: Iterator[_Outcome], count: int, progress: bool) -> Iterator[_Outcome]:
-    shown = progress and sys.stderr is not None and sys.stderr.isatty()
-    yield from tqdm(outcomes, total=count, unit="clip", disable=not shown)
-
-
-def _outcomes(jobs: Sequence[_Job], workers: int) -> Iterator[_Outcome]:
-    """Yield the outcomes as they come; with one worker, in this process."""
-    workers = min(workers, len(jobs))
-    if workers <= 1:
-        yield from map(_process, jobs)
-        return
-    with _pool(workers) as pool:
-        try:
-            for future in as_completed([pool.submit(_process, job) for job in jobs]):
-                yield future.result()
-        except BrokenProcessPool as error:
-            raise CorpusError(
-                "a worker process died (out of memory? or a script that calls prepare() outside of "
-                '`if __name__ == "__main__":`); what is finished is kept: prepare again, with fewer workers'
-            ) from error
+def _heard(found: Recordings, coming: Iterator[_Outcome], count: int, monitor: Monitor) -> list[_Outcome]:
+    """Return all outcomes; each is reported as soon as it is known."""
+    for name, problem in found.problems.items():
+        monitor(Item(name, "skipped", problem))
+    outcomes: list[_Outcome] = []
+    monitor(Progress(STAGE, 0, count, 0.0))
+    for outcome in coming:
+        outcomes.append(outcome)
+        kind = "skipped" if outcome.problem else "kept" if outcome.kept else "prepared"
+        unseen = (f"no face in {outcome.unseen} frames, interpolated",) if outcome.unseen else ()
+        monitor(Item(outcome.name, kind, outcome.problem or "; ".join((*outcome.notes, *unseen))))
+        monitor(Progress(STAGE, len(outcomes), count, len(outcomes) / count))
+    return outcomes
 
 
 @contextmanager
-def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
-    """Give a pool whose processes end when it is left in a hurry, or when this process is killed."""
-    others = set(multiprocessing.active_children())
-    pool = ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), _start_worker)
+def _listed(corpus: Corpus) -> Iterator[None]:
+    """Whatever happens inside, have the corpus list what is finished, and leave nothing that is not."""
     try:
-        yield pool
+        yield
+    except ExportError as error:
+        with suppress(ExportError):
+            corpus.refresh()
+        raise ExportError(f"{error}; {len(corpus)} utterances are finished and kept") from error
     except BaseException:
-        pool.shutdown(wait=False, cancel_futures=True)
-        for process in set(multiprocessing.active_children()) - others:
-            process.terminate()
+        corpus.refresh()
         raise
+    else:
+        corpus.refresh()
     finally:
-        pool.shutdown()
-
-
-def _start_worker() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that started this one
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-    os._exit(1)
+        remove_unfinished(corpus.path / UTTERANCES)

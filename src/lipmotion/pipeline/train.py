@@ -5,26 +5,47 @@ from __future__ import annotations
 import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from importlib import metadata
 from itertools import groupby
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import Engine, engine_named
-from lipmotion.errors import AlignmentError, CorpusError, InputError
+from lipmotion.errors import CorpusError, InputError
+from lipmotion.pipeline.fingerprint import fingerprint
+from lipmotion.pipeline.labels import labelled
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.transcribe import phones_in_time, report_guesses
+from lipmotion.pipeline.workers import working
 from lipmotion.speech.phones import train_phones
 from lipmotion.speech.recogniser import Recogniser
-from lipmotion.stats.em import Monitor, silent_monitor
+from lipmotion.stats.checkpoint import NOTHING_KEPT, Checkpoint
 from lipmotion.stats.hmm.model import HmmConfig, UnitHmm
 from lipmotion.stats.resample import to_model_frames
-from lipmotion.types import FRAME_RATE_HZ, Example, Features, Motion, Speech, Timeline, Track, Unit, Utterance
+from lipmotion.types import (
+    FRAME_RATE_HZ,
+    Each,
+    Example,
+    Features,
+    Monitor,
+    Motion,
+    Speech,
+    Timeline,
+    Track,
+    Unit,
+    Utterance,
+    part_of,
+    silent_monitor,
+)
 from lipmotion.units import Lexicon, is_silent
 
 LOG = logging.getLogger("lipmotion")
+FEWEST = 32
+"""Utterances that are worth a process of their own."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +72,8 @@ def train(
     recogniser: HmmConfig | None = None,
     lexicon: Lexicon | None = None,
     monitor: Monitor = silent_monitor,
+    work: Path | None = None,
+    workers: int = 1,
 ) -> tuple[Model, TrainReport]:
     """Train phone models on what is transcribed, then the motion of everything.
 
@@ -60,6 +83,11 @@ def train(
     speakers   : theirs only; all by default
     engine     : with its configuration; the trajectory engine by default
     recogniser : configuration of the phone models
+    monitor    : hears how far it is, and which utterances are left out
+    work       : a folder that keeps what is finished, so that the same call goes on from there after it was stopped
+                 (``files.unfinished_work`` gives one); the model is the same to the byte
+    workers    : processes that share the work, fewer if the corpus is small; the model does not depend on it. With more
+                 than one, a script must call this under ``if __name__ == "__main__":``, as for every process pool
     Phones that are labelled are taken as they are. Utterances without a transcript are recognised, by the phone models
     of the others or, where there are none, by those of the shipped model.
     Nothing here is random: the same corpus gives the same model.
@@ -70,10 +98,14 @@ def train(
     chosen = tuple(names) if names is not None else corpus.required(split, speakers)
     if not chosen:
         raise CorpusError(f"{corpus.path}: an empty list of names was given; name at least one utterance")
+    recogniser = recogniser or HmmConfig()
     utterances = [corpus.utterance(name) for name in chosen]
-    phones = _phones(utterances, lexicon, recogniser or HmmConfig(), monitor)
-    examples, skipped = _examples(utterances, Recogniser(phones), lexicon)
-    fit = engine.fit(examples, monitor)
+    checkpoint = Checkpoint(work, fingerprint(corpus, chosen, engine, recogniser, lexicon)) if work else NOTHING_KEPT
+    with working(min(workers, len(chosen) // FEWEST)) as team:
+        monitors = part_of(monitor, 0, 0.7, "learning phones: "), part_of(monitor, 0.7, 0.9)
+        phones = _phones(utterances, lexicon, recogniser, monitors[0], checkpoint, team.each)
+        examples, skipped = _examples(utterances, Recogniser(phones), lexicon, monitors[1], checkpoint, team.each)
+    fit = engine.fit(examples, part_of(monitor, 0.9, 1, "learning motion: "), checkpoint)
     used = tuple(example.name for example in examples)
     about = _about(corpus, utterances, "given names" if names is not None else split or "all", len(used))
     if speakers:
@@ -98,17 +130,25 @@ def model_motion(track: Track, frames: int) -> tuple[Motion, Any]:
     return replace(motion, values=values, rate_hz=FRAME_RATE_HZ), valid
 
 
-def _phones(utterances: Sequence[Utterance], lexicon: Lexicon, config: HmmConfig, monitor: Monitor) -> UnitHmm:
+def _phones(
+    utterances: Sequence[Utterance],
+    lexicon: Lexicon,
+    config: HmmConfig,
+    monitor: Monitor,
+    checkpoint: Checkpoint,
+    each: Each,
+) -> UnitHmm:
     spoken = [(u.audio, u.words) for u in utterances if u.phones is None and u.words and _can_be_said(u.words, lexicon)]
-    labelled = [(u.audio, _runs(u.phones)) for u in utterances if u.phones is not None]
-    if not spoken and not labelled:
+    given = [(u.audio, _runs(u.phones)) for u in utterances if u.phones is not None]
+    if not spoken and not given:
         LOG.warning("no transcripts in the corpus: its phones are recognised by the shipped model")
         return load_model().phones
     said = dict.fromkeys(word for _, words in spoken for word in words)
     report_guesses(tuple(said), lexicon)
-    runs = {" ".join(run): (run,) for _, found in labelled for run in found}
-    as_words = [(audio, tuple(map(" ".join, found))) for audio, found in labelled]
-    return train_phones([*spoken, *as_words], Lexicon(lexicon.user | runs), config, monitor)
+    runs = {" ".join(run): (run,) for _, found in given for run in found}
+    as_words = [(audio, tuple(map(" ".join, found))) for audio, found in given]
+    words = Lexicon(lexicon.user | runs)
+    return train_phones([*spoken, *as_words], words, config, monitor, checkpoint, each)
 
 
 def _runs(phones: Timeline[Unit]) -> list[tuple[str, ...]]:
@@ -125,15 +165,19 @@ def _can_be_said(words: Sequence[str], lexicon: Lexicon) -> bool:
 
 
 def _examples(
-    utterances: Sequence[Utterance], phones: Recogniser, lexicon: Lexicon
+    utterances: Sequence[Utterance],
+    phones: Recogniser,
+    lexicon: Lexicon,
+    monitor: Monitor,
+    checkpoint: Checkpoint,
+    each: Each,
 ) -> tuple[list[Example], dict[str, str]]:
     examples: list[Example] = []
     skipped: dict[str, str] = {}
-    for utterance in utterances:
-        try:
-            units = labels_of(utterance, phones, lexicon)
-        except (AlignmentError, InputError) as error:
-            skipped[utterance.name] = str(error)
+    label = partial(labels_of, phones=phones, lexicon=lexicon)
+    for utterance, units in labelled(utterances, label, monitor, checkpoint, each):
+        if isinstance(units, str):
+            skipped[utterance.name] = units
             continue
         motion, valid = model_motion(utterance.track, len(utterance.features.values))
         examples.append(Example(utterance.name, Speech(utterance.features, units), motion, valid))

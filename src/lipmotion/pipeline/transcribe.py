@@ -6,12 +6,15 @@ import logging
 from collections.abc import Sequence
 from pathlib import Path
 
-from lipmotion.errors import InputError
+from lipmotion.files import text_in
+from lipmotion.speech.agreement import DOUBTFUL, agreement
 from lipmotion.speech.recogniser import Recogniser
 from lipmotion.types import Audio, Features, Timeline, Unit
 from lipmotion.units import Lexicon
 
 LOG = logging.getLogger("lipmotion")
+SHOWN = 80
+"""Letters of a word that a message repeats."""
 
 
 def transcribe(
@@ -21,10 +24,14 @@ def transcribe(
 
     features : of the audio, from ``mfcc``
     words    : what is said in it, lower case, or None
+    A warning says if the words are hardly what is said (only where general models listen).
     Raises AlignmentError: the words do not fit into the recording.
     """
     report_guesses(words or (), lexicon)
-    return phones_in_time(phones, audio, features, words, lexicon)
+    units = phones_in_time(phones, audio, features, words, lexicon)
+    if words is not None and phones.kind != "own":
+        report_doubt(audio, units)
+    return units
 
 
 def phones_in_time(
@@ -38,12 +45,19 @@ def phones_in_time(
 
 def read_transcript(path: Path) -> str:
     """Return the text of a file. Raises InputError: no such file, or not UTF-8 text."""
-    try:
-        return path.read_text(encoding="utf-8-sig")
-    except FileNotFoundError as error:
-        raise InputError(f"{path}: no such transcript file") from error
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: not a readable UTF-8 text ({error})") from error
+    return text_in(path, "transcript")
+
+
+def report_doubt(audio: Audio, units: Timeline[Unit]) -> None:
+    """Warn if the phones of a transcript, aligned, are not what is heard."""
+    found = agreement(audio, units)
+    if found < DOUBTFUL:
+        LOG.warning(
+            "the transcript seems not to be what is said (its phones agree with the sound at %.1f, required %.1f or "
+            "more); check it, or leave it out",
+            found,
+            DOUBTFUL,
+        )
 
 
 def report_guesses(words: Sequence[str], lexicon: Lexicon) -> None:
@@ -51,4 +65,5 @@ def report_guesses(words: Sequence[str], lexicon: Lexicon) -> None:
     for word in dict.fromkeys(words):
         if not lexicon.known(word):
             guessed = " ".join(lexicon.pronunciations(word)[0])
-            LOG.warning("%r is not in the dictionary; read as %r; a lexicon file can say better", word, guessed)
+            short = [text if len(text) <= SHOWN else text[:SHOWN] + "..." for text in (word, guessed)]
+            LOG.warning("%r is not in the dictionary; read as %r; a lexicon file can say better", *short)

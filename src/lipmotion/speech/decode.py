@@ -74,7 +74,6 @@ class _Track:
             self._place(frame)
             self._resample(frame)
         self._flush()
-        stated = self._stream.duration
         return Decoded(
             samples=np.frombuffer(self._bytes, np.float32)[self._cut :],
             rate_hz=self._rate_hz,
@@ -83,8 +82,13 @@ class _Track:
             packets=self._packets,
             damaged=self._damaged,
             silence_s=self._silence_s,
-            stated_s=float(stated * self._stream.time_base) if stated else 0.0,
+            stated_s=self._stated_s(),
         )
+
+    def _stated_s(self) -> float:
+        if self._stream.duration:
+            return float(self._stream.duration * self._stream.time_base)
+        return 0.0 if self._container.streams.video else (self._container.duration or 0) / 1e6
 
     def _frames(self) -> Iterator[Any]:
         """Yield what can be decoded; damaged packets are counted."""

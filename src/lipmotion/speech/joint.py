@@ -84,12 +84,12 @@ def joint_evidence(
     trust        : what their log densities are multiplied by, 0 to 1
     general      : from ``general_features`` [shape=(T, 39)]
     """
+    heard = general_model().log_density(general)  # kept: it is asked for twice, and 50 kB a second
 
     def log_density(first: int, end: int, chosen: Chosen) -> NDArray[np.float32]:
-        columns = joint.columns if chosen is None else joint.columns[chosen]
-        values = general_model().log_density(general[first:end])[:, columns]
+        values = heard[first:end, joint.columns if chosen is None else joint.columns[chosen]]
         if trust > 0:
             values += np.float32(trust) * joint.hmm.mixtures.log_likelihood(own_features[first:end], chosen)
         return values
 
-    return Evidence(len(general), log_density)
+    return Evidence(len(heard), log_density)

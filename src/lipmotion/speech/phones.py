@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from itertools import cycle
 
 from lipmotion.speech.mfcc import LOG_ENERGY, mfcc
-from lipmotion.stats.em import Monitor
+from lipmotion.stats.checkpoint import NOTHING_KEPT, Checkpoint
 from lipmotion.stats.hmm.model import HmmConfig, UnitHmm
 from lipmotion.stats.hmm.train import Transcribed, UnitInventory, train_hmm
-from lipmotion.types import Audio
+from lipmotion.types import Audio, Each, Monitor
 from lipmotion.units import PAUSE, SILENCE, Lexicon
 
 TURNS = (1.0, 0.88, 1.0, 0.94, 1.12, 1.06)
@@ -19,7 +19,12 @@ WARPED_FROM = 60
 
 
 def train_phones(
-    spoken: Sequence[tuple[Audio, tuple[str, ...]]], lexicon: Lexicon, config: HmmConfig, monitor: Monitor
+    spoken: Sequence[tuple[Audio, tuple[str, ...]]],
+    lexicon: Lexicon,
+    config: HmmConfig,
+    monitor: Monitor,
+    checkpoint: Checkpoint = NOTHING_KEPT,
+    each: Each = map,
 ) -> UnitHmm:
     """Train phone models from recordings and the words said in them.
 
@@ -33,4 +38,4 @@ def train_phones(
         Transcribed(mfcc(audio, warp).values, tuple(lexicon.pronunciations(word) for word in words))
         for (audio, words), warp in zip(spoken, cycle(turns), strict=False)
     ]
-    return train_hmm(utterances, UnitInventory(SILENCE, PAUSE, LOG_ENERGY), config, monitor)
+    return train_hmm(utterances, UnitInventory(SILENCE, PAUSE, LOG_ENERGY), config, monitor, checkpoint, each)

@@ -19,6 +19,9 @@ LOG = logging.getLogger("lipmotion")
 SPEECH_RATE_HZ = 16_000
 SHORTEST_S = 0.1
 """Recordings under this hold no sentence; the features need 25 ms around every frame."""
+LOWEST_HZ, HIGHEST_HZ = 4000, 1_000_000
+"""Sampled less often, speech cannot be understood; no recorder samples more often."""
+MOST_CHANNELS = 64
 CANCELLED = 0.05
 """The mean of the channels must keep this share of the loudest channel's energy; else they cancel one another."""
 USABLE = 0.5
@@ -71,8 +74,22 @@ def _decoded(path: Path, rate_hz: int, channel: int | None) -> Decoded:
 def _first_track(path: Path, container: Any) -> None:
     if not container.streams.audio:
         raise InputError(f"{path}: has no sound track; give a recording with sound")
+    _check_stream(path, container.streams.audio[0])
     if len(container.streams.audio) > 1:
         LOG.info("%s: the first of %d sound tracks is used", path, len(container.streams.audio))
+
+
+def _check_stream(path: Path, stream: Any) -> None:
+    """Raise InputError before a mistaken header fills the memory: a rate of 1 Hz makes 16,000 samples out of one."""
+    if stream.codec_context is None:
+        raise InputError(f"{path}: its sound is coded in an unknown way; export it as .wav or .flac")
+    rate_hz, channels = stream.rate or 0, stream.channels or 0
+    if not LOWEST_HZ <= rate_hz <= HIGHEST_HZ:
+        raise InputError(
+            f"{path}: sampled at {rate_hz} Hz, required {LOWEST_HZ} to {HIGHEST_HZ}; export the recording again"
+        )
+    if not 1 <= channels <= MOST_CHANNELS:
+        raise InputError(f"{path}: has {channels} channels, required 1 to {MOST_CHANNELS}; export the recording again")
 
 
 def _report_damage(path: Path, sound: Decoded) -> None:

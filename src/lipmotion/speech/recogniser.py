@@ -72,7 +72,8 @@ class Recogniser:
         """
         hmm, evidence = self._evidence(audio, features)
         evidence = never_silent(hmm, evidence, loud_frames(features.values[:, LOG_ENERGY], LOUD_FRAMES))
-        variants = [lexicon.pronunciations(word) for word in words]
+        known_words = {word: lexicon.pronunciations(word) for word in set(words)}
+        variants = [known_words[word] for word in words]
         known = [unit for unit in hmm.table.units if not is_silent(unit)]
         sounds = [[tuple(stand_in(p, known) for p in variant) for variant in choices] for choices in variants]
         said = choose_pronunciations(hmm, evidence, sounds, PAUSE)

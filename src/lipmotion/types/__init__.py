@@ -1,9 +1,11 @@
 """The data that flows. Plain frozen values; nothing here computes more than a look-up."""
 
 from lipmotion.types.audio import Audio
+from lipmotion.types.each import Each
 from lipmotion.types.features import FRAME_RATE_HZ, Features
 from lipmotion.types.generation import Constraints, Example, Generation, Pin, Speech, Trace
 from lipmotion.types.motion import EYE_DISTANCE, WEIGHT, Channel, Motion
+from lipmotion.types.progress import Item, Monitor, Progress, counted, part_of, silent_monitor
 from lipmotion.types.timeline import Span, Timeline, Unit
 from lipmotion.types.utterance import Track, Utterance
 
@@ -14,11 +16,15 @@ __all__ = [
     "Audio",
     "Channel",
     "Constraints",
+    "Each",
     "Example",
     "Features",
     "Generation",
+    "Item",
+    "Monitor",
     "Motion",
     "Pin",
+    "Progress",
     "Span",
     "Speech",
     "Timeline",
@@ -26,4 +32,7 @@ __all__ = [
     "Track",
     "Unit",
     "Utterance",
+    "counted",
+    "part_of",
+    "silent_monitor",
 ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,7 +75,7 @@ class Generation:
     """
 
     motion: Motion
-    variance: NDArray[np.float64]
+    variance: NDArray[np.floating[Any]]
     units: Timeline[Unit]
     trace: Trace
 

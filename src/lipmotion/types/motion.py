@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,21 +28,21 @@ class Channel:
 class Motion:
     """Movement, one row a frame, frame n at ``n / rate_hz`` seconds.
 
-    values   : float array [shape=(T, P)]
+    values   : float array [shape=(T, P)], in single precision where it is long
     rate_hz  : frames per second
     channels : the P curves
     Raises InputError: the shapes do not fit, two channels share a name, or the rate is not positive.
     """
 
-    values: NDArray[np.float64]
+    values: NDArray[np.floating[Any]]
     rate_hz: float
     channels: tuple[Channel, ...]
 
     def __post_init__(self) -> None:
         if self.values.ndim != 2 or self.values.shape[1] != len(self.channels):
             raise InputError(f"motion values have shape {self.values.shape}, required (T, {len(self.channels)})")
-        if not self.rate_hz > 0:
-            raise InputError(f"motion rate is {self.rate_hz} Hz, required more than 0")
+        if not 0 < self.rate_hz < float("inf"):
+            raise InputError(f"motion rate is {self.rate_hz} Hz, required more than 0 and finite")
         if len(set(self.names)) != len(self.channels):
             raise InputError(f"motion channel names repeat: {', '.join(self.names)}")
 
@@ -55,9 +56,9 @@ class Motion:
         """The time of every frame, in seconds [shape=(T,)]."""
         return np.arange(len(self.values)) / self.rate_hz
 
-    def __getitem__(self, name: str) -> NDArray[np.float64]:
+    def __getitem__(self, name: str) -> NDArray[np.floating[Any]]:
         """Return one channel's curve [shape=(T,)]. Raises InputError: no such channel."""
-        curve: NDArray[np.float64] = self.values[:, self.column(name)]
+        curve: NDArray[np.floating[Any]] = self.values[:, self.column(name)]
         return curve
 
     def column(self, name: str) -> int:

@@ -9,6 +9,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from lipmotion.errors import InputError, MissingDependencyError
+from lipmotion.files import text_in
 from lipmotion.units.phones import PHONES, is_silent
 from lipmotion.units.spelling import guess
 from lipmotion.units.transcript import plain
@@ -46,7 +47,7 @@ class Lexicon:
         Raises InputError: no such file, not UTF-8, no phones after a word, or an unknown phone (with its line).
         """
         user: dict[str, tuple[Pronunciation, ...]] = {}
-        for number, line in enumerate(_lines(Path(path)), start=1):
+        for number, line in enumerate(text_in(Path(path), "lexicon").splitlines(), start=1):
             word, *phones = line.split("#")[0].split() or [""]
             if not word:
                 continue
@@ -65,15 +66,6 @@ class Lexicon:
         entries = _dictionary_entries(word)
         variants = [with_reduced_vowels(word, entry) for entry in entries]
         return tuple(dict.fromkeys(variants)) or (with_reduced_vowels(word, guess(word)),)
-
-
-def _lines(path: Path) -> list[str]:
-    try:
-        return path.read_text(encoding="utf-8-sig").splitlines()
-    except FileNotFoundError as error:
-        raise InputError(f"{path}: no such lexicon file") from error
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: not a readable UTF-8 lexicon ({error}); one word and its phones a line") from error
 
 
 def _user_phones(phones: list[str], where: str) -> Pronunciation:

@@ -43,6 +43,10 @@ class Video:
     damage: list[str]
 
 
+LEAST_PIXELS, MOST_PIXELS = 16, 8192
+"""Width and height of a picture: in a smaller one there is no face, a larger one fills the memory."""
+
+
 @contextmanager
 def open_video(path: Path) -> Iterator[Video]:
     """Open the first video stream of a file; memory use does not grow with its length.
@@ -63,6 +67,9 @@ def open_video(path: Path) -> Iterator[Video]:
         stream = _moving_pictures(container)
         if stream is None:
             raise InputError(f"{path}: has no video stream; give a video that shows the speaker's face")
+        if stream.codec_context is None:
+            raise InputError(f"{path}: its pictures are coded in an unknown way; export the video again")
+        _check_size(path, stream.width, stream.height, float(stream.sample_aspect_ratio or 1))
         rates = [float(rate) for rate in (stream.guessed_rate, stream.average_rate) if rate]
         damage: list[str] = []
         with closing(_frames(container, stream, path, damage)) as frames:  # decoding from a closed one would crash
@@ -91,6 +98,7 @@ def _frames(container: Any, stream: Any, path: Path, damage: list[str]) -> Gener
         if picture.time is None or picture.time - start_s <= last_s:
             continue  # without a time, or shown twice: it cannot be placed
         last_s = picture.time - start_s
+        _check_size(path, picture.width, picture.height, float(pixel_shape or 1))
         yield Frame(last_s, _upright(picture, float(pixel_shape or 1)))
     if last_s == float("-inf"):
         raise InputError(f"{path}: holds no picture that can be decoded; export the video again")
@@ -114,6 +122,14 @@ def _pictures(container: Any, stream: Any, damage: list[str]) -> Iterator[Any]:
             return
         except av.FFmpegError as error:
             damage.append(str(error.strerror))
+
+
+def _check_size(path: Path, width: int, height: int, pixel_shape: float) -> None:
+    shown = round(width * pixel_shape)
+    if not (LEAST_PIXELS <= shown <= MOST_PIXELS and LEAST_PIXELS <= height <= MOST_PIXELS):
+        raise InputError(
+            f"{path}: pictures of {shown} × {height} pixels, required {LEAST_PIXELS} to {MOST_PIXELS}; scale the video"
+        )
 
 
 def _upright(picture: Any, pixel_shape: float) -> NDArray[np.uint8]:

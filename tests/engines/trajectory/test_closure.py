@@ -6,8 +6,8 @@ from hypothesis import strategies as st
 from engines.synthetic import PHONES, examples, speech
 from lipmotion.engines import engine_named
 from lipmotion.engines.trajectory.closure import Closure, closing_frames, closing_spans, fit_closure
-from lipmotion.stats.em import silent_monitor
 from lipmotion.types import Constraints, Pin, Span, Timeline, Unit
+from lipmotion.types.progress import silent_monitor
 
 ENGINE = engine_named("trajectory", {})
 MODEL = ENGINE.fit(examples(), silent_monitor).model
@@ -76,8 +76,8 @@ def test_only_frames_that_do_not_close_anyway_are_chosen():
     opening = np.full(80, 0.2)
     opening[[15, 34, 55]] = 0.01, 0.06, 0.07
     closure = Closure(0, 0.05, np.ones(1))
-    assert closing_frames(closure, opening, units, []) == [34, 55]
-    assert closing_frames(closure, opening, units, [52]) == [34]
+    assert closing_frames(closure, opening, closing_spans(units, 80), []) == [34, 55]
+    assert closing_frames(closure, opening, closing_spans(units, 80), [52]) == [34]
 
 
 def test_how_closed_is_the_median_of_the_least_openings():

@@ -7,8 +7,8 @@ from engines.synthetic import CHANNELS, OPENINGS, examples, speech, timeline
 from lipmotion.engines import engine_named
 from lipmotion.engines.trajectory.engine import TrajectoryConfig
 from lipmotion.errors import InputError
-from lipmotion.stats.em import silent_monitor
 from lipmotion.types import WEIGHT, Channel, Constraints, Pin
+from lipmotion.types.progress import silent_monitor
 
 ENGINE = engine_named("trajectory", {})
 MODEL = ENGINE.fit(examples(), silent_monitor).model

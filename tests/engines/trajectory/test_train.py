@@ -4,7 +4,7 @@ import pytest
 from engines.synthetic import examples
 from lipmotion.engines.trajectory import train
 from lipmotion.engines.trajectory.contexts import SPREAD_LEVELS, level_names, places, rest_place
-from lipmotion.stats.em import silent_monitor
+from lipmotion.types.progress import silent_monitor
 
 OPTIONS = {"parts": 3, "edge_s": 0.08, "components": 2, "shrinkage": 10.0, "variance_shrinkage": 20.0}
 

@@ -8,12 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lipmotion.stats.em import silent_monitor
+from lipmotion.stats.hmm import baum_welch as module
 from lipmotion.stats.hmm import train
 from lipmotion.stats.hmm.align import chain_of
+from lipmotion.stats.hmm.baum_welch import adapt_contexts, baum_welch, expect
 from lipmotion.stats.hmm.evidence import heard
 from lipmotion.stats.hmm.model import HmmConfig
-from lipmotion.stats.hmm.train import baum_welch, expect
 from oracles import chains
 from stats.hmm.synthetic import known_hmm, random_hmm, recordings, speaker
 
@@ -59,8 +59,8 @@ def test_a_high_variance_floor_does_not_break_the_rise():
 
 
 def test_the_e_step_agrees_with_the_enumeration_of_all_paths(monkeypatch):
-    monkeypatch.setattr(train, "LEAST_POSTERIOR", 0.0)
-    monkeypatch.setattr(train, "CELLS", 100)
+    monkeypatch.setattr(module, "LEAST_POSTERIOR", 0.0)
+    monkeypatch.setattr(module, "CELLS", 100)
     hmm, draw = random_hmm(1, contexts=6), np.random.default_rng(1)
     said = [("a",), ("sil", "b"), ("a", "sp"), ("b", "a")]
     data = [draw.normal(0, 1.5, (frames, 2)).astype(np.float32) for frames in (7, 8, 5, 7)]
@@ -89,7 +89,7 @@ def test_the_e_step_agrees_with_the_enumeration_of_all_paths(monkeypatch):
 def test_the_size_of_batches_changes_nothing(monkeypatch, cells):
     hmm, data, said = disturbed(6, 1.0)
     better, log_likelihood = baum_welch(hmm, data, said)
-    monkeypatch.setattr(train, "CELLS", cells)
+    monkeypatch.setattr(module, "CELLS", cells)
     same, figure = baum_welch(hmm, data, said)
     assert figure == pytest.approx(log_likelihood, abs=1e-9)
     assert np.array_equal(same.mixtures.means, better.mixtures.means)
@@ -99,8 +99,8 @@ def test_the_size_of_batches_changes_nothing(monkeypatch, cells):
 def test_long_utterances_do_not_fill_the_memory(sizes):
     frames, states = zip(*sizes, strict=True)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(train, "CELLS", 20_000)
-        batches = list(train._batches(frames, states))
+        patch.setattr(module, "CELLS", 20_000)
+        batches = list(module._batches(frames, states))
     assert sorted(i for batch in batches for i in batch) == list(range(len(sizes)))
     for batch in batches:
         padded = len(batch) * max(frames[i] for i in batch) * max(states[i] for i in batch)
@@ -139,8 +139,8 @@ def test_no_state_may_last_longer_than_its_limit():
     hmm = known_hmm(who)
     better, _ = baum_welch(hmm, data, [("sil", "a", "sil")] * 3)
     lasting = {name: 1 / -np.expm1(float(stay)) for name, stay in zip(hmm.table.names, better.log_stay, strict=True)}
-    assert [lasting[f"a.{state}"] for state in range(3)] == pytest.approx([train.LONGEST_STATE] * 3, rel=1e-4)
-    assert train.LONGEST_STATE < lasting["sil.0"] < train.LONGEST_SILENCE
+    assert [lasting[f"a.{state}"] for state in range(3)] == pytest.approx([module.LONGEST_STATE] * 3, rel=1e-4)
+    assert module.LONGEST_STATE < lasting["sil.0"] < module.LONGEST_SILENCE
 
 
 def coarticulated(count: int):
@@ -159,19 +159,27 @@ def coarticulated(count: int):
     return known_hmm(who), data, said
 
 
+def in_context(hmm, data, said):
+    """Return the models with states in context, and the likelihood before every step of adapting them."""
+    hmm, log = train._with_contexts(hmm, train._frequent_contexts(hmm, data, said)), []
+    for _ in range(hmm.config.iterations):
+        hmm, log_likelihood = adapt_contexts(hmm, data, said)
+        log.append(log_likelihood)
+    return hmm, log
+
+
 def test_contexts_get_densities_where_there_are_frames_enough():
     hmm, data, said = coarticulated(30)
     hmm = replace(hmm, config=HmmConfig(mixtures=1, context_frames=40, relevance=5.0))
-    log: list[tuple[str, float]] = []
-    better = train._in_context(hmm, data, said, lambda step, value: log.append((step, value)))
+    better, log = in_context(hmm, data, said)
     plain = len(hmm.table.names)
     assert better.table.names[:plain] == hmm.table.names
     assert np.array_equal(better.mixtures.means[:plain], hmm.mixtures.means)  # those without context are kept
     assert "a.0<d" in better.table.names
     shift = better.mixtures.means[better.table.density("a", 0, "d")] - hmm.mixtures.means[hmm.table.density("a", 0)]
     assert shift[0] == pytest.approx([0, 0, 1.5, 0], abs=0.35)
-    assert log[-1][1] > log[1][1]
-    fewer = train._in_context(replace(hmm, config=replace(hmm.config, context_frames=150)), data, said, silent_monitor)
+    assert log[-1] > log[0]
+    fewer = in_context(replace(hmm, config=replace(hmm.config, context_frames=150)), data, said)[0]
     assert set(fewer.table.names) < set(better.table.names)
-    none = train._in_context(replace(hmm, config=replace(hmm.config, context_frames=10**6)), data, said, silent_monitor)
+    none = in_context(replace(hmm, config=replace(hmm.config, context_frames=10**6)), data, said)[0]
     assert none is hmm or none.table == hmm.table

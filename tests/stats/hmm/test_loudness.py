@@ -88,7 +88,7 @@ def test_nothing_is_quiet_where_nothing_is_loud(frames):
 
 
 def test_quiet_frames_are_silence_whatever_they_sound_like():
-    hmm, features, _, loud = stranger()
+    hmm, features, _, _loud = stranger()
     quiet = np.zeros(len(features), bool)
     quiet[:4] = True
     values = always_silent(hmm, heard(hmm, features), quiet).log_density(2, 6, None)

@@ -39,13 +39,13 @@ def interval_tiers(text: str, where: str) -> list[Tier]:
         if _take(tokens, "text") != "TextGrid":
             raise InputError(f"{where}: a Praat file of another kind; save a TextGrid")
         _pass_range(tokens)
-        tier_count = int(_take(tokens, "number")) if _take(tokens, "flag") == "exists" else 0
+        tier_count = _count(tokens) if _take(tokens, "flag") == "exists" else 0
         for number in range(1, tier_count + 1):
             place = f"tier {number}"
             kind, name = _take(tokens, "text"), _take(tokens, "text")
             place = f"tier {name!r}"
             _pass_range(tokens)
-            labels = [_label(tokens, kind, f"{place}, interval {i + 1}") for i in range(int(_take(tokens, "number")))]
+            labels = [_label(tokens, kind, f"{place}, interval {i + 1}") for i in range(_count(tokens))]
             if kind == INTERVALS:
                 tiers.append(Tier(place, tuple(labels)))
     except _DamagedError as error:
@@ -71,6 +71,13 @@ def _pass_range(tokens: Iterator[tuple[str, str]]) -> None:
     """Pass over where a file or a tier begins and ends."""
     for _ in range(2):
         _take(tokens, "number")
+
+
+def _count(tokens: Iterator[tuple[str, str]]) -> int:
+    value = _take(tokens, "number")
+    if not value.isdecimal():
+        raise _DamagedError(f"there stands number {value[:40]}, required a count")
+    return int(value)
 
 
 def _take(tokens: Iterator[tuple[str, str]], wanted: str) -> str:

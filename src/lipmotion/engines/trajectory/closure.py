@@ -66,16 +66,17 @@ def fit_closure(
 
 
 def closing_frames(
-    closure: Closure, opening: NDArray[np.float64], units: Timeline[Unit], taken: Sequence[int]
+    closure: Closure, opening: NDArray[np.float64], spans: Sequence[slice], taken: Sequence[int]
 ) -> list[int]:
     """Return the frames in which a trajectory must be made to close: the least open one of each p, b and m.
 
     opening : [shape=(T,)], as generated
+    spans   : the frames of each, from ``closing_spans``
     taken   : frames whose opening the user pinned; a phone that holds one is the user's own
     Phones in which the lips close anyway are left alone.
     """
     frames = []
-    for span in closing_spans(units, len(opening)):
+    for span in spans:
         least = span.start + int(opening[span].argmin())
         if opening[least] > closure.closed and not any(span.start <= frame < span.stop for frame in taken):
             frames.append(least)

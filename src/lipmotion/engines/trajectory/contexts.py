@@ -73,12 +73,13 @@ def places(units: Timeline[Unit], frames: int, parts: int, edge_s: float) -> lis
     for left, span, right in with_neighbours(units):
         if span.label.phone not in VISEME_OF:
             raise InputError(f"unknown phone {span.label.phone!r} at {span.start_s} s; the phones: {' '.join(PHONES)}")
-        first, stop = (int(np.ceil(t * FRAME_RATE_HZ - 1e-6)) for t in (span.start_s, span.end_s))
-        time_s = np.arange(max(first, 0), min(stop, frames)) / FRAME_RATE_HZ
+        edges = np.ceil(np.array([span.start_s, span.end_s]) * FRAME_RATE_HZ - 1e-6)
+        first, stop = np.clip(edges, 0, frames).astype(int).tolist()
+        time_s = np.arange(first, stop) / FRAME_RATE_HZ
         rests = _rests(time_s, left, span, right)
         part = _parts(time_s, span.start_s, span.end_s, parts, edge_s)
         for i in np.nonzero(~rests)[0]:
-            result[max(first, 0) + i] = Place(left, span.label.phone, right, int(part[i]))
+            result[first + i] = Place(left, span.label.phone, right, int(part[i]))
     return result
 
 

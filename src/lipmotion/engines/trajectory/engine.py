@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any, ClassVar, final
 
@@ -10,19 +10,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.base import Arrays, Engine, Fit, frame_of
-from lipmotion.engines.trajectory.closure import OPENING, Closure, closing_frames
+from lipmotion.engines.trajectory.closure import OPENING, Closure, closing_frames, closing_spans
 from lipmotion.engines.trajectory.contexts import places, with_neighbours
 from lipmotion.engines.trajectory.model import TrajectoryModel, model_arrays, model_from_arrays
 from lipmotion.engines.trajectory.train import fit_trajectory
-from lipmotion.errors import InputError
+from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.kernels.banded import normal_equations, pin, solve
-from lipmotion.stats.em import Monitor
+from lipmotion.stats.checkpoint import NOTHING_KEPT, Checkpoint
 from lipmotion.types import (
     FRAME_RATE_HZ,
     WEIGHT,
     Constraints,
     Example,
     Generation,
+    Monitor,
     Motion,
     Speech,
     Timeline,
@@ -70,10 +71,12 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
     config: TrajectoryConfig
     name: ClassVar[str] = "trajectory"
 
-    def fit(self, examples: Sequence[Example], monitor: Monitor) -> Fit[TrajectoryModel]:  # noqa: D102
+    def fit(  # noqa: D102
+        self, examples: Sequence[Example], monitor: Monitor, checkpoint: Checkpoint = NOTHING_KEPT
+    ) -> Fit[TrajectoryModel]:
         options = asdict(self.config)
         del options["closures"]  # of generation
-        model = fit_trajectory(examples, **options, monitor=monitor)
+        model = fit_trajectory(examples, **options, monitor=monitor, checkpoint=checkpoint)
         frames = sum(int(example.valid.sum()) for example in examples)
         return Fit(model, {"frames": frames, "contexts": len(model.levels[-1].rows)})
 
@@ -84,15 +87,23 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
         mean, precision, sources = zip(*(model.statistics(place) for place in distinct), strict=True)
         index = {place: number for number, place in enumerate(distinct)}
         path = np.array([index[place] for place in where], np.intp)
-        means, precisions = np.array(mean)[path], np.array(precision)[path]
+        closing = closing_spans(speech.units, frames) if self.config.closures else []
         pins = _resolved(constraints, model, frames)
-        values, variance = _trajectory(means, precisions, pins)
-        if model.closure is not None:
-            if self.config.closures:
-                _close_lips(model.closure, speech.units, (means, precisions), pins, (values, variance))
-            opening = values[:, model.closure.column]
-            np.maximum(opening, 0, out=opening)  # a smooth curve through a closure may overshoot
-        motion, spread = model.space.restore(values, variance)
+        precise = np.float64 if frames <= DOUBLE_FRAMES else np.float32
+        motion, spread = (np.empty((frames, len(model.space.channels)), precise) for _ in range(2))
+        for inner, outer in _stretches(frames):
+            statistics = np.array(mean)[path[outer]], np.array(precision)[path[outer]]
+            inside = {
+                (frame - outer.start, c): v for (frame, c), v in pins.items() if outer.start <= frame < outer.stop
+            }
+            spans = [
+                slice(span.start - outer.start, span.stop - outer.start)
+                for span in closing
+                if outer.start <= span.start and span.stop <= outer.stop
+            ]
+            result = _generated(model, statistics, inside, spans)
+            kept = slice(inner.start - outer.start, inner.stop - outer.start)
+            motion[inner], spread[inner] = model.space.restore(*(values[kept] for values in result))
         weights = [channel.unit == WEIGHT for channel in model.space.channels]
         motion[:, weights] = np.maximum(motion[:, weights], 0)
         return Generation(
@@ -106,8 +117,22 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
         return model_arrays(model)
 
     def from_arrays(self, arrays: Arrays) -> TrajectoryModel:  # noqa: D102
-        return model_from_arrays(arrays)
+        model = model_from_arrays(arrays)
+        parts = self.config.parts
+        missing = next((part for part in range(parts) if f"*:{part}" not in model.spread), None)
+        if missing is not None:
+            raise ModelFormatError(
+                f"the trajectory model is damaged (no variances of part {missing}, required {parts} parts); "
+                "train or download it again"
+            )
+        return model
 
+
+STRETCH, MARGIN = 6000, 500
+"""Frames generated at a time, and those around them that are generated again and thrown away: what lies seconds off
+changes nothing, and the memory does not grow with the recording."""
+DOUBLE_FRAMES = 60_000
+"""The motion of recordings beyond ten minutes is kept in single precision."""
 
 _Pins = dict[tuple[int, int], float]
 """Frame and column in the model's space, to the value there."""
@@ -134,6 +159,25 @@ def _resolved(constraints: Constraints | None, model: TrajectoryModel, frames: i
     return pins
 
 
+def _stretches(frames: int) -> Iterator[tuple[slice, slice]]:
+    """Give the frames of each stretch, and those with what lies around it; a shorter recording is one stretch."""
+    for start in range(0, frames, STRETCH):
+        stop = min(start + STRETCH, frames)
+        yield slice(start, stop), slice(max(start - MARGIN, 0), min(stop + MARGIN, frames))
+
+
+def _generated(
+    model: TrajectoryModel, statistics: tuple[_Array, _Array], pins: _Pins, closing: Sequence[slice]
+) -> tuple[_Array, _Array]:
+    """Return trajectory and variance in the model's space [shape=(T, Q)], lips closed where they must."""
+    result = _trajectory(*statistics, pins)
+    if model.closure is not None:
+        _close_lips(model.closure, closing, statistics, pins, result)
+        opening = result[0][:, model.closure.column]
+        np.maximum(opening, 0, out=opening)  # a smooth curve through a closure may overshoot
+    return result
+
+
 def _trajectory(mean: _Array, precision: _Array, pins: _Pins) -> tuple[_Array, _Array]:
     """Return the trajectory through all pins, and its variance (0 there), both [shape=(T, Q)]."""
     bands = normal_equations(mean, precision)
@@ -147,7 +191,7 @@ def _trajectory(mean: _Array, precision: _Array, pins: _Pins) -> tuple[_Array, _
 
 def _close_lips(
     closure: Closure,
-    units: Timeline[Unit],
+    spans: Sequence[slice],
     statistics: tuple[_Array, _Array],
     pins: _Pins,
     result: tuple[_Array, _Array],
@@ -156,7 +200,7 @@ def _close_lips(
     values, variance = result
     column = closure.column
     taken = [frame for frame, pinned in pins if pinned == column]
-    frames = closing_frames(closure, values[:, column], units, taken)
+    frames = closing_frames(closure, values[:, column], spans, taken)
     if not frames:
         return
     wanted = {(frame, 0): closure.closed for frame in frames}

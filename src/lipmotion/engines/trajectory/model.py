@@ -106,7 +106,7 @@ def model_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> TrajectoryModel:
             variances=arrays["variances"].astype(np.float32),
             closure=closure,
         )
-    except (KeyError, ValueError, IndexError) as error:
+    except (KeyError, ValueError, IndexError, TypeError) as error:
         raise ModelFormatError(f"the trajectory model is damaged ({error}); train or download it again") from error
 
 
@@ -127,6 +127,14 @@ def _check_shapes(arrays: Mapping[str, NDArray[Any]]) -> None:
     for name, shape in required.items():
         if name in arrays and arrays[name].shape != shape:
             raise ValueError(f"{name} of shape {arrays[name].shape}, required {shape}")
+        if name in arrays and not np.isfinite(arrays[name]).all():
+            raise ValueError(f"{name} holds values that are not finite")
+    if not (arrays["variances"] > 0).all():
+        raise ValueError("variances that are not more than 0")
+    if len(set(arrays["direct"].tolist()) & set(range(channels))) < direct:
+        raise ValueError(f"direct channels {arrays['direct'].tolist()}, required different ones under {channels}")
+    if "closure" in arrays and not 0 <= arrays["closure"][0] < dimensions:
+        raise ValueError(f"closure of column {arrays['closure'][0]}, required one under {dimensions}")
 
 
 def _level(arrays: Mapping[str, NDArray[Any]], number: int) -> Level:

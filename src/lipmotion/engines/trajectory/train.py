@@ -12,9 +12,9 @@ from lipmotion.engines.trajectory.contexts import LEVELS, SPREAD_LEVELS, level_n
 from lipmotion.engines.trajectory.model import Level, TrajectoryModel
 from lipmotion.engines.trajectory.space import fit_space
 from lipmotion.errors import CorpusError
-from lipmotion.stats.em import Monitor
+from lipmotion.stats.checkpoint import NOTHING_KEPT, Checkpoint
 from lipmotion.stats.windows import with_dynamics
-from lipmotion.types import Channel, Example
+from lipmotion.types import Channel, Example, Monitor, Progress
 
 PASSES = 4
 """Rounds of backfitting; more change nothing on the validation list."""
@@ -31,6 +31,7 @@ def fit_trajectory(
     shrinkage: float,
     variance_shrinkage: float,
     monitor: Monitor,
+    checkpoint: Checkpoint = NOTHING_KEPT,
 ) -> TrajectoryModel:
     """Return what every context adds to the mean, and variances around the sum.
 
@@ -49,7 +50,7 @@ def fit_trajectory(
     rows: list[NDArray[np.float32]] = []
     for example in examples:
         inner = _inner(example.valid)
-        values.append(space.reduce(example.motion.values))
+        values.append(space.reduce(example.motion.values.astype(float)))
         dynamics = with_dynamics(values[-1])
         where = places(example.speech.units, len(inner), parts, edge_s)
         rows.append(dynamics[inner].astype(np.float32))
@@ -60,8 +61,8 @@ def fit_trajectory(
     motion = np.concatenate(rows)
     _still(motion, [name == level_names(rest_place(parts)) for name in names])
     overall = motion.var(axis=0)
-    levels = _backfit(names, motion, shrinkage, monitor)
-    spread, variances = _fit_variances(names, motion, overall, variance_shrinkage)
+    levels, rest = _backfit(names, motion, shrinkage, monitor, checkpoint)
+    spread, variances = _fit_variances(names, rest, overall, variance_shrinkage)
     closure = None
     if OPENING in space.direct_names:
         masks, timelines = [e.valid for e in examples], [e.speech.units for e in examples]
@@ -85,7 +86,10 @@ def _inner(valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return inner
 
 
-def _groups(names: Sequence[str]) -> tuple[list[str], NDArray[np.intp], NDArray[np.intp]]:
+_Groups = tuple[list[str], NDArray[np.intp], NDArray[np.intp]]
+
+
+def _groups(names: Sequence[str]) -> _Groups:
     """Return the distinct names, the frames sorted by name, and where each name's begin."""
     index: dict[str, int] = {}
     numbers = np.array([index.setdefault(name, len(index)) for name in names])
@@ -102,23 +106,50 @@ def _still(dynamics: NDArray[np.float32], rests: Sequence[bool]) -> None:
 
 
 def _backfit(
-    names: Sequence[tuple[str, ...]], rest: NDArray[np.float32], shrinkage: float, monitor: Monitor
-) -> list[Level]:
-    """Return all levels; ``rest`` becomes what they leave unexplained."""
+    names: Sequence[tuple[str, ...]],
+    motion: NDArray[np.float32],
+    shrinkage: float,
+    monitor: Monitor,
+    checkpoint: Checkpoint,
+) -> tuple[list[Level], NDArray[np.float32]]:
+    """Return all levels, and what they leave unexplained of the motion [shape=(T, 3, Q)]; kept after every pass."""
     groups = [_groups([name[number] for name in names]) for number in range(LEVELS)]
     counts = [np.diff(np.append(starts, len(order))) for _, order, starts in groups]
-    means = [np.zeros((len(distinct), *rest.shape[1:]), np.float32) for distinct, _, _ in groups]
-    for _ in range(PASSES):
-        for number, (_, order, starts) in enumerate(groups):
-            rest[order] += np.repeat(means[number], counts[number], axis=0)
-            sums = np.add.reduceat(rest[order].astype(float), starts, axis=0)
-            means[number] = (sums / (counts[number] + shrinkage)[:, None, None]).astype(np.float32)
-            rest[order] -= np.repeat(means[number], counts[number], axis=0)
-        monitor("motion unexplained", float(rest[:, 0].var(axis=0).sum()))
-    return [
+    means = [np.zeros((len(distinct), *motion.shape[1:]), np.float32) for distinct, _, _ in groups]
+    rest, done = motion, 0
+    kept = checkpoint.load(_CHECKPOINT)
+    if kept is not None:
+        means, rest, done = [kept[f"means{number}"] for number in range(LEVELS)], kept["rest"], int(kept["done"])
+    monitor(Progress(_STAGE, done, PASSES, done / PASSES))
+    for number in range(done, PASSES):
+        _backfit_once(groups, counts, means, rest, shrinkage)
+        state = {f"means{level}": mean for level, mean in enumerate(means)}
+        checkpoint.save(_CHECKPOINT, {**state, "rest": rest, "done": np.array(number + 1)})
+        unexplained = float(rest[:, 0].var(axis=0).sum())
+        monitor(Progress(_STAGE, number + 1, PASSES, (number + 1) / PASSES, unexplained))
+    levels = [
         Level({name: row for row, name in enumerate(distinct)}, mean, count.astype(np.int32))
         for (distinct, _, _), mean, count in zip(groups, means, counts, strict=True)
     ]
+    return levels, rest
+
+
+_CHECKPOINT, _STAGE = "motion", "contexts"
+
+
+def _backfit_once(
+    groups: Sequence[_Groups],
+    counts: Sequence[NDArray[np.intp]],
+    means: list[NDArray[np.float32]],
+    rest: NDArray[np.float32],
+    shrinkage: float,
+) -> None:
+    """Estimate every level's means once from what all the others leave unexplained (both in place)."""
+    for number, (_, order, starts) in enumerate(groups):
+        rest[order] += np.repeat(means[number], counts[number], axis=0)
+        sums = np.add.reduceat(rest[order].astype(float), starts, axis=0)
+        means[number] = (sums / (counts[number] + shrinkage)[:, None, None]).astype(np.float32)
+        rest[order] -= np.repeat(means[number], counts[number], axis=0)
 
 
 def _fit_variances(

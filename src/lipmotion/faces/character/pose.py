@@ -109,7 +109,7 @@ def _at(motion: Motion, curve: Curve, time_s: Curve) -> Curve:
 
 
 def _gap(motion: Motion, time_s: Curve, fps: float) -> Curve:
-    gap = drawn_gap(motion["opening"])
+    gap = drawn_gap(motion["opening"].astype(float))
     then = _at(motion, gap, time_s)
     nearest = np.rint(motion.time_s[gap == 0] * fps).astype(int)
     then[nearest[nearest < len(then)]] = 0
@@ -141,7 +141,7 @@ def _against_rest(name: str, curve: Curve, rest: NDArray[np.bool_]) -> Curve:
 def _width(motion: Motion, rest: NDArray[np.bool_]) -> Curve:
     if "width" not in motion.names:
         return 1 - 0.25 * np.clip(motion["opening"], 0, WIDEST)
-    change = _against_rest("width", motion["width"], rest) - 1
+    change = _against_rest("width", motion["width"].astype(float), rest) - 1
     return 1 + WIDTH_REACH * np.tanh(WIDTH_GAIN * change / WIDTH_REACH)
 
 

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.errors import AlignmentError
 from lipmotion.stats.hmm.evidence import Evidence
 from lipmotion.stats.hmm.model import UnitHmm
 from lipmotion.stats.hmm.network import Network, NetworkBuilder
@@ -99,6 +100,7 @@ def choose_pronunciations(
     The states without context decide, so that a pronunciation's ends need not know its neighbours.
     Raises AlignmentError: the words do not fit into the frames.
     """
+    _check_room(hmm, evidence, words)
     silence = Said(-1, 0, (hmm.table.free[0],))
     slots: list[list[Said]] = [[silence]]
     for word, variants in enumerate(words):
@@ -123,6 +125,17 @@ def choose_pronunciations(
     plain = np.arange(len(hmm.log_stay), dtype=np.intp)
     path = builder.build().best_path(evidence, plain)
     return [said for _, said in sorted({owners[state] for state in path})]
+
+
+def _check_room(hmm: UnitHmm, evidence: Evidence, words: Sequence[Sequence[Sequence[str]]]) -> None:
+    """Raise AlignmentError before a network is built that no path fits through, and that may fill the memory."""
+    counts = dict(zip(hmm.table.units, hmm.table.counts, strict=True))
+    least = sum(min(sum(counts[unit] for unit in variant) for variant in variants) for variants in words)
+    if least > evidence.frames:
+        raise AlignmentError(
+            f"{len(words)} words take at least {least} frames of 10 ms, found {evidence.frames}: the recording is too "
+            "short for what should be said in it; give its own transcript"
+        )
 
 
 def _append(

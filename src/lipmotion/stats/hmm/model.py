@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import ModelFormatError
 from lipmotion.stats.bigram import Bigram
-from lipmotion.stats.hmm.states import StateTable
+from lipmotion.stats.hmm.states import StateTable, plain_states
 from lipmotion.stats.mixture import Mixtures
 
 
@@ -67,16 +67,19 @@ class UnitHmm:
         return float(self.mixtures.log_likelihood(features, plain).max(axis=1).mean())
 
 
-def hmm_arrays(hmm: UnitHmm) -> dict[str, NDArray[Any]]:
-    """Return the models as arrays, Gaussians at half precision; the configuration is not among them."""
+def hmm_arrays(hmm: UnitHmm, precision: type[np.floating[Any]] = np.float16) -> dict[str, NDArray[Any]]:
+    """Return the models as arrays; the configuration is not among them.
+
+    precision : of the Gaussians: half is enough to recognise with, float32 is all there is
+    """
     return {
         "units": np.array(hmm.table.units),
         "counts": np.array(hmm.table.counts, np.int32),
         "names": np.array(hmm.table.names),
         "free": np.array(hmm.table.free),
-        "log_weights": hmm.mixtures.log_weights.astype(np.float16),
-        "means": hmm.mixtures.means.astype(np.float16),
-        "variances": hmm.mixtures.variances.astype(np.float16),
+        "log_weights": hmm.mixtures.log_weights.astype(precision),
+        "means": hmm.mixtures.means.astype(precision),
+        "variances": hmm.mixtures.variances.astype(precision),
         "log_stay": hmm.log_stay,
         "bigram": hmm.bigram.log_probability,
         "typical_fit": np.array([hmm.typical_fit]),
@@ -88,13 +91,15 @@ def hmm_from_arrays(arrays: Mapping[str, NDArray[Any]], config: HmmConfig) -> Un
     try:
         units, counts, names, free = (arrays[key].tolist() for key in ("units", "counts", "names", "free"))
         _check_shapes(arrays)
+        _check_names(units, counts, names, free)
+        _check_values(arrays)
         table = StateTable(tuple(units), tuple(counts), tuple(names), tuple(free))
         mixtures = Mixtures(*(arrays[key].astype(np.float32) for key in ("log_weights", "means", "variances")))
         bigram = Bigram(table.units, arrays["bigram"].astype(np.float32))
         return UnitHmm(
             config, table, mixtures, arrays["log_stay"].astype(np.float32), bigram, float(arrays["typical_fit"][0])
         )
-    except (KeyError, ValueError) as error:
+    except (KeyError, ValueError, TypeError, IndexError, OverflowError) as error:
         raise ModelFormatError(f"the phone models are damaged ({error}); train or download the model again") from error
 
 
@@ -113,3 +118,21 @@ def _check_shapes(arrays: Mapping[str, NDArray[Any]]) -> None:
     for name, shape in required.items():
         if arrays[name].shape != shape:
             raise ValueError(f"{name} of shape {arrays[name].shape}, required {shape}")
+
+
+def _check_names(units: list[str], counts: list[int], names: list[str], free: list[str]) -> None:
+    if not free or not set(free) <= set(units) or min(counts) < 1 or sum(counts) > len(names):
+        raise ValueError(f"{len(names)} states of {len(units)} units, {len(free)} of them silent")
+    wanted = plain_states(tuple(units), tuple(counts), tuple(free)).names
+    if tuple(names[: len(wanted)]) != wanted or len(set(names)) < len(names):
+        raise ValueError("the names of the states are not those of the units")
+
+
+def _check_values(arrays: Mapping[str, NDArray[Any]]) -> None:
+    for name in ("means", "variances", "log_stay", "bigram", "typical_fit"):
+        if not np.isfinite(arrays[name]).all():
+            raise ValueError(f"{name} holds values that are not finite")
+    if not (arrays["variances"] > 0).all() or not (arrays["log_stay"] < 0).all():
+        raise ValueError("variances not more than 0, or probabilities not less than 1")
+    if not np.isfinite(arrays["log_weights"].max(axis=1)).all():
+        raise ValueError("a state without a Gaussian of a finite weight")

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
 
 Context = str | None
 """The neighbouring unit a state depends on; None: it depends on none."""
@@ -59,6 +63,10 @@ class StateTable:
     def neighbour(self, left: str, unit: str, right: str, state: int) -> Context:
         """Return the neighbour that a state depends on."""
         return {"<": left, ">": right, "": None}[self.side(unit, state)]
+
+    def parents(self) -> NDArray[np.intp]:
+        """Return, for every density, the one without context that stands behind it [shape=(G,)]."""
+        return np.array([self._index[re.split("[<>]", name)[0]] for name in self.names], np.intp)
 
     def extended(self, names: tuple[str, ...]) -> StateTable:
         """Return the table with more densities at its end."""

@@ -3,34 +3,31 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError, CorpusError
-from lipmotion.kernels.forward_backward import IMPOSSIBLE, chain_posteriors
 from lipmotion.stats.bigram import estimate_bigram
-from lipmotion.stats.em import Monitor
+from lipmotion.stats.checkpoint import NOTHING_KEPT, Checkpoint
 from lipmotion.stats.hmm.align import Chain, chain_of, choose_pronunciations, state_path
-from lipmotion.stats.hmm.evidence import heard
+from lipmotion.stats.hmm.baum_welch import Statistics, adapt_contexts, baum_welch, heard, longest, maximised
+from lipmotion.stats.hmm.evidence import heard as evidence_of
 from lipmotion.stats.hmm.loudness import loud_frames
-from lipmotion.stats.hmm.model import HmmConfig, UnitHmm
-from lipmotion.stats.hmm.states import StateTable, plain_states
-from lipmotion.stats.mixture import Mixtures, single_gaussian
+from lipmotion.stats.hmm.model import HmmConfig, UnitHmm, hmm_arrays, hmm_from_arrays
+from lipmotion.stats.hmm.states import plain_states
+from lipmotion.stats.mixture import single_gaussian
+from lipmotion.types import Each, Monitor, Progress
 
-CELLS = 2_000_000
-"""Frames × utterances × states whose posteriors are computed together: 16 MB an array, some hundred in all."""
-LEAST_POSTERIOR = 1e-3
-"""State posteriors under this are left out of the statistics."""
+AT_A_TIME = 32
+"""Utterances whose pronunciations are chosen together, by one worker."""
 ONSET_FRAMES = 21
 """For the flat start, speech is where the energy is loud, averaged over so many frames. Without averaging a click or
 a breath is the end of speech, and the state before it takes the silence for its own: the last words of GRID then
 ended up to 0.8 s late."""
-LONGEST_SILENCE, LONGEST_STATE = 200.0, 12.0
-"""Most frames that a state of silence, or of any other unit, may last on average. Without the second limit the
-closure of a stop that begins every other sentence takes the silence before it for its own."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,13 +50,32 @@ class UnitInventory:
     energy: int
 
 
+@dataclass(frozen=True, eq=False)
+class _State:
+    """What training carries from one step to the next: the models, and the units said in every utterance."""
+
+    hmm: UnitHmm
+    said: tuple[tuple[str, ...], ...]
+
+
+_Step = Callable[[_State], tuple[_State, float | None]]
+"""Gives the next state, and the mean log likelihood per frame (or another figure) if it found one."""
+
+
 def train_hmm(
-    utterances: Sequence[Transcribed], inventory: UnitInventory, config: HmmConfig, monitor: Monitor
+    utterances: Sequence[Transcribed],
+    inventory: UnitInventory,
+    config: HmmConfig,
+    monitor: Monitor,
+    checkpoint: Checkpoint = NOTHING_KEPT,
+    each: Each = map,
 ) -> UnitHmm:
     """Train models of every unit that the utterances say.
 
     Stages: flat start with the first pronunciations; choice of pronunciations and pauses; mixtures by
     splitting; the choice again; states in context. Each stage is embedded Baum–Welch over whole utterances.
+    checkpoint : after every step, all that the next one needs is kept there
+    each       : shares the work; the result is the same to the bit
     Raises CorpusError: no utterance, or none long enough for its transcript.
     """
     sequences = [_first_guess(u, inventory) for u in utterances]
@@ -69,20 +85,95 @@ def train_hmm(
             f"none of {len(utterances)} utterances has a transcript that fits into its recording; "
             "check that transcripts and recordings belong together"
         )
-    data = [utterances[i].features for i in kept]
-    hmm = _flat_start(data, [sequences[i] for i in kept], inventory, config)
-    hmm = _iterate(hmm, data, [sequences[i] for i in kept], monitor, "flat start", 2 * config.iterations)
-    hmm = _with_pause(hmm, inventory)
-    said = [_pronounced(hmm, utterances[i], sequences[i], inventory) for i in kept]
-    hmm = _iterate(hmm, data, said, monitor, "pronunciations", config.iterations)
-    while hmm.mixtures.size[1] < config.mixtures:
-        hmm = replace(hmm, mixtures=hmm.mixtures.split())
-        hmm = _iterate(hmm, data, said, monitor, f"{hmm.mixtures.size[1]} Gaussians", config.iterations)
-    said = [_pronounced(hmm, utterances[i], s, inventory) for i, s in zip(kept, said, strict=True)]
-    hmm = _iterate(hmm, data, said, monitor, "pronunciations again", config.iterations)
-    hmm = replace(hmm, bigram=estimate_bigram(hmm.table.units, [_without_pauses(s, inventory) for s in said]))
-    hmm = replace(hmm, typical_fit=float(np.mean([hmm.fit(x) for x in data])))
-    return _in_context(hmm, data, said, monitor)
+    training = _Training([utterances[i] for i in kept], inventory, config, each)
+    steps = training.steps()
+    done, state = _restored(checkpoint, config) or (0, training.flat_start([sequences[i] for i in kept]))
+    for number, (stage, step) in enumerate(steps[done:], start=done):
+        if number == done or stage != steps[number - 1][0]:
+            monitor(Progress(stage, number, len(steps), number / len(steps)))
+        state, figure = step(state)
+        _keep(checkpoint, number + 1, state)
+        monitor(Progress(stage, number + 1, len(steps), (number + 1) / len(steps), figure))
+    return state.hmm
+
+
+_CHECKPOINT = "phones"
+
+
+def _keep(checkpoint: Checkpoint, done: int, state: _State) -> None:
+    said = np.array([" ".join(units) for units in state.said])
+    checkpoint.save(_CHECKPOINT, {**hmm_arrays(state.hmm, np.float32), "said": said, "done": np.array(done)})
+
+
+def _restored(checkpoint: Checkpoint, config: HmmConfig) -> tuple[int, _State] | None:
+    """Return how many steps were done, and the state after them; None where nothing was kept."""
+    arrays = checkpoint.load(_CHECKPOINT)
+    if arrays is None:
+        return None
+    said = tuple(tuple(units.split()) for units in arrays["said"].tolist())
+    return int(arrays["done"]), _State(hmm_from_arrays(arrays, config), said)
+
+
+class _Training:
+    """The steps of training, each from one state to the next, over the same utterances."""
+
+    def __init__(
+        self, utterances: Sequence[Transcribed], inventory: UnitInventory, config: HmmConfig, each: Each
+    ) -> None:
+        self._utterances, self._inventory, self._config, self._each = utterances, inventory, config, each
+        self._data = [utterance.features for utterance in utterances]
+
+    def flat_start(self, sequences: Sequence[tuple[str, ...]]) -> _State:
+        """Return the state that training begins with."""
+        return _State(_flat_start(self._data, sequences, self._inventory, self._config), tuple(sequences))
+
+    def steps(self) -> list[tuple[str, _Step]]:
+        """Return all steps with the stage that each belongs to."""
+        again: list[_Step] = [self._improve] * self._config.iterations
+        stages: dict[str, list[_Step]] = {
+            "flat start": [*again, *again],
+            "pronunciations": [self._pronounce_with_pause, *again],
+        }
+        count = 1
+        while count < self._config.mixtures:
+            count *= 2
+            stages[f"{count} Gaussians"] = [_split, *again]
+        stages["pronunciations again"] = [self._pronounce, *again]
+        stages["states in context"] = [self._find_contexts]
+        stages["contexts"] = [self._adapt] * self._config.iterations
+        return [(stage, step) for stage, steps in stages.items() for step in steps]
+
+    def _improve(self, state: _State) -> tuple[_State, float]:
+        hmm, log_likelihood = baum_welch(state.hmm, self._data, state.said, self._each)
+        return replace(state, hmm=hmm), log_likelihood
+
+    def _pronounce_with_pause(self, state: _State) -> tuple[_State, None]:
+        return self._pronounce(replace(state, hmm=_with_pause(state.hmm, self._inventory)))
+
+    def _pronounce(self, state: _State) -> tuple[_State, None]:
+        jobs = (
+            _Heard(state.hmm, self._utterances[start : start + AT_A_TIME], state.said[start : start + AT_A_TIME])
+            for start in range(0, len(state.said), AT_A_TIME)
+        )
+        said = self._each(partial(_pronounced_all, inventory=self._inventory), jobs)
+        return replace(state, said=tuple(units for some in said for units in some)), None
+
+    def _find_contexts(self, state: _State) -> tuple[_State, float]:
+        """Give states in contexts with enough data densities of their own, the same as without context at first."""
+        spoken = [_without_pauses(units, self._inventory) for units in state.said]
+        typical_fit = float(np.mean([state.hmm.fit(x) for x in self._data]))
+        bigram = estimate_bigram(state.hmm.table.units, spoken)
+        hmm = replace(state.hmm, bigram=bigram, typical_fit=typical_fit)
+        contexts = _frequent_contexts(hmm, self._data, state.said)
+        return replace(state, hmm=_with_contexts(hmm, contexts)), len(contexts)
+
+    def _adapt(self, state: _State) -> tuple[_State, float | None]:
+        hmm, log_likelihood = adapt_contexts(state.hmm, self._data, state.said, self._each)
+        return replace(state, hmm=hmm), log_likelihood
+
+
+def _split(state: _State) -> tuple[_State, None]:
+    return replace(state, hmm=replace(state.hmm, mixtures=state.hmm.mixtures.split())), None
 
 
 def _first_guess(utterance: Transcribed, inventory: UnitInventory) -> tuple[str, ...]:
@@ -107,6 +198,20 @@ def _with_pause(hmm: UnitHmm, inventory: UnitInventory) -> UnitHmm:
     return replace(hmm, mixtures=mixtures)
 
 
+@dataclass(frozen=True, eq=False)
+class _Heard:
+    """Some utterances, the models that they are heard with, and the units that were assumed before."""
+
+    hmm: UnitHmm
+    utterances: Sequence[Transcribed]
+    before: Sequence[tuple[str, ...]]
+
+
+def _pronounced_all(heard: _Heard, inventory: UnitInventory) -> list[tuple[str, ...]]:
+    pairs = zip(heard.utterances, heard.before, strict=True)
+    return [_pronounced(heard.hmm, utterance, before, inventory) for utterance, before in pairs]
+
+
 def _pronounced(
     hmm: UnitHmm, utterance: Transcribed, before: tuple[str, ...], inventory: UnitInventory
 ) -> tuple[str, ...]:
@@ -114,7 +219,7 @@ def _pronounced(
     known = set(hmm.table.units)
     words = [[v for v in variants if set(v) <= known] or variants[:1] for variants in utterance.words]
     try:
-        chosen = choose_pronunciations(hmm, heard(hmm, utterance.features), words, inventory.pause)
+        chosen = choose_pronunciations(hmm, evidence_of(hmm, utterance.features), words, inventory.pause)
     except AlignmentError:
         return before
     sequence = tuple(unit for said in chosen for unit in said.units)
@@ -132,16 +237,16 @@ def _flat_start(
     units = (*silence_and_pause, *sorted({u for s in sequences for u in s} - {inventory.silence}))
     counts = tuple(1 if unit == inventory.pause else config.states for unit in units)
     table = plain_states(units, counts, free=silence_and_pause)
-    log_stay = np.log(1 - 1 / _longest(table)).astype(np.float32)
+    log_stay = np.log(1 - 1 / longest(table)).astype(np.float32)
     start = single_gaussian(np.concatenate(data), len(table.names))
     hmm = UnitHmm(config, table, start, log_stay, estimate_bigram(units, []))
-    statistics = _Statistics(hmm)
+    statistics = Statistics(hmm)
     for x, sequence in zip(data, sequences, strict=True):
         chain = chain_of(hmm, sequence)
         posterior = np.zeros((len(x), len(chain.plain)))
         posterior[np.arange(len(x)), _even_path(x[:, inventory.energy], chain, len(sequence))] = 1
-        statistics.collect(x, chain, posterior, np.zeros(len(chain.plain)))
-    return replace(hmm, mixtures=_maximised(hmm, statistics, data))
+        statistics.add(x, heard(chain, posterior, np.zeros(len(chain.plain))))
+    return replace(hmm, mixtures=maximised(hmm, statistics, data))
 
 
 def _even_path(energy: NDArray[np.float32], chain: Chain, units: int) -> NDArray[np.intp]:
@@ -160,171 +265,20 @@ def _even_path(energy: NDArray[np.float32], chain: Chain, units: int) -> NDArray
     return path
 
 
-def _iterate(
-    hmm: UnitHmm,
-    data: Sequence[NDArray[np.float32]],
-    sequences: Sequence[tuple[str, ...]],
-    monitor: Monitor,
-    stage: str,
-    iterations: int,
-) -> UnitHmm:
-    for _ in range(iterations):
-        hmm, log_likelihood = baum_welch(hmm, data, sequences)
-        monitor(stage, log_likelihood)
-    return hmm
-
-
-def baum_welch(
-    hmm: UnitHmm, data: Sequence[NDArray[np.float32]], sequences: Sequence[tuple[str, ...]]
-) -> tuple[UnitHmm, float]:
-    """Take one embedded Baum–Welch step.
-
-    data      : features of every utterance [shape=(T, D)]
-    sequences : the units said in each
-    Returns the new models, and the mean log likelihood per frame under the old ones.
-    An utterance too short for its units is left out.
-    """
-    statistics = expect(hmm, data, sequences)
-    better = replace(hmm, mixtures=_maximised(hmm, statistics, data), log_stay=statistics.log_stay())
-    return better, statistics.mean_log_likelihood
-
-
-def _maximised(hmm: UnitHmm, statistics: _Statistics, data: Sequence[NDArray[np.float32]]) -> Mixtures:
-    mixtures = hmm.mixtures.copy()
-    floor = hmm.config.variance_floor * np.concatenate(data).var(axis=0)
-    for density, x, share in statistics.by_density():
-        if share.sum() >= 1:
-            mixtures.improve(density, x, share, floor)
-    return mixtures
-
-
-def expect(hmm: UnitHmm, data: Sequence[NDArray[np.float32]], sequences: Sequence[tuple[str, ...]]) -> _Statistics:
-    """Return what the utterances say about every state (the E-step)."""
-    statistics = _Statistics(hmm)
-    chains = [chain_of(hmm, sequence) for sequence in sequences]
-    for batch in _batches([len(x) for x in data], [len(chain.plain) for chain in chains]):
-        statistics.add([data[i] for i in batch], [chains[i] for i in batch])
-    return statistics
-
-
-def _batches(frames: Sequence[int], states: Sequence[int]) -> Iterator[list[int]]:
-    """Give utterances in groups of like length, padded to no more than ``CELLS`` unless one alone is larger."""
-    batch: list[int] = []
-    most = 0
-    for i in sorted(range(len(frames)), key=lambda i: frames[i]):
-        most = max(most, states[i])
-        if batch and frames[i] * most * (len(batch) + 1) > CELLS:
-            yield batch
-            batch, most = [], states[i]
-        batch.append(i)
-    if batch:
-        yield batch
-
-
-class _Statistics:
-    """What one pass over the data says about every state."""
-
-    def __init__(self, hmm: UnitHmm) -> None:
-        self._hmm = hmm
-        self._log_likelihood, self._frames = 0.0, 0
-        self._stay = np.zeros(len(hmm.log_stay))
-        self._occupied = np.zeros(len(hmm.log_stay))
-        self._densities: list[NDArray[np.intp]] = []
-        self._shares: list[NDArray[np.float32]] = []
-        self._rows: list[NDArray[np.intp]] = []
-        self._features: list[NDArray[np.float32]] = []
-        self._seen = 0
-
-    @property
-    def mean_log_likelihood(self) -> float:
-        """Per frame."""
-        return self._log_likelihood / max(self._frames, 1)
-
-    def add(self, data: list[NDArray[np.float32]], chains: list[Chain]) -> None:
-        """Add some utterances."""
-        frames = np.array([len(x) for x in data], np.intp)
-        states = np.array([len(chain.densities) for chain in chains], np.intp)
-        log_emission = np.zeros((frames.max(), len(data), states.max()))
-        log_stay = np.full((len(data), states.max()), -1.0)
-        for u, (x, chain) in enumerate(zip(data, chains, strict=True)):
-            used, local = np.unique(chain.densities, return_inverse=True)
-            log_emission[: len(x), u, : states[u]] = self._hmm.mixtures.log_likelihood(x, used)[:, local]
-            log_stay[u, : states[u]] = self._hmm.log_stay[chain.plain]
-        log_move = np.log(-np.expm1(log_stay))
-        posterior, stay, log_likelihood = chain_posteriors(log_emission, log_stay, log_move, frames, states)
-        for u, (x, chain) in enumerate(zip(data, chains, strict=True)):
-            self.collect(x, chain, posterior[: len(x), u, : states[u]], stay[u, : states[u]])
-        possible = log_likelihood > IMPOSSIBLE / 2
-        self._log_likelihood += float(log_likelihood[possible].sum())
-        self._frames += int(frames[possible].sum())
-
-    def collect(
-        self, x: NDArray[np.float32], chain: Chain, posterior: NDArray[np.float64], stay: NDArray[np.float64]
-    ) -> None:
-        """Add one utterance whose posteriors are known."""
-        np.add.at(self._stay, chain.plain, stay)
-        np.add.at(self._occupied, chain.plain, posterior.sum(axis=0))
-        frame, state = np.nonzero(posterior > LEAST_POSTERIOR)
-        self._densities.append(chain.densities[state])
-        self._shares.append(posterior[frame, state].astype(np.float32))
-        self._rows.append(frame + self._seen)
-        self._features.append(x)
-        self._seen += len(x)
-
-    def by_density(self) -> Iterator[tuple[int, NDArray[np.float32], NDArray[np.float32]]]:
-        """Give every density that was visited: its number, the frames, and its posterior in each."""
-        densities, shares = np.concatenate(self._densities), np.concatenate(self._shares)
-        rows, features = np.concatenate(self._rows), np.concatenate(self._features)
-        order = np.argsort(densities, kind="stable")
-        visited, starts = np.unique(densities[order], return_index=True)
-        for density, mine in zip(visited, np.split(order, starts[1:]), strict=True):
-            yield int(density), features[rows[mine]], shares[mine]
-
-    def log_stay(self) -> NDArray[np.float32]:
-        """Return log P(keep the state) of every state without context."""
-        kept = self._stay / np.maximum(self._occupied, 1e-9)
-        keep = np.where(self._occupied > 0, kept, np.exp(self._hmm.log_stay))
-        return np.log(np.clip(keep, 0.05, 1 - 1 / _longest(self._hmm.table)[: len(keep)])).astype(np.float32)
-
-
-def _longest(table: StateTable) -> NDArray[np.float64]:
-    """Return the most frames each state may last on average [shape=(G,)]."""
-    units = [name.split(".")[0] for name in table.names]
-    return np.array([LONGEST_SILENCE if unit in table.free else LONGEST_STATE for unit in units])
-
-
-def _in_context(
-    hmm: UnitHmm, data: Sequence[NDArray[np.float32]], sequences: Sequence[tuple[str, ...]], monitor: Monitor
-) -> UnitHmm:
-    """Give states in contexts with enough data densities of their own, adapted from those without context."""
-    parents = _frequent_contexts(hmm, data, sequences)
-    monitor("states in context", len(parents))
-    if not parents:
-        return hmm
-    plain = len(hmm.table.names)
-    prior = np.array(list(parents.values()), np.intp)
-    hmm = replace(
-        hmm, table=hmm.table.extended(tuple(parents)), mixtures=hmm.mixtures.joined(hmm.mixtures.picked(prior))
-    )
-    for _ in range(hmm.config.iterations):
-        statistics = expect(hmm, data, sequences)
-        monitor("contexts", statistics.mean_log_likelihood)
-        mixtures = hmm.mixtures.copy()
-        for density, x, share in statistics.by_density():
-            if density >= plain:
-                mixtures.adapt(density, x, share, int(prior[density - plain]), hmm.config.relevance)
-        hmm = replace(hmm, mixtures=mixtures)
-    return hmm
+def _with_contexts(hmm: UnitHmm, names: tuple[str, ...]) -> UnitHmm:
+    table = hmm.table.extended(names)
+    new = hmm.mixtures.picked(table.parents()[len(hmm.log_stay) :])
+    return replace(hmm, table=table, mixtures=hmm.mixtures.joined(new))
 
 
 def _frequent_contexts(
     hmm: UnitHmm, data: Sequence[NDArray[np.float32]], sequences: Sequence[tuple[str, ...]]
-) -> dict[str, int]:
-    """Return the names of all states in contexts with enough frames, with the density each one starts from."""
-    frames: Counter[tuple[str, int]] = Counter()
+) -> tuple[str, ...]:
+    """Return the names of all states in contexts with enough frames."""
+    frames: Counter[str] = Counter()
     for x, sequence in zip(data, sequences, strict=True):
         if len(x) >= sum(hmm.table.count(unit) for unit in sequence):
-            names, path = state_path(hmm, heard(hmm, x), sequence)
-            frames.update(names[position] for position in path)
-    chosen = {name: plain for (name, plain), count in frames.items() if count >= hmm.config.context_frames}
-    return {name: chosen[name] for name in sorted(chosen) if name not in hmm.table.names}
+            names, path = state_path(hmm, evidence_of(hmm, x), sequence)
+            frames.update(names[position][0] for position in path)
+    frequent = {name for name, count in frames.items() if count >= hmm.config.context_frames}
+    return tuple(sorted(frequent - set(hmm.table.names)))

@@ -1,0 +1,214 @@
+"""Speakers, words and lengths that the shipped model was not trained on: accuracy, speed, memory.
+
+    python benchmarks/robust.py [--corpora FOLDER] [--model FILE] [--only others|phones|noise|hour|calls]
+
+others : GRID clips of other speakers, correlation of opening per clip, audio only and with the words of the file's name
+phones : recordings with transcripts of ``speech-open``, phone accuracy against their forced alignment by the general
+         models, and real-time factors (recognition in one process, warm, median of five)
+noise  : what is not speech: share of the time that is taken for speech, and how far the mouth opens
+hour   : peak memory and time of ``lipmotion animate`` on an hour of speech, a process of its own
+calls  : memory of one process over a thousand ``animate`` calls
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import resource
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+import wave
+from pathlib import Path
+
+import numpy as np
+
+from lipmotion import animate, load_model
+from lipmotion.corpora.grid import sentence
+from lipmotion.pipeline.model import Model
+from lipmotion.speech.mfcc import mfcc
+from lipmotion.speech.read import read_audio
+from lipmotion.speech.recogniser import KINDS, recogniser
+from lipmotion.types import Audio
+from lipmotion.units import Lexicon, is_silent, words_of
+from lipmotion.vision.track import track
+
+RATE_HZ = 16_000
+SAME = {"ax": "ah", "axr": "er", "ix": "ih", "el": "l", "em": "m", "en": "n", "ao": "aa", "zh": "sh"}
+"""Phones that count as one: reduced vowels, syllabic consonants, and two pairs that accents merge."""
+SPOKEN = ("61-70968-0000.flac", "acoustic_corpus.wav", "cold_corpus.wav", "common_voice_en_22058264.mp3",
+          "common_voice_en_22058266.mp3", "common_voice_en_22058267.mp3",
+          *(f"sense_and_sensibility_01_austen_64kb-0{n}.wav" for n in (870, 880, 890, 920, 930)))  # fmt: skip
+
+
+def main() -> None:
+    """Print one JSON object a figure."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--corpora", type=Path, default=Path("../shared/corpora"))
+    parser.add_argument("--model", type=Path, help="default: the one that ships")
+    parser.add_argument("--only", action="append", choices=list(PARTS), help="repeatable; default: all")
+    options = parser.parse_args()
+    model = load_model(options.model)
+    for name in options.only or PARTS:
+        PARTS[name](options.corpora, model, options.model)
+
+
+def show(figure: str, **values: object) -> None:
+    """Print one figure."""
+    print(json.dumps({"figure": figure, **values}, ensure_ascii=False), flush=True)
+
+
+def others(corpora: Path, model: Model, _: Path | None) -> None:
+    """Compare with the tracks of five GRID speakers."""
+    clips = sorted((corpora / "grid-others").glob("*.mpg"))
+    tracks = {clip: track(clip, crops=False) for clip in clips}
+    for kind in KINDS:
+        found: dict[str, list[float]] = {"audio only": [], "with transcript": []}
+        for clip in clips:
+            for condition, words in (("audio only", None), ("with transcript", " ".join(sentence(clip.stem) or ()))):
+                motion = animate(clip, transcript=words, model=model, recogniser=kind).motion
+                seen, recorded = tracks[clip].seen, tracks[clip].motion
+                generated = np.interp(recorded.time_s, motion.time_s, motion["opening"])
+                found[condition].append(float(np.corrcoef(generated[seen], recorded["opening"][seen])[0, 1]))
+        for condition, values in found.items():
+            each = {clip.stem: round(value, 3) for clip, value in zip(clips, values, strict=True)}
+            show(f"grid-others, {kind}, {condition}: ACC opening", mean=round(float(np.mean(values)), 3), **each)
+
+
+def phones(corpora: Path, model: Model, _: Path | None) -> None:
+    """Recognise what has a transcript."""
+    folder = corpora / "speech-open"
+    recordings = []
+    for name in SPOKEN:
+        text = (folder / name).with_suffix(".txt")
+        words = words_of((text if text.exists() else text.with_suffix(".lab")).read_text())
+        audio = read_audio(folder / name)
+        aligned = recogniser(model.phones, "general").align(audio, mfcc(audio), words, Lexicon())
+        recordings.append((audio, spoken(span.label.phone for span in aligned)))
+    for kind in KINDS:
+        hear = recogniser(model.phones, kind)
+        errors = [edits(wanted, spoken(s.label.phone for s in hear.recognise(a, mfcc(a)))) for a, wanted in recordings]
+        count = sum(len(wanted) for _, wanted in recordings)
+        total_s = sum(audio.duration_s for audio, _ in recordings)
+        times = [seconds(lambda: [hear.recognise(a, mfcc(a)) for a, _ in recordings]) for _ in range(5)]  # noqa: B023
+        show(
+            f"speech-open, {kind}: phone accuracy",
+            value=round(1 - sum(errors) / count, 3),
+            phones=count,
+            recordings=len(recordings),
+            real_time_factor=round(statistics.median(times) / total_s, 4),
+        )
+
+
+def spoken(names: object) -> list[str]:
+    """Return phones without silence, those that count as one under one name."""
+    return [SAME.get(name, name) for name in names if not is_silent(name)]  # type: ignore[attr-defined]
+
+
+def edits(wanted: list[str], found: list[str]) -> int:
+    """Return the fewest substitutions, insertions and deletions between two sequences."""
+    row = list(range(len(found) + 1))
+    for i, phone in enumerate(wanted, 1):
+        above, row = row, [i]
+        for j, other in enumerate(found, 1):
+            row.append(min(above[j] + 1, row[-1] + 1, above[j - 1] + (phone != other)))
+    return row[-1]
+
+
+def seconds(work: object) -> float:
+    """Return how long a call takes."""
+    start = time.perf_counter()
+    work()  # type: ignore[operator]
+    return time.perf_counter() - start
+
+
+def noise(corpora: Path, model: Model, _: Path | None) -> None:
+    """Animate what is not speech."""
+    recordings = {name: Audio(np.asarray(x, np.float32), RATE_HZ) for name, x in not_speech().items()}
+    for name in ("breaths", "laughter", "whisper", "falsetto", "exaggerated", "longstop"):
+        path = corpora / "speech-open" / f"mfa_{name}.flac"
+        if path.exists():
+            recordings[path.name] = read_audio(path)
+    for name, audio in recordings.items():
+        result = animate(audio, model=model)
+        said_s = sum(span.duration_s for span in result.units if not is_silent(span.label.phone))
+        opening = result.motion["opening"]
+        share = round(said_s / audio.duration_s, 2)
+        show(f"not speech: {name}", spoken=share, mean_opening=round(float(opening.mean()), 3))
+
+
+def not_speech() -> dict[str, np.ndarray]:
+    """Return five seconds of each kind of noise and music."""
+    draw = np.random.default_rng(0)
+    time_s = np.arange(5 * RATE_HZ) / RATE_HZ
+    white = draw.normal(size=len(time_s))
+    notes_hz = np.repeat([196, 220, 262, 294, 330, 262, 220, 196, 165, 196], len(time_s) // 10)
+    phase = 2 * np.pi * np.cumsum(notes_hz) / RATE_HZ
+    decay = np.tile(np.exp(-np.arange(len(time_s) // 10) / 6000), 10)
+    hit = np.exp(-np.arange(4000) / 600)
+    return {
+        "digital silence": np.zeros(len(time_s)),
+        "room noise (white, -60 dB)": 0.001 * white,
+        "white noise (-20 dB)": 0.1 * white,
+        "hum of 50 Hz": 0.1 * np.sin(2 * np.pi * 50 * time_s) + 0.001 * white,
+        "siren": 0.3 * np.sin(2 * np.pi * np.cumsum(600 + 300 * np.sin(np.pi * time_s)) / RATE_HZ),
+        "chord of sines": sum(0.1 * np.sin(2 * np.pi * f * time_s) for f in (261, 329, 392)),
+        "plucked melody": decay * sum(0.2 / k * np.sin(k * phase) for k in range(1, 12)),
+        "drums": 0.3 * np.tile(hit, 20) * draw.normal(size=len(time_s)),
+        "clicks": 0.8 * (draw.random(len(time_s)) < 0.0005),
+        "bursts of noise": 0.1 * white * np.maximum(0, np.sin(2 * np.pi * 0.4 * time_s)) ** 2,
+    }
+
+
+def hour(corpora: Path, _: Model, model_file: Path | None) -> None:
+    """Animate an hour: a reading, over and over."""
+    reading = read_audio(corpora / "speech-open" / "threelittlekittens_01_rountreesmith.ogg").samples
+    samples = np.tile(reading, 1 + 3600 * RATE_HZ // len(reading))[: 3600 * RATE_HZ]
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "hour.wav"
+        with wave.open(str(path), "wb") as file:
+            file.setnchannels(1)
+            file.setsampwidth(2)
+            file.setframerate(RATE_HZ)
+            file.writeframes((np.clip(samples, -1, 1) * 32767).astype("<i2").tobytes())
+        del samples, reading
+        chosen = ["--model", str(model_file)] if model_file else []
+        for suffix in (".npz", ".json"):
+            command = [
+                sys.executable,
+                "-m",
+                "lipmotion.cli.main",
+                "animate",
+                str(path),
+                "-o",
+                f"{path}{suffix}",
+                *chosen,
+            ]
+            taken_s = seconds(lambda: subprocess.run(command, check=True, stdout=subprocess.DEVNULL))  # noqa: B023
+            peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
+            show(f"an hour to {suffix}: peak so far", megabytes=round(peak), seconds=round(taken_s, 1))
+
+
+def calls(corpora: Path, model: Model, _: Path | None) -> None:
+    """Call ``animate`` a thousand times."""
+    clip = read_audio(corpora / "grid-others" / "swwp2s.mpg")
+    sizes = {}
+    for number in range(1, 1001):
+        animate(clip, model=model)
+        if number in (50, 500, 1000):
+            sizes[f"after {number}"] = round(resident_megabytes(), 1)
+    show("animate, one process: resident megabytes", **sizes)
+
+
+def resident_megabytes() -> float:
+    """Return the memory that this process holds now (Linux)."""
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * resource.getpagesize() / 1e6
+
+
+PARTS = {"others": others, "phones": phones, "noise": noise, "hour": hour, "calls": calls}
+
+if __name__ == "__main__":
+    main()

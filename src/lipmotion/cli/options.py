@@ -1,0 +1,12 @@
+"""Options that several verbs have."""
+
+from __future__ import annotations
+
+import argparse
+
+
+def add_machine_readable(parser: argparse.ArgumentParser) -> None:
+    """Add ``--machine-readable`` (docs/long-work.md)."""
+    parser.add_argument(
+        "--machine-readable", action="store_true", help="one JSON object a line on standard output, and nothing else"
+    )

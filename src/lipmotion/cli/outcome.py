@@ -1,0 +1,16 @@
+"""What an error means to the caller of a command."""
+
+from __future__ import annotations
+
+from lipmotion.errors import InputError, LipMotionError
+
+
+def outcome(error: BaseException) -> tuple[int, str] | None:
+    """Return the exit code and one line about an error that can be expected; None for a bug."""
+    if isinstance(error, LipMotionError):
+        return error.exit_code, " ".join(str(error).split())
+    if isinstance(error, MemoryError):
+        return InputError.exit_code, f"not enough memory ({error}); give a shorter recording or a smaller file"
+    if isinstance(error, OSError):  # what the operating system refuses: no permission, a name too long
+        return InputError.exit_code, str(error)
+    return None

@@ -1,0 +1,49 @@
+"""One short text for everything that training depends on: what an earlier run left is used only if it is the same."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import platform
+from collections.abc import Sequence
+from dataclasses import asdict
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from lipmotion.corpora.store import Corpus
+from lipmotion.engines import Engine
+from lipmotion.stats.hmm.model import HmmConfig
+from lipmotion.units import Lexicon
+
+NOT_LEARNED_FROM = ("crops.npy",)
+"""Large files of an utterance that training does not read."""
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+"""A matrix product's last bits may depend on how many threads it is shared among."""
+
+
+def fingerprint(
+    corpus: Corpus, names: Sequence[str], engine: Engine[Any], recogniser: HmmConfig, lexicon: Lexicon
+) -> str:
+    """Return a digest of the utterances' content, the configuration, the user's words, and what computes."""
+    digest = hashlib.sha256()
+    job = {
+        "engine": [engine.name, asdict(engine.config)],
+        "recogniser": asdict(recogniser),
+        "words": lexicon.user,
+        "versions": {name: metadata.version(name) for name in ("lipmotion", "numpy", "scipy", "pocketsphinx")},
+        "machine": [platform.machine(), os.cpu_count(), [os.environ.get(name) for name in THREADS]],
+    }
+    digest.update(json.dumps(job, sort_keys=True).encode())
+    for name in names:
+        digest.update(f"\n{name}\n".encode())
+        for path in sorted(corpus.folder(name).iterdir()):
+            if path.name not in NOT_LEARNED_FROM:
+                digest.update(f"{path.name}\n".encode())
+                digest.update(_content(path))
+    return digest.hexdigest()
+
+
+def _content(path: Path) -> bytes:
+    return hashlib.sha256(path.read_bytes()).digest()

@@ -1,0 +1,56 @@
+"""A disk that is full, played by a limit on the size of files: one clear line, and nothing half written."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from cli.conftest import Run
+from lipmotion.corpora.store import Corpus
+
+resource = pytest.importorskip("resource")
+LIMIT = 3000
+
+
+def run_limited(*arguments: object, limit: int = LIMIT) -> tuple[int, str]:
+    code = (
+        "import resource, sys\n"
+        f"resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit}))\n"
+        "from lipmotion.cli.main import main\n"
+        "sys.exit(main())\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, *map(str, arguments)], capture_output=True, text=True, check=False
+    )
+    assert done.stdout == ""
+    (line,) = done.stderr.splitlines()
+    return done.returncode, line
+
+
+@pytest.mark.parametrize("name", ["a.json", "a.csv", "a.npz", "a.mp4"])
+def test_animate(toy_speech: Path, toy_model_file: Path, here: Path, name: str) -> None:
+    code, line = run_limited("animate", toy_speech, "--model", toy_model_file, "-o", name)
+    assert (code, line.startswith(f"lipmotion: error: {name}: cannot be written: ")) == (7, True)
+    assert line.endswith("; make room, then run it again")
+    assert list(here.iterdir()) == []
+
+
+def test_evaluate(toy_corpus: Corpus, toy_model_file: Path, here: Path) -> None:
+    code, line = run_limited("evaluate", toy_model_file, toy_corpus.path, "-o", "figures.json", limit=100)
+    assert (code, "figures.json: cannot be written" in line) == (7, True)
+    assert list(here.iterdir()) == []
+
+
+@pytest.mark.parametrize("limit", [LIMIT, 100_000, 140_000])
+def test_train_says_what_is_kept_and_goes_on(run_outside: Run, toy_corpus: Corpus, here: Path, limit: int) -> None:
+    code, line = run_limited("train", toy_corpus.path, "-o", "m.lipmotion", limit=limit)
+    assert (code, "cannot be written: " in line) == (7, True)
+    assert "make room, then run it again; what is finished is kept in m.lipmotion.unfinished" in line
+    left = [str(path.relative_to(here)) for path in here.rglob("*") if path.is_file()]
+    assert not [path for path in left if ".part-" in path]
+    assert run_outside("train", toy_corpus.path, "-o", "m.lipmotion").code == 0
+    run_outside("train", toy_corpus.path, "-o", "whole.lipmotion")
+    assert (here / "m.lipmotion").read_bytes() == (here / "whole.lipmotion").read_bytes()

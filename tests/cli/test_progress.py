@@ -1,0 +1,160 @@
+"""Long work as a program and as a terminal see it."""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import sys
+from argparse import Namespace
+from pathlib import Path
+
+import pytest
+
+from cli.conftest import Done, Run
+from lipmotion.cli import evaluate
+from lipmotion.cli.progress import reporting
+from lipmotion.cli.stop import Stopper
+from lipmotion.corpora.store import Corpus
+from lipmotion.errors import CorpusError
+from lipmotion.types import Item, Progress
+
+EVENTS = (
+    Progress("first", 0, 2, 0.0),
+    Item("a", "prepared"),
+    Progress("first", 1, 2, 0.25, -61.5),
+    Item("b", "skipped", "no face\nanywhere"),
+    Progress("second", 2, 2, 1.0),
+)
+
+
+def objects(done: Done) -> list[dict[str, object]]:
+    return [json.loads(line) for line in done.out]
+
+
+def options(machine_readable: bool) -> Namespace:
+    return Namespace(machine_readable=machine_readable, stopper=Stopper())
+
+
+def test_every_event_is_one_json_object_on_a_line(capsys: pytest.CaptureFixture[str]) -> None:
+    with reporting(options(machine_readable=True)) as report:
+        for event in EVENTS:
+            report.hear(event)
+        logging.getLogger("lipmotion").warning("strange %s", "word")
+        report.finish("done", used=3)
+    out, err = capsys.readouterr()
+    assert err == ""
+    assert [json.loads(line) for line in out.splitlines()] == [
+        {"type": "start"},
+        {"type": "progress", "stage": "first", "step": 0, "steps": 2, "value": 0.0},
+        {"type": "item", "name": "a", "outcome": "prepared", "reason": ""},
+        {"type": "progress", "stage": "first", "step": 1, "steps": 2, "value": 0.25},
+        {"type": "item", "name": "b", "outcome": "skipped", "reason": "no face\nanywhere"},
+        {"type": "progress", "stage": "second", "step": 2, "steps": 2, "value": 1.0},
+        {"type": "warning", "message": "strange word"},
+        {"type": "success", "used": 3},
+    ]
+
+
+def test_where_nobody_watches_only_warnings_and_the_result_are_said(capsys: pytest.CaptureFixture[str]) -> None:
+    with reporting(options(machine_readable=False)) as report:
+        for event in EVENTS:
+            report.hear(event)
+        report.finish("done", used=3)
+    assert capsys.readouterr() == ("done\n", "lipmotion: warning: skipped b: no face anywhere\n")
+
+
+def test_a_terminal_gets_a_bar(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
+    with reporting(options(machine_readable=False)) as report:
+        for event in EVENTS:
+            report.hear(event)
+        report.finish("done")
+    out, err = capsys.readouterr()
+    assert out == "done\n"
+    assert "first (1/2)" in err
+    assert "25%" in err
+    assert "second (2/2)" in err
+    assert "100%" in err
+    assert "lipmotion: warning: skipped b: no face anywhere\n" in err
+
+
+def test_training_for_a_program(run: Run, toy_corpus: Corpus, here: Path) -> None:
+    done = run("train", toy_corpus.path, "-o", "m.lipmotion", "--machine-readable")
+    assert (done.code, done.err) == (0, [])
+    first, *between, last = objects(done)
+    assert first == {"type": "start"}
+    assert last == {"type": "success", "model": "m.lipmotion", "used": 8, "minutes": 0.3, "skipped": 0}
+    values = [event["value"] for event in between if event["type"] == "progress"]
+    assert values == sorted(values)  # type: ignore[type-var]
+    assert (values[0], values[-1]) == (0, 1)
+    assert [path.name for path in here.iterdir()] == ["m.lipmotion"]
+
+
+def test_evaluation_for_a_program(run: Run, toy_corpus: Corpus, toy_model_file: Path) -> None:
+    done = run("evaluate", toy_model_file, toy_corpus.path, "--machine-readable")
+    last = objects(done)[-1]
+    assert (done.code, last["type"]) == (0, "success")
+    assert last["figures"]["clips"] == 2  # type: ignore[index]
+
+
+def test_a_failure_is_said_to_both(run: Run) -> None:
+    done = run("train", "missing", "-o", "m", "--machine-readable")
+    assert done.code == 4
+    start, failure = objects(done)
+    assert (start["type"], failure["type"], failure["exit_code"]) == ("start", "failure", 4)
+    assert done.err == [f"lipmotion: error: {failure['reason']}"]
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "reason"),
+    [
+        (CorpusError("two\nlines"), 4, "two lines"),
+        (KeyboardInterrupt(), 130, "stopped; run the same command again to go on"),
+        (ZeroDivisionError("what"), 1, "ZeroDivisionError: what"),
+    ],
+)
+def test_why_it_failed(error: BaseException, code: int, reason: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(type(error)), reporting(options(machine_readable=True)):
+        raise error
+    last = json.loads(capsys.readouterr().out.splitlines()[-1])
+    assert last == {"type": "failure", "reason": reason, "exit_code": code}
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no /dev/full here")  # noqa: PTH110
+@pytest.mark.parametrize("arguments", [["info"], ["train", "CORPUS", "-o", "m", "--machine-readable"]])
+def test_output_that_is_full(toy_corpus: Corpus, here: Path, arguments: list[str]) -> None:
+    import subprocess
+
+    command = [str(toy_corpus.path) if argument == "CORPUS" else argument for argument in arguments]
+    for unbuffered in ("", "1"):
+        with Path("/dev/full").open("w") as full:
+            done = subprocess.run(
+                [sys.executable, "-m", "lipmotion.cli.main", *command],
+                stdout=full,
+                stderr=subprocess.PIPE,
+                text=True,
+                check=False,
+                env=os.environ | {"PYTHONUNBUFFERED": unbuffered},
+            )
+        assert done.returncode == 7
+        assert done.stderr == "lipmotion: error: standard output cannot be written: No space left on device\n"
+    assert list(here.iterdir()) == []
+
+
+def test_what_is_swallowed_stops_at_the_next_event(monkeypatch: pytest.MonkeyPatch, run: Run) -> None:
+    """As when the signal comes in the middle of an import that takes any exception for a missing package."""
+
+    def swallows(given: Namespace) -> None:
+        with reporting(given) as report:
+            try:
+                import signal
+
+                signal.raise_signal(signal.SIGTERM)
+            except BaseException:  # noqa: S110
+                pass
+            report.hear(EVENTS[0])
+            raise AssertionError
+
+    monkeypatch.setattr(evaluate, "run", swallows)
+    assert run("evaluate", "m", "c") == (143, [], ["lipmotion: stopped; run the same command again to go on"])

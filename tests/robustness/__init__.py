@@ -1,0 +1,1 @@
+"""Bad input: a table of it, and mutations of good input."""

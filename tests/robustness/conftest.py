@@ -1,0 +1,43 @@
+from __future__ import annotations
+
+import faulthandler
+import signal
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from cli.conftest import here, run, run_outside
+from lipmotion.corpora.store import Corpus
+from robustness.case import Bench
+
+__all__ = ["bench", "here", "run", "run_outside", "watched"]
+HANGS_S = 120
+
+
+@pytest.fixture
+def bench(tmp_path: Path, toy_speech: Path, toy_model_file: Path, toy_corpus: Corpus) -> Bench:
+    """Good input, and a folder for the bad."""
+    folder = tmp_path / "bad"
+    folder.mkdir()
+    return Bench(folder, toy_speech, toy_model_file, toy_corpus.path)
+
+
+@pytest.fixture(autouse=True)
+def watched() -> Iterator[None]:
+    """Ends what hangs: an error in Python, the process where nothing else reaches it."""
+
+    def stop(*_: object) -> None:
+        raise TimeoutError(f"still not done after {HANGS_S} s")
+
+    if not hasattr(signal, "SIGALRM") or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGALRM, stop)
+    signal.alarm(HANGS_S)
+    faulthandler.dump_traceback_later(2 * HANGS_S, exit=True)
+    yield
+    faulthandler.cancel_dump_traceback_later()
+    signal.alarm(0)
+    signal.signal(signal.SIGALRM, before)

@@ -1,0 +1,277 @@
+"""Corpora, and recordings to make them of: videos, labels, arrays."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from robustness.case import Bench, case, declared, npy
+from robustness.motion_cases import GOOD
+
+GROUP = "corpora"
+AGAIN = ("not a whole utterance", "delete this folder and prepare again")
+
+
+def _damaged(name: str, code: int, *says: str, verb: str = "train") -> Callable[[Callable[[Path], object]], None]:
+    """Put a copy of the corpus, damaged, into the table."""
+
+    def keep(damage: Callable[[Path], object]) -> None:
+        @case(GROUP, name, code, *says)
+        def _(bench: Bench) -> list[object]:
+            path = bench.copied_corpus()
+            damage(path)
+            return ["train", path, "-o", "m"] if verb == "train" else ["corpus", "info", path]
+
+    return keep
+
+
+def _first(corpus: Path) -> Path:
+    return min(path for path in (corpus / "utterances").iterdir() if _entry(path)["split"] == "train")
+
+
+def _entry(folder: Path) -> dict[str, Any]:
+    entry: dict[str, Any] = json.loads((folder / "entry.json").read_text(encoding="utf-8"))
+    return entry
+
+
+def _listed(corpus: Path, **changes: object) -> None:
+    path = corpus / "corpus.json"
+    path.write_text(json.dumps(json.loads(path.read_text(encoding="utf-8")) | changes), encoding="utf-8")
+
+
+def _described(corpus: Path, **changes: object) -> None:
+    path = _first(corpus) / "entry.json"
+    path.write_text(json.dumps(_entry(path.parent) | changes), encoding="utf-8")
+
+
+for _name, _damage in {
+    "without its manifest": lambda corpus: (corpus / "corpus.json").unlink(),
+    "a manifest that is no JSON": lambda corpus: (corpus / "corpus.json").write_text("{"),
+    "a manifest of 100,000 brackets": lambda corpus: (corpus / "corpus.json").write_text("[" * 100_000),
+}.items():
+    _damaged(_name, 4, "not a corpus (no readable corpus.json); give a prepared corpus")(_damage)
+
+
+@_damaged("a newer version", 4, "corpus version 9, this lipmotion reads versions up to 2; upgrade lipmotion")
+def _(corpus: Path) -> None:
+    _listed(corpus, version=9)
+
+
+for _name, _list in {
+    "a list of utterances that is none": 7,
+    "a list of utterances that is a list": ["a"],
+    "an utterance that is a number": {"a": 7},
+    "an utterance without an end": {"a": {"split": "train"}},
+}.items():
+
+    @_damaged(_name, 4, "the list of utterances is damaged", "prepare the corpus again")
+    def _(corpus: Path, content: object = _list) -> None:
+        _listed(corpus, utterances=content)
+
+
+for _name in ("../../elsewhere", "/etc", ".hidden", "a/b", ""):
+
+    @_damaged(f"an utterance named {_name!r}", 4, "is not listed as one; prepare the corpus again")
+    def _(corpus: Path, name: str = _name) -> None:
+        entry = {"split": "train", "duration_s": 1, "frames": 1, "unseen_frames": 0}
+        _listed(corpus, utterances={name: entry})
+
+
+@_damaged("an utterance that is not there", 4, *AGAIN)
+def _(corpus: Path) -> None:
+    shutil.rmtree(_first(corpus))
+
+
+@_damaged("a description that is no JSON", 4, *AGAIN)
+def _(corpus: Path) -> None:
+    (_first(corpus) / "entry.json").write_text("{")
+
+
+@_damaged("info of a description that is no JSON", 4, *AGAIN, verb="info")
+def _(corpus: Path) -> None:
+    (_first(corpus) / "entry.json").write_text("{")
+
+
+for _key, _value in {
+    "words": [1, 2],
+    "source": 7,
+    "channels": [{"name": 7, "unit": "a"}],
+    "audio_rate_hz": 0,
+    "rate_hz": "fast",
+    "split": "tomorrow",
+    "speaker": ["a"],
+    "phones": [[0, 1]],
+}.items():
+
+    @_damaged(f"{_key} that are {_value!r}", 4, *AGAIN)
+    def _(corpus: Path, key: str = _key, value: object = _value) -> None:
+        _described(corpus, **{key: value})
+
+
+for _array in ("audio", "features", "motion", "seen"):
+
+    @_damaged(f"without its {_array}", 4, *AGAIN)
+    def _(corpus: Path, name: str = _array) -> None:
+        (_first(corpus) / f"{name}.npy").unlink()
+
+    @_damaged(f"{_array} cut off", 4, *AGAIN)
+    def _(corpus: Path, name: str = _array) -> None:
+        path = _first(corpus) / f"{name}.npy"
+        path.write_bytes(path.read_bytes()[:-20])
+
+    @_damaged(f"{_array} of texts", 4, *AGAIN, "required one of the kinds")
+    def _(corpus: Path, name: str = _array) -> None:
+        (_first(corpus) / f"{name}.npy").write_bytes(npy(np.array(["a"] * 50)))
+
+    @_damaged(f"{_array} of another shape", 4, *AGAIN)
+    def _(corpus: Path, name: str = _array) -> None:
+        path = _first(corpus) / f"{name}.npy"
+        path.write_bytes(npy(np.load(path, allow_pickle=False)[:5][None]))
+
+    @_damaged(f"{_array} of a trillion numbers declared", 4, *AGAIN)
+    def _(corpus: Path, name: str = _array) -> None:
+        (_first(corpus) / f"{name}.npy").write_bytes(declared("(1000000000000,)"))
+
+    @_damaged(f"{_array} of pickled objects", 4, *AGAIN)
+    def _(corpus: Path, name: str = _array) -> None:
+        (_first(corpus) / f"{name}.npy").write_bytes(npy(np.array([{}], object)))
+
+
+for _array in ("features", "motion"):
+
+    @_damaged(f"NaN in {_array}", 4, *AGAIN, "not finite")
+    def _(corpus: Path, name: str = _array) -> None:
+        path = _first(corpus) / f"{name}.npy"
+        values = np.load(path, allow_pickle=False)
+        values[3, 0] = np.nan
+        np.save(path, values)
+
+
+@_damaged("an array that is a device", 4, *AGAIN, "pipe or a device")
+def _(corpus: Path) -> None:
+    path = _first(corpus) / "audio.npy"
+    path.unlink()
+    path.symlink_to("/dev/zero")
+
+
+@_damaged("an utterance that is a link", 0, verb="info")
+def _(corpus: Path) -> None:
+    path = _first(corpus)
+    path.rename(corpus / "moved").rename(corpus.parent / path.name)
+    path.symlink_to(corpus.parent / path.name)
+
+
+RECORDINGS = "recordings of a corpus"
+
+
+def _prepared(name: str, code: int, *says: str) -> Callable[[Callable[[Bench], object]], None]:
+    """Put a folder of one recording into the table."""
+
+    def keep(lay_out: Callable[[Bench], object]) -> None:
+        @case(RECORDINGS, name, code, *says)
+        def _(bench: Bench) -> list[object]:
+            lay_out(bench)
+            return ["corpus", "prepare", bench.folder, "-o", "corpus", "--workers", "1"]
+
+    return keep
+
+
+def _spoken(bench: Bench) -> None:
+    """Lay out the good sentence with motion beside it."""
+    (bench.folder / "a.wav").write_bytes(bench.speech.read_bytes())
+    frames = len(bench.samples()) // 160 + 1
+    bench.file("a.json", json.dumps(GOOD | {"values": [[0.1]] * frames}))
+
+
+NONE = "none of 1 recordings is usable; the first, a:"
+_prepared("an empty folder", 4, "no videos in it, and no sounds with motion")(lambda bench: bench)
+_prepared("an empty video", 4, NONE, "the file is empty")(lambda bench: (bench.folder / "a.mp4").touch())
+_prepared("a text named .mp4", 4, NONE, "not a readable")(lambda bench: bench.file("a.mp4", "hello " * 500))
+
+
+def _labelled(name: str, suffix: str, content: bytes | str, *says: str) -> None:
+    @_prepared(f"{suffix}: {name}", 4, *says)
+    def _(bench: Bench) -> None:
+        _spoken(bench)
+        bench.file(f"a{suffix}", content)
+
+
+_labelled("binary", ".TextGrid", b"ooBinaryFile\x08TextGrid\x00\xff", "binary TextGrid; save it as a text file")
+_labelled("cut off", ".TextGrid", 'File type = "ooTextFile"\n"TextGrid"\n0\n1\n<exists>\n1\n', "is damaged")
+_labelled("a billion tiers", ".TextGrid", '"ooTextFile"\n"TextGrid"\n0 1 <exists> 1000000000\n', "tier 1 is damaged")
+_labelled("a tier of a billion labels", ".TextGrid", '"ooTextFile"\n"TextGrid"\n0 1 <exists> 1\n"IntervalTier" "a" 0 1 '
+          "1000000000\n0 1 \"b\"\n", "is damaged")  # fmt: skip
+_labelled("half a tier", ".TextGrid", '"ooTextFile"\n"TextGrid"\n0 1 <exists> 0.5\n', "is damaged")
+_labelled("times of NaN", ".TextGrid", '"ooTextFile"\n"TextGrid"\n0 nan <exists> 1\n', "is damaged")
+_labelled("times of 1e999", ".TextGrid", '"ooTextFile"\n"TextGrid"\n0 1 <exists> 1e999\n', "is damaged")
+_labelled("phones that overlap", ".lab", "0 2000000 p\n1000000 3000000 aa\n", "before the one ahead of it ends")
+_labelled("phones with a gap", ".lab", "0 1000000 p\n2000000 3000000 aa\n", "without a gap: label silence as sil")
+_labelled("an unknown phone", ".lab", "0 1000000 p\n1000000 2000000 aa\n2000000 3000000 b\n3000000 4000000 qq\n",
+          "line 4 is 'qq', which is no phone")  # fmt: skip
+_labelled("a line of another form", ".lab", "0 1000000 p\nhello\n", "line 2 is 'hello'; required, as in line 1")
+_labelled("phones of another recording", ".lab", "0 900000000 p\n", "the sound lasts")
+_labelled("a backward label of Audacity", ".txt", "1.5\t0.5\tp\n", "before its start")
+_labelled("no UTF-8", ".txt", b"\xff\xfeh", "a.txt")
+
+
+@_prepared(".lab: an end of a thousand digits, which is the end of the sound", 0)
+def _(bench: Bench) -> None:
+    _spoken(bench)
+    bench.file("a.lab", f"0 {'9' * 1000} p\n")
+
+
+def _moved(name: str, content: str, *says: str) -> None:
+    @_prepared(f"motion: {name}", 4, NONE, *says)
+    def _(bench: Bench) -> None:
+        _spoken(bench)
+        bench.file("a.json", content)
+
+
+_moved("of another length", json.dumps(GOOD), "the sound lasts", "required: the same time")
+_moved("NaN", json.dumps(GOOD | {"values": [[float("nan")]]}), "not finite")
+_moved("no JSON", "{", "not JSON")
+
+
+def _weights(name: str, values: bytes, *says: str, names: bytes | None = None, code: int = 4) -> None:
+    @_prepared(f"FACEGOOD: {name}", code, *says)
+    def _(bench: Bench) -> None:
+        (bench.folder / "a.wav").write_bytes(bench.speech.read_bytes())
+        bench.file("bs_value_a.npy", values)
+        bench.file("x_bs_name.npy", names or npy(np.array(["jaw", "smile"])))
+
+
+_weights("pickled objects", npy(np.array([{}], object)), NONE, "save it with numpy.save")
+_weights("a trillion frames declared", declared("(1000000000000, 2)"), NONE, "required 16000000000000 bytes")
+_weights("a zip", b"PK\5\6" + bytes(18), NONE, "not an array")
+_weights("NaN", npy(np.full((9, 2), np.nan)), NONE, "not finite; interpolate them first")
+_weights("another count of channels", npy(np.zeros((9, 3))), NONE, "required numbers of shape (frames, 2)")
+_weights("names that are numbers", npy(np.zeros((9, 2))), "required one row of different texts", names=npy(np.zeros(2)),
+         code=3)  # fmt: skip
+
+
+@_prepared("a name in two lists", 4, "a is in train.txt and in test.txt", "keep one")
+def _(bench: Bench) -> None:
+    _spoken(bench)
+    bench.file("train.txt", "a\n")
+    bench.file("test.txt", "a\n")
+
+
+@case(RECORDINGS, "a corpus where a file is", 7, "cannot be written: File exists")
+def _(bench: Bench) -> list[object]:
+    _spoken(bench)
+    return ["corpus", "prepare", bench.folder, "-o", bench.folder / "a.wav"]
+
+
+@case(RECORDINGS, "a folder that is not there", 3, "no such folder; give a folder of recordings")
+def _(bench: Bench) -> list[object]:
+    return ["corpus", "prepare", bench.folder / "none", "-o", "corpus"]
+
+
+@case(RECORDINGS, "a recording instead of a folder", 3, "is a file; give the folder of recordings that it is in")
+def _(bench: Bench) -> list[object]:
+    return ["corpus", "prepare", bench.speech, "-o", "corpus"]

@@ -1,0 +1,108 @@
+"""Options and outputs."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from robustness.case import Bench, case
+
+GROUP = "options"
+RATE = "required 1 to 1000 a second"
+
+
+def _option(name: str, code: int, says: tuple[str, ...], *more: object) -> None:
+    @case(GROUP, name, code, *says)
+    def _(bench: Bench) -> list[object]:
+        return bench.animate(None, *more)
+
+
+for _value in ("0", "-1", "nan", "inf", "1e9"):
+    for _name in ("--fps", "--rate"):
+        _option(f"{_name} {_value}", 3, ("the frame rate is", RATE), f"{_name}={_value}")
+_option("--channels of an unknown name", 3, ("no motion channel 'smile' among",), "--channels", "opening,smile")
+_option("--channels of nothing", 3, ("no motion channel ''",), "--channels", "")
+_option("--channels of one name twice", 3, ("channel names repeat",), "--channels", "opening,opening")
+_option("an unknown --recogniser", 3, ("unknown recogniser 'best'; required one of: auto",), "--recogniser", "best")
+
+
+def _cues(name: str, code: int, says: tuple[str, ...], *more: object) -> None:
+    @case(GROUP, f"cues {name}", code, *says)
+    def _(bench: Bench) -> list[object]:
+        return ["cues", bench.speech, "--model", bench.model, "--recogniser", "own", *more]
+
+
+for _value in ("0", "-1", "nan", "inf", "1e9"):
+    _cues(f"--fps {_value}", 3, ("the frame rate is", "required 1 to 60"), f"--fps={_value}")
+_cues("--hold 0", 3, ("the hold is 0 frames, required 1 or more",), "--hold", "0")
+_cues("--hold -1", 3, ("the hold is -1 frames, required 1 or more",), "--hold=-1")
+_cues("--hold 1000000000", 0, (), "--hold", "1000000000", "-o", "a.json")
+_cues("--shapes of unknown letters", 3, ("the optional shapes are 'QZ', required letters out of",), "--shapes", "QZ")
+
+
+for _verb in ("evaluate", "train"):
+    for _name, _options, _says in [
+        ("--split of an unknown name", ("--split", "tomorrow"), ("no utterances of split 'tomorrow'", "there are")),
+        ("--speaker of an unknown name", ("--speaker", "nobody"), ("no speaker 'nobody'", "there are:")),
+    ]:
+
+        @case(GROUP, f"{_verb} {_name}", 4, *_says)
+        def _(bench: Bench, verb: str = _verb, options: tuple[str, ...] = _options) -> list[object]:
+            what = ["evaluate", bench.model, bench.corpus] if verb == "evaluate" else ["train", bench.corpus, "-o", "m"]
+            return [*what, *options]
+
+
+@case(GROUP, "corpus prompts --count -1", 3, "-1 prompts asked for, required at least 1")
+def _(_bench: Bench) -> list[object]:
+    return ["corpus", "prompts", "--count=-1"]
+
+
+@case(GROUP, "corpus prepare --workers -1", 3, "-1 processes, required at least 1")
+def _(bench: Bench) -> list[object]:
+    (bench.folder / "a.mp4").touch()
+    return ["corpus", "prepare", bench.folder, "-o", "c", "--workers=-1"]
+
+
+OUTPUTS = "outputs"
+
+
+def _output(name: str, output: str, *says: str) -> None:
+    @case(OUTPUTS, name, 7, *says)
+    def _(bench: Bench) -> list[object]:
+        return bench.animate(output=output)
+
+
+_output("a folder that does not exist", "none/a.json", "the folder none does not exist; create it first")
+_output("an unknown format", "a.gif", "unknown format '.gif'; required one of: .json .csv .npz .mp4")
+_output("no suffix", "a", "unknown format ''; required one of:")
+_output("/dev/full", "/dev/full", "unknown format ''; required one of:")
+_output("a folder where nothing can be written", "/proc/a.json", "/proc/a.json: cannot be written")
+_output("a name that is too long", "x" * 300 + ".json", "cannot be written: File name too long")
+
+
+@case(OUTPUTS, "a folder", 7, "is a folder; give the name of a file in it")
+def _(bench: Bench) -> list[object]:
+    (bench.folder / "a.json").mkdir()
+    return bench.animate(output=bench.folder / "a.json")
+
+
+@case(OUTPUTS, "the recording itself", 7, "is the recording itself; give another name")
+def _(bench: Bench) -> list[object]:
+    path = bench.folder / "a.mp4"
+    path.write_bytes(bench.speech.read_bytes())
+    return bench.animate(path, output=path)
+
+
+@case(OUTPUTS, "one name twice", 7, "is given twice; give every output another")
+def _(bench: Bench) -> list[object]:
+    return bench.animate(None, "-o", Path("./a.json"), output=Path.cwd() / "a.json")
+
+
+@case(OUTPUTS, "one name twice for cues", 7, "is given twice; give every output another")
+def _(bench: Bench) -> list[object]:
+    return ["cues", bench.speech, "--model", bench.model, "-o", "a.tsv", "a.tsv"]
+
+
+@case(OUTPUTS, "a name that is no UTF-8", 0)
+def _(bench: Bench) -> list[object]:
+    return bench.animate(output=os.fsdecode(b"a\xff.json"))

@@ -1,0 +1,218 @@
+"""Recordings."""
+
+from __future__ import annotations
+
+import os
+import socket
+import struct
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from robustness.case import Bench, case
+from speech.sound import tone, write_pictures, write_sound
+
+GROUP = "recordings"
+NO_RECORDING = ("not a readable recording", "give an audio or video file")
+CUT = ("cut short: it states 3", "s of sound and holds")
+CONTAINERS = {
+    "wav": ("pcm_s16le", {0.6: (0,), 0.004: (3, "holds", "required at least 100 ms")}),
+    "flac": ("flac", {0.6: (0, *CUT), 0.01: (3, *NO_RECORDING)}),
+    "mp3": ("libmp3lame", {0.6: (0, *CUT), 0.01: (3, *NO_RECORDING)}),
+    "ogg": ("libopus", {0.6: (0,), 0.01: (3, *NO_RECORDING)}),
+    "mp4": ("aac", {0.95: (3, "no sound track"), 0.6: (3, *NO_RECORDING), 0.01: (3, *NO_RECORDING)}),
+    "mkv": ("aac", {0.6: (0, *CUT), 0.01: (3, *NO_RECORDING)}),
+}
+
+
+def _cut(suffix: str, codec: str, share: float) -> None:
+    code, *says = CONTAINERS[suffix][1][share]
+
+    @case(GROUP, f"{suffix} cut off at {share:.1%}", code, *says)
+    def _(bench: Bench) -> list[object]:
+        rate_hz = 48_000 if codec == "libopus" else 16_000
+        path = write_sound(bench.folder / f"a.{suffix}", tone(rate_hz, 3.0), rate_hz, codec)
+        content = path.read_bytes()
+        path.write_bytes(content[: int(share * len(content))])
+        return bench.animate(path)
+
+
+for _suffix, (_codec, _cuts) in CONTAINERS.items():
+    for _share in _cuts:
+        _cut(_suffix, _codec, _share)
+
+
+@case(GROUP, "an empty file", 3, "the file is empty", "give a recording")
+def _(bench: Bench) -> list[object]:
+    return bench.animate(bench.file("a.wav", b""))
+
+
+@case(GROUP, "a header only", 3, "holds 0 ms of sound", "required at least 100 ms")
+def _(bench: Bench) -> list[object]:
+    return bench.animate(bench.sound(np.zeros(0, np.int16)))
+
+
+@case(GROUP, "one sample", 3, "of sound, required at least 100 ms")
+def _(bench: Bench) -> list[object]:
+    return bench.animate(bench.sound(np.ones(1, np.int16)))
+
+
+@case(GROUP, "a header that promises more than there is", 0)
+def _(bench: Bench) -> list[object]:
+    content = bytearray(bench.speech.read_bytes())
+    content[4:8], content[40:44] = struct.pack("<I", 2**31), struct.pack("<I", 2**31 - 36)
+    return bench.animate(bench.file("a.wav", bytes(content)))
+
+
+@case(GROUP, "a header that promises less than there is", 3, "required at least 100 ms")
+def _(bench: Bench) -> list[object]:
+    content = bytearray(bench.speech.read_bytes())
+    content[40:44] = struct.pack("<I", 100)
+    return bench.animate(bench.file("a.wav", bytes(content)))
+
+
+for _name, _value in {"NaN": np.nan, "+infinite": np.inf, "-infinite": -np.inf}.items():
+
+    @case(GROUP, f"{_name} samples", 3, "not finite", "export the recording again")
+    def _(bench: Bench, value: float = _value) -> list[object]:
+        samples = bench.samples()
+        samples[8000:8010] = value
+        return bench.animate(bench.sound(samples))
+
+
+@case(GROUP, "samples a million times full scale", 3, "full scale 1, found a peak of")
+def _(bench: Bench) -> list[object]:
+    return bench.animate(bench.sound(bench.samples() * np.float32(1e8)))
+
+
+for _name, _rate_hz, _code, _says in [
+    ("1 Hz", 1, 3, ("sampled at 1 Hz, required 4000 to 1000000",)),
+    ("400 Hz", 400, 3, ("sampled at 400 Hz, required 4000",)),
+    ("384 kHz", 384_000, 0, ()),
+    ("1 GHz", 1_000_000_000, 3, ("sampled at 1000000000 Hz, required",)),
+]:
+
+    @case(GROUP, f"sampled at {_name}", _code, *_says)
+    def _(bench: Bench, rate_hz: int = _rate_hz) -> list[object]:
+        samples = np.repeat(bench.samples(), 24) if rate_hz == 384_000 else bench.samples()
+        return bench.animate(bench.sound(samples, rate_hz))
+
+
+@case(GROUP, "64 channels", 0)
+def _(bench: Bench) -> list[object]:
+    return bench.animate(bench.sound(np.tile(bench.samples()[:, None], (1, 64))))
+
+
+for _name, _samples in {
+    "clipped": lambda samples: np.clip(samples * 50, -1, 1),
+    "a constant": lambda samples: np.full_like(samples, 0.5),
+    "digital silence": lambda samples: 0 * samples,
+    "white noise": lambda samples: np.random.default_rng(0).normal(0, 0.1, len(samples)).astype(np.float32),
+    "one click": lambda samples: (np.arange(len(samples)) == 9000).astype(np.float32),
+    "all but inaudible": lambda samples: samples * np.float32(1e-12),
+}.items():
+
+    @case(GROUP, _name, 0)
+    def _(bench: Bench, change=_samples) -> list[object]:
+        return bench.animate(bench.sound(change(bench.samples())))
+
+
+@case(GROUP, "an mp3 named .wav", 0)
+def _(bench: Bench) -> list[object]:
+    path = write_sound(bench.folder / "a.mp3", tone(16_000), 16_000, "libmp3lame")
+    return bench.animate(path.rename(bench.folder / "a.wav"))
+
+
+for _name, _content in {
+    "a text named .wav": b"words, not sound\n" * 50,
+    "a web page": b"<!DOCTYPE html><html><body>404 Not Found</body></html>\n" * 20,
+    "random bytes": np.random.default_rng(1).bytes(5000),
+    "zeros": bytes(5000),
+}.items():
+
+    @case(GROUP, _name, 3, *NO_RECORDING)
+    def _(bench: Bench, content: bytes = _content) -> list[object]:
+        return bench.animate(bench.file("a.wav", content))
+
+
+@case(GROUP, "a picture", 3, "has no sound track", "give a recording with sound")
+def _(bench: Bench) -> list[object]:
+    Image.new("RGB", (32, 32)).save(bench.folder / "a.png")
+    return bench.animate(bench.folder / "a.png")
+
+
+@case(GROUP, "a video without sound", 3, "has no sound track")
+def _(bench: Bench) -> list[object]:
+    return bench.animate(write_pictures(bench.folder / "a.mp4"))
+
+
+@case(GROUP, "a model", 3, *NO_RECORDING)
+def _(bench: Bench) -> list[object]:
+    return bench.animate(bench.model)
+
+
+@case(GROUP, "a motion file", 3, *NO_RECORDING)
+def _(bench: Bench) -> list[object]:
+    return bench.animate(bench.file("a.json", '{"format": "lipmotion.motion", "version": 1}\n' * 30))
+
+
+@case(GROUP, "a folder", 3, "is a folder; give one recording")
+def _(bench: Bench) -> list[object]:
+    return bench.animate(bench.folder)
+
+
+@case(GROUP, "nothing of that name", 3, "no such file")
+def _(bench: Bench) -> list[object]:
+    return bench.animate(bench.folder / "none.wav")
+
+
+@case(GROUP, "a link to nothing", 3, "no such file")
+def _(bench: Bench) -> list[object]:
+    (bench.folder / "a.wav").symlink_to(bench.folder / "none.wav")
+    return bench.animate(bench.folder / "a.wav")
+
+
+@case(GROUP, "a link to itself", 3, "a.wav")
+def _(bench: Bench) -> list[object]:
+    (bench.folder / "a.wav").symlink_to(bench.folder / "a.wav")
+    return bench.animate(bench.folder / "a.wav")
+
+
+@case(GROUP, "a pipe that nobody writes to", 3, "is a pipe or a device, required a file")
+def _(bench: Bench) -> list[object]:
+    os.mkfifo(bench.folder / "a.wav")
+    return bench.animate(bench.folder / "a.wav")
+
+
+@case(GROUP, "a socket", 3, "is a pipe or a device, required a file")
+def _(bench: Bench) -> list[object]:
+    os.chdir(bench.folder)  # a socket's path must be short
+    with socket.socket(socket.AF_UNIX) as server:
+        server.bind("a.wav")
+    os.chdir(bench.folder.parent / "here")
+    return bench.animate(bench.folder / "a.wav")
+
+
+for _device in ("/dev/null", "/dev/zero"):
+
+    @case(GROUP, _device, 3, "is a pipe or a device, required a file")
+    def _(bench: Bench, device: str = _device) -> list[object]:
+        return bench.animate(Path(device))
+
+
+@case(GROUP, "a name that is too long", 3, "File name too long")
+def _(bench: Bench) -> list[object]:
+    return bench.animate("x" * 300 + ".wav")
+
+
+@case(GROUP, "a name that is no UTF-8", 0)
+def _(bench: Bench) -> list[object]:
+    path = bench.folder / os.fsdecode(b"a\xff\xfe.wav")
+    path.write_bytes(bench.speech.read_bytes())
+    return bench.animate(path)
+
+
+@case(GROUP, "a name like an address", 3, "no such file")
+def _(bench: Bench) -> list[object]:
+    return bench.animate("concat:a.wav|b.wav")

@@ -1,0 +1,71 @@
+"""Videos, with sound, that are to become a corpus."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+import av
+import numpy as np
+
+from robustness.case import Bench, case
+from speech.sound import tone, write_pictures, write_sound
+
+GROUP = "videos"
+NONE = "none of 1 recordings is usable; the first, a:"
+
+
+def _video(bench: Bench, size: tuple[int, int], packets: list[bytes]) -> None:
+    """Write uncompressed pictures, whose content is what it likes, and a second of sound."""
+    with av.open(str(bench.folder / "a.mkv"), "w") as container:
+        stream: Any = container.add_stream("rawvideo", rate=25)
+        stream.width, stream.height, stream.pix_fmt = *size, "yuv420p"
+        sound: Any = container.add_stream("pcm_s16le", rate=16_000, layout="mono")
+        for number, content in enumerate(packets):
+            packet = av.Packet(content)
+            packet.stream, packet.pts, packet.dts, packet.time_base = stream, number, number, Fraction(1, 25)
+            container.mux(packet)
+        samples = np.round(tone(16_000) * 32_767).astype("<i2")
+        part = av.AudioFrame.from_ndarray(samples, format="s16", layout="mono")
+        part.rate, part.pts, part.time_base = 16_000, 0, Fraction(1, 16_000)
+        container.mux(sound.encode(part))
+        container.mux(sound.encode(None))
+
+
+def _pictures(name: str, size: tuple[int, int], packets: list[bytes], *says: str) -> None:
+    @case(GROUP, name, 4, NONE, *says)
+    def _(bench: Bench) -> list[object]:
+        _video(bench, size, packets)
+        return ["corpus", "prepare", bench.folder, "-o", "corpus"]
+
+
+GREY = bytes([128]) * (64 * 64 * 3 // 2)
+_pictures("nothing but grey", (64, 64), [GREY] * 25, "no face in 25 of 25 frames; required: a face in at least 80%")
+_pictures("one picture", (64, 64), [GREY], "pictures for 0.0 of 1.0 s; required at least half")
+_pictures("pictures of one pixel", (1, 1), [bytes(3)] * 25, "pictures of 1 × 1 pixels, required 16 to 8192; scale")
+_pictures("pictures of 16,000 × 16,000", (16_000, 16_000), [GREY], "pictures of 16000 × 16000 pixels, required 16 to")
+_pictures(
+    "pictures that are cut off", (64, 64), [GREY[:100]] * 25, "no picture that can be decoded; export the video again"
+)
+_pictures("no pictures", (64, 64), [], "picture")
+
+
+@case(GROUP, "no pictures, only sound", 4, NONE, "has no video stream; give a video that shows the speaker's face")
+def _(bench: Bench) -> list[object]:
+    write_sound(bench.folder / "a.mkv", tone(16_000), 16_000, "flac")
+    return ["corpus", "prepare", bench.folder, "-o", "corpus"]
+
+
+@case(GROUP, "no sound", 4, NONE, "has no sound track; give a recording with sound")
+def _(bench: Bench) -> list[object]:
+    write_pictures(bench.folder / "a.mp4")
+    return ["corpus", "prepare", bench.folder, "-o", "corpus"]
+
+
+@case(GROUP, "damaged in the middle", 4, NONE)
+def _(bench: Bench) -> list[object]:
+    path = write_sound(bench.folder / "a.mkv", tone(16_000), 16_000, "flac", video=True)
+    content = bytearray(path.read_bytes())
+    content[len(content) // 3 : -len(content) // 3] = bytes(len(content) // 3)
+    path.write_bytes(content)
+    return ["corpus", "prepare", bench.folder, "-o", "corpus"]
