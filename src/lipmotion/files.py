@@ -26,6 +26,9 @@ else:
 
 TEMPORARY = ".part-"
 """Names of unfinished files start with this; a killed run may leave one, the next removes it."""
+PLAYLISTS = (b"#EXTM3U", b"ffconcat version", b"<MPD")
+PLAYLIST_BYTES = 512
+"""Playlists say so within their first bytes. FFmpeg would wait for their addresses, for ever if they are live."""
 LOCK = f"{TEMPORARY}lock"
 """The file that a process holds while it works on a folder."""
 UNFINISHED = ".unfinished"
@@ -43,13 +46,17 @@ def check_source(path: Path, kind: str) -> None:
         raise InputError(f"{path}: no such file")
     if path.stat().st_size == 0:
         raise InputError(f"{path}: the file is empty; give a {kind}")
+    with path.open("rb") as file:
+        start = file.read(PLAYLIST_BYTES)
+    if any(mark in start for mark in PLAYLISTS):
+        raise InputError(f"{path}: is a playlist, which names recordings elsewhere; give the {kind} itself")
 
 
 def open_media(path: Path) -> Any:
     """Return an open PyAV container; close it. Raises what PyAV raises.
 
-    The name is taken as a file's whatever is in it (``12:30.wav`` is no protocol), and a playlist among the
-    recordings opens nothing that is not a file.
+    The name is taken as a file's whatever is in it (``12:30.wav`` is no protocol), and nothing that is not a file is
+    opened, whatever the content says.
     """
     import av
 

@@ -15,6 +15,7 @@ import pytest
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
+from lipmotion.files import open_media
 from lipmotion.speech.read import read_audio
 from speech.sound import babble, write_pictures, write_sound
 
@@ -182,10 +183,26 @@ def test_any_name_is_a_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, na
     assert read_audio(Path(name)).duration_s == 2
 
 
-def test_a_playlist_opens_nothing_from_elsewhere(tmp_path: Path) -> None:
-    (tmp_path / "a.m3u8").write_text("#EXTM3U\n#EXT-X-TARGETDURATION:2\n#EXTINF:2,\nhttp://localhost:9/a.ts\n")
-    with pytest.raises(InputError, match=r"a\.m3u8: "):
-        read_audio(tmp_path / "a.m3u8")
+@pytest.mark.parametrize(
+    "content",
+    [
+        "#EXTM3U\n#EXT-X-TARGETDURATION:2\n#EXTINF:2,\nhttp://localhost:9/a.ts\n",
+        "ffconcat version 1.0\nfile 'a.wav'\n",
+        '<?xml version="1.0"?>\n<MPD mediaPresentationDuration="PT2S"></MPD>\n',
+    ],
+)
+def test_a_playlist_is_not_followed(tmp_path: Path, content: str) -> None:
+    write_sound(tmp_path / "a.wav", babble(16_000), 16_000, "pcm_s16le")
+    (tmp_path / "list.wav").write_text(content)
+    with pytest.raises(InputError, match=r"list\.wav: is a playlist, which names recordings elsewhere; give the rec"):
+        read_audio(tmp_path / "list.wav")
+
+
+def test_addresses_are_not_opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: dict[str, object] = {}
+    monkeypatch.setattr(av, "open", lambda name, **options: asked.update(options, name=name))
+    open_media(tmp_path / "a.wav")
+    assert asked == {"name": f"file:{tmp_path / 'a.wav'}", "options": {"protocol_whitelist": "file"}}
 
 
 @pytest.mark.parametrize(("suffix", "codec"), [("mkv", "pcm_s16le"), ("mkv", "libopus"), ("mp4", "aac")])

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from lipmotion.corpora.entry import read_entry
 from lipmotion.corpora.store import Corpus
+from lipmotion.files import locked
 from lipmotion.measures.offset import Offset, offset, pooled_offset, shift_scores
 from lipmotion.speech.lips import opening_speed, speed
 from lipmotion.speech.mfcc import WINDOW, mfcc
@@ -100,14 +101,16 @@ def sync(corpus: Corpus) -> dict[str, float]:
 
     The track stays; features are computed again. Sound that was late loses its beginning, sound that was early is
     preceded by its own beginning mirrored. The moves are kept in each utterance's source (``offset_removed_ms``).
-    Raises CorpusError: an utterance is damaged. Raises ExportError: it cannot be written.
+    Raises CorpusError: an utterance is damaged. Raises ExportError: it cannot be written, or another process
+    is at work on the corpus.
     """
-    found = offsets(corpus)
-    moved = {name: pooled.late_s for name, pooled in found.collections.items() if _is_worth_moving(pooled)}
-    for collection, late_s in moved.items():
-        for name in found.members[collection]:
-            settings = read_entry(corpus.folder(name))["settings"]
-            corpus.add(_moved(corpus.utterance(name), late_s), settings)
+    with locked(corpus.path):
+        found = offsets(corpus)
+        moved = {name: pooled.late_s for name, pooled in found.collections.items() if _is_worth_moving(pooled)}
+        for collection, late_s in moved.items():
+            for name in found.members[collection]:
+                settings = read_entry(corpus.folder(name))["settings"]
+                corpus.add(_moved(corpus.utterance(name), late_s), settings)
     return moved
 
 

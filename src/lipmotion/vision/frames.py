@@ -27,20 +27,20 @@ class Frame:
     image: NDArray[np.uint8]
 
 
+@dataclass(frozen=True, eq=False)
 class Video:
     """An open video.
 
     frames          : the pictures, decoded as they are asked for
     stated_rates_hz : the frame rates that the container states, the most trustworthy first
     stated_s        : the duration that the container states, 0 if none
-    damaged         : packets and pictures found damaged so far, which are left out
+    damage          : of every packet or picture that was left out so far, why
     """
 
-    def __init__(self, frames: Iterator[Frame], stated_rates_hz: tuple[float, ...], stated_s: float):
-        self.frames = frames
-        self.stated_rates_hz = stated_rates_hz
-        self.stated_s = stated_s
-        self.damaged = 0
+    frames: Iterator[Frame]
+    stated_rates_hz: tuple[float, ...]
+    stated_s: float
+    damage: list[str]
 
 
 LEAST_PIXELS, MOST_PIXELS = 16, 8192
@@ -71,10 +71,9 @@ def open_video(path: Path) -> Iterator[Video]:
             raise InputError(f"{path}: its pictures are coded in an unknown way; export the video again")
         _check_size(path, stream.width, stream.height, float(stream.sample_aspect_ratio or 1))
         rates = [float(rate) for rate in (stream.guessed_rate, stream.average_rate) if rate]
-        video = Video(iter(()), tuple(rates), _stated_s(container, stream))
-        with closing(_frames(container, stream, path, video)) as frames:  # decoding from a closed one would crash
-            video.frames = frames
-            yield video
+        damage: list[str] = []
+        with closing(_frames(container, stream, path, damage)) as frames:  # decoding from a closed one would crash
+            yield Video(frames, tuple(rates), _stated_s(container, stream), damage)
 
 
 def _moving_pictures(container: Any) -> Any | None:
@@ -91,11 +90,11 @@ def _stated_s(container: Any, stream: Any) -> float:
     return (container.duration or 0) / 1e6
 
 
-def _frames(container: Any, stream: Any, path: Path, video: Video) -> Generator[Frame, None, None]:
+def _frames(container: Any, stream: Any, path: Path, damage: list[str]) -> Generator[Frame, None, None]:
     start_s = (container.start_time or 0) / 1e6
     pixel_shape = stream.sample_aspect_ratio
     last_s = float("-inf")
-    for picture in _pictures(container, stream, video):
+    for picture in _pictures(container, stream, damage):
         if picture.time is None or picture.time - start_s <= last_s:
             continue  # without a time, or shown twice: it cannot be placed
         last_s = picture.time - start_s
@@ -105,7 +104,7 @@ def _frames(container: Any, stream: Any, path: Path, video: Video) -> Generator[
         raise InputError(f"{path}: holds no picture that can be decoded; export the video again")
 
 
-def _pictures(container: Any, stream: Any, video: Video) -> Iterator[Any]:
+def _pictures(container: Any, stream: Any, damage: list[str]) -> Iterator[Any]:
     """Yield the pictures that are whole."""
     import av
 
@@ -114,15 +113,15 @@ def _pictures(container: Any, stream: Any, video: Video) -> Iterator[Any]:
         try:
             for picture in next(packets).decode():
                 if picture.is_corrupt:
-                    video.damaged += 1
+                    damage.append("a damaged picture")
                 else:
                     yield picture
         except StopIteration:
             return
         except av.EOFError:
             return
-        except av.FFmpegError:
-            video.damaged += 1
+        except av.FFmpegError as error:
+            damage.append(str(error.strerror))
 
 
 def _check_size(path: Path, width: int, height: int, pixel_shape: float) -> None:

@@ -101,7 +101,7 @@ def track(path: Path, *, crops: bool = True) -> Track:
 def _damage(video: Video, times_s: Array, rate_hz: float) -> list[str]:
     notes = []
     end_s = float(times_s[-1]) + 1 / rate_hz
-    if video.damaged:
+    if video.damage:
         expected = round(max(video.stated_s, end_s) * rate_hz)
         notes.append(f"damaged: {len(times_s)} of about {expected} frames can be decoded")
     if end_s < video.stated_s - SHORT_S:

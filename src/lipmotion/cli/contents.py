@@ -1,0 +1,23 @@
+"""``lipmotion corpus info``: what is in a corpus, and whether its sound and lips are in step."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+
+def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the action to ``lipmotion corpus``."""
+    parser = actions.add_parser("info", help="say what is in a corpus")
+    parser.add_argument("corpus", type=Path)
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Print what ``lipmotion.Corpus`` says of itself, and how late its sound is."""
+    from lipmotion.corpora.store import Corpus
+    from lipmotion.pipeline.offset import offsets
+
+    corpus = Corpus.open(options.corpus)
+    for name, value in (*corpus.summary().items(), *(("offset", line) for line in offsets(corpus).lines())):
+        print(f"{name:12} {value}")

@@ -1,0 +1,26 @@
+"""``lipmotion corpus sync``: sound and lips of a corpus put in step."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+
+def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the action to ``lipmotion corpus``."""
+    parser = actions.add_parser("sync", help="move the sound of a corpus to where the lips are")
+    parser.add_argument("corpus", type=Path)
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Call ``lipmotion.pipeline.offset.sync``."""
+    from lipmotion.corpora.store import Corpus
+    from lipmotion.pipeline.offset import sync
+
+    corpus = Corpus.open(options.corpus)
+    moved = sync(corpus)
+    for collection, late_s in moved.items():
+        print(f"{collection or corpus.path}: sound moved by {-1000 * late_s:+.0f} ms")
+    if not moved:
+        print(f"{corpus.path}: nothing to move: the sound is in step, or it is not known how late it is")
