@@ -192,7 +192,7 @@ def test_a_folder_is_held_by_one_process_and_let_go_of_when_it_is_killed(tmp_pat
 
 def test_a_folder_that_cannot_be_made_is_an_export_error(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
-    with pytest.raises(ExportError, match="file: cannot be written"), locked(tmp_path / "file"):
+    with pytest.raises(ExportError, match="file: is a file; give the name of a new"), locked(tmp_path / "file"):
         raise AssertionError
 
 

@@ -209,6 +209,8 @@ def locked(folder: Path) -> Iterator[None]:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         file = _held(path)
+    except FileExistsError as error:
+        raise ExportError(f"{folder}: is a file; give the name of a new or an empty folder") from error
     except OSError as error:
         raise _refused(folder, error) from error
     try:

@@ -261,7 +261,7 @@ def _(bench: Bench) -> None:
     bench.file("test.txt", "a\n")
 
 
-@case(RECORDINGS, "a corpus where a file is", 7, "cannot be written: File exists")
+@case(RECORDINGS, "a corpus where a file is", 7, "is a file; give the name of a new or an empty folder")
 def _(bench: Bench) -> list[object]:
     _spoken(bench)
     return ["corpus", "prepare", bench.folder, "-o", bench.folder / "a.wav"]
