@@ -115,7 +115,10 @@ def test_edited_units_change_the_motion_where_they_are(move: Animate, toy_senten
 def test_units_need_no_recogniser(move: Animate) -> None:
     with pytest.raises(InputError, match="unknown phone 'AA' at 0"):
         move(units=Timeline((Span(0.0, 0.5, Unit("AA")),)))
-    assert move(units=Timeline(())).motion["opening"].max() < 0.01  # nothing is said
+    with pytest.raises(InputError, match="the units are an empty list"):
+        move(units=Timeline(()))
+    silent = Timeline((Span(0.0, 2.0, Unit("sil")),))
+    assert move(units=silent).motion["opening"].max() < 0.01  # nothing is said
 
 
 def test_pins_are_met_exactly(move: Animate, toy_sentence: ToySentence) -> None:
