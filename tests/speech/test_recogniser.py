@@ -146,7 +146,9 @@ def test_no_words_are_silence(hmm: UnitHmm, sentences: list[ToySentence]) -> Non
 
 
 def test_too_many_words_for_the_sound(hmm: UnitHmm, sentences: list[ToySentence]) -> None:
-    with pytest.raises(AlignmentError, match=r"50 words take at least \d+ frames of 10 ms, found \d+: the recording is too short"):
+    with pytest.raises(
+        AlignmentError, match=r"50 words take at least \d+ frames of 10 ms, found \d+: the recording is too short"
+    ):
         align(hmm, sentences[0].audio, ["baby"] * 50, Lexicon())
 
 
