@@ -18,7 +18,7 @@ from lipmotion.types import Generation, Motion, Timeline, Unit
 def write(path: Path, generation: Generation, source: Mapping[str, str], model: Mapping[str, str]) -> None:
     """Write the arrays ``values`` [shape=(T, P)] and ``document``, the JSON format's text without its values."""
     document = json.dumps({**header(generation), **labels(generation, source, model)}, ensure_ascii=False)
-    np.savez(path, values=np.asarray(generation.motion.values, dtype=np.float64), document=np.array(document))
+    np.savez(path, values=generation.motion.values, document=np.array(document))
 
 
 def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
