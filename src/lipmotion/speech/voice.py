@@ -13,8 +13,8 @@ from lipmotion.types import Audio, Features
 
 WARPS = (0.88, 0.94, 1.0, 1.06, 1.12)
 """The vocal tracts of adults differ by about so much."""
-JUDGED_FRAMES = 6000
-"""A minute, the loudest, is enough to judge a voice by."""
+JUDGED_FRAMES = 2000
+"""Twenty seconds, the loudest, are enough to judge a voice by."""
 
 
 @dataclass(frozen=True, eq=False)
