@@ -63,6 +63,23 @@ def open_media(path: Path) -> Any:
     return av.open(f"file:{path}", options={"protocol_whitelist": "file"})
 
 
+def moving_pictures(container: Any) -> list[Any]:
+    """Return the video streams of an open container that are not the cover of an album."""
+    import av
+
+    cover = av.stream.Disposition.attached_pic
+    return [stream for stream in container.streams.video if not stream.disposition & cover]
+
+
+def sha256_of(path: Path) -> str:
+    """Return the digest of a file's content."""
+    digest = hashlib.sha256()
+    with path.open("rb") as file:
+        while block := file.read(1 << 20):
+            digest.update(block)
+    return digest.hexdigest()
+
+
 def check_regular(path: Path, kind: str) -> None:
     """Raise InputError for a folder, and for a pipe or a device, which may never end. What is missing passes."""
     if path.is_dir():

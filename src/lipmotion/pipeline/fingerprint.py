@@ -9,11 +9,11 @@ import platform
 from collections.abc import Sequence
 from dataclasses import asdict
 from importlib import metadata
-from pathlib import Path
 from typing import Any
 
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import Engine
+from lipmotion.files import sha256_of
 from lipmotion.stats.hmm.model import HmmConfig
 from lipmotion.units import Lexicon
 
@@ -41,9 +41,5 @@ def fingerprint(
         for path in sorted(corpus.folder(name).iterdir()):
             if path.name not in NOT_LEARNED_FROM:
                 digest.update(f"{path.name}\n".encode())
-                digest.update(_content(path))
+                digest.update(bytes.fromhex(sha256_of(path)))
     return digest.hexdigest()
-
-
-def _content(path: Path) -> bytes:
-    return hashlib.sha256(path.read_bytes()).digest()

@@ -11,6 +11,7 @@ from lipmotion.corpora.base import Curves, Recording
 from lipmotion.corpora.facegood import read_array
 from lipmotion.errors import InputError
 from lipmotion.export.base import read_motion
+from lipmotion.files import sha256_of
 from lipmotion.speech.recogniser import SHORT_PAUSE_S
 from lipmotion.types import Span, Timeline, Track, Unit
 from lipmotion.units import PAUSE, SILENCE, is_silent
@@ -28,7 +29,7 @@ def digest(recording: Recording) -> dict[str, str]:
     found = {}
     if recording.curves is not None:
         found["motion_file"] = recording.curves.file.name
-        found["motion_sha256"] = hashlib.sha256(recording.curves.file.read_bytes()).hexdigest()
+        found["motion_sha256"] = sha256_of(recording.curves.file)
     if recording.phones is not None:
         text = "\n".join(f"{span.start_s!r} {span.end_s!r} {span.label.phone}" for span in recording.phones)
         found["phones_sha256"] = hashlib.sha256(text.encode()).hexdigest()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import shutil
 import time
@@ -18,7 +17,7 @@ from lipmotion.corpora.discover import discover
 from lipmotion.corpora.entry import quantised, read_entry, write_utterance
 from lipmotion.corpora.store import UTTERANCES, Corpus
 from lipmotion.errors import CorpusError, ExportError, InputError, MissingDependencyError
-from lipmotion.files import locked, remove_unfinished
+from lipmotion.files import locked, remove_unfinished, sha256_of
 from lipmotion.pipeline.given import DIGESTS, digest, given_phones, given_track
 from lipmotion.pipeline.workers import working
 from lipmotion.speech.mfcc import mfcc
@@ -171,22 +170,14 @@ def _is_taken(folder: Path, video: Path, collection: str) -> bool:
         source = read_entry(folder).get("source", {})
     except CorpusError:
         return False
-    return source.get("collection") != collection and source.get("sha256") != _sha256(video)
-
-
-def _sha256(path: Path) -> str:
-    digest = hashlib.sha256()
-    with path.open("rb") as file:
-        while block := file.read(1 << 20):
-            digest.update(block)
-    return digest.hexdigest()
+    return source.get("collection") != collection and source.get("sha256") != sha256_of(video)
 
 
 def _process(job: _Job) -> _Outcome:
     name = job.recording.name
     try:
         sound = job.recording.file
-        source = job.source | {"sha256": _sha256(sound), "bytes": str(sound.stat().st_size)} | digest(job.recording)
+        source = job.source | {"sha256": sha256_of(sound), "bytes": str(sound.stat().st_size)} | digest(job.recording)
         entry = _kept(job, source)
         if entry is not None:
             return _Outcome(name, kept=True, unseen=int(entry["unseen_frames"]), notes=tuple(entry.get("notes", ())))

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
+from lipmotion.files import moving_pictures
 
 HOLE_S = 0.04
 """A frame this much later than the end of the one before leaves a hole; time stamps are rounded to 1 ms or better."""
@@ -117,16 +118,10 @@ class _Track:
             self._clock_s += frame.samples / frame.sample_rate
 
     def _start(self, time_s: float) -> None:
-        offset_s = time_s - (self._container.start_time or 0) / 1e6 if self._has_pictures() else 0.0
+        has_pictures = bool(moving_pictures(self._container))
+        offset_s = time_s - (self._container.start_time or 0) / 1e6 if has_pictures else 0.0
         self._add_silence(max(offset_s, 0.0))
         self._cut = max(round(-offset_s * self._rate_hz), 0)
-
-    def _has_pictures(self) -> bool:
-        """Whether there is video; the cover of an album has no time."""
-        import av
-
-        cover = av.stream.Disposition.attached_pic
-        return any(not stream.disposition & cover for stream in self._container.streams.video)
 
     def _add_silence(self, duration_s: float) -> None:
         if duration_s > LONGEST_HOLE_S:

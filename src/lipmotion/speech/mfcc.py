@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -43,7 +44,10 @@ def mfcc(audio: Audio, warp: float = 1.0) -> Features:
     Source: Xie & Liu 2007, §5.1; details in the project's conventions.
     """
     samples = checked_samples(audio)
-    static = np.concatenate([log_mel(samples, _filters(warp)) @ _cosine(), log_energy(samples)[:, None]], axis=1)
+    static = np.concatenate(
+        [log_mel(samples, _filters(warp)) @ liftered_cosine(FILTERS, 1, CEPSTRA + 1), log_energy(samples)[:, None]],
+        axis=1,
+    )
     return Features(normalised(_with_deltas(static)), audio.duration_s)
 
 
@@ -142,9 +146,16 @@ def _filters(warp: float) -> NDArray[np.float32]:
     """Triangles, equally spaced in mel from 0 to 8 kHz, of warped frequencies [shape=(257, 26)]."""
     bins = _mel(_warped(np.arange(FFT_SIZE // 2 + 1) * SPEECH_RATE_HZ / FFT_SIZE, warp))
     edges = np.linspace(0, _mel(np.array(SPEECH_RATE_HZ / 2)), FILTERS + 2)
+    return triangles(bins, edges).astype(np.float32)
+
+
+def triangles(bins: NDArray[np.floating[Any]], edges: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+    """Return triangular filters [shape=(bins, F)]: each rises from one edge [shape=(F + 2,)] to the next and falls
+    to the one after.
+    """
     rising = (bins[:, None] - edges[:-2]) / (edges[1:-1] - edges[:-2])
     falling = (edges[2:] - bins[:, None]) / (edges[2:] - edges[1:-1])
-    return np.maximum(0, np.minimum(rising, falling)).astype(np.float32)
+    return np.maximum(0, np.minimum(rising, falling))
 
 
 def _warped(hertz: NDArray[np.float64], warp: float) -> NDArray[np.float64]:
@@ -158,8 +169,9 @@ def _mel(hertz: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 @cache
-def _cosine() -> NDArray[np.float32]:
-    """Orthonormal DCT-II, c1–c12, liftered [shape=(26, 12)]."""
-    order = np.arange(1, CEPSTRA + 1)
-    basis = np.cos(np.pi * (np.arange(FILTERS)[:, None] + 0.5) * order / FILTERS) * np.sqrt(2 / FILTERS)
+def liftered_cosine(filters: int, first: int, end: int) -> NDArray[np.float32]:
+    """Return the orthonormal DCT-II to cepstra ``first``..``end`` - 1, liftered [shape=(filters, end - first)]."""
+    order = np.arange(first, end)
+    basis = np.cos(np.pi * (np.arange(filters)[:, None] + 0.5) * order / filters) * np.sqrt(2 / filters)
+    basis /= np.where(order == 0, np.sqrt(2), 1)
     return (basis * (1 + LIFTER / 2 * np.sin(np.pi * order / LIFTER))).astype(np.float32)

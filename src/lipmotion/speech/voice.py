@@ -39,10 +39,12 @@ def fitted(hmm: UnitHmm, audio: Audio, features: Features) -> Voice:
     state path, so that the warp is chosen before anything is recognised.
     """
     judged = _loudest(audio, features)
-    unwarped = features if judged is audio else mfcc(judged)
-    fits = {warp: hmm.fit((unwarped if warp == 1 else mfcc(judged, warp)).values) for warp in WARPS}
+    heard = {warp: features if warp == 1 and judged is audio else mfcc(judged, warp) for warp in WARPS}
+    fits = {warp: hmm.fit(heard[warp].values) for warp in WARPS}
     warp = max(fits, key=lambda warp: (fits[warp], -abs(warp - 1)))
-    return Voice(features if warp == 1 else mfcc(audio, warp), warp, fits[warp] - hmm.typical_fit)
+    if judged is not audio:
+        heard[warp] = features if warp == 1 else mfcc(audio, warp)
+    return Voice(heard[warp], warp, fits[warp] - hmm.typical_fit)
 
 
 def _loudest(audio: Audio, features: Features) -> Audio:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.files import check_source, open_media
+from lipmotion.files import check_source, moving_pictures, open_media
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +64,7 @@ def open_video(path: Path) -> Iterator[Video]:
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"{path}: not a readable video ({reason}); give a video file") from error
     with container:
-        stream = _moving_pictures(container)
+        stream = next(iter(moving_pictures(container)), None)
         if stream is None:
             raise InputError(f"{path}: has no video stream; give a video that shows the speaker's face")
         if stream.codec_context is None:
@@ -74,14 +74,6 @@ def open_video(path: Path) -> Iterator[Video]:
         damage: list[str] = []
         with closing(_frames(container, stream, path, damage)) as frames:  # decoding from a closed one would crash
             yield Video(frames, tuple(rates), _stated_s(container, stream), damage)
-
-
-def _moving_pictures(container: Any) -> Any | None:
-    """Return the first video stream that is not the cover of an album."""
-    import av
-
-    cover = av.stream.Disposition.attached_pic
-    return next((stream for stream in container.streams.video if not stream.disposition & cover), None)
 
 
 def _stated_s(container: Any, stream: Any) -> float:

@@ -85,6 +85,7 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
         where = places(speech.units, frames, self.config.parts, self.config.edge_s)
         distinct = list(dict.fromkeys(where))
         mean, precision, sources = zip(*(model.statistics(place) for place in distinct), strict=True)
+        means, precisions = np.array(mean), np.array(precision)
         index = {place: number for number, place in enumerate(distinct)}
         path = np.array([index[place] for place in where], np.intp)
         closing = closing_spans(speech.units, frames) if self.config.closures else []
@@ -92,7 +93,7 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
         precise = np.float64 if frames <= DOUBLE_FRAMES else np.float32
         motion, spread = (np.empty((frames, len(model.space.channels)), precise) for _ in range(2))
         for inner, outer in _stretches(frames):
-            statistics = np.array(mean)[path[outer]], np.array(precision)[path[outer]]
+            statistics = means[path[outer]], precisions[path[outer]]
             inside = {
                 (frame - outer.start, c): v for (frame, c), v in pins.items() if outer.start <= frame < outer.stop
             }

@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.speech.mfcc import FFT_SIZE, LIFTER, checked_samples, log_mel
+from lipmotion.speech.mfcc import FFT_SIZE, checked_samples, liftered_cosine, log_mel, triangles
 from lipmotion.speech.read import SPEECH_RATE_HZ
 from lipmotion.types import Audio
 
@@ -23,7 +23,7 @@ def general_features(audio: Audio) -> NDArray[np.float32]:
     Source: the model's own feat.params and CMU Sphinx's ``1s_c_d_dd``. Deviations: windows of 25 instead of
     25.6 ms, centred on their time; no noise removal.
     """
-    cepstra = log_mel(checked_samples(audio), _filters()) @ _cosine()
+    cepstra = log_mel(checked_samples(audio), _filters()) @ liftered_cosine(FILTERS, 0, CEPSTRA)
     cepstra -= cepstra.mean(axis=0)
     padded = np.pad(cepstra, ((3, 3), (0, 0)), mode="edge")
 
@@ -39,17 +39,6 @@ def _filters() -> NDArray[np.float32]:
     """Triangles of equal area, equally spaced in mel, their corners on the spectrum's bins [shape=(257, 25)]."""
     bin_hz = SPEECH_RATE_HZ / FFT_SIZE
     mel = np.linspace(2595 * np.log10(1 + LOWEST_HZ / 700), 2595 * np.log10(1 + HIGHEST_HZ / 700), FILTERS + 2)
-    edges = np.round(700 * (10 ** (mel / 2595) - 1) / bin_hz) * bin_hz
-    hertz = np.arange(FFT_SIZE // 2 + 1)[:, None] * bin_hz
-    rising = (hertz - edges[:-2]) / (edges[1:-1] - edges[:-2])
-    falling = (edges[2:] - hertz) / (edges[2:] - edges[1:-1])
-    return (np.maximum(0, np.minimum(rising, falling)) * 2 / (edges[2:] - edges[:-2])).astype(np.float32)
-
-
-@cache
-def _cosine() -> NDArray[np.float32]:
-    """Orthonormal DCT-II, c0–c12, liftered [shape=(25, 13)]."""
-    order = np.arange(CEPSTRA)
-    basis = np.cos(np.pi * (np.arange(FILTERS)[:, None] + 0.5) * order / FILTERS) * np.sqrt(2 / FILTERS)
-    basis[:, 0] /= np.sqrt(2)
-    return (basis * (1 + LIFTER / 2 * np.sin(np.pi * order / LIFTER))).astype(np.float32)
+    edges = (np.round(700 * (10 ** (mel / 2595) - 1) / bin_hz) * bin_hz).astype(np.float64)
+    hertz = np.arange(FFT_SIZE // 2 + 1) * bin_hz
+    return (triangles(hertz, edges) * 2 / (edges[2:] - edges[:-2])).astype(np.float32)
