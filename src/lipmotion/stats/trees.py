@@ -1,0 +1,203 @@
+"""Decision trees that tie states in contexts: alike contexts share a density, unseen ones find theirs by questions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Context = tuple[str, ...]
+"""What a state depends on, one name a place (left neighbour, unit, right neighbour)."""
+Array = NDArray[np.float64]
+Likelihood = Callable[[Array], Array]
+"""Sufficient statistics [shape=(N, K)], the count of frames first -> log likelihood, each under its own density."""
+LEAST_VARIANCE = 1e-12
+
+
+class Question(NamedTuple):
+    """Whether the name at one place of a context is one of some.
+
+    place : 0 is the left neighbour, 1 the unit, 2 the right neighbour
+    """
+
+    place: int
+    name: str
+    members: frozenset[str]
+
+    def answer(self, context: Context) -> bool:
+        """Return whether it is."""
+        return context[self.place] in self.members
+
+
+@dataclass(frozen=True, eq=False)
+class Tree:
+    """Nodes in the order in which they are met going down the yes-side first; node 0 is the root.
+
+    questions : those that may be asked
+    asked     : int array [shape=(N,)], the question of each node; -1 marks a leaf
+    no        : int array [shape=(N,)], the node behind the answer no (the one behind yes is the next); -1 at a leaf
+    frames    : float array [shape=(N,)], the frames behind each node
+    """
+
+    questions: tuple[Question, ...]
+    asked: NDArray[np.int32]
+    no: NDArray[np.int32]
+    frames: NDArray[np.float64]
+
+    def path(self, context: Context) -> list[int]:
+        """Return the nodes from the root to the leaf of a context, seen in training or not."""
+        nodes = [0]
+        while self.asked[nodes[-1]] >= 0:
+            node = nodes[-1]
+            nodes.append(node + 1 if self.questions[self.asked[node]].answer(context) else int(self.no[node]))
+        return nodes
+
+    @property
+    def leaves(self) -> NDArray[np.intp]:
+        """The nodes that ask nothing."""
+        return np.nonzero(self.asked < 0)[0]
+
+    def name(self, node: int) -> str:
+        """Return the answers that lead to a node, in words."""
+        answers = []
+        at = 0
+        while at != node:
+            yes = node < self.no[at]
+            asked = self.questions[self.asked[at]]
+            answers.append(f"{PLACES[asked.place]} {'is' if yes else 'is not'} {asked.name}")
+            at = at + 1 if yes else int(self.no[at])
+        return ", ".join(answers) or "any"
+
+    def text(self) -> str:
+        """Return the tree for people to read: a line a node, indented by its depth."""
+        lines: list[str] = []
+
+        def write(node: int, depth: int, answer: str) -> None:
+            asked = self.asked[node]
+            question = self.questions[asked] if asked >= 0 else None
+            says = f"{PLACES[question.place]} is {question.name}?" if question else "leaf"
+            lines.append(f"{'  ' * depth}{answer}{says} ({self.frames[node]:.0f} frames)")
+            if question:
+                write(node + 1, depth + 1, "yes: ")
+                write(int(self.no[node]), depth + 1, "no: ")
+
+        write(0, 0, "")
+        return "\n".join(lines)
+
+
+PLACES = ("left", "unit", "right")
+
+
+def gaussian_likelihood(statistics: Array) -> Array:
+    """Return the log likelihood of frames under the diagonal Gaussian that fits them best [shape=(N,)].
+
+    statistics : [shape=(N, 1 + 2·D)]: count, sums, sums of squares
+    """
+    count = np.maximum(statistics[:, :1], 1e-12)
+    sums, squares = np.split(statistics[:, 1:] / count, 2, axis=1)
+    variance = np.maximum(squares - sums * sums, LEAST_VARIANCE)
+    likelihood: Array = -0.5 * count[:, 0] * (np.log(2 * np.pi * variance) + 1).sum(axis=1)
+    return likelihood
+
+
+def grow(
+    contexts: Sequence[Context],
+    statistics: Array,
+    questions: Sequence[Question],
+    log_likelihood: Likelihood,
+    *,
+    parameters: int,
+    factor: float,
+    least: float,
+) -> Tree:
+    """Return the tree whose every split gains more likelihood than its description costs.
+
+    contexts   : C different ones
+    statistics : [shape=(C, K)], additive, the count of frames first
+    parameters : of one density; a split adds as many, at ``factor`` · ½ log(frames) each
+    least      : frames that a leaf must have
+    Source: Shinoda & Watanabe 2000 (minimum description length).
+    """
+    questions = tuple(questions)
+    answers = np.array([[q.answer(c) for c in contexts] for q in questions], float).reshape(len(questions), -1)
+    price = factor * parameters / 2 * np.log(max(statistics[:, 0].sum(), 2.0))
+    asked: list[int] = []
+    no: list[int] = []
+    frames: list[float] = []
+
+    def add(members: NDArray[np.intp]) -> None:
+        node = len(asked)
+        inside = statistics[members]
+        asked.append(_best_question(answers[:, members], inside, log_likelihood, price, least))
+        no.append(-1)
+        frames.append(float(inside[:, 0].sum()))
+        if asked[node] >= 0:
+            yes = answers[asked[node], members] > 0
+            add(members[yes])
+            no[node] = len(asked)
+            add(members[~yes])
+
+    add(np.arange(len(contexts)))
+    return Tree(questions, np.array(asked, np.int32), np.array(no, np.int32), np.array(frames))
+
+
+def _best_question(answers: Array, statistics: Array, log_likelihood: Likelihood, price: float, least: float) -> int:
+    """Return the question that gains most, or -1 where none gains more than its price."""
+    total = statistics.sum(axis=0)
+    yes = answers @ statistics
+    allowed = np.nonzero((yes[:, 0] >= least) & (total[0] - yes[:, 0] >= least))[0]
+    if not len(allowed):
+        return -1
+    gain = log_likelihood(yes[allowed]) + log_likelihood(total - yes[allowed]) - log_likelihood(total[None])
+    best = int(gain.argmax())
+    return int(allowed[best]) if gain[best] > price else -1
+
+
+def tree_arrays(trees: Mapping[str, Tree]) -> dict[str, NDArray[Any]]:
+    """Return trees that share their questions, by name, as plain arrays."""
+    questions = next(iter(trees.values())).questions
+    return {
+        "questions": np.array([(str(q.place), q.name, " ".join(sorted(q.members))) for q in questions], np.str_),
+        "trees": np.array(list(trees)),
+        "sizes": np.array([len(tree.asked) for tree in trees.values()], np.int32),
+        "asked": np.concatenate([tree.asked for tree in trees.values()]),
+        "no": np.concatenate([tree.no for tree in trees.values()]),
+        "frames": np.concatenate([tree.frames for tree in trees.values()]),
+    }
+
+
+def trees_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> dict[str, Tree]:
+    """Return the trees again. Raises KeyError, ValueError: something is missing or inconsistent."""
+    questions = tuple(
+        Question(int(place), str(name), frozenset(str(members).split()))
+        for place, name, members in arrays["questions"].reshape(-1, 3)
+    )
+    ends = np.cumsum(arrays["sizes"])
+    if any(len(arrays[key]) != ends[-1] for key in ("asked", "no", "frames")) or (arrays["sizes"] < 1).any():
+        raise ValueError(f"trees of {ends[-1]} nodes with {len(arrays['asked'])} questions asked")
+    trees = {}
+    for name, start, end in zip(arrays["trees"].tolist(), ends - arrays["sizes"], ends, strict=True):
+        asked, no = arrays["asked"][start:end].astype(np.int32), arrays["no"][start:end].astype(np.int32)
+        _check_nodes(asked, no, len(questions))
+        trees[name] = Tree(questions, asked, no, arrays["frames"][start:end].astype(float))
+    return trees
+
+
+def _check_nodes(asked: NDArray[np.int32], no: NDArray[np.int32], questions: int) -> None:
+    """Raise ValueError where the nodes are no tree in the order of ``Tree``."""
+    inner = asked >= 0
+    if (asked >= questions).any() or (asked < -1).any() or (no[~inner] != -1).any():
+        raise ValueError("a tree asks a question that there is not")
+    end = [len(asked)]  # where the subtrees that are open end
+    for node in range(len(asked)):
+        if node == end[-1]:
+            end.pop()
+        if inner[node]:
+            if not node + 1 < no[node] < end[-1]:
+                raise ValueError("a tree whose branches do not end")
+            end.append(int(no[node]))
+        elif node + 1 != end[-1]:
+            raise ValueError("a tree whose branches do not meet")

@@ -1,0 +1,128 @@
+from itertools import product
+
+import numpy as np
+import pytest
+
+from lipmotion.stats.trees import Question, gaussian_likelihood, grow, tree_arrays, trees_from_arrays
+
+UNITS = ("a", "b", "c", "d")
+QUESTIONS = [Question(place, unit, frozenset([unit])) for place in range(3) for unit in UNITS]
+QUESTIONS += [Question(place, "early", frozenset("ab")) for place in range(3)]
+CONTEXTS = list(product(UNITS, repeat=3))
+
+
+def statistics_of(values):
+    """Count, sum and sum of squares of each context's values [each shape=(N, D)]."""
+    return np.array([np.concatenate([[len(x)], x.sum(axis=0), (x * x).sum(axis=0)]) for x in values])
+
+
+def sample(mean_of, frames=20, seed=0):
+    draw = np.random.default_rng(seed)
+    return [draw.normal(mean_of(context), 0.1, (frames, 2)) for context in CONTEXTS]
+
+
+def grown(values, factor=1.0, least=10.0, contexts=CONTEXTS):
+    return grow(
+        contexts, statistics_of(values), QUESTIONS, gaussian_likelihood, parameters=4, factor=factor, least=least
+    )
+
+
+def test_the_likelihood_is_that_of_the_gaussian_fitted_to_the_frames():
+    x = np.random.default_rng(0).normal([1, -2], [0.5, 3], (50, 2))
+    mean, variance = x.mean(axis=0), x.var(axis=0)
+    expected = (-0.5 * (np.log(2 * np.pi * variance) + (x - mean) ** 2 / variance)).sum()
+    assert gaussian_likelihood(statistics_of([x]))[0] == pytest.approx(expected, rel=1e-9)
+
+
+def test_the_question_that_matters_is_asked_first():
+    tree = grown(sample(lambda context: 5.0 if context[0] in "ab" else 0.0))
+    assert tree.questions[tree.asked[0]] == Question(0, "early", frozenset("ab"))
+    assert len(tree.leaves) == 2
+    assert tree.frames[0] == 20 * 64
+
+
+def test_pure_noise_is_not_split():
+    assert len(grown(sample(lambda _: 0.0), factor=1.0).asked) == 1
+
+
+def test_a_lower_price_gives_a_larger_tree():
+    values = sample(lambda context: 0.05 * UNITS.index(context[0]) + 0.03 * UNITS.index(context[2]))
+    assert len(grown(values, factor=0.2).leaves) > len(grown(values, factor=20.0).leaves)
+
+
+def test_no_leaf_has_fewer_frames_than_asked_for():
+    values = sample(lambda context: float(UNITS.index(context[0]) * 4 + UNITS.index(context[1])))
+    tree = grown(values, least=100.0)
+    assert len(tree.leaves) > 1
+    assert tree.frames[tree.leaves].min() >= 100
+
+
+def test_splits_are_those_of_a_search_by_hand():
+    """The root's question has the highest gain of all, counted frame by frame."""
+    values = sample(lambda context: 1.0 * (context[1] == "c") + 0.4 * (context[2] in "ab"))
+    tree = grown(values)
+
+    def likelihood(chosen):
+        x = np.concatenate(chosen)
+        return (-0.5 * (np.log(2 * np.pi * x.var(axis=0)) + 1)).sum() * len(x)
+
+    gains = []
+    for question in QUESTIONS:
+        yes = [x for x, c in zip(values, CONTEXTS, strict=True) if question.answer(c)]
+        no = [x for x, c in zip(values, CONTEXTS, strict=True) if not question.answer(c)]
+        gains.append(likelihood(yes) + likelihood(no))
+    assert tree.asked[0] == int(np.argmax(gains))
+
+
+def test_every_context_finds_a_leaf_even_one_of_unknown_names():
+    tree = grown(sample(lambda context: float(UNITS.index(context[0]))))
+    for context in [*CONTEXTS, ("x", "y", "z")]:
+        path = tree.path(context)
+        assert path[0] == 0
+        assert tree.asked[path[-1]] == -1
+
+
+def test_a_context_never_seen_is_treated_like_those_that_answer_alike():
+    seen = [context for context in CONTEXTS if context[0] != "b"]
+    values = [x for x, c in zip(sample(lambda c: 5.0 * (c[0] in "ab")), CONTEXTS, strict=True) if c[0] != "b"]
+    questions = [q for q in QUESTIONS if q.name == "early"]  # the only ones that know b
+    tree = grow(seen, statistics_of(values), questions, gaussian_likelihood, parameters=4, factor=1.0, least=10.0)
+    assert tree.path(("b", "a", "a"))[-1] == tree.path(("a", "a", "a"))[-1]
+    assert tree.path(("b", "a", "a"))[-1] != tree.path(("c", "a", "a"))[-1]
+
+
+def test_the_tree_can_be_read():
+    tree = grown(sample(lambda context: 5.0 if context[0] in "ab" else 0.0))
+    assert tree.text().splitlines() == [
+        "left is early? (1280 frames)",
+        "  yes: leaf (640 frames)",
+        "  no: leaf (640 frames)",
+    ]
+    assert [tree.name(node) for node in range(3)] == ["any", "left is early", "left is not early"]
+
+
+def test_trees_come_back_from_arrays():
+    trees = {
+        "one": grown(sample(lambda context: float(UNITS.index(context[0]) + 3 * UNITS.index(context[2])))),
+        "two": grown(sample(lambda _: 0.0)),
+    }
+    again = trees_from_arrays(tree_arrays(trees))
+    assert list(again) == ["one", "two"]
+    for name, tree in trees.items():
+        assert again[name].text() == tree.text()
+        assert [again[name].path(c) for c in CONTEXTS] == [tree.path(c) for c in CONTEXTS]
+
+
+@pytest.mark.parametrize(
+    ("key", "change"),
+    [
+        ("no", lambda no: np.where(no >= 0, 0, no)),  # a loop
+        ("no", lambda no: no * 0 - 1),
+        ("asked", lambda asked: asked + 100),
+        ("asked", lambda asked: asked[:-1]),
+    ],
+)
+def test_damaged_trees_are_refused(key, change):
+    arrays = tree_arrays({"one": grown(sample(lambda context: float(UNITS.index(context[0]))))})
+    with pytest.raises(ValueError, match="tree"):
+        trees_from_arrays(arrays | {key: change(arrays[key])})
