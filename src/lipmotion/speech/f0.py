@@ -36,6 +36,8 @@ LONG_LAG = 0.15
 """The longest lag loses this share of its correlation: a period is as alike to the second next as to the next."""
 SILENCE = 2e-4
 """Power, of that of loud frames (−37 dB), which is added to every frame's: silence is like nothing, itself included."""
+ROUNDING = 1e-10
+"""Power, of that of the highest sample, which is added too: what rounding leaves of a constant has a period."""
 CANDIDATES = 4
 """Lags considered in a frame."""
 
@@ -45,7 +47,7 @@ _HOP = HOP // _STEP
 _PASSED_HZ = (50.0, 1200.0)  # rumble is below; above, harmonics are as noisy as they are useful
 _TAPS = 255
 _WINDOW = 160  # 40 ms, Hann: half of the weight lies within ±6 ms
-_REACH = _STEP * _WINDOW // 2 + _TAPS // 2 - 1  # samples at 16 kHz before the centre of a frame that it hears
+_REACH = _STEP * (_WINDOW - 1) // 2 + _TAPS // 2  # samples at 16 kHz before the centre of a frame that it hears
 
 Floats = NDArray[np.float32]
 
@@ -59,7 +61,7 @@ def log_f0(audio: Audio) -> Floats:
     Raises InputError: as ``speech.mfcc`` says.
     """
     samples = checked_samples(audio)
-    silence = SILENCE * _loudness(samples)
+    silence = SILENCE * _loudness(samples) + ROUNDING * float(max(samples.max(), -samples.min())) ** 2
     frames = frame_count(samples)
     pitch = np.empty((CANDIDATES + 1, frames), np.float32)
     pointers = np.empty((frames, CANDIDATES + 1), np.uint8)
@@ -81,7 +83,7 @@ def correlations(samples: Floats, block: slice, silence: float) -> Floats:
     """
     tables = _tables()
     low = _low_passed(samples, block.start * HOP - _REACH, block.stop - block.start + _WINDOW // _HOP)
-    x = np.ascontiguousarray(sliding_window_view(low, _WINDOW)[: len(low) - _WINDOW : _HOP])
+    x = sliding_window_view(low, _WINDOW)[: len(low) - _WINDOW : _HOP].copy()
     spectrum = x @ tables.fourier
     bins = spectrum.shape[1] // 2
     likeness = (np.square(spectrum[:, :bins]) + np.square(spectrum[:, bins:])) @ tables.inverse
@@ -133,7 +135,7 @@ def _steps(before: Floats, pitch: Floats, cost: Floats) -> NDArray[np.float64]:
     before : log F0 of the frame before the first [shape=(CANDIDATES,)]
     """
     earlier = np.concatenate([before[:, None], pitch[:, :-1]], axis=1)
-    steps = np.full((CANDIDATES + 1, *(CANDIDATES + 1, pitch.shape[1])), VOICING_CHANGE)
+    steps = np.full((CANDIDATES + 1, CANDIDATES + 1, pitch.shape[1]), VOICING_CHANGE)
     steps[:-1, :-1] = JUMP * np.abs(pitch - earlier[:, None])
     steps[-1, -1] = 0
     steps[:, :-1] += cost
@@ -153,18 +155,25 @@ def _loudness(samples: Floats) -> float:
 
 def _low_passed(samples: Floats, first: int, hops: int) -> Floats:
     """Return ``hops`` · 10 ms at 4 kHz, the first sample centred ``_TAPS // 2`` after sample ``first``."""
-    tables = _tables()
-    heard = _reflected(samples, first, first + (hops - 1) * HOP + len(tables.low_pass))
-    low: Floats = sliding_window_view(heard, len(tables.low_pass))[::HOP] @ tables.low_pass
+    low_pass = _tables().low_pass
+    parts = low_pass.shape[1] // _HOP
+    heard = _reflected(samples, first, first + (hops + parts - 1) * HOP)
+    each = heard.reshape(-1, HOP) @ low_pass  # what 10 ms add to the 10 ms at their place and before
+    low = each[:hops, :_HOP].copy()
+    for part in range(1, parts):
+        low += each[part : part + hops, part * _HOP : (part + 1) * _HOP]
     return low.reshape(-1)
 
 
 def _reflected(samples: Floats, first: int, end: int) -> Floats:
     """Return samples ``first``..``end`` - 1 of the signal reflected at both ends, as often as it takes."""
-    if first >= 0 and end <= len(samples):
+    count = len(samples)
+    if first >= 0 and end <= count:
         return samples[first:end]
-    last = len(samples) - 1
-    return samples[last - np.abs(last - np.abs(np.arange(first, end)) % (2 * last))]
+    last, outside = count - 1, np.concatenate([np.arange(first, 0), np.arange(max(first, count), end)])
+    reflected = samples[last - np.abs(last - np.abs(outside) % (2 * last))]
+    before = max(-first, 0)
+    return np.concatenate([reflected[:before], samples[max(first, 0) : end], reflected[before:]])
 
 
 def lags() -> NDArray[np.float64]:
@@ -175,7 +184,7 @@ def lags() -> NDArray[np.float64]:
 class _Tables(NamedTuple):
     """What signals are multiplied with.
 
-    low_pass    : samples of 10 ms and around them → 40 samples at 4 kHz [shape=(411, 40)]
+    low_pass    : 10 ms → their part of 10 ms at 4 kHz, and of those one and two before [shape=(160, 3 · 40)]
     fourier     : a frame → its windowed spectrum, real parts and then imaginary ones [shape=(_WINDOW, 2 · bins)]
     inverse     : powers of the spectrum → Σ w(t) x(t) w(t+k) x(t+k) [shape=(bins, L)]
     early, late : squares of a frame → Σ w(t) w(t+k) x²(t), and of x²(t+k) [shape=(_WINDOW, L)]
@@ -192,7 +201,7 @@ class _Tables(NamedTuple):
 
 @cache
 def _tables() -> _Tables:
-    time, size = np.arange(_WINDOW)[:, None], _WINDOW + int(lags()[-1]) + 1
+    time, size = np.arange(float(_WINDOW))[:, None], _WINDOW + int(lags()[-1]) + 1
     bins = np.arange(int(1.5 * _PASSED_HZ[1] / _RATE_HZ * size))
     angle = 2 * np.pi * time * bins / size
     fourier = np.concatenate([np.cos(angle), np.sin(angle)], axis=1) * _window(time)
@@ -207,12 +216,12 @@ def _window(time: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _low_pass() -> NDArray[np.float64]:
-    """Return a windowed-sinc band pass that stops 0 Hz, once for every output [shape=(_TAPS + HOP - _STEP, _HOP)]."""
+    """Return a windowed-sinc band pass that stops 0 Hz, once for every output [shape=(HOP, 3 · _HOP)]."""
     time = np.arange(_TAPS) - _TAPS // 2
     low, high = (2 * hertz / SPEECH_RATE_HZ * np.sinc(2 * hertz / SPEECH_RATE_HZ * time) for hertz in _PASSED_HZ)
     taps = (high - low) * np.hamming(_TAPS)
     taps -= np.hamming(_TAPS) * taps.sum() / np.hamming(_TAPS).sum()
-    table = np.zeros((_TAPS + HOP - _STEP, _HOP))
+    table = np.zeros((3 * HOP, _HOP))
     for output in range(_HOP):
         table[_STEP * output : _STEP * output + _TAPS, output] = taps
-    return table
+    return np.concatenate(np.split(table, 3), axis=1)
