@@ -1,7 +1,8 @@
 """The slow, readable twin of the correlations of ``speech.f0``: one frame, one lag, one sample at a time.
 
 Written from its description: a windowed-sinc band pass of 255 taps from 50 to 1200 Hz that stops 0 Hz, every fourth
-sample; 160 of them centred on the frame, weighted by a Hann window; the likeness to itself, normalised.
+sample; 160 of them centred on the frame, weighted by a Hann window; the likeness to itself, normalised. A thousandth of
+the power of the slope of the full signal, 10 ms either side, counts as silence.
 """
 
 from __future__ import annotations
@@ -56,3 +57,9 @@ def likeness(x: Array, lag: int, silence: float) -> float:
     product = sum(w * a * b for w, a, b in pairs)
     energy = sum(w * a * a for w, a, _ in pairs), sum(w * b * b for w, _, b in pairs)
     return product / (math.sqrt(energy[0] * energy[1]) + silence * sum(weights))
+
+
+def hiss(samples: Array, n: int) -> float:
+    """Return the power that a frame's hiss adds to silence."""
+    times = range(160 * n - 160, 160 * n + 160)
+    return sum((sample(samples, t) - sample(samples, t - 1)) ** 2 for t in times) / 320 / 1000

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from scipy.signal import lfilter
+from scipy.signal import butter, lfilter
 
 from lipmotion.errors import InputError
 from lipmotion.speech import f0 as module
@@ -59,7 +59,8 @@ def test_correlations_are_their_slow_twin(n: int) -> None:
     samples = voice(np.linspace(90, 200, 1700)) + noise(1700) / 20
     fast = correlations(samples, slice(0, 11), 1e-5)[n]
     x = f0_oracle.frame(samples.astype(float), n)
-    slow = [f0_oracle.likeness(x, int(lag), 1e-5) for lag in lags()[1::2]]
+    silence = 1e-5 + f0_oracle.hiss(samples.astype(float), n)
+    slow = [f0_oracle.likeness(x, int(lag), silence) for lag in lags()[1::2]]
     assert lags()[1::2].tolist() == list(range(10, 68))
     assert fast[1::2] == pytest.approx(slow, abs=1e-4)
 
@@ -136,6 +137,11 @@ def test_speech_is_voiced_where_it_is(pitch_hz: float) -> None:
 @pytest.mark.parametrize("smoothing", [[1.0], [0.5, 0.5], list(np.hanning(16))])
 def test_noise_has_no_voice(smoothing: list[float]) -> None:
     assert np.isnan(found(np.convolve(noise(20 * RATE_HZ), smoothing).astype(np.float32))).all()
+
+
+def test_hiss_has_no_voice() -> None:
+    forward, back = butter(4, 3000, fs=RATE_HZ, btype="high")
+    assert np.isnan(found(lfilter(forward, back, noise(20 * RATE_HZ)).astype(np.float32))).all()
 
 
 @pytest.mark.parametrize("value", [0.0, 1e-30, 0.3, -1.0, 0.1234567])

@@ -36,6 +36,8 @@ LONG_LAG = 0.15
 """The longest lag loses this share of its correlation: a period is as alike to the second next as to the next."""
 SILENCE = 2e-4
 """Power, of that of loud frames (−37 dB), which is added to every frame's: silence is like nothing, itself included."""
+HISS = 1e-3
+"""Share of the power of the slope of the full signal that is added too: what little of s is low may seem to hum."""
 ROUNDING = 1e-10
 """Power, of that of the highest sample, which is added too: what rounding leaves of a constant has a period."""
 CANDIDATES = 4
@@ -78,8 +80,8 @@ def correlations(samples: Floats, block: slice, silence: float) -> Floats:
     """Return how alike the signal is to itself, at lags of ``lags()``, around every frame of a block [shape=(n, L)].
 
     silence : power below which likeness counts less and less
-    With x the low-passed signal and w the window, both around the frame:
-    Σ w(t) x(t) w(t+k) x(t+k) / (√(Σ w(t) w(t+k) x²(t) · Σ w(t) w(t+k) x²(t+k)) + silence · Σ w(t) w(t+k)), at most 1.
+    With x the low-passed signal, w the window, both around the frame, and s = ``silence`` + the frame's hiss:
+    Σ w(t) x(t) w(t+k) x(t+k) / (√(Σ w(t) w(t+k) x²(t) · Σ w(t) w(t+k) x²(t+k)) + s · Σ w(t) w(t+k)), at most 1.
     """
     tables = _tables()
     low = _low_passed(samples, block.start * HOP - _REACH, block.stop - block.start + _WINDOW // _HOP)
@@ -90,7 +92,7 @@ def correlations(samples: Floats, block: slice, silence: float) -> Floats:
     np.square(x, out=x)
     energy = np.sqrt(x @ tables.early)
     energy *= np.sqrt(x @ tables.late)
-    energy += tables.mass * np.float32(silence) + np.finfo(np.float32).tiny
+    energy += tables.mass * (_hiss(samples, block) + np.float32(silence))[:, None] + np.finfo(np.float32).tiny
     likeness /= energy
     return likeness
 
@@ -141,6 +143,14 @@ def _steps(before: Floats, pitch: Floats, cost: Floats) -> NDArray[np.float64]:
     steps[:, :-1] += cost
     steps[:, -1] += UNVOICED
     return steps
+
+
+def _hiss(samples: Floats, block: slice) -> Floats:
+    """Return the power to add for what lies above the low-passed signal, around every frame [shape=(n,)]."""
+    slope = np.diff(_reflected(samples, (block.start - 1) * HOP - 1, block.stop * HOP))
+    np.square(slope, out=slope)
+    power = slope.reshape(-1, HOP).mean(axis=1)
+    return np.float32(HISS / 2) * (power[1:] + power[:-1])
 
 
 def _loudness(samples: Floats) -> float:
