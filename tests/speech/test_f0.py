@@ -77,7 +77,7 @@ def test_the_best_peaks_are_the_candidates() -> None:
     pitch, cost = candidates(likeness)
     lag = lags()[40] + 0.5 / 6  # the top of the parabola, a sixth of a step later
     assert np.exp(pitch[0, 0]) == pytest.approx(4000 / lag)
-    assert cost[0, 0] == pytest.approx(1 - (0.9 + 1 / 120) * (1 - 0.15 * lag / (4000 / 60)))
+    assert cost[0, 0] == pytest.approx(1 - (0.9 + 1 / 120) * (1 - 0.2 * lag / (4000 / 60)))
     assert np.isinf(cost[1:, 0]).all()
     assert np.isinf(cost[:, 1]).all()
 
