@@ -48,7 +48,7 @@ _RATE_HZ = SPEECH_RATE_HZ // _STEP
 _HOP = HOP // _STEP
 _PASSED_HZ = (50.0, 1200.0)  # rumble is below; above, harmonics are as noisy as they are useful
 _TAPS = 255
-_WINDOW = 160  # 40 ms, Hann: half of the weight lies within ±6 ms
+_WINDOW = 160  # 40 ms, Hann: half of the weight lies within ±5.3 ms
 _REACH = _STEP * (_WINDOW - 1) // 2 + _TAPS // 2  # samples at 16 kHz before the centre of a frame that it hears
 
 Floats = NDArray[np.float32]
