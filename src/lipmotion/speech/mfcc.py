@@ -98,7 +98,7 @@ def log_mel(samples: NDArray[np.float32], filters: NDArray[np.float32]) -> NDArr
     filters : weights of the powers from 0 to 8 kHz [shape=(257, F)]
     """
     window = np.hamming(WINDOW).astype(np.float32)
-    power = np.empty((_frame_count(samples), filters.shape[1]), np.float32)
+    power = np.empty((frame_count(samples), filters.shape[1]), np.float32)
     for block in _blocks(len(power)):
         heard = _heard(samples, block)
         emphasised = heard[1:] - np.float32(PRE_EMPHASIS) * heard[:-1]
@@ -109,7 +109,7 @@ def log_mel(samples: NDArray[np.float32], filters: NDArray[np.float32]) -> NDArr
 
 def log_energy(samples: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return the logarithm of the energy around every frame, floored 80 dB under the loudest [shape=(T,)]."""
-    energy = np.empty(_frame_count(samples), np.float32)
+    energy = np.empty(frame_count(samples), np.float32)
     for block in _blocks(len(energy)):
         energy[block] = np.square(_frames(_heard(samples, block)[1:])).sum(axis=1)
     return _log_power(energy)
@@ -123,7 +123,8 @@ def _heard(samples: NDArray[np.float32], block: slice) -> NDArray[np.float32]:
     return np.pad(inside, (max(-first, 0), max(last - len(samples), 0)), mode="reflect")
 
 
-def _frame_count(samples: NDArray[np.float32]) -> int:
+def frame_count(samples: NDArray[np.float32]) -> int:
+    """Return T = floor(duration · 100) + 1."""
     return int(len(samples) / SPEECH_RATE_HZ * FRAME_RATE_HZ + 1e-9) + 1
 
 

@@ -1,0 +1,78 @@
+"""The cheapest path through a few states a frame, where every step has its own costs."""
+
+from __future__ import annotations
+
+from math import isqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def cheapest_arrivals(start: Array, steps: Array) -> tuple[Array, NDArray[np.uint8]]:
+    """Return what the cheapest way to each last state costs [shape=(C,)], and where it came from [shape=(T, C)].
+
+    start : cost of each state before the first step [shape=(C,)]; infinite ones cannot be
+    steps : cost of going from state i to state j [shape=(C, C, T), i first]; for every j one is finite, C ≤ 256
+    Ties go to the lower state. A long recording is passed a stretch at a time: what is returned starts the next one.
+    Exact: Viterbi, Δ_t(j) = min_i Δ_{t−1}(i) + steps(i, j, t). In the algebra of (min, +) a piece of √T frames is
+    one C × C matrix; first these of all pieces at once, then the costs between pieces, one after another, then the
+    costs within all pieces at once.
+    Cost: O(T·C³) time in O(√T) array operations, O(T·C²) memory.
+    """
+    states, frames = len(start), steps.shape[2]
+    pieces = _in_pieces(steps)
+    before = np.empty((len(pieces), states, pieces.shape[3]))
+    before[0] = _entries(start, _products(pieces))
+    for frame in range(len(pieces) - 1):
+        before[frame + 1] = (before[frame][:, None] + pieces[frame]).min(axis=0)
+    arrivals, pointers = _cheapest(before[:, :, None] + pieces)
+    in_order = pointers.transpose(2, 0, 1).reshape(-1, states)[:frames]
+    return arrivals[-1, :, -1], in_order
+
+
+def traced(pointers: NDArray[np.uint8], last: int) -> NDArray[np.intp]:
+    """Return the state of every frame [shape=(T,)] on the way that ends in ``last``."""
+    states, table = pointers.shape[1], pointers.tobytes()
+    path = [last]
+    for row in range(len(table) - states, 0, -states):
+        path.append(table[row + path[-1]])
+    return np.array(path[::-1], np.intp)
+
+
+def _in_pieces(steps: Array) -> Array:
+    """Return the steps [shape=(length, C, C, pieces)]; after the last, every state stays for nothing."""
+    states, _, frames = steps.shape
+    length = isqrt(frames - 1) + 1
+    count = -(-frames // length)
+    padded = np.empty((states, states, count * length))
+    padded[..., :frames] = steps
+    padded[..., frames:] = np.where(np.eye(states), 0.0, np.inf)[..., None]
+    return np.ascontiguousarray(padded.reshape(states, states, count, length).transpose(3, 0, 1, 2))
+
+
+def _products(pieces: Array) -> Array:
+    """Return the cheapest ways through each piece, from any state to any [shape=(C, C, pieces)]."""
+    product = pieces[0]
+    for step in pieces[1:]:
+        product = (product[:, :, None] + step).min(axis=1)
+    return product
+
+
+def _entries(start: Array, products: Array) -> Array:
+    """Return the cost of every state before each piece [shape=(C, pieces)]."""
+    entries = np.empty((len(start), products.shape[2]))
+    entries[:, 0] = start
+    for piece in range(entries.shape[1] - 1):
+        entries[:, piece + 1] = (entries[:, piece, None] + products[:, :, piece]).min(axis=0)
+    return entries
+
+
+def _cheapest(ways: Array) -> tuple[Array, NDArray[np.uint8]]:
+    """Return the least over the state before [shape of ways: (length, C, C, pieces)], and which it is."""
+    least, which = ways[:, 0].copy(), np.zeros((len(ways), *ways.shape[2:]), np.uint8)
+    for state in range(1, ways.shape[1]):
+        which[ways[:, state] < least] = state
+        np.minimum(least, ways[:, state], out=least)
+    return least, which
