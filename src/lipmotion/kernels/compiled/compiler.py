@@ -15,7 +15,16 @@ def compiled(function: FunctionT) -> FunctionT:
 
     Divisions by zero give infinities, as in NumPy.
     """
-    options = {"nogil": True, "error_model": "numpy"}
+    return _compiled(function, False)
+
+
+def compiled_to_rounding(function: FunctionT) -> FunctionT:
+    """Compile likewise, sums in any order: results differ from NumPy's by rounding."""
+    return _compiled(function, {"nnan", "nsz", "reassoc", "contract", "arcp"})
+
+
+def _compiled(function: FunctionT, fastmath: set[str] | bool) -> FunctionT:
+    options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": fastmath}
     try:
         return numba.njit(cache=True, **options)(function)
     except RuntimeError:  # neither beside this file nor in the user's cache folder can anything be written

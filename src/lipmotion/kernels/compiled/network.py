@@ -1,0 +1,167 @@
+"""Forward–backward through networks, compiled, with scaled probabilities in double precision.
+
+Nothing under ``LEAST`` is kept, so no product is denormal, which would be many times slower; and a state without forward
+probability gets no backward one, which else might grow without limit.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.kernels.compiled.compiler import compiled_to_rounding
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+LEAST, LEAST_POSTERIOR = 1e-140, 1e-30
+
+
+@compiled_to_rounding
+def forward_backward(
+    emission: Array, edges: Index, initial: Array, final: Array, runs: Index, run_weight: Array,
+    blocks: Index, block_sources: Index, block_weight: Array, turned: Array,
+) -> tuple[Array, Array, Array, Array, Array]:  # fmt: skip
+    """Return what recordings say about a network; ``emission`` becomes the posteriors.
+
+    emission     : float32 or float64 [shape=(T, S)], by place, one recording after the other: the eighth roots of densities
+                   relative to the best of each frame
+    edges        : [shape=(U + 1,)], where each begins, and T
+    runs ... block_weight : of the layout and its weights (``kernels.arcs``); turned: those of blocks with targets as rows
+    Returns how often each run arc is followed, divided by its weight [shape=(N,)]; the forward probabilities of all
+    blocks' sources and, of the next frame, backward ones of their targets, whose products over time count block arcs
+    [shapes=(T, ...)]; the scale of each frame [shape=(T,)] and of each end [shape=(U,)], 0 where there is no path: their
+    product is the likelihood.
+    """
+    T, S = emission.shape
+    targets = 0
+    for b in range(len(blocks)):
+        targets += blocks[b, 1]
+    counts, scales, ends = np.zeros(len(run_weight)), np.ones(T), np.zeros(len(edges) - 1)
+    leaving, entering = np.zeros((T, len(block_sources))), np.zeros((T, targets))
+    longest = 0
+    for u in range(len(ends)):
+        longest = max(longest, edges[u + 1] - edges[u])
+    forward, beta, onward, room = np.empty((longest, S)), np.empty(S), np.empty(S), np.empty(max(block_weight.shape[1], turned.shape[1]))
+    for u in range(len(ends)):
+        frames = slice(edges[u], edges[u + 1])
+        density, scale, leave, enter = emission[frames], scales[frames], leaving[frames], entering[frames]
+        alpha = forward[: len(density)]
+        for t in range(len(alpha)):
+            if t == 0:
+                alpha[t] = initial
+            else:
+                alpha[t] = 0
+                _forward_runs(alpha[t - 1], alpha[t], runs, run_weight)
+                _forward_blocks(alpha[t - 1], alpha[t], blocks, block_sources, block_weight, leave[t - 1], room)
+            scale[t] = _emit(alpha[t], density[t])
+            if scale[t] <= 0:
+                break
+        ends[u] = (alpha[-1] * final).sum() if scale.min() > 0 else 0.0
+        if ends[u] <= 0:
+            ends[u] = 0
+            density[:], leave[:] = 0, 0
+            continue
+        beta[:] = final / ends[u]
+        for t in range(len(alpha) - 1, -1, -1):
+            _close(density[t], alpha[t], beta, onward, 1 / scale[t])
+            if t > 0:
+                beta[:] = 0
+                _backward_runs(alpha[t - 1], onward, beta, runs, run_weight, counts)
+                _backward_blocks(onward, beta, blocks, block_sources, turned, enter[t - 1], room)
+    return counts, leaving, entering, scales, ends
+
+
+@compiled_to_rounding
+def _forward_runs(before: Array, after: Array, runs: Index, weight: Array) -> None:
+    for r in range(len(runs)):
+        target, source, length, first = runs[r]
+        into, out, arc = after[target : target + length], before[source:], weight[first:]
+        for i in range(len(into)):
+            into[i] += arc[i] * out[i]
+
+
+@compiled_to_rounding
+def _forward_blocks(
+    before: Array, after: Array, blocks: Index, sources: Index, weight: Array, leaving: Array, room: Array
+) -> None:
+    for b in range(len(blocks)):
+        target, targets, first, count = blocks[b]
+        enter, share = room[: weight.shape[1]], leaving[first : first + count]
+        for s in range(count):
+            share[s] = before[sources[first + s]]
+        _times(share, weight[first : first + count], enter)
+        after[target : target + targets] += enter[:targets]
+
+
+@compiled_to_rounding
+def _density(root: float) -> float:
+    """Return the eighth power, in double precision whatever the root's."""
+    square = np.float64(root) * np.float64(root)
+    return square * square * (square * square)
+
+
+@compiled_to_rounding
+def _emit(row: Array, emission: Array) -> float:
+    """Multiply by the densities, make the sum 1; return what it was."""
+    total = 0.0
+    for i in range(len(row)):
+        density = _density(emission[i])
+        row[i] *= density if density > LEAST else 0.0
+        total += row[i]
+    scale = 1 / total if total > 0 else 0.0
+    for i in range(len(row)):
+        row[i] = row[i] * scale if row[i] * scale > LEAST else 0.0
+    return total
+
+
+@compiled_to_rounding
+def _close(emission: Array, alpha: Array, beta: Array, onward: Array, scale: float) -> None:
+    """Fill in what is handed back from this frame; make of its densities its posteriors."""
+    for i in range(len(alpha)):
+        back = beta[i] if alpha[i] > 0 and beta[i] > LEAST else 0.0
+        handed = back * _density(emission[i]) * scale
+        onward[i] = handed if handed > LEAST else 0.0
+        posterior = alpha[i] * back
+        emission[i] = posterior if posterior > LEAST_POSTERIOR else 0.0
+
+
+@compiled_to_rounding
+def _backward_runs(alpha: Array, onward: Array, beta: Array, runs: Index, weight: Array, counts: Array) -> None:
+    for r in range(len(runs)):
+        target, source, length, first = runs[r]
+        back, share, hand = beta[source : source + length], alpha[source:], onward[target:]
+        arc, count = weight[first:], counts[first:]
+        for i in range(len(back)):
+            back[i] += arc[i] * hand[i]
+        for i in range(len(back)):
+            count[i] += share[i] * hand[i]
+
+
+@compiled_to_rounding
+def _times(row: Array, matrix: Array, product: Array) -> None:
+    """Multiply a row by a matrix, four of its rows at a time."""
+    product[:] = 0
+    whole = len(row) // 4 * 4
+    for r in range(0, whole, 4):
+        a, b, c, d = row[r], row[r + 1], row[r + 2], row[r + 3]
+        for i in range(len(product)):
+            product[i] += a * matrix[r, i] + b * matrix[r + 1, i] + c * matrix[r + 2, i] + d * matrix[r + 3, i]
+    for r in range(whole, len(row)):
+        a = row[r]
+        for i in range(len(product)):
+            product[i] += a * matrix[r, i]
+
+
+@compiled_to_rounding
+def _backward_blocks(
+    onward: Array, beta: Array, blocks: Index, sources: Index, turned: Array, entering: Array, room: Array
+) -> None:
+    start = 0
+    for b in range(len(blocks)):
+        target, targets, first, count = blocks[b]
+        back, hand = room[: turned.shape[1]], entering[start : start + targets]
+        hand[:] = onward[target : target + targets]
+        _times(hand, turned[start : start + targets], back)
+        for s in range(count):
+            beta[sources[first + s]] += back[s]
+        start += targets
