@@ -1,8 +1,8 @@
 """How the arcs of a network lie in memory, so that many are followed at once.
 
-States are put into an order in which arcs come in **runs**: neighbouring sources lead to neighbouring targets, and a run
-is followed as one vector. Where many states share the same many sources, as the first states of all phones in a loop do,
-their arcs are a **block**, a dense matrix. Loops of states (arcs to themselves) are always in runs.
+States are put into an order in which arcs come in **runs**: neighbouring sources lead to neighbouring targets, and a
+run is followed as one vector. Where many states share the same many sources, as the first states of all phones in a
+loop do, their arcs are a **block**, a dense matrix. Loops of states (arcs to themselves) are always in runs.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class Layout(NamedTuple):
     """Where everything of a network lies. A place is the position of a state in the new order.
 
     order, place : [shape=(S,)], the state at each place, and the place of each state
-    runs         : [shape=(R, 4)], first target's place, first source's place, length, position of its arcs in ``run_arcs``
+    runs         : [shape=(R, 4)], first target's place, first source's place, length, position in ``run_arcs``
     run_arcs     : [shape=(N,)], arcs by run
     blocks       : [shape=(B, 4)], first target's place, targets, position of its first source in what follows, sources
     block_sources : [shape=(X,)], the places of sources
@@ -122,7 +122,11 @@ def _runs(source: Index, target: Index) -> tuple[Index, Index]:
 def _blocks(groups: _Groups, arc_from: Index, place: Index) -> tuple[Index, Index, Index]:
     total = sum(len(arcs) for _, arcs in groups)
     widest = max((-(-len(targets) // PADDED) * PADDED for targets, _ in groups), default=PADDED)
-    blocks, sources, matrix = np.empty((len(groups), 4), np.intp), np.empty(total, np.intp), np.full((total, widest), -1)
+    blocks, sources, matrix = (
+        np.empty((len(groups), 4), np.intp),
+        np.empty(total, np.intp),
+        np.full((total, widest), -1),
+    )
     first = 0
     for number, (targets, arcs) in enumerate(groups):
         blocks[number] = place[targets[0]], len(targets), first, len(arcs)

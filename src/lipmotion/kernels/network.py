@@ -35,7 +35,8 @@ def network_posteriors(
     arc_start    : [shape=(S,)], where each target's arcs begin; every state has at least one
     log_initial, log_final : [shape=(S,)], of beginning and ending in each state
     Returns posterior [shape=(T, S)], counts [shape=(E,)], log likelihood; where there is no path 0, 0 and -inf.
-    Source: the standard recursions.  Compiled, paths 320 nats under a frame's best are left out, unless no other is left.
+    Source: the standard recursions.  Compiled, paths 320 nats under a frame's best are left out, unless none is left
+    then; and what single precision is given, it gives back (1e-6).
     Cost: O(T·E), by NumPy some fifty times slower.
     """
     expectation = Expectation.of(arc_from, arc_log, arc_start, log_initial, log_final)
@@ -87,9 +88,7 @@ class Expectation(NamedTuple):
         arc_log, log_initial, log_final = (log.astype(np.float64) for log in (arc_log, log_initial, log_final))
         layout = laid_out(arc_from, arc_start)
         weights = weights_of(layout, np.exp(arc_log), 0.0)
-        return cls(
-            arc_from, arc_log, arc_start, log_initial, log_final, layout, weights, _turned(layout, weights)
-        )
+        return cls(arc_from, arc_log, arc_start, log_initial, log_final, layout, weights, _turned(layout, weights))
 
     def over(self, log_emission: NDArray[np.floating[Any]], columns: Index, frames: Index) -> Expected:
         """Return what recordings say, one after the other in ``log_emission``.
@@ -123,10 +122,12 @@ class Expectation(NamedTuple):
         np.exp(np.maximum(root, LOWEST_ROOT, out=root), out=root)
         if not np.array_equal(columns, np.arange(root.shape[1])):
             root = root.take(columns, axis=1)
-        (initial, first), (final, last) = (_probabilities(log[layout.order]) for log in (self.log_initial, self.log_final))
+        (initial, first), (final, last) = (
+            _probabilities(log[layout.order]) for log in (self.log_initial, self.log_final)
+        )
         run_counts, leaving, entering, scales, ends = network.forward_backward(
             root, edges, initial, final, layout.runs, self.weights.runs,
-            layout.blocks, layout.block_sources, self.weights.blocks, self.turned,
+            layout.blocks, layout.block_sources, self.weights.blocks.astype(root.dtype), self.turned.astype(root.dtype),
         )  # fmt: skip
         counts = np.zeros(len(self.arc_log))
         counts[layout.run_arcs] = run_counts * self.weights.runs
@@ -136,8 +137,7 @@ class Expectation(NamedTuple):
         return Expected(root, counts, log_likelihood)
 
     def _in_logs(self, log_emission: Array) -> tuple[Array, Array, float]:
-        """Return posteriors, counts and log likelihood of a recording by NumPy, all probabilities as logarithms: however
-        small, none is lost.
+        """Return posteriors, counts and log likelihood of one recording by NumPy, in logarithms: none is too small.
 
         log_emission : [shape=(T, S)], of the states as they are
         """

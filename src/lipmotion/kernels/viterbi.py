@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -133,9 +132,7 @@ class _Search:
             path[frame] = state
 
 
-def _search(
-    emission: Index, arc_from: Index, arc_log: Scores, arc_start: Index, count: int, beam: float
-) -> _Search:
+def _search(emission: Index, arc_from: Index, arc_log: Scores, arc_start: Index, count: int, beam: float) -> _Search:
     arrays = (emission, arc_from, arc_log, arc_start, beam)
     if compiled_pays(count * (FRAME_S + ARC_S * len(arc_from))):
         layout = laid_out(arc_from, arc_start)

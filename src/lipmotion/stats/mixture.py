@@ -176,20 +176,28 @@ class Quadratic:
         values += self.constant
         return values
 
-    def divided(self, x: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    def divided(self, features: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
         """Return the log density of every mixture [shape=(T, G)], and its components' shares of it [shape=(T, M, G)].
 
-        Shares under e^``LEAST_LOG_SHARE`` are not told apart: smaller ones are denormal in products, and slow.
+        features : ``with_squares`` of what the densities are of
+        Of a single component the share is 1, and not told. Shares under e^``LEAST_LOG_SHARE`` are not told apart:
+        in products smaller ones are denormal, and slow.
         """
-        shares = self.log_components(x)
+        whole = np.concatenate([self.form, self.constant.reshape(1, -1)])
+        shares = (features @ whole).reshape(len(features), *self.constant.shape)
         if shares.shape[1] == 1:
-            return shares[:, 0], np.ones((1, 1, 1), np.float32)
+            return shares[:, 0], None
         best = shares.max(axis=1)
         shares -= best[:, None]
         np.exp(np.maximum(shares, LEAST_LOG_SHARE, out=shares), out=shares)
         total = shares.sum(axis=1)
         shares /= total[:, None]
         return best + np.log(total), shares
+
+
+def with_squares(x: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return features [shape=(T, D)], their squares and 1: what densities, and sums over frames, are products of."""
+    return np.concatenate([x, x * x, np.ones((len(x), 1), np.float32)], axis=1)
 
 
 def single_gaussian(x: NDArray[np.float32], count: int) -> Mixtures:

@@ -1,6 +1,7 @@
-"""Forward–backward through networks, compiled, with scaled probabilities in double precision.
+"""Forward–backward through networks, compiled, with scaled probabilities.
 
-Nothing under ``LEAST`` is kept, so no product is denormal, which would be many times slower; and a state without forward
+They are in double precision; products with blocks, whose terms are made alike first, in the evidence's own. Nothing
+under ``LEAST`` is kept, so no product is denormal, which would be many times slower; and a state without forward
 probability gets no backward one, which else might grow without limit.
 """
 
@@ -13,7 +14,7 @@ from lipmotion.kernels.compiled.compiler import compiled_to_rounding
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
-LEAST, LEAST_POSTERIOR = 1e-140, 1e-30
+LEAST, LEAST_POSTERIOR, LEAST_SHARE = 1e-140, 1e-30, 1e-25
 
 
 @compiled_to_rounding
@@ -23,14 +24,15 @@ def forward_backward(
 ) -> tuple[Array, Array, Array, Array, Array]:  # fmt: skip
     """Return what recordings say about a network; ``emission`` becomes the posteriors.
 
-    emission     : float32 or float64 [shape=(T, S)], by place, one recording after the other: the eighth roots of densities
-                   relative to the best of each frame
+    emission     : float32 or float64 [shape=(T, S)], by place, one recording after the other: the eighth roots of
+                   densities relative to the best of each frame
     edges        : [shape=(U + 1,)], where each begins, and T
-    runs ... block_weight : of the layout and its weights (``kernels.arcs``); turned: those of blocks with targets as rows
+    runs ... block_weight : of the layout and its weights (``kernels.arcs``)
+    turned       : the weights of blocks, targets as rows
     Returns how often each run arc is followed, divided by its weight [shape=(N,)]; the forward probabilities of all
     blocks' sources and, of the next frame, backward ones of their targets, whose products over time count block arcs
-    [shapes=(T, ...)]; the scale of each frame [shape=(T,)] and of each end [shape=(U,)], 0 where there is no path: their
-    product is the likelihood.
+    [shapes=(T, ...)]; the scale of each frame [shape=(T,)] and of each end [shape=(U,)], 0 where there is no path:
+    their product is the likelihood.
     """
     T, S = emission.shape
     targets = 0
@@ -41,7 +43,9 @@ def forward_backward(
     longest = 0
     for u in range(len(ends)):
         longest = max(longest, edges[u + 1] - edges[u])
-    forward, beta, onward, room = np.empty((longest, S)), np.empty(S), np.empty(S), np.empty(max(block_weight.shape[1], turned.shape[1]))
+    forward, beta, onward = np.empty((longest, S)), np.empty(S), np.empty(S)
+    room = np.empty(max(block_weight.shape[1], turned.shape[1]), block_weight.dtype)
+    share = np.empty(max(len(block_weight), len(turned)), block_weight.dtype)
     for u in range(len(ends)):
         frames = slice(edges[u], edges[u + 1])
         density, scale, leave, enter = emission[frames], scales[frames], leaving[frames], entering[frames]
@@ -52,7 +56,7 @@ def forward_backward(
             else:
                 alpha[t] = 0
                 _forward_runs(alpha[t - 1], alpha[t], runs, run_weight)
-                _forward_blocks(alpha[t - 1], alpha[t], blocks, block_sources, block_weight, leave[t - 1], room)
+                _forward_blocks(alpha[t - 1], alpha[t], blocks, block_sources, block_weight, leave[t - 1], room, share)
             scale[t] = _emit(alpha[t], density[t])
             if scale[t] <= 0:
                 break
@@ -67,7 +71,7 @@ def forward_backward(
             if t > 0:
                 beta[:] = 0
                 _backward_runs(alpha[t - 1], onward, beta, runs, run_weight, counts)
-                _backward_blocks(onward, beta, blocks, block_sources, turned, enter[t - 1], room)
+                _backward_blocks(onward, beta, blocks, block_sources, turned, enter[t - 1], room, share)
     return counts, leaving, entering, scales, ends
 
 
@@ -82,15 +86,17 @@ def _forward_runs(before: Array, after: Array, runs: Index, weight: Array) -> No
 
 @compiled_to_rounding
 def _forward_blocks(
-    before: Array, after: Array, blocks: Index, sources: Index, weight: Array, leaving: Array, room: Array
+    before: Array, after: Array, blocks: Index, sources: Index, weight: Array, leaving: Array, room: Array, share: Array
 ) -> None:
     for b in range(len(blocks)):
         target, targets, first, count = blocks[b]
-        enter, share = room[: weight.shape[1]], leaving[first : first + count]
+        enter, leave = room[: weight.shape[1]], leaving[first : first + count]
         for s in range(count):
-            share[s] = before[sources[first + s]]
-        _times(share, weight[first : first + count], enter)
-        after[target : target + targets] += enter[:targets]
+            leave[s] = before[sources[first + s]]
+        greatest = _times(leave, weight[first : first + count], share, enter)
+        into = after[target : target + targets]
+        for i in range(len(into)):
+            into[i] += greatest * enter[i]
 
 
 @compiled_to_rounding
@@ -138,30 +144,40 @@ def _backward_runs(alpha: Array, onward: Array, beta: Array, runs: Index, weight
 
 
 @compiled_to_rounding
-def _times(row: Array, matrix: Array, product: Array) -> None:
-    """Multiply a row by a matrix, four of its rows at a time."""
+def _times(row: Array, matrix: Array, share: Array, product: Array) -> float:
+    """Multiply a row, relative to its greatest element, by a matrix, four of its rows at a time; return that element.
+
+    share : room for the row, in the matrix's precision
+    """
+    greatest = 0.0
+    for r in range(len(row)):
+        greatest = max(greatest, row[r])
+    scale = 1 / greatest if greatest > 0 else 0.0
+    for r in range(len(row)):
+        share[r] = row[r] * scale if row[r] * scale > LEAST_SHARE else 0.0
     product[:] = 0
     whole = len(row) // 4 * 4
     for r in range(0, whole, 4):
-        a, b, c, d = row[r], row[r + 1], row[r + 2], row[r + 3]
+        a, b, c, d = share[r], share[r + 1], share[r + 2], share[r + 3]
         for i in range(len(product)):
             product[i] += a * matrix[r, i] + b * matrix[r + 1, i] + c * matrix[r + 2, i] + d * matrix[r + 3, i]
     for r in range(whole, len(row)):
-        a = row[r]
+        a = share[r]
         for i in range(len(product)):
             product[i] += a * matrix[r, i]
+    return greatest
 
 
 @compiled_to_rounding
 def _backward_blocks(
-    onward: Array, beta: Array, blocks: Index, sources: Index, turned: Array, entering: Array, room: Array
+    onward: Array, beta: Array, blocks: Index, sources: Index, turned: Array, entering: Array, room: Array, share: Array
 ) -> None:
     start = 0
     for b in range(len(blocks)):
         target, targets, first, count = blocks[b]
         back, hand = room[: turned.shape[1]], entering[start : start + targets]
         hand[:] = onward[target : target + targets]
-        _times(hand, turned[start : start + targets], back)
+        greatest = _times(hand, turned[start : start + targets], share, back)
         for s in range(count):
-            beta[sources[first + s]] += back[s]
+            beta[sources[first + s]] += greatest * back[s]
         start += targets

@@ -36,7 +36,7 @@ def scores(
         best = _greatest(delta[t])
         if best > NOTHING:
             _lower(delta[t], best, least)
-            shift += best
+            shift += float(best)
     return shift
 
 
@@ -81,7 +81,7 @@ def _greatest(row: Row) -> np.float32:
         g, h = max(row[i + 6], g), max(row[i + 7], h)
     for i in range(whole, len(row)):
         a = max(row[i], a)
-    return max(max(max(a, b), max(c, d)), max(max(e, f), max(g, h)))
+    return max(a, b, c, d, e, f, g, h)
 
 
 @compiled
@@ -92,9 +92,7 @@ def _lower(row: Row, best: np.float32, least: np.float32) -> None:
 
 
 @compiled
-def trace(
-    path: Index, delta: Row, state: int, place: Index, arc_from: Index, arc_log: Row, arc_start: Index
-) -> None:
+def trace(path: Index, delta: Row, state: int, place: Index, arc_from: Index, arc_log: Row, arc_start: Index) -> None:
     """Fill in the states [shape=(T - 1,)] before ``state`` in the last of T frames."""
     for t in range(len(path) - 1, -1, -1):
         stop = arc_start[state + 1] if state + 1 < len(arc_start) else len(arc_from)

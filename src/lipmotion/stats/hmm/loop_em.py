@@ -1,4 +1,4 @@
-"""Expectation–maximisation of mixtures and arcs over a network: models of recordings of which nothing is known but their sound."""
+"""Expectation–maximisation of mixtures and arcs over a network: models of which nothing is known but recordings."""
 
 from __future__ import annotations
 
@@ -11,11 +11,14 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError
 from lipmotion.kernels.network import Expectation
 from lipmotion.stats.hmm.network import Network
-from lipmotion.stats.mixture import Mixtures, Quadratic
+from lipmotion.stats.mixture import Mixtures, Quadratic, with_squares
 from lipmotion.types import Each
 
 CELLS = 1_000_000
 """Frames × components whose posteriors are computed together: 4 MB an array, a few of them."""
+RETAINED = 31 << 20
+"""Bytes: once so much was allocated and freed, glibc keeps what is freed for the next array. Else every array of some
+size is returned to the system and asked for again, which took a third of the time."""
 LEAST_POSTERIOR = np.float32(1e-10)
 """State posteriors under this are left out of the statistics; also, none is denormal there."""
 LEAST_FRAMES = 1.0
@@ -101,7 +104,9 @@ def _check(mixtures: Mixtures, data: Sequence[NDArray[np.float32]], floor: NDArr
     dimension = mixtures.size[2]
     for number, x in enumerate(data):
         if x.ndim != 2 or x.shape[1] != dimension or not len(x):
-            raise InputError(f"recording {number} has shape {x.shape}, required (frames, {dimension}), one frame or more")
+            raise InputError(
+                f"recording {number} has shape {x.shape}, required (frames, {dimension}), one frame or more"
+            )
     if floor.shape != (dimension,) or not (floor > 0).all():
         raise InputError(f"floor has shape {floor.shape}, required ({dimension},), all more than 0")
 
@@ -120,20 +125,23 @@ def _batches(frames: Sequence[int], components: int) -> Iterator[list[int]]:
 
 def _expected(job: tuple[_Model, list[NDArray[np.float32]]]) -> _Sums:
     model, data = job
+    np.empty(RETAINED, np.uint8)  # freed at once
     frames = np.array([len(x) for x in data])
-    x = np.concatenate(data)
-    log_density, shares = model.form.divided(x)
+    features = with_squares(np.concatenate(data))
+    log_density, shares = model.form.divided(features)
     expected = model.expectation.over(log_density, model.columns, frames)
     possible = np.isfinite(expected.log_likelihood)
     begins = np.append(0, np.cumsum(frames[:-1]))
-    posterior = _by_density(expected.posterior, model.columns)
-    posterior *= posterior > LEAST_POSTERIOR
-    weights = (shares * posterior[:, None]).reshape(len(x), -1)
-    features = np.concatenate([x, x * x, np.ones((len(x), 1), np.float32)], axis=1)
+    begun = expected.posterior[begins].sum(axis=0, dtype=np.float64)
+    weights = _by_density(expected.posterior, model.columns)
+    weights[weights < LEAST_POSTERIOR] = 0
+    if shares is not None:
+        shares *= weights[:, None]
+        weights = shares.reshape(len(features), -1)
     return _Sums(
         (weights.T @ features).reshape(*model.form.constant.shape, -1).astype(np.float64),
         expected.counts,
-        expected.posterior[begins].sum(axis=0, dtype=np.float64),
+        begun,
         float(expected.log_likelihood[possible].sum()),
         int(frames[possible].sum()),
     )
