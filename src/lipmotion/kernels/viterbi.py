@@ -31,6 +31,7 @@ def best_path(
     log_initial: NDArray[np.float32],
     log_final: NDArray[np.float32],
     beam: float | None = None,
+    layout: Callable[[], Layout] | None = None,
 ) -> tuple[NDArray[np.intp], float]:
     """Return the most probable path and its log probability (-inf: no path).
 
@@ -43,10 +44,15 @@ def best_path(
     log_initial, log_final : [shape=(S,)]
     beam         : states whose score falls more than this under the frame's best are dropped: faster, and no longer
                    sure to find the best path, or one at all; None: exact
+    layout       : gives that of the arcs (``kernels.arcs``), where it is kept from search to search
     Returns path [shape=(T,)], score.
     Cost: O(T·E) time, O((T / BLOCK + BLOCK)·(S + G)) memory.
     """
-    search = _search(emission, arc_from, arc_log, arc_start, count, np.inf if beam is None else beam)
+    arcs = (emission, arc_from, arc_log, arc_start, np.inf if beam is None else beam)
+    if compiled_pays(count * (FRAME_S + ARC_S * len(arc_from))):
+        search = _laid_out(arcs, layout() if layout else laid_out(arc_from, arc_start))
+    else:
+        search = _Search(*arcs, order=np.arange(len(emission)), place=np.arange(len(emission)))
     starts = range(0, count, BLOCK)
     first = (log_initial + log_emission(0, 1)[0, emission])[None]
     checkpoints, score = [first[0, search.order]], 0.0
@@ -132,10 +138,5 @@ class _Search:
             path[frame] = state
 
 
-def _search(emission: Index, arc_from: Index, arc_log: Scores, arc_start: Index, count: int, beam: float) -> _Search:
-    arrays = (emission, arc_from, arc_log, arc_start, beam)
-    if compiled_pays(count * (FRAME_S + ARC_S * len(arc_from))):
-        layout = laid_out(arc_from, arc_start)
-        return _Search(*arrays, layout.order, layout.place, layout, weights_of(layout, arc_log, -np.inf))
-    states = np.arange(len(emission))
-    return _Search(*arrays, states, states)
+def _laid_out(arcs: tuple[Index, Index, Scores, Index, float], layout: Layout) -> _Search:
+    return _Search(*arcs, layout.order, layout.place, layout, weights_of(layout, arcs[2], -np.inf))

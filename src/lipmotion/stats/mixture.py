@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +49,9 @@ class Mixtures:
         result = np.empty((len(x), form.constant.shape[1]), np.float32)
         for start in range(0, len(x), BLOCK):
             components = form.log_components(x[start : start + BLOCK])
+            if components.shape[1] == 1:
+                result[start : start + BLOCK] = components[:, 0]
+                continue
             best = components.max(axis=1)
             components -= best[:, None]
             np.exp(components, out=components)
@@ -96,32 +100,34 @@ class Mixtures:
         A component with less than two frames' worth of data is switched off.
         """
         posterior = self._responsibilities(density, x, share)
-        self.estimate(density, posterior.sum(axis=0), posterior.T @ x, posterior.T @ (x * x), floor)
+        count, first, second = posterior.sum(axis=0), posterior.T @ x, posterior.T @ (x * x)
+        self.estimate(np.array([density]), count[None], first[None], second[None], floor)
 
     def estimate(
         self,
-        density: int,
-        count: NDArray[np.floating],
-        first: NDArray[np.floating],
-        second: NDArray[np.floating],
+        densities: NDArray[np.intp],
+        count: NDArray[np.floating[Any]],
+        first: NDArray[np.floating[Any]],
+        second: NDArray[np.floating[Any]],
         floor: NDArray[np.float32],
     ) -> None:
-        """Give a density the weights, means and variances that explain sums over its frames best.
+        """Give densities the weights, means and variances that explain sums over their frames best.
 
-        count         : [shape=(M,)], of the posteriors of each component
-        first, second : [shape=(M, D)], of the features and of their squares, times the posteriors
+        densities     : [shape=(G',)], each once
+        count         : [shape=(G', M)], of the posteriors of each component; some of each density
+        first, second : [shape=(G', M, D)], of the features and of their squares, times the posteriors
         floor         : [shape=(D,)], least variance
         A component with less than two frames' worth of data is switched off.
         """
-        alive = count >= min(2.0, count.max())
-        safe = np.where(alive, count, 1)[:, None]
+        alive = count >= np.minimum(2.0, count.max(axis=1, keepdims=True))
+        safe = np.where(alive, count, 1)[:, :, None]
         mean = first / safe
         variance = np.maximum(second / safe - mean * mean, floor)
         weights = np.where(alive, count, 0)
         with np.errstate(divide="ignore"):
-            self.log_weights[density] = np.log(weights / weights.sum())
-        self.means[density] = np.where(alive[:, None], mean, 0)
-        self.variances[density] = np.where(alive[:, None], variance, 1)
+            self.log_weights[densities] = np.log(weights / weights.sum(axis=1, keepdims=True))
+        self.means[densities] = np.where(alive[:, :, None], mean, 0)
+        self.variances[densities] = np.where(alive[:, :, None], variance, 1)
 
     def adapt(
         self, density: int, x: NDArray[np.float32], share: NDArray[np.float32], prior: int, relevance: float

@@ -69,7 +69,7 @@ def test_a_step_is_that_of_all_paths(components, cells, monkeypatch):
         wanted = mixtures.copy()
         count, (first, second) = sums[density, :, -1], np.split(sums[density, :, :-1], 2, axis=1)
         if count.sum() >= loop_em.LEAST_FRAMES:
-            wanted.estimate(density, count, first, second, FLOOR)
+            wanted.estimate(np.array([density]), count[None], first[None], second[None], FLOOR)
         assert better.means[density] == pytest.approx(wanted.means[density], abs=1e-4)
         assert better.variances[density] == pytest.approx(wanted.variances[density], abs=1e-3)
         assert np.exp(better.log_weights[density]) == pytest.approx(np.exp(wanted.log_weights[density]), abs=1e-4)

@@ -93,10 +93,10 @@ def _forward_blocks(
         enter, leave = room[: weight.shape[1]], leaving[first : first + count]
         for s in range(count):
             leave[s] = before[sources[first + s]]
-        greatest = _times(leave, weight[first : first + count], share, enter)
+        total = _times(leave, weight[first : first + count], share, enter)
         into = after[target : target + targets]
         for i in range(len(into)):
-            into[i] += greatest * enter[i]
+            into[i] += total * enter[i]
 
 
 @compiled_to_rounding
@@ -145,14 +145,14 @@ def _backward_runs(alpha: Array, onward: Array, beta: Array, runs: Index, weight
 
 @compiled_to_rounding
 def _times(row: Array, matrix: Array, share: Array, product: Array) -> float:
-    """Multiply a row, relative to its greatest element, by a matrix, four of its rows at a time; return that element.
+    """Multiply a row, relative to its sum, by a matrix, four of its rows at a time; return that sum.
 
     share : room for the row, in the matrix's precision
     """
-    greatest = 0.0
+    total = 0.0
     for r in range(len(row)):
-        greatest = max(greatest, row[r])
-    scale = 1 / greatest if greatest > 0 else 0.0
+        total += row[r]
+    scale = 1 / total if total > 0 else 0.0
     for r in range(len(row)):
         share[r] = row[r] * scale if row[r] * scale > LEAST_SHARE else 0.0
     product[:] = 0
@@ -165,7 +165,7 @@ def _times(row: Array, matrix: Array, share: Array, product: Array) -> float:
         a = share[r]
         for i in range(len(product)):
             product[i] += a * matrix[r, i]
-    return greatest
+    return total
 
 
 @compiled_to_rounding
@@ -177,7 +177,7 @@ def _backward_blocks(
         target, targets, first, count = blocks[b]
         back, hand = room[: turned.shape[1]], entering[start : start + targets]
         hand[:] = onward[target : target + targets]
-        greatest = _times(hand, turned[start : start + targets], share, back)
+        total = _times(hand, turned[start : start + targets], share, back)
         for s in range(count):
-            beta[sources[first + s]] += greatest * back[s]
+            beta[sources[first + s]] += total * back[s]
         start += targets

@@ -54,11 +54,10 @@ def em_step(
     if total is None or not total.frames:
         raise InputError(f"none of {len(data)} recordings has a path through the network; check its arcs and ends")
     better = mixtures.copy()
-    for number, density in enumerate(used):
-        count = total.products[:, number, -1]
-        if count.sum() >= LEAST_FRAMES:
-            first, second = np.split(total.products[:, number, :-1], 2, axis=1)
-            better.estimate(int(density), count, first, second, floor)
+    products = total.products.transpose(1, 0, 2)
+    known = products[:, :, -1].sum(axis=1) >= LEAST_FRAMES
+    first, second = np.split(products[known, :, :-1], 2, axis=2)
+    better.estimate(used[known], products[known, :, -1], first, second, floor)
     return better, _relearned(network, total), total.log_likelihood / total.frames
 
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError
+from lipmotion.kernels.arcs import Layout, laid_out
 from lipmotion.kernels.network import Expectation
 from lipmotion.kernels.viterbi import best_path
 from lipmotion.stats.hmm.evidence import Evidence
@@ -26,6 +28,11 @@ class Network:
     arc_start: NDArray[np.intp]
     log_initial: NDArray[np.float32]
     log_final: NDArray[np.float32]
+
+    @cached_property
+    def layout(self) -> Layout:
+        """Where the arcs lie for compiled kernels."""
+        return laid_out(self.arc_from, self.arc_start)
 
     def expectation(self) -> Expectation:
         """Return the network ready for forward–backward."""
@@ -55,6 +62,7 @@ class Network:
             self.log_initial,
             self.log_final,
             beam,
+            lambda: self.layout,
         )
         if not np.isfinite(score):
             raise AlignmentError(
