@@ -16,9 +16,6 @@ from lipmotion.types import Each
 
 CELLS = 1_000_000
 """Frames × components whose posteriors are computed together: 4 MB an array, a few of them."""
-RETAINED = 31 << 20
-"""Bytes: once so much was allocated and freed, glibc keeps what is freed for the next array. Else every array of some
-size is returned to the system and asked for again, which took a third of the time."""
 LEAST_POSTERIOR = np.float32(1e-10)
 """State posteriors under this are left out of the statistics; also, none is denormal there."""
 LEAST_FRAMES = 1.0
@@ -124,7 +121,6 @@ def _batches(frames: Sequence[int], components: int) -> Iterator[list[int]]:
 
 def _expected(job: tuple[_Model, list[NDArray[np.float32]]]) -> _Sums:
     model, data = job
-    np.empty(RETAINED, np.uint8)  # freed at once
     frames = np.array([len(x) for x in data])
     features = with_squares(np.concatenate(data))
     log_density, shares = model.form.divided(features)
