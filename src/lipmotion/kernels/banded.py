@@ -23,14 +23,15 @@ def generate(mean: Array, precision: Array, pins: Mapping[tuple[int, int], float
     pins : (frame, channel) to the value there, which the trajectory takes exactly and with variance 0
     Source: Hofer 2008, Eqs. 6–11.  Cost: O(T·P).
     """
-    if not pins and compiled_pays(len(mean) * FRAME_S):
+    fast = compiled_pays(len(mean) * FRAME_S)
+    if fast and not pins:
         from lipmotion.kernels.compiled import banded
 
         return banded.generate(np.ascontiguousarray(mean, float), np.ascontiguousarray(precision, float))
     bands = normal_equations(mean, precision)
     for (frame, channel), value in (pins or {}).items():
         pin(bands, frame, channel, value)
-    values, variance = solve(bands)
+    values, variance = _solved(bands, fast)
     for frame, channel in pins or ():
         variance[frame, channel] = 0
     return values, variance
@@ -77,7 +78,11 @@ def solve(bands: Bands) -> tuple[Array, Array]:
 
     Cost: O(T·P): LDLᵀ over time, all channels at once; the diagonal by the recursion of Takahashi et al. 1973.
     """
-    if compiled_pays(len(bands[0]) * FRAME_S):
+    return _solved(bands, compiled_pays(len(bands[0]) * FRAME_S))
+
+
+def _solved(bands: Bands, fast: bool) -> tuple[Array, Array]:
+    if fast:
         from lipmotion.kernels.compiled import banded
 
         return banded.solve(*bands)

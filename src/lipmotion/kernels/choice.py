@@ -12,9 +12,9 @@ from __future__ import annotations
 import sys
 from functools import cache
 
-START_UP_S = 0.5
-"""Importing numba and loading kernels that were compiled before (docs/results/kernels.md); the first run on a machine
-compiles them, for some seconds."""
+START_UP_S = 1.0
+"""At most, importing numba and loading kernels that were compiled before (docs/results/kernels.md); the first run on a
+machine compiles them, for some seconds."""
 _asked_s = [0.0]
 
 

@@ -17,7 +17,7 @@ LogEmission = Callable[[int, int], NDArray[np.float32]]
 """Gives the log densities of the frames from one up to another [shape=(frames, G)], the same at every call."""
 BLOCK = 2048
 """Frames whose scores are kept at a time; earlier ones are computed again from checkpoints."""
-FRAME_S, ARC_S = 12e-6, 3e-9
+FRAME_S, ARC_S = 10e-6, 15e-9
 """What NumPy takes for a frame, and for every arc in it (docs/results/kernels.md)."""
 
 
