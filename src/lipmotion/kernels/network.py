@@ -126,7 +126,7 @@ class Expectation(NamedTuple):
             _probabilities(log[layout.order]) for log in (self.log_initial, self.log_final)
         )
         run_counts, leaving, entering, scales, ends = network.forward_backward(
-            root, edges, initial, final, layout.runs, self.weights.runs,
+            root, edges, initial, final, layout.runs.astype(np.uintp), self.weights.runs,
             layout.blocks, layout.block_sources, self.weights.blocks.astype(root.dtype), self.turned.astype(root.dtype),
         )  # fmt: skip
         counts = np.zeros(len(self.arc_log))

@@ -14,12 +14,14 @@ from lipmotion.kernels.compiled.compiler import compiled_to_rounding
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
+Unsigned = NDArray[np.uintp]
+"""Signed indices might count from the end, which keeps loops from being vectors."""
 LEAST, LEAST_POSTERIOR, LEAST_SHARE = 1e-140, 1e-30, 1e-25
 
 
 @compiled_to_rounding
 def forward_backward(
-    emission: Array, edges: Index, initial: Array, final: Array, runs: Index, run_weight: Array,
+    emission: Array, edges: Index, initial: Array, final: Array, runs: Unsigned, run_weight: Array,
     blocks: Index, block_sources: Index, block_weight: Array, turned: Array,
 ) -> tuple[Array, Array, Array, Array, Array]:  # fmt: skip
     """Return what recordings say about a network; ``emission`` becomes the posteriors.
@@ -55,9 +57,9 @@ def forward_backward(
                 alpha[t] = initial
             else:
                 alpha[t] = 0
-                _forward_runs(alpha[t - 1], alpha[t], runs, run_weight)
+                _forward_runs(alpha, t, runs, run_weight)
                 _forward_blocks(alpha[t - 1], alpha[t], blocks, block_sources, block_weight, leave[t - 1], room, share)
-            scale[t] = _emit(alpha[t], density[t])
+            scale[t] = _emit(alpha, density, t)
             if scale[t] <= 0:
                 break
         ends[u] = (alpha[-1] * final).sum() if scale.min() > 0 else 0.0
@@ -67,7 +69,7 @@ def forward_backward(
             continue
         beta[:] = final / ends[u]
         for t in range(len(alpha) - 1, -1, -1):
-            _close(density[t], alpha[t], beta, onward, 1 / scale[t])
+            _close(density, alpha, t, beta, onward, 1 / scale[t])
             if t > 0:
                 beta[:] = 0
                 _backward_runs(alpha[t - 1], onward, beta, runs, run_weight, counts)
@@ -76,12 +78,12 @@ def forward_backward(
 
 
 @compiled_to_rounding
-def _forward_runs(before: Array, after: Array, runs: Index, weight: Array) -> None:
+def _forward_runs(alpha: Array, t: int, runs: Unsigned, weight: Array) -> None:
+    into, out = alpha[t], alpha[t - 1]
     for r in range(len(runs)):
         target, source, length, first = runs[r]
-        into, out, arc = after[target : target + length], before[source:], weight[first:]
-        for i in range(len(into)):
-            into[i] += arc[i] * out[i]
+        for i in range(length):
+            into[target + i] += weight[first + i] * out[source + i]
 
 
 @compiled_to_rounding
@@ -107,40 +109,38 @@ def _density(root: float) -> float:
 
 
 @compiled_to_rounding
-def _emit(row: Array, emission: Array) -> float:
+def _emit(alpha: Array, emission: Array, t: int) -> float:
     """Multiply by the densities, make the sum 1; return what it was."""
     total = 0.0
-    for i in range(len(row)):
-        density = _density(emission[i])
-        row[i] *= density if density > LEAST else 0.0
-        total += row[i]
+    for i in range(alpha.shape[1]):
+        density = _density(emission[t, i])
+        alpha[t, i] *= density if density > LEAST else 0.0
+        total += alpha[t, i]
     scale = 1 / total if total > 0 else 0.0
-    for i in range(len(row)):
-        row[i] = row[i] * scale if row[i] * scale > LEAST else 0.0
+    for i in range(alpha.shape[1]):
+        alpha[t, i] = alpha[t, i] * scale if alpha[t, i] * scale > LEAST else 0.0
     return total
 
 
 @compiled_to_rounding
-def _close(emission: Array, alpha: Array, beta: Array, onward: Array, scale: float) -> None:
+def _close(emission: Array, alpha: Array, t: int, beta: Array, onward: Array, scale: float) -> None:
     """Fill in what is handed back from this frame; make of its densities its posteriors."""
-    for i in range(len(alpha)):
-        back = beta[i] if alpha[i] > 0 and beta[i] > LEAST else 0.0
-        handed = back * _density(emission[i]) * scale
+    for i in range(len(beta)):
+        back = beta[i] if alpha[t, i] > 0 and beta[i] > LEAST else 0.0
+        handed = back * _density(emission[t, i]) * scale
         onward[i] = handed if handed > LEAST else 0.0
-        posterior = alpha[i] * back
-        emission[i] = posterior if posterior > LEAST_POSTERIOR else 0.0
+        posterior = alpha[t, i] * back
+        emission[t, i] = posterior if posterior > LEAST_POSTERIOR else 0.0
 
 
 @compiled_to_rounding
-def _backward_runs(alpha: Array, onward: Array, beta: Array, runs: Index, weight: Array, counts: Array) -> None:
+def _backward_runs(alpha: Array, onward: Array, beta: Array, runs: Unsigned, weight: Array, counts: Array) -> None:
     for r in range(len(runs)):
         target, source, length, first = runs[r]
-        back, share, hand = beta[source : source + length], alpha[source:], onward[target:]
-        arc, count = weight[first:], counts[first:]
-        for i in range(len(back)):
-            back[i] += arc[i] * hand[i]
-        for i in range(len(back)):
-            count[i] += share[i] * hand[i]
+        for i in range(length):
+            beta[source + i] += weight[first + i] * onward[target + i]
+        for i in range(length):
+            counts[first + i] += alpha[source + i] * onward[target + i]
 
 
 @compiled_to_rounding
