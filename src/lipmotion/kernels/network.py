@@ -36,7 +36,7 @@ def network_posteriors(
     log_initial, log_final : [shape=(S,)], of beginning and ending in each state
     Returns posterior [shape=(T, S)], counts [shape=(E,)], log likelihood; where there is no path 0, 0 and -inf.
     Source: the standard recursions.  Compiled, paths 320 nats under a frame's best are left out, unless none is left
-    then; and what single precision is given, it gives back (1e-6).
+    then; posteriors under 1e-12 are 0; and what is given in single precision comes back as precise.
     Cost: O(T·E), by NumPy some fifty times slower.
     """
     expectation = Expectation.of(arc_from, arc_log, arc_start, log_initial, log_final)

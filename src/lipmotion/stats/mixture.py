@@ -12,7 +12,7 @@ SPLIT_STEP = 0.2
 """Halves of a split component move apart by this many standard deviations."""
 BLOCK = 256
 """Frames whose components are computed at a time: they fit into the cache."""
-LEAST_LOG_SHARE = np.float32(-60)
+LEAST_LOG_SHARE = np.float32(-50)
 LOG_2PI = float(np.log(2 * np.pi))
 
 
@@ -187,7 +187,7 @@ class Quadratic:
 
         features : ``with_squares`` of what the densities are of
         Of a single component the share is 1, and not told. Shares under e^``LEAST_LOG_SHARE`` are not told apart:
-        in products smaller ones are denormal, and slow.
+        in products smaller ones would be denormal, and slow.
         """
         whole = np.concatenate([self.form, self.constant.reshape(1, -1)])
         shares = (features @ whole).reshape(len(features), *self.constant.shape)

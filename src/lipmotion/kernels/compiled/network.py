@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 Unsigned = NDArray[np.uintp]
 """Signed indices might count from the end, which keeps loops from being vectors."""
-LEAST, LEAST_POSTERIOR, LEAST_SHARE = 1e-140, 1e-30, 1e-25
+LEAST, LEAST_POSTERIOR, LEAST_SHARE = 1e-140, 1e-12, 1e-25
 
 
 @compiled_to_rounding

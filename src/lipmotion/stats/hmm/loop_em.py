@@ -16,8 +16,6 @@ from lipmotion.types import Each
 
 CELLS = 1_000_000
 """Frames × components whose posteriors are computed together: 4 MB an array, a few of them."""
-LEAST_POSTERIOR = np.float32(1e-10)
-"""State posteriors under this are left out of the statistics; also, none is denormal there."""
 LEAST_FRAMES = 1.0
 """A density, or the arcs out of a state, with less data than so many frames stay as they are."""
 
@@ -129,7 +127,6 @@ def _expected(job: tuple[_Model, list[NDArray[np.float32]]]) -> _Sums:
     begins = np.append(0, np.cumsum(frames[:-1]))
     begun = expected.posterior[begins].sum(axis=0, dtype=np.float64)
     weights = _by_density(expected.posterior, model.columns)
-    weights[weights < LEAST_POSTERIOR] = 0
     if shares is not None:
         shares *= weights[:, None]
         weights = shares.reshape(len(features), -1)
