@@ -12,7 +12,7 @@ def halves(x: float) -> float:
 def test_compiled_code_is_kept_on_disk():
     function = compiled(halves)
     assert function(3.0) == 1.5
-    assert sum(function.stats.cache_misses.values()) + sum(function.stats.cache_hits.values()) == 1
+    assert function.stats.cache_path is not None
 
 
 def test_what_cannot_be_kept_is_compiled_all_the_same():
@@ -20,4 +20,4 @@ def test_what_cannot_be_kept_is_compiled_all_the_same():
     exec(compile("def double(x):\n    return 2 * x\n", "nowhere", "exec"), places)  # noqa: S102  (no file, no cache)
     function = compiled(places["double"])
     assert function(3.0) == 6.0
-    assert not function.stats.cache_misses
+    assert function.stats.cache_path is None
