@@ -2,8 +2,9 @@
 
     python benchmarks/kernels.py --bench ../shared/bench [--rounds 3] [--only NAME ...]
 
-Each figure is work per CPU second of one thread, the median over rounds in which ours and the peer take turns; what is
-compared is the ratio. Peers that cannot be imported are left out (pip install hmmlearn nnmnkwii psutil).
+Each figure is work per CPU second of one thread, over rounds in which ours and the peer take turns: the median and the
+best round (what else the machine does makes both slower, and short runs most); what is compared is the ratio. Peers
+that cannot be imported are left out (pip install hmmlearn nnmnkwii psutil).
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ class Case(NamedTuple):
 
 
 LOOP = ("--utts", "100", "--repeats", "3")
-SHORT_LOOP = ("--utts", "20", "--repeats", "3", "--K", "8")
+SHORT_LOOP = ("--utts", "10", "--repeats", "2", "--K", "8")
 CASES = {
     "parameter generation, D=90": Case("bench_mlpg.py", "mlpg", "nnmnkwii", "nnmnkwii", ("--repeats", "15")),
     "EM, K=1": Case("bench_hmm.py", "em", "hmmlearn_scaling", "hmmlearn", (*LOOP, "--op", "em")),
@@ -141,10 +142,12 @@ def compared(bench: Path, case: Case, rounds: int) -> dict[str, Any]:
     for _ in range(rounds):
         for name, implementation in implementations.items():
             rows[name].append(run(bench / case.script, implementation, case.options))
-    rates = {name: statistics.median(r["work"] / r["cpu_sec_median"] for r in found) for name, found in rows.items()}
-    result: dict[str, Any] = {f"{name}, per CPU second": round(rate) for name, rate in rates.items()}
-    if case.peer in rates:
-        result["ratio"] = round(rates["ours"] / rates[case.peer], 1)
+    result: dict[str, Any] = {}
+    for kind, choose in (("median", statistics.median), ("best", max)):
+        rates = {name: choose([r["work"] / r["cpu_sec_median"] for r in found]) for name, found in rows.items()}
+        result |= {f"{name}, per CPU second, {kind}": round(rate) for name, rate in rates.items()}
+        if case.peer in rates:
+            result[f"ratio, {kind}"] = round(rates["ours"] / rates[case.peer], 1)
     return result | {f"{name}, check": found[0]["check"] for name, found in rows.items()}
 
 
