@@ -81,7 +81,7 @@ def forward_backward(
 def _forward_runs(alpha: Array, t: int, runs: Unsigned, weight: Array) -> None:
     into, out = alpha[t], alpha[t - 1]
     for r in range(len(runs)):
-        target, source, length, first = runs[r]
+        target, source, length, first = runs[r, 0], runs[r, 1], runs[r, 2], runs[r, 3]
         for i in range(length):
             into[target + i] += weight[first + i] * out[source + i]
 
@@ -136,7 +136,7 @@ def _close(emission: Array, alpha: Array, t: int, beta: Array, onward: Array, sc
 @compiled_to_rounding
 def _backward_runs(alpha: Array, onward: Array, beta: Array, runs: Unsigned, weight: Array, counts: Array) -> None:
     for r in range(len(runs)):
-        target, source, length, first = runs[r]
+        target, source, length, first = runs[r, 0], runs[r, 1], runs[r, 2], runs[r, 3]
         for i in range(length):
             beta[source + i] += weight[first + i] * onward[target + i]
         for i in range(length):
