@@ -16,7 +16,7 @@ from lipmotion.engines.trajectory.learning import Learning
 from lipmotion.engines.trajectory.model import TrajectoryModel, model_arrays, model_from_arrays
 from lipmotion.engines.trajectory.train import fit_trajectory
 from lipmotion.errors import InputError
-from lipmotion.kernels.banded import normal_equations, pin, solve
+from lipmotion.kernels.banded import generate
 from lipmotion.stats.checkpoint import NOTHING_KEPT, Checkpoint
 from lipmotion.types import (
     FRAME_RATE_HZ,
@@ -190,23 +190,12 @@ def _generated(
     model: TrajectoryModel, statistics: tuple[_Array, _Array], pins: _Pins, closing: Sequence[slice]
 ) -> tuple[_Array, _Array]:
     """Return trajectory and variance in the model's space [shape=(T, Q)], lips closed where they must."""
-    result = _trajectory(*statistics, pins)
+    result = generate(*statistics, pins)
     if model.closure is not None:
         _close_lips(model.closure, closing, statistics, pins, result)
         opening = result[0][:, model.closure.column]
         np.maximum(opening, 0, out=opening)  # a smooth curve through a closure may overshoot
     return result
-
-
-def _trajectory(mean: _Array, precision: _Array, pins: _Pins) -> tuple[_Array, _Array]:
-    """Return the trajectory through all pins, and its variance (0 there), both [shape=(T, Q)]."""
-    bands = normal_equations(mean, precision)
-    for (frame, column), value in pins.items():
-        pin(bands, frame, column, value)
-    values, variance = solve(bands)
-    for frame, column in pins:
-        variance[frame, column] = 0
-    return values, variance
 
 
 def _close_lips(
@@ -226,7 +215,7 @@ def _close_lips(
     wanted = {(frame, 0): closure.closed for frame in frames}
     wanted |= {(frame, 0): pins[frame, column] for frame in taken}
     opening = slice(column, column + 1)
-    closing, spread = _trajectory(statistics[0][:, :, opening], statistics[1][:, :, opening], wanted)
+    closing, spread = generate(statistics[0][:, :, opening], statistics[1][:, :, opening], wanted)
     follow = closure.follow.copy()
     follow[[pinned for _, pinned in pins]] = 0
     values += (closing - values[:, opening]) * follow
