@@ -47,7 +47,7 @@ class TrajectoryConfig:
     axes       : numbers that the sound around a frame is reduced to
     ridge, shared_ridge : how strongly a regression on the sound is drawn towards that of the node above, and the one
                  that all share towards none
-    ridge_frames : frames that a node must have for a regression of its own
+    ridge_frames : frames that a node must have for a regression of its own (``hearing.MOST`` asks for more)
     closures   : make the lips meet in every p, b and m
     """
 
@@ -60,10 +60,10 @@ class TrajectoryConfig:
     shrinkage: float = 10.0
     variance_shrinkage: float = 20.0
     listens: bool = True
-    axes: int = 200
+    axes: int = 150
     ridge: float = 2000.0
     shared_ridge: float = 100.0
-    ridge_frames: float = 200.0
+    ridge_frames: float = 100.0
     closures: bool = True
 
     def __post_init__(self) -> None:
