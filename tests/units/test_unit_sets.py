@@ -162,6 +162,8 @@ def test_silence_may_be_closed_lips(tmp_path: Path) -> None:
 def test_neither_a_name_nor_a_file(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"'evis'; there are: 2vis, sVis, pbVis, eVis, phone"):
         unit_set("evis")
+    with pytest.raises(InputError, match="there are: 2vis"):
+        unit_set("x" * 300)
     with pytest.raises(InputError, match=r"not a file|directory|folder"):
         unit_set(tmp_path)
     (tmp_path / "binary").write_bytes(b"\xff\xfe\x00")
