@@ -207,3 +207,12 @@ def test_figures_that_do_not_exist_are_dashes() -> None:
 
 def test_every_set_of_the_table_is_known() -> None:
     assert all(unit_set(name).name == name for name in PAPER)
+
+
+def test_the_document_shows_the_figures_beside_it() -> None:
+    results = Path(__file__).parents[2] / "docs" / "results"
+    figures = json.loads((results / "unit-sets.json").read_text(encoding="utf-8"))
+    text = (results / "unit-sets.md").read_text(encoding="utf-8")
+    assert f"```text\n{table(figures)}\n```" in text
+    for name, row in all_rows(figures):
+        assert (row["units"], row["paper"]) == (unit_set(name).count, PAPER[name])
