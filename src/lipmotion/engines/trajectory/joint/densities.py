@@ -1,0 +1,191 @@
+"""The tied densities of one stream: mixtures of Gaussians, with or without a point mass for frames without a value."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.engines.trajectory.joint.streams import Stream
+from lipmotion.stats.mixture import Mixtures
+
+LEAST_FRAMES = 2.0
+"""A Gaussian with less data than so many frames stays as it is."""
+SPLIT_FRAMES = 40.0
+"""A Gaussian with less is not split."""
+LEAST_VOICED = 1e-3
+"""No frame is voiced, or unvoiced, with less than this probability."""
+LEAST_SHARE = np.float32(1e-10)
+"""Posteriors under this are nothing; also, none is denormal, which is slow."""
+LEAST_SCALE = 1e-6
+"""Dimensions that move less than this do not move."""
+
+Floats = NDArray[np.float32]
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Scale:
+    """The mean and standard deviation of a stream's dimensions: inside, everything is counted from and in these.
+
+    mean, deviation : [shape=(D,)]
+    """
+
+    mean: Array
+    deviation: Array
+
+    def inside(self, stream: Stream) -> Known:
+        """Return a stream as the densities take it."""
+        values = (stream.values - self.mean) / self.deviation
+        return Known(np.where(stream.known[:, None], values, 0).astype(np.float32), stream.known)
+
+    @property
+    def log_volume(self) -> float:
+        """What densities inside are more than outside, as a logarithm."""
+        return float(np.log(self.deviation).sum())
+
+
+@dataclass(frozen=True, eq=False)
+class Known:
+    """A stream in its own scale: values [shape=(T, D)], 0 where not known, and known [shape=(T,)]."""
+
+    values: Floats
+    known: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Sums:
+    """What frames say about densities.
+
+    frames : [shape=(G,)], those without a value included
+    sums   : [shape=(G, M, 1 + 2·D)], of posteriors, values and squares, in frames with a value
+    """
+
+    frames: Array
+    sums: Array
+
+    @classmethod
+    def none(cls, densities: int, components: int, dimensions: int) -> Sums:
+        """Return what nothing says."""
+        return cls(np.zeros(densities), np.zeros((densities, components, 1 + 2 * dimensions)))
+
+    def add(self, densities: NDArray[np.intp], frames: Array, sums: Array) -> None:
+        """Add, in place, what some frames say about some densities, each named once."""
+        self.frames[densities] += frames
+        self.sums[densities] += sums
+
+    def of_groups(self, groups: NDArray[np.intp], count: int) -> Sums:
+        """Return what the frames say about groups of densities: ``groups`` [shape=(G,)] says which each is in."""
+        joined = Sums.none(count, self.sums.shape[1], self.sums.shape[2] // 2)
+        np.add.at(joined.frames, groups, self.frames)
+        np.add.at(joined.sums, groups, self.sums)
+        return joined
+
+
+@dataclass(frozen=True, eq=False)
+class Tied:
+    """G densities.
+
+    mixtures : of what is known, in the stream's own scale
+    voiced   : [shape=(G,)], the probability that a frame has a value; None: a frame without one says nothing
+    Source: Tokuda, Masuko, Miyazaki & Kobayashi 1999 (multi-space distributions), with one space of one dimension (or
+    D) and one of none.
+    """
+
+    mixtures: Mixtures
+    voiced: Array | None
+
+    def log_density(self, stream: Known, chosen: NDArray[np.intp], log_volume: float = 0.0) -> Floats:
+        """Return the log density of every frame under some of the densities [shape=(T, len(chosen))].
+
+        log_volume : of the scale, so that densities are those of the values as they were observed
+        """
+        values = self.mixtures.log_likelihood(stream.values, chosen) - np.float32(log_volume)
+        missing = ~stream.known
+        if self.voiced is None:
+            values[missing] = 0
+            return values
+        values += np.log(self.voiced[chosen]).astype(np.float32)
+        values[missing] = np.log1p(-self.voiced[chosen]).astype(np.float32)
+        return values
+
+    def heard(self, stream: Known, chosen: NDArray[np.intp], posterior: Floats) -> tuple[Array, Array]:
+        """Return what frames say about some densities, whose posteriors are known [shape=(T, len(chosen))].
+
+        Returns frames and sums as in ``Sums``.
+        """
+        posterior = np.where(posterior > LEAST_SHARE, posterior, np.float32(0))
+        G, (_, M, D) = len(chosen), self.mixtures.size
+        if self.voiced is None:
+            posterior = posterior * stream.known[:, None]
+        shares = posterior * stream.known[:, None]
+        if M > 1:
+            shares = self._by_component(stream.values, chosen, shares).reshape(-1, G * M)
+        sums = np.concatenate([shares.sum(axis=0)[:, None], shares.T @ with_squares(stream.values)], axis=1)
+        return posterior.sum(axis=0, dtype=float), sums.reshape(G, M, 1 + 2 * D).astype(float)
+
+    def _by_component(self, x: Floats, chosen: NDArray[np.intp], shares: Floats) -> Floats:
+        components = np.ascontiguousarray(self.mixtures.log_components(x, chosen))
+        components -= components.max(axis=2, keepdims=True)
+        np.exp(components, out=components)
+        components *= (shares / components.sum(axis=2))[:, :, None]
+        components[components < LEAST_SHARE] = 0
+        return components
+
+    def maximised(self, sums: Sums, floor: float) -> Tied:
+        """Return the densities that explain the sums best (the M-step).
+
+        floor : least variance, in the stream's own scale
+        What has too little data stays as it is, so the likelihood never falls.
+        """
+        count, first, second = np.split(sums.sums, [1, 1 + self.mixtures.size[2]], axis=2)
+        alive = count >= LEAST_FRAMES
+        safe = np.maximum(count, LEAST_FRAMES)
+        mean = first / safe
+        variance = np.maximum(second / safe - mean * mean, floor)
+        total = count.sum(axis=1)
+        with np.errstate(divide="ignore"):
+            log_weights = np.log(count[:, :, 0] / np.maximum(total, 1e-30))
+        mixtures = Mixtures(
+            np.where(total >= LEAST_FRAMES, log_weights, self.mixtures.log_weights).astype(np.float32),
+            np.where(alive, mean, self.mixtures.means).astype(np.float32),
+            np.where(alive, variance, self.mixtures.variances).astype(np.float32),
+        )
+        if self.voiced is None:
+            return replace(self, mixtures=mixtures)
+        voiced = np.clip(total[:, 0] / np.maximum(sums.frames, 1e-30), LEAST_VOICED, 1 - LEAST_VOICED)
+        return Tied(mixtures, np.where(sums.frames >= LEAST_FRAMES, voiced, self.voiced))
+
+    def split(self, sums: Sums) -> Tied:
+        """Return mixtures of twice as many Gaussians; those with too little data are not split."""
+        count, once = sums.sums[:, :, 0], self.mixtures
+        twice, M = once.split(), once.size[1]
+        whole = count < SPLIT_FRAMES
+        twice.log_weights[:, :M] = np.where(whole, once.log_weights, twice.log_weights[:, :M])
+        twice.log_weights[:, M:] = np.where(whole, -np.inf, twice.log_weights[:, M:])
+        twice.means[:, :M] = np.where(whole[:, :, None], once.means, twice.means[:, :M])
+        return replace(self, mixtures=twice)
+
+
+def with_squares(x: Floats) -> Floats:
+    """Return values and their squares side by side [shape=(T, 2·D)]."""
+    return np.concatenate([x, x * x], axis=1)
+
+
+def standard(densities: int, dimensions: int, has_spaces: bool, voiced: float = 0.5) -> Tied:
+    """Return densities that are all as the whole stream is: mean 0, variance 1."""
+    shape = (densities, 1, dimensions)
+    mixtures = Mixtures(np.zeros((densities, 1), np.float32), np.zeros(shape, np.float32), np.ones(shape, np.float32))
+    share = float(np.clip(voiced, LEAST_VOICED, 1 - LEAST_VOICED))
+    return Tied(mixtures, np.full(densities, share) if has_spaces else None)
+
+
+def fit_scale(streams: list[Stream]) -> tuple[Scale, float]:
+    """Return the scale of a stream over all utterances, and the share of its frames that have a value."""
+    known = np.concatenate([stream.values[stream.known] for stream in streams]).astype(float)
+    dimensions = known.shape[1]
+    if not len(known):
+        return Scale(np.zeros(dimensions), np.ones(dimensions)), 0.0
+    scale = Scale(known.mean(axis=0), np.maximum(known.std(axis=0), LEAST_SCALE))
+    return scale, len(known) / sum(len(stream.known) for stream in streams)
