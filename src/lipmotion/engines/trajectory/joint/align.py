@@ -12,9 +12,12 @@ from lipmotion.engines.trajectory.joint.inventory import States, states_of
 from lipmotion.engines.trajectory.joint.model import JointHmm
 from lipmotion.engines.trajectory.joint.streams import Observed, StreamWeights
 from lipmotion.errors import AlignmentError, InputError
+from lipmotion.kernels.durations import best_durations
 from lipmotion.stats.hmm.evidence import Evidence
 from lipmotion.stats.hmm.network import NetworkBuilder
 
+LONGEST = 60
+"""Frames up to which the length of a state has a probability of its own."""
 LEAST_SPREAD = 1.0
 """Least variance of a duration, in frames²: states that always lasted as long may still last a frame longer."""
 
@@ -53,7 +56,7 @@ def align(
     weights = weights or hmm.config.recognition
     states = states_of(hmm.inventory, units)
     inside = hmm.inside(observed, weights)
-    log_density = hmm.log_density(inside, hmm.leaves(states.contexts, states.numbers), weights)
+    log_density = hmm.log_density(inside, hmm.leaves(states.places), weights)
     kept = np.arange(len(states.rows))
     if bounds is not None:
         _check_bounds(bounds, len(units), observed.frames)
@@ -61,12 +64,16 @@ def align(
         first, end = bounds[states.positions], bounds[states.positions + 1]
         time = np.arange(observed.frames)[:, None]
         log_density[(time < first) | (time >= end)] = -np.inf
-    if len(kept) > observed.frames:
-        raise AlignmentError(
-            f"{len(units)} units take at least {len(kept)} frames of 10 ms, found {observed.frames}: the recording is "
-            "too short for what should be said in it; give its own units"
-        )
+    _check_room(len(units), len(kept), observed.frames)
     return StatePath(states, kept[_best_path(hmm, log_density[:, kept], states.rows[kept])])
+
+
+def _check_room(units: int, states: int, frames: int) -> None:
+    if states > frames:
+        raise AlignmentError(
+            f"{units} units take at least {states} frames of 10 ms, found {frames}: the recording is too short for "
+            "what should be said in it; give its own units"
+        )
 
 
 def _check_bounds(bounds: NDArray[np.intp], units: int, frames: int) -> None:
@@ -98,9 +105,7 @@ def _best_path(hmm: JointHmm, log_density: NDArray[np.float64], rows: NDArray[np
     return builder.build().best_path(evidence)
 
 
-def measured_durations(
-    hmm: JointHmm, utterances: Iterable[tuple[Observed, Sequence[str]]]
-) -> NDArray[np.float64]:
+def measured_durations(hmm: JointHmm, utterances: Iterable[tuple[Observed, Sequence[str]]]) -> NDArray[np.float64]:
     """Return mean and variance of the frames that each state without context lasts [shape=(R, 2)].
 
     Utterances without room for their units are left out. A state that was never heard lasts as its probability to be
@@ -122,3 +127,37 @@ def measured_durations(
     durations = np.where(sums[:, :1] > 0, found, expected)
     durations[:, 1] = np.maximum(durations[:, 1], LEAST_SPREAD)
     return durations
+
+
+def align_by_durations(
+    hmm: JointHmm,
+    observed: Observed,
+    units: Sequence[str],
+    weight: float = 1.0,
+    weights: StreamWeights | None = None,
+) -> StatePath:
+    """Return the most probable states of a sequence of units, each state's length as probable as it was in training.
+
+    weight  : of the log probability of a length: a Gaussian of the state's measured mean and variance; beyond
+              ``LONGEST`` frames, and in silence, the model's own geometric one
+    weights : as in ``align``
+    Raises as ``align``.
+    """
+    weights = weights or hmm.config.recognition
+    states = states_of(hmm.inventory, units)
+    log_density = hmm.log_density(hmm.inside(observed, weights), hmm.leaves(states.places), weights)
+    log_duration = weight * _log_durations(hmm)[states.rows]
+    _check_room(len(units), len(states.rows), observed.frames)
+    lengths, _ = best_durations(log_density, log_duration, weight * hmm.log_stay[states.rows])
+    return StatePath(states, np.repeat(np.arange(len(lengths)), lengths))
+
+
+def _log_durations(hmm: JointHmm) -> NDArray[np.float64]:
+    """Return the log probability of every state lasting 1 to ``LONGEST`` frames [shape=(R, LONGEST)]."""
+    frames = np.arange(1, LONGEST + 1)
+    mean, variance = hmm.durations[:, :1], hmm.durations[:, 1:]
+    gaussian = -0.5 * ((frames - mean) ** 2 / variance)
+    gaussian -= np.logaddexp.reduce(gaussian, axis=1)[:, None]
+    geometric = (frames - 1) * hmm.log_stay[:, None] + hmm.log_move[:, None]
+    silent = np.array([unit in hmm.inventory.free for unit, _ in hmm.inventory.rows])[:, None]
+    return np.where(silent, geometric, gaussian)

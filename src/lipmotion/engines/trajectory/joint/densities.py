@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.trajectory.joint.streams import Stream
-from lipmotion.stats.mixture import Mixtures
+from lipmotion.stats.mixture import LOG_2PI, Mixtures
 
 LEAST_FRAMES = 2.0
 """A Gaussian with less data than so many frames stays as it is."""
@@ -35,23 +36,20 @@ class Scale:
     mean: Array
     deviation: Array
 
-    def inside(self, stream: Stream) -> Known:
-        """Return a stream as the densities take it."""
+    def inside(self, stream: Stream) -> Floats:
+        """Return a stream as its densities take it [shape=(T, 2 + 2·D)], a row a frame.
+
+        Each is 1 and, where the frame has a value, 1, the value in this scale and its square, else all 0.
+        """
         values = (stream.values - self.mean) / self.deviation
-        return Known(np.where(stream.known[:, None], values, 0).astype(np.float32), stream.known)
+        known = stream.known[:, None]
+        ones = np.ones((len(values), 1))
+        return np.concatenate([ones, known, values * known, values * values * known], axis=1).astype(np.float32)
 
     @property
     def log_volume(self) -> float:
         """What densities inside are more than outside, as a logarithm."""
         return float(np.log(self.deviation).sum())
-
-
-@dataclass(frozen=True, eq=False)
-class Known:
-    """A stream in its own scale: values [shape=(T, D)], 0 where not known, and known [shape=(T,)]."""
-
-    values: Floats
-    known: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,10 +68,13 @@ class Sums:
         """Return what nothing says."""
         return cls(np.zeros(densities), np.zeros((densities, components, 1 + 2 * dimensions)))
 
-    def add(self, densities: NDArray[np.intp], frames: Array, sums: Array) -> None:
-        """Add, in place, what some frames say about some densities, each named once."""
-        self.frames[densities] += frames
-        self.sums[densities] += sums
+    def add(self, densities: NDArray[np.intp], rows: Array) -> None:
+        """Add, in place, sums of posteriors and rows [shape=(len(densities), 2 + 2·D)] to single Gaussians.
+
+        Each density is named once.
+        """
+        self.frames[densities] += rows[:, 0]
+        self.sums[densities, 0] += rows[:, 1:]
 
     def of_groups(self, groups: NDArray[np.intp], count: int) -> Sums:
         """Return what the frames say about groups of densities: ``groups`` [shape=(G,)] says which each is in."""
@@ -89,41 +90,59 @@ class Tied:
 
     mixtures : of what is known, in the stream's own scale
     voiced   : [shape=(G,)], the probability that a frame has a value; None: a frame without one says nothing
-    Source: Tokuda, Masuko, Miyazaki & Kobayashi 1999 (multi-space distributions), with one space of one dimension (or
-    D) and one of none.
+    Source: Tokuda, Masuko, Miyazaki & Kobayashi 1999 (multi-space distributions), with one space of D dimensions and
+    one of none.
     """
 
     mixtures: Mixtures
     voiced: Array | None
 
-    def log_density(self, stream: Known, chosen: NDArray[np.intp], log_volume: float = 0.0) -> Floats:
-        """Return the log density of every frame under some of the densities [shape=(T, len(chosen))].
+    def log_density(self, rows: Floats, leaves: NDArray[np.intp], log_volume: float = 0.0) -> Floats:
+        """Return the log density of every frame under some of the densities [shape=(T, len(leaves))].
 
+        rows       : from ``Scale.inside``
         log_volume : of the scale, so that densities are those of the values as they were observed
         """
-        values = self.mixtures.log_likelihood(stream.values, chosen) - np.float32(log_volume)
-        missing = ~stream.known
-        if self.voiced is None:
-            values[missing] = 0
+        if self.mixtures.size[1] == 1:
+            values = rows @ self._linear[leaves].T
+            values -= np.float32(log_volume) * rows[:, 1:2]
             return values
-        values += np.log(self.voiced[chosen]).astype(np.float32)
-        values[missing] = np.log1p(-self.voiced[chosen]).astype(np.float32)
-        return values
+        used, local = np.unique(leaves, return_inverse=True)
+        values = self.mixtures.log_likelihood(self.values(rows), used) - np.float32(log_volume)
+        values *= rows[:, 1:2]
+        values += rows[:, :2] @ self._linear[used].T
+        return values[:, local]
 
-    def heard(self, stream: Known, chosen: NDArray[np.intp], posterior: Floats) -> tuple[Array, Array]:
-        """Return what frames say about some densities, whose posteriors are known [shape=(T, len(chosen))].
+    def values(self, rows: Floats) -> Floats:
+        """Return the values of frames, in the stream's own scale, 0 where there is none [shape=(T, D)]."""
+        return rows[:, 2 : 2 + self.mixtures.size[2]]
 
-        Returns frames and sums as in ``Sums``.
+    @cached_property
+    def _linear(self) -> Floats:
+        """What rows are multiplied by in the log density [shape=(G, 2 + 2·D)]; of mixtures, the first two."""
+        constant = np.zeros((self.mixtures.size[0], 2))
+        if self.voiced is not None:
+            constant[:, 0] = np.log1p(-self.voiced)
+            constant[:, 1] = np.log(self.voiced) - constant[:, 0]
+        if self.mixtures.size[1] > 1:
+            return constant.astype(np.float32)
+        means, variances = (array[:, 0].astype(float) for array in (self.mixtures.means, self.mixtures.variances))
+        constant[:, 1] -= 0.5 * (LOG_2PI + np.log(variances) + means * means / variances).sum(axis=1)
+        return np.concatenate([constant, means / variances, -0.5 / variances], axis=1).astype(np.float32)
+
+    def add_components(self, sums: Sums, rows: Floats, leaves: NDArray[np.intp], posterior: Floats) -> None:
+        """Add, in place, what frames say about the Gaussians of mixtures.
+
+        posterior : of states whose leaves are ``leaves`` [shape=(T, S)]
         """
-        posterior = np.where(posterior > LEAST_SHARE, posterior, np.float32(0))
-        G, (_, M, D) = len(chosen), self.mixtures.size
-        if self.voiced is None:
-            posterior = posterior * stream.known[:, None]
-        shares = posterior * stream.known[:, None]
-        if M > 1:
-            shares = self._by_component(stream.values, chosen, shares).reshape(-1, G * M)
-        sums = np.concatenate([shares.sum(axis=0)[:, None], shares.T @ with_squares(stream.values)], axis=1)
-        return posterior.sum(axis=0, dtype=float), sums.reshape(G, M, 1 + 2 * D).astype(float)
+        used, local = np.unique(leaves, return_inverse=True)
+        member = np.zeros((len(leaves), len(used)), np.float32)
+        member[np.arange(len(leaves)), local] = 1
+        shares = posterior @ member
+        sums.frames[used] += shares.sum(axis=0) if self.voiced is not None else shares.T @ rows[:, 1]
+        components = self._by_component(self.values(rows), used, shares * rows[:, 1:2])
+        found = components.reshape(len(rows), -1).T @ rows[:, 1:]
+        sums.sums[used] += found.reshape(len(used), -1, found.shape[1])
 
     def _by_component(self, x: Floats, chosen: NDArray[np.intp], shares: Floats) -> Floats:
         components = np.ascontiguousarray(self.mixtures.log_components(x, chosen))
@@ -166,11 +185,6 @@ class Tied:
         twice.log_weights[:, M:] = np.where(whole, -np.inf, twice.log_weights[:, M:])
         twice.means[:, :M] = np.where(whole[:, :, None], once.means, twice.means[:, :M])
         return replace(self, mixtures=twice)
-
-
-def with_squares(x: Floats) -> Floats:
-    """Return values and their squares side by side [shape=(T, 2·D)]."""
-    return np.concatenate([x, x * x], axis=1)
 
 
 def standard(densities: int, dimensions: int, has_spaces: bool, voiced: float = 0.5) -> Tied:

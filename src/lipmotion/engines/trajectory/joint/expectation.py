@@ -2,31 +2,58 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.trajectory.joint.densities import Known, Sums
-from lipmotion.engines.trajectory.joint.inventory import Inventory, States, states_of
-from lipmotion.engines.trajectory.joint.model import JointHmm, Part
+from lipmotion.engines.trajectory.joint.densities import LEAST_SHARE, Sums
+from lipmotion.engines.trajectory.joint.inventory import Inventory, Place, states_of
+from lipmotion.engines.trajectory.joint.model import JointHmm
+from lipmotion.engines.trajectory.joint.streams import Observed
 from lipmotion.kernels.forward_backward import IMPOSSIBLE, chain_posteriors
 from lipmotion.stats.hmm.baum_welch import LONGEST_SILENCE, LONGEST_STATE, batches
 
 LEAST_STAY = 0.05
-Streams = Mapping[str, Known]
+Rows = NDArray[np.float32]
 Leaves = Mapping[str, NDArray[np.intp]]
 
 
 @dataclass(frozen=True, eq=False)
 class Sentence:
-    """An utterance in the model's scale, and the states of its units."""
+    """An utterance in the model's scale, and the states of its units.
 
-    streams: Streams
-    states: States
+    streams  : from ``Scale.inside``
+    states   : [shape=(S,)], the number of each without context
+    places   : [shape=(S,)], of each in its context, in ``Sentences.places``
+    distinct : those places, each once;  member : [shape=(S, len(distinct))], 1 where a state is in a place, else 0
+    """
+
+    streams: Mapping[str, Rows]
+    states: NDArray[np.intp]
+    places: NDArray[np.intp]
+    distinct: NDArray[np.intp]
+    member: NDArray[np.float32]
     frames: int
+
+    @property
+    def fits(self) -> bool:
+        """Whether there is room for all states."""
+        return len(self.states) <= self.frames
+
+
+@dataclass(frozen=True, eq=False)
+class Sentences:
+    """Utterances, and all different states in context that they have."""
+
+    items: tuple[Sentence, ...]
+    places: tuple[Place, ...]
+
+    def leaves(self, hmm: JointHmm) -> Leaves:
+        """Return the leaves of all places, by stream."""
+        return hmm.leaves(self.places)
 
 
 class Posterior(NamedTuple):
@@ -47,11 +74,13 @@ class Posterior(NamedTuple):
 class Expected:
     """What utterances say about a model (the E-step).
 
-    sums           : by stream, about its leaves
+    places         : by stream, about every state in context (``Sentences.places``), a Gaussian each
+    leaves         : by stream, about its leaves
     stay, occupied : [shape=(R,)], how often each state without context was kept, and how many frames it had
     """
 
-    sums: Mapping[str, Sums]
+    places: Mapping[str, Sums]
+    leaves: Mapping[str, Sums]
     stay: NDArray[np.float64]
     occupied: NDArray[np.float64]
     log_likelihood: float
@@ -63,27 +92,35 @@ class Expected:
         return self.log_likelihood / max(self.frames, 1)
 
 
-def sentence_of(inventory: Inventory, streams: Streams, units: Sequence[str]) -> Sentence:
-    """Return an utterance and the states of its units. Raises InputError: an unknown unit."""
-    frames = len(next(iter(streams.values())).known)
-    return Sentence(streams, states_of(inventory, units), frames)
+def sentences_of(hmm: JointHmm, utterances: Iterable[tuple[Observed, Sequence[str]]]) -> Sentences:
+    """Return utterances in the model's scale, and the states of their units. Raises InputError: an unknown unit."""
+    index: dict[Place, int] = {}
+    items = []
+    for observed, units in utterances:
+        states = states_of(hmm.inventory, units)
+        places = np.array([index.setdefault(place, len(index)) for place in states.places], np.intp)
+        distinct, local = np.unique(places, return_inverse=True)
+        member = np.eye(len(distinct), dtype=np.float32)[local]
+        streams = {n: hmm.parts[n].scale.inside(stream) for n, stream in observed.streams.items() if n in hmm.parts}
+        items.append(Sentence(streams, states.rows, places, distinct, member, observed.frames))
+    return Sentences(tuple(items), tuple(index))
 
 
-def posteriors(hmm: JointHmm, sentences: Sequence[Sentence]) -> Iterator[Posterior]:
+def posteriors(hmm: JointHmm, sentences: Sentences) -> Iterator[Posterior]:
     """Give the state posteriors of all utterances that have room for their states, not in their order."""
-    log_move, weights = hmm.log_move, hmm.config.training
-    counts = [len(sentence.states.rows) for sentence in sentences]
-    for batch in batches([sentence.frames for sentence in sentences], counts):
-        frames = np.array([sentences[i].frames for i in batch], np.intp)
+    items, leaves, log_move, weights = sentences.items, sentences.leaves(hmm), hmm.log_move, hmm.config.training
+    counts = [len(sentence.states) for sentence in items]
+    for batch in batches([sentence.frames for sentence in items], counts):
+        frames = np.array([items[i].frames for i in batch], np.intp)
         states = np.array([counts[i] for i in batch], np.intp)
         log_emission = np.zeros((frames.max(), len(batch), states.max()))
         log_keep, log_leave = np.full((2, len(batch), states.max()), -1.0)
         for u, i in enumerate(batch):
-            streams = {name: stream for name, stream in sentences[i].streams.items() if name in weights.on}
-            chain = sentences[i].states
-            leaves = hmm.leaves(chain.contexts, chain.numbers)
-            log_emission[: frames[u], u, : states[u]] = hmm.log_density(streams, leaves, weights)
-            log_keep[u, : states[u]], log_leave[u, : states[u]] = hmm.log_stay[chain.rows], log_move[chain.rows]
+            sentence, inside = items[i], (slice(frames[u]), u, slice(states[u]))
+            streams = {name: stream for name, stream in sentence.streams.items() if name in weights.on}
+            mine = {name: leaves[name][sentence.places] for name in streams}
+            log_emission[inside] = hmm.log_density(streams, mine, weights)
+            log_keep[inside[1:]], log_leave[inside[1:]] = hmm.log_stay[sentence.states], log_move[sentence.states]
         posterior, stay, log_likelihood = chain_posteriors(log_emission, log_keep, log_leave, frames, states)
         for u, i in enumerate(batch):
             if log_likelihood[u] > IMPOSSIBLE / 2:
@@ -91,44 +128,39 @@ def posteriors(hmm: JointHmm, sentences: Sequence[Sentence]) -> Iterator[Posteri
                 yield Posterior(i, found, stay[u, : states[u]], float(log_likelihood[u]))
 
 
-def expect(hmm: JointHmm, sentences: Sequence[Sentence], found: Iterator[Posterior] | None = None) -> Expected:
-    """Return what utterances say about every leaf and state.
+def expect(hmm: JointHmm, sentences: Sentences, found: Iterator[Posterior] | None = None) -> Expected:
+    """Return what utterances say about every place, every leaf of mixtures, and every state.
 
     found : their posteriors, where they are not the model's own
     """
-    sums = {
-        name: Sums.none(part.forest.size, *part.tied.mixtures.size[1:]) for name, part in hmm.parts.items()
-    }
-    stay, occupied = np.zeros(len(hmm.log_stay)), np.zeros(len(hmm.log_stay))
+    places = {name: Sums.none(len(sentences.places), 1, len(part.scale.mean)) for name, part in hmm.parts.items()}
+    mixed = {name: part for name, part in hmm.parts.items() if part.tied.mixtures.size[1] > 1}
+    leaves = {name: Sums.none(*part.tied.mixtures.size) for name, part in mixed.items()}
+    stay, occupied, which = np.zeros(len(hmm.log_stay)), np.zeros(len(hmm.log_stay)), sentences.leaves(hmm)
     log_likelihood, frames = 0.0, 0
     for posterior in posteriors(hmm, sentences) if found is None else found:
-        sentence = sentences[posterior.sentence]
-        leaves = hmm.leaves(sentence.states.contexts, sentence.states.numbers)
-        add_all(sums, hmm.parts, sentence, posterior, leaves)
-        np.add.at(stay, sentence.states.rows, posterior.stay)
-        np.add.at(occupied, sentence.states.rows, posterior.states.sum(axis=0))
+        sentence = sentences.items[posterior.sentence]
+        states = posterior.states.astype(np.float32)
+        states[states < LEAST_SHARE] = 0
+        shares = (states @ sentence.member).T
+        for name, rows in sentence.streams.items():
+            places[name].add(sentence.distinct, shares @ rows)
+            if name in mixed:
+                mixed[name].tied.add_components(leaves[name], rows, which[name][sentence.places], states)
+        np.add.at(stay, sentence.states, posterior.stay)
+        np.add.at(occupied, sentence.states, posterior.states.sum(axis=0))
         log_likelihood += posterior.log_likelihood
         frames += sentence.frames
-    return Expected(sums, stay, occupied, log_likelihood, frames)
-
-
-def add_all(
-    sums: Mapping[str, Sums], parts: Mapping[str, Part], sentence: Sentence, posterior: Posterior, groups: Leaves
-) -> None:
-    """Add, in place, what one utterance says about groups of its states, by stream [shape=(S,)]."""
-    states = posterior.states.astype(np.float32)
-    for name, stream in sentence.streams.items():
-        used, local = np.unique(groups[name], return_inverse=True)
-        member = np.zeros((len(local), len(used)), np.float32)
-        member[np.arange(len(local)), local] = 1
-        sums[name].add(used, *parts[name].tied.heard(stream, used, states @ member))
+    for name in hmm.parts.keys() - mixed.keys():
+        leaves[name] = places[name].of_groups(which[name], hmm.parts[name].forest.size)
+    return Expected(places, leaves, stay, occupied, log_likelihood, frames)
 
 
 def maximised(hmm: JointHmm, expected: Expected) -> JointHmm:
     """Return the models that explain what was found best (the M-step)."""
     floor = hmm.config.variance_floor
     parts = {
-        name: replace(part, tied=part.tied.maximised(expected.sums[name], floor)) for name, part in hmm.parts.items()
+        name: replace(part, tied=part.tied.maximised(expected.leaves[name], floor)) for name, part in hmm.parts.items()
     }
     return replace(hmm, parts=parts, log_stay=_log_stay(hmm, expected))
 

@@ -10,12 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.trajectory.joint.densities import Sums
-from lipmotion.engines.trajectory.joint.inventory import Inventory
+from lipmotion.engines.trajectory.joint.inventory import Inventory, Place
 from lipmotion.engines.trajectory.joint.streams import MOTION
 from lipmotion.stats.trees import Context, Question, Tree, gaussian_likelihood, grow, multispace_likelihood
-
-Place = tuple[Context, int]
-"""A state in its context: (left, unit, right), and which state of the unit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,19 +36,20 @@ class Forest:
         """How many leaves there are."""
         return sum(len(tree.leaves) for tree in self.trees.values())
 
-    def leaf(self, context: Context, state: int) -> int:
+    def leaf(self, place: Place) -> int:
         """Return the leaf of a state in a context, seen in training or not."""
-        number = self._found.get((context, state))
+        number = self._found.get(place)
         if number is None:
+            context, state = place
             name = self.inventory.tree(context[1], state)
             tree = self.trees[name]
             number = self._first[name] + int(np.searchsorted(tree.leaves, tree.path(context)[-1]))
-            self._found[context, state] = number
+            self._found[place] = number
         return number
 
-    def leaves(self, contexts: Iterable[Context], states: Iterable[int]) -> NDArray[np.intp]:
+    def leaves(self, places: Iterable[Place]) -> NDArray[np.intp]:
         """Return the leaves of states in their contexts [shape=(S,)]."""
-        return np.array([self.leaf(*place) for place in zip(contexts, states, strict=True)], np.intp)
+        return np.array([self.leaf(place) for place in places], np.intp)
 
     def name(self, leaf: int) -> str:
         """Return the tree of a leaf and the answers that lead to it, in words."""
@@ -136,7 +134,7 @@ def grown(
     for name, (unit, state) in inventory.trees.items():
         asked = places_asked(stream, inventory, unit, state)
         mine = np.flatnonzero(names == name)
-        contexts, pooled = _pooled([seen[i][0] for i in mine], statistics[mine], asked)
+        contexts, pooled = _pooled([seen[i][0] for i in mine.tolist()], statistics[mine], asked)
         trees[name] = grow(
             contexts,
             pooled,

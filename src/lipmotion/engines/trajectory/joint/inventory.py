@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError
 from lipmotion.stats.trees import Context
 
+Place = tuple[Context, int]
+"""A state in its context: (left, unit, right), and which state of the unit."""
+
 
 @dataclass(frozen=True)
 class Inventory:
@@ -81,29 +84,20 @@ class Inventory:
 class States:
     """The states of a sequence of units, one after another.
 
-    contexts  : of every state
-    numbers   : [shape=(S,)], which state of its unit it is
+    places    : every state in its context
     positions : [shape=(S,)], which unit of the sequence it belongs to
     rows      : [shape=(S,)], the state without context, which carries its duration
     """
 
-    contexts: tuple[Context, ...]
-    numbers: NDArray[np.intp]
+    places: tuple[Place, ...]
     positions: NDArray[np.intp]
     rows: NDArray[np.intp]
 
 
 def states_of(inventory: Inventory, units: Sequence[str]) -> States:
     """Return the states of a sequence of units. Raises InputError: an unknown unit."""
-    found = [
-        (context, state, position)
-        for position, context in enumerate(inventory.contexts(units))
-        for state in range(inventory.count(context[1]))
-    ]
-    rows = [inventory.rows[context[1], state] for context, state, _ in found]
-    return States(
-        tuple(context for context, _, _ in found),
-        np.array([state for _, state, _ in found], np.intp),
-        np.array([position for _, _, position in found], np.intp),
-        np.array(rows, np.intp),
-    )
+    contexts = inventory.contexts(units)
+    counts = [inventory.count(unit) for unit in units]
+    places = tuple((context, state) for context, count in zip(contexts, counts, strict=True) for state in range(count))
+    rows = np.array([inventory.rows[context[1], state] for context, state in places], np.intp)
+    return States(places, np.repeat(np.arange(len(units)), counts), rows)

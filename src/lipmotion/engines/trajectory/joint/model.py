@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.trajectory.joint.densities import Known, Scale, Tied
+from lipmotion.engines.trajectory.joint.densities import Scale, Tied
 from lipmotion.engines.trajectory.joint.forest import Forest
-from lipmotion.engines.trajectory.joint.inventory import Inventory
+from lipmotion.engines.trajectory.joint.inventory import Inventory, Place
 from lipmotion.engines.trajectory.joint.streams import Observed, StreamWeights
 from lipmotion.errors import InputError
 from lipmotion.stats.bigram import Bigram
-from lipmotion.stats.trees import Context
 
 HEARD_ONLY = StreamWeights(motion=0.0)
 MOTION_ONLY = StreamWeights(0.0, 0.0, 0.0, 0.0, 1.0)
@@ -89,8 +88,8 @@ class JointHmm:
     spoken: tuple[str, ...]
     bigram: Bigram
 
-    def inside(self, observed: Observed, weights: StreamWeights) -> dict[str, Known]:
-        """Return the streams that are switched on, in their own scales.
+    def inside(self, observed: Observed, weights: StreamWeights) -> dict[str, NDArray[np.float32]]:
+        """Return the streams that are switched on, as their densities take them (``Scale.inside``).
 
         Raises InputError: none of them was observed, or one has other dimensions than the model's.
         """
@@ -106,29 +105,24 @@ class JointHmm:
                 raise InputError(f"the stream {name} has {found} dimensions, the model's has {required}")
         return {name: self.parts[name].scale.inside(observed.streams[name]) for name in on}
 
-    def leaves(self, contexts: Iterable[Context], states: Iterable[int]) -> dict[str, NDArray[np.intp]]:
+    def leaves(self, places: Sequence[Place]) -> dict[str, NDArray[np.intp]]:
         """Return the leaves of states in their contexts, by stream [shape=(S,)]."""
-        places = list(zip(contexts, states, strict=True))
-        return {
-            name: np.array([part.forest.leaf(context, int(state)) for context, state in places], np.intp)
-            for name, part in self.parts.items()
-        }
+        return {name: part.forest.leaves(places) for name, part in self.parts.items()}
 
     def log_density(
-        self, inside: Mapping[str, Known], leaves: Mapping[str, NDArray[np.intp]], weights: StreamWeights
+        self, inside: Mapping[str, NDArray[np.float32]], leaves: Mapping[str, NDArray[np.intp]], weights: StreamWeights
     ) -> NDArray[np.float64]:
         """Return the weighted sum of the streams' log densities of S states in every frame [shape=(T, S)].
 
         inside : from ``inside``
         leaves : of each stream [shape=(S,)]
         """
-        total = 0.0
-        for name, stream in inside.items():
-            used, local = np.unique(leaves[name], return_inverse=True)
+        total = np.zeros((1, 1))
+        for name, rows in inside.items():
             part = self.parts[name]
-            values = part.tied.log_density(stream, used, part.scale.log_volume)
-            total = total + weights.on[name] * values.astype(float)[:, local]
-        return np.asarray(total)
+            values = part.tied.log_density(rows, leaves[name], part.scale.log_volume)
+            total = total + weights.on[name] * values.astype(float)
+        return total
 
     @property
     def log_move(self) -> NDArray[np.float64]:
@@ -137,4 +131,5 @@ class JointHmm:
 
     def text(self) -> str:
         """Return the trees of all streams for people to read."""
-        return "\n\n".join(f"{name}: {part.forest.size} leaves\n{part.forest.text()}" for name, part in self.parts.items())
+        forests = {name: part.forest for name, part in self.parts.items()}
+        return "\n\n".join(f"{name}: {forest.size} leaves\n{forest.text()}" for name, forest in forests.items())

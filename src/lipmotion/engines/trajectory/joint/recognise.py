@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.engines.trajectory.joint.inventory import Place
 from lipmotion.engines.trajectory.joint.model import JointHmm
 from lipmotion.engines.trajectory.joint.streams import HEARD, MOTION, SPEECH, Observed, StreamWeights
 from lipmotion.errors import AlignmentError, InputError
@@ -115,10 +116,11 @@ class _States:
 
 def _states(hmm: JointHmm) -> _States:
     inventory = hmm.inventory
-    plain = [((inventory.silence, unit, inventory.silence), state) for unit, state in inventory.rows]
+    plain: list[Place] = [((inventory.silence, unit, inventory.silence), state) for unit, state in inventory.rows]
     counts = tuple(inventory.count(unit) for unit in inventory.names)
     table = plain_states(inventory.names, counts, inventory.free)
-    names, places = [], []
+    names: list[str] = []
+    places: list[Place] = []
     for unit, state in inventory.rows:
         side = inventory.side(unit, state)
         for neighbour in hmm.spoken if side else ():
@@ -126,7 +128,7 @@ def _states(hmm: JointHmm) -> _States:
                 names.append(f"{unit}.{state}{'<' if side < 0 else '>'}{neighbour}")
                 places.append((_beside(inventory.silence, unit, neighbour, side), state))
     heard = [name for name in HEARD if name in hmm.parts]
-    found = hmm.leaves(*zip(*plain, *places, strict=True))
+    found = hmm.leaves([*plain, *places])
     rows = np.stack([found[name] for name in heard], axis=1)
     first = np.array([inventory.rows[context[1], state] for context, state in places], np.intp)
     differ = np.flatnonzero((rows[len(plain) :] != rows[first]).any(axis=1))
@@ -142,9 +144,7 @@ def _beside(silence: str, unit: str, neighbour: str, side: int) -> Context:
 
 def _as_plain(hmm: JointHmm, states: _States) -> UnitHmm:
     """Return the speech stream alone, as models of units that the loop can be built from."""
-    config = HmmConfig(
-        states=hmm.config.states, bigram_weight=hmm.config.bigram_weight, insertion=hmm.config.insertion
-    )
+    config = HmmConfig(states=hmm.config.states, bigram_weight=hmm.config.bigram_weight, insertion=hmm.config.insertion)
     mixtures = hmm.parts[SPEECH].tied.mixtures.picked(states.leaves[SPEECH][states.column])
     bigram = Bigram(hmm.inventory.names, hmm.bigram.log_probability)
     return UnitHmm(config, states.table, mixtures, hmm.log_stay.astype(np.float32), bigram)

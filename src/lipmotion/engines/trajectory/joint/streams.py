@@ -73,7 +73,7 @@ class Observed:
         for name, stream in self.streams.items():
             if stream.values.ndim != 2 or stream.known.shape != (self.frames,) or len(stream.values) != self.frames:
                 raise InputError(
-                    f"the stream {name} has shape {stream.values.shape}, of which {stream.known.shape} are known or not; "
+                    f"the stream {name} has values of shape {stream.values.shape} and a mask of {stream.known.shape}; "
                     f"required ({self.frames}, D) and ({self.frames},), as many frames as speech"
                 )
             if not np.isfinite(stream.values).all():
@@ -104,8 +104,8 @@ def observe(
     if log_f0 is not None:
         streams |= f0_streams(np.asarray(log_f0, float))
     if motion is not None:
-        motion = np.asarray(motion, float)
-        streams[MOTION] = motion_stream(motion, np.ones(len(motion), bool) if seen is None else seen)
+        values: NDArray[np.float64] = np.asarray(motion, np.float64)
+        streams[MOTION] = motion_stream(values, np.ones(len(values), bool) if seen is None else seen)
     return Observed(streams)
 
 

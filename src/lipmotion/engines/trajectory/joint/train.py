@@ -4,24 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.trajectory.joint.align import measured_durations
-from lipmotion.engines.trajectory.joint.densities import Sums, fit_scale, standard
+from lipmotion.engines.trajectory.joint.densities import fit_scale, standard
 from lipmotion.engines.trajectory.joint.expectation import (
     Posterior,
-    Sentence,
-    add_all,
+    Sentences,
     expect,
     maximised,
     most_stay,
     posteriors,
-    sentence_of,
+    sentences_of,
 )
-from lipmotion.engines.trajectory.joint.forest import Place, grown, questions_about, unit_forest
-from lipmotion.engines.trajectory.joint.inventory import Inventory, States
+from lipmotion.engines.trajectory.joint.forest import grown, questions_about, unit_forest
+from lipmotion.engines.trajectory.joint.inventory import Inventory, states_of
 from lipmotion.engines.trajectory.joint.model import JointConfig, JointHmm, Part
 from lipmotion.engines.trajectory.joint.streams import F0_STREAMS, MOTION, SPEECH, STREAMS, Observed
 from lipmotion.errors import CorpusError, InputError
@@ -82,12 +82,12 @@ def train_joint(
     training = _Training(inventory, classes, monitor, config)
     hmm = _untrained(utterances, inventory, config, streams)
     sentences = _sentences(hmm, utterances)
-    if not any(_fits(sentence) for sentence in sentences):
+    if not any(sentence.fits for sentence in sentences.items):
         raise CorpusError(
             f"none of {len(utterances)} utterances has room for the states of its units; "
             "check that units and recordings belong together, or give units fewer states"
         )
-    hmm = _started(hmm, sentences, [utterance.bounds for utterance in utterances])
+    hmm = _started(hmm, sentences, [(utterance.units, utterance.bounds) for utterance in utterances])
     hmm = training.improve(hmm, sentences, "units", config.plain_iterations)
     hmm = training.tie(hmm, sentences)
     hmm = training.improve(hmm, sentences, "units in context", config.iterations)
@@ -104,7 +104,7 @@ class _Training:
     monitor: Monitor
     config: JointConfig
 
-    def improve(self, hmm: JointHmm, sentences: Sequence[Sentence], stage: str, iterations: int) -> JointHmm:
+    def improve(self, hmm: JointHmm, sentences: Sentences, stage: str, iterations: int) -> JointHmm:
         """Take some steps of embedded Baum–Welch."""
         for step in range(iterations):
             expected = expect(hmm, sentences)
@@ -112,9 +112,9 @@ class _Training:
             self._report(stage, step + 1, iterations, expected.mean_log_likelihood)
         return hmm
 
-    def tie(self, hmm: JointHmm, sentences: Sequence[Sentence]) -> JointHmm:
+    def tie(self, hmm: JointHmm, sentences: Sentences) -> JointHmm:
         """Return the same models, their states in context tied by trees; a Gaussian a leaf."""
-        seen, sums = context_statistics(hmm, sentences)
+        seen, sums = sentences.places, expect(hmm, sentences).places
         questions = questions_about(self.inventory, self.classes)
         parts = {}
         for step, (name, part) in enumerate(hmm.parts.items()):
@@ -124,14 +124,14 @@ class _Training:
                 factor=self.config.tree_factor, least_frames=self.config.least_frames,
                 least_variance=self.config.variance_floor,
             )  # fmt: skip
-            leaves = forest.leaves(*zip(*seen, strict=True))
+            leaves = forest.leaves(seen)
             tied = standard(forest.size, len(part.scale.mean), has_spaces)
             tied = tied.maximised(sums[name].of_groups(leaves, forest.size), self.config.variance_floor)
             parts[name] = Part(part.scale, forest, tied)
             self._report("trees", step + 1, len(hmm.parts), float(forest.size))
         return replace(hmm, parts=parts)
 
-    def split(self, hmm: JointHmm, sentences: Sequence[Sentence], held_out: Sequence[Sentence]) -> JointHmm:
+    def split(self, hmm: JointHmm, sentences: Sentences, held_out: Sentences) -> JointHmm:
         """Return the models with as many Gaussians as are allowed, and as held-out utterances are better with."""
         best = mean_log_likelihood(hmm, held_out)
         for name, most in ((SPEECH, self.config.mixtures), (MOTION, self.config.motion_mixtures)):
@@ -141,62 +141,28 @@ class _Training:
                 new = self._twice(hmm, sentences, name)
                 new = self.improve(new, sentences, f"{count} Gaussians for {name}", self.config.iterations)
                 figure = mean_log_likelihood(new, held_out)
-                if held_out and not figure > best:
+                if held_out.items and not figure > best:
                     break
                 hmm, best = new, figure
         return hmm
 
-    def _twice(self, hmm: JointHmm, sentences: Sequence[Sentence], name: str) -> JointHmm:
+    def _twice(self, hmm: JointHmm, sentences: Sentences, name: str) -> JointHmm:
         part = hmm.parts[name]
-        tied = part.tied.split(expect(hmm, sentences).sums[name])
+        tied = part.tied.split(expect(hmm, sentences).leaves[name])
         return replace(hmm, parts={**hmm.parts, name: replace(part, tied=tied)})
 
     def _report(self, stage: str, step: int, steps: int, figure: float) -> None:
         self.monitor(Progress(stage, step, steps, step / steps, figure))
 
 
-def mean_log_likelihood(hmm: JointHmm, sentences: Sequence[Sentence]) -> float:
-    """Return the log likelihood a frame, of those utterances that have room for their states; 0 where there are none."""
-    found = [(p.log_likelihood, sentences[p.sentence].frames) for p in posteriors(hmm, sentences)]
+def mean_log_likelihood(hmm: JointHmm, sentences: Sentences) -> float:
+    """Return the log likelihood a frame, of utterances with room for their states; 0 where there are none."""
+    found = [(p.log_likelihood, sentences.items[p.sentence].frames) for p in posteriors(hmm, sentences)]
     return sum(value for value, _ in found) / max(sum(frames for _, frames in found), 1)
 
 
-def context_statistics(hmm: JointHmm, sentences: Sequence[Sentence]) -> tuple[list[Place], dict[str, Sums]]:
-    """Return every state in every context that was seen, and what the frames say about each, by stream."""
-    index: dict[Place, int] = {}
-    groups = [
-        np.array(
-            [
-                index.setdefault((context, int(number)), len(index))
-                for context, number in zip(sentence.states.contexts, sentence.states.numbers, strict=True)
-            ]
-        )
-        for sentence in sentences
-    ]
-    sums = {name: Sums.none(len(index), 1, len(part.scale.mean)) for name, part in hmm.parts.items()}
-    for posterior in posteriors(hmm, sentences):
-        mine = dict.fromkeys(hmm.parts, groups[posterior.sentence])
-        add_all(sums, hmm.parts, sentences[posterior.sentence], posterior, mine)
-    return list(index), sums
-
-
-def _fits(sentence: Sentence) -> bool:
-    return len(sentence.states.rows) <= sentence.frames
-
-
-def _sentences(hmm: JointHmm, utterances: Sequence[Transcribed]) -> list[Sentence]:
-    return [
-        sentence_of(
-            hmm.inventory,
-            {
-                name: hmm.parts[name].scale.inside(stream)
-                for name, stream in utterance.observed.streams.items()
-                if name in hmm.parts
-            },
-            utterance.units,
-        )
-        for utterance in utterances
-    ]
+def _sentences(hmm: JointHmm, utterances: Sequence[Transcribed]) -> Sentences:
+    return sentences_of(hmm, [(utterance.observed, utterance.units) for utterance in utterances])
 
 
 def _untrained(
@@ -224,27 +190,30 @@ def _without_pauses(units: Sequence[str], inventory: Inventory) -> tuple[str, ..
 
 
 def _started(
-    hmm: JointHmm, sentences: Sequence[Sentence], bounds: Sequence[NDArray[np.intp] | None]
+    hmm: JointHmm, sentences: Sentences, starts: Sequence[tuple[tuple[str, ...], NDArray[np.intp] | None]]
 ) -> JointHmm:
     """Return the models of units cut into states as long as each other (the flat start)."""
 
     def found() -> Iterator[Posterior]:
-        for number, (sentence, edges) in enumerate(zip(sentences, bounds, strict=True)):
-            if _fits(sentence):
-                path = _even_path(sentence.states, sentence.frames, edges)
-                posterior = np.zeros((sentence.frames, len(sentence.states.rows)))
+        for number, (sentence, (units, edges)) in enumerate(zip(sentences.items, starts, strict=True)):
+            if sentence.fits:
+                path = _even_path(states_of(hmm.inventory, units).positions, sentence.frames, edges)
+                posterior = np.zeros((sentence.frames, len(sentence.states)))
                 posterior[np.arange(sentence.frames), path] = 1
                 yield Posterior(number, posterior, np.maximum(posterior.sum(axis=0) - 1, 0), 0.0)
 
     return maximised(hmm, expect(hmm, sentences, found()))
 
 
-def _even_path(states: States, frames: int, bounds: NDArray[np.intp] | None) -> NDArray[np.intp]:
-    """Return the state of every frame [shape=(T,)]: each unit cut evenly, or the whole utterance without bounds."""
+def _even_path(positions: NDArray[np.intp], frames: int, bounds: NDArray[np.intp] | None) -> NDArray[np.intp]:
+    """Return the state of every frame [shape=(T,)]: each unit cut evenly, or the whole utterance without bounds.
+
+    positions : [shape=(S,)], the unit that each state belongs to
+    """
     if bounds is None:
-        return np.arange(frames) * len(states.rows) // frames
+        return np.arange(frames) * len(positions) // frames
     path = np.empty(frames, np.intp)
-    for position, (start, end) in enumerate(zip(bounds[:-1], bounds[1:], strict=True)):
-        mine = np.flatnonzero(states.positions == position)
+    for position, (start, end) in enumerate(pairwise(bounds.tolist())):
+        mine = np.flatnonzero(positions == position)
         path[start:end] = mine[np.arange(end - start) * len(mine) // max(end - start, 1)]
     return path
