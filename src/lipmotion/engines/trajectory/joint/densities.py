@@ -176,15 +176,26 @@ class Tied:
         voiced = np.clip(total[:, 0] / np.maximum(sums.frames, 1e-30), LEAST_VOICED, 1 - LEAST_VOICED)
         return Tied(mixtures, np.where(sums.frames >= LEAST_FRAMES, voiced, self.voiced))
 
+    def splits(self, sums: Sums) -> bool:
+        """Return whether any Gaussian has enough data to be split."""
+        return bool((sums.sums[:, :, 0] >= SPLIT_FRAMES).any())
+
     def split(self, sums: Sums) -> Tied:
-        """Return mixtures of twice as many Gaussians; those with too little data are not split."""
-        count, once = sums.sums[:, :, 0], self.mixtures
-        twice, M = once.split(), once.size[1]
-        whole = count < SPLIT_FRAMES
+        """Return mixtures of up to twice as many Gaussians; those with too little data are not split."""
+        once, twice, M = self.mixtures, self.mixtures.split(), self.mixtures.size[1]
+        whole = sums.sums[:, :, 0] < SPLIT_FRAMES
         twice.log_weights[:, :M] = np.where(whole, once.log_weights, twice.log_weights[:, :M])
         twice.log_weights[:, M:] = np.where(whole, -np.inf, twice.log_weights[:, M:])
         twice.means[:, :M] = np.where(whole[:, :, None], once.means, twice.means[:, :M])
-        return replace(self, mixtures=twice)
+        return replace(self, mixtures=_compact(twice))
+
+
+def _compact(mixtures: Mixtures) -> Mixtures:
+    """Return the same mixtures, Gaussians without weight last, and no more places for Gaussians than are used."""
+    order = np.argsort(-mixtures.log_weights, axis=1, kind="stable")
+    order = order[:, : np.isfinite(mixtures.log_weights).sum(axis=1).max()]
+    means, variances = (np.take_along_axis(a, order[:, :, None], axis=1) for a in (mixtures.means, mixtures.variances))
+    return Mixtures(np.take_along_axis(mixtures.log_weights, order, axis=1), means, variances)
 
 
 def standard(densities: int, dimensions: int, has_spaces: bool, voiced: float = 0.5) -> Tied:

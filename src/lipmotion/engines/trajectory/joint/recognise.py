@@ -35,7 +35,8 @@ class JointRecogniser:
 
     hmm     : the models
     weights : of the streams; those of recognition by default
-    Exact: trees of what is heard ask for one neighbour only.
+    Exact: trees of what is heard ask for one neighbour only. Where units have one state, one said twice in a row is
+    heard as said once.
     Raises InputError: motion is not switched off: its trees ask for both neighbours.
     Source: Hofer 2008, Eq. 5.
     """

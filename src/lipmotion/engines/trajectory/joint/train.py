@@ -135,10 +135,11 @@ class _Training:
         """Return the models with as many Gaussians as are allowed, and as held-out utterances are better with."""
         best = mean_log_likelihood(hmm, held_out)
         for name, most in ((SPEECH, self.config.mixtures), (MOTION, self.config.motion_mixtures)):
-            count = 1
-            while name in hmm.parts and 2 * count <= most:
-                count *= 2
+            while name in hmm.parts and 2 * hmm.parts[name].tied.mixtures.size[1] <= most:
                 new = self._twice(hmm, sentences, name)
+                if new is hmm:
+                    break
+                count = new.parts[name].tied.mixtures.size[1]
                 new = self.improve(new, sentences, f"{count} Gaussians for {name}", self.config.iterations)
                 figure = mean_log_likelihood(new, held_out)
                 if held_out.items and not figure > best:
@@ -147,9 +148,11 @@ class _Training:
         return hmm
 
     def _twice(self, hmm: JointHmm, sentences: Sentences, name: str) -> JointHmm:
-        part = hmm.parts[name]
-        tied = part.tied.split(expect(hmm, sentences).leaves[name])
-        return replace(hmm, parts={**hmm.parts, name: replace(part, tied=tied)})
+        """Return the models with some Gaussians of a stream split in two, or the same where none has enough data."""
+        part, sums = hmm.parts[name], expect(hmm, sentences).leaves[name]
+        if not part.tied.splits(sums):
+            return hmm
+        return replace(hmm, parts={**hmm.parts, name: replace(part, tied=part.tied.split(sums))})
 
     def _report(self, stage: str, step: int, steps: int, figure: float) -> None:
         self.monitor(Progress(stage, step, steps, step / steps, figure))
