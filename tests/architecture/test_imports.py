@@ -21,6 +21,8 @@ FORBIDDEN = [
     ("Imports only go down", "utils.py", "'a module on no floor'"),
     ("Only corpora and vision may import OpenCV and MediaPipe", "pipeline/train.py", "import cv2"),
     ("Only corpora and vision may import OpenCV and MediaPipe", "speech/read.py", "import mediapipe"),
+    ("Only kernels may import numba", "stats/mixture.py", "def late():\n    import numba"),
+    ("Only kernels may import numba", "engines/base.py", "from llvmlite import ir"),
 ]
 
 

@@ -3,7 +3,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lipmotion.kernels.banded import normal_equations, pin, solve
+from lipmotion.kernels import banded
+from lipmotion.kernels.banded import generate, normal_equations, pin, solve
 from oracles import trajectories
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -106,3 +107,49 @@ def test_inputs_stay_as_they_were():
     solve(bands)
     assert np.array_equal(mean, copies[0])
     assert np.array_equal(precision, copies[1])
+
+
+def forms(monkeypatch, compute) -> list:
+    """What NumPy and what the compiled form give."""
+    results = []
+    for compiled in (False, True):
+        monkeypatch.setattr(banded, "compiled_pays", lambda _, compiled=compiled: compiled)
+        results.append(compute())
+    return results
+
+
+@pytest.mark.parametrize("frames", [1, 2, 3, 4, 5, 60])
+@pytest.mark.parametrize("channels", [1, 2, 7, 33])
+def test_the_compiled_form_gives_the_same_bits(frames, channels, monkeypatch):
+    pytest.importorskip("numba")
+    mean, precision = statistics(frames, frames, channels)
+    plain, fast = forms(monkeypatch, lambda: generate(mean, precision))
+    assert np.array_equal(plain, fast)
+    pins = {(frames // 2, 0): 0.5, (frames - 1, channels - 1): -1.0}
+    plain, fast = forms(monkeypatch, lambda: generate(mean, precision, pins))
+    assert np.array_equal(plain, fast)
+
+
+@pytest.mark.parametrize("frames", [1, 2, 3, 4, 9])
+def test_the_compiled_form_agrees_with_the_dense_system(frames, monkeypatch):
+    pytest.importorskip("numba")
+    mean, precision = statistics(frames, frames)
+    _, (values, variance) = forms(monkeypatch, lambda: generate(mean, precision))
+    for channel, (wanted, spread) in enumerate(dense(mean, precision)):
+        assert values[:, channel] == pytest.approx(wanted, abs=1e-12)
+        assert variance[:, channel] == pytest.approx(spread, abs=1e-12)
+
+
+def test_pins_have_no_variance():
+    mean, precision = statistics(6, 8)
+    values, variance = generate(mean, precision, {(3, 1): 0.25})
+    assert values[3, 1] == 0.25
+    assert variance[3, 1] == 0
+    assert (np.delete(variance[:, 1], 3) > 0).all()
+
+
+def test_layout_of_the_input_changes_nothing(monkeypatch):
+    mean, precision = statistics(8, 12, 5)
+    wanted = forms(monkeypatch, lambda: generate(mean[:, :, 1:3].copy(), precision[:, :, 1:3].copy()))
+    found = forms(monkeypatch, lambda: generate(mean[:, :, 1:3], precision[:, :, 1:3]))
+    assert np.array_equal(wanted, found)

@@ -1,32 +1,11 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from kernels.networks import phone_loop, random_network
 from lipmotion.kernels import viterbi
 from oracles import paths
-
-
-def random_network(seed: int, states: int, densities: int, density_of_arcs: float):
-    """A network with loops and random arcs, as the kernel wants it, and its arcs by source and target."""
-    draw = np.random.default_rng(seed)
-    arcs = {}
-    for target in range(states):
-        for source in range(states):
-            if source == target or draw.random() < density_of_arcs:
-                arcs[source, target] = np.float32(draw.normal(-2, 1))
-    ordered = sorted(arcs, key=lambda arc: arc[1])
-    some = draw.random((2, states)) < 0.6
-    initial, final = np.where(some, draw.normal(-1, 1, (2, states)), -np.inf).astype(np.float32)
-    arrays = {
-        "emission": draw.integers(densities, size=states),
-        "arc_from": np.array([source for source, _ in ordered], np.intp),
-        "arc_log": np.array([arcs[arc] for arc in ordered], np.float32),
-        "arc_start": np.searchsorted([target for _, target in ordered], np.arange(states)).astype(np.intp),
-        "log_initial": initial,
-        "log_final": final,
-    }
-    return arrays, arcs
 
 
 def random_emission(seed: int, frames: int, densities: int) -> np.ndarray:
@@ -36,6 +15,14 @@ def random_emission(seed: int, frames: int, densities: int) -> np.ndarray:
 def asked(log_emission: np.ndarray):
     """Return the densities as the kernel asks for them, and how many frames there are."""
     return lambda first, end: log_emission[first:end], len(log_emission)
+
+
+@pytest.fixture(params=["numpy", "compiled"], autouse=True)
+def form(request, monkeypatch) -> None:
+    """Everything holds for both forms."""
+    if request.param == "compiled":
+        pytest.importorskip("numba")
+    monkeypatch.setattr(viterbi, "compiled_pays", lambda _: request.param == "compiled")
 
 
 @pytest.fixture(params=[1, 2, 3, 5, 2048])
@@ -61,7 +48,7 @@ def test_agrees_with_the_enumeration_of_all_paths(seed, frames):
 
 
 @given(seed=st.integers(0, 2**32 - 1), frames=st.integers(1, 80), block=st.integers(1, 90))
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_blocks_change_nothing(seed, frames, block):
     arrays, arcs = random_network(seed, states=7, densities=4, density_of_arcs=0.3)
     log_emission = random_emission(seed, frames, 4)
@@ -116,3 +103,50 @@ def test_hours_lose_no_precision():
     path, score = viterbi.best_path(*asked(log_emission), **chain)
     assert path.argmax() == 17_000
     assert score == pytest.approx(30_000 * -79.75 - 29_999 * 0.5, rel=1e-6)
+
+
+def both(monkeypatch, log_emission: np.ndarray, arrays: dict, beam: float | None = None) -> list:
+    """What NumPy and what the compiled form find."""
+    pytest.importorskip("numba")
+    found = []
+    for compiled in (False, True):
+        monkeypatch.setattr(viterbi, "compiled_pays", lambda _, compiled=compiled: compiled)
+        found.append(viterbi.best_path(*asked(log_emission), **arrays, beam=beam))
+    return found
+
+
+@pytest.mark.parametrize("beam", [None, 2.0, 20.0])
+@pytest.mark.parametrize("seed", range(6))
+def test_both_forms_find_the_same_to_the_bit(seed, beam, monkeypatch):
+    arrays, _ = phone_loop(seed) if seed % 2 else random_network(seed, states=9, densities=4, density_of_arcs=0.4)
+    log_emission = random_emission(seed, 90, len(arrays["emission"]))
+    (plain, score), (fast, same_score) = both(monkeypatch, log_emission, arrays, beam)
+    assert score == same_score
+    assert np.isfinite(score) or beam is not None
+    if np.isfinite(score):
+        assert np.array_equal(plain, fast)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_ties_are_broken_alike(seed, monkeypatch):
+    arrays, _ = phone_loop(seed)
+    arrays["arc_log"] = np.round(arrays["arc_log"])
+    log_emission = np.round(random_emission(seed, 60, len(arrays["emission"])) / 4)
+    (plain, _), (fast, _) = both(monkeypatch, log_emission, arrays)
+    assert np.array_equal(plain, fast)
+
+
+def test_a_wide_beam_drops_nothing_and_a_narrow_one_the_better_late_path():
+    chain = left_to_right(2)
+    chain["log_initial"] = chain["log_final"] = np.zeros(2, np.float32)
+    chain["arc_from"], chain["arc_start"] = (
+        np.array([0, 1], np.intp),
+        np.array([0, 1], np.intp),
+    )  # two loops, no way over
+    chain["arc_log"] = np.zeros(2, np.float32)
+    log_emission = np.array([[0, -10], [0, 0], [-30, 0]], np.float32)
+    assert viterbi.best_path(*asked(log_emission), **chain)[0].tolist() == [1, 1, 1]
+    assert viterbi.best_path(*asked(log_emission), **chain, beam=50.0)[0].tolist() == [1, 1, 1]
+    path, score = viterbi.best_path(*asked(log_emission), **chain, beam=5.0)
+    assert path.tolist() == [0, 0, 0]
+    assert score == -30

@@ -132,7 +132,7 @@ def test_another_job_starts_over(corpus: Corpus, work: Path, tmp_path: Path, wha
     assert content(train(corpus, **options, work=work)[0], tmp_path) == expected  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("name", ["phones", "labels-0", "motion"])
+@pytest.mark.parametrize("name", ["phones", "labels-0"])
 def test_a_damaged_checkpoint_is_not_used(corpus: Corpus, work: Path, tmp_path: Path, name: str) -> None:
     whole = content(run(corpus, work), tmp_path)
     path = work / f"{name}.checkpoint"

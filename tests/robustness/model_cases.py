@@ -51,7 +51,7 @@ def _header(name: str, *says: str, **header: object) -> None:
         return bench.animate(None, "--model", bench.changed_model({}, **header))
 
 
-_header("a newer version", "model version 9, this lipmotion reads version 2; upgrade lipmotion", version=9)
+_header("a newer version", "model version 9, this lipmotion reads version 3; upgrade lipmotion", version=9)
 _header("another format", *NO_MODEL, format="other")
 _header("an unknown engine", *DAMAGED, "no engine 'quantum'; there are: trajectory", engine="quantum")
 _header("an engine that is a list", *DAMAGED, engine=[])

@@ -2,12 +2,39 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
+
+from lipmotion.kernels.choice import compiled_pays
 
 Array = NDArray[np.float64]
 Bands = tuple[Array, Array, Array, Array]
 """Main, first and second diagonal of a symmetric system per channel, and its right-hand side, all (T, P)."""
+FRAME_S = 12e-6
+"""What NumPy takes for a frame, with up to some 90 channels (docs/results/kernels.md)."""
+
+
+def generate(mean: Array, precision: Array, pins: Mapping[tuple[int, int], float] | None = None) -> tuple[Array, Array]:
+    """Return the most probable trajectory and its variance, both [shape=(T, P)].
+
+    mean, precision : [shape=(T, 3, P)], of the static value, Δ = (-½, 0, ½) and Δ² = (1, -2, 1)
+    pins : (frame, channel) to the value there, which the trajectory takes exactly and with variance 0
+    Source: Hofer 2008, Eqs. 6–11.  Cost: O(T·P).
+    """
+    fast = compiled_pays(len(mean) * FRAME_S)
+    if fast and not pins:
+        from lipmotion.kernels.compiled import banded
+
+        return banded.generate(np.ascontiguousarray(mean, float), np.ascontiguousarray(precision, float))
+    bands = normal_equations(mean, precision)
+    for (frame, channel), value in (pins or {}).items():
+        pin(bands, frame, channel, value)
+    values, variance = _solved(bands, fast)
+    for frame, channel in pins or ():
+        variance[frame, channel] = 0
+    return values, variance
 
 
 def normal_equations(mean: Array, precision: Array) -> Bands:
@@ -51,32 +78,44 @@ def solve(bands: Bands) -> tuple[Array, Array]:
 
     Cost: O(T·P): LDLᵀ over time, all channels at once; the diagonal by the recursion of Takahashi et al. 1973.
     """
-    main, first, second, right = bands
-    pivot, lower1, lower2, x = np.empty_like(main), np.zeros_like(main), np.zeros_like(main), np.empty_like(main)
-    for t in range(len(main)):
-        pivot[t], x[t] = main[t], right[t]
-        coupling = first[t].copy()
-        if t:
-            scaled = lower1[t - 1] * pivot[t - 1]
-            pivot[t] -= scaled * lower1[t - 1]
-            coupling -= scaled * lower2[t - 1]
-            x[t] -= lower1[t - 1] * x[t - 1]
-        if t > 1:
-            pivot[t] -= lower2[t - 2] * lower2[t - 2] * pivot[t - 2]
-            x[t] -= lower2[t - 2] * x[t - 2]
-        lower1[t] = coupling / pivot[t]
-        lower2[t] = second[t] / pivot[t]
-    x /= pivot
-    variance = 1 / pivot
-    beside = np.zeros_like(main)  # inverse between t and t + 1
-    for t in range(len(main) - 2, -1, -1):
-        x[t] -= lower1[t] * x[t + 1]
-        across = -lower1[t] * variance[t + 1]
-        beside[t] = across
-        variance[t] -= lower1[t] * across
-        if t + 2 < len(main):
-            x[t] -= lower2[t] * x[t + 2]
-            beside[t] -= lower2[t] * beside[t + 1]
-            far = -lower1[t] * beside[t + 1] - lower2[t] * variance[t + 2]
-            variance[t] += lower1[t] * lower2[t] * beside[t + 1] - lower2[t] * far
-    return x, variance
+    return _solved(bands, compiled_pays(len(bands[0]) * FRAME_S))
+
+
+def _solved(bands: Bands, fast: bool) -> tuple[Array, Array]:
+    if fast:
+        from lipmotion.kernels.compiled import banded
+
+        return banded.solve(*bands)
+    return _substitute(*_eliminate(*bands))
+
+
+def _eliminate(main: Array, first: Array, second: Array, right: Array) -> tuple[Array, Array, Array, Array]:
+    """Return 1 / D and both diagonals of L of the factorisation LDLᵀ, and L⁻¹ times the right-hand side."""
+    frames, channels = main.shape
+    inverse = np.empty_like(main)
+    lower1, lower2, x, coupling, far = (np.zeros((frames + 2, channels)) for _ in range(5))  # row t lies at t + 2
+    far[2:] = second
+    for t in range(frames):
+        pivot = main[t] - coupling[t + 1] * lower1[t + 1] - far[t] * lower2[t]
+        coupling[t + 2] = first[t] - coupling[t + 1] * lower2[t + 1]
+        x[t + 2] = right[t] - lower1[t + 1] * x[t + 1] - lower2[t] * x[t]
+        np.divide(1, pivot, out=inverse[t])
+        np.multiply(coupling[t + 2], inverse[t], out=lower1[t + 2])
+        np.multiply(second[t], inverse[t], out=lower2[t + 2])
+    return inverse, lower1[2:], lower2[2:], x[2:]
+
+
+def _substitute(inverse: Array, lower1: Array, lower2: Array, x: Array) -> tuple[Array, Array]:
+    """Return the solution and the diagonal of the inverse from the factors."""
+    frames, channels = inverse.shape
+    values, variance = np.zeros((frames + 2, channels)), np.zeros((frames + 2, channels))
+    np.multiply(x, inverse, out=values[:frames])
+    beside = np.zeros(channels)  # of the inverse, between the next row and the one behind it
+    for t in range(frames - 1, -1, -1):
+        l1, l2 = lower1[t], lower2[t]
+        values[t] = values[t] - l1 * values[t + 1] - l2 * values[t + 2]
+        across = -(l1 * variance[t + 1]) - l2 * beside
+        far = -(l1 * beside) - l2 * variance[t + 2]
+        variance[t] = inverse[t] - l1 * across - l2 * far
+        beside = across
+    return values[:frames], variance[:frames]

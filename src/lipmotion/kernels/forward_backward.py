@@ -5,8 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.kernels.choice import compiled_pays
+
+Array = NDArray[np.float64]
 IMPOSSIBLE = -1e30
 """A log probability of nothing that still adds up without NaN."""
+LEAST_LOG = -700.0
+CELL_S = 60e-9
+"""What NumPy takes for one state of one utterance in one frame (docs/results/kernels.md)."""
 
 
 def chain_posteriors(
@@ -26,6 +32,31 @@ def chain_posteriors(
     no path (fewer frames than states), and the other two are 0.
     Source: the standard recursions, in the log domain.  Cost: O(T·U·S).
     """
+    arrays = (log_emission, log_stay, log_move, frames, states)
+    if compiled_pays(log_emission.size * CELL_S):
+        from lipmotion.kernels.compiled import forward_backward
+
+        log_posterior, log_kept, log_likelihood = forward_backward.chains(*arrays)
+    else:
+        log_posterior, log_kept, log_likelihood = _chains(*arrays)
+    possible = log_likelihood > IMPOSSIBLE / 2
+    within = frames > np.arange(len(log_emission))[:, None]
+    posterior, kept = _probabilities(log_posterior), _probabilities(log_kept)
+    posterior *= (within & possible)[:, :, None]
+    return posterior, kept.sum(axis=0) * possible[:, None], log_likelihood
+
+
+def _probabilities(log: Array) -> Array:
+    """Return exp of logarithms of at most 0; those that are nearly nothing are slow, and nothing here."""
+    return np.exp(np.minimum(log, 0, out=log), out=np.zeros_like(log), where=log > LEAST_LOG)
+
+
+def _chains(
+    log_emission: Array, log_stay: Array, log_move: Array, frames: NDArray[np.intp], states: NDArray[np.intp]
+) -> tuple[Array, Array, Array]:
+    """Return log posteriors of being in each state, and of keeping it for the next frame, both [shape=(T, U, S)], and
+    log likelihoods [shape=(U,)]; in the padding, the first is anything.
+    """
     T, U, S = log_emission.shape
     alpha = np.full((T, U, S), IMPOSSIBLE)
     alpha[0, :, 0] = log_emission[0, :, 0]
@@ -39,18 +70,15 @@ def chain_posteriors(
     leave[rows, states - 1] = log_move[rows, states - 1]
     log_likelihood = (alpha[frames - 1, rows] + leave).max(axis=1)
 
-    beta = np.full((T, U, S), IMPOSSIBLE)
-    stay = np.zeros((U, S))
+    beta, log_kept = np.full((T, U, S), IMPOSSIBLE), np.full((T, U, S), IMPOSSIBLE)
     for t in range(T - 1, -1, -1):
+        last = (frames == t + 1)[:, None]
         if t + 1 < T:
             onward = log_emission[t + 1] + beta[t + 1]
             kept = log_stay + onward
             reach = kept.copy()
             reach[:, :-1] = np.logaddexp(kept[:, :-1], log_move[:, :-1] + onward[:, 1:])
             np.maximum(reach, IMPOSSIBLE, out=beta[t])
-            stay += np.exp(np.minimum(alpha[t] + kept - log_likelihood[:, None], 0)) * (frames > t + 1)[:, None]
-        beta[t] = np.where((frames == t + 1)[:, None], leave, beta[t])
-    posterior = np.exp(np.minimum(alpha + beta - log_likelihood[:, None], 0))
-    possible = log_likelihood > IMPOSSIBLE / 2
-    posterior *= ((frames > np.arange(T)[:, None]) & possible)[:, :, None]
-    return posterior, stay * possible[:, None], log_likelihood
+            log_kept[t] = np.where((frames > t + 1)[:, None], alpha[t] + kept - log_likelihood[:, None], IMPOSSIBLE)
+        beta[t] = np.where(last, leave, beta[t])
+    return alpha + beta - log_likelihood[:, None], log_kept, log_likelihood

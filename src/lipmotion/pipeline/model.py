@@ -17,7 +17,7 @@ from lipmotion.stats.archive import UNREADABLE, read_archive, read_archive_heade
 from lipmotion.stats.hmm.model import HmmConfig, UnitHmm, hmm_arrays, hmm_from_arrays
 
 FORMAT = "lipmotion.model"
-VERSION = 2
+VERSION = 3
 SHIPPED = "grid-s1.lipmotion"
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ SPLIT_STEP = 0.2
 """Halves of a split component move apart by this many standard deviations."""
 BLOCK = 256
 """Frames whose components are computed at a time: they fit into the cache."""
+LEAST_LOG_SHARE = np.float32(-50)
 LOG_2PI = float(np.log(2 * np.pi))
 
 
@@ -39,29 +41,32 @@ class Mixtures:
         chosen : [shape=(G',)], the densities wanted; all by default
         Cost: O(T·G'·M·D), as one matrix product.
         """
-        return _quadratic(x, *self._quadratic_form(chosen)).transpose(0, 2, 1)
+        return self.quadratic(chosen).log_components(x).transpose(0, 2, 1)
 
     def log_likelihood(self, x: NDArray[np.float32], chosen: NDArray[np.intp] | None = None) -> NDArray[np.float32]:
         """Return the log density of every frame under every mixture [shape=(T, G')]."""
-        form, constant = self._quadratic_form(chosen)
-        result = np.empty((len(x), constant.shape[1]), np.float32)
+        form = self.quadratic(chosen)
+        result = np.empty((len(x), form.constant.shape[1]), np.float32)
         for start in range(0, len(x), BLOCK):
-            components = _quadratic(x[start : start + BLOCK], form, constant)
+            components = form.log_components(x[start : start + BLOCK])
+            if components.shape[1] == 1:
+                result[start : start + BLOCK] = components[:, 0]
+                continue
             best = components.max(axis=1)
             components -= best[:, None]
             np.exp(components, out=components)
             result[start : start + BLOCK] = best + np.log(components.sum(axis=1))
         return result
 
-    def _quadratic_form(self, chosen: NDArray[np.intp] | None) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Return what x and x² are multiplied by [shape=(2 D, M G')], and what is added [shape=(M, G')]."""
+    def quadratic(self, chosen: NDArray[np.intp] | None = None) -> Quadratic:
+        """Return the densities [shape=(G',)] as one matrix; all by default."""
         pick = slice(None) if chosen is None else chosen
         means, precision = self.means[pick], 1 / self.variances[pick]
         constant = self.log_weights[pick] - 0.5 * (
             means.shape[2] * LOG_2PI - np.log(precision).sum(axis=2) + (means * means * precision).sum(axis=2)
         )
         form = np.concatenate([means * precision, precision / -2], axis=2).transpose(2, 1, 0)
-        return np.ascontiguousarray(form).reshape(len(form), -1), constant.T.astype(np.float32)
+        return Quadratic(np.ascontiguousarray(form).reshape(len(form), -1), constant.T.astype(np.float32))
 
     def split(self) -> Mixtures:
         """Return twice as many components, each half moved apart along all axes."""
@@ -95,16 +100,34 @@ class Mixtures:
         A component with less than two frames' worth of data is switched off.
         """
         posterior = self._responsibilities(density, x, share)
-        count = posterior.sum(axis=0)
-        alive = count >= min(2.0, count.max())
-        safe = np.where(alive, count, 1)[:, None]
-        mean = (posterior.T @ x) / safe
-        variance = np.maximum((posterior.T @ (x * x)) / safe - mean * mean, floor)
+        count, first, second = posterior.sum(axis=0), posterior.T @ x, posterior.T @ (x * x)
+        self.estimate(np.array([density]), count[None], first[None], second[None], floor)
+
+    def estimate(
+        self,
+        densities: NDArray[np.intp],
+        count: NDArray[np.floating[Any]],
+        first: NDArray[np.floating[Any]],
+        second: NDArray[np.floating[Any]],
+        floor: NDArray[np.float32],
+    ) -> None:
+        """Give densities the weights, means and variances that explain sums over their frames best.
+
+        densities     : [shape=(G',)], each once
+        count         : [shape=(G', M)], of the posteriors of each component; some of each density
+        first, second : [shape=(G', M, D)], of the features and of their squares, times the posteriors
+        floor         : [shape=(D,)], least variance
+        A component with less than two frames' worth of data is switched off.
+        """
+        alive = count >= np.minimum(2.0, count.max(axis=1, keepdims=True))
+        safe = np.where(alive, count, 1)[:, :, None]
+        mean = first / safe
+        variance = np.maximum(second / safe - mean * mean, floor)
         weights = np.where(alive, count, 0)
         with np.errstate(divide="ignore"):
-            self.log_weights[density] = np.log(weights / weights.sum())
-        self.means[density] = np.where(alive[:, None], mean, 0)
-        self.variances[density] = np.where(alive[:, None], variance, 1)
+            self.log_weights[densities] = np.log(weights / weights.sum(axis=1, keepdims=True))
+        self.means[densities] = np.where(alive[:, :, None], mean, 0)
+        self.variances[densities] = np.where(alive[:, :, None], variance, 1)
 
     def adapt(
         self, density: int, x: NDArray[np.float32], share: NDArray[np.float32], prior: int, relevance: float
@@ -142,11 +165,45 @@ class Mixtures:
         )
 
 
-def _quadratic(x: NDArray[np.float32], form: NDArray[np.float32], constant: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return the log densities of components [shape=(T, M, G)]; G last, for sums over M run along memory."""
-    values = (np.concatenate([x, x * x], axis=1) @ form).reshape(len(x), *constant.shape)
-    values += constant
-    return values
+@dataclass(frozen=True, eq=False)
+class Quadratic:
+    """Mixtures as what features and their squares are multiplied by.
+
+    form     : [shape=(2 D, M G)]
+    constant : [shape=(M, G)], what is added; G last, for sums over M run along memory
+    """
+
+    form: NDArray[np.float32]
+    constant: NDArray[np.float32]
+
+    def log_components(self, x: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return log weight + log density of every component [shape=(T, M, G)]."""
+        values = (np.concatenate([x, x * x], axis=1) @ self.form).reshape(len(x), *self.constant.shape)
+        values += self.constant
+        return values
+
+    def divided(self, features: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
+        """Return the log density of every mixture [shape=(T, G)], and its components' shares of it [shape=(T, M, G)].
+
+        features : ``with_squares`` of what the densities are of
+        Of a single component the share is 1, and not told. Shares under e^``LEAST_LOG_SHARE`` are not told apart:
+        in products smaller ones would be denormal, and slow.
+        """
+        whole = np.concatenate([self.form, self.constant.reshape(1, -1)])
+        shares = (features @ whole).reshape(len(features), *self.constant.shape)
+        if shares.shape[1] == 1:
+            return shares[:, 0], None
+        best = shares.max(axis=1)
+        shares -= best[:, None]
+        np.exp(np.maximum(shares, LEAST_LOG_SHARE, out=shares), out=shares)
+        total = shares.sum(axis=1)
+        shares /= total[:, None]
+        return best + np.log(total), shares
+
+
+def with_squares(x: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return features [shape=(T, D)], their squares and 1: what densities, and sums over frames, are products of."""
+    return np.concatenate([x, x * x, np.ones((len(x), 1), np.float32)], axis=1)
 
 
 def single_gaussian(x: NDArray[np.float32], count: int) -> Mixtures:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -55,6 +56,14 @@ class Tree:
             nodes.append(node + 1 if self.questions[self.asked[node]].answer(context) else int(self.no[node]))
         return nodes
 
+    def path_to(self, node: int) -> list[int]:
+        """Return the nodes from the root to a node."""
+        nodes = [0]
+        while nodes[-1] != node:
+            at = nodes[-1]
+            nodes.append(at + 1 if node < self.no[at] else int(self.no[at]))
+        return nodes
+
     @property
     def leaves(self) -> NDArray[np.intp]:
         """The nodes that ask nothing."""
@@ -62,13 +71,11 @@ class Tree:
 
     def name(self, node: int) -> str:
         """Return the answers that lead to a node, in words."""
+        path = self.path_to(node)
         answers = []
-        at = 0
-        while at != node:
-            yes = node < self.no[at]
+        for at, following in pairwise(path):
             asked = self.questions[self.asked[at]]
-            answers.append(f"{PLACES[asked.place]} {'is' if yes else 'is not'} {asked.name}")
-            at = at + 1 if yes else int(self.no[at])
+            answers.append(f"{PLACES[asked.place]} {'is' if following == at + 1 else 'is not'} {asked.name}")
         return ", ".join(answers) or "any"
 
     def text(self) -> str:
@@ -178,13 +185,18 @@ def _best_question(answers: Array, statistics: Array, log_likelihood: Likelihood
 
 
 def tree_arrays(trees: Mapping[str, Tree]) -> dict[str, NDArray[Any]]:
-    """Return trees that share their questions, by name, as plain arrays."""
+    """Return trees that share their questions, by name, as plain arrays, with the questions that are asked."""
     questions = next(iter(trees.values())).questions
+    asked = np.concatenate([tree.asked for tree in trees.values()])
+    used = np.unique(asked[asked >= 0])
+    kept = [questions[number] for number in used]
     return {
-        "questions": np.array([(str(q.place), q.name, " ".join(sorted(q.members))) for q in questions], np.str_),
+        "questions": np.array([(str(q.place), q.name, " ".join(sorted(q.members))) for q in kept], np.str_).reshape(
+            -1, 3
+        ),
         "trees": np.array(list(trees)),
         "sizes": np.array([len(tree.asked) for tree in trees.values()], np.int32),
-        "asked": np.concatenate([tree.asked for tree in trees.values()]),
+        "asked": np.where(asked >= 0, np.searchsorted(used, asked), -1).astype(np.int32),
         "no": np.concatenate([tree.no for tree in trees.values()]),
         "frames": np.concatenate([tree.frames for tree in trees.values()]),
     }
@@ -193,8 +205,7 @@ def tree_arrays(trees: Mapping[str, Tree]) -> dict[str, NDArray[Any]]:
 def trees_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> dict[str, Tree]:
     """Return the trees again. Raises KeyError, ValueError: something is missing or inconsistent."""
     questions = tuple(
-        Question(int(place), str(name), frozenset(str(members).split()))
-        for place, name, members in arrays["questions"].reshape(-1, 3)
+        Question(int(place), str(name), frozenset(str(members).split())) for place, name, members in arrays["questions"]
     )
     ends = np.cumsum(arrays["sizes"])
     if any(len(arrays[key]) != ends[-1] for key in ("asked", "no", "frames")) or (arrays["sizes"] < 1).any():

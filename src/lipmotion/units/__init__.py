@@ -1,5 +1,6 @@
 """What is spoken: phones, visemes, words. Data and look-ups, no audio."""
 
+from lipmotion.units.classes import phone_classes
 from lipmotion.units.lexicon import Lexicon, Pronunciation, phone_named, with_reduced_vowels
 from lipmotion.units.phones import LIP_CLOSING, PAUSE, PHONES, RELATIVES, SILENCE, is_silent, stand_in
 from lipmotion.units.transcript import words_of
@@ -16,6 +17,7 @@ __all__ = [
     "Lexicon",
     "Pronunciation",
     "is_silent",
+    "phone_classes",
     "phone_named",
     "stand_in",
     "with_reduced_vowels",

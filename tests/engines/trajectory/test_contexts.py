@@ -4,20 +4,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from engines.synthetic import timeline
-from lipmotion.engines.trajectory.contexts import (
-    LEVELS,
-    REST_MARGIN_S,
-    Place,
-    level_names,
-    places,
-    rest_place,
-    with_neighbours,
-)
+from lipmotion.engines.trajectory.contexts import Cut, Place, places, with_neighbours
 from lipmotion.errors import InputError
 from lipmotion.types import Span, Timeline, Unit
-from lipmotion.units import PHONES, VISEME_OF
 
-REST = rest_place(5)
+CUT = Cut(5, 7, 0.1)
+REST = CUT.rest
 
 
 def spans(*labels: tuple[float, float, str]) -> Timeline[Unit]:
@@ -25,36 +17,17 @@ def spans(*labels: tuple[float, float, str]) -> Timeline[Unit]:
 
 
 def parts_of(units: Timeline[Unit], phone: str, parts: int = 5, edge_s: float = 0.08) -> list[int]:
-    return [place.part for place in places(units, 200, parts, edge_s) if place.phone == phone and place != REST]
+    return [place.part for place in places(units, 200, Cut(parts, 1, edge_s)) if place.phone == phone]
 
 
-def test_names_go_from_the_most_general_to_the_most_particular():
-    assert level_names(Place("p", "aa", "t", 3)) == (
-        "*:3",
-        "[lr1]:3",
-        "[bi]-[lr1]:3",
-        "[lr1]+[al]:3",
-        "aa:3",
-        "[bi]-aa:3",
-        "aa+[al]:3",
-        "p-aa+t:3",
-    )
-
-
-@given(one=st.tuples(*[st.sampled_from(PHONES)] * 3), two=st.tuples(*[st.sampled_from(PHONES)] * 3))
-def test_places_of_the_same_viseme_classes_share_their_general_names(one, two):
-    first, second = level_names(Place(*one, 0)), level_names(Place(*two, 0))
-    assert len(first) == LEVELS
-    assert first[0] == second[0]
-    alike = [VISEME_OF[a] == VISEME_OF[b] for a, b in zip(one, two, strict=True)]
-    shared = [a == b for a, b in zip(first, second, strict=True)]
-    assert shared[1:4] == [alike[1], alike[0] and alike[1], alike[1] and alike[2]]
-    assert shared[4:7] == [
-        one[1] == two[1],
-        alike[0] and one[1] == two[1],
-        alike[2] and one[1] == two[1],
+def test_parts_have_names():
+    assert CUT.names[:2] + CUT.names[-2:] == ["speech.0", "speech.1", "silence.5", "silence.6"]
+    assert [CUT.name(Place("t", phone, "t", 3)) for phone in ("aa", "sil", "sp")] == [
+        "speech.3",
+        "silence.3",
+        "silence.3",
     ]
-    assert shared[7] == (one == two)
+    assert CUT.name(REST) == "silence.3"
 
 
 def test_beyond_the_ends_lies_silence():
@@ -100,9 +73,10 @@ def test_parts_mirror_in_time(start, length, edge):
 
 
 def test_silence_rests_away_from_speech_only():
-    where = places(spans((0, 0.595, "sil"), (0.595, 0.695, "aa"), (0.695, 1.5, "sil")), 151, 5, 0.08)
+    where = places(spans((0, 0.595, "sil"), (0.595, 0.695, "aa"), (0.695, 1.5, "sil")), 151, CUT)
     rests = np.array([place == REST for place in where])
-    margin = round(REST_MARGIN_S * 100)
+    margin = round(CUT.rest_s * 100)
+    assert margin == 30
     assert rests[: 60 - margin].all()
     assert not rests[60 - margin : 70 + margin].any()
     assert rests[70 + margin :].all()
@@ -111,19 +85,19 @@ def test_silence_rests_away_from_speech_only():
 
 def test_short_silence_between_words_never_rests():
     units = spans((0, 0.1, "aa"), (0.1, 0.6, "sil"), (0.6, 0.7, "aa"))
-    assert REST not in places(units, 70, 5, 0.08)
+    assert REST not in places(units, 70, CUT)
 
 
 def test_frames_outside_all_units_rest():
-    where = places(spans((0.1, 0.2, "aa"), (0.3, 0.4, "t")), 60, 5, 0.08)
+    where = places(spans((0.1, 0.2, "aa"), (0.3, 0.4, "t")), 60, CUT)
     assert [frame for frame in range(60) if where[frame] != REST] == [*range(10, 20), *range(30, 40)]
 
 
 def test_frames_belong_to_the_unit_that_has_begun():
-    where = places(spans((0.0, 0.105, "aa"), (0.105, 0.2, "t")), 20, 5, 0.08)
+    where = places(spans((0.0, 0.105, "aa"), (0.105, 0.2, "t")), 20, CUT)
     assert [place.phone for place in where] == ["aa"] * 11 + ["t"] * 9
 
 
 def test_unknown_phones_are_named():
     with pytest.raises(InputError, match=r"'xx' at 0\.6 s"):
-        places(timeline(("xx",)), 10, 5, 0.08)
+        places(timeline(("xx",)), 10, CUT)

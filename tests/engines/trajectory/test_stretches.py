@@ -27,7 +27,9 @@ def test_stretches_change_nothing(whole, stretch, monkeypatch):
     monkeypatch.setattr(module, "MARGIN", 250)
     pins = Constraints((Pin(3.3, "opening", 0.2), Pin(5.01, "opening", 0.1)))
     pieces = ENGINE.generate(MODEL, SPOKEN, pins)
-    assert pieces.motion.values == pytest.approx(whole.motion.values, abs=1e-9)
+    assert pieces.motion.values == pytest.approx(
+        whole.motion.values, abs=1e-7
+    )  # what is heard is summed in single precision
     assert pieces.variance == pytest.approx(whole.variance, abs=1e-9)
     assert np.array_equal(pieces.trace.frames, whole.trace.frames)
     assert pieces.motion["opening"][330] == 0.2

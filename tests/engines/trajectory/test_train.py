@@ -1,82 +1,100 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from engines.synthetic import examples
-from lipmotion.engines.trajectory import train
-from lipmotion.engines.trajectory.contexts import SPREAD_LEVELS, level_names, places, rest_place
+from lipmotion.engines.trajectory.contexts import Cut, Place, places
+from lipmotion.engines.trajectory.engine import TrajectoryConfig
+from lipmotion.engines.trajectory.train import LEAST_VARIANCE, fit_trajectory
 from lipmotion.types.progress import silent_monitor
 
-OPTIONS = {"parts": 3, "edge_s": 0.08, "components": 2, "shrinkage": 10.0, "variance_shrinkage": 20.0}
+HOW = replace(TrajectoryConfig(parts=3, silent_parts=7, components=2, listens=False).learning)
+CUT = HOW.cut
 
 
-def design(corpus, parts: int = 3):
-    """Names of all frames that have dynamics, and the static, Δ and Δ² of the opening there."""
-    names, rows = [], []
+def fit(corpus, **changes):
+    return fit_trajectory(corpus, replace(HOW, **changes), silent_monitor)
+
+
+def frames_by_density(corpus, emission):
+    """Static, Δ and Δ² of the opening in all frames that have them, by the density of their place."""
+    found: dict[int, list[list[float]]] = {}
     for example in corpus:
-        opening = example.motion["opening"]
-        where = places(example.speech.units, len(opening), parts, 0.08)
-        names += [level_names(place) for place in where[1:-1]]
-        slope, bend = (opening[2:] - opening[:-2]) / 2, opening[2:] - 2 * opening[1:-1] + opening[:-2]
-        rows.append(np.stack([opening[1:-1], slope, bend], axis=1))
-    return names, np.concatenate(rows)
+        x = example.motion["opening"]
+        for t, place in list(enumerate(places(example.speech.units, len(x), CUT)))[1:-1]:
+            row = [x[t], (x[t + 1] - x[t - 1]) / 2, x[t + 1] - 2 * x[t] + x[t - 1]]
+            found.setdefault(emission.row(place, CUT), []).append(row)
+    return {density: np.array(rows) for density, rows in found.items()}
 
 
-def test_means_are_a_ridge_regression_on_all_contexts(monkeypatch):
-    monkeypatch.setattr(train, "PASSES", 300)
-    monkeypatch.setattr(train, "_still", lambda *_: None)
-    corpus = examples(3)
-    names, motion = design(corpus)
-    model = train.fit_trajectory(corpus, **OPTIONS, monitor=silent_monitor)
-    columns = list(dict.fromkeys(name for row in names for name in row))
-    index = {name: column for column, name in enumerate(columns)}
-    X = np.zeros((len(names), len(columns)))
-    for row, levels in enumerate(names):
-        X[row, [index[name] for name in levels]] = 1
-    weights = np.linalg.solve(X.T @ X + OPTIONS["shrinkage"] * np.eye(len(columns)), X.T @ motion)
-    for level in model.levels:
-        for name, row in level.rows.items():
-            assert level.means[row][:, 0] == pytest.approx(weights[index[name]], abs=2e-4)
-            assert level.frames[row] == X[:, index[name]].sum()
+def test_without_shrinkage_each_leaf_has_the_mean_and_variance_of_its_frames():
+    corpus = examples(6)
+    emission = fit(corpus, shrinkage=1e-9, variance_shrinkage=1e-9).emission
+    rest = len(emission.means) - 1
+    found = frames_by_density(corpus, emission)
+    assert len(found) > 20
+    for density, rows in found.items():
+        if density == rest:
+            continue
+        assert emission.means[density, :, 0] == pytest.approx(rows.mean(axis=0), abs=1e-5)
+        assert emission.variances[density, :, 0] == pytest.approx(rows.var(axis=0), rel=0.02, abs=1e-5)
 
 
-def test_variances_shrink_towards_the_more_general_ones():
-    corpus = examples(4)
-    model = train.fit_trajectory(corpus, **OPTIONS, monitor=silent_monitor)
-    assert {name.split(":")[0] for name in model.spread} >= {"*", "[bi]", "p", "aa"}
-    tight = train.fit_trajectory(corpus, **{**OPTIONS, "variance_shrinkage": 1e9}, monitor=silent_monitor)
-    for names in {tuple(level_names(p)[n] for n in SPREAD_LEVELS) for p in places(corpus[0].speech.units, 99, 3, 0.08)}:
-        rows = [tight.variances[tight.spread[name]] for name in names]
-        assert rows[1] == pytest.approx(rows[0], rel=1e-3)
-        assert rows[2] == pytest.approx(rows[0], rel=1e-3)
+def test_shrinkage_draws_leaves_together():
+    corpus = examples(6)
+    apart, together = (fit(corpus, shrinkage=strength, tree_factor=0.2).emission for strength in (1e-9, 1e9))
+    found = frames_by_density(corpus, apart)
+    overall = np.concatenate([rows for density, rows in found.items() if density < len(apart.means) - 1])[:, 0].mean()
+    assert np.ptp(apart.means[:-1, 0, 0]) > 0.2
+    assert together.means[:-1, 0, 0] == pytest.approx(np.full(len(together.means) - 1, overall), abs=5e-3)
+
+
+def test_trees_tell_apart_what_moves_apart():
+    emission = fit(examples(12)).emission
+    middle = {
+        phone: emission.means[emission.row(Place("t", phone, "s", 1), CUT), 0, 0] for phone in ("aa", "iy", "uw", "p")
+    }
+    assert middle["aa"] > middle["iy"] + 0.1
+    assert middle["iy"] > middle["p"] + 0.05
+    assert {tree.questions[tree.asked[0]].place for tree in emission.forest.values() if tree.asked[0] >= 0} >= {1}
 
 
 def test_what_the_mouth_does_in_silence_away_from_speech_is_not_learned():
     calm, restless = examples(4), examples(4)
     for example in restless:
         example.motion.values[5:25:2, 0] += 0.1
-    models = [train.fit_trajectory(corpus, **OPTIONS, monitor=silent_monitor) for corpus in (calm, restless)]
-    one, two = (model.statistics(rest_place(3)) for model in models)
-    assert two[0][:, 0] == pytest.approx(one[0][:, 0], abs=2e-3)
-    assert two[1][:, 0] == pytest.approx(one[1][:, 0], rel=0.05)
+    one, two = (fit(corpus).emission for corpus in (calm, restless))
+    assert two.means[-1, :, 0] == pytest.approx(one.means[-1, :, 0], abs=2e-3)
+    assert two.variances[-1, :, 0] == pytest.approx(one.variances[-1, :, 0], rel=0.1)
 
 
 def test_a_channel_that_never_moves_keeps_a_variance():
     corpus = examples(4)
     for example in corpus:
         example.motion.values[:, 1] = 0.0
-    model = train.fit_trajectory(corpus, **OPTIONS, monitor=silent_monitor)
-    assert (model.variances > 0).all()
-    mean, precision, _ = model.statistics(places(corpus[0].speech.units, 99, 3, 0.08)[70])
-    assert np.isfinite(mean).all()
-    assert np.isfinite(precision).all()
+    emission = fit(corpus, listens=True, axes=20).emission
+    assert (emission.variances >= LEAST_VARIANCE / 1e4).all()
+    rows = np.array([emission.row(place, CUT) for place in places(corpus[0].speech.units, 99, CUT)])
+    for statistic in emission.statistics(rows, corpus[0].speech.features.values, slice(0, 99)):
+        assert np.isfinite(statistic).all()
 
 
-def test_the_source_of_a_place_is_the_most_particular_context_that_was_seen():
-    corpus = examples(6)
-    model = train.fit_trajectory(corpus, **OPTIONS, monitor=silent_monitor)
-    place = places(corpus[0].speech.units, 99, 3, 0.08)[64]
-    name = level_names(place)[-1]
-    frames = model.levels[-1].frames[model.levels[-1].rows[name]]
-    assert model.statistics(place)[2] == f"{name} ({frames} frames)"
-    assert model.statistics(place._replace(left="zh", right="zh"))[2].startswith(f"{place.phone}:")
-    assert model.statistics(place._replace(left="zh", phone="oy", right="zh"))[2].startswith("[lr1]:")
+def test_the_source_of_a_place_says_what_its_density_rests_on():
+    emission = fit(examples(6)).emission
+    said = emission.source(Place("t", "aa", "p", 1), CUT)
+    assert said.startswith("t-aa+p speech.1: ")
+    assert said.endswith(" frames)")
+    assert emission.source(CUT.rest, CUT) == "rest"
+
+
+def test_phones_never_heard_resolve_like_those_of_their_class():
+    emission = fit(examples(8)).emission
+    for phone in ("zh", "oy", "em"):
+        assert 0 <= emission.row(Place("zh", phone, "ng", 2), CUT) < len(emission.means) - 1
+    assert emission.row(Place("t", "sp", "t", 6), CUT) == emission.row(Place("t", "sil", "t", 6), CUT)
+
+
+def test_silence_may_be_cut_finer_than_speech():
+    emission = fit(examples(4), cut=Cut(1, 3, 0.1)).emission
+    assert list(emission.forest) == ["speech.0", "silence.0", "silence.1", "silence.2"]

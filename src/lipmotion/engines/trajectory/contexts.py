@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -21,36 +22,48 @@ class Place(NamedTuple):
     right: str
     part: int
 
+    @property
+    def context(self) -> tuple[str, str, str]:
+        """The phone between its neighbours, what decision trees ask about."""
+        return self.left, self.phone, self.right
 
-REST_MARGIN_S = 0.3
-"""The mouth rests in silence this far from speech."""
-LEVELS = 8
 
+@dataclass(frozen=True)
+class Cut:
+    """How phones are cut into parts.
 
-def level_names(place: Place) -> tuple[str, ...]:
-    """Return the names of a place from the most general to the most particular context.
-
-    Any phone; its viseme class, then beside the class to its left and to its right; the phone, then beside the
-    classes to its left and right; the phone between phones. So an unseen context, and a phone never seen at
-    all, resolve to the closest classes that were seen.
+    speech, silence : parts of a phone, and of a silence; odd numbers
+    edge_s : the parts before and after the middle one last an equal share, but no longer than this: it is the middle of
+             a long sound that gets longer
     """
-    left, phone, right, part = place
-    before, viseme, after = f"[{VISEME_OF[left]}]", f"[{VISEME_OF[phone]}]", f"[{VISEME_OF[right]}]"
-    names = (
-        "*",
-        viseme,
-        f"{before}-{viseme}",
-        f"{viseme}+{after}",
-        phone,
-        f"{before}-{phone}",
-        f"{phone}+{after}",
-        f"{left}-{phone}+{right}",
-    )
-    return tuple(f"{name}:{part}" for name in names)
 
+    speech: int
+    silence: int
+    edge_s: float
 
-SPREAD_LEVELS = (0, 1, 4)
-"""The levels that have variances of their own: any phone, viseme class, phone."""
+    def parts(self, phone: str) -> int:
+        """Return how many parts a phone has."""
+        return self.silence if is_silent(phone) else self.speech
+
+    def name(self, place: Place) -> str:
+        """Return the part alone, as ``speech.2`` or ``silence.6``."""
+        return f"{'silence' if is_silent(place.phone) else 'speech'}.{place.part}"
+
+    @property
+    def names(self) -> list[str]:
+        """All parts by name."""
+        kinds = (("speech", self.speech), ("silence", self.silence))
+        return [f"{kind}.{part}" for kind, count in kinds for part in range(count)]
+
+    @property
+    def rest(self) -> Place:
+        """The place of frames in silence away from speech."""
+        return Place(SILENCE, SILENCE, SILENCE, self.silence // 2)
+
+    @property
+    def rest_s(self) -> float:
+        """The mouth rests in silence this far from speech."""
+        return self.silence // 2 * self.edge_s
 
 
 def with_neighbours(units: Timeline[Unit]) -> Iterator[tuple[str, Span[Unit], str]]:
@@ -59,41 +72,33 @@ def with_neighbours(units: Timeline[Unit]) -> Iterator[tuple[str, Span[Unit], st
     return zip(phones, units, phones[2:], strict=False)
 
 
-def places(units: Timeline[Unit], frames: int, parts: int, edge_s: float) -> list[Place]:
+def places(units: Timeline[Unit], frames: int, cut: Cut) -> list[Place]:
     """Return the place of every frame [length ``frames``].
 
-    Silence further than ``REST_MARGIN_S`` from speech, and frames outside all units, are ``rest_place``.
-
-    parts  : an odd number of parts a phone is cut into
-    edge_s : the parts before and after the middle one last an equal share, but no longer than this:
-             it is the middle of a long sound that gets longer
+    Silence further than ``cut.rest_s`` from speech, and frames outside all units, are ``cut.rest``.
     Raises InputError: a phone outside the inventory.
     """
-    result = [rest_place(parts)] * frames
+    result = [cut.rest] * frames
     for left, span, right in with_neighbours(units):
-        if span.label.phone not in VISEME_OF:
-            raise InputError(f"unknown phone {span.label.phone!r} at {span.start_s} s; the phones: {' '.join(PHONES)}")
+        phone = span.label.phone
+        if phone not in VISEME_OF:
+            raise InputError(f"unknown phone {phone!r} at {span.start_s} s; the phones: {' '.join(PHONES)}")
         edges = np.ceil(np.array([span.start_s, span.end_s]) * FRAME_RATE_HZ - 1e-6)
         first, stop = np.clip(edges, 0, frames).astype(int).tolist()
         time_s = np.arange(first, stop) / FRAME_RATE_HZ
-        rests = _rests(time_s, left, span, right)
-        part = _parts(time_s, span.start_s, span.end_s, parts, edge_s)
+        rests = _rests(time_s, left, span, right, cut.rest_s)
+        part = _parts(time_s, span.start_s, span.end_s, cut.parts(phone), cut.edge_s)
         for i in np.nonzero(~rests)[0]:
-            result[first + i] = Place(left, span.label.phone, right, int(part[i]))
+            result[first + i] = Place(left, phone, right, int(part[i]))
     return result
 
 
-def rest_place(parts: int) -> Place:
-    """Return the place of frames in silence away from speech."""
-    return Place(SILENCE, SILENCE, SILENCE, parts // 2)
-
-
-def _rests(time_s: NDArray[np.float64], left: str, span: Span[Unit], right: str) -> NDArray[np.bool_]:
+def _rests(time_s: NDArray[np.float64], left: str, span: Span[Unit], right: str, rest_s: float) -> NDArray[np.bool_]:
     """Return which frames of a span are silence away from speech; beyond the recording's ends there is none."""
     if not is_silent(span.label.phone):
         return np.zeros(len(time_s), bool)
-    after = np.full(len(time_s), is_silent(left)) | (time_s - span.start_s > REST_MARGIN_S)
-    before = np.full(len(time_s), is_silent(right)) | (span.end_s - time_s > REST_MARGIN_S)
+    after = np.full(len(time_s), is_silent(left)) | (time_s - span.start_s > rest_s)
+    before = np.full(len(time_s), is_silent(right)) | (span.end_s - time_s > rest_s)
     return after & before
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar, final
 
 import numpy as np
@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 
 from lipmotion.engines.base import Arrays, Engine, Fit, frame_of
 from lipmotion.engines.trajectory.closure import OPENING, Closure, closing_frames, closing_spans
-from lipmotion.engines.trajectory.contexts import places, with_neighbours
+from lipmotion.engines.trajectory.contexts import Cut, places, with_neighbours
+from lipmotion.engines.trajectory.learning import Learning
 from lipmotion.engines.trajectory.model import TrajectoryModel, model_arrays, model_from_arrays
 from lipmotion.engines.trajectory.train import fit_trajectory
-from lipmotion.errors import InputError, ModelFormatError
-from lipmotion.kernels.banded import normal_equations, pin, solve
+from lipmotion.errors import InputError
+from lipmotion.kernels.banded import generate
 from lipmotion.stats.checkpoint import NOTHING_KEPT, Checkpoint
 from lipmotion.types import (
     FRAME_RATE_HZ,
@@ -34,66 +35,92 @@ from lipmotion.types import (
 
 @dataclass(frozen=True)
 class TrajectoryConfig:
-    """How the trajectory engine models motion (chosen on the validation list; see docs/results).
+    """How the trajectory engine models motion (chosen on the validation list; see docs/decisions/0009).
 
-    parts      : parts a phone is cut into, an odd number
+    parts, silent_parts : parts that a phone, and a silence, is cut into; odd numbers
     edge_s     : most seconds that a part before or after the middle one lasts
     components : dimensions that all point channels are reduced to
-    shrinkage  : frames of evidence that a context must outweigh to change the mean
-    variance_shrinkage : frames that the more general variance counts for
+    tree_factor: what a split of a decision tree must gain, in units of its description length
+    least_frames : frames that a leaf of a tree must have
+    shrinkage, variance_shrinkage : frames that the mean, and the variance, of the node above count for
+    listens    : let the means follow the sound around the frame (False: the paper's plain Gaussians)
+    axes       : numbers that the sound around a frame is reduced to
+    ridge, shared_ridge : how strongly a regression on the sound is drawn towards that of the node above, and the one
+                 that all share towards none
+    ridge_frames : frames that a node must have for a regression of its own (``hearing.MOST`` asks for more)
     closures   : make the lips meet in every p, b and m
     """
 
     parts: int = 5
+    silent_parts: int = 13
     edge_s: float = 0.08
     components: int = 16
+    tree_factor: float = 0.2
+    least_frames: float = 8.0
     shrinkage: float = 10.0
     variance_shrinkage: float = 20.0
+    listens: bool = True
+    axes: int = 150
+    ridge: float = 2000.0
+    shared_ridge: float = 100.0
+    ridge_frames: float = 100.0
     closures: bool = True
 
     def __post_init__(self) -> None:
-        if self.parts < 1 or self.parts % 2 != 1:
-            raise InputError(f"parts is {self.parts}, required an odd number from 1")
-        numbers = (self.edge_s, self.components, self.shrinkage, self.variance_shrinkage)
+        for name in ("parts", "silent_parts"):
+            if getattr(self, name) < 1 or getattr(self, name) % 2 != 1:
+                raise InputError(f"{name} is {getattr(self, name)}, required an odd number from 1")
+        numbers = [getattr(self, field.name) for field in fields(self) if field.type != "bool"]
         if not all(0 < number < float("inf") for number in numbers):
             raise InputError(f"all numbers of the configuration must be more than 0 and finite: {self}")
+
+    @property
+    def cut(self) -> Cut:
+        """How phones are cut into parts."""
+        return Cut(self.parts, self.silent_parts, self.edge_s)
+
+    @property
+    def learning(self) -> Learning:
+        """What training needs of it."""
+        names = {field.name for field in fields(Learning)} - {"cut"}
+        return Learning(self.cut, **{name: getattr(self, name) for name in names})
 
 
 @final
 @dataclass(frozen=True)
 class TrajectoryEngine(Engine[TrajectoryModel]):
-    """Statistics of context-dependent units, made a smooth trajectory by parameter generation.
+    """Hidden Markov models of context-dependent units, made a smooth trajectory by parameter generation.
 
-    Source: Hofer 2008, §5.  Deviation: one Gaussian a unit part, estimated along forced alignments and backed
-    off from phones between phones to viseme classes, instead of joint audio–visual HMMs.
+    Source: Hofer 2008, §5.  Deviation: the state of a frame is its part of the phone, whose times are known from
+    recognition or alignment; means follow the sound around the frame.
     """
 
     config: TrajectoryConfig
     name: ClassVar[str] = "trajectory"
 
     def fit(  # noqa: D102
-        self, examples: Sequence[Example], monitor: Monitor, checkpoint: Checkpoint = NOTHING_KEPT
+        self,
+        examples: Sequence[Example],
+        monitor: Monitor,
+        checkpoint: Checkpoint = NOTHING_KEPT,  # noqa: ARG002 - a matter of seconds
     ) -> Fit[TrajectoryModel]:
-        options = asdict(self.config)
-        del options["closures"]  # of generation
-        model = fit_trajectory(examples, **options, monitor=monitor, checkpoint=checkpoint)
+        model = fit_trajectory(examples, self.config.learning, monitor)
         frames = sum(int(example.valid.sum()) for example in examples)
-        return Fit(model, {"frames": frames, "contexts": len(model.levels[-1].rows)})
+        return Fit(model, {"frames": frames, "leaves": len(model.emission.means)})
 
     def generate(self, model: TrajectoryModel, speech: Speech, constraints: Constraints | None = None) -> Generation:  # noqa: D102
-        frames = len(speech.features.values)
-        where = places(speech.units, frames, self.config.parts, self.config.edge_s)
-        distinct = list(dict.fromkeys(where))
-        mean, precision, sources = zip(*(model.statistics(place) for place in distinct), strict=True)
-        means, precisions = np.array(mean), np.array(precision)
-        index = {place: number for number, place in enumerate(distinct)}
-        path = np.array([index[place] for place in where], np.intp)
+        features = np.asarray(speech.features.values)
+        frames, cut = len(features), self.config.cut
+        where = places(speech.units, frames, cut)
+        distinct = {place: number for number, place in enumerate(dict.fromkeys(where))}
+        path = np.array([distinct[place] for place in where], np.intp)
+        rows = np.array([model.emission.row(place, cut) for place in distinct], np.intp)
         closing = closing_spans(speech.units, frames) if self.config.closures else []
         pins = _resolved(constraints, model, frames)
         precise = np.float64 if frames <= DOUBLE_FRAMES else np.float32
         motion, spread = (np.empty((frames, len(model.space.channels)), precise) for _ in range(2))
         for inner, outer in _stretches(frames):
-            statistics = means[path[outer]], precisions[path[outer]]
+            statistics = model.emission.statistics(rows[path[outer]], features, outer)
             inside = {
                 (frame - outer.start, c): v for (frame, c), v in pins.items() if outer.start <= frame < outer.stop
             }
@@ -111,22 +138,14 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
             Motion(motion, FRAME_RATE_HZ, model.space.channels),
             spread,
             _named(speech.units),
-            Trace(sources, path),
+            Trace(tuple(model.emission.source(place, cut) for place in distinct), path),
         )
 
     def to_arrays(self, model: TrajectoryModel) -> dict[str, NDArray[Any]]:  # noqa: D102
         return model_arrays(model)
 
     def from_arrays(self, arrays: Arrays) -> TrajectoryModel:  # noqa: D102
-        model = model_from_arrays(arrays)
-        parts = self.config.parts
-        missing = next((part for part in range(parts) if f"*:{part}" not in model.spread), None)
-        if missing is not None:
-            raise ModelFormatError(
-                f"the trajectory model is damaged (no variances of part {missing}, required {parts} parts); "
-                "train or download it again"
-            )
-        return model
+        return model_from_arrays(arrays, self.config.cut)
 
 
 STRETCH, MARGIN = 6000, 500
@@ -171,23 +190,12 @@ def _generated(
     model: TrajectoryModel, statistics: tuple[_Array, _Array], pins: _Pins, closing: Sequence[slice]
 ) -> tuple[_Array, _Array]:
     """Return trajectory and variance in the model's space [shape=(T, Q)], lips closed where they must."""
-    result = _trajectory(*statistics, pins)
+    result = generate(*statistics, pins)
     if model.closure is not None:
         _close_lips(model.closure, closing, statistics, pins, result)
         opening = result[0][:, model.closure.column]
         np.maximum(opening, 0, out=opening)  # a smooth curve through a closure may overshoot
     return result
-
-
-def _trajectory(mean: _Array, precision: _Array, pins: _Pins) -> tuple[_Array, _Array]:
-    """Return the trajectory through all pins, and its variance (0 there), both [shape=(T, Q)]."""
-    bands = normal_equations(mean, precision)
-    for (frame, column), value in pins.items():
-        pin(bands, frame, column, value)
-    values, variance = solve(bands)
-    for frame, column in pins:
-        variance[frame, column] = 0
-    return values, variance
 
 
 def _close_lips(
@@ -207,7 +215,7 @@ def _close_lips(
     wanted = {(frame, 0): closure.closed for frame in frames}
     wanted |= {(frame, 0): pins[frame, column] for frame in taken}
     opening = slice(column, column + 1)
-    closing, spread = _trajectory(statistics[0][:, :, opening], statistics[1][:, :, opening], wanted)
+    closing, spread = generate(statistics[0][:, :, opening], statistics[1][:, :, opening], wanted)
     follow = closure.follow.copy()
     follow[[pinned for _, pinned in pins]] = 0
     values += (closing - values[:, opening]) * follow

@@ -29,6 +29,11 @@ class MotionSpace:
         """The names of the channels that are modelled as they are."""
         return tuple(self.channels[channel].name for channel in self.direct)
 
+    @property
+    def dimensions(self) -> int:
+        """Q."""
+        return len(self.direct) + (len(self.points.basis) if self.points is not None else 0)
+
     def reduce(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return motion [shape=(T, P)] as the model sees it [shape=(T, Q)]."""
         direct = values[:, self.direct]

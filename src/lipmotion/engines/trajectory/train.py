@@ -1,4 +1,4 @@
-"""Statistics of motion, unit by unit: a sum of what every generality of context adds."""
+"""Learning how the mouth moves in every part of every unit in context."""
 
 from __future__ import annotations
 
@@ -8,66 +8,56 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.trajectory.closure import OPENING, fit_closure
-from lipmotion.engines.trajectory.contexts import LEVELS, SPREAD_LEVELS, level_names, places, rest_place
-from lipmotion.engines.trajectory.model import Level, TrajectoryModel
+from lipmotion.engines.trajectory.contexts import Cut, Place, places
+from lipmotion.engines.trajectory.emission import Emission
+from lipmotion.engines.trajectory.hearing import fit_hearing
+from lipmotion.engines.trajectory.learning import Learning, Observed
+from lipmotion.engines.trajectory.model import TrajectoryModel
 from lipmotion.engines.trajectory.space import fit_space
 from lipmotion.errors import CorpusError
-from lipmotion.stats.checkpoint import NOTHING_KEPT, Checkpoint
+from lipmotion.stats.trees import Question, Tree, gaussian_likelihood, grow
 from lipmotion.stats.windows import with_dynamics
 from lipmotion.types import Channel, Example, Monitor, Progress
+from lipmotion.units import phone_classes
 
-PASSES = 4
-"""Rounds of backfitting; more change nothing on the validation list."""
+Array = NDArray[np.float64]
 LEAST_VARIANCE_SHARE, LEAST_VARIANCE = 1e-3, 1e-12
 """No variance falls under this share of the overall one, nor under this: some dimensions never move."""
 
 
-def fit_trajectory(
-    examples: Sequence[Example],
-    *,
-    parts: int,
-    edge_s: float,
-    components: int,
-    shrinkage: float,
-    variance_shrinkage: float,
-    monitor: Monitor,
-    checkpoint: Checkpoint = NOTHING_KEPT,
-) -> TrajectoryModel:
-    """Return what every context adds to the mean, and variances around the sum.
+def fit_trajectory(examples: Sequence[Example], how: Learning, monitor: Monitor) -> TrajectoryModel:
+    """Return densities of the motion for every part of a phone in context, tied by decision trees.
 
-    The means are a ridge regression of static, Δ and Δ² on the indicators of all contexts of a frame, solved
-    by backfitting: a context with few frames, or one that the more general ones explain, adds little.
-    components : dimensions that all point channels (``x_17``, ...) are reduced to
-    shrinkage  : frames of evidence that a context must outweigh (the ridge)
-    variance_shrinkage : frames that the more general variance counts for
     Raises CorpusError: no example with motion that was seen in speech, or examples of different channels.
     """
     channels = _common_channels(examples)
     seen = np.concatenate([example.motion.values[example.valid] for example in examples])
-    space = fit_space(channels, seen, components)
-    names: list[tuple[str, ...]] = []
-    values: list[NDArray[np.float64]] = []
-    rows: list[NDArray[np.float32]] = []
-    for example in examples:
-        inner = _inner(example.valid)
-        values.append(space.reduce(example.motion.values.astype(float)))
-        dynamics = with_dynamics(values[-1])
-        where = places(example.speech.units, len(inner), parts, edge_s)
-        rows.append(dynamics[inner].astype(np.float32))
-        names += [level_names(place) for place, kept in zip(where, inner, strict=True) if kept]
-    covered = {name[0] for name in names}
-    if len(covered) < parts:
-        raise CorpusError(f"motion was seen in {len(covered)} of {parts} parts of a phone; learn from more speech")
-    motion = np.concatenate(rows)
-    _still(motion, [name == level_names(rest_place(parts)) for name in names])
-    overall = motion.var(axis=0)
-    levels, rest = _backfit(names, motion, shrinkage, monitor, checkpoint)
-    spread, variances = _fit_variances(names, rest, overall, variance_shrinkage)
+    space = fit_space(channels, seen, how.components)
+    values = [space.reduce(example.motion.values.astype(float)) for example in examples]
+    observed = [_observed(example, x, how.cut) for example, x in zip(examples, values, strict=True)]
+    covered = {how.cut.name(place) for one in observed for place in one.places if not _silent(how.cut, place)}
+    if len(covered) < how.cut.speech:
+        raise CorpusError(
+            f"motion was seen in {len(covered)} of {how.cut.speech} parts of a phone; learn from more speech"
+        )
+    monitor(Progress(_STAGE, 1, 3, 0.1))
+    emission = _tied(observed, how)
+    if how.listens:
+        monitor(Progress(_STAGE, 2, 3, 0.3))
+        emission = fit_hearing(emission, observed, how)
+    monitor(Progress(_STAGE, 3, 3, 1.0))
     closure = None
     if OPENING in space.direct_names:
         masks, timelines = [e.valid for e in examples], [e.speech.units for e in examples]
         closure = fit_closure(values, masks, timelines, space.direct_names.index(OPENING))
-    return TrajectoryModel(space, tuple(levels), spread, variances, closure)
+    return TrajectoryModel(space, emission, closure)
+
+
+_STAGE = "trees"
+
+
+def _silent(cut: Cut, place: Place) -> bool:
+    return cut.name(place).startswith("silence")
 
 
 def _common_channels(examples: Sequence[Example]) -> tuple[Channel, ...]:
@@ -86,88 +76,97 @@ def _inner(valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return inner
 
 
-_Groups = tuple[list[str], NDArray[np.intp], NDArray[np.intp]]
+def _observed(example: Example, values: Array, cut: Cut) -> Observed:
+    frames = np.nonzero(_inner(example.valid))[0]
+    where = places(example.speech.units, len(values), cut)
+    features = np.asarray(example.speech.features.values)
+    dynamics = with_dynamics(values)[frames].astype(np.float32)
+    return Observed(features, frames, dynamics, [where[frame] for frame in frames])
 
 
-def _groups(names: Sequence[str]) -> _Groups:
-    """Return the distinct names, the frames sorted by name, and where each name's begin."""
-    index: dict[str, int] = {}
-    numbers = np.array([index.setdefault(name, len(index)) for name in names])
-    starts = np.concatenate([[0], np.cumsum(np.bincount(numbers))[:-1]])
-    return list(index), np.argsort(numbers, kind="stable"), starts.astype(np.intp)
-
-
-def _still(dynamics: NDArray[np.float32], rests: Sequence[bool]) -> None:
-    """Replace what the mouth did in silence away from speech (breath, a lick of the lips) by its median pose."""
-    resting = np.array(rests)
-    if resting.any():
-        dynamics[resting, 0] = np.median(dynamics[resting, 0], axis=0)
-        dynamics[resting, 1:] = 0
-
-
-def _backfit(
-    names: Sequence[tuple[str, ...]],
-    motion: NDArray[np.float32],
-    shrinkage: float,
-    monitor: Monitor,
-    checkpoint: Checkpoint,
-) -> tuple[list[Level], NDArray[np.float32]]:
-    """Return all levels, and what they leave unexplained of the motion [shape=(T, 3, Q)]; kept after every pass."""
-    groups = [_groups([name[number] for name in names]) for number in range(LEVELS)]
-    counts = [np.diff(np.append(starts, len(order))) for _, order, starts in groups]
-    means = [np.zeros((len(distinct), *motion.shape[1:]), np.float32) for distinct, _, _ in groups]
-    rest, done = motion, 0
-    kept = checkpoint.load(_CHECKPOINT)
-    if kept is not None:
-        means, rest, done = [kept[f"means{number}"] for number in range(LEVELS)], kept["rest"], int(kept["done"])
-    monitor(Progress(_STAGE, done, PASSES, done / PASSES))
-    for number in range(done, PASSES):
-        _backfit_once(groups, counts, means, rest, shrinkage)
-        state = {f"means{level}": mean for level, mean in enumerate(means)}
-        checkpoint.save(_CHECKPOINT, {**state, "rest": rest, "done": np.array(number + 1)})
-        unexplained = float(rest[:, 0].var(axis=0).sum())
-        monitor(Progress(_STAGE, number + 1, PASSES, (number + 1) / PASSES, unexplained))
-    levels = [
-        Level({name: row for row, name in enumerate(distinct)}, mean, count.astype(np.int32))
-        for (distinct, _, _), mean, count in zip(groups, means, counts, strict=True)
+def _tied(observed: Sequence[Observed], how: Learning) -> Emission:
+    """Return the Gaussians of all leaves: each mean and variance is drawn towards that of the node above it."""
+    moving = np.concatenate(
+        [one.rows[[place != how.cut.rest for place in one.places]] for one in observed], dtype=np.float64
+    )
+    centre, overall = moving.mean(axis=0), moving.var(axis=0)
+    least = np.maximum(LEAST_VARIANCE_SHARE * overall, LEAST_VARIANCE)
+    scale = np.sqrt(np.maximum(overall, least))
+    grouped = _grouped(observed, how.cut, centre, scale)
+    forest = {name: _grown(contexts, 2 * overall.size, how) for name, contexts in grouped.items()}
+    leaves = [
+        gaussian
+        for name, tree in forest.items()
+        for gaussian in _leaf_gaussians(tree, grouped[name], overall.size, how)
     ]
-    return levels, rest
+    means, variances = (np.array(part).reshape(-1, *overall.shape) for part in zip(*leaves, strict=True))
+    rest_mean, rest_variance = _rest(observed, how, centre, overall)
+    means = np.concatenate([means * scale + centre, rest_mean[None]])
+    variances = np.concatenate([variances * scale * scale, rest_variance[None]])
+    return Emission(forest, means.astype(np.float32), np.maximum(variances, least).astype(np.float32), None)
 
 
-_CHECKPOINT, _STAGE = "motion", "contexts"
+def _grown(contexts: _Contexts, parameters: int, how: Learning) -> Tree:
+    """Return the tree of one part; a single leaf where the part was never seen."""
+    unseen = {how.cut.rest.context: np.zeros(1 + parameters)}
+    return grow(
+        list(contexts or unseen),
+        np.array(list((contexts or unseen).values())),
+        [Question(place, *named) for place in range(3) for named in phone_classes().items()],
+        gaussian_likelihood,
+        parameters=parameters,
+        factor=how.tree_factor,
+        least=how.least_frames,
+    )
 
 
-def _backfit_once(
-    groups: Sequence[_Groups],
-    counts: Sequence[NDArray[np.intp]],
-    means: list[NDArray[np.float32]],
-    rest: NDArray[np.float32],
-    shrinkage: float,
-) -> None:
-    """Estimate every level's means once from what all the others leave unexplained (both in place)."""
-    for number, (_, order, starts) in enumerate(groups):
-        rest[order] += np.repeat(means[number], counts[number], axis=0)
-        sums = np.add.reduceat(rest[order].astype(float), starts, axis=0)
-        means[number] = (sums / (counts[number] + shrinkage)[:, None, None]).astype(np.float32)
-        rest[order] -= np.repeat(means[number], counts[number], axis=0)
+_Contexts = dict[tuple[str, str, str], Array]
+"""Count, sums and sums of squares of the frames of every context."""
 
 
-def _fit_variances(
-    names: Sequence[tuple[str, ...]], rest: NDArray[np.float32], overall: NDArray[np.float32], shrinkage: float
-) -> tuple[dict[str, int], NDArray[np.float32]]:
-    """Return the variances around the full mean, of some levels, each shrunk towards the more general one."""
-    rows: dict[str, int] = {}
-    variances: list[NDArray[np.float32]] = []
-    squares, least = np.square(rest), np.maximum(LEAST_VARIANCE_SHARE * overall, LEAST_VARIANCE)
-    for position, number in enumerate(SPREAD_LEVELS):
-        distinct, order, starts = _groups([name[number] for name in names])
-        first = {name[number]: name for name in names}
-        general_level = SPREAD_LEVELS[position - 1]
-        sums = np.add.reduceat(squares[order].astype(float), starts, axis=0)
-        counts = np.diff(np.append(starts, len(order)))
-        for name, total, count in zip(distinct, sums, counts, strict=True):
-            general = variances[rows[first[name][general_level]]] if position else rest.var(axis=0)
-            variance = (total + shrinkage * general) / (count + shrinkage)
-            rows[name] = len(variances)
-            variances.append(np.maximum(variance, least).astype(np.float32))
-    return rows, np.array(variances)
+def _grouped(observed: Sequence[Observed], cut: Cut, centre: Array, scale: Array) -> dict[str, _Contexts]:
+    """Return the moments of the standardised frames of every context, part by part."""
+    grouped: dict[str, _Contexts] = {name: {} for name in cut.names}
+    for one in observed:
+        index: dict[Place, list[int]] = {}
+        for number, place in enumerate(one.places):
+            index.setdefault(place, []).append(number)
+        for place, numbers in index.items():
+            if place == cut.rest:
+                continue
+            rows = ((one.rows[numbers] - centre) / scale).reshape(len(numbers), -1)
+            moments = np.concatenate([[len(rows)], rows.sum(axis=0), (rows * rows).sum(axis=0)])
+            contexts = grouped[cut.name(place)]
+            contexts[place.context] = contexts.get(place.context, 0) + moments
+    return grouped
+
+
+def _leaf_gaussians(tree: Tree, contexts: _Contexts, size: int, how: Learning) -> list[tuple[Array, Array]]:
+    """Return mean and variance [each shape=(3·Q,)] of every leaf, in standardised units."""
+    totals = np.zeros((len(tree.asked), 1 + 2 * size))
+    above = np.full(len(tree.asked), -1)
+    for context, moments in contexts.items():
+        path = tree.path(context)
+        totals[path] += moments
+        above[path[1:]] = path[:-1]
+    means, variances = np.zeros((len(tree.asked), size)), np.ones((len(tree.asked), size))
+    for node, (total, parent) in enumerate(zip(totals, above, strict=True)):
+        count, sums, squares = total[0], total[1 : 1 + size], total[1 + size :]
+        mean, variance = (means[parent], variances[parent]) if parent >= 0 else (np.zeros(size), np.ones(size))
+        means[node] = (sums + how.shrinkage * mean) / (count + how.shrinkage)
+        around = squares - 2 * means[node] * sums + count * means[node] ** 2
+        variances[node] = (around + how.variance_shrinkage * variance) / (count + how.variance_shrinkage)
+    return [(means[leaf], variances[leaf]) for leaf in tree.leaves]
+
+
+def _rest(observed: Sequence[Observed], how: Learning, fallback: Array, overall: Array) -> tuple[Array, Array]:
+    """Return the median pose of silence away from speech, and a variance that holds it still.
+
+    What the mouth did there (breath, a lick of the lips) is no speech.
+    """
+    poses = [one.rows[number, 0] for one in observed for number, p in enumerate(one.places) if p == how.cut.rest]
+    if not poses:
+        return fallback, overall
+    mean = np.zeros_like(overall)
+    mean[0] = np.median(poses, axis=0)
+    return mean, how.variance_shrinkage * overall / (len(poses) + how.variance_shrinkage)

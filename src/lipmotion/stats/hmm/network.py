@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError
+from lipmotion.kernels.arcs import Layout, laid_out
+from lipmotion.kernels.network import Expectation
 from lipmotion.kernels.viterbi import best_path
 from lipmotion.stats.hmm.evidence import Evidence
 
@@ -26,10 +29,22 @@ class Network:
     log_initial: NDArray[np.float32]
     log_final: NDArray[np.float32]
 
-    def best_path(self, evidence: Evidence, chosen: NDArray[np.intp] | None = None) -> NDArray[np.intp]:
+    @cached_property
+    def layout(self) -> Layout:
+        """Where the arcs lie for compiled kernels."""
+        return laid_out(self.arc_from, self.arc_start)
+
+    def expectation(self) -> Expectation:
+        """Return the network ready for forward–backward."""
+        return Expectation.of(self.arc_from, self.arc_log, self.arc_start, self.log_initial, self.log_final)
+
+    def best_path(
+        self, evidence: Evidence, chosen: NDArray[np.intp] | None = None, beam: float | None = None
+    ) -> NDArray[np.intp]:
         """Return the best path's states [shape=(T,)].
 
         chosen : the densities that ``emission`` counts; all by default
+        beam   : states whose score falls more than this under the frame's best are dropped; None: exact
         Raises AlignmentError: no path reaches the end.
         """
         kept = evidence.log_density(0, evidence.frames, chosen) if evidence.frames <= KEPT_FRAMES else None
@@ -46,6 +61,8 @@ class Network:
             self.arc_start,
             self.log_initial,
             self.log_final,
+            beam,
+            lambda: self.layout,
         )
         if not np.isfinite(score):
             raise AlignmentError(

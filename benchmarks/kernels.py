@@ -1,0 +1,183 @@
+"""Speed of the compiled kernels beside their peers, in the peers' own harness.
+
+    python benchmarks/kernels.py --bench ../shared/bench [--rounds 3] [--only NAME ...]
+
+Each figure is work per CPU second of one thread, over rounds in which ours and the peer take turns: the median and the
+best round (what else the machine does makes both slower, and short runs most); what is compared is the ratio. Peers
+that cannot be imported are left out (pip install hmmlearn nnmnkwii psutil).
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import statistics
+import subprocess
+import sys
+from collections.abc import Callable
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+HERE = Path(__file__).resolve().parent
+Work = Callable[[], Any]
+
+
+class Case(NamedTuple):
+    """One comparison: the harness's script, our factory, the peer and its package, and options of both."""
+
+    script: str
+    ours: str
+    peer: str
+    package: str
+    options: tuple[str, ...] = ()
+
+
+LOOP = ("--utts", "100", "--repeats", "3")
+SHORT_LOOP = ("--utts", "10", "--repeats", "2", "--K", "8")
+CASES = {
+    "parameter generation, D=90": Case("bench_mlpg.py", "mlpg", "nnmnkwii", "nnmnkwii", ("--repeats", "15")),
+    "EM, K=1": Case("bench_hmm.py", "em", "hmmlearn_scaling", "hmmlearn", (*LOOP, "--op", "em")),
+    "EM, K=8": Case("bench_hmm.py", "em", "hmmlearn_scaling", "hmmlearn", (*SHORT_LOOP, "--op", "em")),
+    "Viterbi, K=1": Case("bench_hmm.py", "viterbi", "hmmlearn_scaling", "hmmlearn", (*LOOP, "--op", "viterbi")),
+    "Viterbi, beam 200": Case("bench_hmm.py", "narrow", "hmmlearn_scaling", "hmmlearn", (*LOOP, "--op", "viterbi")),
+}
+
+
+def mlpg(options: Any) -> Work:
+    """Trajectory and variance of every frame (the peers compute no variance)."""
+    import numba  # noqa: F401  (loaded: so the compiled form is taken at once)
+
+    from lipmotion.kernels.banded import generate
+
+    mean, precision = (np.ascontiguousarray(a.transpose(1, 0, 2)) for a in _harness("get")(options))
+    return lambda: generate(mean, precision)[0]
+
+
+def em(options: Any) -> Work:
+    """One step of expectation and maximisation of all recordings."""
+    from lipmotion.stats.hmm.loop_em import em_step
+
+    mixtures, network, data = _loop(options)
+    floor = np.full(options.D, 1e-3, np.float32)
+
+    def step() -> tuple[float]:
+        return (em_step(mixtures, network, data, floor)[2] * options.T * options.utts,)
+
+    return step
+
+
+def viterbi(options: Any, beam: float | None = None) -> Work:
+    """Densities and best path of every recording."""
+    import numba  # noqa: F401
+
+    from lipmotion.kernels.viterbi import best_path
+
+    mixtures, network, data = _loop(options)
+    arcs = (network.emission, network.arc_from, network.arc_log, network.arc_start)
+    ends = (network.log_initial, network.log_final)
+
+    def decode() -> tuple[float]:
+        total = 0.0
+        for x in data:
+            density = mixtures.log_likelihood(x)
+            total += best_path(
+                lambda a, b, density=density: density[a:b], len(x), *arcs, *ends, beam, lambda: network.layout
+            )[1]
+        return (total,)
+
+    return decode
+
+
+def narrow(options: Any) -> Work:
+    """The same with a beam."""
+    return viterbi(options, 200.0)
+
+
+def _harness(name: str) -> Any:
+    return getattr(sys.modules["__main__"], name)
+
+
+def _loop(options: Any) -> tuple[Any, Any, list[np.ndarray]]:
+    """Return the harness's model as mixtures and network, and its recordings."""
+    from lipmotion.stats.hmm.network import NetworkBuilder
+    from lipmotion.stats.mixture import Mixtures
+
+    model, data = _harness("get")(options)
+    builder = NetworkBuilder()
+    for state, stay in enumerate(np.diag(model["A"])):
+        builder.state(state, float(np.log(stay)))
+        builder.final(state)
+    for source, target in zip(*np.nonzero(model["A"]), strict=True):
+        if source != target:
+            builder.arc(int(source), int(target), float(np.log(model["A"][source, target])))
+    for state in np.flatnonzero(model["pi"]):
+        builder.initial(int(state), float(np.log(model["pi"][state])))
+    values = (np.log(model["w"]), model["mu"], model["var"])
+    return Mixtures(*(v.astype(np.float32) for v in values)), builder.build(), list(data.astype(np.float32))
+
+
+def main() -> None:
+    """Print one JSON object a comparison."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--bench", type=Path, default=Path("../shared/bench"))
+    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--only", nargs="*", default=list(CASES), choices=list(CASES))
+    options = parser.parse_args()
+    for name, seconds in start_up().items():
+        print(json.dumps({"figure": name, "seconds": seconds}), flush=True)
+    for name in options.only:
+        print(json.dumps({"figure": name} | compared(options.bench, CASES[name], options.rounds)), flush=True)
+
+
+def compared(bench: Path, case: Case, rounds: int) -> dict[str, Any]:
+    """Return work per CPU second of ours and of the peer, and what the harness checks of both."""
+    implementations = {"ours": f"kernels:{case.ours}"}
+    if find_spec(case.package):
+        implementations[case.peer] = case.peer
+    rows: dict[str, list[dict[str, Any]]] = {name: [] for name in implementations}
+    for _ in range(rounds):
+        for name, implementation in implementations.items():
+            rows[name].append(run(bench / case.script, implementation, case.options))
+    result: dict[str, Any] = {}
+    for kind, choose in (("median", statistics.median), ("best", max)):
+        rates = {name: choose([r["work"] / r["cpu_sec_median"] for r in found]) for name, found in rows.items()}
+        result |= {f"{name}, per CPU second, {kind}": round(rate) for name, rate in rates.items()}
+        if case.peer in rates:
+            result[f"ratio, {kind}"] = round(rates["ours"] / rates[case.peer], 1)
+    return result | {f"{name}, check": found[0]["check"] for name, found in rows.items()}
+
+
+def run(script: Path, implementation: str, options: tuple[str, ...]) -> dict[str, Any]:
+    """Run one implementation in the harness, on one thread."""
+    paths = os.pathsep.join([str(HERE), str(HERE.parent / "src")])
+    command = [sys.executable, str(script), "--impl", implementation, "--threads", "1", *options]
+    done = subprocess.run(command, env=os.environ | {"PYTHONPATH": paths}, check=True, capture_output=True, text=True)
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def start_up() -> dict[str, float]:
+    """Return the median time of importing numba, and of the first call of a kernel that was compiled before."""
+    code = """
+import time, numpy as np
+start = time.perf_counter()
+import numba
+imported = time.perf_counter()
+from lipmotion.kernels.banded import generate
+generate(np.ones((3, 3, 2)), np.ones((3, 3, 2)))
+print(imported - start, time.perf_counter() - imported)
+"""
+    environment = os.environ | {"PYTHONPATH": str(HERE.parent / "src")}
+    times = []
+    for _ in range(6):
+        done = subprocess.run([sys.executable, "-c", code], env=environment, check=True, capture_output=True, text=True)
+        times.append([*map(float, done.stdout.split())])
+    imported, loaded = (round(statistics.median(column[1:]), 3) for column in zip(*times, strict=True))
+    return {"import numba": imported, "first call of a kernel compiled before": loaded}
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,136 @@
+"""How the arcs of a network lie in memory, so that many are followed at once.
+
+States are put into an order in which arcs come in **runs**: neighbouring sources lead to neighbouring targets, and a
+run is followed as one vector. Where many states share the same many sources, as the first states of all phones in a
+loop do, their arcs are a **block**, a dense matrix. Loops of states (arcs to themselves) are always in runs.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Index = NDArray[np.intp]
+
+LEAST_BLOCK = 8
+"""Sources and targets that a block has at least."""
+PADDED = 16
+"""Rows of a block are padded to a multiple of this."""
+
+
+class Layout(NamedTuple):
+    """Where everything of a network lies. A place is the position of a state in the new order.
+
+    order, place : [shape=(S,)], the state at each place, and the place of each state
+    runs         : [shape=(R, 4)], first target's place, first source's place, length, position in ``run_arcs``
+    run_arcs     : [shape=(N,)], arcs by run
+    blocks       : [shape=(B, 4)], first target's place, targets, position of its first source in what follows, sources
+    block_sources : [shape=(X,)], the places of sources
+    block_arcs   : [shape=(X, Y)], the arc from each source to each target of its block, padded with -1
+    """
+
+    order: Index
+    place: Index
+    runs: Index
+    run_arcs: Index
+    blocks: Index
+    block_sources: Index
+    block_arcs: Index
+
+
+class Weights(NamedTuple):
+    """Values of arcs, laid out."""
+
+    runs: NDArray[Any]
+    blocks: NDArray[Any]
+
+
+def laid_out(arc_from: Index, arc_start: Index) -> Layout:
+    """Return the layout of a network whose arcs are sorted by target.
+
+    arc_from  : [shape=(E,)], the source states of all arcs
+    arc_start : [shape=(S,)], where each target's arcs begin; every state has at least one
+    """
+    states = len(arc_start)
+    arc_to = np.repeat(np.arange(states), np.diff(arc_start, append=len(arc_from)))
+    groups = _groups(arc_from, arc_start)
+    blocked = np.zeros(len(arc_from), bool)
+    for _, arcs in groups:
+        blocked[arcs] = True
+    rest = np.flatnonzero(~blocked)
+    order = _order(states, groups, arc_from[rest], arc_to[rest])
+    place = np.empty(states, np.intp)
+    place[order] = np.arange(states)
+    runs, positions = _runs(place[arc_from[rest]], place[arc_to[rest]])
+    return Layout(order, place, runs, rest[positions], *_blocks(groups, arc_from, place))
+
+
+def weights_of(layout: Layout, values: NDArray[Any], nothing: float) -> Weights:
+    """Return the values of arcs [shape=(E,)] by run and by block; ``nothing`` where a block is padded."""
+    blocks = values[layout.block_arcs]
+    blocks[layout.block_arcs < 0] = nothing
+    return Weights(values[layout.run_arcs], blocks)
+
+
+_Groups = list[tuple[Index, Index]]
+"""States with the same sources, and their arcs [shape=(sources, targets)]."""
+
+
+def _groups(arc_from: Index, arc_start: Index) -> _Groups:
+    members: dict[bytes, list[tuple[int, Index]]] = defaultdict(list)
+    stops = np.append(arc_start[1:], len(arc_from))
+    for state in np.flatnonzero(stops - arc_start >= LEAST_BLOCK):
+        arcs = np.arange(arc_start[state], stops[state])
+        arcs = arcs[arc_from[arcs] != state]
+        arcs = arcs[np.argsort(arc_from[arcs], kind="stable")]
+        if len(arcs) >= LEAST_BLOCK:
+            members[arc_from[arcs].tobytes()].append((int(state), arcs))
+    return [
+        (np.array([state for state, _ in group], np.intp), np.stack([arcs for _, arcs in group], axis=1))
+        for group in members.values()
+        if len(group) >= LEAST_BLOCK
+    ]
+
+
+def _order(states: int, groups: _Groups, source: Index, target: Index) -> Index:
+    """Return the states: the targets of each block side by side, then those one arc behind them, and so on."""
+    if not groups:
+        return np.arange(states)
+    group, depth = np.full(states, len(groups)), np.zeros(states, np.intp)
+    for number, (targets, _) in enumerate(groups):
+        group[targets] = number
+    onward = (source != target) & (group[target] == len(groups))
+    for before, after in zip(source[onward].tolist(), target[onward].tolist(), strict=True):
+        depth[after] = depth[before] + 1
+    depth[group < len(groups)] = 0
+    return np.lexsort((group, depth))
+
+
+def _runs(source: Index, target: Index) -> tuple[Index, Index]:
+    """Return the runs, and the arcs in their order."""
+    positions = np.lexsort((target, target - source))
+    source, target = source[positions], target[positions]
+    broken = (np.diff(target) != 1) | (np.diff(source) != 1)
+    firsts = np.append(0, np.flatnonzero(broken) + 1) if len(target) else np.empty(0, np.intp)
+    lengths = np.diff(firsts, append=len(target))
+    return np.stack([target[firsts], source[firsts], lengths, firsts], axis=1).astype(np.intp), positions
+
+
+def _blocks(groups: _Groups, arc_from: Index, place: Index) -> tuple[Index, Index, Index]:
+    total = sum(len(arcs) for _, arcs in groups)
+    widest = max((-(-len(targets) // PADDED) * PADDED for targets, _ in groups), default=PADDED)
+    blocks, sources, matrix = (
+        np.empty((len(groups), 4), np.intp),
+        np.empty(total, np.intp),
+        np.full((total, widest), -1),
+    )
+    first = 0
+    for number, (targets, arcs) in enumerate(groups):
+        blocks[number] = place[targets[0]], len(targets), first, len(arcs)
+        sources[first : first + len(arcs)] = place[arc_from[arcs[:, 0]]]
+        matrix[first : first + len(arcs), : len(targets)] = arcs
+        first += len(arcs)
+    return blocks, sources, matrix

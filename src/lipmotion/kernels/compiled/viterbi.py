@@ -1,0 +1,104 @@
+"""The scores of the best paths, compiled: the same bits as in ``kernels.viterbi``."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.kernels.compiled.compiler import compiled
+
+Index = NDArray[np.intp]
+Row = NDArray[np.float32]
+NOTHING = np.float32(-np.inf)
+
+
+@compiled
+def scores(
+    delta: Row, log_emission: Row, columns: NDArray[np.uintp],
+    runs: Index, run_log: Row, blocks: Index, block_sources: Index, block_log: Row, least: np.float32,
+) -> float:  # fmt: skip
+    """Fill in the scores by place [shape=(T, S)], whose first row is given; return the sum of what was taken off.
+
+    log_emission, columns : [shape=(T, G)], and which of them is that of each place [shape=(S,)]
+    runs ... block_log    : of the layout and its weights (``kernels.arcs``)
+    least                 : what is lower under the frame's best is dropped
+    """
+    shift = 0.0
+    enter = np.empty(block_log.shape[1], np.float32)
+    for t in range(1, len(delta)):
+        delta[t] = NOTHING
+        _follow_runs(delta[t - 1], delta[t], runs, run_log)
+        for b in range(len(blocks)):
+            target, targets, first, sources = blocks[b]
+            matrix, into = block_log[first : first + sources], delta[t, target : target + targets]
+            _follow_block(delta[t - 1], into, block_sources[first:], matrix, enter)
+        _emit(delta[t], log_emission[t], columns)
+        best = _greatest(delta[t])
+        if best > NOTHING:
+            _lower(delta[t], best, least)
+            shift += float(best)
+    return shift
+
+
+@compiled
+def _follow_runs(before: Row, after: Row, runs: Index, run_log: Row) -> None:
+    for r in range(len(runs)):
+        target, source, length, first = runs[r]
+        into, out, log_weight = after[target : target + length], before[source:], run_log[first:]
+        for i in range(len(into)):
+            score = out[i] + log_weight[i]
+            into[i] = score if score > into[i] else into[i]
+
+
+@compiled
+def _follow_block(before: Row, after: Row, sources: Index, log_weight: Row, enter: Row) -> None:
+    enter[:] = NOTHING
+    for s in range(len(log_weight)):
+        score = before[sources[s]]
+        if score > NOTHING:
+            for i in range(len(enter)):
+                arriving = score + log_weight[s, i]
+                enter[i] = arriving if arriving > enter[i] else enter[i]
+    for i in range(len(after)):
+        after[i] = enter[i] if enter[i] > after[i] else after[i]
+
+
+@compiled
+def _emit(row: Row, log_emission: Row, columns: NDArray[np.uintp]) -> None:
+    for i in range(len(row)):
+        row[i] += log_emission[columns[i]]
+
+
+@compiled
+def _greatest(row: Row) -> np.float32:
+    """Return the greatest value: eight at a time, for one running maximum is no work for vectors."""
+    a = b = c = d = e = f = g = h = NOTHING
+    whole = len(row) // 8 * 8
+    for i in range(0, whole, 8):
+        a, b = max(row[i], a), max(row[i + 1], b)
+        c, d = max(row[i + 2], c), max(row[i + 3], d)
+        e, f = max(row[i + 4], e), max(row[i + 5], f)
+        g, h = max(row[i + 6], g), max(row[i + 7], h)
+    for i in range(whole, len(row)):
+        a = max(row[i], a)
+    return max(a, b, c, d, e, f, g, h)
+
+
+@compiled
+def _lower(row: Row, best: np.float32, least: np.float32) -> None:
+    for i in range(len(row)):
+        score = row[i] - best
+        row[i] = score if score >= least else NOTHING
+
+
+@compiled
+def trace(path: Index, delta: Row, state: int, place: Index, arc_from: Index, arc_log: Row, arc_start: Index) -> None:
+    """Fill in the states [shape=(T - 1,)] before ``state`` in the last of T frames."""
+    for t in range(len(path) - 1, -1, -1):
+        stop = arc_start[state + 1] if state + 1 < len(arc_start) else len(arc_from)
+        best, source = NOTHING, arc_from[arc_start[state]]
+        for arc in range(arc_start[state], stop):
+            score = delta[t, place[arc_from[arc]]] + arc_log[arc]
+            if score > best:
+                best, source = score, arc_from[arc]
+        state = path[t] = source

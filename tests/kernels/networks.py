@@ -1,0 +1,45 @@
+"""Networks for the tests of kernels."""
+
+import numpy as np
+
+
+def arrays_of(arcs: dict, states: int) -> dict:
+    """Arcs by source and target as the kernels want them."""
+    ordered = sorted(arcs, key=lambda arc: arc[1])
+    return {
+        "arc_from": np.array([source for source, _ in ordered], np.intp),
+        "arc_log": np.array([arcs[arc] for arc in ordered], np.float32),
+        "arc_start": np.searchsorted([target for _, target in ordered], np.arange(states)).astype(np.intp),
+    }
+
+
+def random_network(seed: int, states: int, densities: int, density_of_arcs: float):
+    """A network with loops and random arcs, as the kernel wants it, and its arcs by source and target."""
+    draw = np.random.default_rng(seed)
+    arcs = {}
+    for target in range(states):
+        for source in range(states):
+            if source == target or draw.random() < density_of_arcs:
+                arcs[source, target] = np.float32(draw.normal(-2, 1))
+    some = draw.random((2, states)) < 0.6
+    initial, final = np.where(some, draw.normal(-1, 1, (2, states)), -np.inf).astype(np.float32)
+    ends = {"log_initial": initial, "log_final": final}
+    return {"emission": draw.integers(densities, size=states), **arrays_of(arcs, states), **ends}, arcs
+
+
+def phone_loop(seed: int, units: int = 11, states: int = 3):
+    """Every unit behind every other: what has blocks. Its last unit has one state, and no arcs in but two."""
+    draw = np.random.default_rng(seed)
+    counts = [states] * (units - 1) + [1]
+    firsts = np.append(0, np.cumsum(counts))
+    total = int(firsts[-1])
+    arcs = {(s, s): np.float32(np.log(0.7)) for s in range(total)}
+    for unit in range(units):
+        for s in range(firsts[unit], firsts[unit + 1] - 1):
+            arcs[s, s + 1] = np.float32(np.log(0.3))
+        for other in range(units):
+            if counts[other] > 1:
+                arcs[int(firsts[unit + 1]) - 1, int(firsts[other])] = np.float32(draw.normal(-3, 1))
+    arcs[0, total - 1] = np.float32(-2)
+    ends = {"log_initial": np.full(total, -3, np.float32), "log_final": np.zeros(total, np.float32)}
+    return {"emission": draw.permutation(total), **arrays_of(arcs, total), **ends}, arcs

@@ -1,0 +1,117 @@
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from kernels.networks import arrays_of, phone_loop, random_network
+from lipmotion.kernels import network
+from lipmotion.kernels.network import Expectation, network_posteriors
+from oracles import networks
+
+SEEDS = st.integers(0, 2**32 - 1)
+SHARED = settings(deadline=None, max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
+
+
+@pytest.fixture(params=["numpy", "compiled"], autouse=True)
+def form(request, monkeypatch) -> None:
+    """Everything holds for both forms."""
+    if request.param == "compiled":
+        pytest.importorskip("numba")
+    monkeypatch.setattr(network, "numba_works", lambda: request.param == "compiled")
+
+
+def random_emission(seed: int, frames: int, densities: int, spread: float = 4.0) -> np.ndarray:
+    return np.random.default_rng([seed, 1]).normal(-20, spread, (frames, densities))
+
+
+def agree(log_emission, arrays, arcs, tolerance=1e-10) -> None:
+    posterior, counts, log_likelihood = network_posteriors(log_emission, **arrays)
+    ends = arrays["log_initial"].astype(float), arrays["log_final"].astype(float)
+    exact = {arc: float(log) for arc, log in arcs.items()}
+    wanted, wanted_counts, wanted_log_likelihood = networks.posteriors(log_emission, arrays["emission"], exact, *ends)
+    assert posterior == pytest.approx(wanted, abs=tolerance)
+    ordered = sorted(arcs, key=lambda arc: arc[1])
+    assert counts == pytest.approx([wanted_counts[arc] for arc in ordered], abs=tolerance)
+    assert log_likelihood == pytest.approx(wanted_log_likelihood, abs=1e-9)
+
+
+@given(seed=SEEDS, frames=st.integers(1, 6), spread=st.sampled_from([0.1, 4.0, 1e3, 1e5]))
+@SHARED
+def test_agrees_with_the_enumeration_of_all_paths(seed, frames, spread):
+    arrays, arcs = random_network(seed, states=3 + seed % 2, densities=3, density_of_arcs=0.5)
+    agree(random_emission(seed, frames, 3, spread), arrays, arcs, 1e-10 if spread < 1e4 else 1e-7)
+
+
+@pytest.mark.parametrize("frames", [1, 2, 3])
+def test_blocks_agree_with_the_enumeration_of_all_paths(frames):
+    arrays, arcs = phone_loop(frames, units=9, states=2)
+    agree(random_emission(frames, frames, len(arrays["emission"])), arrays, arcs)
+
+
+@pytest.mark.parametrize("precision", [np.float32, np.float64])
+def test_posteriors_of_every_frame_sum_to_one_and_followed_arcs_are_as_many_as_steps(precision):
+    arrays, _ = phone_loop(5)
+    log_emission = random_emission(5, 200, len(arrays["emission"]), 30.0).astype(precision)
+    posterior, counts, _ = network_posteriors(log_emission, **arrays)
+    tolerance = 1e-9 if precision is np.float64 else 1e-5
+    assert posterior.sum(axis=1) == pytest.approx(np.ones(200), abs=tolerance)
+    assert counts.sum() == pytest.approx(199, abs=199 * tolerance)
+    arrived = np.add.reduceat(counts, arrays["arc_start"])
+    assert arrived == pytest.approx(posterior[1:].sum(axis=0), abs=199 * tolerance)
+
+
+@given(seed=SEEDS, spread=st.sampled_from([1.0, 30.0, 1e3, 1e5]))
+@SHARED
+def test_single_precision_is_close_however_loud(seed, spread):
+    arrays, _ = phone_loop(seed % 1000)
+    log_emission = random_emission(seed, 40, len(arrays["emission"]), spread).astype(np.float32)
+    posterior, _, log_likelihood = network_posteriors(log_emission, **arrays)
+    exact, _, wanted = network_posteriors(log_emission.astype(float), **arrays)
+    assert posterior == pytest.approx(exact, abs=1e-4)
+    assert log_likelihood == pytest.approx(wanted, rel=1e-6)
+
+
+def test_the_only_path_is_found_though_everything_else_is_far_more_probable():
+    arcs = {(0, 0): -0.5, (0, 1): -0.5, (1, 1): -0.5}
+    chain = {"emission": np.arange(2), **arrays_of(arcs, 2)}
+    chain["log_initial"], chain["log_final"] = (np.array(ends, np.float32) for ends in ([0, -np.inf], [-np.inf, 0]))
+    log_emission = np.array([[-5000.0, 0], [0, -4000.0]])
+    posterior, counts, log_likelihood = network_posteriors(log_emission, **chain)
+    assert posterior == pytest.approx(np.eye(2))
+    assert counts == pytest.approx([0, 1, 0])
+    assert log_likelihood == pytest.approx(-9000.5)
+
+
+def test_no_path_says_so():
+    arrays, _ = random_network(1, states=3, densities=3, density_of_arcs=0.5)
+    arrays["log_final"] = np.full(3, -np.inf, np.float32)
+    posterior, counts, log_likelihood = network_posteriors(random_emission(1, 5, 3), **arrays)
+    assert log_likelihood == -np.inf
+    assert not posterior.any()
+    assert not counts.any()
+
+
+@pytest.mark.parametrize("frames", [[7, 1, 30], [12]])
+def test_many_recordings_are_as_each_alone(frames):
+    arrays, _ = phone_loop(3)
+    emission = arrays.pop("emission")
+    expectation = Expectation.of(**arrays)
+    log_emission = random_emission(3, sum(frames), len(emission))
+    together = expectation.over(log_emission, emission[expectation.layout.order], np.array(frames))
+    counts, start = np.zeros(len(arrays["arc_log"])), 0
+    for number, count in enumerate(frames):
+        mine = slice(start, start + count)
+        posterior, alone, log_likelihood = network_posteriors(log_emission[mine], emission, **arrays)
+        assert together.posterior[mine][:, expectation.layout.place] == pytest.approx(posterior, abs=1e-12)
+        assert together.log_likelihood[number] == pytest.approx(log_likelihood, abs=1e-9)
+        counts, start = counts + alone, start + count
+    assert together.counts == pytest.approx(counts, abs=1e-9)
+
+
+def test_inputs_stay_as_they_were():
+    arrays, _ = phone_loop(4)
+    log_emission = random_emission(4, 20, len(arrays["emission"]))
+    copies = log_emission.copy(), {name: values.copy() for name, values in arrays.items()}
+    network_posteriors(log_emission, **arrays)
+    assert np.array_equal(log_emission, copies[0])
+    assert all(np.array_equal(arrays[name], copy) for name, copy in copies[1].items())
