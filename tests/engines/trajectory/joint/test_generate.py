@@ -7,7 +7,13 @@ from hypothesis import strategies as st
 
 from engines.trajectory.joint.synthetic import CLASSES, config, inventory, observed, random_joint, utterances
 from lipmotion.engines.trajectory.joint.align import align
-from lipmotion.engines.trajectory.joint.generate import FrameDensities, densities_along, densities_over, generate
+from lipmotion.engines.trajectory.joint.generate import (
+    FrameDensities,
+    densities_along,
+    densities_of,
+    densities_over,
+    generate,
+)
 from lipmotion.engines.trajectory.joint.model import HEARD_ONLY
 from lipmotion.engines.trajectory.joint.streams import MOTION, SPEECH
 from lipmotion.engines.trajectory.joint.train import train_joint
@@ -128,6 +134,20 @@ def test_all_paths_together_maximise_the_expected_density():
         P = np.einsum("ts,sw->tw", posterior, precisions)
         m = np.einsum("ts,sw->tw", posterior, precisions * means) / P
         assert found[:, channel] == pytest.approx(trajectories.generate(m, P)[0], abs=1e-6)
+
+
+def test_several_paths_count_as_often_as_they_are_given():
+    hmm = random_joint(3, components=1)
+    data = observed(np.random.default_rng(4), 20)
+    one, other = (align(hmm, data, units) for units in (("sil", "a", "b", "sil"), ("sil", "b", "sil")))
+    leaves = [hmm.parts[MOTION].forest.leaves(path.states.places) for path in (one, other)]
+    posterior = np.concatenate(
+        [0.75 * np.eye(len(leaves[0]))[one.frames], 0.25 * np.eye(len(leaves[1]))[other.frames]], axis=1
+    )
+    wanted = generate(densities_over(hmm, np.concatenate(leaves), posterior)).values
+    assert generate(densities_of(hmm, [one, other, one, one])).values == pytest.approx(wanted, abs=1e-9)
+    with pytest.raises(InputError, match="of the same length"):
+        densities_of(hmm, [])
 
 
 def test_what_was_learned_comes_back():

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from engines.trajectory.joint.synthetic import observed, random_joint, utterances
+from lipmotion.engines.trajectory.joint.inventory import states_of
 from lipmotion.engines.trajectory.joint.model import HEARD_ONLY
 from lipmotion.engines.trajectory.joint.recognise import JointRecogniser
 from lipmotion.engines.trajectory.joint.streams import SPEECH, Observed, StreamWeights
@@ -66,6 +67,38 @@ def test_sequences_are_drawn_as_often_as_they_are_probable():
         assert drawn.count(key) / count == pytest.approx(share, abs=5 * np.sqrt(share / count))
 
 
+def test_posteriors_are_the_shares_of_all_sequences():
+    hmm = random_joint(3, states=2, bigram_weight=0.3, insertion=1.5)
+    data, frames = observed(np.random.default_rng(4), 7), 7
+    ways = list(slow.everything(hmm, slow_densities(hmm, data, SOFT), frames, candidates(hmm, frames)))
+    shares = np.exp([score for score, _, _ in ways] - np.logaddexp.reduce([score for score, _, _ in ways]))
+    expected = np.zeros((frames, len(hmm.inventory.rows)))
+    for share, (_, units, lengths) in zip(shares, ways, strict=True):
+        expected[np.arange(frames), np.repeat(states_of(hmm.inventory, units).rows, lengths)] += share
+    found = JointRecogniser(hmm, SOFT).posterior(data)
+    assert found == pytest.approx(expected, abs=1e-4)
+    assert found.sum(axis=1) == pytest.approx(np.ones(frames), abs=1e-5)
+
+
+def test_paths_that_are_drawn_go_through_the_states_of_their_units():
+    hmm, data = random_joint(3, bigram_weight=0.3, insertion=2.0), observed(np.random.default_rng(5), 40)
+    recogniser = JointRecogniser(hmm, SOFT)
+    paths = recogniser.sampled_paths(data, 400, 6)
+    for path, said in zip(paths, recogniser.sampled(data, 400, 6), strict=True):
+        assert set(np.diff(path.frames).tolist()) <= {0, 1}
+        assert (path.frames[0], path.frames[-1]) == (0, len(path.states.rows) - 1)
+        assert [context[1] for context, state in path.states.places if state == 0] == [s.unit for s in said]
+        assert path.bounds(len(said))[:-1].tolist() == [s.first for s in said]
+    drawn = np.mean([np.eye(len(hmm.inventory.rows))[path.states.rows[path.frames]] for path in paths], axis=0)
+    assert drawn == pytest.approx(recogniser.posterior(data), abs=0.13)
+
+
+def test_a_wide_beam_changes_nothing():
+    hmm, data = random_joint(3), observed(np.random.default_rng(5), 40)
+    recogniser = JointRecogniser(hmm)
+    assert recogniser.recognise(data, beam=1e4) == recogniser.recognise(data)
+
+
 def test_the_same_seed_draws_the_same():
     hmm = random_joint(6, bigram_weight=0.3, insertion=2.0)
     data = observed(np.random.default_rng(7), 20)
@@ -118,6 +151,8 @@ def test_what_cannot_be_recognised():
         JointRecogniser(hmm).recognise(observed(np.random.default_rng(0), 2))
     with pytest.raises(AlignmentError):
         JointRecogniser(hmm).sampled(observed(np.random.default_rng(0), 2), 1, 0)
+    with pytest.raises(AlignmentError):
+        JointRecogniser(hmm).posterior(observed(np.random.default_rng(0), 2))
     wide = Observed({SPEECH: type(data.streams[SPEECH])(np.zeros((9, 4)), np.ones(9, bool))})
     with pytest.raises(InputError, match="has 4 dimensions"):
         JointRecogniser(hmm).recognise(wide)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -93,6 +93,21 @@ def densities_over(hmm: JointHmm, leaves: NDArray[np.intp], posterior: Array) ->
     total = (by_leaf.T @ precision.reshape(len(used), -1)).reshape(shape)
     mean = (by_leaf.T @ weighted.reshape(len(used), -1)).reshape(shape) / np.maximum(total, np.finfo(float).tiny)
     return _without_ends(FrameDensities(np.zeros((len(posterior), 1)), mean, total))
+
+
+def densities_of(hmm: JointHmm, paths: Sequence[StatePath]) -> FrameDensities:
+    """Return what the motion stream says of several paths that are as probable (``JointRecogniser.sampled_paths``).
+
+    Raises InputError: as ``densities_over``, or no paths, or of different lengths.
+    """
+    part, _ = _motion(hmm)
+    if not paths or len({len(path.frames) for path in paths}) > 1:
+        raise InputError(f"{len(paths)} paths, required one or more of the same length")
+    chosen = np.stack([part.forest.leaves(path.states.places)[path.frames] for path in paths])
+    leaves, local = np.unique(chosen, return_inverse=True)
+    posterior = np.zeros((len(paths[0].frames), len(leaves)))
+    np.add.at(posterior, (np.arange(len(posterior)), local.reshape(chosen.shape)), 1 / len(paths))
+    return densities_over(hmm, leaves, posterior)
 
 
 def generate(

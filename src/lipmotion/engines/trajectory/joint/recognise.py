@@ -4,20 +4,23 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.trajectory.joint.inventory import Place
+from lipmotion.engines.trajectory.joint.align import StatePath
+from lipmotion.engines.trajectory.joint.inventory import Place, states_of
 from lipmotion.engines.trajectory.joint.model import JointHmm
 from lipmotion.engines.trajectory.joint.streams import HEARD, MOTION, SPEECH, Observed, StreamWeights
 from lipmotion.errors import AlignmentError, InputError
+from lipmotion.kernels.network import network_posteriors
 from lipmotion.kernels.sampling import sample_paths
 from lipmotion.stats.bigram import Bigram
 from lipmotion.stats.hmm.decode import UnitLoop, decode_units, unit_loop
 from lipmotion.stats.hmm.evidence import Evidence
 from lipmotion.stats.hmm.model import HmmConfig, UnitHmm
+from lipmotion.stats.hmm.network import Network
 from lipmotion.stats.hmm.states import StateTable, plain_states
 from lipmotion.stats.trees import Context
 
@@ -48,35 +51,56 @@ class JointRecogniser:
         if MOTION in self._weights.on:
             raise InputError("recognition hears, and does not see: give the stream motion the weight 0")
 
-    def recognise(self, observed: Observed) -> list[Said]:
+    def recognise(self, observed: Observed, beam: float | None = None) -> list[Said]:
         """Return the units that were most probably said.
 
+        beam : as in ``stats.hmm.decode.decode_units``; None: exact
         Raises InputError: no stream that is switched on was observed. Raises AlignmentError: too few frames.
         """
-        units, starts = decode_units(self._loop, self._evidence(observed))
+        units, starts = decode_units(self._loop, self._evidence(observed), beam)
         return [Said(unit, int(first)) for unit, first in zip(units, starts[:-1], strict=True)]
 
-    def sampled(self, observed: Observed, count: int, seed: int) -> list[list[Said]]:
-        """Return sequences of units, drawn from all that may have been said, each as often as it is probable.
+    def posterior(self, observed: Observed) -> NDArray[np.float64]:
+        """Return how probable each state without context is in every frame [shape=(T, R)] (``Inventory.rows``).
+
+        All sequences of units count, each as it is probable. Raises as ``recognise``.
+        """
+        network = self._loop.network
+        found, _, log_likelihood = network_posteriors(self._all_evidence(observed), *_arrays(network))
+        _check_found(log_likelihood, observed.frames)
+        rows = self._states.rows[network.emission]
+        result = np.zeros((observed.frames, len(self.hmm.inventory.rows)))
+        np.add.at(result.T, rows, found.T.astype(float))
+        return result
+
+    def sampled_paths(self, observed: Observed, count: int, seed: int) -> list[StatePath]:
+        """Return paths of states, drawn from all that there may have been, each as often as it is probable.
 
         Raises as ``recognise``.
         """
         if count < 1:
-            raise InputError(f"{count} sequences, required one or more")
-        evidence, network = self._evidence(observed), self._loop.network
-        uniform = np.random.default_rng(seed).random((count, evidence.frames))
-        paths, log_likelihood = sample_paths(
-            evidence.log_density(0, evidence.frames, None), network.emission, network.arc_from, network.arc_log,
-            network.arc_start, network.log_initial, network.log_final, uniform,
-        )  # fmt: skip
-        if not np.isfinite(log_likelihood):
-            raise AlignmentError(f"no units fit into {evidence.frames} frames of 10 ms; give a longer recording")
-        return [self._said(path) for path in paths]
+            raise InputError(f"{count} paths, required one or more")
+        uniform = np.random.default_rng(seed).random((count, observed.frames))
+        network = self._loop.network
+        paths, log_likelihood = sample_paths(self._all_evidence(observed), *_arrays(network), uniform)
+        _check_found(log_likelihood, observed.frames)
+        return [self._path(nodes) for nodes in paths]
 
-    def _said(self, path: NDArray[np.intp]) -> list[Said]:
-        entries = self._loop.entries
-        starts = [t for t in range(len(path)) if t == 0 or (path[t] != path[t - 1] and int(path[t]) in entries)]
-        return [Said(self._loop.owners[path[t]], t) for t in starts]
+    def sampled(self, observed: Observed, count: int, seed: int) -> list[list[Said]]:
+        """Return sequences of units, those of ``sampled_paths``."""
+        found = []
+        for path in self.sampled_paths(observed, count, seed):
+            units = [context[1] for (context, state) in path.states.places if state == 0]
+            firsts = path.bounds(len(units))[:-1].tolist()
+            found.append([Said(unit, first) for unit, first in zip(units, firsts, strict=True)])
+        return found
+
+    def _path(self, nodes: NDArray[np.intp]) -> StatePath:
+        """Return a path through the loop as one through the states of its units: every new node is the next state."""
+        changes = np.append(True, np.diff(nodes) != 0)
+        entered = [int(node) for node in nodes[changes] if int(node) in self._loop.entries]
+        units = [self._loop.owners[node] for node in entered]
+        return StatePath(states_of(self.hmm.inventory, units), np.cumsum(changes) - 1)
 
     @property
     def _weights(self) -> StreamWeights:
@@ -100,6 +124,22 @@ class JointRecogniser:
             observed.frames, lambda first, end, chosen: values[first:end, column if chosen is None else column[chosen]]
         )
 
+    def _all_evidence(self, observed: Observed) -> NDArray[np.float32]:
+        return self._evidence(observed).log_density(0, observed.frames, None)
+
+
+_Arrays = tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]
+
+
+def _arrays(network: Network) -> _Arrays:
+    arcs = network.arc_from, network.arc_log, network.arc_start
+    return network.emission, *arcs, network.log_initial, network.log_final
+
+
+def _check_found(log_likelihood: float, frames: int) -> None:
+    if not np.isfinite(log_likelihood):
+        raise AlignmentError(f"no units fit into {frames} frames of 10 ms; give a longer recording")
+
 
 @dataclass(frozen=True, eq=False)
 class _States:
@@ -108,11 +148,13 @@ class _States:
     table  : names of states in context that differ in any stream from the same state in silence
     leaves : by stream [shape=(C,)], of each different combination
     column : [shape=(len(table.names),)], the combination behind each name
+    rows   : [shape=(len(table.names),)], the state without context behind it
     """
 
     table: StateTable
     leaves: dict[str, NDArray[np.intp]]
     column: NDArray[np.intp]
+    rows: NDArray[np.intp]
 
 
 def _states(hmm: JointHmm) -> _States:
@@ -136,7 +178,8 @@ def _states(hmm: JointHmm) -> _States:
     kept = np.concatenate([rows[: len(plain)], rows[len(plain) + differ]])
     distinct, column = np.unique(kept, axis=0, return_inverse=True)
     leaves = {name: distinct[:, number] for number, name in enumerate(heard)}
-    return _States(table.extended(tuple(names[i] for i in differ)), leaves, column.reshape(-1))
+    extended = table.extended(tuple(names[i] for i in differ))
+    return _States(extended, leaves, column.reshape(-1), np.concatenate([np.arange(len(plain)), first[differ]]))
 
 
 def _beside(silence: str, unit: str, neighbour: str, side: int) -> Context:
