@@ -35,7 +35,7 @@ def usual():
 def stages(events):
     found: dict[str, list[float]] = {}
     for event in events:
-        if event.stage != "trees":
+        if event.stage not in ("trees", "lengths of states"):
             found.setdefault(event.stage, []).append(event.figure)
     return found
 
@@ -145,6 +145,19 @@ def test_streams_and_units_that_are_missing_here_and_there():
     path = align(hmm, HELD_OUT[0].observed, ("sil", "x", "sil"))  # never heard
     assert len(path.frames) == HELD_OUT[0].observed.frames
     assert np.isfinite(hmm.durations).all()
+
+
+def test_progress_ends_with_everything_done(usual):
+    shares = [event.share for event in usual[1]]
+    assert shares == sorted(shares)
+    assert shares[-1] == 1
+    assert sum(event.stage == "trees" for event in usual[1]) == len(STREAMS)
+
+
+def test_nothing_that_is_switched_on_was_observed():
+    deaf = [replace(u, observed=Observed({"speech": u.observed.streams["speech"]})) for u in TRAIN[:3]]
+    with pytest.raises(InputError, match="switched on are motion"):
+        trained(deaf, training=MOTION_ONLY)
 
 
 def test_training_is_repeatable(usual):

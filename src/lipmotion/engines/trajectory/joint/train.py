@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -26,7 +26,8 @@ from lipmotion.engines.trajectory.joint.model import JointConfig, JointHmm, Part
 from lipmotion.engines.trajectory.joint.streams import F0_STREAMS, MOTION, SPEECH, STREAMS, Observed
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.stats.bigram import estimate_bigram
-from lipmotion.types import Monitor, Progress, silent_monitor
+from lipmotion.stats.trees import Question
+from lipmotion.types import Monitor, Progress, part_of, silent_monitor
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,9 +55,6 @@ class Transcribed:
             )
 
 
-Progressed = Callable[[str, float], None]
-
-
 def train_joint(
     utterances: Sequence[Transcribed],
     inventory: Inventory,
@@ -73,13 +71,16 @@ def train_joint(
     A stream whose weight is 0 in training has no say in when a state begins, but learns what it is like in it.
     Within each stage the likelihood never falls.
     Raises CorpusError: no utterance, or none with room for the states of its units.
-    Raises InputError: an unknown unit.
+    Raises InputError: an unknown unit, or no stream that is switched on in training.
     Source: Hofer 2008, §4 and §6; ties by minimum description length as in ``stats.trees``.
     """
+    if not utterances:
+        raise CorpusError("no utterances to train on; give at least one")
     streams = [name for name in STREAMS if any(name in utterance.observed.streams for utterance in utterances)]
     if config.states != inventory.states:
         raise InputError(f"an inventory of {inventory.states} states a unit, the configuration says {config.states}")
-    training = _Training(inventory, classes, monitor, config)
+    if not set(streams) & set(config.training.on):
+        raise InputError(f"switched on are {', '.join(config.training.on)}; observed were {', '.join(streams)}")
     hmm = _untrained(utterances, inventory, config, streams)
     sentences = _sentences(hmm, utterances)
     if not any(sentence.fits for sentence in sentences.items):
@@ -88,74 +89,77 @@ def train_joint(
             "check that units and recordings belong together, or give units fewer states"
         )
     hmm = _started(hmm, sentences, [(utterance.units, utterance.bounds) for utterance in utterances])
-    hmm = training.improve(hmm, sentences, "units", config.plain_iterations)
-    hmm = training.tie(hmm, sentences)
-    hmm = training.improve(hmm, sentences, "units in context", config.iterations)
-    hmm = training.split(hmm, sentences, _sentences(hmm, validation))
-    return replace(hmm, durations=measured_durations(hmm, [(u.observed, u.units) for u in utterances]))
+    splits = _doublings(config.mixtures), _doublings(config.motion_mixtures)
+    widths = [config.plain_iterations, 1, config.iterations, *(2 * config.iterations * count for count in splits), 1]
+    plain, trees, tied, *mixed, last = _parts(monitor, widths)
+    hmm = _improved(hmm, sentences, "units", config.plain_iterations, plain)
+    hmm = _tied(hmm, sentences, questions_about(inventory, classes), trees)
+    hmm = _improved(hmm, sentences, "units in context", config.iterations, tied)
+    held_out = _sentences(hmm, validation)
+    for name, count, part in zip((SPEECH, MOTION), splits, mixed, strict=True):
+        hmm = _mixed(hmm, sentences, held_out, name, _parts(part, [1] * count)) if name in hmm.parts else hmm
+    hmm = replace(hmm, durations=measured_durations(hmm, [(u.observed, u.units) for u in utterances]))
+    last(Progress("lengths of states", 1, 1, 1.0))
+    return hmm
 
 
-@dataclass(frozen=True)
-class _Training:
-    """The stages of training."""
+def _doublings(most: int) -> int:
+    """Return how often one can be doubled until it is ``most``."""
+    return most.bit_length() - 1
 
-    inventory: Inventory
-    classes: Mapping[str, frozenset[str]]
-    monitor: Monitor
-    config: JointConfig
 
-    def improve(self, hmm: JointHmm, sentences: Sentences, stage: str, iterations: int) -> JointHmm:
-        """Take some steps of embedded Baum–Welch."""
-        for step in range(iterations):
-            expected = expect(hmm, sentences)
-            hmm = maximised(hmm, expected)
-            self._report(stage, step + 1, iterations, expected.mean_log_likelihood)
-        return hmm
+def _parts(monitor: Monitor, widths: Sequence[int]) -> list[Monitor]:
+    """Return a monitor for each part of the work, of so much of it."""
+    edges = np.cumsum([0, *widths]) / max(sum(widths), 1)
+    return [part_of(monitor, start, stop) for start, stop in pairwise(edges.tolist())]
 
-    def tie(self, hmm: JointHmm, sentences: Sentences) -> JointHmm:
-        """Return the same models, their states in context tied by trees; a Gaussian a leaf."""
-        seen, sums = sentences.places, expect(hmm, sentences).places
-        questions = questions_about(self.inventory, self.classes)
-        parts = {}
-        for step, (name, part) in enumerate(hmm.parts.items()):
-            has_spaces = part.tied.voiced is not None
-            forest = grown(
-                name, self.inventory, questions, seen, sums[name], has_spaces=has_spaces,
-                factor=self.config.tree_factor, least_frames=self.config.least_frames,
-                least_variance=self.config.variance_floor,
-            )  # fmt: skip
-            leaves = forest.leaves(seen)
-            tied = standard(forest.size, len(part.scale.mean), has_spaces)
-            tied = tied.maximised(sums[name].of_groups(leaves, forest.size), self.config.variance_floor)
-            parts[name] = Part(part.scale, forest, tied)
-            self._report("trees", step + 1, len(hmm.parts), float(forest.size))
-        return replace(hmm, parts=parts)
 
-    def split(self, hmm: JointHmm, sentences: Sentences, held_out: Sentences) -> JointHmm:
-        """Return the models with as many Gaussians as are allowed, and as held-out utterances are better with."""
-        best = mean_log_likelihood(hmm, held_out)
-        for name, most in ((SPEECH, self.config.mixtures), (MOTION, self.config.motion_mixtures)):
-            while name in hmm.parts and 2 * hmm.parts[name].tied.mixtures.size[1] <= most:
-                new = self._twice(hmm, sentences, name)
-                if new is hmm:
-                    break
-                count = new.parts[name].tied.mixtures.size[1]
-                new = self.improve(new, sentences, f"{count} Gaussians for {name}", self.config.iterations)
-                figure = mean_log_likelihood(new, held_out)
-                if held_out.items and not figure > best:
-                    break
-                hmm, best = new, figure
-        return hmm
+def _improved(hmm: JointHmm, sentences: Sentences, stage: str, iterations: int, monitor: Monitor) -> JointHmm:
+    """Return the models after some steps of embedded Baum–Welch."""
+    for step in range(1, iterations + 1):
+        expected = expect(hmm, sentences)
+        hmm = maximised(hmm, expected)
+        monitor(Progress(stage, step, iterations, step / iterations, expected.mean_log_likelihood))
+    return hmm
 
-    def _twice(self, hmm: JointHmm, sentences: Sentences, name: str) -> JointHmm:
-        """Return the models with some Gaussians of a stream split in two, or the same where none has enough data."""
+
+def _tied(hmm: JointHmm, sentences: Sentences, questions: tuple[Question, ...], monitor: Monitor) -> JointHmm:
+    """Return the same models, their states in context tied by trees; a Gaussian a leaf."""
+    config, seen, sums = hmm.config, sentences.places, expect(hmm, sentences).places
+    parts = {}
+    for step, (name, part) in enumerate(hmm.parts.items(), start=1):
+        has_spaces = part.tied.voiced is not None
+        forest = grown(
+            name, hmm.inventory, questions, seen, sums[name], has_spaces=has_spaces, factor=config.tree_factor,
+            least_frames=config.least_frames, least_variance=config.variance_floor,
+        )  # fmt: skip
+        of_leaves = sums[name].of_groups(forest.leaves(seen), forest.size)
+        tied = standard(forest.size, len(part.scale.mean), has_spaces).maximised(of_leaves, config.variance_floor)
+        parts[name] = Part(part.scale, forest, tied)
+        monitor(Progress("trees", step, len(hmm.parts), step / len(hmm.parts), float(forest.size)))
+    return replace(hmm, parts=parts)
+
+
+def _mixed(
+    hmm: JointHmm, sentences: Sentences, held_out: Sentences, name: str, monitors: Sequence[Monitor]
+) -> JointHmm:
+    """Return the models with the Gaussians of a stream split as often as there are monitors, and as held-out
+    utterances become more probable.
+    """
+    best = mean_log_likelihood(hmm, held_out)
+    for monitor in monitors:
         part, sums = hmm.parts[name], expect(hmm, sentences).leaves[name]
         if not part.tied.splits(sums):
-            return hmm
-        return replace(hmm, parts={**hmm.parts, name: replace(part, tied=part.tied.split(sums))})
-
-    def _report(self, stage: str, step: int, steps: int, figure: float) -> None:
-        self.monitor(Progress(stage, step, steps, step / steps, figure))
+            break
+        tied = part.tied.split(sums)
+        new = replace(hmm, parts={**hmm.parts, name: replace(part, tied=tied)})
+        stage = f"{tied.mixtures.size[1]} Gaussians for {name}"
+        new = _improved(new, sentences, stage, hmm.config.iterations, monitor)
+        figure = mean_log_likelihood(new, held_out)
+        if held_out.items and not figure > best:
+            break
+        hmm, best = new, figure
+    return hmm
 
 
 def mean_log_likelihood(hmm: JointHmm, sentences: Sentences) -> float:
@@ -172,8 +176,6 @@ def _untrained(
     utterances: Sequence[Transcribed], inventory: Inventory, config: JointConfig, streams: Sequence[str]
 ) -> JointHmm:
     """Return models in which all units are alike."""
-    if not utterances:
-        raise CorpusError("no utterances to train on; give at least one")
     spoken = {unit for utterance in utterances for unit in utterance.units}
     spoken_units = tuple(unit for unit in inventory.names if unit in spoken | {inventory.silence})
     parts = {}
