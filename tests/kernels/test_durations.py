@@ -1,12 +1,13 @@
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lipmotion.kernels.durations import best_durations
 from oracles import durations as slow
 
 
+@settings(deadline=None)
 @given(frames=st.integers(1, 9), states=st.integers(1, 4), longest=st.integers(1, 4), seed=st.integers(0, 200))
 def test_no_other_lengths_are_better(frames, states, longest, seed):
     draw = np.random.default_rng(seed)

@@ -63,7 +63,8 @@ class JointRecogniser:
     def posterior(self, observed: Observed) -> NDArray[np.float64]:
         """Return how probable each state without context is in every frame [shape=(T, R)] (``Inventory.rows``).
 
-        All sequences of units count, each as it is probable. Raises as ``recognise``.
+        All sequences of units count, each as it is probable. Memory grows with the frames: 20 kB each, in GRID.
+        Raises as ``recognise``.
         """
         network = self._loop.network
         found, _, log_likelihood = network_posteriors(self._all_evidence(observed), *_arrays(network))
@@ -76,7 +77,7 @@ class JointRecogniser:
     def sampled_paths(self, observed: Observed, count: int, seed: int) -> list[StatePath]:
         """Return paths of states, drawn from all that there may have been, each as often as it is probable.
 
-        Raises as ``recognise``.
+        Memory grows with the frames, as in ``posterior``. Raises as ``recognise``.
         """
         if count < 1:
             raise InputError(f"{count} paths, required one or more")
@@ -118,11 +119,13 @@ class JointRecogniser:
 
     def _evidence(self, observed: Observed) -> Evidence:
         inside = self.hmm.inside(observed, self._weights)
-        values = self.hmm.log_density(inside, self._states.leaves, self._weights).astype(np.float32)
-        column = self._states.column
-        return Evidence(
-            observed.frames, lambda first, end, chosen: values[first:end, column if chosen is None else column[chosen]]
-        )
+
+        def log_density(first: int, end: int, chosen: NDArray[np.intp] | None) -> NDArray[np.float32]:
+            rows = {name: stream[first:end] for name, stream in inside.items()}
+            values = self.hmm.log_density(rows, self._states.leaves, self._weights).astype(np.float32)
+            return values[:, self._states.column if chosen is None else self._states.column[chosen]]
+
+        return Evidence(observed.frames, log_density)
 
     def _all_evidence(self, observed: Observed) -> NDArray[np.float32]:
         return self._evidence(observed).log_density(0, observed.frames, None)
