@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from lipmotion.engines.base import Arrays, Engine, Fit, frame_of
 from lipmotion.engines.trajectory.closure import OPENING, Closure, closing_frames, closing_spans
 from lipmotion.engines.trajectory.contexts import Cut, places, with_neighbours
+from lipmotion.engines.trajectory.dynamic_range import widened
 from lipmotion.engines.trajectory.learning import Learning
 from lipmotion.engines.trajectory.model import TrajectoryModel, model_arrays, model_from_arrays
 from lipmotion.engines.trajectory.train import fit_trajectory
@@ -48,6 +49,8 @@ class TrajectoryConfig:
     ridge, shared_ridge : how strongly a regression on the sound is drawn towards that of the node above, and the one
                  that all share towards none
     ridge_frames : frames that a node must have for a regression of its own (``hearing.MOST`` asks for more)
+    trajectory_steps : steps of training for the least error of the generated trajectory (0: none)
+    full_range : make movements as large as the original's
     closures   : make the lips meet in every p, b and m
     """
 
@@ -64,15 +67,24 @@ class TrajectoryConfig:
     ridge: float = 2000.0
     shared_ridge: float = 100.0
     ridge_frames: float = 100.0
+    trajectory_steps: int = 0
+    full_range: bool = True
     closures: bool = True
 
     def __post_init__(self) -> None:
         for name in ("parts", "silent_parts"):
             if getattr(self, name) < 1 or getattr(self, name) % 2 != 1:
                 raise InputError(f"{name} is {getattr(self, name)}, required an odd number from 1")
-        numbers = [getattr(self, field.name) for field in fields(self) if field.type != "bool"]
+        numbers = [
+            getattr(self, field.name)
+            for field in fields(self)
+            if field.type != "bool" and field.name != "trajectory_steps"
+        ]
         if not all(0 < number < float("inf") for number in numbers):
             raise InputError(f"all numbers of the configuration must be more than 0 and finite: {self}")
+
+        if self.trajectory_steps < 0:
+            raise InputError(f"trajectory_steps is {self.trajectory_steps}, required 0 or more")
 
     @property
     def cut(self) -> Cut:
@@ -121,6 +133,8 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
         motion, spread = (np.empty((frames, len(model.space.channels)), precise) for _ in range(2))
         for inner, outer in _stretches(frames):
             statistics = model.emission.statistics(rows[path[outer]], features, outer)
+            if self.config.full_range:
+                statistics = widened(*statistics, model.gain, model.emission.means[-1, 0])
             inside = {
                 (frame - outer.start, c): v for (frame, c), v in pins.items() if outer.start <= frame < outer.stop
             }

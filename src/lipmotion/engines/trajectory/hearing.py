@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.trajectory.emission import Emission, Hearing, add_heard
-from lipmotion.engines.trajectory.learning import Learning, Observed
+from lipmotion.engines.trajectory.learning import Learning, Observed, rows_of
 from lipmotion.engines.trajectory.regression import Moments, fit_tree, no_moments, owner, ridge
 from lipmotion.engines.trajectory.window import AudioWindow, fit_window
 
@@ -64,7 +64,7 @@ def _frames(
     keys, of_row = list(numbers), np.array([numbers[key] for key in owners])
     for start in range(0, len(observed), AT_A_TIME):
         block = observed[start : start + AT_A_TIME]
-        rows = np.concatenate([_rows_of(emission, one, how) for one in block])
+        rows = np.concatenate([rows_of(emission, one.seen_places, how.cut) for one in block])
         z = np.concatenate([window(one.features, one.frames) for one in block])
         error = np.concatenate([one.rows for one in block]) - emission.means[rows]
         order = np.argsort(of_row[rows], kind="stable")
@@ -74,12 +74,6 @@ def _frames(
             key = keys[number]
             if key is not None:
                 yield key, z[begin:end], error[begin:end]
-
-
-def _rows_of(emission: Emission, one: Observed, how: Learning) -> NDArray[np.intp]:
-    """Return the density of every frame of an example [shape=(N,)]."""
-    distinct = {place: emission.row(place, how.cut) for place in dict.fromkeys(one.places)}
-    return np.array([distinct[place] for place in one.places], np.intp)
 
 
 def _coefficients(
@@ -101,7 +95,7 @@ def _variances(
     """Return the variances around means that follow the sound, shrunk towards those of all frames together."""
     squares, counts = np.zeros(emission.means.shape), np.zeros(len(emission.means))
     for one in observed:
-        rows = _rows_of(emission, one, how)
+        rows = rows_of(emission, one.seen_places, how.cut)
         means = emission.means[rows].astype(float)
         add_heard(means, hearing, rows, hearing.window(one.features, one.frames))
         np.add.at(squares, rows, np.square(one.rows - means))

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.trajectory.contexts import Cut, Place
+from lipmotion.engines.trajectory.emission import Emission
 
 
 @dataclass(frozen=True)
@@ -23,6 +25,7 @@ class Learning:
     axes       : numbers that the sound around a frame is reduced to
     ridge, shared_ridge : how strongly a regression is drawn towards the one above it, and the shared one towards none
     ridge_frames : frames that a node must have for a regression of its own
+    trajectory_steps : steps of training for the least error of the generated trajectory (0: none)
     """
 
     cut: Cut
@@ -36,19 +39,31 @@ class Learning:
     ridge: float
     shared_ridge: float
     ridge_frames: float
+    trajectory_steps: int
 
 
 @dataclass(frozen=True, eq=False)
 class Observed:
-    """The frames of one example that were seen with both neighbours.
+    """One example.
 
-    features : of the whole example [shape=(T, D)]
-    frames   : int array [shape=(N,)], which frames these are
-    rows     : float32 array [shape=(N, 3, Q)], their static value, Δ and Δ²
-    places   : what is said there
+    features : [shape=(T, D)]
+    places   : what is said in each frame [length T]
+    frames   : int array [shape=(N,)], those that were seen with both neighbours
+    rows     : float32 array [shape=(N, 3, Q)], static value, Δ and Δ² there
     """
 
     features: NDArray[np.float32]
+    places: list[Place]
     frames: NDArray[np.intp]
     rows: NDArray[np.float32]
-    places: list[Place]
+
+    @property
+    def seen_places(self) -> list[Place]:
+        """What is said in the frames that were seen [length N]."""
+        return [self.places[frame] for frame in self.frames]
+
+
+def rows_of(emission: Emission, where: Sequence[Place], cut: Cut) -> NDArray[np.intp]:
+    """Return the density of each place [shape=(len(where),)]."""
+    distinct = {place: emission.row(place, cut) for place in dict.fromkeys(where)}
+    return np.array([distinct[place] for place in where], np.intp)

@@ -24,11 +24,13 @@ class TrajectoryModel:
 
     space    : the Q dimensions in which motion is modelled
     emission : densities of all tied states
+    gain     : by how much movements away from rest are made larger [shape=(Q,)]
     closure  : how the lips close (None: the motion has no opening)
     """
 
     space: MotionSpace
     emission: Emission
+    gain: NDArray[np.float64]
     closure: Closure | None
 
 
@@ -37,6 +39,7 @@ def model_arrays(model: TrajectoryModel) -> dict[str, NDArray[Any]]:
     arrays: dict[str, NDArray[Any]] = {
         "channels": np.array([(channel.name, channel.unit) for channel in model.space.channels]),
         "direct": model.space.direct,
+        "gain": model.gain,
     }
     if model.space.points is not None:
         points = model.space.points
@@ -61,7 +64,7 @@ def model_from_arrays(arrays: Mapping[str, NDArray[Any]], cut: Cut) -> Trajector
         if OPENING in space.direct_names:
             column, closed = arrays["closure"]
             closure = Closure(int(column), float(closed), arrays["closure_follow"].astype(float))
-        return TrajectoryModel(space, emission_from_arrays(arrays, cut, space.dimensions), closure)
+        return TrajectoryModel(space, emission_from_arrays(arrays, cut, space.dimensions), arrays["gain"], closure)
     except (KeyError, ValueError, IndexError, TypeError) as error:
         raise ModelFormatError(f"the trajectory model is damaged ({error}); train or download it again") from error
 
@@ -73,6 +76,7 @@ def _check_shapes(arrays: Mapping[str, NDArray[Any]]) -> None:
     required = {
         "points_mean": (channels - direct,),
         "points_basis": (reduced, channels - direct),
+        "gain": (dimensions,),
         "closure": (2,),
         "closure_follow": (dimensions,),
     }
@@ -81,6 +85,8 @@ def _check_shapes(arrays: Mapping[str, NDArray[Any]]) -> None:
             raise ValueError(f"{name} of shape {arrays[name].shape}, required {shape}")
         if name in arrays and not np.isfinite(arrays[name]).all():
             raise ValueError(f"{name} holds values that are not finite")
+    if not (arrays["gain"] > 0).all():
+        raise ValueError("a gain that is not more than 0")
     if len(set(arrays["direct"].tolist()) & set(range(channels))) < direct:
         raise ValueError(f"direct channels {arrays['direct'].tolist()}, required different ones under {channels}")
     if "closure" in arrays and not 0 <= arrays["closure"][0] < dimensions:

@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 
 from lipmotion.engines.trajectory.closure import OPENING, fit_closure
 from lipmotion.engines.trajectory.contexts import Cut, Place, places
+from lipmotion.engines.trajectory.dynamic_range import fit_gain
 from lipmotion.engines.trajectory.emission import Emission
+from lipmotion.engines.trajectory.generation_error import minimise_generation_error
 from lipmotion.engines.trajectory.hearing import fit_hearing
 from lipmotion.engines.trajectory.learning import Learning, Observed
 from lipmotion.engines.trajectory.model import TrajectoryModel
@@ -34,8 +36,8 @@ def fit_trajectory(examples: Sequence[Example], how: Learning, monitor: Monitor)
     seen = np.concatenate([example.motion.values[example.valid] for example in examples])
     space = fit_space(channels, seen, how.components)
     values = [space.reduce(example.motion.values.astype(float)) for example in examples]
-    observed = [_observed(example, x, how.cut) for example, x in zip(examples, values, strict=True)]
-    covered = {how.cut.name(place) for one in observed for place in one.places if not _silent(how.cut, place)}
+    observed = [observed_of(example, x, how.cut) for example, x in zip(examples, values, strict=True)]
+    covered = {how.cut.name(place) for one in observed for place in one.seen_places if not _silent(how.cut, place)}
     if len(covered) < how.cut.speech:
         raise CorpusError(
             f"motion was seen in {len(covered)} of {how.cut.speech} parts of a phone; learn from more speech"
@@ -45,12 +47,15 @@ def fit_trajectory(examples: Sequence[Example], how: Learning, monitor: Monitor)
     if how.listens:
         monitor(Progress(_STAGE, 2, 3, 0.3))
         emission = fit_hearing(emission, observed, how)
+    if how.trajectory_steps:
+        emission = minimise_generation_error(emission, observed, how)
+    gain = fit_gain(emission, observed, how)
     monitor(Progress(_STAGE, 3, 3, 1.0))
     closure = None
     if OPENING in space.direct_names:
         masks, timelines = [e.valid for e in examples], [e.speech.units for e in examples]
         closure = fit_closure(values, masks, timelines, space.direct_names.index(OPENING))
-    return TrajectoryModel(space, emission, closure)
+    return TrajectoryModel(space, emission, gain, closure)
 
 
 _STAGE = "trees"
@@ -76,18 +81,19 @@ def _inner(valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return inner
 
 
-def _observed(example: Example, values: Array, cut: Cut) -> Observed:
+def observed_of(example: Example, values: Array, cut: Cut) -> Observed:
+    """Return what training needs of an example, whose motion in the model's space is ``values`` [shape=(T, Q)]."""
     frames = np.nonzero(_inner(example.valid))[0]
     where = places(example.speech.units, len(values), cut)
     features = np.asarray(example.speech.features.values)
     dynamics = with_dynamics(values)[frames].astype(np.float32)
-    return Observed(features, frames, dynamics, [where[frame] for frame in frames])
+    return Observed(features, where, frames, dynamics)
 
 
 def _tied(observed: Sequence[Observed], how: Learning) -> Emission:
     """Return the Gaussians of all leaves: each mean and variance is drawn towards that of the node above it."""
     moving = np.concatenate(
-        [one.rows[[place != how.cut.rest for place in one.places]] for one in observed], dtype=np.float64
+        [one.rows[[place != how.cut.rest for place in one.seen_places]] for one in observed], dtype=np.float64
     )
     centre, overall = moving.mean(axis=0), moving.var(axis=0)
     least = np.maximum(LEAST_VARIANCE_SHARE * overall, LEAST_VARIANCE)
@@ -129,7 +135,7 @@ def _grouped(observed: Sequence[Observed], cut: Cut, centre: Array, scale: Array
     grouped: dict[str, _Contexts] = {name: {} for name in cut.names}
     for one in observed:
         index: dict[Place, list[int]] = {}
-        for number, place in enumerate(one.places):
+        for number, place in enumerate(one.seen_places):
             index.setdefault(place, []).append(number)
         for place, numbers in index.items():
             if place == cut.rest:
@@ -164,7 +170,7 @@ def _rest(observed: Sequence[Observed], how: Learning, fallback: Array, overall:
 
     What the mouth did there (breath, a lick of the lips) is no speech.
     """
-    poses = [one.rows[number, 0] for one in observed for number, p in enumerate(one.places) if p == how.cut.rest]
+    poses = [one.rows[number, 0] for one in observed for number, p in enumerate(one.seen_places) if p == how.cut.rest]
     if not poses:
         return fallback, overall
     mean = np.zeros_like(overall)

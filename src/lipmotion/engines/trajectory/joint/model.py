@@ -35,7 +35,7 @@ class JointConfig:
     """
 
     states: int = 3
-    mixtures: int = 4
+    mixtures: int = 16
     motion_mixtures: int = 1
     plain_iterations: int = 6
     iterations: int = 4
