@@ -32,6 +32,7 @@ from lipmotion.types import (
     Trace,
     Unit,
 )
+from lipmotion.units import UnitSet, unit_set
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,8 @@ class TrajectoryConfig:
     ridge_frames : frames that a node must have for a regression of its own (``hearing.MOST`` asks for more)
     trajectory_steps : steps of training for the least error of the generated trajectory (0: none)
     full_range : make movements as large as the original's
-    closures   : make the lips meet in every p, b and m
+    closures   : make the lips meet in every p, b and m, whatever their units are
+    units      : what is modelled: a unit set's name, or a table's (docs/unit-sets.md); training reads the table
     """
 
     parts: int = 5
@@ -70,15 +72,18 @@ class TrajectoryConfig:
     trajectory_steps: int = 0
     full_range: bool = True
     closures: bool = True
+    units: str = "phone"
 
     def __post_init__(self) -> None:
         for name in ("parts", "silent_parts"):
             if getattr(self, name) < 1 or getattr(self, name) % 2 != 1:
                 raise InputError(f"{name} is {getattr(self, name)}, required an odd number from 1")
+        if not isinstance(self.units, str):
+            raise InputError(f"units is {self.units!r}, required the name of a unit set or a table")
         numbers = [
             getattr(self, field.name)
             for field in fields(self)
-            if field.type != "bool" and field.name != "trajectory_steps"
+            if field.type not in ("bool", "str") and field.name != "trajectory_steps"
         ]
         if not all(0 < number < float("inf") for number in numbers):
             raise InputError(f"all numbers of the configuration must be more than 0 and finite: {self}")
@@ -86,16 +91,15 @@ class TrajectoryConfig:
         if self.trajectory_steps < 0:
             raise InputError(f"trajectory_steps is {self.trajectory_steps}, required 0 or more")
 
-    @property
-    def cut(self) -> Cut:
-        """How phones are cut into parts."""
-        return Cut(self.parts, self.silent_parts, self.edge_s)
+    def cut(self, units: UnitSet) -> Cut:
+        """Return how units are cut into parts."""
+        return Cut(self.parts, self.silent_parts, self.edge_s, units)
 
     @property
     def learning(self) -> Learning:
-        """What training needs of it."""
+        """What training needs of it. Raises InputError: no such unit set, or a table that is wrong."""
         names = {field.name for field in fields(Learning)} - {"cut"}
-        return Learning(self.cut, **{name: getattr(self, name) for name in names})
+        return Learning(self.cut(unit_set(self.units)), **{name: getattr(self, name) for name in names})
 
 
 @final
@@ -122,7 +126,7 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
 
     def generate(self, model: TrajectoryModel, speech: Speech, constraints: Constraints | None = None) -> Generation:  # noqa: D102
         features = np.asarray(speech.features.values)
-        frames, cut = len(features), self.config.cut
+        frames, cut = len(features), self.config.cut(model.units)
         where = places(speech.units, frames, cut)
         distinct = {place: number for number, place in enumerate(dict.fromkeys(where))}
         path = np.array([distinct[place] for place in where], np.intp)
@@ -151,7 +155,7 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
         return Generation(
             Motion(motion, FRAME_RATE_HZ, model.space.channels),
             spread,
-            _named(speech.units),
+            _named(speech.units, model.units),
             Trace(tuple(model.emission.source(place, cut) for place in distinct), path),
         )
 
@@ -159,7 +163,7 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
         return model_arrays(model)
 
     def from_arrays(self, arrays: Arrays) -> TrajectoryModel:  # noqa: D102
-        return model_from_arrays(arrays, self.config.cut)
+        return model_from_arrays(arrays, self.config.cut, self.config.units)
 
 
 STRETCH, MARGIN = 6000, 500
@@ -236,10 +240,10 @@ def _close_lips(
     values[:, opening], variance[:, opening] = closing, spread
 
 
-def _named(units: Timeline[Unit]) -> Timeline[Unit]:
-    """Return the timeline with each phone between its neighbours as its unit."""
-    named = [
-        replace(span, label=replace(span.label, unit=f"{left}-{span.label.phone}+{right}"))
-        for left, span, right in with_neighbours(units)
-    ]
+def _named(spans: Timeline[Unit], units: UnitSet) -> Timeline[Unit]:
+    """Return the timeline with the unit of each phone named, between its neighbours."""
+    named = []
+    for left, span, right in with_neighbours(spans):
+        before, unit, after = map(units.unit, (left, span.label.phone, right))
+        named.append(replace(span, label=replace(span.label, unit=f"{before}-{unit}+{after}")))
     return Timeline(tuple(named))

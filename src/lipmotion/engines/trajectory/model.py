@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,18 +16,24 @@ from lipmotion.engines.trajectory.space import MotionSpace
 from lipmotion.errors import ModelFormatError
 from lipmotion.stats.pca import Pca
 from lipmotion.types import Channel
+from lipmotion.units import UNIT_SETS, UnitSet
+
+SINGLE = UNIT_SETS["phone"]
+"""Each phone its own unit: needs no table."""
 
 
 @dataclass(frozen=True, eq=False)
 class TrajectoryModel:
     """Statistics of motion for every part of every unit in context.
 
+    units    : the unit of every phone
     space    : the Q dimensions in which motion is modelled
     emission : densities of all tied states
     gain     : by how much movements away from rest are made larger [shape=(Q,)]
     closure  : how the lips close (None: the motion has no opening)
     """
 
+    units: UnitSet
     space: MotionSpace
     emission: Emission
     gain: NDArray[np.float64]
@@ -41,6 +47,8 @@ def model_arrays(model: TrajectoryModel) -> dict[str, NDArray[Any]]:
         "direct": model.space.direct,
         "gain": model.gain,
     }
+    if model.units != SINGLE:
+        arrays["units"] = np.array(list(model.units.of.items()))
     if model.space.points is not None:
         points = model.space.points
         arrays |= {"points_mean": points.mean, "points_basis": points.basis.astype(np.float32)}
@@ -52,8 +60,13 @@ def model_arrays(model: TrajectoryModel) -> dict[str, NDArray[Any]]:
     return arrays | emission_arrays(model.emission)
 
 
-def model_from_arrays(arrays: Mapping[str, NDArray[Any]], cut: Cut) -> TrajectoryModel:
-    """Return the model again. Raises ModelFormatError: something is missing or has the wrong shape."""
+def model_from_arrays(arrays: Mapping[str, NDArray[Any]], cut: Callable[[UnitSet], Cut], units: str) -> TrajectoryModel:
+    """Return the model again.
+
+    cut   : how the parts of some units are cut
+    units : the name of its unit set; the set itself is in the arrays
+    Raises ModelFormatError: something is missing or has the wrong shape.
+    """
     try:
         _check_shapes(arrays)
         channels = tuple(Channel(str(name), str(unit)) for name, unit in arrays["channels"])
@@ -64,9 +77,19 @@ def model_from_arrays(arrays: Mapping[str, NDArray[Any]], cut: Cut) -> Trajector
         if OPENING in space.direct_names:
             column, closed = arrays["closure"]
             closure = Closure(int(column), float(closed), arrays["closure_follow"].astype(float))
-        return TrajectoryModel(space, emission_from_arrays(arrays, cut, space.dimensions), arrays["gain"], closure)
+        of = SINGLE if units == SINGLE.name else UnitSet(units, _mapping(arrays["units"]))
+        emission = emission_from_arrays(arrays, cut(of), space.dimensions)
+        return TrajectoryModel(of, space, emission, arrays["gain"], closure)
     except (KeyError, ValueError, IndexError, TypeError) as error:
         raise ModelFormatError(f"the trajectory model is damaged ({error}); train or download it again") from error
+
+
+def _mapping(pairs: NDArray[Any]) -> dict[str, str]:
+    """Return the unit of every phone. Raises ValueError: something else."""
+    of = {str(phone): str(unit) for phone, unit in pairs}
+    if len(of) != len(pairs):
+        raise ValueError("a phone with two units")
+    return of
 
 
 def _check_shapes(arrays: Mapping[str, NDArray[Any]]) -> None:
