@@ -158,6 +158,8 @@ def test_nothing_that_is_switched_on_was_observed():
     deaf = [replace(u, observed=Observed({"speech": u.observed.streams["speech"]})) for u in TRAIN[:3]]
     with pytest.raises(InputError, match="switched on are motion"):
         trained(deaf, training=MOTION_ONLY)
+    hmm, _ = trained([*TRAIN[:6], deaf[0]], training=MOTION_ONLY)  # where some have it, the others do no harm
+    assert np.isfinite(hmm.durations).all()
 
 
 def test_training_is_repeatable(usual):

@@ -108,15 +108,15 @@ def _best_path(hmm: JointHmm, log_density: NDArray[np.float64], rows: NDArray[np
 def measured_durations(hmm: JointHmm, utterances: Iterable[tuple[Observed, Sequence[str]]]) -> NDArray[np.float64]:
     """Return mean and variance of the frames that each state without context lasts [shape=(R, 2)].
 
-    Utterances without room for their units are left out. A state that was never heard lasts as its probability to be
-    kept says.
+    Utterances without room for their units, or without a stream that is switched on in training, are left out. A state
+    that was never heard lasts as its probability to be kept says.
     """
     sums = np.zeros((len(hmm.log_stay), 3))
     for observed, units in utterances:
-        try:
-            path = align(hmm, observed, units, weights=hmm.config.training)
-        except AlignmentError:
+        heard = set(hmm.config.training.on) & set(observed.streams) & set(hmm.parts)
+        if not heard or len(states_of(hmm.inventory, units).rows) > observed.frames:
             continue
+        path = align(hmm, observed, units, weights=hmm.config.training)
         frames = np.bincount(path.frames, minlength=len(path.states.rows)).astype(float)
         np.add.at(sums, path.states.rows, np.stack([np.ones(len(frames)), frames, frames * frames], axis=1))
     leave = np.exp(hmm.log_move)

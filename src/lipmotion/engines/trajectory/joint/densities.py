@@ -130,27 +130,19 @@ class Tied:
         constant[:, 1] -= 0.5 * (LOG_2PI + np.log(variances) + means * means / variances).sum(axis=1)
         return np.concatenate([constant, means / variances, -0.5 / variances], axis=1).astype(np.float32)
 
-    def add_components(self, sums: Sums, rows: Floats, leaves: NDArray[np.intp], posterior: Floats) -> None:
+    def add_components(self, sums: Sums, rows: Floats, leaves: NDArray[np.intp], shares: Floats) -> None:
         """Add, in place, what frames say about the Gaussians of mixtures.
 
-        posterior : of states whose leaves are ``leaves`` [shape=(T, S)]
+        rows   : of frames [shape=(N, 2 + 2·D)]; one may stand there more than once
+        leaves : the density that each has a share in [shape=(N,)];  shares : how much [shape=(N,)]
         """
-        used, local = np.unique(leaves, return_inverse=True)
-        member = np.zeros((len(leaves), len(used)), np.float32)
-        member[np.arange(len(leaves)), local] = 1
-        shares = posterior @ member
-        sums.frames[used] += shares.sum(axis=0) if self.voiced is not None else shares.T @ rows[:, 1]
-        components = self._by_component(self.values(rows), used, shares * rows[:, 1:2])
-        found = components.reshape(len(rows), -1).T @ rows[:, 1:]
-        sums.sums[used] += found.reshape(len(used), -1, found.shape[1])
-
-    def _by_component(self, x: Floats, chosen: NDArray[np.intp], shares: Floats) -> Floats:
-        components = np.ascontiguousarray(self.mixtures.log_components(x, chosen))
-        components -= components.max(axis=2, keepdims=True)
-        np.exp(components, out=components)
-        components *= (shares / components.sum(axis=2))[:, :, None]
-        components[components < LEAST_SHARE] = 0
-        return components
+        order = np.argsort(leaves, kind="stable")
+        visited, starts = np.unique(leaves[order], return_index=True)
+        for leaf, mine in zip(visited.tolist(), np.split(order, starts[1:]), strict=True):
+            x, known = rows[mine], shares[mine] * rows[mine, 1]
+            components = self.mixtures.responsibilities(leaf, self.values(x), known)
+            sums.sums[leaf] += components.T @ x[:, 1:]
+            sums.frames[leaf] += (known if self.voiced is None else shares[mine]).sum()
 
     def maximised(self, sums: Sums, floor: float) -> Tied:
         """Return the densities that explain the sums best (the M-step).

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.trajectory.joint.densities import LEAST_SHARE, Sums
+from lipmotion.engines.trajectory.joint.densities import LEAST_SHARE, Sums, Tied
 from lipmotion.engines.trajectory.joint.inventory import Inventory, Place, states_of
 from lipmotion.engines.trajectory.joint.model import JointHmm
 from lipmotion.engines.trajectory.joint.streams import Observed
@@ -17,6 +17,10 @@ from lipmotion.kernels.forward_backward import IMPOSSIBLE, chain_posteriors
 from lipmotion.stats.hmm.baum_welch import LONGEST_SILENCE, LONGEST_STATE, batches
 
 LEAST_STAY = 0.05
+LEAST_COUNTED = 1e-5
+"""State posteriors under this are left out of the statistics of mixtures: nearly all of them are."""
+GATHERED = 50_000
+"""Frames whose shares in mixtures are counted together."""
 Rows = NDArray[np.float32]
 Leaves = Mapping[str, NDArray[np.intp]]
 
@@ -107,8 +111,15 @@ def sentences_of(hmm: JointHmm, utterances: Iterable[tuple[Observed, Sequence[st
 
 
 def posteriors(hmm: JointHmm, sentences: Sentences) -> Iterator[Posterior]:
-    """Give the state posteriors of all utterances that have room for their states, not in their order."""
-    items, leaves, log_move, weights = sentences.items, sentences.leaves(hmm), hmm.log_move, hmm.config.training
+    """Give the state posteriors of utterances, not in their order.
+
+    Those without room for their states, or without a stream that is switched on, are left out.
+    """
+    leaves, log_move, weights = sentences.leaves(hmm), hmm.log_move, hmm.config.training
+    usable = [
+        i for i, sentence in enumerate(sentences.items) if sentence.fits and set(weights.on) & set(sentence.streams)
+    ]
+    items = [sentences.items[i] for i in usable]
     counts = [len(sentence.states) for sentence in items]
     for batch in batches([sentence.frames for sentence in items], counts):
         frames = np.array([items[i].frames for i in batch], np.intp)
@@ -125,7 +136,30 @@ def posteriors(hmm: JointHmm, sentences: Sentences) -> Iterator[Posterior]:
         for u, i in enumerate(batch):
             if log_likelihood[u] > IMPOSSIBLE / 2:
                 found = posterior[: frames[u], u, : states[u]]
-                yield Posterior(i, found, stay[u, : states[u]], float(log_likelihood[u]))
+                yield Posterior(usable[i], found, stay[u, : states[u]], float(log_likelihood[u]))
+
+
+class _Mixed:
+    """What frames say about mixtures, gathered over many utterances: many frames of one mixture at a time are fast."""
+
+    def __init__(self, tied: Tied) -> None:
+        self._tied, self._sums = tied, Sums.none(*tied.mixtures.size)
+        self._kept: list[tuple[Rows, NDArray[np.intp], Rows]] = []
+
+    def add(self, rows: Rows, leaves: NDArray[np.intp], posterior: Rows) -> None:
+        """Add an utterance; posterior of its states [shape=(T, S)]."""
+        frame, state = np.nonzero(posterior > LEAST_COUNTED)
+        self._kept.append((rows[frame], leaves[state], posterior[frame, state]))
+        if sum(len(kept) for _, kept, _ in self._kept) > GATHERED:
+            self.all()
+
+    def all(self) -> Sums:
+        """Return what all frames so far say."""
+        if self._kept:
+            rows, leaves, shares = (np.concatenate(each) for each in zip(*self._kept, strict=True))
+            self._tied.add_components(self._sums, rows, leaves, shares)
+            self._kept.clear()
+        return self._sums
 
 
 def expect(hmm: JointHmm, sentences: Sentences, found: Iterator[Posterior] | None = None) -> Expected:
@@ -134,8 +168,7 @@ def expect(hmm: JointHmm, sentences: Sentences, found: Iterator[Posterior] | Non
     found : their posteriors, where they are not the model's own
     """
     places = {name: Sums.none(len(sentences.places), 1, len(part.scale.mean)) for name, part in hmm.parts.items()}
-    mixed = {name: part for name, part in hmm.parts.items() if part.tied.mixtures.size[1] > 1}
-    leaves = {name: Sums.none(*part.tied.mixtures.size) for name, part in mixed.items()}
+    mixed = {name: _Mixed(part.tied) for name, part in hmm.parts.items() if part.tied.mixtures.size[1] > 1}
     stay, occupied, which = np.zeros(len(hmm.log_stay)), np.zeros(len(hmm.log_stay)), sentences.leaves(hmm)
     log_likelihood, frames = 0.0, 0
     for posterior in posteriors(hmm, sentences) if found is None else found:
@@ -146,13 +179,15 @@ def expect(hmm: JointHmm, sentences: Sentences, found: Iterator[Posterior] | Non
         for name, rows in sentence.streams.items():
             places[name].add(sentence.distinct, shares @ rows)
             if name in mixed:
-                mixed[name].tied.add_components(leaves[name], rows, which[name][sentence.places], states)
+                mixed[name].add(rows, which[name][sentence.places], states)
         np.add.at(stay, sentence.states, posterior.stay)
         np.add.at(occupied, sentence.states, posterior.states.sum(axis=0))
         log_likelihood += posterior.log_likelihood
         frames += sentence.frames
-    for name in hmm.parts.keys() - mixed.keys():
-        leaves[name] = places[name].of_groups(which[name], hmm.parts[name].forest.size)
+    leaves = {
+        name: mixed[name].all() if name in mixed else places[name].of_groups(which[name], part.forest.size)
+        for name, part in hmm.parts.items()
+    }
     return Expected(places, leaves, stay, occupied, log_likelihood, frames)
 
 
