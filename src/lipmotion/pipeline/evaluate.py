@@ -16,12 +16,13 @@ from lipmotion.measures import curves
 from lipmotion.measures.bootstrap import interval
 from lipmotion.measures.closures import closed_threshold, closure_figures, phone_closures
 from lipmotion.measures.report import without_nan
+from lipmotion.pipeline.hear import hear
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.train import labels_of
 from lipmotion.pipeline.transcribe import report_guesses
 from lipmotion.speech.recogniser import Recogniser
 from lipmotion.speech.recogniser import recogniser as cached_recogniser
-from lipmotion.types import Monitor, Motion, Speech, Timeline, Unit, Utterance, counted, part_of, silent_monitor
+from lipmotion.types import Monitor, Motion, Timeline, Unit, Utterance, counted, part_of, silent_monitor
 from lipmotion.units import VISEMES, Lexicon, is_silent
 
 ModelT = TypeVar("ModelT")
@@ -190,7 +191,7 @@ def _clip(
     motion = utterance.track.motion
     seen = np.asarray(utterance.track.seen)
     time_s = (np.arange(len(motion.values)) / motion.rate_hz)[seen]
-    generated = engine.generate(learned, Speech(utterance.features, units)).motion
+    generated = engine.generate(learned, hear(engine, utterance.audio, utterance.features, units)).motion
     _check_channels(generated, compared)
     spoken = tuple((s.start_s, s.end_s, s.label.phone) for s in reference if not is_silent(s.label.phone))
     return Clip(

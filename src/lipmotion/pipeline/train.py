@@ -21,6 +21,7 @@ from lipmotion.pipeline.labels import labelled
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.transcribe import phones_in_time, report_guesses
 from lipmotion.pipeline.workers import working
+from lipmotion.speech.f0 import log_f0
 from lipmotion.speech.phones import train_phones
 from lipmotion.speech.recogniser import Recogniser
 from lipmotion.stats.checkpoint import NOTHING_KEPT, Checkpoint
@@ -200,7 +201,8 @@ def _examples(
             skipped[utterance.name] = units
             continue
         motion, valid = model_motion(utterance.track, len(utterance.features.values))
-        examples.append(Example(utterance.name, Speech(utterance.features, units), motion, valid))
+        heard = Speech(utterance.features, units, log_f0(utterance.audio))
+        examples.append(Example(utterance.name, heard, motion, valid))
     if not examples:
         name, reason = next(iter(skipped.items()))
         raise CorpusError(f"none of {len(skipped)} utterances could be used; the first, {name}: {reason}")

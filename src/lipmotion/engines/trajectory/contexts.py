@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -76,6 +76,15 @@ def with_neighbours(units: Timeline[Unit]) -> Iterator[tuple[str, Span[Unit], st
     """Give each span between the phones beside it; beyond the ends lies silence."""
     phones = [SILENCE, *(span.label.phone for span in units), SILENCE]
     return zip(phones, units, phones[2:], strict=False)
+
+
+def named(spans: Timeline[Unit], units: UnitSet) -> Timeline[Unit]:
+    """Return the timeline with the unit of each phone named, between its neighbours."""
+    found = []
+    for left, span, right in with_neighbours(spans):
+        before, unit, after = map(units.unit, (left, span.label.phone, right))
+        found.append(replace(span, label=replace(span.label, unit=f"{before}-{unit}+{after}")))
+    return Timeline(tuple(found))
 
 
 def places(units: Timeline[Unit], frames: int, cut: Cut) -> list[Place]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from typing import Any, ClassVar, final
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lipmotion.engines.base import Arrays, Engine, Fit
 from lipmotion.engines.trajectory.closure import closing_spans
-from lipmotion.engines.trajectory.contexts import Cut, places, with_neighbours
+from lipmotion.engines.trajectory.contexts import Cut, named, places
 from lipmotion.engines.trajectory.dynamic_range import widened
 from lipmotion.engines.trajectory.generation import Statistics, generated_motion, resolved
 from lipmotion.engines.trajectory.learning import Learning
@@ -27,9 +27,7 @@ from lipmotion.types import (
     Monitor,
     Motion,
     Speech,
-    Timeline,
     Trace,
-    Unit,
 )
 from lipmotion.units import UnitSet, unit_set
 
@@ -157,12 +155,3 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
 
     def from_arrays(self, arrays: Arrays) -> TrajectoryModel:  # noqa: D102
         return model_from_arrays(arrays, self.config.cut, self.config.units)
-
-
-def named(spans: Timeline[Unit], units: UnitSet) -> Timeline[Unit]:
-    """Return the timeline with the unit of each phone named, between its neighbours."""
-    named = []
-    for left, span, right in with_neighbours(spans):
-        before, unit, after = map(units.unit, (left, span.label.phone, right))
-        named.append(replace(span, label=replace(span.label, unit=f"{before}-{unit}+{after}")))
-    return Timeline(tuple(named))

@@ -29,7 +29,7 @@ def joint_arrays(hmm: JointHmm, precision: type[np.floating[Any]] = np.float16) 
     arrays: dict[str, NDArray[Any]] = {
         "units": np.array(hmm.inventory.names),
         "free": np.array(hmm.inventory.free),
-        "spoken": np.array(hmm.spoken),
+        "spoken": np.isin(hmm.inventory.names, hmm.spoken).astype(np.int8),
         "streams": np.array(list(hmm.parts)),
         "log_stay": hmm.log_stay,
         "durations": hmm.durations,
@@ -53,10 +53,12 @@ def joint_arrays(hmm: JointHmm, precision: type[np.floating[Any]] = np.float16) 
 def joint_from_arrays(arrays: Arrays, config: JointConfig) -> JointHmm:
     """Return the model again. Raises ModelFormatError: something is missing, has the wrong shape or is no number."""
     try:
-        units, free, spoken, streams = (tuple(map(str, arrays[key])) for key in ("units", "free", "spoken", "streams"))
+        units, free, streams = (tuple(map(str, arrays[key])) for key in ("units", "free", "streams"))
         inventory = Inventory(units, free, config.states)
-        if not set(spoken) <= set(units) or inventory.silence not in spoken:
-            raise ValueError("units were heard in training that the model does not have")
+        _check(arrays, {"spoken": (len(units),)})
+        spoken = tuple(unit for unit, heard in zip(units, arrays["spoken"], strict=True) if heard)
+        if inventory.silence not in spoken:
+            raise ValueError("silence was not heard in training")
         if SPEECH not in streams or not set(streams) <= set(STREAMS) or len(set(streams)) < len(streams):
             raise ValueError(f"streams {streams}")
         states, count = len(inventory.rows), len(units)

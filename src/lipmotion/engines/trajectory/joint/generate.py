@@ -141,12 +141,27 @@ def generate(
     return Trajectory(values, variance, tuple(found))
 
 
-def _solved(densities: FrameDensities, share: Array, pins: Mapping[tuple[int, int], float]) -> tuple[Array, Array]:
-    """Return the trajectory and its variance, each Gaussian with its share in its frame [shape=(T, M)]."""
+def settled(densities: FrameDensities) -> tuple[Array, Array]:
+    """Return one Gaussian a frame: mean and precision [each shape=(T, 3, Q)].
+
+    Those of mixtures count as much as EM over the components finds that they stand behind the most probable trajectory.
+    """
+    if densities.log_weights.shape[1] == 1:
+        return densities.means[:, 0], densities.precisions[:, 0]
+    components = densities.log_components(generate(densities).values)
+    share = np.exp(components - components.max(axis=1, keepdims=True))
+    return _merged(densities, share / share.sum(axis=1, keepdims=True))
+
+
+def _merged(densities: FrameDensities, share: Array) -> tuple[Array, Array]:
     shared = densities.precisions * share[:, :, None, None]
     precision = shared.sum(axis=1)
-    mean = (shared * densities.means).sum(axis=1) / np.maximum(precision, np.finfo(float).tiny)
-    bands = normal_equations(mean, precision)
+    return (shared * densities.means).sum(axis=1) / np.maximum(precision, np.finfo(float).tiny), precision
+
+
+def _solved(densities: FrameDensities, share: Array, pins: Mapping[tuple[int, int], float]) -> tuple[Array, Array]:
+    """Return the trajectory and its variance, each Gaussian with its share in its frame [shape=(T, M)]."""
+    bands = normal_equations(*_merged(densities, share))
     for (frame, dimension), value in pins.items():
         pin(bands, frame, dimension, value)
     values, variance = solve(bands)

@@ -44,8 +44,11 @@ def in_frames(
     return tuple(names), np.array([*firsts, frames], np.intp)
 
 
-def in_time(said: Sequence[Said], duration_s: float) -> Timeline[Unit]:
-    """Return recognised phones in time: frame n covers (n ± ½) · 10 ms, from 0 s to the end of the recording."""
+def in_time(said: Sequence[Said], duration_s: float, phone_of: Callable[[str], str] = str) -> Timeline[Unit]:
+    """Return recognised units in time: frame n covers (n ± ½) · 10 ms, from 0 s to the end of the recording.
+
+    phone_of : gives a phone of a unit; by default the unit is the phone
+    """
     edges = np.clip((np.array([unit.first for unit in said]) - 0.5) / FRAME_RATE_HZ, 0, duration_s).tolist()
     spans = zip(edges, [*edges[1:], duration_s], said, strict=True)
-    return Timeline(tuple(Span(start_s, end_s, Unit(unit.unit)) for start_s, end_s, unit in spans))
+    return Timeline(tuple(Span(start_s, end_s, Unit(phone_of(unit.unit))) for start_s, end_s, unit in spans))
