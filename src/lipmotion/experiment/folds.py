@@ -81,8 +81,8 @@ def table(figures: Mapping[str, Any]) -> str:
             f"  p b m: {number(row['recall_p_b_m'], '.1f')} % of {row['p_b_m']} closed; closings elsewhere "
             f"{number(row['false_per_minute'], '.1f')} a minute of speech "
             f"(original {number(row['original_per_minute'], '.1f')})",
-            f"  closings: score {number(row['score'], '.1f')} of {row['closings']}, precision "
-            f"{number(row['precision'], '.1f')} of {row['generated_closings']}, "
+            f"  closings: score {number(row['score'], '.1f')} % of {row['closings']}, precision "
+            f"{number(row['precision'], '.1f')} % of {row['generated_closings']}, "
             f"timing {number(row['timing_ms'], '+.0f')} ms",
             f"  opening: ACC {acc}, nRMSE {row['nrmse']:.3f}, variance {row['global_variance']:.2f}",
         ]

@@ -109,7 +109,7 @@ def table(figures: Mapping[str, Any]) -> str:
     """Return the figures of ``learning_curve`` as text."""
     order = {"given": "the list given", "shuffled": f"the training list shuffled with seed {figures['seed']}"}
     lines = [
-        f"trained on the first clips of {order[figures['order']]}, {figures['workers']} process(es) at most; "
+        f"trained on the first N clips of {order[figures['order']]}, with up to {figures['workers']} process(es); "
         f"split {figures['split']}: {figures['clips']} clips"
     ]
     for condition in figures["rows"][0]["conditions"]:
