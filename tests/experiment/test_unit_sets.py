@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -10,34 +9,23 @@ from typing import Any
 import numpy as np
 import pytest
 
+from experiment.copies import copied, renamed
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError
-from lipmotion.experiment import unit_sets as experiment
 from lipmotion.experiment.unit_sets import PAPER, SYSTEMS, table, unit_sets
-from lipmotion.measures.bootstrap import interval
 from lipmotion.measures.closures import closings
-from lipmotion.pipeline import evaluate as evaluation
 from lipmotion.pipeline.evaluate import clips, evaluate, recorded
 from lipmotion.pipeline.train import train
 from lipmotion.speech.recogniser import recogniser
 from lipmotion.stats.hmm.model import HmmConfig
-from lipmotion.types import Channel, Progress
+from lipmotion.types import Progress
 from lipmotion.units import unit_set
 
 SMALL = HmmConfig(mixtures=1, iterations=2)
 PLAIN, SHIPPED = SYSTEMS
 CONDITIONS = ["audio only", "with transcript"]
 Rows = dict[str, dict[str, Any]]
-
-
-@pytest.fixture(scope="module", autouse=True)
-def few_draws() -> Iterator[None]:
-    """Intervals of 50 draws: what they say is tested with the measures."""
-    with pytest.MonkeyPatch.context() as patch:
-        for module in (experiment, evaluation):
-            patch.setattr(module, "interval", partial(interval, draws=50))
-        yield
 
 
 @pytest.fixture(scope="module")
@@ -52,13 +40,6 @@ def figures(toy_corpus: Corpus, stages: list[Progress]) -> dict[str, Any]:
 
 def all_rows(figures: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
     return [item for system in figures["systems"].values() for rows in system.values() for item in rows.items()]
-
-
-def copied(corpus: Corpus, folder: Path, **changes: Any) -> Corpus:
-    result = Corpus.create(folder / "copy")
-    for name in corpus.names():
-        result.add(replace(corpus.utterance(name), **changes))
-    return result
 
 
 def test_the_rows_are_those_of_the_paper(figures: dict[str, Any]) -> None:
@@ -148,27 +129,19 @@ def test_progress_goes_from_nothing_to_all(figures: dict[str, Any], stages: list
 
 
 def test_without_transcripts_there_is_audio_only(toy_corpus: Corpus, tmp_path: Path) -> None:
-    corpus = Corpus.create(tmp_path / "copy")
-    for name in toy_corpus.names():
-        utterance = toy_corpus.utterance(name)
-        corpus.add(utterance if utterance.split == "train" else replace(utterance, words=None))
+    corpus = copied(toy_corpus, tmp_path, lambda u: u if u.split == "train" else replace(u, words=None))
     untold = unit_sets(corpus, recogniser=SMALL)
     assert [list(system) for system in untold["systems"].values()] == [["audio only"]] * 2
 
 
 def test_motion_without_an_opening(toy_corpus: Corpus, tmp_path: Path) -> None:
-    corpus = Corpus.create(tmp_path / "copy")
-    for name in toy_corpus.names():
-        track = (utterance := toy_corpus.utterance(name)).track
-        channels = tuple(Channel(f"shape {number}") for number, _ in enumerate(track.motion.channels))
-        corpus.add(replace(utterance, track=replace(track, motion=replace(track.motion, channels=channels))))
     with pytest.raises(CorpusError, match="compared by the channel 'opening', which is not in it"):
-        unit_sets(corpus, recogniser=SMALL)
+        unit_sets(renamed(toy_corpus, tmp_path, "shape 0", "shape 1", "shape 2"))
 
 
 def test_nothing_to_train_on_or_to_compare_with(toy_corpus: Corpus, tmp_path: Path) -> None:
     with pytest.raises(CorpusError, match="no utterances of split 'train'"):
-        unit_sets(copied(toy_corpus, tmp_path, split="test"))
+        unit_sets(copied(toy_corpus, tmp_path, partial(replace, split="test")))
     with pytest.raises(CorpusError, match="no utterances of split 'tset'"):
         unit_sets(toy_corpus, split="tset", recogniser=SMALL)
 

@@ -6,7 +6,7 @@ import argparse
 import os
 from pathlib import Path
 
-from lipmotion.cli.options import add_machine_readable
+from lipmotion.cli.options import add_machine_readable, list_or_all
 
 UNITS = "what is modelled: phone (default), eVis, sVis, pbVis, 2vis, or a table file (docs/unit-sets.md)"
 
@@ -39,7 +39,7 @@ def run(options: argparse.Namespace) -> None:
 
     workers = options.workers or os.cpu_count() or 1
     with reporting(options) as report:
-        split = None if options.split == "all" else options.split
+        split = list_or_all(options.split)
         lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
         unit_set(options.units)  # before the long work
         engine = engine_named("trajectory", {"units": options.units})

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import engine_named
-from lipmotion.errors import CorpusError
+from lipmotion.experiment.trial import channels_with_opening, opening_row
 from lipmotion.measures import curves
 from lipmotion.measures.bootstrap import interval
 from lipmotion.measures.closures import found_closings
@@ -57,7 +57,7 @@ def unit_sets(
     Intervals are 95 % bootstrap intervals over clips; differences from ``phone`` are of the same draws of clips.
     Raises CorpusError: no utterances to train on or of this split, or motion without an opening.
     """
-    corpus.required(split)  # before the long work
+    channels_with_opening(corpus, corpus.required(split))  # before the long work
     utterances = [corpus.utterance(name) for name in corpus.required("train")]
     lexicon = lexicon or Lexicon()
     with working(min(workers, len(utterances) // FEWEST)) as team:
@@ -66,8 +66,6 @@ def unit_sets(
         phones, examples, _ = phones_and_examples(utterances, config, lexicon, finding, NOTHING_KEPT, team.each)
     listening = part_of(monitor, 0.5, 0.6)
     found = recorded(corpus, cached_recogniser(phones), split=split, lexicon=lexicon, monitor=listening)
-    if found.closed_under is None:
-        raise CorpusError(f"{corpus.path}: unit sets are compared by the channel {OPENING!r}, which is not in it")
     systems = {
         name: _block(found, examples, settings | {"closures": closures}, seed, part_of(monitor, *share, f"{name}: "))
         for (name, settings), share in zip(SYSTEMS.items(), ((0.6, 0.75), (0.75, 1.0)), strict=True)
@@ -96,7 +94,6 @@ def _block(
 
 def _row(found: Recorded, units: str, made: Sequence[Clip], baseline: Sequence[Clip], seed: int) -> dict[str, Any]:
     figures = figures_of(made, found, seed)
-    opening, closing, lips = figures["channels"][OPENING], figures["closures"], figures["closures_p_b_m"]
     (generated, original), (other, _) = _openings(found, made), _openings(found, baseline)
     threshold = found.closed_under or 0.0
     hits, count = found_closings(generated, original, threshold)
@@ -104,22 +101,11 @@ def _row(found: Recorded, units: str, made: Sequence[Clip], baseline: Sequence[C
     return {
         "units": UNIT_SETS[units].count,
         "paper": PAPER[units],
-        "score": 100 * closing["score"],
         "score_95": interval(_score, hits, count, seed),
         "score_gain_95": _gain(_score, hits, other_hits, count, seed),
-        "precision": 100 * closing["precision"],
-        "timing_ms": closing["timing_ms"],
-        "closings": closing["original"],
-        "generated_closings": closing["generated"],
-        "recall_p_b_m": 100 * lips["recall"],
-        "p_b_m": lips["intervals"],
-        "acc": opening["acc"],
-        "acc_95": figures["opening_acc_95"],
         "acc_gain_95": _gain(_acc, generated, other, original, seed),
         "rmse": float(curves.rmse(generated, original)[0]),
-        "nrmse": opening["nrmse"],
-        "global_variance": opening["global_variance"],
-    }
+    } | opening_row(figures)
 
 
 def _openings(found: Recorded, made: Sequence[Clip]) -> tuple[list[Array], list[Array]]:

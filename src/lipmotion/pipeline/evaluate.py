@@ -110,13 +110,20 @@ def recorded(
     *,
     split: str | None = "test",
     speakers: Sequence[str] = (),
+    names: Sequence[str] | None = None,
+    channels: Sequence[str] | None = None,
     lexicon: Lexicon | None = None,
     monitor: Monitor = silent_monitor,
 ) -> Recorded:
-    """Return the recordings of a split, and their phones as ``phones`` finds them. Raises as ``evaluate``."""
+    """Return the recordings of a split, and their phones as ``phones`` finds them. Raises as ``evaluate``.
+
+    names    : these utterances only, whatever their list
+    channels : compare these, whether they move or not
+    """
     lexicon = lexicon or Lexicon()
-    utterances = [corpus.utterance(name) for name in corpus.required(split, speakers)]
-    compared, still = _compared(utterances)
+    chosen = names if names is not None else corpus.required(split, speakers)
+    utterances = [corpus.utterance(name) for name in chosen]
+    compared, still = (tuple(channels), ()) if channels is not None else compared_channels(utterances)
     report_guesses([word for utterance in utterances for word in utterance.words or ()], lexicon)
     heard = counted(utterances, "finding the phones", part_of(monitor, 0, 0.4))
     reference = [_reference(utterance, phones, lexicon) for utterance in heard]
@@ -130,7 +137,7 @@ def recorded(
     return Recorded(utterances, compared, still, threshold, reference, conditions)
 
 
-def _compared(utterances: Sequence[Utterance]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def compared_channels(utterances: Sequence[Utterance]) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return the channels to compare, and those left out because they are still.
 
     Raises CorpusError: the utterances have different channels, or nothing moves.
