@@ -83,7 +83,7 @@ def test_the_mouth_closes_on_p_b_m_and_rests_in_silence(move: Animate, toy_sente
         if span.label.phone in ("p", "b", "m"):
             assert opening[frames_of(span)].min() < 0.01
     first, last = toy_sentence.units.spans[0], toy_sentence.units.spans[-1]
-    for silence in (opening[: round(first.end_s * 100) - 30], opening[round(last.start_s * 100) + 30 :]):
+    for silence in (opening[: round(first.end_s * 100) - 50], opening[round(last.start_s * 100) + 50 :]):
         assert silence.max() < 0.01
         assert silence.std() < 1e-3
 

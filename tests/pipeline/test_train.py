@@ -52,7 +52,7 @@ def test_every_stage_is_reported(toy_corpus: Corpus) -> None:
     steps: list[str] = []
     train(toy_corpus, names=TRAINED[:3], recogniser=SMALL, monitor=lambda event: steps.append(event.stage))
     assert list(dict.fromkeys(steps))[:2] == ["learning phones: flat start", "learning phones: pronunciations"]
-    assert "learning motion: contexts" in steps
+    assert "learning motion: trees" in steps
 
 
 def test_other_lists_all_and_given_names(toy_corpus: Corpus) -> None:
