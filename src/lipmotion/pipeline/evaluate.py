@@ -71,7 +71,7 @@ def evaluate(
     utterances = [corpus.utterance(name) for name in corpus.required(split, speakers)]
     compared, still = _compared(utterances)
     report_guesses([word for utterance in utterances for word in utterance.words or ()], lexicon)
-    phones = cached_recogniser(model.phones, recogniser)
+    phones = cached_recogniser(model.phones, recogniser, model.adaptation)
     heard = counted(utterances, "finding the phones", part_of(monitor, 0, 0.4))
     reference = [_reference(utterance, phones, lexicon) for utterance in heard]
     threshold = None

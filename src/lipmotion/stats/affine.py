@@ -29,9 +29,7 @@ class AffineStatistics:
     linear: Array
 
     def __add__(self, other: AffineStatistics) -> AffineStatistics:
-        return AffineStatistics(
-            self.count + other.count, self.quadratic + other.quadratic, self.linear + other.linear
-        )
+        return AffineStatistics(self.count + other.count, self.quadratic + other.quadratic, self.linear + other.linear)
 
     def times(self, factor: float) -> AffineStatistics:
         """Return what ``factor`` times as many frames of the same kind would say."""
@@ -121,9 +119,7 @@ def improved(transform: Array, statistics: AffineStatistics, free: NDArray[np.bo
     return result
 
 
-def _best_row(
-    old: Array, columns: NDArray[np.intp], cofactors: Array, statistics: AffineStatistics, row: int
-) -> Array:
+def _best_row(old: Array, columns: NDArray[np.intp], cofactors: Array, statistics: AffineStatistics, row: int) -> Array:
     fixed = np.where(np.isin(np.arange(len(old)), columns), 0.0, old)
     inverse = np.linalg.inv(statistics.quadratic[row][np.ix_(columns, columns)])
     pull = (statistics.linear[row] - statistics.quadratic[row] @ fixed)[columns]
