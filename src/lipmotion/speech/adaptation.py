@@ -13,7 +13,7 @@ from lipmotion.errors import ModelFormatError
 from lipmotion.speech.general.acoustic import STREAMS
 from lipmotion.speech.general.front_end import general_features
 from lipmotion.speech.mfcc import FEATURES, mfcc
-from lipmotion.stats.affine import transformed
+from lipmotion.stats.affine import identity, transformed
 from lipmotion.types import Audio, Features
 
 WIDEST_WARP = 2.0
@@ -49,6 +49,12 @@ class Adaptation:
         features = general_features(audio)
         streams = [transformed(features[:, s], matrix) for s, matrix in zip(STREAMS, self.general, strict=True)]
         return np.concatenate(streams, axis=1)
+
+
+def unadapted(warp: float, trust: float) -> Adaptation:
+    """Return an adaptation whose transforms change nothing."""
+    streams, size, _ = _GENERAL
+    return Adaptation(warp, trust, identity(FEATURES), np.stack([identity(size)] * streams))
 
 
 def adaptation_arrays(adaptation: Adaptation) -> dict[str, NDArray[Any]]:

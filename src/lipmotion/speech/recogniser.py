@@ -91,9 +91,11 @@ class Recogniser:
     def densities(self, audio: Audio, features: Features) -> NDArray[np.intp]:
         """Return which density was most probably heard in each frame [shape=(T,)].
 
-        They are those of ``joint``, of the kind ``own`` those of its own models.
+        They are those of ``joint``, of the kind ``own`` those of its own models. In digital silence it is silence.
         Raises MissingDependencyError: as ``recognise``.
         """
+        if not features.values.any():
+            return np.full(len(features.values), self.own.table.density(SILENCE, 0), np.intp)
         _, evidence = self._evidence(audio, features)
         network = self._loop.network
         return network.emission[network.best_path(evidence)]
