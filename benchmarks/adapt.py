@@ -17,6 +17,7 @@ from robust import SPOKEN, edits, show, spoken
 
 from lipmotion import adapt, animate, load_model
 from lipmotion.corpora.grid import sentence
+from lipmotion.errors import InputError
 from lipmotion.pipeline.model import Model
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.read import read_audio
@@ -53,12 +54,21 @@ def strangers(folder: Path, model: Model) -> None:
         found: dict[str, list[tuple[int, int]]] = {}
         for i, audio in enumerate(audios):
             learned = [audio] if name == "itself" else [other for j, other in enumerate(audios) if j != i]
-            for key, errors in judged(model, adapt(model, learned), audio, wanted[i]).items():
+            for key, errors in judged(model, adapted_if_possible(model, learned), audio, wanted[i]).items():
                 found.setdefault(key, []).append((errors, len(wanted[i])))
         for key, pairs in found.items():
             total.setdefault(key, []).extend(pairs)
         show(f"speech-open, adapted to {name}", **accuracies(found))
     show("speech-open, all", **accuracies(total))
+
+
+def adapted_if_possible(model: Model, recordings: list[Audio]) -> Model:
+    """Return an adapted model; where there is too little speech, the model as it is."""
+    try:
+        return adapt(model, recordings)
+    except InputError as error:
+        show("speech-open, not adapted", reason=str(error))
+        return model
 
 
 def judged(model: Model, adapted: Model, audio: Audio, wanted: list[str]) -> dict[str, int]:
