@@ -13,6 +13,7 @@ from typing import NamedTuple
 import pytest
 
 from lipmotion.cli.main import main
+from lipmotion.pipeline.model import VERSION
 from lipmotion.stats.archive import HEADER
 
 
@@ -75,7 +76,9 @@ def newer_model(toy_model_file: Path, tmp_path_factory: pytest.TempPathFactory) 
     with zipfile.ZipFile(toy_model_file) as old, zipfile.ZipFile(path, "w") as new:
         for name in old.namelist():
             content = old.read(name)
-            new.writestr(name, json.dumps(json.loads(content) | {"version": 3}) if name == HEADER else content)
+            new.writestr(
+                name, json.dumps(json.loads(content) | {"version": VERSION + 1}) if name == HEADER else content
+            )
     return path
 
 

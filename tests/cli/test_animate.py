@@ -8,7 +8,7 @@ import pytest
 from cli.conftest import Run, is_one_error
 from lipmotion.export.base import read_motion
 from lipmotion.pipeline.animate import animate, write
-from lipmotion.pipeline.model import load_model
+from lipmotion.pipeline.model import VERSION, load_model
 
 
 @pytest.fixture
@@ -128,7 +128,11 @@ def test_files_that_are_not_what_they_should_be(
         (["--transcript", "latin.txt"], 3, "latin.txt: not a readable UTF-8 transcript"),
         (["--transcript", "empty.txt"], 3, "holds no word"),
         (["--lexicon", "lexicon.txt"], 3, "lexicon.txt, line 2: unknown phone 'Q'"),
-        (["--model", newer_model], 6, "model version 3, this lipmotion reads version 2; upgrade lipmotion"),
+        (
+            ["--model", newer_model],
+            6,
+            f"version {VERSION + 1}, this lipmotion reads version {VERSION}; upgrade",
+        ),
         (["--model", toy_speech], 6, "not a lipmotion model"),
         (["--model", "empty.txt"], 6, "not a lipmotion model"),
     ]:

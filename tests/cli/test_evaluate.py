@@ -9,7 +9,7 @@ from cli.conftest import Run, is_one_error
 from lipmotion.corpora.store import Corpus
 from lipmotion.measures.report import table
 from lipmotion.pipeline.evaluate import evaluate
-from lipmotion.pipeline.model import load_model
+from lipmotion.pipeline.model import VERSION, load_model
 
 
 def test_the_figures_are_those_of_the_function(run: Run, toy_corpus: Corpus, toy_model_file: Path, here: Path) -> None:
@@ -31,7 +31,7 @@ def test_other_lists(run: Run, toy_corpus: Corpus, toy_model_file: Path) -> None
     [
         (["missing", "CORPUS"], 3, "missing: no such model"),
         (["text", "CORPUS"], 6, "text: not a lipmotion model"),
-        (["NEWER", "CORPUS"], 6, "model version 3"),
+        (["NEWER", "CORPUS"], 6, f"model version {VERSION + 1}"),
         (["MODEL", "missing"], 4, "missing: no such corpus"),
         (["MODEL", "CORPUS", "--split", "tset"], 4, "no utterances of split 'tset'"),
         (["MODEL", "CORPUS", "-o", "missing/a.json"], 7, "the folder missing does not exist"),

@@ -5,13 +5,13 @@ from pathlib import Path
 import pytest
 
 from cli.conftest import Run, is_one_error
-from lipmotion.pipeline.model import read_header, shipped_path
+from lipmotion.pipeline.model import VERSION, read_header, shipped_path
 
 
 def test_a_model_says_whose_recordings_it_comes_from(run: Run, toy_model_file: Path) -> None:
     done = run("info", toy_model_file)
     assert (done.code, done.err) == (0, [])
-    assert done.out[0].split() == ["file", str(toy_model_file), "(0.1", "MB)"]
+    assert done.out[0].split() == ["file", str(toy_model_file), "(0.2", "MB)"]
     said = dict(line.split(maxsplit=1) for line in done.out if len(line.split()) > 1)
     assert said["licence"] == "synthesised by lipmotion"
     assert said["engine"] == "trajectory"
@@ -32,7 +32,7 @@ def test_the_shipped_model_is_the_default(run: Run) -> None:
         ("missing", 3, "missing: no such model"),
         ("text", 6, "text: not a lipmotion model"),
         (".", 3, ".: no such model"),
-        ("NEWER", 6, "model version 3, this lipmotion reads version 2; upgrade lipmotion"),
+        ("NEWER", 6, f"version {VERSION + 1}, this lipmotion reads version {VERSION}; upgrade"),
     ],
 )
 def test_what_is_no_model(run: Run, newer_model: Path, here: Path, name: str, code: int, words: str) -> None:

@@ -9,6 +9,7 @@ from cli.conftest import Run, is_one_error
 from lipmotion.corpora.store import Corpus
 from lipmotion.pipeline.model import load_model, save_model
 from lipmotion.pipeline.train import train
+from lipmotion.units import unit_set
 
 
 def test_a_model_and_what_it_was_made_of(run: Run, toy_corpus: Corpus, here: Path) -> None:
@@ -52,6 +53,19 @@ def test_speakers_are_chosen(run: Run, toy_corpus: Corpus, here: Path) -> None:
     )
 
 
+def test_units_of_a_table_that_is_not_needed_again(run: Run, toy_corpus: Corpus, here: Path) -> None:
+    units = unit_set("eVis")
+    table = here / "mine.txt"
+    table.write_text("".join(f"u{n} {' '.join(units.phones(unit))}\n" for n, unit in enumerate(units.units)))
+    assert run("train", toy_corpus.path, "-o", "m", "--units", "mine.txt").code == 0
+    table.unlink()
+    assert set(load_model(here / "m").learned.units.units) == {f"u{n}" for n in range(19)}
+    assert run("train", toy_corpus.path, "-o", "named", "--units", "eVis").code == 0
+    assert load_model(here / "named").learned.units.of == units.of
+    figures = [run("evaluate", name, toy_corpus.path).out for name in ("m", "named")]
+    assert figures[0] == figures[1]
+
+
 @pytest.mark.parametrize(
     ("arguments", "code", "words"),
     [
@@ -62,6 +76,8 @@ def test_speakers_are_chosen(run: Run, toy_corpus: Corpus, here: Path) -> None:
         (["CORPUS", "-o", "m", "--split", "tset"], 4, "no utterances of split 'tset' (there are train: 8, val: 2"),
         (["CORPUS", "-o", "m", "--speaker", "dora"], 4, "no speaker 'dora' (there are: no speaker by name)"),
         (["CORPUS", "-o", "m", "--lexicon", "missing"], 3, "missing: no such lexicon file"),
+        (["CORPUS", "-o", "m", "--units", "evis"], 3, "no unit set 'evis'; there are: 2vis, sVis, pbVis"),
+        (["CORPUS", "-o", "m", "--units", "folder"], 3, "folder: "),
     ],
 )
 def test_what_cannot_be_used(

@@ -13,16 +13,25 @@ from lipmotion.engines import ENGINES, engine_named
 from lipmotion.errors import CorpusError, InputError, ModelFormatError
 from lipmotion.types import Constraints, Features, Pin, Span, Speech, Timeline, Unit
 from lipmotion.types.progress import silent_monitor
-from lipmotion.units import PHONES
+from lipmotion.units import PHONES, UNIT_SETS
 
 SENTENCE = ("t", "aa", "p", "iy", "m", "uw", "s", "aa")
 
 
+SYSTEMS = {
+    **{name: (name, {}) for name in sorted(ENGINES)},
+    **{f"trajectory of {units}": ("trajectory", {"units": units}) for units in UNIT_SETS if units != "phone"},
+    "plain trajectory of eVis": ("trajectory", {"units": "eVis", "listens": False}),
+}
+"""Every engine as it is, and its other settings that change what the model holds."""
+
+
 class Trained:
-    """An engine and what it learned from a few sentences."""
+    """A system and what it learned from a few sentences."""
 
     def __init__(self, name: str) -> None:
-        self.engine = engine_named(name, {})
+        self.name = name
+        self.engine = engine_named(*SYSTEMS[name])
         self.model = self.engine.fit(examples(), silent_monitor).model
 
     def generate(self, spoken: Speech, *pins: Pin):
@@ -34,7 +43,7 @@ def engine_called(name: str) -> Trained:
     return Trained(name)
 
 
-@pytest.fixture(params=sorted(ENGINES))
+@pytest.fixture(params=SYSTEMS)
 def trained(request) -> Trained:
     return engine_called(request.param)
 
@@ -86,7 +95,7 @@ def test_units_keep_their_times_and_say_what_they_resolved_to(trained):
 
 @settings(deadline=None, max_examples=25)
 @given(data=st.data())
-@pytest.mark.parametrize("name", sorted(ENGINES))
+@pytest.mark.parametrize("name", SYSTEMS)
 def test_pins_are_exact(name, data):
     trained = engine_called(name)
     spoken = speech(timeline(("p", "aa", "m")))
@@ -138,7 +147,7 @@ def test_no_constraints_are_empty_constraints(trained):
 
 def test_the_same_input_gives_the_same_bytes(trained):
     spoken = speech(timeline(SENTENCE))
-    again = Trained(trained.engine.name)
+    again = Trained(trained.name)
     assert same(trained.generate(spoken), trained.generate(spoken))
     assert same(again.generate(spoken), trained.generate(spoken))
 
@@ -203,9 +212,9 @@ def test_odd_timelines_and_the_shortest_recordings(trained, units, frames):
     assert (result.variance >= 0).all()
 
 
-@pytest.mark.parametrize("name", sorted(ENGINES))
+@pytest.mark.parametrize("name", SYSTEMS)
 def test_nothing_to_learn_from_is_a_corpus_error(name):
-    engine = engine_named(name, {})
+    engine = engine_named(*SYSTEMS[name])
     unseen = [replace(e, valid=np.zeros_like(e.valid)) for e in examples(2)]
     silent = [example(()) for _ in range(2)]
     for useless in ([], unseen, silent):
@@ -213,17 +222,17 @@ def test_nothing_to_learn_from_is_a_corpus_error(name):
             engine.fit(useless, silent_monitor)
 
 
-@pytest.mark.parametrize("name", sorted(ENGINES))
+@pytest.mark.parametrize("name", SYSTEMS)
 def test_examples_of_different_channels_are_a_corpus_error(name):
     one, two = examples(2)
     fewer = replace(two.motion, values=two.motion.values[:, :2], channels=two.motion.channels[:2])
     with pytest.raises(CorpusError, match="channels"):
-        engine_named(name, {}).fit([one, replace(two, motion=fewer)], silent_monitor)
+        engine_named(*SYSTEMS[name]).fit([one, replace(two, motion=fewer)], silent_monitor)
 
 
-@pytest.mark.parametrize("name", sorted(ENGINES))
+@pytest.mark.parametrize("name", SYSTEMS)
 def test_frames_that_were_not_seen_teach_nothing(name):
-    engine, generated = engine_named(name, {}), []
+    engine, generated = engine_named(*SYSTEMS[name]), []
     for garbage in (0.0, -7.0):
         spoilt = []
         for number, clean in enumerate(examples(6)):
@@ -236,9 +245,9 @@ def test_frames_that_were_not_seen_teach_nothing(name):
     assert same(*generated)
 
 
-@pytest.mark.parametrize("name", sorted(ENGINES))
+@pytest.mark.parametrize("name", SYSTEMS)
 def test_one_short_example_is_enough(name):
-    engine = engine_named(name, {})
+    engine = engine_named(*SYSTEMS[name])
     model = engine.fit([example(("p", "aa"))], silent_monitor).model
     result = engine.generate(model, speech(timeline(SENTENCE)))
     assert np.isfinite(result.motion.values).all()

@@ -13,6 +13,7 @@ from lipmotion.measures.curves import (
     normalised_rmse,
     per_clip_correlation,
     pooled_correlation,
+    rmse,
 )
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -76,6 +77,7 @@ def test_error_is_in_units_of_the_channels_deviation():
     original = [column(0, 2), column(0, 2)]
     generated = [column(1, 2), column(0, 3)]
     assert normalised_rmse(generated, original)[0] == pytest.approx(np.sqrt(2 / 4) / 1)
+    assert rmse(generated, original)[0] == pytest.approx(np.sqrt(2 / 4))
 
 
 @given(seed=SEEDS)

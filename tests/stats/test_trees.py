@@ -3,7 +3,14 @@ from itertools import product
 import numpy as np
 import pytest
 
-from lipmotion.stats.trees import Question, gaussian_likelihood, grow, tree_arrays, trees_from_arrays
+from lipmotion.stats.trees import (
+    Question,
+    gaussian_likelihood,
+    grow,
+    multispace_likelihood,
+    tree_arrays,
+    trees_from_arrays,
+)
 
 UNITS = ("a", "b", "c", "d")
 QUESTIONS = [Question(place, unit, frozenset([unit])) for place in range(3) for unit in UNITS]
@@ -126,3 +133,40 @@ def test_damaged_trees_are_refused(key, change):
     arrays = tree_arrays({"one": grown(sample(lambda context: float(UNITS.index(context[0]))))})
     with pytest.raises(ValueError, match="tree"):
         trees_from_arrays(arrays | {key: change(arrays[key])})
+
+
+def spaces_of(values):
+    """Count, count of those with a value, their sum and sum of squares [each of ``values``: shape=(N,), NaN: none]."""
+    found = []
+    for x in values:
+        known = x[~np.isnan(x)]
+        found.append([len(x), len(known), known.sum(), (known * known).sum()])
+    return np.array(found, float)
+
+
+def test_frames_without_a_value_are_as_likely_as_they_are_frequent():
+    x = np.array([1.0, 2.0, 4.0, np.nan, np.nan])
+    known = x[:3]
+    gaussian = -0.5 * (np.log(2 * np.pi * known.var()) + (known - known.mean()) ** 2 / known.var())
+    expected = 3 * np.log(0.6) + 2 * np.log(0.4) + gaussian.sum()
+    assert multispace_likelihood(spaces_of([x]))[0] == pytest.approx(expected)
+    assert multispace_likelihood(spaces_of([np.full(4, np.nan)]))[0] == pytest.approx(0)
+    assert multispace_likelihood(spaces_of([known])) == pytest.approx(gaussian_likelihood(spaces_of([known])[:, 1:]))
+    assert multispace_likelihood(np.zeros((1, 4)))[0] == pytest.approx(0)
+
+
+def test_voicing_alone_is_worth_a_question():
+    draw = np.random.default_rng(0)
+    values = [
+        np.where(draw.random(30) < (0.9 if context[1] in "ab" else 0.1), draw.normal(0, 1, 30), np.nan)
+        for context in CONTEXTS
+    ]
+    tree = grow(CONTEXTS, spaces_of(values), QUESTIONS, multispace_likelihood, parameters=3, factor=1.0, least=10.0)
+    assert tree.questions[tree.asked[0]] == Question(1, "early", frozenset("ab"))
+
+
+def test_frames_that_are_all_alike_gain_no_more_than_the_least_variance_allows():
+    x = np.full((5, 1), 3.0)
+    assert gaussian_likelihood(statistics_of([x]), 0.5)[0] == pytest.approx(-2.5 * np.log(2 * np.pi * 0.5))
+    spread = np.array([[0.0], [2.0]])  # a variance of 1 under a Gaussian of 4
+    assert gaussian_likelihood(statistics_of([spread]), 4.0)[0] == pytest.approx(-(np.log(2 * np.pi * 4) + 0.25))

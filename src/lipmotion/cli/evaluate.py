@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import Any
 
-from lipmotion.cli.options import add_machine_readable
+from lipmotion.cli.figures import add_figures_arguments, report_figures
+from lipmotion.cli.options import list_or_all
 from lipmotion.cli.speech import add_recogniser_argument
 
 
@@ -16,33 +18,21 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser.add_argument("corpus", type=Path)
     parser.add_argument("--split", default="test", help="train, val, test or all (default: test)")
     parser.add_argument("--speaker", action="append", default=[], metavar="NAME", help="this one only (repeatable)")
-    parser.add_argument("--lexicon", type=Path, metavar="FILE", help="pronunciations: WORD PHONE PHONE ... a line")
     add_recogniser_argument(parser)
-    parser.add_argument("-o", "--output", type=Path, metavar="FILE.json", help="write all figures here as well")
-    add_machine_readable(parser)
+    add_figures_arguments(parser)
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:
     """Call ``lipmotion.evaluate`` and print its figures."""
-    import json
-
-    from lipmotion.cli.progress import reporting
     from lipmotion.corpora.store import Corpus
-    from lipmotion.files import check_target, whole_file
     from lipmotion.measures.report import table
     from lipmotion.pipeline.evaluate import evaluate
     from lipmotion.pipeline.model import load_model
-    from lipmotion.units import Lexicon
 
-    with reporting(options) as report:
-        if options.output:
-            check_target(options.output)
-        lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
-        split = None if options.split == "all" else options.split
-        chosen = {"split": split, "speakers": options.speaker, "lexicon": lexicon, "recogniser": options.recogniser}
-        figures = evaluate(load_model(options.model), Corpus.open(options.corpus), **chosen, monitor=report.hear)
-        if options.output:
-            with whole_file(options.output) as unfinished:
-                unfinished.write_text(json.dumps(figures, indent=1, allow_nan=False) + "\n")
-        report.finish(table(figures), figures=figures)
+    chosen = {"split": list_or_all(options.split), "speakers": options.speaker, "recogniser": options.recogniser}
+
+    def compute(**given: Any) -> dict[str, Any]:
+        return evaluate(load_model(options.model), Corpus.open(options.corpus), **chosen, **given)
+
+    report_figures(options, compute, table)

@@ -10,3 +10,8 @@ def add_machine_readable(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--machine-readable", action="store_true", help="one JSON object a line on standard output, and nothing else"
     )
+
+
+def list_or_all(split: str) -> str | None:
+    """Return the list that ``--split`` names; None for ``all``."""
+    return None if split == "all" else split

@@ -6,7 +6,9 @@ import argparse
 import os
 from pathlib import Path
 
-from lipmotion.cli.options import add_machine_readable
+from lipmotion.cli.options import add_machine_readable, list_or_all
+
+UNITS = "what is modelled: phone (default), eVis, sVis, pbVis, 2vis, or a table file (docs/unit-sets.md)"
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -17,6 +19,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser.add_argument("--split", default="train", help="train, val, test or all (default: train)")
     parser.add_argument("--speaker", action="append", default=[], metavar="NAME", help="this one only (repeatable)")
     parser.add_argument("--lexicon", type=Path, metavar="FILE", help="pronunciations: WORD PHONE PHONE ... a line")
+    parser.add_argument("--units", default="phone", metavar="SET", help=UNITS)
     parser.add_argument("--workers", type=int, help="processes (default: one a core)")
     add_machine_readable(parser)
     parser.set_defaults(run=run)
@@ -28,16 +31,19 @@ def run(options: argparse.Namespace) -> None:
 
     from lipmotion.cli.progress import reporting
     from lipmotion.corpora.store import Corpus
+    from lipmotion.engines import engine_named
     from lipmotion.files import unfinished_work
     from lipmotion.pipeline.model import save_model
     from lipmotion.pipeline.train import train
-    from lipmotion.units import Lexicon
+    from lipmotion.units import Lexicon, unit_set
 
     workers = options.workers or os.cpu_count() or 1
     with reporting(options) as report:
-        split = None if options.split == "all" else options.split
+        split = list_or_all(options.split)
         lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
-        chosen = {"split": split, "speakers": options.speaker, "lexicon": lexicon, "workers": workers}
+        unit_set(options.units)  # before the long work
+        engine = engine_named("trajectory", {"units": options.units})
+        chosen = {"engine": engine, "split": split, "speakers": options.speaker, "lexicon": lexicon, "workers": workers}
         with unfinished_work(options.output) as work:
             model, result = train(Corpus.open(options.corpus), **chosen, monitor=report.hear, work=work)
             save_model(model, options.output)

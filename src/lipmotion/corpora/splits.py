@@ -6,7 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from lipmotion.corpora.base import Recordings
-from lipmotion.errors import CorpusError
+from lipmotion.errors import CorpusError, InputError
+from lipmotion.files import text_in
 
 SPLITS = ("train", "val", "test")
 LISTS = tuple(f"{split}.txt" for split in SPLITS)
@@ -40,15 +41,19 @@ def _read_lists(directory: Path) -> dict[str, str]:
     split_of: dict[str, str] = {}
     for split in SPLITS:
         path = directory / f"{split}.txt"
-        for name in _names(path) if path.is_file() else ():
+        for name in names_in(path) if path.is_file() else ():
             if split_of.setdefault(name, split) != split:
                 raise CorpusError(f"{name} is in {split_of[name]}.txt and in {split}.txt of {directory}; keep one")
     return split_of
 
 
-def _names(path: Path) -> list[str]:
+def names_in(path: Path) -> list[str]:
+    """Return the names of utterances that a text file lists, one a line.
+
+    Raises CorpusError: no such file, or not UTF-8 text.
+    """
     try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except UnicodeDecodeError as error:
-        raise CorpusError(f"{path}: is not UTF-8 text; required: one name a line") from error
+        lines = text_in(path, "list").splitlines()
+    except InputError as error:
+        raise CorpusError(f"{error}; required: one name a line") from error
     return [line.strip().replace("/", "-") for line in lines if line.strip()]

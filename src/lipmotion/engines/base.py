@@ -31,6 +31,11 @@ class Engine(ABC, Generic[ModelT]):
     name: ClassVar[str]
     config: Any
 
+    @property
+    def hears_f0(self) -> bool:
+        """Whether it wants ``Speech.log_f0``."""
+        return False
+
     @abstractmethod
     def fit(self, examples: Sequence[Example], monitor: Monitor, checkpoint: Checkpoint = NOTHING_KEPT) -> Fit[ModelT]:
         """Learn from speech with its motion.

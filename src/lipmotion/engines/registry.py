@@ -7,10 +7,12 @@ from typing import Any
 
 from lipmotion.engines.base import Engine
 from lipmotion.engines.trajectory.engine import TrajectoryConfig, TrajectoryEngine
+from lipmotion.engines.trajectory.joint.engine import JointEngine, JointEngineConfig
 from lipmotion.errors import InputError
 
 ENGINES: dict[str, Callable[..., Engine[Any]]] = {
     TrajectoryEngine.name: lambda **options: TrajectoryEngine(TrajectoryConfig(**options)),
+    JointEngine.name: lambda **options: JointEngine(JointEngineConfig(**options)),
 }
 
 

@@ -97,6 +97,20 @@ def closure_figures(
     )
 
 
+def found_closings(
+    generated: Sequence[Curve], original: Sequence[Curve], threshold: float
+) -> tuple[list[Curve], list[Curve]]:
+    """Return, clip by clip, how many original closings have a generated one near them, and how many there are.
+
+    generated, original : openings [each shape=(T, 1)]
+    Both as arrays [shape=(1,)]: the closure score is the sum of the first over that of the second, also of clips that
+    are drawn for an interval.
+    """
+    wanted = [closings(o[:, 0], threshold) for o in original]
+    hits = [near(o, closings(g[:, 0], threshold)) for g, o in zip(generated, wanted, strict=True)]
+    return [np.array([hit], float) for hit in hits], [np.array([len(o)], float) for o in wanted]
+
+
 def phone_closures(
     generated: Sequence[Curve],
     original: Sequence[Curve],

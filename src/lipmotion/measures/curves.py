@@ -50,10 +50,14 @@ def mean_distance(generated: Clips, original: Clips) -> float:
     return float(np.linalg.norm(np.concatenate(generated) - np.concatenate(original), axis=1).mean())
 
 
+def rmse(generated: Clips, original: Clips) -> Array:
+    """Return the root of the mean squared error over all frames, in each channel's unit [shape=(P,)]."""
+    return np.sqrt(np.square(np.concatenate(generated) - np.concatenate(original)).mean(axis=0))
+
+
 def normalised_rmse(generated: Clips, original: Clips) -> Array:
     """Return the RMSE of every channel in units of its standard deviation over all frames [shape=(P,)]."""
-    o = np.concatenate(original)
-    return np.sqrt(np.square(np.concatenate(generated) - o).mean(axis=0)) / o.std(axis=0)
+    return rmse(generated, original) / np.concatenate(original).std(axis=0)
 
 
 def global_variance_ratio(generated: Clips, original: Clips) -> Array:

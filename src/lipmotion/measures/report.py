@@ -19,9 +19,9 @@ def table(figures: Mapping[str, Any]) -> str:
         lines += ["", name, f"  {'channel':{size}}{'ACC':>7}{'per clip':>10}{'nRMSE':>7}{'variance':>10}{'jerk':>7}"]
         for channel, row in condition["channels"].items():
             lines.append(
-                f"  {channel:{size}}{_number(row['acc'], '7.3f')}{_number(row['acc_per_clip'], '10.3f')}"
-                f"{_number(row['nrmse'], '7.3f')}{_number(row['global_variance'], '10.2f')}"
-                f"{_number(row['jerk'], '7.2f')}"
+                f"  {channel:{size}}{number(row['acc'], '7.3f')}{number(row['acc_per_clip'], '10.3f')}"
+                f"{number(row['nrmse'], '7.3f')}{number(row['global_variance'], '10.2f')}"
+                f"{number(row['jerk'], '7.2f')}"
             )
         lines += _rest(condition)
     return "\n".join(lines)
@@ -39,14 +39,14 @@ def _rest(condition: Mapping[str, Any]) -> list[str]:
     quiet, original = condition["silence"]["generated"], condition["silence"]["original"]
     return [
         f"  opening ACC 95 % interval {low:.3f} to {high:.3f};{lines[0][1:]}",
-        f"  closures: score {_number(closures['score'], '.3f')} of {closures['original']}, precision "
-        f"{_number(closures['precision'], '.3f')} of {closures['generated']}, timing "
-        f"{_number(closures['timing_ms'], '+.0f')} ms",
-        f"  p b m: recall {_number(phones['recall'], '.3f')} of {phones['intervals']}, false closures "
-        f"{_number(phones['false_per_minute'], '.1f')} a minute (original "
-        f"{_number(phones['original_per_minute'], '.1f')})",
-        f"  silence: opening {_number(quiet['mean'], '.4f')} ± {_number(quiet['std'], '.4f')} "
-        f"(original {_number(original['mean'], '.4f')} ± {_number(original['std'], '.4f')}, {quiet['frames']} frames)",
+        f"  closures: score {number(closures['score'], '.3f')} of {closures['original']}, precision "
+        f"{number(closures['precision'], '.3f')} of {closures['generated']}, timing "
+        f"{number(closures['timing_ms'], '+.0f')} ms",
+        f"  p b m: recall {number(phones['recall'], '.3f')} of {phones['intervals']}, false closures "
+        f"{number(phones['false_per_minute'], '.1f')} a minute (original "
+        f"{number(phones['original_per_minute'], '.1f')})",
+        f"  silence: opening {number(quiet['mean'], '.4f')} ± {number(quiet['std'], '.4f')} "
+        f"(original {number(original['mean'], '.4f')} ± {number(original['std'], '.4f')}, {quiet['frames']} frames)",
     ]
 
 
@@ -59,7 +59,7 @@ def without_nan(figures: Any) -> Any:
     return None if isinstance(figures, float) and not np.isfinite(figures) else figures
 
 
-def _number(value: float | None, form: str) -> str:
+def number(value: float | None, form: str) -> str:
     """Return a figure as text, a dash in the same width where there is none."""
     width = form.partition(".")[0].strip("+")
     return f"{'–':>{width or 0}}" if value is None else format(value, form)

@@ -9,12 +9,13 @@ from pathlib import Path
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export.base import MOTION_SUFFIXES, write_motion
 from lipmotion.files import as_text, check_distinct, check_target
+from lipmotion.pipeline.hear import hear
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.transcribe import read_transcript, transcribe
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.read import read_audio
 from lipmotion.speech.recogniser import recogniser as cached_recogniser
-from lipmotion.types import Audio, Constraints, Generation, Speech, Timeline, Unit
+from lipmotion.types import Audio, Constraints, Generation, Timeline, Unit
 from lipmotion.units import Lexicon, words_of
 
 VIDEO_SUFFIX = ".mp4"
@@ -60,8 +61,9 @@ def animate(
         text = read_transcript(transcript) if isinstance(transcript, Path) else transcript
         words = words_of(text) if text is not None else None
         units = transcribe(phones, audio, features, words, lexicon or Lexicon())
+    heard = hear(chosen.engine, audio, features, units)
     del audio  # of a long recording it is much
-    return chosen.engine.generate(chosen.learned, Speech(features, units), constraints)
+    return chosen.engine.generate(chosen.learned, heard, constraints)
 
 
 def _check_units(units: Timeline[Unit], duration_s: float) -> None:

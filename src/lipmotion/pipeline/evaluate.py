@@ -2,33 +2,55 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.corpora.store import Corpus
+from lipmotion.engines import Engine
 from lipmotion.errors import AlignmentError, CorpusError
 from lipmotion.measures import curves
 from lipmotion.measures.bootstrap import interval
 from lipmotion.measures.closures import closed_threshold, closure_figures, phone_closures
 from lipmotion.measures.report import without_nan
+from lipmotion.pipeline.hear import hear
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.train import labels_of
 from lipmotion.pipeline.transcribe import report_guesses
 from lipmotion.speech.recogniser import Recogniser
 from lipmotion.speech.recogniser import recogniser as cached_recogniser
-from lipmotion.types import Monitor, Motion, Speech, Timeline, Unit, Utterance, counted, part_of, silent_monitor
+from lipmotion.types import Monitor, Motion, Timeline, Unit, Utterance, counted, part_of, silent_monitor
 from lipmotion.units import VISEMES, Lexicon, is_silent
 
+ModelT = TypeVar("ModelT")
 OPENING = "opening"
 DISTANCES = (OPENING, "width", "outer")
 """What is compared where faces were tracked; all other channels follow from points near these."""
 BILABIAL = VISEMES["bi"]
 SILENCE_MARGIN_S = 0.3
 """The mouth may still close, or already open, this close to speech."""
+
+
+@dataclass(frozen=True, eq=False)
+class Recorded:
+    """Recordings to compare with, and what is said in them.
+
+    channels   : names of those that are compared
+    still      : of those left out because they do not move
+    closed_under : the opening under which the mouth is closed; None where there is no opening
+    reference  : what is spoken, utterance by utterance
+    conditions : what an engine is told of that, by name: ``audio only``, ``with transcript``
+    """
+
+    utterances: Sequence[Utterance]
+    channels: tuple[str, ...]
+    still: tuple[str, ...]
+    closed_under: float | None
+    reference: Sequence[Timeline[Unit]]
+    conditions: Mapping[str, Sequence[Timeline[Unit]]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,11 +89,42 @@ def evaluate(
     Raises CorpusError: no utterances of this split, or a model without the channels compared.
     Raises AlignmentError: a transcript does not fit into its recording.
     """
-    lexicon = lexicon or Lexicon()
-    utterances = [corpus.utterance(name) for name in corpus.required(split, speakers)]
-    compared, still = _compared(utterances)
-    report_guesses([word for utterance in utterances for word in utterance.words or ()], lexicon)
     phones = cached_recogniser(model.phones, recogniser, model.adaptation)
+    found = recorded(corpus, phones, split=split, speakers=speakers, lexicon=lexicon, monitor=monitor)
+    figures = {
+        "split": split or "all",
+        "clips": len(found.utterances),
+        "closed_under": found.closed_under,
+        "still_channels": list(found.still),
+        "conditions": {
+            name: figures_of(clips(found, name, model.engine, model.learned), found, seed) for name in found.conditions
+        },
+    }
+    plain: dict[str, Any] = without_nan(figures)
+    return plain
+
+
+def recorded(
+    corpus: Corpus,
+    phones: Recogniser,
+    *,
+    split: str | None = "test",
+    speakers: Sequence[str] = (),
+    names: Sequence[str] | None = None,
+    channels: Sequence[str] | None = None,
+    lexicon: Lexicon | None = None,
+    monitor: Monitor = silent_monitor,
+) -> Recorded:
+    """Return the recordings of a split, and their phones as ``phones`` finds them. Raises as ``evaluate``.
+
+    names    : these utterances only, whatever their list
+    channels : compare these, whether they move or not
+    """
+    lexicon = lexicon or Lexicon()
+    chosen = names if names is not None else corpus.required(split, speakers)
+    utterances = [corpus.utterance(name) for name in chosen]
+    compared, still = (tuple(channels), ()) if channels is not None else compared_channels(utterances)
+    report_guesses([word for utterance in utterances for word in utterance.words or ()], lexicon)
     heard = counted(utterances, "finding the phones", part_of(monitor, 0, 0.4))
     reference = [_reference(utterance, phones, lexicon) for utterance in heard]
     threshold = None
@@ -81,26 +134,10 @@ def evaluate(
     conditions = {"audio only": [phones.recognise(u.audio, u.features) for u in heard]}
     if all(utterance.words or utterance.phones for utterance in utterances):
         conditions["with transcript"] = reference
-    figures = {
-        "split": split or "all",
-        "clips": len(utterances),
-        "closed_under": threshold,
-        "still_channels": list(still),
-        "conditions": {
-            name: _figures(
-                [_clip(model, compared, *row) for row in zip(utterances, units, reference, strict=True)],
-                compared,
-                threshold,
-                seed,
-            )
-            for name, units in conditions.items()
-        },
-    }
-    plain: dict[str, Any] = without_nan(figures)
-    return plain
+    return Recorded(utterances, compared, still, threshold, reference, conditions)
 
 
-def _compared(utterances: Sequence[Utterance]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def compared_channels(utterances: Sequence[Utterance]) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return the channels to compare, and those left out because they are still.
 
     Raises CorpusError: the utterances have different channels, or nothing moves.
@@ -142,13 +179,26 @@ def _reference(utterance: Utterance, phones: Recogniser, lexicon: Lexicon) -> Ti
         raise AlignmentError(f"{utterance.name}: {error}; correct its transcript, or leave it out") from error
 
 
+def clips(found: Recorded, condition: str, engine: Engine[ModelT], learned: ModelT) -> list[Clip]:
+    """Return what an engine makes of recordings, beside the originals. Raises CorpusError: it has other channels."""
+    return [
+        _clip(engine, learned, found.channels, *row)
+        for row in zip(found.utterances, found.conditions[condition], found.reference, strict=True)
+    ]
+
+
 def _clip(
-    model: Model, compared: Sequence[str], utterance: Utterance, units: Timeline[Unit], reference: Timeline[Unit]
+    engine: Engine[ModelT],
+    learned: ModelT,
+    compared: Sequence[str],
+    utterance: Utterance,
+    units: Timeline[Unit],
+    reference: Timeline[Unit],
 ) -> Clip:
     motion = utterance.track.motion
     seen = np.asarray(utterance.track.seen)
     time_s = (np.arange(len(motion.values)) / motion.rate_hz)[seen]
-    generated = model.engine.generate(model.learned, Speech(utterance.features, units)).motion
+    generated = engine.generate(learned, hear(engine, utterance.audio, utterance.features, units)).motion
     _check_channels(generated, compared)
     spoken = tuple((s.start_s, s.end_s, s.label.phone) for s in reference if not is_silent(s.label.phone))
     return Clip(
@@ -159,7 +209,9 @@ def _clip(
     )
 
 
-def _figures(clips: Sequence[Clip], compared: Sequence[str], threshold: float | None, seed: int) -> dict[str, Any]:
+def figures_of(clips: Sequence[Clip], found: Recorded, seed: int) -> dict[str, Any]:
+    """Return the figures of one condition; NaN where there is none."""
+    compared, threshold = found.channels, found.closed_under
     generated, original = [clip.generated for clip in clips], [clip.original for clip in clips]
     rate_hz = float(1 / np.median(np.diff(clips[0].time_s)))
     acc, clip_acc = curves.pooled_correlation(generated, original), curves.per_clip_correlation(generated, original)

@@ -21,6 +21,7 @@ from lipmotion.pipeline.labels import labelled
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.transcribe import phones_in_time, report_guesses
 from lipmotion.pipeline.workers import working
+from lipmotion.speech.f0 import log_f0
 from lipmotion.speech.phones import train_phones
 from lipmotion.speech.recogniser import Recogniser
 from lipmotion.stats.checkpoint import NOTHING_KEPT, Checkpoint
@@ -102,15 +103,35 @@ def train(
     utterances = [corpus.utterance(name) for name in chosen]
     checkpoint = Checkpoint(work, fingerprint(corpus, chosen, engine, recogniser, lexicon)) if work else NOTHING_KEPT
     with working(min(workers, len(chosen) // FEWEST)) as team:
-        monitors = part_of(monitor, 0, 0.7, "learning phones: "), part_of(monitor, 0.7, 0.9)
-        phones = _phones(utterances, lexicon, recogniser, monitors[0], checkpoint, team.each)
-        examples, skipped = _examples(utterances, Recogniser(phones), lexicon, monitors[1], checkpoint, team.each)
+        listening = part_of(monitor, 0, 0.9)
+        phones, examples, skipped = phones_and_examples(
+            utterances, recogniser, lexicon, listening, checkpoint, team.each
+        )
     fit = engine.fit(examples, part_of(monitor, 0.9, 1, "learning motion: "), checkpoint)
     used = tuple(example.name for example in examples)
     about = _about(corpus, utterances, "given names" if names is not None else split or "all", len(used))
     if speakers:
         about["speakers"] = sorted(set(speakers))
     return Model(phones, engine, fit.model, about), TrainReport(used, skipped, fit.figures)
+
+
+def phones_and_examples(
+    utterances: Sequence[Utterance],
+    recogniser: HmmConfig,
+    lexicon: Lexicon,
+    monitor: Monitor,
+    checkpoint: Checkpoint,
+    each: Each,
+) -> tuple[UnitHmm, list[Example], dict[str, str]]:
+    """Return phone models of what is transcribed, every utterance ready for an engine, and why others are left out.
+
+    each : shares the work
+    Raises CorpusError: no utterance can be used.
+    """
+    learning, finding = part_of(monitor, 0, 0.78, "learning phones: "), part_of(monitor, 0.78, 1)
+    phones = _phones(utterances, lexicon, recogniser, learning, checkpoint, each)
+    examples, skipped = _examples(utterances, Recogniser(phones), lexicon, finding, checkpoint, each)
+    return phones, examples, skipped
 
 
 def labels_of(utterance: Utterance, phones: Recogniser, lexicon: Lexicon) -> Timeline[Unit]:
@@ -180,7 +201,8 @@ def _examples(
             skipped[utterance.name] = units
             continue
         motion, valid = model_motion(utterance.track, len(utterance.features.values))
-        examples.append(Example(utterance.name, Speech(utterance.features, units), motion, valid))
+        heard = Speech(utterance.features, units, log_f0(utterance.audio))
+        examples.append(Example(utterance.name, heard, motion, valid))
     if not examples:
         name, reason = next(iter(skipped.items()))
         raise CorpusError(f"none of {len(skipped)} utterances could be used; the first, {name}: {reason}")

@@ -99,7 +99,7 @@ class Mixtures:
         floor : [shape=(D,)], least variance
         A component with less than two frames' worth of data is switched off.
         """
-        posterior = self._responsibilities(density, x, share)
+        posterior = self.responsibilities(density, x, share)
         count, first, second = posterior.sum(axis=0), posterior.T @ x, posterior.T @ (x * x)
         self.estimate(np.array([density]), count[None], first[None], second[None], floor)
 
@@ -138,7 +138,7 @@ class Mixtures:
         prior     : the density that counts as much as ``relevance`` frames a component
         Source: Gauvain & Lee 1994, with the prior's own shape as its certainty.
         """
-        posterior = self._responsibilities(density, x, share)
+        posterior = self.responsibilities(density, x, share)
         count = posterior.sum(axis=0)[:, None]
         weight, mean, variance = np.exp(self.log_weights[prior]), self.means[prior], self.variances[prior]
         new_mean = (relevance * mean + posterior.T @ x) / (relevance + count)
@@ -149,9 +149,11 @@ class Mixtures:
         self.means[density] = new_mean
         self.variances[density] = np.maximum(second - new_mean * new_mean, variance / 4)
 
-    def _responsibilities(
-        self, density: int, x: NDArray[np.float32], share: NDArray[np.float32]
-    ) -> NDArray[np.float32]:
+    def responsibilities(self, density: int, x: NDArray[np.float32], share: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return each frame's share divided between the components of one density [shape=(N, M)].
+
+        x, share : as in ``improve``
+        """
         components = self.log_components(x, np.array([density]))[:, 0]
         components -= components.max(axis=1, keepdims=True)
         posterior = np.exp(components)

@@ -98,16 +98,37 @@ class Tree:
 PLACES = ("left", "unit", "right")
 
 
-def gaussian_likelihood(statistics: Array) -> Array:
+def gaussian_likelihood(statistics: Array, least_variance: float = LEAST_VARIANCE) -> Array:
     """Return the log likelihood of frames under the diagonal Gaussian that fits them best [shape=(N,)].
 
-    statistics : [shape=(N, 1 + 2·D)]: count, sums, sums of squares
+    statistics     : [shape=(N, 1 + 2·D)]: count, sums, sums of squares
+    least_variance : that the Gaussian may have: else a few frames that are alike gain without limit
     """
     count = np.maximum(statistics[:, :1], 1e-12)
     sums, squares = np.split(statistics[:, 1:] / count, 2, axis=1)
-    variance = np.maximum(squares - sums * sums, LEAST_VARIANCE)
-    likelihood: Array = -0.5 * count[:, 0] * (np.log(2 * np.pi * variance) + 1).sum(axis=1)
+    spread = np.maximum(squares - sums * sums, 0.0)
+    variance = np.maximum(spread, least_variance)
+    likelihood: Array = -0.5 * count[:, 0] * (np.log(2 * np.pi * variance) + spread / variance).sum(axis=1)
     return likelihood
+
+
+def multispace_likelihood(statistics: Array, least_variance: float = LEAST_VARIANCE) -> Array:
+    """Return the log likelihood of frames, some without a value, under the density that fits them best [shape=(N,)].
+
+    statistics : [shape=(N, 2 + 2·D)]: count, count of frames with a value, their sums, sums of squares
+    least_variance : as in ``gaussian_likelihood``
+    The density is a Gaussian for frames with a value and a point mass for those without one.
+    """
+    count, voiced = statistics[:, 0], statistics[:, 1]
+    whole = np.maximum(count, 1e-12)
+    likelihood: Array = _share_likelihood(voiced, whole) + _share_likelihood(count - voiced, whole)
+    return likelihood + np.where(voiced > 0, gaussian_likelihood(statistics[:, 1:], least_variance), 0.0)
+
+
+def _share_likelihood(part: Array, whole: Array) -> Array:
+    """Return part · log(part / whole), 0 where there is no part."""
+    part = np.maximum(part, 0.0)
+    return part * np.log(np.where(part > 0, part, whole) / whole)
 
 
 def grow(

@@ -16,10 +16,15 @@ from lipmotion.types.timeline import Timeline, Unit
 
 @dataclass(frozen=True, eq=False)
 class Speech:
-    """One recording as an engine sees it: features, and the phones in time."""
+    """One recording as an engine sees it.
+
+    units  : the phones in time
+    log_f0 : natural logarithm of F0 in Hz, NaN where there is no voice [shape=(T,)], for engines that hear it
+    """
 
     features: Features
     units: Timeline[Unit]
+    log_f0: NDArray[np.float32] | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,6 +4,8 @@ from lipmotion.units.classes import phone_classes
 from lipmotion.units.lexicon import Lexicon, Pronunciation, phone_named, with_reduced_vowels
 from lipmotion.units.phones import LIP_CLOSING, PAUSE, PHONES, RELATIVES, SILENCE, is_silent, stand_in
 from lipmotion.units.transcript import words_of
+from lipmotion.units.unit_set import UnitSet
+from lipmotion.units.unit_sets import UNIT_SETS, unit_set
 from lipmotion.units.visemes import VISEME_OF, VISEMES
 
 __all__ = [
@@ -12,14 +14,17 @@ __all__ = [
     "PHONES",
     "RELATIVES",
     "SILENCE",
+    "UNIT_SETS",
     "VISEMES",
     "VISEME_OF",
     "Lexicon",
     "Pronunciation",
+    "UnitSet",
     "is_silent",
     "phone_classes",
     "phone_named",
     "stand_in",
+    "unit_set",
     "with_reduced_vowels",
     "words_of",
 ]

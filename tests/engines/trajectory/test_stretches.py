@@ -5,7 +5,7 @@ import pytest
 
 from engines.synthetic import PHONES, examples, speech, timeline
 from lipmotion.engines import engine_named
-from lipmotion.engines.trajectory import engine as module
+from lipmotion.engines.trajectory import generation as module
 from lipmotion.types import Constraints, Pin
 from lipmotion.types.progress import silent_monitor
 

@@ -100,7 +100,7 @@ def test_long_utterances_do_not_fill_the_memory(sizes):
     frames, states = zip(*sizes, strict=True)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "CELLS", 20_000)
-        batches = list(module._batches(frames, states))
+        batches = list(module.batches(frames, states))
     assert sorted(i for batch in batches for i in batch) == list(range(len(sizes)))
     for batch in batches:
         padded = len(batch) * max(frames[i] for i in batch) * max(states[i] for i in batch)

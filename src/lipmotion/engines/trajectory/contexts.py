@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -11,43 +11,48 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.types import FRAME_RATE_HZ, Span, Timeline, Unit
-from lipmotion.units import PHONES, SILENCE, VISEME_OF, is_silent
+from lipmotion.units import PHONES, SILENCE, UNIT_SETS, UnitSet, is_silent
+
+RESTING = -1
+"""The part of silence that is no part of it."""
 
 
 class Place(NamedTuple):
-    """A part of a phone between its neighbours."""
+    """A part of a unit between its neighbours."""
 
     left: str
-    phone: str
+    unit: str
     right: str
     part: int
 
     @property
     def context(self) -> tuple[str, str, str]:
-        """The phone between its neighbours, what decision trees ask about."""
-        return self.left, self.phone, self.right
+        """The unit between its neighbours, what decision trees ask about."""
+        return self.left, self.unit, self.right
 
 
 @dataclass(frozen=True)
 class Cut:
-    """How phones are cut into parts.
+    """How units are cut into parts.
 
-    speech, silence : parts of a phone, and of a silence; odd numbers
+    speech, silence : parts of a unit, and of one that is silence only; odd numbers
     edge_s : the parts before and after the middle one last an equal share, but no longer than this: it is the middle of
              a long sound that gets longer
+    units  : the unit of every phone
     """
 
     speech: int
     silence: int
     edge_s: float
+    units: UnitSet = UNIT_SETS["phone"]
 
-    def parts(self, phone: str) -> int:
-        """Return how many parts a phone has."""
-        return self.silence if is_silent(phone) else self.speech
+    def parts(self, unit: str) -> int:
+        """Return how many parts a unit has."""
+        return self.silence if self.units.silent(unit) else self.speech
 
     def name(self, place: Place) -> str:
         """Return the part alone, as ``speech.2`` or ``silence.6``."""
-        return f"{'silence' if is_silent(place.phone) else 'speech'}.{place.part}"
+        return f"{'silence' if self.units.silent(place.unit) else 'speech'}.{place.part}"
 
     @property
     def names(self) -> list[str]:
@@ -58,7 +63,8 @@ class Cut:
     @property
     def rest(self) -> Place:
         """The place of frames in silence away from speech."""
-        return Place(SILENCE, SILENCE, SILENCE, self.silence // 2)
+        quiet = self.units.unit(SILENCE)
+        return Place(quiet, quiet, quiet, RESTING)
 
     @property
     def rest_s(self) -> float:
@@ -72,24 +78,35 @@ def with_neighbours(units: Timeline[Unit]) -> Iterator[tuple[str, Span[Unit], st
     return zip(phones, units, phones[2:], strict=False)
 
 
+def named(spans: Timeline[Unit], units: UnitSet) -> Timeline[Unit]:
+    """Return the timeline with the unit of each phone named, between its neighbours."""
+    found = []
+    for left, span, right in with_neighbours(spans):
+        before, unit, after = map(units.unit, (left, span.label.phone, right))
+        found.append(replace(span, label=replace(span.label, unit=f"{before}-{unit}+{after}")))
+    return Timeline(tuple(found))
+
+
 def places(units: Timeline[Unit], frames: int, cut: Cut) -> list[Place]:
     """Return the place of every frame [length ``frames``].
 
-    Silence further than ``cut.rest_s`` from speech, and frames outside all units, are ``cut.rest``.
+    Silence (the phone, whatever its unit) further than ``cut.rest_s`` from speech, and frames outside all units, are
+    ``cut.rest``.
     Raises InputError: a phone outside the inventory.
     """
+    for span in units:
+        if span.label.phone not in PHONES:
+            raise InputError(f"unknown phone {span.label.phone!r} at {span.start_s} s; the phones: {' '.join(PHONES)}")
     result = [cut.rest] * frames
     for left, span, right in with_neighbours(units):
-        phone = span.label.phone
-        if phone not in VISEME_OF:
-            raise InputError(f"unknown phone {phone!r} at {span.start_s} s; the phones: {' '.join(PHONES)}")
         edges = np.ceil(np.array([span.start_s, span.end_s]) * FRAME_RATE_HZ - 1e-6)
         first, stop = np.clip(edges, 0, frames).astype(int).tolist()
         time_s = np.arange(first, stop) / FRAME_RATE_HZ
+        before, unit, after = map(cut.units.unit, (left, span.label.phone, right))
         rests = _rests(time_s, left, span, right, cut.rest_s)
-        part = _parts(time_s, span.start_s, span.end_s, cut.parts(phone), cut.edge_s)
+        part = _parts(time_s, span.start_s, span.end_s, cut.parts(unit), cut.edge_s)
         for i in np.nonzero(~rests)[0]:
-            result[first + i] = Place(left, phone, right, int(part[i]))
+            result[first + i] = Place(before, unit, after, int(part[i]))
     return result
 
 

@@ -13,32 +13,29 @@ from lipmotion.stats.trees import Tree
 Array = NDArray[np.float64]
 
 
-@dataclass(eq=False)
+@dataclass(frozen=True, eq=False)
 class Moments:
-    """Sums over frames of inputs z [shape=(F,)] and what they should explain, r [shape=(P,)].
+    """Sums over frames of inputs z [shape=(F,)] and what they should explain, r [shape=(P,)]; they grow in place.
 
-    frames   : N
     products : Σ z zᵀ [shape=(F, F)]
     targets  : Σ z rᵀ [shape=(F, P)]
     """
 
-    frames: float
     products: Array
     targets: Array
 
     def add(self, z: NDArray[np.float32], r: NDArray[np.float32]) -> None:
         """Take in frames [shapes=(N, F), (N, P)]."""
-        self.frames += len(z)
-        self.products += z.T @ z
-        self.targets += z.T @ r
+        np.add(self.products, z.T @ z, out=self.products)
+        np.add(self.targets, z.T @ r, out=self.targets)
 
     def __add__(self, other: Moments) -> Moments:
-        return Moments(self.frames + other.frames, self.products + other.products, self.targets + other.targets)
+        return Moments(self.products + other.products, self.targets + other.targets)
 
 
 def no_moments(inputs: int, outputs: int) -> Moments:
     """Return the sums over no frames."""
-    return Moments(0.0, np.zeros((inputs, inputs)), np.zeros((inputs, outputs)))
+    return Moments(np.zeros((inputs, inputs)), np.zeros((inputs, outputs)))
 
 
 def ridge(moments: Moments, prior: Array, strength: float) -> Array:

@@ -20,7 +20,6 @@ from lipmotion.errors import CorpusError
 from lipmotion.stats.trees import Question, Tree, gaussian_likelihood, grow
 from lipmotion.stats.windows import with_dynamics
 from lipmotion.types import Channel, Example, Monitor, Progress
-from lipmotion.units import phone_classes
 
 Array = NDArray[np.float64]
 LEAST_VARIANCE_SHARE, LEAST_VARIANCE = 1e-3, 1e-12
@@ -37,7 +36,8 @@ def fit_trajectory(examples: Sequence[Example], how: Learning, monitor: Monitor)
     space = fit_space(channels, seen, how.components)
     values = [space.reduce(example.motion.values.astype(float)) for example in examples]
     observed = [observed_of(example, x, how.cut) for example, x in zip(examples, values, strict=True)]
-    covered = {how.cut.name(place) for one in observed for place in one.seen_places if not _silent(how.cut, place)}
+    quiet = how.cut.units.silence
+    covered = {how.cut.name(place) for one in observed for place in one.seen_places if place.unit not in quiet}
     if len(covered) < how.cut.speech:
         raise CorpusError(
             f"motion was seen in {len(covered)} of {how.cut.speech} parts of a phone; learn from more speech"
@@ -55,14 +55,10 @@ def fit_trajectory(examples: Sequence[Example], how: Learning, monitor: Monitor)
     if OPENING in space.direct_names:
         masks, timelines = [e.valid for e in examples], [e.speech.units for e in examples]
         closure = fit_closure(values, masks, timelines, space.direct_names.index(OPENING))
-    return TrajectoryModel(space, emission, gain, closure)
+    return TrajectoryModel(how.cut.units, space, emission, gain, closure)
 
 
 _STAGE = "trees"
-
-
-def _silent(cut: Cut, place: Place) -> bool:
-    return cut.name(place).startswith("silence")
 
 
 def _common_channels(examples: Sequence[Example]) -> tuple[Channel, ...]:
@@ -118,7 +114,7 @@ def _grown(contexts: _Contexts, parameters: int, how: Learning) -> Tree:
     return grow(
         list(contexts or unseen),
         np.array(list((contexts or unseen).values())),
-        [Question(place, *named) for place in range(3) for named in phone_classes().items()],
+        [Question(place, *named) for place in range(3) for named in how.cut.units.classes().items()],
         gaussian_likelihood,
         parameters=parameters,
         factor=how.tree_factor,

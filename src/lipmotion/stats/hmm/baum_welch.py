@@ -74,9 +74,9 @@ def expect(
     """Return what the utterances say about every state (the E-step)."""
     statistics = Statistics(hmm)
     states = [sum(hmm.table.count(unit) for unit in sequence) for sequence in sequences]
-    batches = list(_batches([len(x) for x in data], states))
-    jobs = (_Batch(hmm, [data[i] for i in batch], [sequences[i] for i in batch]) for batch in batches)
-    for batch, (found, log_likelihood, frames) in zip(batches, each(_heard, jobs), strict=True):
+    groups = list(batches([len(x) for x in data], states))
+    jobs = (_Batch(hmm, [data[i] for i in batch], [sequences[i] for i in batch]) for batch in groups)
+    for batch, (found, log_likelihood, frames) in zip(groups, each(_heard, jobs), strict=True):
         for i, heard in zip(batch, found, strict=True):
             statistics.add(data[i], heard)
         statistics.count(log_likelihood, frames)
@@ -136,7 +136,7 @@ def _heard(batch: _Batch) -> tuple[list[Heard], float, int]:
     return found, float(log_likelihood[possible].sum()), int(frames[possible].sum())
 
 
-def _batches(frames: Sequence[int], states: Sequence[int]) -> Iterator[list[int]]:
+def batches(frames: Sequence[int], states: Sequence[int]) -> Iterator[list[int]]:
     """Give utterances in groups of like length, padded to no more than ``CELLS`` unless one alone is larger."""
     batch: list[int] = []
     most = 0

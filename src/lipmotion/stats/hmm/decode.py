@@ -51,12 +51,15 @@ def unit_loop(hmm: UnitHmm, inventory: Sequence[str]) -> UnitLoop:
     return UnitLoop(builder.build(), tuple(owners), entries)
 
 
-def decode_units(loop: UnitLoop, evidence: Evidence) -> tuple[tuple[str, ...], NDArray[np.intp]]:
+def decode_units(
+    loop: UnitLoop, evidence: Evidence, beam: float | None = None
+) -> tuple[tuple[str, ...], NDArray[np.intp]]:
     """Return the units said, and the first frame of each with the frame count at the end.
 
+    beam : as in ``Network.best_path``; None: exact
     Viterbi over context-dependent states with the bigram (Hofer 2008, Eq. 5).
     """
-    path = loop.network.best_path(evidence)
+    path = loop.network.best_path(evidence, beam=beam)
     starts = [t for t in range(len(path)) if t == 0 or (path[t] != path[t - 1] and path[t] in loop.entries)]
     return tuple(loop.owners[path[t]] for t in starts), np.array([*starts, len(path)], np.intp)
 

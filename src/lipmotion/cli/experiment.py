@@ -1,0 +1,15 @@
+"""``lipmotion experiment unit-sets|learning-curve|folds``: systems trained and compared on a corpus."""
+
+from __future__ import annotations
+
+import argparse
+
+from lipmotion.cli import folds, learning_curve, unit_sets
+
+
+def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the verb."""
+    parser = verbs.add_parser("experiment", help="train and compare systems on a corpus, as the papers did")
+    actions = parser.add_subparsers(title="experiments", required=True, metavar="EXPERIMENT")
+    for experiment in (unit_sets, learning_curve, folds):
+        experiment.add(actions)

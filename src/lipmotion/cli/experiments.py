@@ -1,0 +1,37 @@
+"""What the experiments of ``lipmotion experiment`` have in common."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from lipmotion.cli.figures import add_figures_arguments, report_figures
+
+
+def add_experiment_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the corpus, the processes, and where the figures go."""
+    parser.add_argument("corpus", type=Path)
+    parser.add_argument("--workers", type=int, help="processes (default: one a core)")
+    add_figures_arguments(parser)
+
+
+def run_experiment(
+    options: argparse.Namespace,
+    experiment: Callable[..., dict[str, Any]],
+    table: Callable[[dict[str, Any]], str],
+) -> None:
+    """Call ``experiment(corpus, lexicon=..., workers=..., monitor=...)`` and print its table."""
+    from lipmotion.corpora.store import Corpus
+
+    def compute(**given: Any) -> dict[str, Any]:
+        return experiment(Corpus.open(options.corpus), workers=options.workers or os.cpu_count() or 1, **given)
+
+    report_figures(options, compute, table)
+
+
+def one_thread_each() -> None:
+    """Keep matrix products to one thread: the processes share the cores. Call it before NumPy is imported."""
+    os.environ.setdefault("OMP_NUM_THREADS", "1")

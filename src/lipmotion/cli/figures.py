@@ -1,0 +1,42 @@
+"""Figures that a verb prints, and writes where it is told to."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from lipmotion.cli.options import add_machine_readable
+
+Figures = dict[str, Any]
+
+
+def add_figures_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the lexicon, where figures go, and ``--machine-readable``."""
+    parser.add_argument("--lexicon", type=Path, metavar="FILE", help="pronunciations: WORD PHONE PHONE ... a line")
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE.json", help="write all figures here as well")
+    add_machine_readable(parser)
+
+
+def report_figures(
+    options: argparse.Namespace,
+    compute: Callable[..., Figures],
+    table: Callable[[Figures], str],
+) -> None:
+    """Call ``compute(lexicon=..., monitor=...)``, write its figures, and print their table."""
+    import json
+
+    from lipmotion.cli.progress import reporting
+    from lipmotion.files import check_target, whole_file
+    from lipmotion.units import Lexicon
+
+    with reporting(options) as report:
+        if options.output:
+            check_target(options.output)
+        lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
+        figures = compute(lexicon=lexicon, monitor=report.hear)
+        if options.output:
+            with whole_file(options.output) as unfinished:
+                unfinished.write_text(json.dumps(figures, indent=1, allow_nan=False) + "\n")
+        report.finish(table(figures), figures=figures)

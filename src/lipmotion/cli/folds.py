@@ -1,0 +1,25 @@
+"""``lipmotion experiment folds``: the whole training list, held out part by part."""
+
+from __future__ import annotations
+
+import argparse
+from functools import partial
+
+from lipmotion.cli.experiments import add_experiment_arguments, one_thread_each, run_experiment
+
+
+def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the experiment to ``lipmotion experiment``."""
+    parser = actions.add_parser("folds", help="each part of the training list by a model of the others")
+    parser.add_argument("--folds", type=int, default=5, metavar="K", help="so many parts (default: 5)")
+    add_experiment_arguments(parser)
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Call ``experiment.folds`` and print its table."""
+    one_thread_each()
+
+    from lipmotion.experiment.folds import folds, table
+
+    run_experiment(options, partial(folds, count=options.folds), table)

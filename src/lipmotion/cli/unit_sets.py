@@ -1,0 +1,28 @@
+"""``lipmotion experiment unit-sets``: Table 1 of Hofer 2008, on a corpus."""
+
+from __future__ import annotations
+
+import argparse
+from functools import partial
+
+from lipmotion.cli.experiments import add_experiment_arguments, one_thread_each, run_experiment
+from lipmotion.cli.options import list_or_all
+
+
+def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the experiment to ``lipmotion experiment``."""
+    parser = actions.add_parser("unit-sets", help="which units find the closings of the mouth (Hofer 2008, Table 1)")
+    parser.add_argument("--split", default="test", help="compare on train, val, test or all (default: test)")
+    parser.add_argument("--closures", action="store_true", help="make the lips meet in every p, b and m")
+    add_experiment_arguments(parser)
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Call ``experiment.unit_sets`` and print its table."""
+    one_thread_each()
+
+    from lipmotion.experiment.unit_sets import table, unit_sets
+
+    chosen = {"split": list_or_all(options.split), "closures": options.closures}
+    run_experiment(options, partial(unit_sets, **chosen), table)

@@ -1,0 +1,1 @@
+"""A corpus and engines to the tables of the papers."""

@@ -1,0 +1,140 @@
+"""Which unit models a phone: a mapping of the whole inventory, and tables of it that people write."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from lipmotion.errors import InputError
+from lipmotion.files import text_in
+from lipmotion.units.classes import phone_classes
+from lipmotion.units.phones import PHONES, is_silent
+
+CLOSED = "closed"
+"""The only unit that silence may share with speech."""
+
+
+@dataclass(frozen=True)
+class UnitSet:
+    """The unit of every phone.
+
+    name      : as the user calls it
+    of        : phone to unit, all phones of the inventory
+    uncounted : units that a printed count leaves out (``count``)
+
+    Raises InputError: a phone is missing or unknown, a unit has no name or one with a blank in it, or silence shares a
+    unit other than ``closed`` with speech.
+    """
+
+    name: str
+    of: Mapping[str, str]
+    uncounted: frozenset[str] = frozenset()
+
+    def __post_init__(self) -> None:
+        unknown, missing = sorted(set(self.of) - set(PHONES)), [phone for phone in PHONES if phone not in self.of]
+        if unknown or missing:
+            wrong = [f"unknown {' '.join(unknown)}"] * bool(unknown) + [f"missing {' '.join(missing)}"] * bool(missing)
+            raise InputError(f"unit set {self.name}: phones {'; '.join(wrong)}; required: {' '.join(PHONES)}")
+        nameless = [phone for phone, unit in self.of.items() if len(unit.split()) != 1 or unit != unit.strip()]
+        if nameless:
+            raise InputError(f"unit set {self.name}: the unit of {nameless[0]} is {self.of[nameless[0]]!r}, not a word")
+        for unit in _mixed(self.of):
+            raise InputError(f"unit set {self.name}: {_ADVICE.format(unit)}")
+
+    @cached_property
+    def units(self) -> tuple[str, ...]:
+        """All units, in the order of the table."""
+        return tuple(dict.fromkeys(self.of.values()))
+
+    @property
+    def count(self) -> int:
+        """How many units a printed table counts."""
+        return len(self.units) - len(self.uncounted)
+
+    @cached_property
+    def silence(self) -> tuple[str, ...]:
+        """The units that silence (sil, sp) has, alone or shared with closed lips."""
+        return tuple(dict.fromkeys(unit for phone, unit in self.of.items() if is_silent(phone)))
+
+    @cached_property
+    def _silent(self) -> frozenset[str]:
+        return frozenset(unit for unit in self.silence if all(map(is_silent, self.phones(unit))))
+
+    def silent(self, unit: str) -> bool:
+        """Whether a unit is silence and nothing else."""
+        return unit in self._silent
+
+    def unit(self, phone: str) -> str:
+        """Return the unit of a phone. Raises InputError: it is not in the inventory."""
+        if phone not in self.of:
+            raise InputError(f"unknown phone {phone!r}; the phones: {' '.join(PHONES)}")
+        return self.of[phone]
+
+    def phones(self, unit: str) -> tuple[str, ...]:
+        """Return the phones of a unit."""
+        return tuple(phone for phone, other in self.of.items() if other == unit)
+
+    def classes(self) -> dict[str, frozenset[str]]:
+        """Return the sets of units that decision trees may ask about, by name, each once.
+
+        A class of phones becomes the units all of whose phones lie in it; every unit alone is one, too. What would hold
+        no unit, or all, is left out. Of single phones these are ``phone_classes`` themselves.
+        """
+        members = {unit: frozenset(self.phones(unit)) for unit in self.units}
+        found: dict[frozenset[str], str] = {}
+        for name, phones in phone_classes().items():
+            inside = frozenset(unit for unit in self.units if members[unit] <= phones)
+            if 1 < len(inside) < len(self.units):
+                found.setdefault(inside, f"class {name}" if name in self.units else name)
+            elif len(inside) == 1:
+                found.setdefault(inside, *inside)
+        for unit in self.units:
+            found.setdefault(frozenset([unit]), unit)
+        return {name: units for units, name in found.items() if len(units) < len(self.units)}
+
+
+def read_unit_table(path: Path) -> UnitSet:
+    """Read ``UNIT phone phone ...`` lines; ``#`` starts a comment.
+
+    Raises InputError, with the line: no such file, not UTF-8, a unit twice or without phones, a phone that is unknown,
+    twice or missing, or silence in one unit with speech that is not called ``closed``.
+    """
+    unit_line: dict[str, int] = {}
+    phone_line: dict[str, int] = {}
+    of: dict[str, str] = {}
+    for number, line in enumerate(text_in(path, "unit table").splitlines(), start=1):
+        unit, *phones = line.split("#")[0].split() or [""]
+        if not unit:
+            continue
+        where = f"{path}, line {number}"
+        if not phones:
+            raise InputError(f"{where}: unit {unit!r} without phones; write the unit, then its phones")
+        if unit in unit_line:
+            raise InputError(f"{where}: unit {unit!r} stands in line {unit_line[unit]} already; write it in one line")
+        unit_line[unit] = number
+        for phone in phones:
+            if phone not in PHONES:
+                raise InputError(f"{where}: unknown phone {phone!r}; the phones are: {' '.join(PHONES)}")
+            if phone in phone_line:
+                raise InputError(f"{where}: phone {phone!r} has a unit in line {phone_line[phone]} already; keep one")
+            phone_line[phone], of[phone] = number, unit
+    for unit in _mixed(of):
+        raise InputError(f"{path}, line {unit_line[unit]}: {_ADVICE.format(unit)}")
+    try:
+        return UnitSet(path.stem, of)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+
+
+def _mixed(of: Mapping[str, str]) -> list[str]:
+    """Return the units, other than ``closed``, in which silence stands beside speech."""
+    silent, spoken = ({unit for phone, unit in of.items() if is_silent(phone) is wanted} for wanted in (True, False))
+    return sorted((silent & spoken) - {CLOSED})
+
+
+_ADVICE = (
+    "unit {!r} holds silence and speech; give sil and sp a unit without other phones, or call this one "
+    f"{CLOSED!r}: silence is then a closed mouth"
+)

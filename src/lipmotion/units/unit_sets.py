@@ -1,0 +1,125 @@
+"""The five unit sets of Hofer 2008 (§6, Table 1), each group with its reason.
+
+The paper prints how many units a set has and what they are in a line of text; the groups are ours. How silence counts:
+
+- ``2vis``: 2; the closed mouth is silence's, too;
+- ``sVis``: 6 groups of speech as printed, and silence is a unit beside them;
+- ``pbVis``: 9 drawings of a speaking mouth, and Preston Blair's mouth at rest is a unit beside them;
+- ``eVis``: 19; silence is one of the 10 that are not vowels;
+- ``phone``: 46, silence among them; ``sp``, a pause between words, is the 47th phone of our inventory.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import NamedTuple
+
+from lipmotion.errors import InputError
+from lipmotion.units.phones import PAUSE, PHONES
+from lipmotion.units.unit_set import CLOSED, UnitSet, read_unit_table
+
+
+class Group(NamedTuple):
+    """The phones of one unit, and why they are together."""
+
+    unit: str
+    phones: str
+    reason: str
+
+
+_OPEN_PHONES = (
+    "aa ae ah ao aw ax axr ay ch d dh eh el en er ey f g hh ih ix iy jh k l n ng ow oy r s sh t th uh uw v w y z zh"
+)
+_BILABIAL = Group("bilabial", "p b m em", "the lips meet")
+_LABIODENTAL = Group("labiodental", "f v", "the lower lip is at the upper teeth")
+_SILENCE = Group("silence", "sil sp", "nothing is said; the mouth rests or gets ready")
+
+GROUPS: dict[str, tuple[Group, ...]] = {
+    "2vis": (
+        Group("open", _OPEN_PHONES, "the lips are apart; of f v, too: the lip is at the teeth, not at the other lip"),
+        Group(CLOSED, "p b m em sil sp", "the lips meet; in silence they rest on each other"),
+    ),
+    "sVis": (
+        Group("front", "iy ih ix eh ey ax axr er", "not low, not back: jaw half shut, lips spread or slack"),
+        Group(
+            "low", "aa ae ah aw ay", "low: the jaw drops; diphthongs stand where they begin, for that part is longer"
+        ),
+        Group("back", "ao ow oy uh uw", "back, not low: the vowels that round the lips"),
+        _BILABIAL,
+        _LABIODENTAL,
+        Group(
+            "other",
+            "ch d dh el en g hh jh k l n ng r s sh t th w y z zh",
+            "all other consonants: lips hardly needed; w rounds them, but does not shut them",
+        ),
+        _SILENCE,
+    ),
+    "pbVis": (
+        Group("AI", "aa ae ah aw ay", "wide open: a as in father, i as in ice"),
+        Group(
+            "E", "eh ey iy ih ix ax er axr", "open and spread: e as in let and in see, and the slack vowels near them"
+        ),
+        Group("O", "ao ow oy", "round and open"),
+        Group("U", "uh uw", "round and nearly shut"),
+        Group("WQ", "w", "puckered tightly; q is written k w here"),
+        Group("MBP", "p b m em", "the lips meet"),
+        Group("FV", "f v", "the lower lip is at the upper teeth"),
+        Group("L", "l el", "the tongue shows behind the upper teeth"),
+        Group(
+            "etc",
+            "ch d dh en g hh jh k n ng r s sh t th y z zh",
+            "teeth together: his C D G K N R S TH Y Z and those made like them",
+        ),
+        Group("rest", "sil sp", "lips together and relaxed"),
+    ),
+    "eVis": (
+        Group("aw", "aw", "diphthong: open, then rounding"),
+        Group("ay", "ay", "diphthong: open, then spreading"),
+        Group("ey", "ey", "diphthong: half open, then spreading"),
+        Group("ow", "ow", "diphthong: rounded, then narrower"),
+        Group("oy", "oy", "diphthong: rounded, then spreading"),
+        Group("high", "iy ih ix", "high front vowels: jaw nearly shut, lips spread"),
+        Group("mid", "eh ax axr er", "mid vowels, front and central: jaw half shut, lips slack"),
+        Group("low", "aa ae ah", "low vowels: the jaw drops"),
+        Group("back", "ao uh uw", "back vowels: lips rounded"),
+        _BILABIAL,
+        _LABIODENTAL,
+        Group("dental", "th dh", "the tongue's tip at or between the teeth: the jaw stays a little open for it"),
+        Group("alveolar", "t d n en", "the tongue at the gum, lips free to do what the neighbours want"),
+        Group("sibilant", "s z", "teeth together"),
+        Group("palatal", "sh zh ch jh", "teeth together, lips pushed forward"),
+        Group("hidden", "k g ng hh", "made at the back: nothing of it shows, the neighbours decide"),
+        Group("glide", "l el y", "the tongue raised, lips not rounded"),
+        Group("rounded", "w r", "lips rounded or pushed forward"),
+        _SILENCE,
+    ),
+    "phone": tuple(Group(phone, phone, "itself") for phone in PHONES),
+}
+_UNCOUNTED = {"sVis": "silence", "pbVis": "rest", "phone": PAUSE}
+"""Units that the paper's count leaves out."""
+
+
+def _built_in(name: str) -> UnitSet:
+    of = {phone: group.unit for group in GROUPS[name] for phone in group.phones.split()}
+    return UnitSet(name, of, frozenset([_UNCOUNTED[name]] if name in _UNCOUNTED else []))
+
+
+UNIT_SETS: dict[str, UnitSet] = {name: _built_in(name) for name in GROUPS}
+"""In the order of the paper's Table 1 but for sVis, which goes by its size."""
+
+
+def unit_set(name_or_path: str | Path) -> UnitSet:
+    """Return a unit set of the paper by its name, or that of a table file (docs/unit-sets.md).
+
+    Raises InputError: neither a name nor a file, or a table that is wrong (with its line).
+    """
+    known = UNIT_SETS.get(str(name_or_path))
+    if known is not None:
+        return known
+    if not os.path.exists(name_or_path):  # noqa: PTH110 - False, not an error, for a name that no file can have
+        raise InputError(
+            f"no unit set {str(name_or_path)!r}; there are: {', '.join(UNIT_SETS)}; or give a table file, "
+            "a unit and its phones a line"
+        )
+    return read_unit_table(Path(name_or_path))

@@ -1,0 +1,118 @@
+from __future__ import annotations
+
+import json
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from cli.conftest import Run, is_one_error
+from lipmotion.corpora.store import Corpus
+from lipmotion.experiment import folds, learning_curve, unit_sets
+from lipmotion.measures.bootstrap import interval
+from lipmotion.pipeline import evaluate
+
+
+@pytest.fixture(autouse=True)
+def few_draws(monkeypatch: pytest.MonkeyPatch) -> None:
+    """And the first two unit sets of the paper beside the one that they are compared with."""
+    for module in (unit_sets, evaluate):
+        monkeypatch.setattr(module, "interval", partial(interval, draws=20))
+    monkeypatch.setattr(unit_sets, "PAPER", {name: unit_sets.PAPER[name] for name in ("2vis", "pbVis", "phone")})
+
+
+def test_the_table_is_that_of_the_figures(run: Run, toy_corpus: Corpus, here: Path) -> None:
+    done = run("experiment", "unit-sets", toy_corpus.path, "-o", "a.json", "--split", "all", "--workers", "1")
+    assert (done.code, done.err) == (0, [])
+    figures = json.loads((here / "a.json").read_text())
+    assert "\n".join(done.out) == unit_sets.table(figures)
+    assert (figures["split"], figures["clips"], figures["closures"]) == ("all", 12, False)
+    assert [path.name for path in here.iterdir()] == ["a.json"]
+
+
+def test_a_program_reads_the_figures(run: Run, toy_corpus: Corpus) -> None:
+    done = run("experiment", "unit-sets", toy_corpus.path, "--closures", "--machine-readable")
+    assert (done.code, done.err) == (0, [])
+    last = json.loads(done.out[-1])
+    assert last["type"] == "success"
+    assert last["figures"]["closures"] is True
+    assert {"type", "stage", "step", "steps", "value"} == set(json.loads(done.out[1]))
+
+
+def test_the_learning_curve_of_a_list(run: Run, toy_corpus: Corpus, here: Path) -> None:
+    (here / "order.txt").write_text("\n".join(toy_corpus.names("train")) + "\n\n")
+    chosen = ("--order", "order.txt", "--sizes", "8,3", "--split", "val")
+    done = run("experiment", "learning-curve", toy_corpus.path, *chosen, "-o", "a.json", "--workers", "1")
+    assert (done.code, done.err) == (0, [])
+    figures = json.loads((here / "a.json").read_text())
+    assert "\n".join(done.out) == learning_curve.table(figures)
+    assert (figures["split"], figures["order"], figures["workers"]) == ("val", "given", 1)
+    assert [row["names"] for row in figures["rows"]] == [3, 8]
+
+
+def test_folds_of_the_training_list(run: Run, toy_corpus: Corpus, here: Path) -> None:
+    done = run("experiment", "folds", toy_corpus.path, "--folds", "2", "-o", "a.json", "--workers", "1")
+    assert (done.code, done.err) == (0, [])
+    figures = json.loads((here / "a.json").read_text())
+    assert "\n".join(done.out) == folds.table(figures)
+    assert (figures["folds"], figures["trained_on"]) == (2, [4, 4])
+
+
+def test_a_program_reads_them(run: Run, toy_corpus: Corpus) -> None:
+    done = run("experiment", "learning-curve", toy_corpus.path, "--sizes", "3", "--machine-readable")
+    assert (done.code, done.err) == (0, [])
+    assert json.loads(done.out[-1])["figures"]["order"] == "shuffled"
+
+
+LEARNING_CURVE, FOLDS = "learning-curve CORPUS", "folds CORPUS"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (f"{LEARNING_CURVE} --order missing.txt", 4, "missing.txt: no such list file; required: one name a line"),
+        (f"{LEARNING_CURVE} --order empty.txt", 3, "the list of utterances to train on is empty"),
+        (f"{LEARNING_CURVE} --order strange.txt", 4, "1 of 2 names to train on (nobody) are not in the corpus"),
+        (f"{LEARNING_CURVE} --sizes 9", 3, "sizes 9; required: from 1 to 8"),
+        (f"{LEARNING_CURVE} --sizes 0,8", 3, "sizes 0, 8; required: from 1 to 8"),
+        (f"{LEARNING_CURVE} --split all", 4, "are in the split that is compared with"),
+        (f"{FOLDS} --folds 1", 3, "1 folds; required: from 2 to 8"),
+        (f"{FOLDS} -o missing/a.json", 7, "the folder missing does not exist"),
+        ("folds missing", 4, "missing: no such corpus; make one"),
+    ],
+)
+def test_lists_and_numbers_that_cannot_be_used(
+    run: Run, toy_corpus: Corpus, here: Path, arguments: str, code: int, words: str
+) -> None:
+    (here / "empty.txt").write_text("\n")
+    (here / "strange.txt").write_text("toy00\nnobody\n")
+    names = [str(toy_corpus.path) if argument == "CORPUS" else argument for argument in arguments.split()]
+    done = run("experiment", *names)
+    assert is_one_error(done, code)
+    assert words in done.err[0]
+    assert len(list(here.iterdir())) == 2
+
+
+def test_sizes_that_are_not_numbers(run: Run, toy_corpus: Corpus) -> None:
+    done = run("experiment", "learning-curve", toy_corpus.path, "--sizes", "20,many")
+    assert done.code == 2
+    assert "'20,many'; required: numbers with commas between them" in done.err[-1]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (["missing"], 4, "missing: no such corpus; make one"),
+        (["CORPUS", "--split", "tset"], 4, "no utterances of split 'tset'"),
+        (["CORPUS", "-o", "missing/a.json"], 7, "the folder missing does not exist"),
+        (["CORPUS", "--lexicon", "missing"], 3, "missing: no such lexicon file"),
+    ],
+)
+def test_what_cannot_be_used(
+    run: Run, toy_corpus: Corpus, here: Path, arguments: list[str], code: int, words: str
+) -> None:
+    names = [toy_corpus.path if argument == "CORPUS" else argument for argument in arguments]
+    done = run("experiment", "unit-sets", *names)
+    assert is_one_error(done, code)
+    assert words in done.err[0]
+    assert list(here.iterdir()) == []

@@ -1,0 +1,177 @@
+"""Units other than phones: what trees ask, what is saved, and that lips meet all the same."""
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from engines.synthetic import OPENINGS, examples, speech, timeline
+from lipmotion.engines import Engine, engine_named
+from lipmotion.engines.trajectory.closure import closing_spans
+from lipmotion.engines.trajectory.contexts import Cut, places
+from lipmotion.errors import InputError, ModelFormatError
+from lipmotion.types import Generation
+from lipmotion.types.progress import silent_monitor
+from lipmotion.units import LIP_CLOSING, PHONES, UNIT_SETS, unit_set
+
+PLAIN = {"listens": False, "silent_parts": 7}
+SPOKEN = speech(timeline(("t", "aa", "p", "iy", "zh", "m", "uw", "sp", "s", "aa")))
+named = pytest.mark.parametrize("name", UNIT_SETS)
+
+
+@cache
+def trained(units: str, listens: bool = False):
+    engine = engine_named("trajectory", PLAIN | {"units": units, "listens": listens})
+    return engine, engine.fit(examples(), silent_monitor).model
+
+
+def generated(units: str) -> Generation:
+    engine, model = trained(units)
+    return engine.generate(model, SPOKEN)
+
+
+def renamed_phones(folder: Path) -> str:
+    """Write a table in which every phone is a unit of another name; the names sort in another order."""
+    path = folder / "renamed.txt"
+    path.write_text("".join(f"u{99 - number}{phone} {phone}\n" for number, phone in enumerate(PHONES)))
+    return str(path)
+
+
+@pytest.mark.parametrize("listens", [False, True])
+def test_phones_by_another_name_move_the_same_to_the_bit(tmp_path, listens):
+    own, renamed = (trained(units, listens) for units in ("phone", renamed_phones(tmp_path)))
+    one, two = (engine.generate(model, SPOKEN) for engine, model in (own, renamed))
+    assert one.motion.values.tobytes() == two.motion.values.tobytes()
+    assert one.variance.tobytes() == two.variance.tobytes()
+    for key, array in (arrays := own[0].to_arrays(own[1])).items():
+        if key != "questions":
+            assert array.tobytes() == renamed[0].to_arrays(renamed[1])[key].tobytes()
+    assert "units" not in arrays  # and what is saved is what it was before there were unit sets
+
+
+@named
+def test_trees_ask_about_units_of_the_set(name):
+    _, model = trained(name)
+    classes = set(unit_set(name).classes().values())
+    for tree in model.emission.forest.values():
+        assert {question.members for question in tree.questions} == classes
+
+
+@named
+def test_the_timeline_names_units_in_context(name):
+    units = unit_set(name)
+    phones = ["sil", *(span.label.phone for span in SPOKEN.units), "sil"]
+    of = [units.of[phone] for phone in phones]
+    wanted = [f"{left}-{unit}+{right}" for left, unit, right in zip(of, of[1:], of[2:], strict=False)]
+    result = generated(name)
+    assert [span.label.unit for span in result.units] == wanted
+    assert [span.label.phone for span in result.units] == phones[1:-1]
+    assert {state.split()[0] for state in result.trace.states} <= {*wanted, "rest"}
+
+
+@pytest.mark.parametrize("name", [name for name in UNIT_SETS if name != "phone"])
+def test_phones_of_one_unit_move_alike(name):
+    engine, model = trained(name)
+    units = unit_set(name)
+    for one, two in (("t", "d"), ("iy", "ih"), ("aa", "ah"), ("f", "v")):
+        assert units.of[one] == units.of[two]
+        pair = [engine.generate(model, speech(timeline(("s", phone, "s")))).motion.values for phone in (one, two)]
+        assert pair[0].tobytes() == pair[1].tobytes()
+
+
+def test_finer_sets_tell_more_apart():
+    differs = {}
+    for name in UNIT_SETS:
+        engine, model = trained(name)
+        one, two = (engine.generate(model, speech(timeline(("t", p, "t")))).motion["opening"] for p in ("iy", "aa"))
+        differs[name] = np.abs(one - two).max()
+    assert differs["2vis"] == 0
+    assert min(differs[name] for name in UNIT_SETS if name != "2vis") > 0.1
+
+
+@named
+def test_lips_meet_on_p_b_m_whatever_their_unit(name):
+    result, (_, model) = generated(name), trained(name)
+    spans = closing_spans(SPOKEN.units, len(result.motion.values))
+    assert len(spans) == sum(span.label.phone in LIP_CLOSING for span in SPOKEN.units) == 2
+    for span in spans:
+        assert result.motion["opening"][span].min() <= model.closure.closed + 1e-9
+
+
+@named
+def test_the_mouth_rests_in_silence_whatever_its_unit(name):
+    opening = generated(name).motion["opening"]
+    for rest in (opening[:20], opening[-20:]):
+        assert rest == pytest.approx(np.full(20, OPENINGS["sil"]), abs=2e-3)
+
+
+def test_silence_that_is_a_closed_mouth_is_cut_as_speech():
+    cut = Cut(3, 7, 0.1, unit_set("2vis"))
+    where = places(timeline(("p", "aa")), 141, cut)
+    assert {place.unit for place in where} == {"open", "closed"}
+    assert {cut.name(place) for place in where if place != cut.rest} == {"speech.0", "speech.1", "speech.2"}
+    assert where[0] == where[-1] == cut.rest
+    assert cut.rest not in where[60:80]
+
+
+def test_lips_that_meet_between_others_do_not_rest():
+    """All three are units of silence, too, and the part may have the number of silence's middle one."""
+    cut = Cut(5, 5, 0.1, unit_set("2vis"))
+    assert cut.rest not in places(timeline(("p", "b", "m")), 150, cut)[60:90]
+
+
+def table_model(folder: Path) -> tuple[Engine, dict]:
+    """Train with a table file that is then removed."""
+    path = Path(renamed_phones(folder))
+    engine = engine_named("trajectory", PLAIN | {"units": str(path)})
+    model = engine.fit(examples(4), silent_monitor).model
+    path.unlink()
+    return engine, engine.to_arrays(model)
+
+
+def test_a_model_needs_its_table_no_more(tmp_path):
+    engine, arrays = table_model(tmp_path)
+    model = engine.from_arrays(arrays)
+    assert model.units.of == {phone: f"u{99 - number}{phone}" for number, phone in enumerate(PHONES)}
+    assert np.isfinite(engine.generate(model, SPOKEN).motion.values).all()
+    with pytest.raises(InputError, match="no unit set"):
+        engine.fit(examples(1), silent_monitor)
+
+
+def changed(pairs: np.ndarray, row: int, column: int, text: str) -> np.ndarray:
+    result = pairs.astype("U20")
+    result[row, column] = text
+    return result
+
+
+DAMAGES = {
+    "an unknown phone": lambda pairs: changed(pairs, 3, 0, "xx"),
+    "a phone twice": lambda pairs: changed(pairs, 3, 0, PHONES[4]),
+    "a phone too many": lambda pairs: np.concatenate([pairs, pairs[:1]]),
+    "a phone missing": lambda pairs: pairs[1:],
+    "a unit without a name": lambda pairs: changed(pairs, 3, 1, ""),
+    "silence in a unit of speech": lambda pairs: changed(pairs, PHONES.index("sil"), 1, str(pairs[0, 1])),
+    "three columns": lambda pairs: np.concatenate([pairs, pairs[:, :1]], axis=1),
+    "one column": lambda pairs: pairs[:, 0],
+    "no table": lambda pairs: pairs[:0],
+    "numbers": lambda pairs: np.zeros(pairs.shape),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_a_damaged_table_is_refused(damage, tmp_path):
+    engine, arrays = table_model(tmp_path)
+    with pytest.raises(ModelFormatError):
+        engine.from_arrays(arrays | {"units": DAMAGES[damage](arrays["units"])})
+
+
+@pytest.mark.parametrize("units", [3, None, True, ["eVis"]])
+def test_a_unit_set_has_a_name(units):
+    with pytest.raises(InputError, match="units"):
+        engine_named("trajectory", {"units": units})
+
+
+def test_no_such_unit_set():
+    with pytest.raises(InputError, match="there are: 2vis"):
+        engine_named("trajectory", {"units": "evis"}).fit(examples(1), silent_monitor)

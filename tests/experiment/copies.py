@@ -1,0 +1,30 @@
+"""Corpora that differ from the toy corpus in one way."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+from lipmotion.corpora.store import Corpus
+from lipmotion.types import Channel, Utterance
+
+
+def copied(corpus: Corpus, folder: Path, change: Callable[[Utterance], Utterance]) -> Corpus:
+    result = Corpus.create(folder / "copy")
+    for name in corpus.names():
+        result.add(change(corpus.utterance(name)))
+    return result
+
+
+def renamed(corpus: Corpus, folder: Path, *names: str) -> Corpus:
+    """The first channels, by other names; the others are left out."""
+
+    def change(utterance: Utterance) -> Utterance:
+        motion = utterance.track.motion
+        channels, values = tuple(map(Channel, names)), motion.values[:, : len(names)]
+        return replace(
+            utterance, track=replace(utterance.track, motion=replace(motion, channels=channels, values=values))
+        )
+
+    return copied(corpus, folder, change)

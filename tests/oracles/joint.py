@@ -1,0 +1,72 @@
+"""Joint models by the book: densities term by term, recognition and posteriors by trying everything."""
+
+from itertools import pairwise
+
+import numpy as np
+
+from oracles.sequences import segmentations
+
+
+def gaussian(x, mean, variance) -> float:
+    return float((-0.5 * (np.log(2 * np.pi * variance) + (x - mean) ** 2 / variance)).sum())
+
+
+def mixture(x, weights, means, variances) -> float:
+    return float(
+        np.logaddexp.reduce([w + gaussian(x, m, v) for w, m, v in zip(weights, means, variances, strict=True)])
+    )
+
+
+def stream_density(part, leaf, value, known) -> float:
+    """Return the log density of one frame of one stream, in the units it was observed in."""
+    mixtures, voiced = part.tied.mixtures, part.tied.voiced
+    if not known:
+        return 0.0 if voiced is None else float(np.log(1 - voiced[leaf]))
+    means = mixtures.means[leaf] * part.scale.deviation + part.scale.mean
+    found = mixture(value, mixtures.log_weights[leaf], means, mixtures.variances[leaf] * part.scale.deviation**2)
+    return found if voiced is None else found + float(np.log(voiced[leaf]))
+
+
+def log_density(hmm, observed, place, frame, weights) -> float:
+    """Return the weighted sum of all streams' log densities of a state in its context."""
+    total = 0.0
+    for name, weight in weights:
+        if weight and name in hmm.parts and name in observed.streams:
+            stream, part = observed.streams[name], hmm.parts[name]
+            leaf = part.forest.leaf(place)
+            total += weight * stream_density(part, leaf, stream.values[frame], stream.known[frame])
+    return total
+
+
+def score(hmm, densities, units, lengths) -> float:
+    """Return the log probability of units whose states last so many frames, as recognition pays for it.
+
+    densities : of a place and a frame
+    Silence lies around; an utterance that begins in silence pays its insertion only, one that ends in another unit pays
+    the silence after it.
+    """
+    silence, inventory = hmm.inventory.silence, hmm.inventory
+
+    def price(unit, following):
+        return hmm.config.bigram_weight * hmm.bigram(unit, following) + hmm.config.insertion
+
+    total = hmm.config.insertion if units[0] == silence else price(silence, units[0])
+    total += sum(price(unit, following) for unit, following in pairwise(units))
+    total += price(units[-1], silence) if units[-1] != silence else 0.0
+    frame, lasting = 0, iter(lengths)
+    around = (silence, *units, silence)
+    for position, unit in enumerate(units):
+        for state in range(inventory.count(unit)):
+            place, length = ((around[position], unit, around[position + 2]), state), next(lasting)
+            total += sum(densities(place, t) for t in range(frame, frame + length))
+            stay = hmm.log_stay[inventory.rows[unit, state]]
+            total += (length - 1) * stay + np.log(1 - np.exp(stay))
+            frame += length
+    return float(total)
+
+
+def everything(hmm, densities, frames, candidates):
+    """Give score, units and lengths of everything that may have been said."""
+    for units in candidates:
+        for lengths in segmentations(frames, sum(hmm.inventory.count(unit) for unit in units)):
+            yield score(hmm, densities, units, lengths), units, lengths

@@ -1,0 +1,206 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lipmotion.errors import InputError
+from lipmotion.export.cues.shapes import SHAPES
+from lipmotion.units import LIP_CLOSING, PHONES, UNIT_SETS, UnitSet, is_silent, phone_classes, unit_set
+from lipmotion.units.unit_sets import GROUPS
+
+DOCUMENT = Path(__file__).parents[2] / "docs" / "unit-sets.md"
+PRINTED = {"2vis": 2, "pbVis": 9, "sVis": 6, "eVis": 19, "phone": 46}
+"""Hofer 2008, Table 1."""
+SPOKEN = tuple(phone for phone in PHONES if not is_silent(phone))
+DIPHTHONGS = {"aw", "ay", "ey", "ow", "oy"}
+VOWELS = set("aa ae ah ao ax axr eh er ih ix iy uh uw".split()) | DIPHTHONGS
+named = pytest.mark.parametrize("name", PRINTED)
+
+
+def table(of: dict[str, str]) -> str:
+    units = dict.fromkeys(of.values())
+    return "".join(f"{unit} {' '.join(p for p in of if of[p] == unit)}\n" for unit in units)
+
+
+def written(folder: Path, text: str) -> Path:
+    path = folder / "mine.txt"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_the_counts_are_those_of_the_paper() -> None:
+    assert {name: found.count for name, found in UNIT_SETS.items()} == PRINTED
+
+
+@named
+def test_every_phone_stands_in_one_group(name: str) -> None:
+    phones = [phone for group in GROUPS[name] for phone in group.phones.split()]
+    assert sorted(phones) == list(PHONES)
+    assert len({group.unit for group in GROUPS[name]}) == len(GROUPS[name])
+    assert all(group.reason for group in GROUPS[name])
+    found = unit_set(name)
+    assert {found.unit(phone) for phone in PHONES} == set(found.units)
+
+
+@named
+def test_silence_is_alone_unless_it_is_a_closed_mouth(name: str) -> None:
+    found = unit_set(name)
+    beside = {phone for unit in found.silence for phone in found.phones(unit)}
+    assert beside - {"sil", "sp"} == (set(LIP_CLOSING) if name == "2vis" else set())
+    assert [found.silent(unit) for unit in found.silence] == [name != "2vis"] * len(found.silence)
+    assert not any(found.silent(found.unit(phone)) for phone in SPOKEN)
+
+
+@named
+def test_lips_that_meet_are_no_part_of_an_open_unit(name: str) -> None:
+    found = unit_set(name)
+    closing = {found.unit(phone) for phone in LIP_CLOSING}
+    assert all(phone in LIP_CLOSING or is_silent(phone) for unit in closing for phone in found.phones(unit))
+
+
+def kinds(name: str) -> dict[str, int]:
+    """Count units of diphthongs alone, of other vowels, and of the rest."""
+    count = {"diphthong": 0, "vowel": 0, "other": 0}
+    found = unit_set(name)
+    for unit in found.units:
+        phones = set(found.phones(unit))
+        assert phones <= VOWELS or not phones & VOWELS
+        count["diphthong" if phones <= DIPHTHONGS else "vowel" if phones <= VOWELS else "other"] += 1
+    return count
+
+
+def test_the_parts_of_the_sets_are_those_of_the_paper() -> None:
+    assert kinds("eVis") == {"diphthong": 5, "vowel": 4, "other": 10}
+    assert kinds("sVis") == {"diphthong": 0, "vowel": 3, "other": 3 + 1}
+    assert unit_set("phone").of == {phone: phone for phone in PHONES}
+
+
+@pytest.mark.parametrize(("fine", "coarse"), [("phone", "eVis"), ("eVis", "sVis"), ("sVis", "2vis")])
+def test_the_extended_set_breaks_the_simple_one_down(fine: str, coarse: str) -> None:
+    for unit in unit_set(fine).units:
+        speech = [phone for phone in unit_set(fine).phones(unit) if not is_silent(phone)]
+        assert len({unit_set(coarse).unit(phone) for phone in speech}) <= 1
+
+
+def test_preston_blair_has_the_same_names_everywhere() -> None:
+    assert {shape.blair for shape in SHAPES.values()} == set(unit_set("pbVis").units) - {"WQ"}
+
+
+def test_classes_of_single_phones_are_the_phone_classes_in_order() -> None:
+    assert list(unit_set("phone").classes().items()) == list(phone_classes().items())
+
+
+def check_classes(found: UnitSet) -> None:
+    """By the definition, set by set."""
+    whole = frozenset(found.units)
+    wanted = {frozenset([unit]) for unit in found.units}
+    for phones in phone_classes().values():
+        wanted.add(frozenset(unit for unit in found.units if set(found.phones(unit)) <= phones))
+    classes = found.classes()
+    assert len(set(classes.values())) == len(classes)
+    assert set(classes.values()) == wanted - {whole, frozenset()}
+    for name, units in classes.items():
+        assert (name in found.units) == (len(units) == 1)
+        assert len(units) > 1 or units == {name}
+
+
+@named
+def test_classes_hold_whole_units(name: str) -> None:
+    check_classes(unit_set(name))
+
+
+@given(
+    units=st.lists(st.sampled_from(["a", "vowel", "stop", "x"]), min_size=len(SPOKEN), max_size=len(SPOKEN)),
+    quiet=st.sampled_from([("sil", "sp"), ("silence", "silence")]),
+)
+def test_classes_of_any_table(units: list[str], quiet: tuple[str, str]) -> None:
+    found = UnitSet("any", dict(zip((*SPOKEN, "sil", "sp"), (*units, *quiet), strict=True)))
+    check_classes(found)
+    assert found.silence == tuple(dict.fromkeys(quiet))
+
+
+@named
+def test_a_table_says_the_same_as_the_set(name: str, tmp_path: Path) -> None:
+    path = written(tmp_path, "# mine\n\n" + table(dict(unit_set(name).of)).replace("\n", " # why\n"))
+    found = unit_set(path)
+    assert (found.name, dict(found.of), found.units) == ("mine", dict(unit_set(name).of), unit_set(name).units)
+    assert found.count == len(found.units)
+
+
+GOOD = table(dict(unit_set("eVis").of))
+WRONG = {
+    "a phone is missing": (GOOD.replace(" zh", ""), r"mine\.txt.*missing zh"),
+    "a phone twice": (GOOD + "more zh\n", r"line 20: phone 'zh' has a unit in line 15"),
+    "a phone twice in a line": (GOOD.replace("f v", "f v v"), r"line 11: phone 'v' has a unit in line 11"),
+    "no phone of ours": (GOOD + "more xx\n", r"line 20: unknown phone 'xx'; the phones are: aa ae"),
+    "a unit twice": (GOOD.replace("dental th dh", "dental th\ndental dh"), r"line 13: unit 'dental' stands in line 12"),
+    "a unit without phones": ("empty\n" + GOOD, r"line 1: unit 'empty' without phones"),
+    "silence beside speech": (GOOD.replace("silence sil sp\n", "").replace("f v", "f v sil sp"), "line 11: .*'closed'"),
+    "a pause beside speech": (GOOD.replace("sil sp\n", "sil\n").replace("f v", "f v sp"), r"line 11: .*'closed'"),
+    "nothing": ("# nothing\n", "missing aa ae"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_a_wrong_table_is_refused(case: str, tmp_path: Path) -> None:
+    text, message = WRONG[case]
+    assert text != GOOD
+    with pytest.raises(InputError, match=message):
+        unit_set(written(tmp_path, text))
+
+
+def test_silence_may_be_closed_lips(tmp_path: Path) -> None:
+    text = GOOD.replace("silence sil sp\n", "").replace("bilabial p b m em", "closed p b m em sil sp")
+    found = unit_set(written(tmp_path, text))
+    assert found.silence == ("closed",)
+    assert not found.silent("closed")
+
+
+def test_neither_a_name_nor_a_file(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"'evis'; there are: 2vis, sVis, pbVis, eVis, phone"):
+        unit_set("evis")
+    with pytest.raises(InputError, match="there are: 2vis"):
+        unit_set("x" * 300)
+    with pytest.raises(InputError, match=r"not a file|directory|folder"):
+        unit_set(tmp_path)
+    (tmp_path / "binary").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(InputError, match="UTF-8"):
+        unit_set(tmp_path / "binary")
+
+
+@pytest.mark.parametrize("unit", ["", "a b", " a", "a\n"])
+def test_a_unit_is_a_word(unit: str) -> None:
+    with pytest.raises(InputError, match="not a word"):
+        UnitSet("mine", {**unit_set("phone").of, "zh": unit})
+
+
+def test_an_unknown_phone_has_no_unit() -> None:
+    with pytest.raises(InputError, match="'xx'; the phones: aa"):
+        unit_set("eVis").unit("xx")
+    with pytest.raises(InputError, match="unknown xx"):
+        UnitSet("mine", {**unit_set("phone").of, "xx": "xx"})
+
+
+def test_the_document_says_what_the_tables_say() -> None:
+    rows = [line.strip("| ").split(" | ") for line in DOCUMENT.read_text(encoding="utf-8").splitlines()]
+    shown = [tuple(row) for row in rows if len(row) == 3]
+    for name in GROUPS:
+        if name != "phone":
+            groups = [(f"`{group.unit}`", group.phones, group.reason) for group in GROUPS[name]]
+            start = shown.index(groups[0])
+            assert shown[start : start + len(groups)] == groups
+    head = [row for row in rows if row[0].strip("`") in PRINTED and len(row) == 5]
+    assert [(r[0].strip("`"), int(r[1]), int(r[2]), r[3]) for r in head] == [
+        (name, found.count, len(found.units), ", ".join(f"`{unit}`" for unit in found.silence))
+        for name, found in UNIT_SETS.items()
+    ]
+
+
+def test_the_table_in_the_document_is_one(tmp_path: Path) -> None:
+    example = DOCUMENT.read_text(encoding="utf-8").partition("```text\n")[2].partition("```")[0]
+    found = unit_set(written(tmp_path, example))
+    assert found.units == ("closed", "teeth", "rounded", "open")
+    assert found.silence == ("closed",)
