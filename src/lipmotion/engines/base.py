@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.stats.checkpoint import NOTHING_KEPT, Checkpoint
-from lipmotion.types import Constraints, Example, Generation, Monitor, Speech
+from lipmotion.types import Constraints, Example, Generation, Monitor, Speech, Timeline, Unit
 
 ModelT = TypeVar("ModelT")
 Arrays = Mapping[str, NDArray[Any]]
@@ -44,6 +44,14 @@ class Engine(ABC, Generic[ModelT]):
 
         Raises CorpusError: no example, or none with motion that was seen.
         """
+
+    def listen(self, model: ModelT, speech: Speech, said: bool) -> Timeline[Unit] | None:  # noqa: ARG002
+        """Return the phones in time as the engine's own models hear them; None where they cannot.
+
+        speech : with its phones, if any are known
+        said   : whether these are the phones of a transcript, which are only placed anew
+        """
+        return None
 
     @abstractmethod
     def generate(self, model: ModelT, speech: Speech, constraints: Constraints | None = None) -> Generation:

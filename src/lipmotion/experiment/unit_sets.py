@@ -30,8 +30,8 @@ PAPER: dict[str, float] = {"2vis": 66.5, "pbVis": 67.7, "sVis": 67.4, "eVis": 68
 BASELINE = "phone"
 """What every set is compared with."""
 SYSTEMS: dict[str, dict[str, Any]] = {
-    "plain Gaussians, as in the paper": {"listens": False, "full_range": False},
-    "as shipped": {},
+    "plain Gaussians, as in the paper": {"listens": False, "full_range": False, "joint": False},
+    "as shipped": {"joint": False},
 }
 """Settings of the trajectory engine, by the name of the block of the table."""
 

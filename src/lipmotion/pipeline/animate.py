@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export.base import MOTION_SUFFIXES, write_motion
 from lipmotion.files import as_text, check_distinct, check_target
-from lipmotion.pipeline.hear import hear
+from lipmotion.pipeline.hear import hear, hear_out
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.transcribe import read_transcript, transcribe
 from lipmotion.speech.mfcc import mfcc
@@ -57,11 +58,16 @@ def animate(
     features = mfcc(audio)
     if units is not None:
         _check_units(units, audio.duration_s)
+        heard = hear(chosen.engine, audio, features, units)
     else:
         text = read_transcript(transcript) if isinstance(transcript, Path) else transcript
         words = words_of(text) if text is not None else None
-        units = transcribe(phones, audio, features, words, lexicon or Lexicon())
-    heard = hear(chosen.engine, audio, features, units)
+        found = partial(transcribe, phones, audio, features, words, lexicon or Lexicon())
+        if recogniser == "general":
+            heard = hear(chosen.engine, audio, features, found())
+        else:
+            said = found() if words is not None else None
+            heard = hear_out(chosen.engine, chosen.learned, audio, features, said=said, recognise=found)
     del audio  # of a long recording it is much
     return chosen.engine.generate(chosen.learned, heard, constraints)
 

@@ -16,17 +16,18 @@ from lipmotion.measures import curves
 from lipmotion.measures.bootstrap import interval
 from lipmotion.measures.closures import closed_threshold, closure_figures, phone_closures
 from lipmotion.measures.report import without_nan
-from lipmotion.pipeline.hear import hear
+from lipmotion.pipeline.hear import hear, hear_out
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.train import labels_of
 from lipmotion.pipeline.transcribe import report_guesses
 from lipmotion.speech.recogniser import Recogniser
 from lipmotion.speech.recogniser import recogniser as cached_recogniser
-from lipmotion.types import Monitor, Motion, Timeline, Unit, Utterance, counted, part_of, silent_monitor
+from lipmotion.types import Monitor, Motion, Speech, Timeline, Unit, Utterance, counted, part_of, silent_monitor
 from lipmotion.units import VISEMES, Lexicon, is_silent
 
 ModelT = TypeVar("ModelT")
 OPENING = "opening"
+WITH_TRANSCRIPT = "with transcript"
 DISTANCES = (OPENING, "width", "outer")
 """What is compared where faces were tracked; all other channels follow from points near these."""
 BILABIAL = VISEMES["bi"]
@@ -43,6 +44,7 @@ class Recorded:
     closed_under : the opening under which the mouth is closed; None where there is no opening
     reference  : what is spoken, utterance by utterance
     conditions : what an engine is told of that, by name: ``audio only``, ``with transcript``
+    listens    : whether engines may find the phones by models of their own
     """
 
     utterances: Sequence[Utterance]
@@ -51,6 +53,7 @@ class Recorded:
     closed_under: float | None
     reference: Sequence[Timeline[Unit]]
     conditions: Mapping[str, Sequence[Timeline[Unit]]]
+    listens: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,8 +136,8 @@ def recorded(
     heard = counted(utterances, "recognising the phones", part_of(monitor, 0.4, 0.9))
     conditions = {"audio only": [phones.recognise(u.audio, u.features) for u in heard]}
     if all(utterance.words or utterance.phones for utterance in utterances):
-        conditions["with transcript"] = reference
-    return Recorded(utterances, compared, still, threshold, reference, conditions)
+        conditions[WITH_TRANSCRIPT] = reference
+    return Recorded(utterances, compared, still, threshold, reference, conditions, phones.kind != "general")
 
 
 def compared_channels(utterances: Sequence[Utterance]) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -181,10 +184,29 @@ def _reference(utterance: Utterance, phones: Recogniser, lexicon: Lexicon) -> Ti
 
 def clips(found: Recorded, condition: str, engine: Engine[ModelT], learned: ModelT) -> list[Clip]:
     """Return what an engine makes of recordings, beside the originals. Raises CorpusError: it has other channels."""
+    rows = zip(found.utterances, found.conditions[condition], found.reference, strict=True)
+    said = condition == WITH_TRANSCRIPT
     return [
-        _clip(engine, learned, found.channels, *row)
-        for row in zip(found.utterances, found.conditions[condition], found.reference, strict=True)
+        _clip(
+            engine,
+            learned,
+            found.channels,
+            utterance,
+            _heard(engine, learned, found, utterance, units, said),
+            reference,
+        )
+        for utterance, units, reference in rows
     ]
+
+
+def _heard(
+    engine: Engine[ModelT], learned: ModelT, found: Recorded, utterance: Utterance, units: Timeline[Unit], said: bool
+) -> Speech:
+    """Return an utterance as ``animate`` would hear it; phones that were labelled by hand stay where they are."""
+    if not found.listens or (said and utterance.phones is not None):
+        return hear(engine, utterance.audio, utterance.features, units)
+    known = units if said else None
+    return hear_out(engine, learned, utterance.audio, utterance.features, said=known, recognise=lambda: units)
 
 
 def _clip(
@@ -192,13 +214,13 @@ def _clip(
     learned: ModelT,
     compared: Sequence[str],
     utterance: Utterance,
-    units: Timeline[Unit],
+    heard: Speech,
     reference: Timeline[Unit],
 ) -> Clip:
     motion = utterance.track.motion
     seen = np.asarray(utterance.track.seen)
     time_s = (np.arange(len(motion.values)) / motion.rate_hz)[seen]
-    generated = engine.generate(learned, hear(engine, utterance.audio, utterance.features, units)).motion
+    generated = engine.generate(learned, heard).motion
     _check_channels(generated, compared)
     spoken = tuple((s.start_s, s.end_s, s.label.phone) for s in reference if not is_silent(s.label.phone))
     return Clip(

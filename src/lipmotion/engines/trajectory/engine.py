@@ -27,7 +27,9 @@ from lipmotion.types import (
     Monitor,
     Motion,
     Speech,
+    Timeline,
     Trace,
+    Unit,
 )
 from lipmotion.units import UnitSet, unit_set
 
@@ -50,6 +52,8 @@ class TrajectoryConfig:
     trajectory_steps : steps of training for the least error of the generated trajectory (0: none)
     full_range : make movements as large as the original's
     closures   : make the lips meet in every p, b and m, whatever their units are
+    joint      : train the paper's joint model of speech, F0 and motion as well, if there is speech enough: it finds the
+                 phones of voices that it knows, and places those of transcripts (``listening``)
     units      : what is modelled: a unit set's name, or a table's (docs/unit-sets.md); training reads the table
     """
 
@@ -69,6 +73,7 @@ class TrajectoryConfig:
     trajectory_steps: int = 0
     full_range: bool = True
     closures: bool = True
+    joint: bool = True
     units: str = "phone"
 
     def __post_init__(self) -> None:
@@ -111,15 +116,20 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
     config: TrajectoryConfig
     name: ClassVar[str] = "trajectory"
 
+    @property
+    def hears_f0(self) -> bool:
+        """Whether it wants ``Speech.log_f0``."""
+        return self.config.joint
+
     def fit(  # noqa: D102
-        self,
-        examples: Sequence[Example],
-        monitor: Monitor,
-        checkpoint: Checkpoint = NOTHING_KEPT,  # noqa: ARG002 - a matter of seconds
+        self, examples: Sequence[Example], monitor: Monitor, checkpoint: Checkpoint = NOTHING_KEPT
     ) -> Fit[TrajectoryModel]:
-        model = fit_trajectory(examples, self.config.learning, monitor)
+        model = fit_trajectory(examples, self.config.learning, monitor, checkpoint)
         frames = sum(int(example.valid.sum()) for example in examples)
         return Fit(model, {"frames": frames, "leaves": len(model.emission.means)})
+
+    def listen(self, model: TrajectoryModel, speech: Speech, said: bool) -> Timeline[Unit] | None:  # noqa: D102
+        return model.listener.phones(speech, said) if model.listener is not None else None
 
     def generate(self, model: TrajectoryModel, speech: Speech, constraints: Constraints | None = None) -> Generation:  # noqa: D102
         features = np.asarray(speech.features.values)

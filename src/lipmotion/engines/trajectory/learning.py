@@ -26,6 +26,7 @@ class Learning:
     ridge, shared_ridge : how strongly a regression is drawn towards the one above it, and the shared one towards none
     ridge_frames : frames that a node must have for a regression of its own
     trajectory_steps : steps of training for the least error of the generated trajectory (0: none)
+    joint : train the joint model as well
     """
 
     cut: Cut
@@ -40,6 +41,7 @@ class Learning:
     shared_ridge: float
     ridge_frames: float
     trajectory_steps: int
+    joint: bool
 
 
 @dataclass(frozen=True, eq=False)

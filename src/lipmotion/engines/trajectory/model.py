@@ -13,6 +13,7 @@ from lipmotion.engines.trajectory.closure import Closure
 from lipmotion.engines.trajectory.contexts import Cut
 from lipmotion.engines.trajectory.emission import Emission, emission_arrays, emission_from_arrays
 from lipmotion.engines.trajectory.frame import frame_arrays, frame_from_arrays
+from lipmotion.engines.trajectory.listening import Listener, listener_arrays, listener_from_arrays
 from lipmotion.engines.trajectory.space import MotionSpace
 from lipmotion.errors import ModelFormatError
 from lipmotion.units import UnitSet
@@ -27,6 +28,7 @@ class TrajectoryModel:
     emission : densities of all tied states
     gain     : by how much movements away from rest are made larger [shape=(Q,)]
     closure  : how the lips close (None: the motion has no opening)
+    listener : finds the phones of voices that it knows (None: there was too little speech to learn from)
     """
 
     units: UnitSet
@@ -34,12 +36,14 @@ class TrajectoryModel:
     emission: Emission
     gain: NDArray[np.float64]
     closure: Closure | None
+    listener: Listener | None = None
 
 
 def model_arrays(model: TrajectoryModel) -> dict[str, NDArray[Any]]:
     """Return the model as arrays."""
     arrays = frame_arrays(model.units, model.space, model.closure) | {"gain": model.gain}
-    return arrays | emission_arrays(model.emission)
+    heard = listener_arrays(model.listener) if model.listener is not None else {}
+    return arrays | emission_arrays(model.emission) | heard
 
 
 def model_from_arrays(arrays: Mapping[str, NDArray[Any]], cut: Callable[[UnitSet], Cut], units: str) -> TrajectoryModel:
@@ -57,6 +61,6 @@ def model_from_arrays(arrays: Mapping[str, NDArray[Any]], cut: Callable[[UnitSet
             raise ValueError(
                 f"a gain of shape {gain.shape}, required ({space.dimensions},), all finite and more than 0"
             )
-        return TrajectoryModel(of, space, emission, gain, closure)
+        return TrajectoryModel(of, space, emission, gain, closure, listener_from_arrays(arrays))
     except (KeyError, ValueError, IndexError, TypeError) as error:
         raise ModelFormatError(f"the trajectory model is damaged ({error}); train or download it again") from error

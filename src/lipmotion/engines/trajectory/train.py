@@ -14,19 +14,23 @@ from lipmotion.engines.trajectory.emission import Emission
 from lipmotion.engines.trajectory.generation_error import minimise_generation_error
 from lipmotion.engines.trajectory.hearing import fit_hearing
 from lipmotion.engines.trajectory.learning import Learning, Observed
+from lipmotion.engines.trajectory.listening import fit_listener, replaced
 from lipmotion.engines.trajectory.model import TrajectoryModel
 from lipmotion.engines.trajectory.space import fit_space
 from lipmotion.errors import CorpusError
+from lipmotion.stats.checkpoint import NOTHING_KEPT, Checkpoint
 from lipmotion.stats.trees import Question, Tree, gaussian_likelihood, grow
 from lipmotion.stats.windows import with_dynamics
-from lipmotion.types import Channel, Example, Monitor, Progress
+from lipmotion.types import Channel, Example, Monitor, Progress, part_of
 
 Array = NDArray[np.float64]
 LEAST_VARIANCE_SHARE, LEAST_VARIANCE = 1e-3, 1e-12
 """No variance falls under this share of the overall one, nor under this: some dimensions never move."""
 
 
-def fit_trajectory(examples: Sequence[Example], how: Learning, monitor: Monitor) -> TrajectoryModel:
+def fit_trajectory(
+    examples: Sequence[Example], how: Learning, monitor: Monitor, checkpoint: Checkpoint = NOTHING_KEPT
+) -> TrajectoryModel:
     """Return densities of the motion for every part of a phone in context, tied by decision trees.
 
     Raises CorpusError: no example with motion that was seen in speech, or examples of different channels.
@@ -35,6 +39,11 @@ def fit_trajectory(examples: Sequence[Example], how: Learning, monitor: Monitor)
     seen = np.concatenate([example.motion.values[example.valid] for example in examples])
     space = fit_space(channels, seen, how.components)
     values = [space.reduce(example.motion.values.astype(float)) for example in examples]
+    listener = None
+    if how.joint:
+        listener = fit_listener(examples, values, part_of(monitor, 0, 0.8), checkpoint)
+        examples = replaced(listener, examples) if listener is not None else examples
+    monitor = part_of(monitor, 0.8, 1)
     observed = [observed_of(example, x, how.cut) for example, x in zip(examples, values, strict=True)]
     quiet = how.cut.units.silence
     covered = {how.cut.name(place) for one in observed for place in one.seen_places if place.unit not in quiet}
@@ -55,7 +64,7 @@ def fit_trajectory(examples: Sequence[Example], how: Learning, monitor: Monitor)
     if OPENING in space.direct_names:
         masks, timelines = [e.valid for e in examples], [e.speech.units for e in examples]
         closure = fit_closure(values, masks, timelines, space.direct_names.index(OPENING))
-    return TrajectoryModel(how.cut.units, space, emission, gain, closure)
+    return TrajectoryModel(how.cut.units, space, emission, gain, closure, listener)
 
 
 _STAGE = "trees"

@@ -1,0 +1,150 @@
+"""The joint model finds the phones of voices that it knows, and where they begin."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.engines.trajectory.joint.align import align
+from lipmotion.engines.trajectory.joint.arrays import joint_arrays, joint_from_arrays
+from lipmotion.engines.trajectory.joint.inventory import Inventory
+from lipmotion.engines.trajectory.joint.labels import in_frames, in_time
+from lipmotion.engines.trajectory.joint.model import JointConfig, JointHmm
+from lipmotion.engines.trajectory.joint.recognise import JointRecogniser
+from lipmotion.engines.trajectory.joint.streams import SPEECH, Observed, observe
+from lipmotion.engines.trajectory.joint.train import Transcribed, train_joint
+from lipmotion.errors import AlignmentError
+from lipmotion.stats.checkpoint import Checkpoint
+from lipmotion.types import FRAME_RATE_HZ, Example, Monitor, Span, Speech, Timeline, Unit
+from lipmotion.units import UNIT_SETS, is_silent
+
+PHONES = UNIT_SETS["phone"]
+CONFIG = JointConfig(mixtures=16)
+LEAST_MINUTES = 8.0
+"""With less speech to learn from, the phones are found better with the help of the models of many voices."""
+LONGEST_S = 120.0
+"""Longer recordings are left to the other recogniser, which works block by block."""
+FAMILIAR = -6.0
+"""A voice is known whose sound the model explains at most this much worse than its training data (mean log density of a
+frame under what fits it best). GRID's s1 in other recordings: -6 to 2; five others of the same studio: -9 to -7."""
+HEARD_FRAMES = 400
+"""So many frames, spread evenly, tell whether a voice is known."""
+_STAGE = "joint"
+
+
+@dataclass(frozen=True, eq=False)
+class Listener:
+    """The joint model as a recogniser of phones.
+
+    typical : how well it explains its training data
+    """
+
+    hmm: JointHmm
+    typical: float
+
+    def phones(self, speech: Speech, said: bool) -> Timeline[Unit] | None:
+        """Return the phones in time; None where the voice is not known, or the recording too long.
+
+        said : whether the phones of ``speech.units`` are those of a transcript; then they are only placed anew
+        """
+        observed = _observed(speech)
+        long = observed.frames > LONGEST_S * FRAME_RATE_HZ
+        if long or not speech.features.values.any() or _fit(self.hmm, observed) < self.typical + FAMILIAR:
+            return None
+        if said:
+            return self.placed(speech)
+        found = _recogniser(self.hmm).recognise(observed)
+        return in_time(found, speech.features.duration_s)
+
+    def placed(self, speech: Speech) -> Timeline[Unit]:
+        """Return the same phones where this model hears them; as they were where they do not fit."""
+        spans = speech.units.spans
+        try:
+            path = align(self.hmm, _observed(speech), [PHONES.unit(span.label.phone) for span in spans])
+        except AlignmentError:
+            return speech.units
+        edges = np.clip((path.bounds(len(spans)) - 0.5) / FRAME_RATE_HZ, 0, speech.features.duration_s).tolist()
+        edges[-1] = speech.features.duration_s
+        placed = zip(edges, edges[1:], spans, strict=False)
+        return Timeline(tuple(Span(start_s, end_s, span.label) for start_s, end_s, span in placed))
+
+
+def fit_listener(
+    examples: Sequence[Example], values: Sequence[NDArray[np.float64]], monitor: Monitor, checkpoint: Checkpoint
+) -> Listener | None:
+    """Return a listener trained on sound and motion; None where there is too little, or nothing is said.
+
+    values : every example's motion in the model's space [each shape=(T, Q)]
+    Source: Hofer 2008, §4 to §6: all streams are trained together; only the heard ones recognise.
+    """
+    spoken_s = sum(s.duration_s for e in examples for s in e.speech.units if not is_silent(s.label.phone))
+    if spoken_s < 60 * LEAST_MINUTES:
+        return None
+    kept = checkpoint.load(_STAGE)
+    if kept is None:
+        hmm = train_joint(
+            [_transcribed(example, x) for example, x in zip(examples, values, strict=True)],
+            Inventory(PHONES.units, PHONES.silence, CONFIG.states),
+            PHONES.classes(),
+            CONFIG,
+            monitor,
+        )
+        kept = joint_arrays(hmm, np.float32)
+        checkpoint.save(_STAGE, kept)
+    hmm = joint_from_arrays(kept, CONFIG)
+    return Listener(hmm, float(np.mean([_fit(hmm, _observed(example.speech)) for example in examples])))
+
+
+def replaced(listener: Listener, examples: Sequence[Example]) -> list[Example]:
+    """Return the examples with their phones where the listener hears them."""
+    return [
+        replace(example, speech=replace(example.speech, units=listener.placed(example.speech))) for example in examples
+    ]
+
+
+def listener_arrays(listener: Listener) -> dict[str, NDArray[Any]]:
+    """Return a listener as arrays, at half precision."""
+    arrays = {f"joint_{name}": array for name, array in joint_arrays(listener.hmm).items()}
+    return arrays | {"joint_typical": np.array([listener.typical])}
+
+
+def listener_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> Listener | None:
+    """Return it again, or None. Raises ModelFormatError, KeyError, ValueError: something is missing or damaged."""
+    own = {name.removeprefix("joint_"): array for name, array in arrays.items() if name.startswith("joint_")}
+    if not own:
+        return None
+    typical = own.pop("typical")
+    if typical.shape != (1,) or not np.isfinite(typical).all():
+        raise ValueError(f"a typical fit of shape {typical.shape}, required one finite number")
+    return Listener(joint_from_arrays(own, CONFIG), float(typical[0]))
+
+
+@lru_cache(maxsize=4)
+def _recogniser(hmm: JointHmm) -> JointRecogniser:
+    """Return the recogniser of a model; the last few are kept with the networks that they search."""
+    return JointRecogniser(hmm)
+
+
+def _observed(speech: Speech) -> Observed:
+    return observe(np.asarray(speech.features.values), speech.log_f0)
+
+
+def _transcribed(example: Example, values: NDArray[np.float64]) -> Transcribed:
+    speech = example.speech
+    observed = observe(np.asarray(speech.features.values), speech.log_f0, values, example.valid)
+    units, bounds = in_frames(speech.units, observed.frames, PHONES.silence[0], PHONES.unit)
+    return Transcribed(observed, units, bounds)
+
+
+def _fit(hmm: JointHmm, observed: Observed) -> float:
+    """Return the mean log density of some frames' features, each under the leaf that fits it best."""
+    part = hmm.parts[SPEECH]
+    rows = hmm.inside(observed, hmm.config.recognition)[SPEECH]
+    chosen = rows[np.linspace(0, len(rows) - 1, min(len(rows), HEARD_FRAMES)).astype(int)]
+    leaves = np.arange(part.forest.size)
+    return float(part.tied.log_density(chosen, leaves, part.scale.log_volume).max(axis=1).mean())
