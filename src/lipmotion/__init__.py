@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from lipmotion.engines import engine_named
     from lipmotion.export.base import read_motion
     from lipmotion.export.cues.sheet import CueSheet
+    from lipmotion.pipeline.adapt import adapt
     from lipmotion.pipeline.animate import animate, write
     from lipmotion.pipeline.cues import cues, write_cues
     from lipmotion.pipeline.evaluate import evaluate
@@ -39,6 +40,7 @@ __all__ = [
     "Span",
     "Timeline",
     "Unit",
+    "adapt",
     "animate",
     "cues",
     "engine_named",
@@ -57,6 +59,7 @@ _HOMES = {
     "CueSheet": "lipmotion.export.cues.sheet",
     "Lexicon": "lipmotion.units",
     "Model": "lipmotion.pipeline.model",
+    "adapt": "lipmotion.pipeline.adapt",
     "animate": "lipmotion.pipeline.animate",
     "cues": "lipmotion.pipeline.cues",
     "engine_named": "lipmotion.engines",

@@ -132,3 +132,8 @@ def _(bench: Bench) -> list[object]:
 @case(GROUP, "info of a damaged one", 6, *NO_MODEL)
 def _(bench: Bench) -> list[object]:
     return ["info", bench.file("m.lipmotion", "hello")]
+
+
+@case(GROUP, "an adaptation of a wrong shape", 6, "the adaptation is damaged", "adapt the model again")
+def _(bench: Bench) -> list[object]:
+    return bench.animate(None, "--model", bench.changed_model({"adaptation/own.npy": npy(np.zeros((39, 39)))}))

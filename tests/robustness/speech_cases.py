@@ -216,3 +216,19 @@ def _(bench: Bench) -> list[object]:
 @case(GROUP, "a name like an address", 3, "no such file")
 def _(bench: Bench) -> list[object]:
     return bench.animate("concat:a.wav|b.wav")
+
+
+@case(GROUP, "adapt to digital silence", 3, "no speech found in the recordings; give some of the voice to adapt to")
+def _(bench: Bench) -> list[object]:
+    return ["adapt", bench.sound(np.zeros(48_000, np.float32)), "--model", bench.model, "-o", "m"]
+
+
+@case(GROUP, "adapt to words in a text file", 3, *NO_RECORDING)
+def _(bench: Bench) -> list[object]:
+    return ["adapt", bench.speech, bench.file("a.wav", "words"), "--model", bench.model, "-o", "m"]
+
+
+@case(GROUP, "adapt over one of the recordings", 7, "is the recording itself; give another name")
+def _(bench: Bench) -> list[object]:
+    path = bench.sound(np.zeros(48_000, np.float32))
+    return ["adapt", bench.speech, path, "--model", bench.model, "-o", path]

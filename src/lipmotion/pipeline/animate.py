@@ -53,7 +53,7 @@ def animate(
     Raises AlignmentError: the transcript does not fit into the recording.
     """
     chosen = model if isinstance(model, Model) else load_model(model)
-    phones = cached_recogniser(chosen.phones, recogniser)
+    phones = cached_recogniser(chosen.phones, recogniser, chosen.adaptation)
     audio = speech if isinstance(speech, Audio) else read_audio(Path(speech))
     features = mfcc(audio)
     if units is not None:

@@ -92,7 +92,7 @@ def evaluate(
     Raises CorpusError: no utterances of this split, or a model without the channels compared.
     Raises AlignmentError: a transcript does not fit into its recording.
     """
-    phones = cached_recogniser(model.phones, recogniser)
+    phones = cached_recogniser(model.phones, recogniser, model.adaptation)
     found = recorded(corpus, phones, split=split, speakers=speakers, lexicon=lexicon, monitor=monitor)
     figures = {
         "split": split or "all",

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from lipmotion.engines import Engine, engine_named
 from lipmotion.errors import InputError, ModelFormatError
+from lipmotion.speech.adaptation import Adaptation, adaptation_arrays, adaptation_from_arrays
 from lipmotion.stats.archive import UNREADABLE, read_archive, read_archive_header, write_archive
 from lipmotion.stats.hmm.model import HmmConfig, UnitHmm, hmm_arrays, hmm_from_arrays
 
@@ -25,16 +26,18 @@ SHIPPED = "grid-s1.lipmotion"
 class Model:
     """Everything that speech needs to become motion.
 
-    phones  : the acoustic models
-    engine  : with its configuration
-    learned : what the engine learned
-    about   : corpus, split, seed, versions, licence, attribution: whatever a user must know
+    phones     : the acoustic models
+    engine     : with its configuration
+    learned    : what the engine learned
+    about      : corpus, split, seed, versions, licence, attribution: whatever a user must know
+    adaptation : how it hears the voice that it was adapted to, if it was
     """
 
     phones: UnitHmm
     engine: Engine[Any]
     learned: Any
     about: Mapping[str, Any]
+    adaptation: Adaptation | None = None
 
 
 def save_model(model: Model, path: str | Path) -> None:
@@ -44,6 +47,8 @@ def save_model(model: Model, path: str | Path) -> None:
     """
     arrays = {f"phones/{key}": array for key, array in hmm_arrays(model.phones).items()}
     arrays |= {f"engine/{key}": array for key, array in model.engine.to_arrays(model.learned).items()}
+    if model.adaptation is not None:
+        arrays |= {f"adaptation/{key}": array for key, array in adaptation_arrays(model.adaptation).items()}
     header = {
         "format": FORMAT,
         "version": VERSION,
@@ -102,7 +107,7 @@ def _shipped() -> Model:
 
 def _read(path: Path) -> Model:
     header = read_header(path)
-    arrays: dict[str, dict[str, NDArray[Any]]] = {"phones": {}, "engine": {}}
+    arrays: dict[str, dict[str, NDArray[Any]]] = {"phones": {}, "engine": {}, "adaptation": {}}
     try:
         for name, array in read_archive(path).items():
             part, _, key = name.partition("/")
@@ -110,12 +115,13 @@ def _read(path: Path) -> Model:
         engine = engine_named(header["engine"], header["configuration"])
         phones = hmm_from_arrays(arrays["phones"], _numbers(header["recogniser"]))
         learned = engine.from_arrays(arrays["engine"])
+        adaptation = adaptation_from_arrays(arrays["adaptation"]) if arrays["adaptation"] else None
     except ModelFormatError as error:
         raise ModelFormatError(f"{path}: {error}") from error
     except UNREADABLE as error:
         raise ModelFormatError(f"{path}: the model is damaged ({error}); train or download it again") from error
     about = {key: value for key, value in header.items() if key not in _OWN_KEYS}
-    return Model(phones, engine, learned, about)
+    return Model(phones, engine, learned, about, adaptation)
 
 
 def _numbers(options: Mapping[str, Any]) -> HmmConfig:

@@ -19,6 +19,8 @@ HOP = 160  # 10 ms
 FFT_SIZE = 512
 FILTERS = 26
 CEPSTRA = 12
+FEATURES = 39
+"""12 cepstra and the log energy, their Δ and ΔΔ."""
 LOG_ENERGY = 12
 """The column of the features that holds the log energy."""
 LIFTER = 22

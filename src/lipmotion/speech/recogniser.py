@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
+from lipmotion.speech.adaptation import Adaptation
 from lipmotion.speech.general.front_end import general_features
 from lipmotion.speech.joint import NOISES, Joint, joined, joint_evidence
 from lipmotion.speech.mfcc import LOG_ENERGY, log_energy
@@ -36,16 +37,18 @@ SHORT_PAUSE_S = 0.2
 class Recogniser:
     """Forced alignment and recognition with a model's own phone models and those of many voices.
 
-    own  : the phone models of a corpus
-    kind : one of ``KINDS``
+    own        : the phone models of a corpus
+    kind       : one of ``KINDS``
+    adaptation : how they hear the voice that they were adapted to, if they were
     Raises InputError: another kind.
     """
 
-    def __init__(self, own: UnitHmm, kind: str = "auto"):
+    def __init__(self, own: UnitHmm, kind: str = "auto", adaptation: Adaptation | None = None):
         if kind not in KINDS:
             raise InputError(f"unknown recogniser {kind!r}; required one of: {', '.join(KINDS)}")
         self.own = own
         self.kind = kind
+        self.adaptation = adaptation
 
     def recognise(self, audio: Audio, features: Features) -> Timeline[Unit]:
         """Return the phones that were most probably said, in time: Viterbi with a back-off bigram.
@@ -85,13 +88,26 @@ class Recogniser:
         ]
         return _timeline(labels, bounds, features.duration_s)
 
+    def densities(self, audio: Audio, features: Features) -> NDArray[np.intp]:
+        """Return which density was most probably heard in each frame [shape=(T,)].
+
+        They are those of ``joint``, of the kind ``own`` those of its own models. In digital silence it is silence.
+        Raises MissingDependencyError: as ``recognise``.
+        """
+        if not features.values.any():
+            return np.full(len(features.values), self.own.table.density(SILENCE, 0), np.intp)
+        _, evidence = self._evidence(audio, features)
+        network = self._loop.network
+        return network.emission[network.best_path(evidence)]
+
     @cached_property
-    def _joint(self) -> Joint:
+    def joint(self) -> Joint:
+        """The own models with all phones. Raises MissingDependencyError: pocketsphinx is not installed."""
         return joined(self.own)
 
     @cached_property
     def _loop(self) -> UnitLoop:
-        hmm = self.own if self.kind == "own" else self._joint.hmm
+        hmm = self.own if self.kind == "own" else self.joint.hmm
         return unit_loop(hmm, [unit for unit in hmm.table.units if unit != PAUSE])
 
     def _evidence(self, audio: Audio, features: Features) -> tuple[UnitHmm, Evidence]:
@@ -99,19 +115,29 @@ class Recogniser:
         return hmm, always_silent(hmm, evidence, quiet_frames(log_energy(audio.samples)))
 
     def _said(self, audio: Audio, features: Features) -> tuple[UnitHmm, Evidence]:
-        if self.kind == "general":
-            return self._joint.hmm, joint_evidence(self._joint, features.values, 0.0, general_features(audio))
-        voice = fitted(self.own, audio, features)
         if self.kind == "own":
-            return self.own, heard(self.own, voice.features.values)
-        trust = min(max((voice.fit - FOREIGN) / (FAMILIAR - FOREIGN), 0.0), 1.0)
-        return self._joint.hmm, joint_evidence(self._joint, voice.features.values, trust, general_features(audio))
+            return self.own, heard(self.own, self._own_features(audio, features)[0])
+        general = general_features(audio) if self.adaptation is None else self.adaptation.general_features(audio)
+        own, trust = (features.values, 0.0) if self.kind == "general" else self._own_features(audio, features)
+        return self.joint.hmm, joint_evidence(self.joint, own, trust, general)
+
+    def _own_features(self, audio: Audio, features: Features) -> tuple[NDArray[np.float32], float]:
+        """Return what the own models hear, and how far they know it, from 0 to 1."""
+        if self.adaptation is not None:
+            return self.adaptation.own_features(audio, features), self.adaptation.trust
+        voice = fitted(self.own, audio, features)
+        return voice.features.values, trusted(voice.fit)
 
 
 @lru_cache(maxsize=4)
-def recogniser(own: UnitHmm, kind: str = "auto") -> Recogniser:
+def recogniser(own: UnitHmm, kind: str = "auto", adaptation: Adaptation | None = None) -> Recogniser:
     """Return the recogniser of some models; the last few are kept with the networks that they search."""
-    return Recogniser(own, kind)
+    return Recogniser(own, kind, adaptation)
+
+
+def trusted(fit: float) -> float:
+    """Return how far own models that fit a recording so well (``Voice.fit``) are heard beside the general ones."""
+    return min(max((fit - FOREIGN) / (FAMILIAR - FOREIGN), 0.0), 1.0)
 
 
 def _timeline(labels: list[tuple[str, str]], bounds: NDArray[np.intp], duration_s: float) -> Timeline[Unit]:

@@ -9,7 +9,7 @@ from pocketsphinx import Decoder
 from lipmotion.errors import InputError, MissingDependencyError
 from lipmotion.pipeline.toy import ToySentence
 from lipmotion.speech.general import acoustic
-from lipmotion.speech.general.acoustic import GAUSSIANS, PHONES, STATES, column, general_model
+from lipmotion.speech.general.acoustic import GAUSSIANS, PHONES, STATES, STREAMS, column, general_model
 from lipmotion.speech.general.front_end import general_features
 from lipmotion.speech.general.language import english_bigram
 from lipmotion.speech.synthesise import synthesise
@@ -132,3 +132,11 @@ def test_pocketsphinx_s_own_alignment_agrees(toy_sentence: ToySentence) -> None:
     units = ["sil", *(name for name, _ in theirs), "sil"]
     bounds = align_units(joint.hmm, joint_evidence(joint, general, 0.0, general), units)[1:-2] / 100
     assert np.median(np.abs(bounds - [start_s for _, start_s in theirs])) <= 0.03
+
+
+def test_the_densities_of_its_streams_are_mixtures() -> None:
+    model, x = general_model(), np.random.default_rng(0).normal(0, 2, (5, 39)).astype(np.float32)
+    total = sum(model.mixtures(n).log_likelihood(x[:, stream]) for n, stream in enumerate(STREAMS))
+    expected = total - total.max(axis=1, keepdims=True)
+    near = expected > -60  # beyond, products of tiny shares are floored
+    np.testing.assert_allclose(model.log_density(x)[near], expected[near], atol=0.02)

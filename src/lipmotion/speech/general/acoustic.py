@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import MissingDependencyError
+from lipmotion.stats.mixture import Mixtures
 from lipmotion.units.lexicon import english_data
 
 PHONES = (
@@ -52,6 +53,13 @@ class GeneralModel:
                 total += self._stream(number, frames[:, stream])
             result[start : start + BLOCK] = total - total.max(axis=1, keepdims=True)
         return result
+
+    def mixtures(self, stream: int) -> Mixtures:
+        """Return the densities of all states in one stream [G = P·3, M = 128, D = 13]."""
+        pulls, halves = self.forms[stream].reshape(2, -1, len(PHONES), GAUSSIANS).transpose(0, 2, 3, 1)
+        means, variances = (np.repeat(values, STATES, axis=0) for values in (pulls / (-2 * halves), 1 / (-2 * halves)))
+        weights = self.weights[stream].transpose(0, 2, 1).reshape(-1, GAUSSIANS)
+        return Mixtures(np.log(np.maximum(weights, np.float32(1e-30))), means, variances)
 
     def _stream(self, number: int, x: NDArray[np.float32]) -> NDArray[np.float32]:
         logs = np.concatenate([x, x * x], axis=1) @ self.forms[number] + self.constants[number]

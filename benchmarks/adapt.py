@@ -1,0 +1,130 @@
+"""Adaptation to strangers from untranscribed recordings: phone accuracy and lip motion before and after.
+
+    python benchmarks/adapt.py [--corpora FOLDER] [--model FILE]
+
+speech-open : recordings with transcripts; where there are several of a voice, it is adapted to all but the one judged,
+              else to that recording itself; the phones wanted are those of the transcript's alignment
+grid-others : one clip a speaker, adapted to that clip itself, untranscribed; correlation of opening with its track
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+from robust import SPOKEN, edits, show, spoken
+
+from lipmotion import adapt, animate, load_model
+from lipmotion.corpora.grid import sentence
+from lipmotion.errors import InputError
+from lipmotion.pipeline.model import Model
+from lipmotion.speech.mfcc import mfcc
+from lipmotion.speech.read import read_audio
+from lipmotion.speech.recogniser import KINDS, Recogniser
+from lipmotion.types import Audio
+from lipmotion.units import Lexicon, words_of
+from lipmotion.vision.track import track
+
+VOICES = {
+    "LibriVox reader, the 4 others": tuple(name for name in SPOKEN if name.startswith("sense_and")),
+    "two of one man, the other": ("acoustic_corpus.wav", "cold_corpus.wav"),
+    "itself": tuple(name for name in SPOKEN if name.startswith(("61-", "common"))),
+}
+"""Recordings by what each is adapted to."""
+
+
+def main() -> None:
+    """Print one JSON object a figure."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--corpora", type=Path, default=Path("../shared/corpora"))
+    parser.add_argument("--model", type=Path, help="default: the one that ships")
+    options = parser.parse_args()
+    model = load_model(options.model)
+    strangers(options.corpora / "speech-open", model)
+    others(options.corpora / "grid-others", model)
+
+
+def strangers(folder: Path, model: Model) -> None:
+    """Recognise what has a transcript."""
+    total: dict[str, list[tuple[int, int]]] = {}
+    for name, files in VOICES.items():
+        audios = [read_audio(folder / file) for file in files]
+        wanted = [phones_of(model, folder / file) for file in files]
+        found: dict[str, list[tuple[int, int]]] = {}
+        for i, audio in enumerate(audios):
+            learned = [audio] if name == "itself" else [other for j, other in enumerate(audios) if j != i]
+            for key, errors in judged(model, adapted_if_possible(model, learned), audio, wanted[i]).items():
+                found.setdefault(key, []).append((errors, len(wanted[i])))
+        for key, pairs in found.items():
+            total.setdefault(key, []).extend(pairs)
+        show(f"speech-open, adapted to {name}", **accuracies(found))
+    show("speech-open, all", **accuracies(total))
+
+
+def adapted_if_possible(model: Model, recordings: list[Audio]) -> Model:
+    """Return an adapted model; where there is too little speech, the model as it is."""
+    try:
+        return adapt(model, recordings)
+    except InputError as error:
+        show("speech-open, not adapted", reason=str(error))
+        return model
+
+
+def judged(model: Model, adapted: Model, audio: Audio, wanted: list[str]) -> dict[str, int]:
+    """Return the errors of every recogniser before and after."""
+    features = mfcc(audio)
+    return {
+        f"{kind} {when}": edits(
+            wanted,
+            spoken(
+                span.label.phone for span in Recogniser(one.phones, kind, one.adaptation).recognise(audio, features)
+            ),
+        )
+        for kind in KINDS
+        for when, one in (("before", model), ("after", adapted))
+    }
+
+
+def phones_of(model: Model, path: Path) -> list[str]:
+    """Return the phones of a recording's transcript, as the general models hear them pronounced."""
+    text = path.with_suffix(".txt")
+    words = words_of((text if text.exists() else path.with_suffix(".lab")).read_text())
+    audio = read_audio(path)
+    aligned = Recogniser(model.phones, "general").align(audio, mfcc(audio), words, Lexicon())
+    return spoken(span.label.phone for span in aligned)
+
+
+def accuracies(found: dict[str, list[tuple[int, int]]]) -> dict[str, object]:
+    """Return phone accuracies, and how many phones they are of."""
+    count = sum(phones for _, phones in next(iter(found.values())))
+    values = {key: round(1 - sum(errors for errors, _ in pairs) / count, 3) for key, pairs in found.items()}
+    return {"phones": count, **values}
+
+
+def others(folder: Path, model: Model) -> None:
+    """Animate five GRID speakers."""
+    figures: dict[str, dict[str, float]] = {}
+    errors: dict[str, list[tuple[int, int]]] = {}
+    for clip in sorted(folder.glob("*.mpg")):
+        tracked, audio = track(clip, crops=False), read_audio(clip)
+        adapted, words = adapt(model, [audio]), " ".join(sentence(clip.stem) or ())
+        aligned = Recogniser(model.phones, "general").align(audio, mfcc(audio), words.split(), Lexicon())
+        wanted = spoken(span.label.phone for span in aligned)
+        for key, count in judged(model, adapted, audio, wanted).items():
+            errors.setdefault(key, []).append((count, len(wanted)))
+        for kind in ("auto", "own"):
+            for when, one in (("before", model), ("after", adapted)):
+                for condition, text in (("audio only", None), ("with transcript", words)):
+                    motion = animate(clip, transcript=text, model=one, recogniser=kind).motion
+                    generated = np.interp(tracked.motion.time_s, motion.time_s, motion["opening"])[tracked.seen]
+                    seen = tracked.motion["opening"][tracked.seen]
+                    row = figures.setdefault(f"{kind}, {condition}, {when}", {})
+                    row[clip.stem] = round(float(np.corrcoef(generated, seen)[0, 1]), 3)
+    show("grid-others, adapted to itself: phones", **accuracies(errors))
+    for key, row in figures.items():
+        show(f"grid-others, {key}: ACC opening", mean=round(float(np.mean(list(row.values()))), 3), **row)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,62 @@
+from __future__ import annotations
+
+import wave
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cli.conftest import Run, is_one_error
+from lipmotion.pipeline.adapt import adapt
+from lipmotion.pipeline.model import load_model, save_model
+
+
+def sound(path: Path, samples: np.ndarray) -> Path:
+    with wave.open(str(path), "wb") as file:
+        file.setnchannels(1)
+        file.setsampwidth(2)
+        file.setframerate(16_000)
+        file.writeframes(np.round(samples * 32767).astype("<i2").tobytes())
+    return path
+
+
+def test_it_is_the_function_of_the_same_name(run: Run, here: Path, toy_speech: Path, toy_model_file: Path) -> None:
+    done = run("adapt", toy_speech, "--model", toy_model_file, "-o", "voice.lipmotion")
+    assert (done.code, done.err) == (0, [])
+    assert done.out[0].startswith("voice.lipmotion: 1 recordings, ")
+    assert done.out[0].endswith("s of speech; use it: lipmotion animate SPEECH -o FILE --model voice.lipmotion")
+    save_model(adapt(load_model(toy_model_file), [toy_speech]), here / "same")
+    assert (here / "same").read_bytes() == (here / "voice.lipmotion").read_bytes()
+    said = dict(line.split(maxsplit=1) for line in run("info", "voice.lipmotion").out if len(line.split()) > 1)
+    assert said["adapted"].startswith("recordings=1, speech_s=")
+    assert run("animate", toy_speech, "--model", "voice.lipmotion", "-o", "m.json").code == 0
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (None, "no such file"),
+        (b"words", "not a readable recording"),
+        (np.zeros(32_000), "no speech found in the recordings"),
+    ],
+)
+def test_what_cannot_be_adapted_to(
+    run: Run, here: Path, toy_model_file: Path, tmp_path: Path, content: object, words: str
+) -> None:
+    path = tmp_path / "other.wav"
+    if isinstance(content, bytes):
+        path.write_bytes(content)
+    elif content is not None:
+        sound(path, content)
+    done = run("adapt", path, "--model", toy_model_file, "-o", "voice.lipmotion")
+    assert is_one_error(done, 3)
+    assert words in done.err[0]
+    assert list(here.iterdir()) == []
+
+
+def test_a_recording_is_not_overwritten(run: Run, here: Path, toy_speech: Path, toy_model_file: Path) -> None:
+    (here / "a.wav").write_bytes(toy_speech.read_bytes())
+    done = run("adapt", toy_speech, "a.wav", "--model", toy_model_file, "-o", "a.wav")
+    assert is_one_error(done, 7)
+    assert "a.wav: is the recording itself" in done.err[0]
+    assert (here / "a.wav").read_bytes() == toy_speech.read_bytes()

@@ -1,0 +1,51 @@
+"""Affine transforms of features, one frame, Gaussian and row at a time."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from lipmotion.stats.mixture import Mixtures
+
+
+def log_gaussian(x: np.ndarray, mean: np.ndarray, variance: np.ndarray) -> float:
+    return float(-0.5 * (np.log(2 * np.pi * variance) + (x - mean) ** 2 / variance).sum())
+
+
+def log_likelihood(mixtures: Mixtures, features: np.ndarray, densities: np.ndarray, transform: np.ndarray) -> float:
+    """Return the log density of frames before the transform, each under its own mixture behind it."""
+    total = len(features) * np.log(abs(np.linalg.det(transform[:, :-1])))
+    for x, density in zip(features, densities, strict=True):
+        heard = transform[:, :-1] @ x + transform[:, -1]
+        total += np.log(
+            sum(
+                np.exp(weight + log_gaussian(heard, mean, variance))
+                for weight, mean, variance in zip(
+                    mixtures.log_weights[density], mixtures.means[density], mixtures.variances[density], strict=True
+                )
+            )
+        )
+    return float(total)
+
+
+def statistics(
+    mixtures: Mixtures, features: np.ndarray, densities: np.ndarray, transform: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the quadratic and the linear sums [shapes=(D, D + 1, D + 1), (D, D + 1)]."""
+    size = features.shape[1]
+    quadratic, linear = np.zeros((size, size + 1, size + 1)), np.zeros((size, size + 1))
+    for x, density in zip(features, densities, strict=True):
+        heard, extended = transform[:, :-1] @ x + transform[:, -1], np.append(x, 1)
+        shares = np.array(
+            [
+                np.exp(mixtures.log_weights[density, m])
+                * np.exp(log_gaussian(heard, mixtures.means[density, m], mixtures.variances[density, m]))
+                for m in range(mixtures.size[1])
+            ]
+        )
+        shares /= shares.sum()
+        for m, share in enumerate(shares):
+            for row in range(size):
+                precision = share / mixtures.variances[density, m, row]
+                quadratic[row] += precision * np.outer(extended, extended)
+                linear[row] += precision * mixtures.means[density, m, row] * extended
+    return quadratic, linear

@@ -1,0 +1,91 @@
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lipmotion.errors import InputError, ModelFormatError
+from lipmotion.pipeline.adapt import adapt
+from lipmotion.pipeline.animate import animate
+from lipmotion.pipeline.model import Model, load_model, read_header, save_model
+from lipmotion.pipeline.toy import toy_sentences
+from lipmotion.types import Audio
+from pipeline.test_model import npy, rewritten
+
+
+@pytest.fixture(scope="module")
+def adapted(toy_model: Model, toy_speech: Path) -> Model:
+    return adapt(toy_model, [toy_speech, toy_sentences(3)[1].audio])
+
+
+@pytest.fixture(scope="module")
+def adapted_file(adapted: Model, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("adapted") / "adapted.lipmotion"
+    save_model(adapted, path)
+    return path
+
+
+def test_only_what_is_heard_changes(toy_model: Model, adapted: Model) -> None:
+    assert toy_model.adaptation is None
+    assert adapted.adaptation is not None
+    assert adapted.phones is toy_model.phones
+    assert adapted.learned is toy_model.learned
+    told = dict(adapted.about)
+    assert told.pop("adapted")["recordings"] == 2
+    assert told == toy_model.about
+
+
+def test_it_is_used_from_then_on(toy_model: Model, adapted: Model, toy_speech: Path, monkeypatch) -> None:
+    used = []
+    kind = type(adapted.adaptation)
+    plain = kind.own_features
+    monkeypatch.setattr(kind, "own_features", lambda one, *given: used.append(one) or plain(one, *given))
+    for words in (None, "ba"):
+        animate(toy_speech, model=adapted, transcript=words, recogniser="own")
+    assert used == [adapted.adaptation] * 2
+    animate(toy_speech, model=toy_model, recogniser="own")
+    assert len(used) == 2
+
+
+def test_saved_and_loaded_it_hears_the_same(adapted: Model, adapted_file: Path, toy_speech: Path) -> None:
+    again = load_model(adapted_file)
+    assert again.adaptation is not None
+    assert np.array_equal(again.adaptation.own, adapted.adaptation.own)
+    assert np.array_equal(again.adaptation.general, adapted.adaptation.general)
+    assert read_header(adapted_file)["adapted"] == adapted.about["adapted"]
+    before, after = (animate(toy_speech, model=model).units for model in (adapted, again))
+    assert [span.label.phone for span in before] == [span.label.phone for span in after]
+
+
+def test_a_model_without_it_is_written_as_before(toy_model_file: Path) -> None:
+    with zipfile.ZipFile(toy_model_file) as file:
+        assert not [name for name in file.namelist() if name.startswith("adaptation")]
+    assert load_model(toy_model_file).adaptation is None
+
+
+def test_an_earlier_adaptation_is_forgotten(adapted: Model, toy_model: Model, toy_speech: Path) -> None:
+    again, fresh = (adapt(model, [toy_speech]) for model in (adapted, toy_model))
+    assert np.array_equal(again.adaptation.own, fresh.adaptation.own)
+    assert again.about == fresh.about
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"adaptation/own.npy": None},
+        {"adaptation/own.npy": npy(np.zeros((39, 39)))},
+        {"adaptation/numbers.npy": npy(np.array([np.nan, 1.0]))},
+    ],
+)
+def test_a_damaged_adaptation(changes: dict[str, bytes | None], adapted_file: Path, tmp_path: Path) -> None:
+    path = rewritten(adapted_file, tmp_path / "m.lipmotion", changes)
+    with pytest.raises(ModelFormatError, match=r"m.lipmotion: the adaptation is damaged .+ adapt the model again"):
+        load_model(path)
+
+
+@pytest.mark.parametrize("given", [[], "one.wav", Path("one.wav"), Audio(np.zeros(16_000, np.float32), 16_000)])
+def test_a_list_of_recordings_is_required(toy_model: Model, given: object) -> None:
+    with pytest.raises(InputError, match="required: a list of one recording or more"):
+        adapt(toy_model, given)

@@ -1,0 +1,196 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lipmotion.stats.affine import (
+    AffineStatistics,
+    heard_statistics,
+    identity,
+    improved,
+    log_determinant,
+    own_statistics,
+    transformed,
+)
+from lipmotion.stats.mixture import Mixtures
+from oracles import affine as oracle
+
+SIZE = 3
+ALL = np.ones((SIZE, SIZE + 1), bool)
+
+
+def random_mixtures(draw: np.random.Generator, densities: int = 4, gaussians: int = 2, size: int = SIZE) -> Mixtures:
+    shape = (densities, gaussians, size)
+    return Mixtures(
+        np.log(draw.dirichlet(np.ones(gaussians), densities)).astype(np.float32),
+        draw.normal(0, 2, shape).astype(np.float32),
+        draw.uniform(0.3, 1.5, shape).astype(np.float32),
+    )
+
+
+def spoken(draw: np.random.Generator, mixtures: Mixtures, frames: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return features drawn from the mixtures, and the density of each frame."""
+    densities = draw.integers(0, mixtures.size[0], frames)
+    weights = np.exp(mixtures.log_weights.astype(float))
+    chosen = np.array([draw.choice(mixtures.size[1], p=weights[d] / weights[d].sum()) for d in densities], int)
+    noise = draw.normal(size=(frames, mixtures.size[2]))
+    features = mixtures.means[densities, chosen] + noise * np.sqrt(mixtures.variances[densities, chosen])
+    return features.astype(np.float32), densities
+
+
+def random_transform(draw: np.random.Generator, size: int = SIZE) -> np.ndarray:
+    return identity(size) + draw.normal(0, 0.3, (size, size + 1))
+
+
+def gradient(statistics: AffineStatistics, transform: np.ndarray, step: float = 1e-5) -> np.ndarray:
+    slope = np.zeros(transform.shape)
+    for place in np.ndindex(*transform.shape):
+        moved = np.zeros(transform.shape)
+        moved[place] = step
+        difference = statistics.objective(transform + moved) - statistics.objective(transform - moved)
+        slope[place] = difference / (2 * step)
+    return slope
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_statistics_are_those_of_the_sums_written_out(seed: int) -> None:
+    draw = np.random.default_rng(seed)
+    mixtures, transform = random_mixtures(draw), random_transform(draw)
+    features, densities = spoken(draw, mixtures, 20)
+    found, log_likelihood = heard_statistics(mixtures, features, densities, transform)
+    quadratic, linear = oracle.statistics(mixtures, features, densities, transform)
+    assert found.count == 20
+    np.testing.assert_allclose(found.quadratic, quadratic, rtol=1e-4, atol=1e-4)
+    np.testing.assert_allclose(found.linear, linear, rtol=1e-4, atol=1e-4)
+    assert log_likelihood == pytest.approx(oracle.log_likelihood(mixtures, features, densities, transform), abs=1e-3)
+
+
+def test_the_objective_has_the_slope_of_the_likelihood() -> None:
+    """Where the posteriors were computed, both rise alike in every direction."""
+    draw = np.random.default_rng(5)
+    mixtures, transform = random_mixtures(draw), random_transform(draw)
+    features, densities = spoken(draw, mixtures, 20)
+    statistics, _ = heard_statistics(mixtures, features, densities, transform)
+    slope = gradient(statistics, transform)
+    for place in np.ndindex(*transform.shape):
+        moved = np.zeros(transform.shape)
+        moved[place] = 1e-4
+        rise = oracle.log_likelihood(mixtures, features, densities, transform + moved)
+        rise -= oracle.log_likelihood(mixtures, features, densities, transform - moved)
+        assert rise / 2e-4 == pytest.approx(slope[place], rel=1e-2, abs=1e-2)
+
+
+@settings(deadline=None, max_examples=25)
+@given(seed=st.integers(0, 10_000), frames=st.integers(0, 30))
+def test_no_row_lowers_the_objective(seed: int, frames: int) -> None:
+    draw = np.random.default_rng(seed)
+    mixtures, transform = random_mixtures(draw), random_transform(draw)
+    statistics, _ = heard_statistics(mixtures, *spoken(draw, mixtures, frames), transform)
+    statistics += own_statistics(mixtures, np.arange(4)).times(5)
+    values = [statistics.objective(transform)]
+    for _ in range(4):
+        transform = improved(transform, statistics, ALL, sweeps=1)
+        values.append(statistics.objective(transform))
+    assert (np.diff(values) >= -1e-8 * np.abs(values[1:])).all()
+
+
+def test_at_the_end_nothing_rises_any_more() -> None:
+    draw = np.random.default_rng(8)
+    mixtures = random_mixtures(draw)
+    features, densities = spoken(draw, mixtures, 200)
+    statistics, _ = heard_statistics(mixtures, features, densities, identity(SIZE))
+    best = improved(identity(SIZE), statistics, ALL, sweeps=50)
+    assert np.abs(gradient(statistics, best)).max() < 1e-2
+    assert np.abs(gradient(statistics, identity(SIZE))).max() > 1
+
+
+def test_the_likelihood_never_falls() -> None:
+    """Of the frames and of the prior together, over all steps of EM."""
+    draw = np.random.default_rng(2)
+    mixtures = random_mixtures(draw)
+    features, densities = spoken(draw, mixtures, 60)
+    features = transformed(features, random_transform(draw))
+    prior = own_statistics(mixtures, np.arange(4)).times(30)
+    transform, values = identity(SIZE), []
+    for _ in range(12):
+        statistics, log_likelihood = heard_statistics(mixtures, features, densities, transform)
+        values.append(log_likelihood + prior.objective(transform))
+        transform = improved(transform, statistics + prior, ALL)
+    assert (np.diff(values) > -1e-3).all()
+    assert values[-1] > values[0] + 10
+
+
+def test_a_known_distortion_is_undone() -> None:
+    draw = np.random.default_rng(1)
+    mixtures = random_mixtures(draw, densities=8)
+    clean, densities = spoken(draw, mixtures, 4000)
+    distortion = random_transform(draw)
+    features, transform = transformed(clean, distortion), identity(SIZE)
+    _, before = heard_statistics(mixtures, features, densities, transform)
+    for _ in range(30):
+        statistics, _ = heard_statistics(mixtures, features, densities, transform)
+        transform = improved(transform, statistics, ALL)
+    restored = transformed(features, transform)
+    assert np.abs(restored - clean).mean() < 0.1 < np.abs(features - clean).mean()
+    _, after = heard_statistics(mixtures, features, densities, transform)
+    assert after > before + 1000
+    assert log_determinant(transform) == pytest.approx(-log_determinant(distortion), abs=0.1)
+
+
+def test_the_models_own_data_ask_for_no_change() -> None:
+    mixtures = random_mixtures(np.random.default_rng(4))
+    prior = own_statistics(mixtures, np.array([0, 2]))
+    assert prior.count == pytest.approx(1)
+    assert np.abs(gradient(prior, identity(SIZE))).max() < 1e-6
+    np.testing.assert_allclose(improved(identity(SIZE), prior, ALL), identity(SIZE), atol=1e-8)
+    for seed in range(20):
+        other = random_transform(np.random.default_rng(seed))
+        assert prior.objective(other) < prior.objective(identity(SIZE))
+
+
+def test_own_statistics_are_those_of_many_frames_drawn() -> None:
+    draw = np.random.default_rng(6)
+    mixtures = random_mixtures(draw, densities=2, gaussians=1)
+    features, densities = spoken(draw, mixtures, 40_000)
+    found, _ = heard_statistics(mixtures, features, densities, identity(SIZE))
+    expected = own_statistics(mixtures, np.arange(2)).times(40_000)
+    np.testing.assert_allclose(found.quadratic / 40_000, expected.quadratic / 40_000, atol=0.3)
+    np.testing.assert_allclose(found.linear / 40_000, expected.linear / 40_000, atol=0.3)
+
+
+def test_switched_off_gaussians_say_nothing() -> None:
+    mixtures = random_mixtures(np.random.default_rng(4))
+    mixtures.log_weights[:] = [0, -np.inf]
+    alone = Mixtures(mixtures.log_weights[:, :1], mixtures.means[:, :1], mixtures.variances[:, :1])
+    found, wanted = (own_statistics(one, np.arange(4)) for one in (mixtures, alone))
+    np.testing.assert_allclose(found.quadratic, wanted.quadratic)
+    np.testing.assert_allclose(found.linear, wanted.linear)
+
+
+def test_a_prior_holds_a_transform_of_few_frames_back() -> None:
+    draw = np.random.default_rng(9)
+    mixtures = random_mixtures(draw)
+    features, densities = spoken(draw, mixtures, 10)
+    statistics, _ = heard_statistics(mixtures, features + 2, densities, identity(SIZE))
+    prior = own_statistics(mixtures, np.arange(4))
+    moved = [
+        np.abs(improved(identity(SIZE), statistics + prior.times(frames), ALL) - identity(SIZE)).max()
+        for frames in (1, 100, 1e6)
+    ]
+    assert moved[0] > moved[1] > moved[2]
+    assert moved[2] < 1e-3
+
+
+def test_entries_that_are_not_free_stay() -> None:
+    draw = np.random.default_rng(3)
+    mixtures, start = random_mixtures(draw), random_transform(draw)
+    statistics, _ = heard_statistics(mixtures, *spoken(draw, mixtures, 50), start)
+    free = np.eye(SIZE, SIZE + 1, dtype=bool)
+    free[:, -1] = True
+    better = improved(start, statistics, free)
+    assert np.array_equal(better[~free], start[~free])
+    assert statistics.objective(better) > statistics.objective(start)
+    slope = gradient(statistics, improved(start, statistics, free, sweeps=60))
+    assert np.abs(slope[free]).max() < 1e-2 < np.abs(slope[~free]).max()
