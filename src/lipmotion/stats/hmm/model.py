@@ -20,7 +20,7 @@ class HmmConfig:
     """How unit models are built and trained.
 
     states       : states per unit, left to right, no skips
-    mixtures     : Gaussians per state (a power of two)
+    mixtures     : most Gaussians per state (a power of two); with little speech there are fewer
     context_frames : least frames of data for a state in context to get a density of its own
     relevance    : frames that the density without context counts for, per Gaussian, in one with context
     iterations   : embedded Baum–Welch iterations per stage

@@ -58,6 +58,9 @@ class _State:
     said: tuple[tuple[str, ...], ...]
 
 
+FRAMES_A_GAUSSIAN = 25
+"""Mixtures are split while so many frames are left for each Gaussian on the average. With 20 clips of GRID, 2 and not 8
+raise ACC of opening on the validation list from 0.753 to 0.767, audio only; with 50, 4 raise it from 0.840 to 0.855."""
 _Step = Callable[[_State], tuple[_State, float | None]]
 """Gives the next state, and the mean log likelihood per frame (or another figure) if it found one."""
 
@@ -134,8 +137,11 @@ class _Training:
             "flat start": [*again, *again],
             "pronunciations": [self._pronounce_with_pause, *again],
         }
-        count = 1
-        while count < self._config.mixtures:
+        count, frames = 1, sum(map(len, self._data))
+        states = self._config.states * len(
+            {unit for said in self._utterances for word in said.words for unit in word[0]}
+        )
+        while count < self._config.mixtures and frames >= 2 * count * FRAMES_A_GAUSSIAN * states:
             count *= 2
             stages[f"{count} Gaussians"] = [_split, *again]
         stages["pronunciations again"] = [self._pronounce, *again]
