@@ -180,6 +180,12 @@ def test_a_model_with_an_array_cut_short_is_damaged(trained):
             trained.engine.from_arrays(arrays | {name: arrays[name][:-1]})
 
 
+def test_trees_can_be_read(trained):
+    text = trained.engine.trees(trained.model)
+    assert "leaf (" in text
+    assert max(map(len, text.splitlines())) < 200
+
+
 @pytest.mark.parametrize("phone", PHONES)
 def test_every_phone_of_the_inventory_resolves(trained, phone):
     result = trained.generate(speech(timeline(("aa", phone, "zh", phone))))

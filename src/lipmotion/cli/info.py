@@ -10,14 +10,19 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb."""
     parser = verbs.add_parser("info", help="say what a model is, and whose recordings it comes from")
     parser.add_argument("model", type=Path, nargs="?", help="default: the model that ships with the package")
+    parser.add_argument("--trees", action="store_true", help="print its decision trees, and nothing else")
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:
     """Print the model's header."""
-    from lipmotion.pipeline.model import read_header, shipped_path
+    from lipmotion.pipeline.model import load_model, read_header, shipped_path
 
     path = options.model or shipped_path()
+    if options.trees:
+        model = load_model(path)
+        print(model.engine.trees(model.learned))
+        return
     header = read_header(path)
     print(f"{'file':14} {path} ({path.stat().st_size / 1e6:.1f} MB)")
     for name, value in header.items():

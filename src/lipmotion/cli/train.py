@@ -19,6 +19,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser.add_argument("--split", default="train", help="train, val, test or all (default: train)")
     parser.add_argument("--speaker", action="append", default=[], metavar="NAME", help="this one only (repeatable)")
     parser.add_argument("--lexicon", type=Path, metavar="FILE", help="pronunciations: WORD PHONE PHONE ... a line")
+    parser.add_argument("--engine", default="trajectory", help="trajectory (default), or joint: the paper's own system")
     parser.add_argument("--units", default="phone", metavar="SET", help=UNITS)
     parser.add_argument("--workers", type=int, help="processes (default: one a core)")
     add_machine_readable(parser)
@@ -42,7 +43,7 @@ def run(options: argparse.Namespace) -> None:
         split = list_or_all(options.split)
         lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
         unit_set(options.units)  # before the long work
-        engine = engine_named("trajectory", {"units": options.units})
+        engine = engine_named(options.engine, {"units": options.units})
         chosen = {"engine": engine, "split": split, "speakers": options.speaker, "lexicon": lexicon, "workers": workers}
         with unfinished_work(options.output) as work:
             model, result = train(Corpus.open(options.corpus), **chosen, monitor=report.hear, work=work)

@@ -45,12 +45,8 @@ class Engine(ABC, Generic[ModelT]):
         Raises CorpusError: no example, or none with motion that was seen.
         """
 
-    def listen(self, model: ModelT, speech: Speech, said: bool) -> Timeline[Unit] | None:  # noqa: ARG002
-        """Return the phones in time as the engine's own models hear them; None where they cannot.
-
-        speech : with its phones, if any are known
-        said   : whether these are the phones of a transcript, which are only placed anew
-        """
+    def listen(self, model: ModelT, speech: Speech) -> Timeline[Unit] | None:  # noqa: ARG002
+        """Return the phones that the engine's own models hear; None where they do not know the voice."""
         return None
 
     @abstractmethod
@@ -59,6 +55,10 @@ class Engine(ABC, Generic[ModelT]):
 
         Raises InputError: a constraint names no channel, or lies outside the recording.
         """
+
+    @abstractmethod
+    def trees(self, model: ModelT) -> str:
+        """Return the decision trees of a model for people to read."""
 
     @abstractmethod
     def to_arrays(self, model: ModelT) -> dict[str, NDArray[Any]]:

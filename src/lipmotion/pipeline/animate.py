@@ -10,7 +10,7 @@ from pathlib import Path
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export.base import MOTION_SUFFIXES, write_motion
 from lipmotion.files import as_text, check_distinct, check_target
-from lipmotion.pipeline.hear import hear, hear_out
+from lipmotion.pipeline.hear import hear, hear_unsaid
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.transcribe import read_transcript, transcribe
 from lipmotion.speech.mfcc import mfcc
@@ -63,11 +63,10 @@ def animate(
         text = read_transcript(transcript) if isinstance(transcript, Path) else transcript
         words = words_of(text) if text is not None else None
         found = partial(transcribe, phones, audio, features, words, lexicon or Lexicon())
-        if recogniser == "general":
+        if words is not None:
             heard = hear(chosen.engine, audio, features, found())
         else:
-            said = found() if words is not None else None
-            heard = hear_out(chosen.engine, chosen.learned, audio, features, said=said, recognise=found)
+            heard = hear_unsaid(chosen.engine, chosen.learned, audio, features, phones, found)
     del audio  # of a long recording it is much
     return chosen.engine.generate(chosen.learned, heard, constraints)
 

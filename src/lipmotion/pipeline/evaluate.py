@@ -16,7 +16,7 @@ from lipmotion.measures import curves
 from lipmotion.measures.bootstrap import interval
 from lipmotion.measures.closures import closed_threshold, closure_figures, phone_closures
 from lipmotion.measures.report import without_nan
-from lipmotion.pipeline.hear import hear, hear_out
+from lipmotion.pipeline.hear import hear, hear_unsaid
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.train import labels_of
 from lipmotion.pipeline.transcribe import report_guesses
@@ -44,7 +44,7 @@ class Recorded:
     closed_under : the opening under which the mouth is closed; None where there is no opening
     reference  : what is spoken, utterance by utterance
     conditions : what an engine is told of that, by name: ``audio only``, ``with transcript``
-    listens    : whether engines may find the phones by models of their own
+    phones     : what found them
     """
 
     utterances: Sequence[Utterance]
@@ -53,7 +53,7 @@ class Recorded:
     closed_under: float | None
     reference: Sequence[Timeline[Unit]]
     conditions: Mapping[str, Sequence[Timeline[Unit]]]
-    listens: bool
+    phones: Recogniser
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +137,7 @@ def recorded(
     conditions = {"audio only": [phones.recognise(u.audio, u.features) for u in heard]}
     if all(utterance.words or utterance.phones for utterance in utterances):
         conditions[WITH_TRANSCRIPT] = reference
-    return Recorded(utterances, compared, still, threshold, reference, conditions, phones.kind != "general")
+    return Recorded(utterances, compared, still, threshold, reference, conditions, phones)
 
 
 def compared_channels(utterances: Sequence[Utterance]) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -184,29 +184,20 @@ def _reference(utterance: Utterance, phones: Recogniser, lexicon: Lexicon) -> Ti
 
 def clips(found: Recorded, condition: str, engine: Engine[ModelT], learned: ModelT) -> list[Clip]:
     """Return what an engine makes of recordings, beside the originals. Raises CorpusError: it has other channels."""
-    rows = zip(found.utterances, found.conditions[condition], found.reference, strict=True)
-    said = condition == WITH_TRANSCRIPT
-    return [
-        _clip(
-            engine,
-            learned,
-            found.channels,
-            utterance,
-            _heard(engine, learned, found, utterance, units, said),
-            reference,
-        )
-        for utterance, units, reference in rows
-    ]
+    made = []
+    for utterance, units, reference in zip(found.utterances, found.conditions[condition], found.reference, strict=True):
+        heard = _heard(engine, learned, found, utterance, units, condition == WITH_TRANSCRIPT)
+        made.append(_clip(engine, learned, found.channels, utterance, heard, reference))
+    return made
 
 
 def _heard(
     engine: Engine[ModelT], learned: ModelT, found: Recorded, utterance: Utterance, units: Timeline[Unit], said: bool
 ) -> Speech:
-    """Return an utterance as ``animate`` would hear it; phones that were labelled by hand stay where they are."""
-    if not found.listens or (said and utterance.phones is not None):
+    """Return an utterance as ``animate`` hears it."""
+    if said:
         return hear(engine, utterance.audio, utterance.features, units)
-    known = units if said else None
-    return hear_out(engine, learned, utterance.audio, utterance.features, said=known, recognise=lambda: units)
+    return hear_unsaid(engine, learned, utterance.audio, utterance.features, found.phones, lambda: units)
 
 
 def _clip(

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 from lipmotion.engines import Engine
+from lipmotion.errors import AlignmentError
 from lipmotion.speech.f0 import log_f0
+from lipmotion.speech.recogniser import Recogniser
 from lipmotion.types import Audio, Features, Speech, Timeline, Unit
-
-NOTHING: Timeline[Unit] = Timeline(())
 
 
 def hear(engine: Engine[Any], audio: Audio, features: Features, units: Timeline[Unit]) -> Speech:
@@ -17,22 +18,24 @@ def hear(engine: Engine[Any], audio: Audio, features: Features, units: Timeline[
     return Speech(features, units, log_f0(audio) if engine.hears_f0 else None)
 
 
-def hear_out(
+def hear_unsaid(
     engine: Engine[Any],
     learned: Any,
     audio: Audio,
     features: Features,
-    *,
-    said: Timeline[Unit] | None,
+    phones: Recogniser,
     recognise: Callable[[], Timeline[Unit]],
 ) -> Speech:
-    """Return a recording with the phones that the engine's own models hear, where they know the voice.
+    """Return a recording whose words are not known, with its phones in time.
 
-    said      : the phones of its transcript, in time, or None
-    recognise : gives its phones where there is no transcript and the engine does not know the voice
+    They are those that the engine's own models hear, if they know the voice, placed by the recogniser as it placed
+    those of the training; else those that ``recognise`` gives.
     """
-    speech = hear(engine, audio, features, NOTHING if said is None else said)
-    units = engine.listen(learned, speech, said is not None)
-    if units is None:
-        units = recognise() if said is None else said
-    return Speech(features, units, speech.log_f0)
+    speech = hear(engine, audio, features, Timeline(()))
+    found = engine.listen(learned, speech) if phones.kind != "general" else None
+    if found is None:
+        return replace(speech, units=recognise())
+    try:
+        return replace(speech, units=phones.place(audio, features, found))
+    except AlignmentError:
+        return replace(speech, units=recognise())

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property, lru_cache
+from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
@@ -99,6 +101,18 @@ class Recogniser:
         _, evidence = self._evidence(audio, features)
         network = self._loop.network
         return network.emission[network.best_path(evidence)]
+
+    def place(self, audio: Audio, features: Features, phones: Timeline[Unit]) -> Timeline[Unit]:
+        """Return phones that others found where these models hear them; pauses between them may come and go.
+
+        Raises AlignmentError: they do not fit into the recording.
+        """
+        names = (span.label.phone for span in phones)
+        runs = [tuple(run) for silent, run in groupby(names, key=is_silent) if not silent]
+        words = [" ".join(run) for run in runs]
+        lexicon = Lexicon({word: (run,) for word, run in zip(words, runs, strict=True)})
+        placed = self.align(audio, features, words, lexicon)
+        return Timeline(tuple(replace(span, label=replace(span.label, word="")) for span in placed))
 
     @cached_property
     def joint(self) -> Joint:

@@ -53,7 +53,7 @@ class TrajectoryConfig:
     full_range : make movements as large as the original's
     closures   : make the lips meet in every p, b and m, whatever their units are
     joint      : train the paper's joint model of speech, F0 and motion as well, if there is speech enough: it finds the
-                 phones of voices that it knows, and places those of transcripts (``listening``)
+                 phones of voices that it knows (``listening``)
     units      : what is modelled: a unit set's name, or a table's (docs/unit-sets.md); training reads the table
     """
 
@@ -128,8 +128,8 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
         frames = sum(int(example.valid.sum()) for example in examples)
         return Fit(model, {"frames": frames, "leaves": len(model.emission.means)})
 
-    def listen(self, model: TrajectoryModel, speech: Speech, said: bool) -> Timeline[Unit] | None:  # noqa: D102
-        return model.listener.phones(speech, said) if model.listener is not None else None
+    def listen(self, model: TrajectoryModel, speech: Speech) -> Timeline[Unit] | None:  # noqa: D102
+        return model.listener.phones(speech) if model.listener is not None else None
 
     def generate(self, model: TrajectoryModel, speech: Speech, constraints: Constraints | None = None) -> Generation:  # noqa: D102
         features = np.asarray(speech.features.values)
@@ -159,6 +159,9 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
             named(speech.units, model.units),
             Trace(tuple(model.emission.source(place, cut) for place in distinct), path),
         )
+
+    def trees(self, model: TrajectoryModel) -> str:  # noqa: D102
+        return "\n\n".join(f"{name}\n{tree.text()}" for name, tree in model.emission.forest.items())
 
     def to_arrays(self, model: TrajectoryModel) -> dict[str, NDArray[Any]]:  # noqa: D102
         return model_arrays(model)

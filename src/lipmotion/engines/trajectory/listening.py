@@ -1,16 +1,15 @@
-"""The joint model finds the phones of voices that it knows, and where they begin."""
+"""The joint model finds the phones of voices that it knows."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.trajectory.joint.align import align
 from lipmotion.engines.trajectory.joint.arrays import joint_arrays, joint_from_arrays
 from lipmotion.engines.trajectory.joint.inventory import Inventory
 from lipmotion.engines.trajectory.joint.labels import in_frames, in_time
@@ -20,7 +19,7 @@ from lipmotion.engines.trajectory.joint.streams import SPEECH, Observed, observe
 from lipmotion.engines.trajectory.joint.train import Transcribed, train_joint
 from lipmotion.errors import AlignmentError
 from lipmotion.stats.checkpoint import Checkpoint
-from lipmotion.types import FRAME_RATE_HZ, Example, Monitor, Span, Speech, Timeline, Unit
+from lipmotion.types import FRAME_RATE_HZ, Example, Monitor, Speech, Timeline, Unit
 from lipmotion.units import UNIT_SETS, is_silent
 
 PHONES = UNIT_SETS["phone"]
@@ -47,31 +46,20 @@ class Listener:
     hmm: JointHmm
     typical: float
 
-    def phones(self, speech: Speech, said: bool) -> Timeline[Unit] | None:
-        """Return the phones in time; None where the voice is not known, or the recording too long.
+    def phones(self, speech: Speech) -> Timeline[Unit] | None:
+        """Return the phones that were most probably said; None where the voice is not known, or the recording too long.
 
-        said : whether the phones of ``speech.units`` are those of a transcript; then they are only placed anew
+        They are placed as this model hears them, which is not how the recogniser places those of a transcript.
         """
         observed = _observed(speech)
         long = observed.frames > LONGEST_S * FRAME_RATE_HZ
         if long or not speech.features.values.any() or _fit(self.hmm, observed) < self.typical + FAMILIAR:
             return None
-        if said:
-            return self.placed(speech)
-        found = _recogniser(self.hmm).recognise(observed)
-        return in_time(found, speech.features.duration_s)
-
-    def placed(self, speech: Speech) -> Timeline[Unit]:
-        """Return the same phones where this model hears them; as they were where they do not fit."""
-        spans = speech.units.spans
         try:
-            path = align(self.hmm, _observed(speech), [PHONES.unit(span.label.phone) for span in spans])
-        except AlignmentError:
-            return speech.units
-        edges = np.clip((path.bounds(len(spans)) - 0.5) / FRAME_RATE_HZ, 0, speech.features.duration_s).tolist()
-        edges[-1] = speech.features.duration_s
-        placed = zip(edges, edges[1:], spans, strict=False)
-        return Timeline(tuple(Span(start_s, end_s, span.label) for start_s, end_s, span in placed))
+            found = _recogniser(self.hmm).recognise(observed)
+        except AlignmentError:  # shorter than any phone
+            return None
+        return in_time(found, speech.features.duration_s)
 
 
 def fit_listener(
@@ -98,13 +86,6 @@ def fit_listener(
         checkpoint.save(_STAGE, kept)
     hmm = joint_from_arrays(kept, CONFIG)
     return Listener(hmm, float(np.mean([_fit(hmm, _observed(example.speech)) for example in examples])))
-
-
-def replaced(listener: Listener, examples: Sequence[Example]) -> list[Example]:
-    """Return the examples with their phones where the listener hears them."""
-    return [
-        replace(example, speech=replace(example.speech, units=listener.placed(example.speech))) for example in examples
-    ]
 
 
 def listener_arrays(listener: Listener) -> dict[str, NDArray[Any]]:

@@ -14,7 +14,7 @@ from lipmotion.engines.trajectory.emission import Emission
 from lipmotion.engines.trajectory.generation_error import minimise_generation_error
 from lipmotion.engines.trajectory.hearing import fit_hearing
 from lipmotion.engines.trajectory.learning import Learning, Observed
-from lipmotion.engines.trajectory.listening import fit_listener, replaced
+from lipmotion.engines.trajectory.listening import fit_listener
 from lipmotion.engines.trajectory.model import TrajectoryModel
 from lipmotion.engines.trajectory.space import fit_space
 from lipmotion.errors import CorpusError
@@ -42,7 +42,6 @@ def fit_trajectory(
     listener = None
     if how.joint:
         listener = fit_listener(examples, values, part_of(monitor, 0, 0.8), checkpoint)
-        examples = replaced(listener, examples) if listener is not None else examples
     monitor = part_of(monitor, 0.8, 1)
     observed = [observed_of(example, x, how.cut) for example, x in zip(examples, values, strict=True)]
     quiet = how.cut.units.silence

@@ -174,6 +174,9 @@ class JointEngine(Engine[JointModel]):
             Trace(_sources(model.hmm, paths[0]), paths[0].frames),
         )
 
+    def trees(self, model: JointModel) -> str:  # noqa: D102
+        return model.hmm.text()
+
     def to_arrays(self, model: JointModel) -> dict[str, NDArray[Any]]:  # noqa: D102
         joint = {f"joint_{name}": array for name, array in joint_arrays(model.hmm).items()}
         return frame_arrays(model.units, model.space, model.closure) | joint
