@@ -20,6 +20,13 @@ def test_a_model_says_whose_recordings_it_comes_from(run: Run, toy_model_file: P
     assert [line.split()[0] for line in done.out[1:]] == list(read_header(toy_model_file))
 
 
+def test_its_trees_can_be_printed(run: Run, toy_model_file: Path) -> None:
+    done = run("info", toy_model_file, "--trees")
+    assert (done.code, done.err) == (0, [])
+    assert done.out[0] == "speech.0"
+    assert sum("leaf (" in line for line in done.out) >= 18
+
+
 def test_the_shipped_model_is_the_default(run: Run) -> None:
     done = run("info")
     assert done.out == run("info", shipped_path()).out

@@ -53,6 +53,13 @@ def test_speakers_are_chosen(run: Run, toy_corpus: Corpus, here: Path) -> None:
     )
 
 
+def test_the_papers_own_system(run: Run, toy_corpus: Corpus, here: Path) -> None:
+    assert run("train", toy_corpus.path, "-o", "joint", "--engine", "joint").code == 0
+    assert load_model(here / "joint").engine.name == "joint"
+    assert run("evaluate", "joint", toy_corpus.path).code == 0
+    assert "motion: " in "\n".join(run("info", "joint", "--trees").out)
+
+
 def test_units_of_a_table_that_is_not_needed_again(run: Run, toy_corpus: Corpus, here: Path) -> None:
     units = unit_set("eVis")
     table = here / "mine.txt"
@@ -78,6 +85,7 @@ def test_units_of_a_table_that_is_not_needed_again(run: Run, toy_corpus: Corpus,
         (["CORPUS", "-o", "m", "--lexicon", "missing"], 3, "missing: no such lexicon file"),
         (["CORPUS", "-o", "m", "--units", "evis"], 3, "no unit set 'evis'; there are: 2vis, sVis, pbVis"),
         (["CORPUS", "-o", "m", "--units", "folder"], 3, "folder: "),
+        (["CORPUS", "-o", "m", "--engine", "joined"], 3, "no engine 'joined'; there are: trajectory, joint"),
     ],
 )
 def test_what_cannot_be_used(
