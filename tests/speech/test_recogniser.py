@@ -187,6 +187,7 @@ def test_an_unknown_kind() -> None:
 def test_the_own_models_are_heard_as_far_as_they_know_the_voice(
     hmm: UnitHmm, sentences: list[ToySentence], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(module, "FEW_GAUSSIANS", 0)
     trusted = []
     real = module.joint_evidence
     monkeypatch.setattr(module, "joint_evidence", lambda *given: trusted.append(given[2]) or real(*given))
@@ -195,6 +196,25 @@ def test_the_own_models_are_heard_as_far_as_they_know_the_voice(
         monkeypatch.setattr(module, "fitted", lambda *_, fit=fit: Voice(mfcc(audio), 1.0, fit))
         recognise(hmm, audio, "auto")
         assert trusted[-1] == pytest.approx(wanted)
+
+
+def test_own_models_that_learned_little_do_not_align(hmm: UnitHmm, sentences: list[ToySentence]) -> None:
+    """They still say what was said; where it was is left to the general models."""
+    assert hmm.mixtures.size[1] <= module.FEW_GAUSSIANS
+    said, lexicon = sentences[0], Lexicon()
+    aligned = align(hmm, said.audio, said.words, lexicon, "auto")
+    assert aligned == align(hmm, said.audio, said.words, lexicon, "general")
+    assert aligned != align(hmm, said.audio, said.words, lexicon, "own")
+    found = recognise(hmm, said.audio, "auto")
+    assert found == Recogniser(hmm, "general").place(said.audio, mfcc(said.audio), found)
+
+
+def test_own_models_that_learned_enough_align_too(
+    hmm: UnitHmm, sentences: list[ToySentence], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "FEW_GAUSSIANS", 0)
+    said, lexicon = sentences[0], Lexicon()
+    assert align(hmm, said.audio, said.words, lexicon, "auto") != align(hmm, said.audio, said.words, lexicon, "general")
 
 
 def test_noises_are_silence_and_silences_are_one(hmm: UnitHmm, monkeypatch: pytest.MonkeyPatch) -> None:

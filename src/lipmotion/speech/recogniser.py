@@ -10,7 +10,7 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError
+from lipmotion.errors import AlignmentError, InputError
 from lipmotion.speech.adaptation import Adaptation
 from lipmotion.speech.general.front_end import general_features
 from lipmotion.speech.joint import NOISES, Joint, joined, joint_evidence
@@ -30,6 +30,10 @@ FOREIGN, FAMILIAR = -9.0, -5.0
 """Own models that explain a recording this much worse than their training data (``Voice.fit``) are not heard at all;
 up to this much worse, as much as the general ones. Another speaker in the same studio costs GRID's models 4 to 6, other
 voices in other rooms 7 to 15."""
+FEW_GAUSSIANS = 2
+"""Own models of so few Gaussians a state learned from less than two minutes: forced alignment is left to the general
+ones then. With 20 clips of GRID that raises ACC of opening on the validation list from 0.767 to 0.786 (audio only),
+from 0.806 to 0.841 (transcripts)."""
 LOUD_FRAMES = 11
 """The energy is averaged over so many frames before it rules silence out."""
 SHORT_PAUSE_S = 0.2
@@ -65,7 +69,13 @@ class Recogniser:
         _, evidence = self._evidence(audio, features)
         phones, bounds = decode_units(self._loop, evidence)
         labels = [(SILENCE if phone in NOISES else phone, "") for phone in phones]
-        return _timeline(labels, bounds, features.duration_s)
+        found = _timeline(labels, bounds, features.duration_s)
+        if self.kind != "auto" or not self._knows_little:
+            return found
+        try:
+            return self.place(audio, features, found)
+        except AlignmentError:
+            return found
 
     def align(self, audio: Audio, features: Features, words: Sequence[str], lexicon: Lexicon) -> Timeline[Unit]:
         """Return the phones of a known transcript in time.
@@ -75,7 +85,7 @@ class Recogniser:
         Raises AlignmentError: the transcript does not fit into the recording.
         Raises MissingDependencyError: as ``recognise``.
         """
-        hmm, evidence = self._evidence(audio, features)
+        hmm, evidence = self._evidence(audio, features, aligning=True)
         evidence = never_silent(hmm, evidence, loud_frames(features.values[:, LOG_ENERGY], LOUD_FRAMES))
         known_words = {word: lexicon.pronunciations(word) for word in set(words)}
         variants = [known_words[word] for word in words]
@@ -124,15 +134,20 @@ class Recogniser:
         hmm = self.own if self.kind == "own" else self.joint.hmm
         return unit_loop(hmm, [unit for unit in hmm.table.units if unit != PAUSE])
 
-    def _evidence(self, audio: Audio, features: Features) -> tuple[UnitHmm, Evidence]:
-        hmm, evidence = self._said(audio, features)
+    @property
+    def _knows_little(self) -> bool:
+        return self.own.mixtures.size[1] <= FEW_GAUSSIANS
+
+    def _evidence(self, audio: Audio, features: Features, aligning: bool = False) -> tuple[UnitHmm, Evidence]:
+        alone = self.kind == "general" or (aligning and self.kind == "auto" and self._knows_little)
+        hmm, evidence = self._said(audio, features, alone)
         return hmm, always_silent(hmm, evidence, quiet_frames(log_energy(audio.samples)))
 
-    def _said(self, audio: Audio, features: Features) -> tuple[UnitHmm, Evidence]:
+    def _said(self, audio: Audio, features: Features, general_alone: bool) -> tuple[UnitHmm, Evidence]:
         if self.kind == "own":
             return self.own, heard(self.own, self._own_features(audio, features)[0])
         general = general_features(audio) if self.adaptation is None else self.adaptation.general_features(audio)
-        own, trust = (features.values, 0.0) if self.kind == "general" else self._own_features(audio, features)
+        own, trust = (features.values, 0.0) if general_alone else self._own_features(audio, features)
         return self.joint.hmm, joint_evidence(self.joint, own, trust, general)
 
     def _own_features(self, audio: Audio, features: Features) -> tuple[NDArray[np.float32], float]:
