@@ -18,3 +18,10 @@ def with_dynamics(values: NDArray[np.float64]) -> NDArray[np.float64]:
     dynamics[1:-1, 1] = (values[2:] - values[:-2]) / 2
     dynamics[1:-1, 2] = values[2:] - 2 * values[1:-1] + values[:-2]
     return dynamics
+
+
+def within(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return which frames hold with both neighbours [shape=(T,)]: those whose dynamics are known."""
+    inner = np.zeros_like(mask)
+    inner[1:-1] = mask[:-2] & mask[1:-1] & mask[2:]
+    return inner

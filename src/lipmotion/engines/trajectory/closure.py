@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.types import FRAME_RATE_HZ, Timeline, Unit
+from lipmotion.types import FRAME_RATE_HZ, Example, Timeline, Unit
 from lipmotion.units import LIP_CLOSING
 
 OPENING = "opening"
@@ -81,3 +81,17 @@ def closing_frames(
         if opening[least] > closure.closed and not any(span.start <= frame < span.stop for frame in taken):
             frames.append(least)
     return frames
+
+
+def learned_closure(
+    names: Sequence[str], values: Sequence[NDArray[np.float64]], examples: Sequence[Example]
+) -> Closure | None:
+    """Return how the lips of some examples close; None where nothing is called ``opening``.
+
+    names  : of the first dimensions of the model's space
+    values : the motion of each example in it [each shape=(T, Q)]
+    """
+    if OPENING not in names:
+        return None
+    masks, timelines = [example.valid for example in examples], [example.speech.units for example in examples]
+    return fit_closure(values, masks, timelines, names.index(OPENING))

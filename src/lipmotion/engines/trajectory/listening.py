@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,7 @@ from lipmotion.engines.trajectory.joint.arrays import joint_arrays, joint_from_a
 from lipmotion.engines.trajectory.joint.inventory import Inventory
 from lipmotion.engines.trajectory.joint.labels import in_frames, in_time
 from lipmotion.engines.trajectory.joint.model import JointConfig, JointHmm
-from lipmotion.engines.trajectory.joint.recognise import JointRecogniser
+from lipmotion.engines.trajectory.joint.recognise import joint_recogniser
 from lipmotion.engines.trajectory.joint.streams import SPEECH, Observed, observe
 from lipmotion.engines.trajectory.joint.train import Transcribed, train_joint
 from lipmotion.errors import AlignmentError
@@ -56,7 +55,7 @@ class Listener:
         if long or not speech.features.values.any() or _fit(self.hmm, observed) < self.typical + FAMILIAR:
             return None
         try:
-            found = _recogniser(self.hmm).recognise(observed)
+            found = joint_recogniser(self.hmm).recognise(observed)
         except AlignmentError:  # shorter than any phone
             return None
         return in_time(found, speech.features.duration_s)
@@ -103,12 +102,6 @@ def listener_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> Listener | None:
     if typical.shape != (1,) or not np.isfinite(typical).all():
         raise ValueError(f"a typical fit of shape {typical.shape}, required one finite number")
     return Listener(joint_from_arrays(own, CONFIG), float(typical[0]))
-
-
-@lru_cache(maxsize=4)
-def _recogniser(hmm: JointHmm) -> JointRecogniser:
-    """Return the recogniser of a model; the last few are kept with the networks that they search."""
-    return JointRecogniser(hmm)
 
 
 def _observed(speech: Speech) -> Observed:

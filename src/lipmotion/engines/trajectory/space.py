@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.errors import CorpusError
 from lipmotion.stats.pca import Pca, fit_pca
-from lipmotion.types import Channel
+from lipmotion.stats.windows import within
+from lipmotion.types import Channel, Example
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,3 +66,18 @@ def fit_space(channels: tuple[Channel, ...], seen: NDArray[np.float64], componen
     is_point = np.array([channel.name[:2] in ("x_", "y_", "z_") for channel in channels])
     points = fit_pca(seen[:, is_point], components) if is_point.any() else None
     return MotionSpace(channels, np.nonzero(~is_point)[0].astype(np.intp), points)
+
+
+def motion_in_space(examples: Sequence[Example], components: int) -> tuple[MotionSpace, list[NDArray[np.float64]]]:
+    """Return the space of some examples' motion, and the motion of each in it [each shape=(T, Q)].
+
+    Raises CorpusError: no motion was seen, or the examples have different channels.
+    """
+    if not any(within(example.valid).any() for example in examples):
+        raise CorpusError(f"none of {len(examples)} examples has motion to learn from; prepare a corpus with faces")
+    found = {example.motion.channels for example in examples}
+    if len(found) > 1:
+        raise CorpusError("the utterances have different motion channels; train on one kind of corpus at a time")
+    seen = np.concatenate([example.motion.values[example.valid] for example in examples])
+    space = fit_space(found.pop(), seen, components)
+    return space, [space.reduce(example.motion.values.astype(float)) for example in examples]

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.trajectory.closure import OPENING, fit_closure
+from lipmotion.engines.trajectory.closure import learned_closure
 from lipmotion.engines.trajectory.contexts import Cut, Place, places
 from lipmotion.engines.trajectory.dynamic_range import fit_gain
 from lipmotion.engines.trajectory.emission import Emission
@@ -16,12 +16,12 @@ from lipmotion.engines.trajectory.hearing import fit_hearing
 from lipmotion.engines.trajectory.learning import Learning, Observed
 from lipmotion.engines.trajectory.listening import fit_listener
 from lipmotion.engines.trajectory.model import TrajectoryModel
-from lipmotion.engines.trajectory.space import fit_space
+from lipmotion.engines.trajectory.space import motion_in_space
 from lipmotion.errors import CorpusError
 from lipmotion.stats.checkpoint import NOTHING_KEPT, Checkpoint
 from lipmotion.stats.trees import Question, Tree, gaussian_likelihood, grow
-from lipmotion.stats.windows import with_dynamics
-from lipmotion.types import Channel, Example, Monitor, Progress, part_of
+from lipmotion.stats.windows import with_dynamics, within
+from lipmotion.types import Example, Monitor, Progress, part_of
 
 Array = NDArray[np.float64]
 LEAST_VARIANCE_SHARE, LEAST_VARIANCE = 1e-3, 1e-12
@@ -35,10 +35,7 @@ def fit_trajectory(
 
     Raises CorpusError: no example with motion that was seen in speech, or examples of different channels.
     """
-    channels = _common_channels(examples)
-    seen = np.concatenate([example.motion.values[example.valid] for example in examples])
-    space = fit_space(channels, seen, how.components)
-    values = [space.reduce(example.motion.values.astype(float)) for example in examples]
+    space, values = motion_in_space(examples, how.components)
     listener = None
     if how.joint:
         listener = fit_listener(examples, values, part_of(monitor, 0, 0.8), checkpoint)
@@ -59,35 +56,16 @@ def fit_trajectory(
         emission = minimise_generation_error(emission, observed, how)
     gain = fit_gain(emission, observed, how)
     monitor(Progress(_STAGE, 3, 3, 1.0))
-    closure = None
-    if OPENING in space.direct_names:
-        masks, timelines = [e.valid for e in examples], [e.speech.units for e in examples]
-        closure = fit_closure(values, masks, timelines, space.direct_names.index(OPENING))
+    closure = learned_closure(space.direct_names, values, examples)
     return TrajectoryModel(how.cut.units, space, emission, gain, closure, listener)
 
 
 _STAGE = "trees"
 
 
-def _common_channels(examples: Sequence[Example]) -> tuple[Channel, ...]:
-    if not any(_inner(example.valid).any() for example in examples):
-        raise CorpusError(f"none of {len(examples)} examples has motion to learn from; prepare a corpus with faces")
-    found = {example.motion.channels for example in examples}
-    if len(found) > 1:
-        raise CorpusError("the utterances have different motion channels; train on one kind of corpus at a time")
-    return found.pop()
-
-
-def _inner(valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return the frames that were seen with both neighbours: those whose dynamics are known."""
-    inner = np.zeros_like(valid)
-    inner[1:-1] = valid[:-2] & valid[1:-1] & valid[2:]
-    return inner
-
-
 def observed_of(example: Example, values: Array, cut: Cut) -> Observed:
     """Return what training needs of an example, whose motion in the model's space is ``values`` [shape=(T, Q)]."""
-    frames = np.nonzero(_inner(example.valid))[0]
+    frames = np.nonzero(within(example.valid))[0]
     where = places(example.speech.units, len(values), cut)
     features = np.asarray(example.speech.features.values)
     dynamics = with_dynamics(values)[frames].astype(np.float32)

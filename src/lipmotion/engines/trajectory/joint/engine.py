@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from functools import lru_cache
 from typing import Any, ClassVar, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.base import Arrays, Engine, Fit
-from lipmotion.engines.trajectory.closure import OPENING, Closure, closing_spans, fit_closure
+from lipmotion.engines.trajectory.closure import Closure, closing_spans, learned_closure
 from lipmotion.engines.trajectory.contexts import named
 from lipmotion.engines.trajectory.frame import frame_arrays, frame_from_arrays
 from lipmotion.engines.trajectory.generation import Statistics, generated_motion, resolved
@@ -21,10 +20,10 @@ from lipmotion.engines.trajectory.joint.generate import densities_along, densiti
 from lipmotion.engines.trajectory.joint.inventory import Inventory
 from lipmotion.engines.trajectory.joint.labels import in_frames, in_time
 from lipmotion.engines.trajectory.joint.model import JointConfig, JointHmm
-from lipmotion.engines.trajectory.joint.recognise import JointRecogniser
+from lipmotion.engines.trajectory.joint.recognise import joint_recogniser
 from lipmotion.engines.trajectory.joint.streams import MOTION, Observed, StreamWeights, observe
 from lipmotion.engines.trajectory.joint.train import Transcribed, train_joint
-from lipmotion.engines.trajectory.space import MotionSpace, fit_space
+from lipmotion.engines.trajectory.space import MotionSpace, motion_in_space
 from lipmotion.errors import CorpusError, InputError, ModelFormatError
 from lipmotion.stats.checkpoint import NOTHING_KEPT, Checkpoint
 from lipmotion.types import (
@@ -131,16 +130,13 @@ class JointEngine(Engine[JointModel]):
         checkpoint: Checkpoint = NOTHING_KEPT,  # noqa: ARG002 - a matter of two minutes
     ) -> Fit[JointModel]:
         units = unit_set(self.config.units)
-        space, values = _reduced(examples, self.config.components)
+        space, values = motion_in_space(examples, self.config.components)
         utterances = [self._transcribed(one, x, units) for one, x in zip(examples, values, strict=True)]
         if all(set(utterance.units) <= set(units.silence) for utterance in utterances):
             raise CorpusError(f"nothing is said in {len(examples)} examples; learn from speech")
         inventory = Inventory(units.units, units.silence[:1] + _also_silent(units), self.config.states)
         hmm = train_joint(utterances, inventory, units.classes(), self.config.joint, monitor)
-        closure = None
-        if OPENING in space.direct_names:
-            column = space.direct_names.index(OPENING)
-            closure = fit_closure(values, [e.valid for e in examples], [e.speech.units for e in examples], column)
+        closure = learned_closure(space.direct_names, values, examples)
         figures = {f"leaves_{name}": float(part.forest.size) for name, part in hmm.parts.items()}
         frames = sum(int(example.valid.sum()) for example in examples)
         return Fit(JointModel(units, space, hmm, closure), {"frames": frames, **figures})
@@ -206,31 +202,13 @@ class JointEngine(Engine[JointModel]):
     def _recognised(
         self, model: JointModel, observed: Observed, duration_s: float
     ) -> tuple[Timeline[Unit], list[StatePath]]:
-        recogniser = _recogniser(model.hmm)
+        recogniser = joint_recogniser(model.hmm)
         said = recogniser.recognise(observed)
         spoken = in_time(said, duration_s, lambda unit: model.units.phones(unit)[0])
         if self.config.paths > 1:
             return spoken, recogniser.sampled_paths(observed, self.config.paths, self.config.seed)
         bounds = np.array([*(one.first for one in said), observed.frames])
         return spoken, [align(model.hmm, observed, [one.unit for one in said], bounds)]
-
-
-@lru_cache(maxsize=4)
-def _recogniser(hmm: JointHmm) -> JointRecogniser:
-    """Return the recogniser of a model; the last few are kept with the networks that they search."""
-    return JointRecogniser(hmm)
-
-
-def _reduced(examples: Sequence[Example], components: int) -> tuple[MotionSpace, list[NDArray[np.float64]]]:
-    """Return the space of the motion, and every example's in it. Raises CorpusError: none was seen, or of two kinds."""
-    seen = [example.motion.values[example.valid] for example in examples if example.valid.any()]
-    if not seen:
-        raise CorpusError(f"none of {len(examples)} examples has motion to learn from; prepare a corpus with faces")
-    found = {example.motion.channels for example in examples}
-    if len(found) > 1:
-        raise CorpusError("the utterances have different motion channels; train on one kind of corpus at a time")
-    space = fit_space(found.pop(), np.concatenate(seen), components)
-    return space, [space.reduce(example.motion.values.astype(float)) for example in examples]
 
 
 def _also_silent(units: UnitSet) -> tuple[str, ...]:

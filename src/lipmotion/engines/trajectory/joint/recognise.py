@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -195,3 +195,9 @@ def _as_plain(hmm: JointHmm, states: _States) -> UnitHmm:
     mixtures = hmm.parts[SPEECH].tied.mixtures.picked(states.leaves[SPEECH][states.column])
     bigram = Bigram(hmm.inventory.names, hmm.bigram.log_probability)
     return UnitHmm(config, states.table, mixtures, hmm.log_stay.astype(np.float32), bigram)
+
+
+@lru_cache(maxsize=4)
+def joint_recogniser(hmm: JointHmm) -> JointRecogniser:
+    """Return the recogniser of a model; the last few are kept with the networks that they search."""
+    return JointRecogniser(hmm)

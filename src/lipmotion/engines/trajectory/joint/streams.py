@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.stats.windows import with_dynamics
+from lipmotion.stats.windows import with_dynamics, within
 
 SPEECH, MOTION = "speech", "motion"
 F0_STREAMS = ("f0", "f0_slope", "f0_curvature")
@@ -138,10 +138,3 @@ def motion_stream(motion: NDArray[np.float64], seen: NDArray[np.bool_]) -> Strea
     known = within(np.asarray(seen, bool))
     dynamics = with_dynamics(np.where(seen[:, None], motion, 0.0)).reshape(len(motion), -1)
     return Stream(np.where(known[:, None], dynamics, 0.0), known)
-
-
-def within(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return which frames hold with both neighbours [shape=(T,)]: those whose dynamics are known."""
-    inner = np.zeros_like(mask)
-    inner[1:-1] = mask[:-2] & mask[1:-1] & mask[2:]
-    return inner
