@@ -115,3 +115,70 @@ def test_inputs_stay_as_they_were():
     network_posteriors(log_emission, **arrays)
     assert np.array_equal(log_emission, copies[0])
     assert all(np.array_equal(arrays[name], copy) for name, copy in copies[1].items())
+
+
+def chained(seed: int, frames: int, spread: float, chains: int = 2):
+    """A loop of phones whose densities are products: expectation, factors, and the density of each place in each."""
+    arrays, _ = phone_loop(seed)
+    expectation = Expectation.of(**{name: values for name, values in arrays.items() if name != "emission"})
+    draw = np.random.default_rng([seed, 2])
+    factors = [draw.normal(-20, spread, (frames, 4 + chain)) for chain in range(chains)]
+    columns = [draw.integers(4 + chain, size=len(arrays["emission"])) for chain in range(chains)]
+    return expectation, factors, columns
+
+
+def joint_of(factors, columns) -> np.ndarray:
+    return sum(factor[:, column].astype(float) for factor, column in zip(factors, columns, strict=True))
+
+
+@given(seed=st.integers(0, 1000), chains=st.integers(1, 3), spread=st.sampled_from([0.1, 4.0, 1e2, 1e3, 1e5]))
+@SHARED
+def test_densities_of_chains_are_as_their_products(seed, chains, spread):
+    expectation, factors, columns = chained(seed, 30, spread, chains)
+    masked = np.random.default_rng(seed).random(factors[0].shape) < 0.1
+    factors[0][masked] = -np.inf
+    frames = np.array([12, 18])
+    found = expectation.over_chains(factors, columns, frames)
+    log_emission = joint_of(factors, columns)
+    wanted = expectation.over(log_emission, np.arange(log_emission.shape[1]), frames)
+    tolerance = 1e-10 if spread < 1e4 else 1e-7
+    assert found.posterior == pytest.approx(wanted.posterior, abs=tolerance)
+    assert found.counts == pytest.approx(wanted.counts, abs=30 * tolerance)
+    assert found.log_likelihood == pytest.approx(wanted.log_likelihood, abs=1e-8 if spread < 1e4 else 1e-4)
+
+
+def test_densities_of_chains_agree_with_the_enumeration_of_all_paths():
+    arrays, arcs = random_network(5, states=4, densities=4, density_of_arcs=0.5)
+    arrays["emission"] = np.arange(4)
+    expectation = Expectation.of(**{name: values for name, values in arrays.items() if name != "emission"})
+    draw = np.random.default_rng(5)
+    factors, columns = [draw.normal(0, 3, (5, n)) for n in (3, 2)], [np.array([0, 1, 2, 0]), np.array([1, 0, 0, 1])]
+    order, place = expectation.layout.order, expectation.layout.place
+    found = expectation.over_chains(factors, [column[order] for column in columns], np.array([5]))
+    ends = arrays["log_initial"].astype(float), arrays["log_final"].astype(float)
+    exact = {arc: float(log) for arc, log in arcs.items()}
+    wanted, counts, log_likelihood = networks.posteriors(joint_of(factors, columns), np.arange(4), exact, *ends)
+    assert found.posterior[:, place] == pytest.approx(wanted, abs=1e-10)
+    assert found.counts == pytest.approx([counts[arc] for arc in sorted(arcs, key=lambda arc: arc[1])], abs=1e-10)
+    assert found.log_likelihood[0] == pytest.approx(log_likelihood, abs=1e-9)
+
+
+@pytest.mark.parametrize("spread", [1.0, 30.0, 1e3])
+def test_single_precision_of_chains_is_close(spread):
+    expectation, factors, columns = chained(7, 60, spread)
+    factors = [factor.astype(np.float32) for factor in factors]
+    found = expectation.over_chains(factors, columns, np.array([60]))
+    exact = expectation.over_chains([factor.astype(float) for factor in factors], columns, np.array([60]))
+    assert found.posterior.dtype == np.float32
+    assert found.posterior == pytest.approx(exact.posterior, abs=1e-4)
+    assert found.log_likelihood == pytest.approx(exact.log_likelihood, rel=1e-6)
+
+
+def test_chains_that_allow_nothing_together_have_no_path():
+    expectation, factors, columns = chained(8, 5, 1.0)
+    for factor in factors:
+        factor[2] = -np.inf
+    found = expectation.over_chains(factors, columns, np.array([5]))
+    assert found.log_likelihood[0] == -np.inf
+    assert not found.posterior.any()
+    assert not found.counts.any()

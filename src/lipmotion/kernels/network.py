@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -97,31 +98,67 @@ class Expectation(NamedTuple):
         columns      : [shape=(S,)], the density of the state at each place
         frames       : [shape=(U,)], of each recording
         """
-        edges = np.append(0, np.cumsum(frames))
-        if numba_works():
-            expected = self._compiled(log_emission, columns, edges)
-        else:
-            posterior = np.zeros((len(log_emission), len(columns)), log_emission.dtype)
+        if not numba_works():
+            return self._over([log_emission], [columns], frames, None)
+        root, best = _roots(log_emission)
+        if not np.array_equal(columns, np.arange(root.shape[1])):
+            root = root.take(columns, axis=1)
+        return self._over([log_emission], [columns], frames, self._compiled(root, best, frames))
+
+    def over_chains(
+        self, log_emissions: Sequence[NDArray[np.floating[Any]]], columns: Sequence[Index], frames: Index
+    ) -> Expected:
+        """Return what recordings say whose densities are products, one factor from each of some chains.
+
+        log_emissions : one or more [shape=(T, G_c)], all as precise; the log density of the state at place s is the
+            sum over chains of ``log_emissions[c][:, columns[c][s]]``
+        columns       : of each chain [shape=(S,)]
+        frames        : [shape=(U,)], of each recording
+        Cost: as ``over``, but exponentials are taken of the chains' densities only.
+        """
+        if not numba_works():
+            return self._over(log_emissions, columns, frames, None)
+        from lipmotion.kernels.compiled import network
+
+        roots, bests = zip(*map(_roots, log_emissions), strict=True)
+        firsts = np.cumsum([0, *(root.shape[1] for root in roots[:-1])])
+        root, best = network.products(np.hstack(roots), np.stack(columns) + firsts[:, None])
+        with np.errstate(divide="ignore"):
+            best = 8 * np.log(best) + np.sum(bests, axis=0, dtype=np.float64)
+        return self._over(log_emissions, columns, frames, self._compiled(root, best, frames))
+
+    def _over(
+        self,
+        log_emissions: Sequence[NDArray[np.floating[Any]]],
+        columns: Sequence[Index],
+        frames: Index,
+        expected: Expected | None,
+    ) -> Expected:
+        """Return what was found, what has no path yet in logarithms."""
+        if expected is None:
+            posterior = np.zeros((len(log_emissions[0]), len(columns[0])), log_emissions[0].dtype)
             expected = Expected(posterior, np.zeros(len(self.arc_log)), np.full(len(frames), -np.inf))
+        edges = np.append(0, np.cumsum(frames))
         for u in np.flatnonzero(np.isneginf(expected.log_likelihood)):
             mine = slice(edges[u], edges[u + 1])
-            posterior, counts, expected.log_likelihood[u] = self._in_logs(
-                log_emission[mine, columns[self.layout.place]].astype(np.float64)
+            log_emission = sum(
+                log[mine, column[self.layout.place]].astype(np.float64)
+                for log, column in zip(log_emissions, columns, strict=True)
             )
+            posterior, counts, expected.log_likelihood[u] = self._in_logs(np.asarray(log_emission))
             expected.posterior[mine] = posterior[:, self.layout.order]
             expected.counts[:] += counts
         return expected
 
-    def _compiled(self, log_emission: NDArray[np.floating[Any]], columns: Index, edges: Index) -> Expected:
+    def _compiled(self, root: NDArray[Any], best: NDArray[Any], frames: Index) -> Expected:
+        """Return what recordings say, where there are paths within reach.
+
+        root : [shape=(T, S)], by place, the eighth roots of densities relative to ``best``; becomes the posteriors
+        best : [shape=(T,)], logarithms
+        """
         from lipmotion.kernels.compiled import network
 
-        layout, best = self.layout, log_emission.max(axis=1)
-        best[~np.isfinite(best)] = 0
-        root = log_emission - best[:, None]  # eighth roots of all densities above e⁻⁶⁴⁰ are single-precision numbers
-        root *= root.dtype.type(1 / 8)
-        np.exp(np.maximum(root, LOWEST_ROOT, out=root), out=root)
-        if not np.array_equal(columns, np.arange(root.shape[1])):
-            root = root.take(columns, axis=1)
+        layout, edges = self.layout, np.append(0, np.cumsum(frames))
         (initial, first), (final, last) = (
             _probabilities(log[layout.order]) for log in (self.log_initial, self.log_final)
         )
@@ -158,6 +195,18 @@ class Expectation(NamedTuple):
             beta[t, sources] = np.logaddexp.reduceat(onward[by_source], source_start)
             counts += np.exp(alpha[t, arc_from] + onward - log_likelihood)
         return np.exp(alpha + beta - log_likelihood), counts, log_likelihood
+
+
+def _roots(log_density: NDArray[np.floating[Any]]) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Return the eighth roots of densities relative to the best of each frame, and its logarithm.
+
+    Those of all densities above e⁻⁶⁴⁰ are single-precision numbers; others become that.
+    """
+    best = log_density.max(axis=1)
+    best[~np.isfinite(best)] = 0
+    root = log_density - best[:, None]
+    root *= root.dtype.type(1 / 8)
+    return np.exp(np.maximum(root, LOWEST_ROOT, out=root), out=root), best
 
 
 def _probabilities(log: Array) -> tuple[Array, float]:

@@ -19,6 +19,35 @@ Unsigned = NDArray[np.uintp]
 LEAST, LEAST_POSTERIOR, LEAST_SHARE = 1e-140, 1e-12, 1e-25
 
 
+LEAST_ROOT = 1.9e-35
+"""exp(-80): a density not above its eighth power counts as none."""
+
+
+@compiled_to_rounding
+def products(roots: Array, columns: Index) -> tuple[Array, Array]:
+    """Return the roots of joint densities relative to the best of each frame, and its root.
+
+    roots   : float32 or float64 [shape=(T, G)], of all chains side by side, each relative to its own best
+    columns : [shape=(C, S)], by place, those of each chain
+    Returns [shape=(T, S)], as precise as ``roots``, and [shape=(T,)]; where all are nothing, 0.
+    """
+    joint, best = np.empty((len(roots), columns.shape[1]), roots.dtype), np.empty(len(roots))
+    factor, product = np.empty(roots.shape[1]), np.empty(columns.shape[1])
+    for t in range(len(roots)):
+        for g in range(len(factor)):
+            factor[g] = roots[t, g] if roots[t, g] > LEAST_ROOT else 0.0
+        product[:] = 1.0
+        for c in range(len(columns)):
+            for s in range(len(product)):
+                product[s] *= factor[columns[c, s]]
+        best[t] = product.max()
+        scale = 1 / best[t] if best[t] > 0 else 0.0
+        for s in range(len(product)):
+            root = product[s] * scale
+            joint[t, s] = root if root > LEAST_ROOT else 0.0
+    return joint, best
+
+
 @compiled_to_rounding
 def forward_backward(
     emission: Array, edges: Index, initial: Array, final: Array, runs: Unsigned, run_weight: Array,
