@@ -6,12 +6,15 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from lipmotion.engines.base import Engine
+from lipmotion.engines.coupled.config import CoupledConfig
+from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.engines.trajectory.engine import TrajectoryConfig, TrajectoryEngine
 from lipmotion.engines.trajectory.joint.engine import JointEngine, JointEngineConfig
 from lipmotion.errors import InputError
 
 ENGINES: dict[str, Callable[..., Engine[Any]]] = {
     TrajectoryEngine.name: lambda **options: TrajectoryEngine(TrajectoryConfig(**options)),
+    CoupledEngine.name: lambda **options: CoupledEngine(CoupledConfig(**options)),
     JointEngine.name: lambda **options: JointEngine(JointEngineConfig(**options)),
 }
 

@@ -91,6 +91,16 @@ class Expectation(NamedTuple):
         weights = weights_of(layout, np.exp(arc_log), 0.0)
         return cls(arc_from, arc_log, arc_start, log_initial, log_final, layout, weights, _turned(layout, weights))
 
+    def with_arcs(self, arc_log: NDArray[np.floating[Any]], log_initial: NDArray[np.floating[Any]]) -> Expectation:
+        """Return the network with other probabilities [shapes=(E,), (S,)]; nothing is laid out anew."""
+        weights = weights_of(self.layout, np.exp(arc_log.astype(np.float64)), 0.0)
+        return self._replace(
+            arc_log=arc_log.astype(np.float64),
+            log_initial=log_initial.astype(np.float64),
+            weights=weights,
+            turned=_turned(self.layout, weights),
+        )
+
     def over(self, log_emission: NDArray[np.floating[Any]], columns: Index, frames: Index) -> Expected:
         """Return what recordings say, one after the other in ``log_emission``.
 

@@ -34,8 +34,8 @@ def hear_unsaid(
     speech = hear(engine, audio, features, Timeline(()))
     found = engine.listen(learned, speech) if phones.kind != "general" else None
     if found is None:
-        return replace(speech, units=recognise())
+        return replace(speech, units=recognise(), said=False)
     try:
-        return replace(speech, units=phones.place(audio, features, found))
+        return replace(speech, units=phones.place(audio, features, found), said=False)
     except AlignmentError:
-        return replace(speech, units=recognise())
+        return replace(speech, units=recognise(), said=False)

@@ -19,12 +19,14 @@ class Speech:
     """One recording as an engine sees it.
 
     units  : the phones in time
+    said   : whether these are known (given, labelled, or aligned to known words), not recognised
     log_f0 : natural logarithm of F0 in Hz, NaN where there is no voice [shape=(T,)], for engines that hear it
     """
 
     features: Features
     units: Timeline[Unit]
     log_f0: NDArray[np.float32] | None = None
+    said: bool = True
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,6 +18,7 @@ from typing import NamedTuple
 from lipmotion.errors import InputError
 from lipmotion.units.phones import PAUSE, PHONES
 from lipmotion.units.unit_set import CLOSED, UnitSet, read_unit_table
+from lipmotion.units.visemes import VISEME_OF
 
 
 class Group(NamedTuple):
@@ -107,19 +108,21 @@ def _built_in(name: str) -> UnitSet:
 
 UNIT_SETS: dict[str, UnitSet] = {name: _built_in(name) for name in GROUPS}
 """In the order of the paper's Table 1 but for sVis, which goes by its size."""
+VISEME_SET = UnitSet("viseme", VISEME_OF)
+"""The 13 visemes of Xie & Liu 2007, Table 1, which is none of the five."""
 
 
 def unit_set(name_or_path: str | Path) -> UnitSet:
-    """Return a unit set of the paper by its name, or that of a table file (docs/unit-sets.md).
+    """Return a unit set of the papers by its name, or that of a table file (docs/unit-sets.md).
 
     Raises InputError: neither a name nor a file, or a table that is wrong (with its line).
     """
-    known = UNIT_SETS.get(str(name_or_path))
-    if known is not None:
-        return known
+    known = UNIT_SETS | {VISEME_SET.name: VISEME_SET}
+    if str(name_or_path) in known:
+        return known[str(name_or_path)]
     if not os.path.exists(name_or_path):  # noqa: PTH110 - False, not an error, for a name that no file can have
         raise InputError(
-            f"no unit set {str(name_or_path)!r}; there are: {', '.join(UNIT_SETS)}; or give a table file, "
+            f"no unit set {str(name_or_path)!r}; there are: {', '.join(known)}; or give a table file, "
             "a unit and its phones a line"
         )
     return read_unit_table(Path(name_or_path))

@@ -1,0 +1,143 @@
+"""The coupled engine."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.engines.base import Arrays, Engine, Fit
+from lipmotion.engines.coupled.arrays import coupled_arrays, coupled_from_arrays
+from lipmotion.engines.coupled.config import PATH, TRAJECTORY, CoupledConfig
+from lipmotion.engines.coupled.conversion import converted, path_means
+from lipmotion.engines.coupled.densities import Single
+from lipmotion.engines.coupled.fit import fit_coupled
+from lipmotion.engines.coupled.lattice import Lattice, within
+from lipmotion.engines.coupled.learned import CoupledModel
+from lipmotion.engines.coupled.train import allowed_units
+from lipmotion.engines.trajectory.closure import closing_spans
+from lipmotion.engines.trajectory.dynamic_range import widened
+from lipmotion.engines.trajectory.generation import Statistics, generated_motion, resolved
+from lipmotion.kernels.banded import generate
+from lipmotion.stats.checkpoint import NOTHING_KEPT, Checkpoint
+from lipmotion.types import (
+    FRAME_RATE_HZ,
+    Constraints,
+    Example,
+    Generation,
+    Monitor,
+    Motion,
+    Span,
+    Speech,
+    Timeline,
+    Trace,
+    Unit,
+)
+
+Array = NDArray[np.float64]
+
+
+@final
+@dataclass(frozen=True)
+class CoupledEngine(Engine[CoupledModel]):
+    """Chains of hidden states for speech and lips, coupled, made motion by expectation over all of their paths.
+
+    Source: Xie & Liu 2007. Beyond the paper: the visual chain emits slope and curvature as well, and its expected
+    precisions and means go through parameter generation (``conversion = trajectory``).
+    """
+
+    config: CoupledConfig
+    name: ClassVar[str] = "coupled"
+
+    def fit(  # noqa: D102
+        self,
+        examples: Sequence[Example],
+        monitor: Monitor,
+        checkpoint: Checkpoint = NOTHING_KEPT,  # noqa: ARG002 - training takes a minute
+    ) -> Fit[CoupledModel]:
+        model = fit_coupled(examples, self.config, monitor)
+        frames = sum(int(example.valid.sum()) for example in examples)
+        return Fit(model, {"frames": frames, "joint_states": len(model.chains.transitions.product.joints)})
+
+    def generate(self, model: CoupledModel, speech: Speech, constraints: Constraints | None = None) -> Generation:  # noqa: D102
+        features = np.asarray(speech.features.values)
+        frames = len(features)
+        path = np.empty(frames, np.intp)
+
+        def statistics(wanted: slice) -> Statistics:
+            lattice = self.lattice(model, speech, wanted)
+            found, path[wanted] = self._statistics(model, features[wanted], lattice)
+            return widened(*found, model.gain, model.rest) if self.config.full_range else found
+
+        motion, spread = generated_motion(
+            statistics,
+            frames,
+            model.space,
+            closure=model.closure,
+            closing=closing_spans(speech.units, frames) if self.config.closures else [],
+            pins=resolved(constraints, model.space, frames),
+        )
+        states, places = np.unique(path, return_inverse=True)
+        return Generation(
+            Motion(motion, FRAME_RATE_HZ, model.space.channels),
+            spread,
+            _named(model, speech.units),
+            Trace(tuple(model.chains.transitions.product.name(int(state)) for state in states), places),
+        )
+
+    def lattice(self, model: CoupledModel, speech: Speech, wanted: slice) -> Lattice:
+        """Return where the chains can be in some frames: near what is said, if that is known, else anywhere."""
+        chains = model.chains
+        if not speech.said:
+            return chains.everywhere
+        frames = len(speech.features.values)
+        allowed = allowed_units(chains.structure, speech.units, frames)[wanted]
+        return within(chains.transitions.product, [group.tie for group in chains.groups], allowed)
+
+    def _statistics(
+        self, model: CoupledModel, features: Single, lattice: Lattice
+    ) -> tuple[Statistics, NDArray[np.intp]]:
+        """Return means and precisions [each shape=(T, 3, Q)], and the most probable joint state of every frame."""
+        chains, observed = model.chains, model.unseen(features)
+        evidence = chains.evidence(observed, lattice)
+        if self.config.conversion == PATH:
+            path, _ = chains.best_path(evidence, lattice)
+            return model.frames([path_means(chains, path, s + 1) for s in range(len(model.visual))]), path
+        if self.config.conversion != TRAJECTORY:
+            streams = converted(chains, observed, lattice, self.config.em).streams[1:]
+            posteriors = chains.posteriors(evidence, lattice)
+            return model.frames(streams), posteriors.best
+        posteriors = chains.posteriors(evidence, lattice)
+        found = model.statistics(observed, evidence, posteriors, lattice)
+        for _ in range(self.config.steps):
+            evidence = chains.evidence(model.seen(observed, generate(*found)[0]), lattice)
+            posteriors = chains.posteriors(evidence, lattice)
+            found = model.statistics(observed, evidence, posteriors, lattice)
+        return found, posteriors.best
+
+    def trees(self, model: CoupledModel) -> str:  # noqa: D102
+        structure = model.chains.structure
+        return "\n".join(
+            f"{chain.name}: {len(units)} units of {structure.states} states"
+            for chain, units in zip(structure.chains, structure.units, strict=True)
+        )
+
+    def to_arrays(self, model: CoupledModel) -> dict[str, NDArray[Any]]:  # noqa: D102
+        return coupled_arrays(model)
+
+    def from_arrays(self, arrays: Arrays) -> CoupledModel:  # noqa: D102
+        return coupled_from_arrays(arrays, self.config)
+
+
+def _named(model: CoupledModel, units: Timeline[Unit]) -> Timeline[Unit]:
+    """Return the phones with the units that model them, one a chain."""
+    chains = model.chains.structure.chains
+    return Timeline(
+        tuple(
+            Span(s.start_s, s.end_s, Unit(s.label.phone, "/".join(c.unit(s.label.phone) for c in chains), s.label.word))
+            for s in units
+        )
+    )

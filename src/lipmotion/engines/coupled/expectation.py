@@ -1,0 +1,140 @@
+"""Expectation–maximisation of coupled chains over recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.engines.coupled.densities import Observed, Single, Sums, no_sums, relearned
+from lipmotion.engines.coupled.lattice import Lattice
+from lipmotion.engines.coupled.model import Chains
+from lipmotion.errors import InputError
+
+AT_A_TIME = 16
+"""Recordings whose sums are added up before they go to those of others."""
+LEAST_FRAMES = 3.0
+"""A density with less data than so many frames stays as it is."""
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """What is observed, and where the chains can be meanwhile."""
+
+    observed: Observed
+    lattice: Lattice
+
+
+@dataclass(frozen=True, eq=False)
+class Expected:
+    """What recordings say.
+
+    groups : sums for each group
+    arcs   : how often each arc was followed [shape=(E,)]
+    visits : frames spent in each joint state [shape=(S,)]
+    log_likelihood, frames : of the recordings that have a path
+    """
+
+    groups: tuple[Sums, ...]
+    arcs: NDArray[np.float64]
+    visits: NDArray[np.float64]
+    log_likelihood: float
+    frames: int
+
+    def plus(self, other: Expected) -> Expected:
+        """Return both together."""
+        return Expected(
+            tuple(a.plus(b) for a, b in zip(self.groups, other.groups, strict=True)),
+            self.arcs + other.arcs,
+            self.visits + other.visits,
+            self.log_likelihood + other.log_likelihood,
+            self.frames + other.frames,
+        )
+
+
+def expected(chains: Chains, recordings: Sequence[Recording], workers: int = 1) -> Expected:
+    """Return what recordings say about chains. Raises InputError: none has a path through them."""
+    parts = range(0, len(recordings), AT_A_TIME)
+    jobs = ((chains, recordings[start : start + AT_A_TIME]) for start in parts)
+    total: Expected | None = None
+    for part in _each(_together, jobs, workers):
+        total = part if total is None else total.plus(part)
+    if total is None or not total.frames:
+        raise InputError(f"none of {len(recordings)} recordings can be said by these chains; check their labels")
+    return total
+
+
+def maximised(
+    chains: Chains,
+    said: Expected,
+    floors: Sequence[Single],
+    *,
+    streams: Sequence[int],
+    moves: bool = True,
+) -> Chains:
+    """Return the chains that explain best what recordings said.
+
+    floors  : the least variance of each stream [each shape=(D_s,)]
+    streams : those whose densities are learned;  moves : learn the transitions
+    """
+    groups = [
+        relearned(group, sums, [floors[s] for s in group.streams], LEAST_FRAMES, streams)
+        if set(group.streams) & set(streams)
+        else group
+        for group, sums in zip(chains.groups, said.groups, strict=True)
+    ]
+    transitions = chains.transitions.relearned(said.arcs) if moves else chains.transitions
+    return replace(chains, groups=tuple(groups), transitions=transitions)
+
+
+def _together(job: tuple[Chains, Sequence[Recording]]) -> Expected:
+    chains, recordings = job
+    product = chains.transitions.product
+    sums = tuple(no_sums(group) for group in chains.groups)
+    arcs, visits = np.zeros(len(product.arc_from)), np.zeros(len(product.joints))
+    log_likelihood, frames = 0.0, 0
+    for recording in recordings:
+        observed, lattice = recording.observed, recording.lattice
+        evidence = chains.evidence(observed, lattice)
+        posteriors = chains.posteriors(evidence, lattice)
+        if not np.isfinite(posteriors.log_likelihood):
+            continue
+        for one, group, chosen, posterior, shares in zip(
+            sums, chains.groups, lattice.densities, posteriors.densities, evidence.shares, strict=True
+        ):
+            one.add(group, observed, chosen, posterior, shares)
+        arcs[lattice.arcs] += posteriors.arcs
+        visits[posteriors.states] += posteriors.joint.sum(axis=0)
+        log_likelihood += posteriors.log_likelihood
+        frames += observed.frames
+    return Expected(sums, arcs, visits, log_likelihood, frames)
+
+
+def joined(observed: Sequence[Observed]) -> Observed:
+    """Return recordings one after the other."""
+    streams = range(len(observed[0].streams))
+    masks = [[o.seen[s] for o in observed] for s in streams]
+    return Observed(
+        tuple(np.concatenate([o.streams[s] for o in observed]) for s in streams),
+        tuple(
+            None
+            if all(mask is None for mask in own)
+            else np.concatenate(
+                [np.ones(o.frames, bool) if mask is None else mask for o, mask in zip(observed, own, strict=True)]
+            )
+            for own in masks
+        ),
+    )
+
+
+def _each(function: Callable[[Any], Expected], jobs: Iterable[Any], workers: int) -> Iterator[Expected]:
+    """Give the results in order. Kernels and matrix products run without the interpreter's lock."""
+    if workers < 2:
+        yield from map(function, jobs)
+        return
+    with ThreadPoolExecutor(workers) as pool:
+        yield from pool.map(function, jobs)

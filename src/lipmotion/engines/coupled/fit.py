@@ -1,0 +1,183 @@
+"""Learning a coupled model from examples."""
+
+from __future__ import annotations
+
+import itertools
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.engines.coupled.config import CoupledConfig
+from lipmotion.engines.coupled.conversion import speech_alone
+from lipmotion.engines.coupled.densities import Observed
+from lipmotion.engines.coupled.following import (
+    Following,
+    Heard,
+    Surroundings,
+    belief_axes,
+    fit_following,
+    fit_surroundings,
+)
+from lipmotion.engines.coupled.learned import CoupledModel, chain_posteriors
+from lipmotion.engines.coupled.model import Chains
+from lipmotion.engines.coupled.systems import HMM, Structure, structure_of
+from lipmotion.engines.coupled.train import Labelled, Schedule, Step, train_chains
+from lipmotion.engines.coupled.visual import visual_streams
+from lipmotion.engines.trajectory.closure import learned_closure
+from lipmotion.engines.trajectory.space import motion_in_space
+from lipmotion.kernels.banded import generate
+from lipmotion.stats.windows import within
+from lipmotion.types import FRAME_RATE_HZ, Example, Monitor, Progress, Timeline, Unit, part_of
+from lipmotion.units import VISEME_OF, is_silent
+
+Array = NDArray[np.float64]
+ResultT = TypeVar("ResultT")
+SPEECH = "speech"
+LARGEST_GAIN = 2.0
+CALM_S = 0.15
+"""Silence this far from speech is rest."""
+
+
+def fit_coupled(examples: Sequence[Example], config: CoupledConfig, monitor: Monitor) -> CoupledModel:
+    """Return a model of speech with its motion.
+
+    Raises CorpusError: no example with motion that was seen, or examples of different channels.
+    Raises InputError: no such unit set, or a structure that does not fit together.
+    """
+    structure = structure_of(config.structure, config.chains, config.states, config.asynchrony, config.crosses)
+    space, values = motion_in_space(examples, config.components)
+    seen = [within(example.valid) for example in examples]
+    visual = visual_streams(space, values, seen, config.dynamic)
+    data = [
+        Labelled(
+            Observed((_features(example), *(stream.observed(x) for stream in visual)), (None, *(mask for _ in visual))),
+            example.speech.units,
+        )
+        for example, x, mask in zip(examples, values, seen, strict=True)
+    ]
+    names = (SPEECH, *(stream.name for stream in visual))
+    mixtures = (config.mixtures, *(config.visual_mixtures for _ in visual))
+    how = Schedule(
+        mixtures[:1] if structure.kind == HMM else mixtures,
+        (config.audio_weight, *(config.visual_weight for _ in visual)),
+    )
+    chains = train_chains(structure, names, data, how, _told(how, part_of(monitor, 0, 0.7)), workers())
+    rest = _rest(examples, values, seen)
+    closure = learned_closure(space.direct_names, values, examples)
+    model = CoupledModel(chains, space, visual, None, np.ones(space.dimensions), rest, closure)
+    if config.dynamic and config.follows:
+        monitor(Progress("following the sound", 1, 1, 0.75))
+        model = replace(model, follow=_follow(model, data))
+    if config.dynamic and config.full_range:
+        model = replace(model, gain=_gain(model, data, values))
+    monitor(Progress("following the sound", 1, 1, 1.0))
+    return model
+
+
+def workers() -> int:
+    """Return how many threads share the work; the result does not depend on it."""
+    return min(os.cpu_count() or 1, 8)
+
+
+def _features(example: Example) -> NDArray[np.float32]:
+    return np.asarray(example.speech.features.values)
+
+
+def _told(how: Schedule, monitor: Monitor) -> Callable[[Step], None]:
+    """Return what reports the steps of training; how many there will be is not known beforehand."""
+    total = how.most * max(how.mixtures).bit_length()
+    done = itertools.count(1)
+
+    def tell(step: Step) -> None:
+        number = next(done)
+        monitor(Progress("chains", number, total, number / total, step.log_likelihood))
+
+    return tell
+
+
+def _rest(examples: Sequence[Example], values: Sequence[Array], seen: Sequence[NDArray[np.bool_]]) -> Array:
+    """Return the median pose of silence away from speech; of everything where there is none [shape=(Q,)]."""
+    poses = [
+        x[mask & calm(example.speech.units, len(x))] for example, x, mask in zip(examples, values, seen, strict=True)
+    ]
+    chosen = np.concatenate(poses)
+    if not len(chosen):
+        chosen = np.concatenate([x[mask] for x, mask in zip(values, seen, strict=True)])
+    rest: Array = np.median(chosen, axis=0)
+    return rest
+
+
+def calm(units: Timeline[Unit], frames: int) -> NDArray[np.bool_]:
+    """Return which frames are silence away from speech [shape=(T,)]."""
+    times = np.arange(frames) / FRAME_RATE_HZ
+    away = np.ones(frames, bool)
+    for span in units:
+        if not is_silent(span.label.phone):
+            away &= (times < span.start_s - CALM_S) | (times > span.end_s + CALM_S)
+    return away
+
+
+def _follow(model: CoupledModel, data: Sequence[Labelled]) -> tuple[Surroundings, tuple[Following, ...]]:
+    """Return how the visual means follow what is around a frame, believed as when only speech is known."""
+    chains = model.chains
+    first = list(_each(lambda one: _believed(chains, one, range(1)), data))
+    axes = belief_axes(posterior for (posterior,) in first)
+    structure = chains.structure
+    others = [structure.chain_of(stream + 1) for stream in range(len(model.visual))]
+    heard = [
+        Heard(
+            one.observed.streams[0],
+            posterior @ axes,
+            gates,
+            one.observed.streams[1:],
+            np.asarray(one.observed.seen[1]),
+        )
+        for one, (posterior,), gates in zip(
+            data, first, _each(lambda one: _believed(chains, one, others), data), strict=True
+        )
+    ]
+    around = fit_surroundings(axes, heard)
+    return around, tuple(
+        fit_following(around, heard, stream, _kinds(structure, chain)) for stream, chain in enumerate(others)
+    )
+
+
+def _believed(chains: Chains, one: Labelled, which: Sequence[int]) -> tuple[NDArray[np.float32], ...]:
+    evidence = chains.evidence(speech_alone(one.observed), chains.everywhere)
+    posteriors = chains.posteriors(evidence, chains.everywhere)
+    return tuple(chain_posteriors(chains, posteriors, chain) for chain in which)
+
+
+def _kinds(structure: Structure, chain: int) -> NDArray[np.intp]:
+    """Return a number for the viseme of each state of a chain [shape=(N,)]."""
+    visemes = [VISEME_OF[structure.chains[chain].phones(unit)[0]] for unit in structure.units[chain]]
+    numbers = np.unique(visemes, return_inverse=True)[1]
+    return np.repeat(numbers, structure.states).astype(np.intp)
+
+
+def _gain(model: CoupledModel, data: Sequence[Labelled], values: Sequence[Array]) -> Array:
+    """Return by how much movements must grow to be as large as the original's [shape=(Q,)]."""
+    chains = model.chains
+
+    def spread(one: Labelled) -> Array:
+        observed = speech_alone(one.observed)
+        evidence = chains.evidence(observed, chains.everywhere)
+        posteriors = chains.posteriors(evidence, chains.everywhere)
+        motion, _ = generate(*model.statistics(observed, evidence, posteriors, chains.everywhere))
+        deviation: Array = motion[one.observed.seen[1]].std(axis=0)
+        return deviation
+
+    generated = np.array(list(_each(spread, data)))
+    original = np.array([x[one.observed.seen[1]].std(axis=0) for one, x in zip(data, values, strict=True)])
+    ratio = original.mean(axis=0) / np.maximum(generated.mean(axis=0), 1e-9)
+    return np.clip(ratio, 1.0, LARGEST_GAIN)
+
+
+def _each(function: Callable[[Labelled], ResultT], data: Sequence[Labelled]) -> Iterator[ResultT]:
+    with ThreadPoolExecutor(workers()) as pool:
+        yield from pool.map(function, data)

@@ -1,0 +1,94 @@
+"""What the coupled engine learns."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.engines.coupled.conversion import statistics
+from lipmotion.engines.coupled.densities import Observed, Single, density_posteriors
+from lipmotion.engines.coupled.following import Following, Surroundings
+from lipmotion.engines.coupled.lattice import Lattice
+from lipmotion.engines.coupled.model import Chains, Evidence, Posteriors
+from lipmotion.engines.coupled.visual import VisualStream
+from lipmotion.engines.trajectory.closure import Closure
+from lipmotion.engines.trajectory.space import MotionSpace
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class CoupledModel:
+    """Chains, and how what they emit becomes motion.
+
+    space   : the Q dimensions in which motion is modelled
+    visual  : the streams that they are, in the order of the chains' streams after speech
+    follow  : how visual means follow what is around a frame (None: they are those of the chains' densities)
+    gain    : by how much movements away from rest are made larger [shape=(Q,)]
+    rest    : the pose in silence [shape=(Q,)]
+    closure : how the lips close (None: the motion has no opening)
+    """
+
+    chains: Chains
+    space: MotionSpace
+    visual: tuple[VisualStream, ...]
+    follow: tuple[Surroundings, tuple[Following, ...]] | None
+    gain: Array
+    rest: Array
+    closure: Closure | None
+
+    def unseen(self, features: Single) -> Observed:
+        """Return speech [shape=(T, 39)] with nothing seen."""
+        nothing = tuple(np.zeros((len(features), len(stream.mean)), np.float32) for stream in self.visual)
+        return Observed((features, *nothing), (None, *(np.zeros(len(features), bool) for _ in nothing)))
+
+    def statistics(
+        self, observed: Observed, evidence: Evidence, posteriors: Posteriors, lattice: Lattice
+    ) -> tuple[Array, Array]:
+        """Return means and precisions of the motion in its space [each shape=(T, 3, Q)]."""
+        shape = (observed.frames, 3, self.space.dimensions)
+        means, precisions = np.zeros(shape), np.zeros(shape)
+        around = self._around(observed.streams[0], posteriors)
+        for number, stream in enumerate(self.visual):
+            if around is None or self.follow is None:
+                precision, weighted = statistics(self.chains, posteriors, evidence, lattice, number + 1)
+                mean = weighted / np.maximum(precision, 1e-300)
+            else:
+                gate = chain_posteriors(self.chains, posteriors, self.chains.structure.chain_of(number + 1))
+                following = self.follow[1][number]
+                mean, precision = following.means(around, gate), following.precisions(gate)
+            means[:, :, stream.columns], precisions[:, :, stream.columns] = stream.restored(mean, precision)
+        return means, precisions
+
+    def seen(self, observed: Observed, values: Array) -> Observed:
+        """Return what was observed, with motion in the space [shape=(T, Q)] as if it had been seen."""
+        for number, stream in enumerate(self.visual, start=1):
+            observed = observed.given(number, stream.observed(values))
+        return observed
+
+    def frames(self, streams: Sequence[Array]) -> tuple[Array, Array]:
+        """Return the values of all visual streams [each shape=(T, D)] as means, and precisions of the values alone.
+
+        Parameter generation gives such means back as they are.
+        """
+        shape = (len(streams[0]), 3, self.space.dimensions)
+        means, precisions = np.zeros(shape), np.zeros(shape)
+        for stream, values in zip(self.visual, streams, strict=True):
+            mean, precision = stream.restored(values, np.ones_like(values))
+            means[:, :, stream.columns], precisions[:, :, stream.columns] = mean, precision
+        precisions[:, 1:] = 0
+        return means, precisions
+
+    def _around(self, features: Single, posteriors: Posteriors) -> Single | None:
+        if self.follow is None:
+            return None
+        return self.follow[0](features, chain_posteriors(self.chains, posteriors, 0))
+
+
+def chain_posteriors(chains: Chains, posteriors: Posteriors, chain: int) -> Single:
+    """Return the posteriors of one chain's states [shape=(T, N)]."""
+    states = chains.transitions.product.chain_states[chain][posteriors.states]
+    return density_posteriors(posteriors.joint, states, chains.structure.counts[chain])

@@ -1,0 +1,186 @@
+"""The joint states that chains can reach together, and what leads from one to the next."""
+
+from __future__ import annotations
+
+from collections import defaultdict, deque
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.engines.coupled.systems import Structure
+
+Index = NDArray[np.intp]
+
+
+class Joint(NamedTuple):
+    """Where every chain is.
+
+    units, states : of every chain
+    ahead         : whether it has left the unit that others are still in
+    """
+
+    units: tuple[int, ...]
+    states: tuple[int, ...]
+    ahead: tuple[bool, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Product:
+    """The reachable joint states of chains with an asynchrony limit, and the arcs between them.
+
+    bigram, first : as given to ``reachable``
+    joints   : S states
+    arc_from : [shape=(E,)], the source states of all arcs, sorted by target
+    arc_to   : [shape=(E,)]
+    moves    : bool array [shape=(C, E)], which chains an arc moves on
+    base     : [shape=(E,)], probability of the unit it leads to, among those that it may lead to
+    initial  : [shape=(S,)], probability of beginning in each state
+    Source: Xie & Liu 2007, Eqs. 17–19. The mask of Eq. 19 limits the current states, so what is left of a row of the
+    tables is made to sum to 1 again (``transitions``).
+    """
+
+    structure: Structure
+    bigram: NDArray[np.float64]
+    first: NDArray[np.float64]
+    joints: tuple[Joint, ...]
+    arc_from: Index
+    arc_to: Index
+    moves: NDArray[np.bool_]
+    base: NDArray[np.float64]
+    initial: NDArray[np.float64]
+
+    @cached_property
+    def arc_start(self) -> Index:
+        """Where each target's arcs begin [shape=(S,)]."""
+        return np.searchsorted(self.arc_to, np.arange(len(self.joints)))
+
+    @cached_property
+    def chain_states(self) -> Index:
+        """The state of every chain in each joint state [shape=(C, S)]."""
+        chains = range(len(self.structure.chains))
+        return np.array(
+            [[self.structure.state(joint.units[c], joint.states[c]) for joint in self.joints] for c in chains], np.intp
+        )
+
+    @cached_property
+    def lead(self) -> Index:
+        """How many states each chain is ahead of the first [shape=(C, S)]."""
+        count = self.structure.states
+        places = np.array([[s + count * a for s, a in zip(j.states, j.ahead, strict=True)] for j in self.joints]).T
+        return places - places[0]
+
+    def name(self, state: int) -> str:
+        """Return what a joint state is, in words: ``b.1 | bi.2``, each chain's unit and state, counted from 1."""
+        joint = self.joints[state]
+        names = [self.structure.units[chain][unit] for chain, unit in enumerate(joint.units)]
+        return " | ".join(f"{name}.{place + 1}" for name, place in zip(names, joint.states, strict=True))
+
+
+def reachable(structure: Structure, bigram: NDArray[np.float64], first: NDArray[np.float64]) -> Product:
+    """Return the product of chains.
+
+    bigram : P(next unit | unit) of the first chain [shape=(U, U)], all more than 0
+    first  : probability that a recording begins with each unit [shape=(U,)]
+    """
+    chains = range(len(structure.chains))
+    together, level = (False,) * len(chains), (0,) * len(chains)
+    begins = {
+        Joint(tuple(structure.follows[c][unit] for c in chains), level, together): float(probability)
+        for unit, probability in enumerate(first)
+    }
+    walk = _Walk(structure, bigram)
+    found: dict[Joint, list[tuple[Joint, tuple[bool, ...], float]]] = {}
+    waiting = deque(begins)
+    while waiting:
+        joint = waiting.popleft()
+        if joint in found:
+            continue
+        found[joint] = list(walk.onward(joint))
+        waiting.extend(target for target, _, _ in found[joint] if target not in found)
+    joints = tuple(sorted(found, key=lambda j: (j.ahead, j.states, j.units[1:], j.units[0])))
+    number = {joint: index for index, joint in enumerate(joints)}
+    arcs = sorted(
+        ((number[target], number[source], moved, base) for source, to in found.items() for target, moved, base in to),
+        key=lambda arc: arc[:2],
+    )
+    targets, sources, moves, base = zip(*arcs, strict=True)
+    initial = np.zeros(len(joints))
+    for joint, probability in begins.items():
+        initial[number[joint]] = probability
+    return Product(
+        structure,
+        bigram,
+        first,
+        joints,
+        np.array(sources, np.intp),
+        np.array(targets, np.intp),
+        np.array(moves, bool).T,
+        np.array(base, float),
+        initial / initial.sum(),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Walk:
+    structure: Structure
+    bigram: NDArray[np.float64]
+
+    def onward(self, joint: Joint) -> Iterator[tuple[Joint, tuple[bool, ...], float]]:
+        """Give the states that may follow, which chains move, and the probability of the units entered."""
+        for moved in product((False, True), repeat=len(joint.units)):
+            leaving = tuple(
+                move and state == self.structure.states - 1 for move, state in zip(moved, joint.states, strict=True)
+            )
+            if any(out and ahead for out, ahead in zip(leaving, joint.ahead, strict=True)):
+                continue  # a second unit ahead
+            if any(leaving) and not (self.structure.crosses or all(leaving)):
+                continue
+            states = tuple(
+                0 if out else state + move for out, state, move in zip(leaving, joint.states, moved, strict=True)
+            )
+            ahead = tuple(out or was for out, was in zip(leaving, joint.ahead, strict=True))
+            if not self._near(states, ahead):
+                continue
+            settled = (False,) * len(ahead) if all(ahead) else ahead
+            for units, base in self._entered(joint, leaving):
+                yield Joint(units, states, settled), moved, base
+
+    def _near(self, states: tuple[int, ...], ahead: tuple[bool, ...]) -> bool:
+        places = [state + self.structure.states * out for state, out in zip(states, ahead, strict=True)]
+        return self.structure.limit is None or max(places) - min(places) <= self.structure.limit
+
+    def _entered(self, joint: Joint, leaving: tuple[bool, ...]) -> Iterator[tuple[tuple[int, ...], float]]:
+        """Give the units of all chains after those in ``leaving`` have entered the next one."""
+        follows = self.structure.follows
+        if not any(leaving):
+            yield joint.units, 1.0
+            return
+        if joint.ahead[0]:  # what is said next is known
+            yield self._with(joint, leaving, joint.units[0]), 1.0
+            return
+        row = self.bigram[joint.units[0]]
+        fitting = [
+            unit
+            for unit in range(len(row))
+            if all(
+                follows[c][unit] == own
+                for c, (own, out) in enumerate(zip(joint.units, joint.ahead, strict=True))
+                if out
+            )
+        ]
+        total = sum(row[unit] for unit in fitting)
+        shares: dict[tuple[int, ...], float] = defaultdict(float)
+        for unit in fitting:
+            shares[self._with(joint, leaving, unit)] += float(row[unit] / total)
+        yield from shares.items()
+
+    def _with(self, joint: Joint, leaving: tuple[bool, ...], unit: int) -> tuple[int, ...]:
+        return tuple(
+            self.structure.follows[c][unit] if out else own
+            for c, (own, out) in enumerate(zip(joint.units, leaving, strict=True))
+        )

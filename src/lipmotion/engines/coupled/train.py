@@ -1,0 +1,262 @@
+"""Learning coupled chains from speech with its motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.engines.coupled.densities import Group, Observed, Single, no_sums
+from lipmotion.engines.coupled.expectation import Expected, Recording, expected, joined, maximised
+from lipmotion.engines.coupled.lattice import within
+from lipmotion.engines.coupled.model import Chains
+from lipmotion.engines.coupled.product import Joint, Product, reachable
+from lipmotion.engines.coupled.systems import HMM, Structure
+from lipmotion.engines.coupled.transitions import first_transitions
+from lipmotion.engines.trajectory.joint.labels import in_frames
+from lipmotion.stats.bigram import estimate_bigram
+from lipmotion.stats.mixture import Mixtures
+from lipmotion.types import FRAME_RATE_HZ, Timeline, Unit
+from lipmotion.units import SILENCE, stand_in
+
+Index = NDArray[np.intp]
+
+SLACK_S = 0.05
+"""A phone may be said this long before and after its label."""
+FLOOR_SHARE = 0.01
+"""No variance falls under this share of the stream's own."""
+VITERBI_STEPS = 2
+FIRST_SHARE = 0.1
+"""Of the probability of how recordings begin: shared by all units, said first or not."""
+CONVERGED = 0.02
+"""Of the log likelihood a frame: less is no progress."""
+
+
+@dataclass(frozen=True, eq=False)
+class Labelled:
+    """Observed streams, and the phones with them."""
+
+    observed: Observed
+    phones: Timeline[Unit]
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step of training: components per density of speech and of the rest, and the mean log likelihood a frame."""
+
+    mixtures: tuple[int, ...]
+    log_likelihood: float
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """How training goes on.
+
+    mixtures : Gaussians per density of each group, powers of two
+    weights  : exponents of the streams
+    most     : steps of EM between one splitting and the next, at most
+    """
+
+    mixtures: tuple[int, ...]
+    weights: tuple[float, ...]
+    most: int = 6
+
+
+def train_chains(
+    structure: Structure,
+    streams: tuple[str, ...],
+    data: Sequence[Labelled],
+    how: Schedule,
+    heard: Callable[[Step], None] = lambda _: None,
+    workers: int = 1,
+) -> Chains:
+    """Return chains learned by EM, from the labels' times and the best paths between them.
+
+    heard : is told every step; within a number of components the log likelihood never falls
+    Source: Xie & Liu 2007, §3.4 and Appendix A, with scaled recursions.
+    """
+    floors = tuple(_floor(stream) for stream in joined([one.observed for one in data]).streams)
+    chains = _flat_start(structure, streams, data, how)
+    product, ties = chains.transitions.product, [group.tie for group in chains.groups]
+    recordings = [
+        Recording(one.observed, within(product, ties, allowed_units(structure, one.phones, one.observed.frames)))
+        for one in data
+    ]
+    paths = [labelled_path(chains.transitions.product, one.phones, one.observed.frames) for one in data]
+    for _ in range(1 + VITERBI_STEPS):
+        chains = _learned_along(chains, recordings, paths, floors)
+        paths = [_best(chains, one) for one in recordings]
+    visits = np.bincount(np.concatenate(paths), minlength=len(chains.transitions.product.joints))
+    chains = replace(chains, transitions=chains.transitions.tied(visits))
+    while True:
+        chains = _converged(chains, recordings, floors, how.most, heard, workers)
+        now = components(chains)
+        if all(n >= most for n, most in zip(now, how.mixtures, strict=True)):
+            return chains
+        chains = split(chains, how.mixtures)
+
+
+def components(chains: Chains) -> tuple[int, ...]:
+    """Return how many Gaussians a density of each group has."""
+    return tuple(group.mixtures.size[1] for group in chains.groups)
+
+
+def split(chains: Chains, most: Sequence[int]) -> Chains:
+    """Return chains with twice as many Gaussians in the densities of those groups that have fewer than ``most``."""
+    groups = [
+        replace(group, mixtures=group.mixtures.split()) if now < target else group
+        for group, now, target in zip(chains.groups, components(chains), most, strict=True)
+    ]
+    return replace(chains, groups=tuple(groups))
+
+
+def allowed_units(structure: Structure, phones: Timeline[Unit], frames: int) -> NDArray[np.bool_]:
+    """Return which units of the first chain may be said in each frame [shape=(T, U)]: those labelled near it.
+
+    Between labels, silence may be.
+    """
+    names, first = structure.units[0], structure.chains[0]
+    allowed = np.zeros((frames, len(names)), bool)
+    slack = round(SLACK_S * FRAME_RATE_HZ)
+    for unit, start, stop in frame_labels(structure, phones, frames):
+        allowed[max(start - slack, 0) : stop + slack, unit] = True
+    bare = ~allowed.any(axis=1)
+    for silence in first.silence:
+        allowed[bare, names.index(silence)] = True
+    return allowed
+
+
+def frame_labels(structure: Structure, phones: Timeline[Unit], frames: int) -> list[tuple[int, int, int]]:
+    """Return the unit of the first chain, the first frame and the end of every label that has a frame."""
+    names, bounds = in_frames(phones, frames, SILENCE)
+    units = [structure.units[0].index(structure.chains[0].unit(name)) for name in names]
+    return list(zip(units, bounds[:-1].tolist(), bounds[1:].tolist(), strict=True))
+
+
+def labelled_path(product: Product, phones: Timeline[Unit], frames: int) -> Index:
+    """Return joint states [shape=(T,)] of chains that all cut every label into equal parts."""
+    structure, chains = product.structure, range(len(product.structure.chains))
+    number = {joint: index for index, joint in enumerate(product.joints)}
+    path = np.empty(frames, np.intp)
+    for unit, start, stop in frame_labels(structure, phones, frames):
+        units = tuple(structure.follows[c][unit] for c in chains)
+        for frame in range(start, stop):
+            state = (frame - start) * structure.states // (stop - start)
+            path[frame] = number[Joint(units, (state,) * len(chains), (False,) * len(chains))]
+    return path
+
+
+def _flat_start(structure: Structure, streams: tuple[str, ...], data: Sequence[Labelled], how: Schedule) -> Chains:
+    """Return chains that know which units follow which, and nothing of what they emit."""
+    said = [[structure.units[0][unit] for unit, _, _ in _labels(structure, one)] for one in data]
+    bigram = np.exp(estimate_bigram(structure.units[0], said).log_probability.astype(float))
+    first = np.full(len(bigram), FIRST_SHARE / len(bigram))
+    for sentence in said:
+        first[structure.units[0].index(sentence[0])] += (1 - FIRST_SHARE) / len(said)
+    product = reachable(structure, bigram, first)
+    groups = []
+    together = [tuple(range(len(streams)))] if structure.kind == HMM else [(s,) for s in range(len(streams))]
+    dimensions = [stream.shape[1] for stream in data[0].observed.streams]
+    for members in together:
+        edges = np.cumsum([0, *(dimensions[s] for s in members)])
+        chain = structure.chain_of(members[0])
+        groups.append(
+            Group(
+                members,
+                tuple(slice(a, b) for a, b in pairwise(edges.tolist())),
+                _unknown(structure.counts[chain], int(edges[-1])),
+                tuple(how.weights[s] for s in members),
+                product.chain_states[chain],
+            )
+        )
+    return Chains(streams, first_transitions(product), tuple(groups))
+
+
+def _labels(structure: Structure, one: Labelled) -> list[tuple[int, int, int]]:
+    return frame_labels(structure, one.phones, one.observed.frames)
+
+
+def _unknown(count: int, size: int) -> Mixtures:
+    shape = (count, 1, size)
+    return Mixtures(np.zeros((count, 1), np.float32), np.zeros(shape, np.float32), np.ones(shape, np.float32))
+
+
+def _floor(values: Single) -> Single:
+    return np.maximum(FLOOR_SHARE * values.var(axis=0), 1e-8).astype(np.float32)
+
+
+def _learned_along(
+    chains: Chains, recordings: Sequence[Recording], paths: Sequence[Index], floors: Sequence[Single]
+) -> Chains:
+    """Return chains that explain best what was observed along paths of joint states."""
+    groups = []
+    for group in chains.groups:
+        sums = no_sums(group)
+        for one, path in zip(recordings, paths, strict=True):
+            chosen, place = np.unique(group.tie[path], return_inverse=True)
+            sums.add(group, one.observed, chosen, np.eye(len(chosen), dtype=np.float32)[place], None)
+        groups.append(sums)
+    said = Expected(tuple(groups), _followed(chains.transitions.product, paths), np.empty(0), 0.0, 1)
+    chains = maximised(chains, said, floors, streams=range(len(chains.streams)))
+    structure = chains.structure
+    return replace(
+        chains,
+        groups=tuple(
+            _borrowed(group, sums.count.sum(axis=0) > 0, structure, structure.chain_of(group.streams[0]))
+            for group, sums in zip(chains.groups, groups, strict=True)
+        ),
+    )
+
+
+def _borrowed(group: Group, known: NDArray[np.bool_], structure: Structure, chain: int) -> Group:
+    """Return the group with densities for states never seen: those of the unit that is most like theirs.
+
+    known : whether each density was learned [shape=(G,)]
+    """
+    units, of = structure.units[chain], structure.chains[chain]
+    source = np.arange(len(known))
+    for state in np.flatnonzero(~known):
+        unit, place = divmod(int(state), structure.states)
+        phones = [
+            phone for i, name in enumerate(units) if known[structure.state(i, place)] for phone in of.phones(name)
+        ]
+        if phones:
+            alike = of.unit(stand_in(of.phones(units[unit])[0], phones))
+            source[state] = structure.state(units.index(alike), place)
+    return replace(group, mixtures=group.mixtures.picked(source))
+
+
+def _best(chains: Chains, recording: Recording) -> Index:
+    return chains.best_path(chains.evidence(recording.observed, recording.lattice), recording.lattice)[0]
+
+
+def _followed(product: Product, paths: Sequence[Index]) -> NDArray[np.float64]:
+    """Return how often each arc is followed; jumps without one do not count."""
+    count = len(product.joints)
+    keys = product.arc_to * count + product.arc_from
+    jumps = np.concatenate([path[1:] * count + path[:-1] for path in paths])
+    places = np.minimum(np.searchsorted(keys, jumps), len(keys) - 1)
+    return np.bincount(places[keys[places] == jumps], minlength=len(keys)).astype(float)
+
+
+def _converged(
+    chains: Chains,
+    recordings: Sequence[Recording],
+    floors: Sequence[Single],
+    most: int,
+    heard: Callable[[Step], None],
+    workers: int,
+) -> Chains:
+    last = -np.inf
+    for _ in range(most):
+        said = expected(chains, recordings, workers)
+        figure = said.log_likelihood / said.frames
+        heard(Step(components(chains), figure))
+        chains = maximised(chains, said, floors, streams=range(len(chains.streams)))
+        if figure - last < CONVERGED:
+            break
+        last = figure
+    return chains
