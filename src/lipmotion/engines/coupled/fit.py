@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import itertools
 import os
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
@@ -26,7 +28,7 @@ from lipmotion.engines.coupled.following import (
 from lipmotion.engines.coupled.learned import CoupledModel, chain_posteriors
 from lipmotion.engines.coupled.model import Chains
 from lipmotion.engines.coupled.systems import HMM, Structure, structure_of
-from lipmotion.engines.coupled.train import Labelled, Schedule, Step, train_chains
+from lipmotion.engines.coupled.train import Labelled, Schedule, Step, growing_chains
 from lipmotion.engines.coupled.visual import visual_streams
 from lipmotion.engines.trajectory.closure import learned_closure
 from lipmotion.engines.trajectory.space import motion_in_space
@@ -49,6 +51,16 @@ def fit_coupled(examples: Sequence[Example], config: CoupledConfig, monitor: Mon
     Raises CorpusError: no example with motion that was seen, or examples of different channels.
     Raises InputError: no such unit set, or a structure that does not fit together.
     """
+    return deque(growing_models(examples, config, monitor), maxlen=1)[0]()
+
+
+def growing_models(
+    examples: Sequence[Example], config: CoupledConfig, monitor: Monitor
+) -> Iterator[Callable[[], CoupledModel]]:
+    """Give what makes the models with 1, 2, 4, … Gaussians that ``fit_coupled`` learns on its way, itself the last.
+
+    Raises as ``fit_coupled``.
+    """
     structure = structure_of(config.structure, config.chains, config.states, config.asynchrony, config.crosses)
     space, values = motion_in_space(examples, config.components)
     seen = [within(example.valid) for example in examples]
@@ -66,17 +78,21 @@ def fit_coupled(examples: Sequence[Example], config: CoupledConfig, monitor: Mon
         mixtures[:1] if structure.kind == HMM else mixtures,
         (config.audio_weight, *(config.visual_weight for _ in visual)),
     )
-    chains = train_chains(structure, names, data, how, _told(how, part_of(monitor, 0, 0.7)), workers())
     rest = _rest(examples, values, seen)
     closure = learned_closure(space.direct_names, values, examples)
-    model = CoupledModel(chains, space, visual, None, np.ones(space.dimensions), rest, closure)
-    if config.dynamic and config.follows:
-        monitor(Progress("following the sound", 1, 1, 0.75))
-        model = replace(model, follow=_follow(model, data))
-    if config.dynamic and config.full_range:
-        model = replace(model, gain=_gain(model, data, values))
-    monitor(Progress("following the sound", 1, 1, 1.0))
-    return model
+
+    def model_of(chains: Chains) -> CoupledModel:
+        model = CoupledModel(chains, space, visual, None, np.ones(space.dimensions), rest, closure)
+        if config.dynamic and config.follows:
+            monitor(Progress("following the sound", 1, 1, 0.75))
+            model = replace(model, follow=_follow(model, data))
+        if config.dynamic and config.full_range:
+            model = replace(model, gain=_gain(model, data, values))
+        monitor(Progress("following the sound", 1, 1, 1.0))
+        return model
+
+    for chains in growing_chains(structure, names, data, how, _told(how, part_of(monitor, 0, 0.7)), workers()):
+        yield partial(model_of, chains)
 
 
 def workers() -> int:
