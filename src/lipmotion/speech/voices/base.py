@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import shutil
 import subprocess
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from lipmotion.errors import InputError, MissingDependencyError
+from lipmotion.speech.voices.sounds import Labels
 from lipmotion.types import Audio, Timeline
 
 START_S, EACH_S = 30.0, 5.0
 """How long a program may take to start, and for each sentence: a hundred times what they need."""
 SHOWN = 200
 """Letters of a program's complaint that an error repeats."""
-Labels = Mapping[str, tuple[str, ...]]
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """A program of its own: texts to wav files and the starts of their phones, by the library of espeak-ng.
 
-It reads ``{"voice", "texts", "folder"}`` and writes a list of ``[label, start_s]`` for every text, as JSON, and the sound
-of text n to ``folder/n.wav``. It imports nothing of this package: it runs without its start-up time.
+It reads ``{"voice", "texts", "folder"}`` and writes a list of ``[label, start_s]`` for every text, as JSON, and the
+sound of text n to ``folder/n.wav``. It imports nothing of this package: it runs without its start-up time.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """When a phone of espeak-ng begins, other than its library says.
 
-Two things that it says are not so. Stops are reported at their burst: the silence of the closure, 40 to 50 ms of it, comes
-before. An l at the end of a syllable is spoken with its vowel, and reported in its last 0 to 45 ms.
+Two things that it says are not so. Stops are reported at their burst: the silence of the closure, 40 to 50 ms of it,
+comes before. An l at the end of a syllable is spoken with its vowel, and reported in its last 0 to 45 ms.
 """
 
 from __future__ import annotations

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
+from contextlib import closing
 from pathlib import Path
 
 from lipmotion.errors import InputError, MissingDependencyError
-from lipmotion.speech.voices.base import SyntheticVoice, Synthesiser
+from lipmotion.speech.voices.base import Synthesiser, SyntheticVoice
 from lipmotion.speech.voices.espeak import ESPEAK_NG
 from lipmotion.speech.voices.festival import FESTIVAL
 from lipmotion.speech.voices.flite import FLITE
@@ -29,12 +30,13 @@ def speak(text: str, voice: SyntheticVoice, lexicon: Lexicon | None = None) -> t
     lexicon : whose words tell which vowels are unstressed; the built-in one by default
     Raises as ``speak_all``.
     """
-    return next(speak_all([text], voice, lexicon))
+    with closing(speak_all([text], voice, lexicon)) as said:
+        return next(said)
 
 
 def speak_all(
     texts: Sequence[str], voice: SyntheticVoice, lexicon: Lexicon | None = None
-) -> Iterator[tuple[Audio, Timeline[Unit]]]:
+) -> Generator[tuple[Audio, Timeline[Unit]], None, None]:
     """Give several sentences in a voice, as ``speak``; the program is started once for all of them where it can be.
 
     Raises MissingDependencyError: the synthesiser is not installed (the message names the package).

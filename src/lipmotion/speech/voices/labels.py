@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import groupby
 
 from lipmotion.errors import InputError
 from lipmotion.speech.recogniser import SHORT_PAUSE_S
+from lipmotion.speech.voices.sounds import Labels
 from lipmotion.types import Span, Timeline, Unit
 from lipmotion.units import PAUSE, SILENCE, VISEME_OF, Lexicon, is_silent, phone_classes
 from lipmotion.units.lexicon import REDUCED
@@ -19,7 +20,7 @@ Phones = Sequence[tuple[str, float, float]]
 
 
 def labelled(
-    said: Timeline[str], table: Mapping[str, tuple[str, ...]], words: Sequence[str], lexicon: Lexicon, duration_s: float
+    said: Timeline[str], table: Labels, words: Sequence[str], lexicon: Lexicon, duration_s: float
 ) -> Timeline[Unit]:
     """Return what a synthesiser says of its phones as the project's own aligner would.
 
@@ -89,7 +90,7 @@ def _cost(phone: str, other: str) -> float:
     return OTHER if (phone in VOWELS) == (other in VOWELS) else UNLIKE
 
 
-def _translated(said: Timeline[str], table: Mapping[str, tuple[str, ...]]) -> list[tuple[str, float, float]]:
+def _translated(said: Timeline[str], table: Labels) -> list[tuple[str, float, float]]:
     phones: list[tuple[str, float, float]] = []
     for span in said:
         if span.label not in table:

@@ -6,9 +6,14 @@ and IH become ax, axr and ix where the dictionary says so (``labels``).
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from lipmotion.units import PHONES, SILENCE
 
-ARPABET: dict[str, tuple[str, ...]] = {phone: (phone,) for phone in PHONES} | {"pau": (SILENCE,)}
+Labels = Mapping[str, tuple[str, ...]]
+"""The phones of the inventory that a label means."""
+
+ARPABET: Labels = {phone: (phone,) for phone in PHONES} | {"pau": (SILENCE,)}
 """Flite and Festival (phone set ``radio``). They have their own ax; their er and ih are stressed and unstressed."""
 
 _ESPEAK: dict[str, str] = {
@@ -53,7 +58,5 @@ _ESPEAK: dict[str, str] = {
     # parts of what is before: the glide from a vowel to the next, the beginning of an unstressed vowel
     "; @-": "",
 }  # fmt: skip
-ESPEAK: dict[str, tuple[str, ...]] = {
-    label: tuple(phones.split()) for labels, phones in _ESPEAK.items() for label in labels.split()
-}
+ESPEAK: Labels = {label: tuple(phones.split()) for labels, phones in _ESPEAK.items() for label in labels.split()}
 """espeak-ng's mnemonics (as ``espeak-ng -x`` writes them), voice en-us."""
