@@ -31,7 +31,7 @@ from lipmotion.types import Audio, Each, Features, Item, Monitor, Span, Timeline
 from lipmotion.units import SILENCE, Lexicon, is_silent
 
 SENTENCES = 60
-PAUSE_S, FLOOR_DB = 0.25, 40.0
+PAUSE_S, FLOOR_DB = 0.25, 50.0
 """Synthesisers begin at once, out of a silence that no room has: both would shift features normalised per recording."""
 PARTS, JUDGED = 4, 1
 """Speakers fall into so many parts by their names; those in this one are for judging."""
@@ -83,7 +83,7 @@ def many_voices(
     texts  : the first 60 of ``prompts`` by default, which say every phone of the dictionary
     voices : all that are installed by default
     each   : shares the work, a voice at a time; the same arguments give the same samples
-    A pause of 0.25 s is put before and after each, and white noise 40 dB under the speech throughout.
+    A pause of 0.25 s is put before and after each, and white noise 50 dB under the speech throughout.
     Raises MissingDependencyError: no synthesiser is installed. Raises InputError: as ``speech.voices.speak_all``.
     """
     chosen = installed_voices() if voices is None else tuple(voices)

@@ -105,12 +105,11 @@ def _translated(said: Timeline[str], table: Labels) -> list[tuple[str, float, fl
 
 def _covered(phones: Phones, duration_s: float) -> list[tuple[str, float, float]]:
     """Fill what is not covered with silence, and cut what is past the end of the sound."""
-    covered, now = [], 0.0
+    covered: list[tuple[str, float, float]] = []
+    now = 0.0
     for phone, start, end in phones:
-        if start > now:
-            covered.append((SILENCE, now, start))
+        covered += [(SILENCE, now, min(start, duration_s)), (phone, start, min(end, duration_s))]
         now = min(end, duration_s)
-        covered.append((phone, start, now))
     covered.append((SILENCE, now, duration_s))
     return [(phone, start, end) for phone, start, end in covered if end > start]
 
