@@ -14,7 +14,7 @@ from lipmotion.engines.coupled.densities import Group
 from lipmotion.engines.coupled.following import OFFSETS, Following, Surroundings
 from lipmotion.engines.coupled.learned import CoupledModel
 from lipmotion.engines.coupled.model import Chains
-from lipmotion.engines.coupled.product import Product, reachable
+from lipmotion.engines.coupled.product import Grammar, Product, reachable
 from lipmotion.engines.coupled.systems import Structure
 from lipmotion.engines.coupled.transitions import Transitions
 from lipmotion.engines.coupled.visual import VisualStream
@@ -35,10 +35,10 @@ def coupled_arrays(model: CoupledModel) -> dict[str, NDArray[Any]]:
         "gain": model.gain,
         "rest": model.rest,
         "streams": np.array(chains.streams),
-        "bigram": product.bigram.astype(np.float32),
-        "first": product.first.astype(np.float32),
     }
     for number, chain in enumerate(chains.structure.chains):
+        arrays[f"chain_{number}/bigram"] = product.grammar.bigrams[number].astype(np.float32)
+        arrays[f"chain_{number}/first"] = product.grammar.firsts[number].astype(np.float32)
         arrays[f"chain_{number}/units"] = np.array(list(chain.of.items()))
         arrays[f"chain_{number}/rows"] = chains.transitions.rows[number].astype(np.int32)
         arrays[f"chain_{number}/advance"] = chains.transitions.advance[number]
@@ -123,11 +123,15 @@ def _structure(arrays: Arrays, config: CoupledConfig) -> Structure:
 
 
 def _product(arrays: Arrays, structure: Structure) -> Product:
-    count = len(structure.units[0])
-    _check(arrays, {"bigram": (count, count), "first": (count,)})
-    if not (arrays["bigram"] > 0).all() or not (arrays["first"] > 0).all():
-        raise ValueError("probabilities that are not more than 0")
-    return reachable(structure, arrays["bigram"].astype(float), arrays["first"].astype(float))
+    bigrams, firsts = [], []
+    for chain, units in enumerate(structure.units):
+        bigram, first = arrays[f"chain_{chain}/bigram"], arrays[f"chain_{chain}/first"]
+        _check(arrays, {f"chain_{chain}/bigram": (len(units), len(units)), f"chain_{chain}/first": (len(units),)})
+        if not (bigram > 0).all() or not (first > 0).all():
+            raise ValueError("probabilities that are not more than 0")
+        bigrams.append(bigram.astype(float))
+        firsts.append(first.astype(float))
+    return reachable(structure, Grammar(tuple(bigrams), tuple(firsts)))
 
 
 def _rows(arrays: Arrays, chain: int, count: int) -> NDArray[np.intp]:

@@ -13,8 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.coupled.systems import Structure
+from lipmotion.errors import InputError
 
 Index = NDArray[np.intp]
+MOST_ARCS = 200_000
+"""Of products without a limit, which are listed arc by arc."""
 
 
 class Joint(NamedTuple):
@@ -29,11 +32,22 @@ class Joint(NamedTuple):
     ahead: tuple[bool, ...]
 
 
+class Grammar(NamedTuple):
+    """Which units follow which, chain by chain; chains with an asynchrony limit all go by that of the first.
+
+    bigrams : P(next unit | unit) [each shape=(U_c, U_c)], all more than 0
+    firsts  : probability that a recording begins with each unit [each shape=(U_c,)]
+    """
+
+    bigrams: tuple[NDArray[np.float64], ...]
+    firsts: tuple[NDArray[np.float64], ...]
+
+
 @dataclass(frozen=True, eq=False)
 class Product:
-    """The reachable joint states of chains with an asynchrony limit, and the arcs between them.
+    """The reachable joint states of chains, and the arcs between them.
 
-    bigram, first : as given to ``reachable``
+    grammar  : as given to ``reachable``
     joints   : S states
     arc_from : [shape=(E,)], the source states of all arcs, sorted by target
     arc_to   : [shape=(E,)]
@@ -45,8 +59,7 @@ class Product:
     """
 
     structure: Structure
-    bigram: NDArray[np.float64]
-    first: NDArray[np.float64]
+    grammar: Grammar
     joints: tuple[Joint, ...]
     arc_from: Index
     arc_to: Index
@@ -81,19 +94,21 @@ class Product:
         return " | ".join(f"{name}.{place + 1}" for name, place in zip(names, joint.states, strict=True))
 
 
-def reachable(structure: Structure, bigram: NDArray[np.float64], first: NDArray[np.float64]) -> Product:
+def reachable(structure: Structure, grammar: Grammar) -> Product:
     """Return the product of chains.
 
-    bigram : P(next unit | unit) of the first chain [shape=(U, U)], all more than 0
-    first  : probability that a recording begins with each unit [shape=(U,)]
+    With a limit of asynchrony all chains say the same units; without one each goes its own way.
+    Raises InputError: chains without a limit that have too many joint states to list.
     """
+    if structure.limit is None:
+        return _unlimited(structure, grammar)
     chains = range(len(structure.chains))
     together, level = (False,) * len(chains), (0,) * len(chains)
     begins = {
         Joint(tuple(structure.follows[c][unit] for c in chains), level, together): float(probability)
-        for unit, probability in enumerate(first)
+        for unit, probability in enumerate(grammar.firsts[0])
     }
-    walk = _Walk(structure, bigram)
+    walk = _Walk(structure, grammar.bigrams[0])
     found: dict[Joint, list[tuple[Joint, tuple[bool, ...], float]]] = {}
     waiting = deque(begins)
     while waiting:
@@ -114,8 +129,7 @@ def reachable(structure: Structure, bigram: NDArray[np.float64], first: NDArray[
         initial[number[joint]] = probability
     return Product(
         structure,
-        bigram,
-        first,
+        grammar,
         joints,
         np.array(sources, np.intp),
         np.array(targets, np.intp),
@@ -123,6 +137,66 @@ def reachable(structure: Structure, bigram: NDArray[np.float64], first: NDArray[
         np.array(base, float),
         initial / initial.sum(),
     )
+
+
+def _unlimited(structure: Structure, grammar: Grammar) -> Product:
+    """Return all combinations of the chains' states, each chain following arcs of its own."""
+    chains = range(len(structure.chains))
+    arcs = [_chain_arcs(structure, grammar.bigrams[chain]) for chain in chains]
+    total = int(np.prod([len(own) for own in arcs]))
+    if total > MOST_ARCS:
+        raise InputError(
+            f"{' and '.join(chain.name for chain in structure.chains)}: {total} arcs between joint states, at most "
+            f"{MOST_ARCS}; limit the asynchrony, or take smaller unit sets"
+        )
+    states = list(product(*(range(count) for count in structure.counts)))
+    joints = tuple(
+        Joint(
+            tuple(state // structure.states for state in joint),
+            tuple(state % structure.states for state in joint),
+            (False,) * len(joint),
+        )
+        for joint in states
+    )
+    number = {joint: index for index, joint in enumerate(states)}
+    found = sorted(
+        (
+            number[tuple(arc[1] for arc in together)],
+            number[tuple(arc[0] for arc in together)],
+            tuple(arc[2] for arc in together),
+            float(np.prod([arc[3] for arc in together])),
+        )
+        for together in product(*arcs)
+    )
+    targets, sources, moves, base = zip(*found, strict=True)
+    begins = [np.zeros(count) for count in structure.counts]
+    for chain, own in enumerate(begins):
+        own[:: structure.states] = grammar.firsts[chain]
+    initial = np.array([np.prod([begins[c][state] for c, state in enumerate(joint)]) for joint in states])
+    return Product(
+        structure,
+        grammar,
+        joints,
+        np.array(sources, np.intp),
+        np.array(targets, np.intp),
+        np.array(moves, bool).T,
+        np.array(base, float),
+        initial / initial.sum(),
+    )
+
+
+def _chain_arcs(structure: Structure, bigram: NDArray[np.float64]) -> list[tuple[int, int, bool, float]]:
+    """Return the source and target of one chain's arcs, whether they move on, and the probability of the unit."""
+    arcs: list[tuple[int, int, bool, float]] = []
+    for unit, row in enumerate(bigram):
+        for place in range(structure.states):
+            state = structure.state(unit, place)
+            arcs.append((state, state, False, 1.0))
+            if place < structure.states - 1:
+                arcs.append((state, state + 1, True, 1.0))
+        last = structure.state(unit, structure.states - 1)
+        arcs += [(last, structure.state(entered, 0), True, float(share)) for entered, share in enumerate(row)]
+    return arcs
 
 
 @dataclass(frozen=True, eq=False)

@@ -53,8 +53,6 @@ class Structure:
             raise InputError(
                 f"asynchrony is {self.limit} states, required 0 to {self.states - 1} (fewer than a unit has), or -1"
             )
-        if self.kind == COUPLED and self.limit is None:
-            raise InputError("coupled chains without a limit of asynchrony have too many states; give one from 0")
 
     @cached_property
     def units(self) -> tuple[tuple[str, ...], ...]:

@@ -14,7 +14,7 @@ from lipmotion.engines.coupled.densities import Group, Observed, Single, no_sums
 from lipmotion.engines.coupled.expectation import Expected, Recording, expected, joined, maximised
 from lipmotion.engines.coupled.lattice import within
 from lipmotion.engines.coupled.model import Chains
-from lipmotion.engines.coupled.product import Joint, Product, reachable
+from lipmotion.engines.coupled.product import Grammar, Joint, Product, reachable
 from lipmotion.engines.coupled.systems import HMM, Structure
 from lipmotion.engines.coupled.transitions import first_transitions
 from lipmotion.engines.trajectory.joint.labels import in_frames
@@ -165,12 +165,7 @@ def labelled_path(product: Product, phones: Timeline[Unit], frames: int) -> Inde
 
 def _flat_start(structure: Structure, streams: tuple[str, ...], data: Sequence[Labelled], how: Schedule) -> Chains:
     """Return chains that know which units follow which, and nothing of what they emit."""
-    said = [[structure.units[0][unit] for unit, _, _ in _labels(structure, one)] for one in data]
-    bigram = np.exp(estimate_bigram(structure.units[0], said).log_probability.astype(float))
-    first = np.full(len(bigram), FIRST_SHARE / len(bigram))
-    for sentence in said:
-        first[structure.units[0].index(sentence[0])] += (1 - FIRST_SHARE) / len(said)
-    product = reachable(structure, bigram, first)
+    product = reachable(structure, grammar_of(structure, data))
     groups = []
     together = [tuple(range(len(streams)))] if structure.kind == HMM else [(s,) for s in range(len(streams))]
     dimensions = [stream.shape[1] for stream in data[0].observed.streams]
@@ -187,6 +182,20 @@ def _flat_start(structure: Structure, streams: tuple[str, ...], data: Sequence[L
             )
         )
     return Chains(streams, first_transitions(product), tuple(groups))
+
+
+def grammar_of(structure: Structure, data: Sequence[Labelled]) -> Grammar:
+    """Return which units follow which in some labels, in every chain."""
+    said = [[unit for unit, _, _ in _labels(structure, one)] for one in data]
+    bigrams, firsts = [], []
+    for units, follows in zip(structure.units, structure.follows, strict=True):
+        sentences = [[units[follows[unit]] for unit in sentence] for sentence in said]
+        bigrams.append(np.exp(estimate_bigram(units, sentences).log_probability.astype(float)))
+        first = np.full(len(units), FIRST_SHARE / len(units))
+        for sentence in sentences:
+            first[units.index(sentence[0])] += (1 - FIRST_SHARE) / len(sentences)
+        firsts.append(first)
+    return Grammar(tuple(bigrams), tuple(firsts))
 
 
 def _labels(structure: Structure, one: Labelled) -> list[tuple[int, int, int]]:

@@ -1,0 +1,93 @@
+"""The synthetic voices that are installed: how much they say, how fast, and how their phone times agree with ours.
+
+    python benchmarks/voices.py [--sentences 60]
+
+One JSON object a line: a synthesiser each, then all. ``late_ms``: median of (its start of a phone − where general phone
+models place the same phone); ``off_ms``, ``worst_ms``: median and 90th percentile of the distance. ``biased``: phones
+that it starts 12 ms or more too late or too early in the median (of 20 or more).
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from collections import Counter, defaultdict
+from collections.abc import Sequence
+
+import numpy as np
+
+import lipmotion
+from lipmotion.errors import AlignmentError
+from lipmotion.pipeline.prompts import prompts
+from lipmotion.pipeline.voices import SpokenSentence, heard, is_for_judging, many_voices
+from lipmotion.speech.mfcc import mfcc
+from lipmotion.speech.recogniser import Recogniser
+from lipmotion.speech.voices.installed import installed_voices
+from lipmotion.types import Span, Timeline, Unit
+from lipmotion.units import is_silent
+
+FEWEST, BIASED_MS = 20, 12
+
+
+def main() -> None:
+    """Print one JSON object a line."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--sentences", type=int, default=60)
+    texts = [prompt.text for prompt in prompts(count=parser.parse_args().sentences).chosen]
+    general = Recogniser(lipmotion.load_model().phones, "general")
+    everything: list[SpokenSentence] = []
+    total_s = 0.0
+    for name in dict.fromkeys(voice.synthesiser for voice in installed_voices()):
+        voices = [voice for voice in installed_voices() if voice.synthesiser == name]
+        before_s = time.perf_counter()
+        sentences = list(many_voices(texts, voices))
+        count = sum(1 for _ in heard(sentences))
+        taken_s = time.perf_counter() - before_s
+        size = {"synthesiser": name, "voices": len(voices), "sentences": count, "minutes": minutes(sentences)}
+        print(json.dumps(size | {"seconds": round(taken_s, 1)} | late(sentences, general)))
+        everything += sentences
+        total_s += taken_s
+    speakers = dict.fromkeys(sentence.speaker for sentence in everything)
+    counts = Counter(span.label.phone for sentence in everything for span in sentence.phones)
+    print(
+        json.dumps({"minutes": minutes(everything), "seconds": round(total_s, 1), "phones": dict(counts.most_common())})
+    )
+    print(json.dumps({"speakers": list(speakers), "for judging": [name for name in speakers if is_for_judging(name)]}))
+
+
+def minutes(sentences: Sequence[SpokenSentence]) -> float:
+    """Return how long they are."""
+    return round(sum(sentence.audio.duration_s for sentence in sentences) / 60, 1)
+
+
+def late(sentences: Sequence[SpokenSentence], general: Recogniser) -> dict[str, object]:
+    """Return how much later than in the ears of the general models phones start."""
+    late_ms, misfits = defaultdict(list), 0
+    for sentence in sentences:
+        try:
+            placed = general.place(sentence.audio, mfcc(sentence.audio), sentence.phones)
+        except AlignmentError:
+            misfits += 1
+            continue
+        for said, found in zip(spoken(sentence.phones), spoken(placed), strict=True):
+            late_ms[said.label.phone].append(1000 * (said.start_s - found.start_s))
+    errors = np.concatenate(list(late_ms.values()))
+    medians = {phone: round(float(np.median(values))) for phone, values in late_ms.items() if len(values) >= FEWEST}
+    return {
+        "phones": len(errors),
+        "misfits": misfits,
+        "late_ms": round(float(np.median(errors)), 1),
+        "off_ms": round(float(np.median(np.abs(errors))), 1),
+        "worst_ms": round(float(np.quantile(np.abs(errors), 0.9)), 1),
+        "biased": {phone: median for phone, median in sorted(medians.items()) if abs(median) >= BIASED_MS},
+    }
+
+
+def spoken(units: Timeline[Unit]) -> list[Span[Unit]]:
+    """Return the phones between the silences."""
+    return [span for span in units if not is_silent(span.label.phone)]
+
+
+if __name__ == "__main__":
+    main()

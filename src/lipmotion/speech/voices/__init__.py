@@ -1,0 +1,1 @@
+"""Sentences in the voices of speech synthesisers that are installed, with the time of every phone."""

@@ -1,0 +1,75 @@
+"""Festival: any English voice that is installed, one program run for all sentences."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from lipmotion.errors import InputError
+from lipmotion.speech.read import read_audio
+from lipmotion.speech.voices.base import Said, Synthesiser, SyntheticVoice, output_of
+from lipmotion.speech.voices.sounds import ARPABET
+from lipmotion.types import Span, Timeline
+
+PACKAGE = "festival festvox-us-slt-hts"
+MARK = "-- sentence"
+LISTING = """(mapcar (lambda (name)
+  (let ((about (cadr (voice.description name))))
+    (format t "%s %s %s\\n" name (cadr (assoc 'language about)) (cadr (assoc 'dialect about)))))
+  (voice.list))"""
+SPEAKING = f"""(define (say text path)
+  (let ((utterance (utt.synth (eval (list 'Utterance 'Text text)))))
+    (format t "{MARK}\\n")
+    (mapcar (lambda (segment) (format t "%s %s %s\\n" (item.name segment) (item.feat segment "segment_start")
+                                      (item.feat segment "end")))
+            (utt.relation.items utterance 'Segment))
+    (utt.save.wave utterance path 'riff)))
+"""
+
+
+def _voices() -> tuple[SyntheticVoice, ...]:
+    if shutil.which("festival") is None:
+        return ()
+    rows = [line.split() for line in output_of(["festival", "-b", LISTING], PACKAGE).splitlines()]
+    names = [row[0] for row in rows if row[1:] == ["english", "american"]]
+    return tuple(SyntheticVoice(name, "festival", _speaker(name)) for name in names)
+
+
+def _speaker(name: str) -> str:
+    """Return ``slt`` for ``cmu_us_slt_arctic_hts``, ``kal`` for ``kal_diphone``."""
+    return re.sub(r"^cmu_us_|_.*", "", re.sub(r"^cmu_us_", "", name))
+
+
+def _say(voice: str, texts: Sequence[str], folder: Path) -> Iterator[Said]:
+    paths = [folder / f"{number}.wav" for number in range(len(texts))]
+    script = folder / "say.scm"
+    calls = [f"(say {_quoted(text)} {_quoted(str(path))})" for text, path in zip(texts, paths, strict=True)]
+    script.write_text("\n".join([f"(voice_{voice})", SPEAKING, *calls, ""]), encoding="utf-8")
+    printed = output_of(["festival", "-b", str(script)], PACKAGE, len(texts))
+    parts = printed.split(f"{MARK}\n")[1:]
+    if len(parts) != len(texts):
+        raise InputError(f"festival said {len(parts)} of {len(texts)} sentences; try another text or voice")
+    for path, part in zip(paths, parts, strict=True):
+        yield Said(read_audio(path), phones_in(part))
+        path.unlink()
+
+
+def phones_in(printed: str) -> Timeline[str]:
+    """Return phones in time from lines of a name, a start and an end. Raises InputError: other lines."""
+    spans = []
+    for line in printed.splitlines():
+        try:
+            label, start, end = line.split()
+            spans.append(Span(float(start), float(end), label))
+        except ValueError as error:
+            raise InputError(f"festival prints {line!r}, required a phone, its start and its end") from error
+    return Timeline(tuple(spans))
+
+
+def _quoted(text: str) -> str:
+    return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
+
+
+FESTIVAL = Synthesiser("festival", PACKAGE, _voices, _say, ARPABET)

@@ -1,0 +1,55 @@
+"""Flite: four voices of 16 kHz, one program run a sentence."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from lipmotion.errors import InputError
+from lipmotion.speech.read import read_audio
+from lipmotion.speech.voices.base import Said, Synthesiser, SyntheticVoice, output_of
+from lipmotion.speech.voices.sounds import ARPABET
+from lipmotion.types import Span, Timeline
+
+PACKAGE = "flite"
+UNUSED = frozenset({"kal", "awb_time"})
+"""kal is kal16 at 8 kHz; awb_time knows the words of the time of day alone."""
+SPEAKERS = {"kal16": "kal"}
+
+
+def _voices() -> tuple[SyntheticVoice, ...]:
+    if shutil.which("flite") is None:
+        return ()
+    names = output_of(["flite", "-lv"], PACKAGE).partition(":")[2].split()
+    return tuple(SyntheticVoice(name, "flite", SPEAKERS.get(name, name)) for name in names if name not in UNUSED)
+
+
+def _say(voice: str, texts: Sequence[str], folder: Path) -> Iterator[Said]:
+    path = folder / "flite.wav"
+    for text in texts:
+        printed = output_of(["flite", "-voice", voice, "-psdur", "-o", str(path), "-t", text], PACKAGE)
+        yield Said(read_audio(path), phones_in(printed))
+
+
+def phones_in(printed: str) -> Timeline[str]:
+    """Return phones in time from what ``flite -psdur`` prints: ``pau:0.220 k:0.346``, a line an utterance.
+
+    The number is the end of the phone in its utterance; a long text is several utterances.
+    Raises InputError: it prints something else.
+    """
+    spans, start_s = [], 0.0
+    for line in printed.splitlines():
+        first_s = start_s
+        for entry in line.split():
+            label, _, end = entry.partition(":")
+            try:
+                end_s = max(first_s + float(end), start_s)
+            except ValueError as error:
+                raise InputError(f"flite prints {entry!r}, required a phone and its end, as in 'k:0.346'") from error
+            spans.append(Span(start_s, end_s, label))
+            start_s = end_s
+    return Timeline(tuple(spans))
+
+
+FLITE = Synthesiser("flite", PACKAGE, _voices, _say, ARPABET)

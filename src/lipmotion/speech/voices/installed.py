@@ -1,0 +1,67 @@
+"""The voices that are installed here, and sentences in them."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Generator, Sequence
+from contextlib import closing
+from pathlib import Path
+
+from lipmotion.errors import InputError, MissingDependencyError
+from lipmotion.speech.voices.base import Synthesiser, SyntheticVoice
+from lipmotion.speech.voices.espeak import ESPEAK_NG
+from lipmotion.speech.voices.festival import FESTIVAL
+from lipmotion.speech.voices.flite import FLITE
+from lipmotion.speech.voices.labels import labelled
+from lipmotion.types import Audio, Timeline, Unit
+from lipmotion.units import Lexicon, words_of
+
+SYNTHESISERS: dict[str, Synthesiser] = {each.name: each for each in (FLITE, FESTIVAL, ESPEAK_NG)}
+
+
+def installed_voices() -> tuple[SyntheticVoice, ...]:
+    """Return the English voices of the synthesisers that are installed; none where none is."""
+    return tuple(voice for synthesiser in SYNTHESISERS.values() for voice in synthesiser.voices())
+
+
+def speak(text: str, voice: SyntheticVoice, lexicon: Lexicon | None = None) -> tuple[Audio, Timeline[Unit]]:
+    """Return a sentence in a voice: the sound at 16 kHz, and the phones that are in it, in time, from 0 s to its end.
+
+    lexicon : whose words tell which vowels are unstressed; the built-in one by default
+    Raises as ``speak_all``.
+    """
+    with closing(speak_all([text], voice, lexicon)) as said:
+        return next(said)
+
+
+def speak_all(
+    texts: Sequence[str], voice: SyntheticVoice, lexicon: Lexicon | None = None
+) -> Generator[tuple[Audio, Timeline[Unit]], None, None]:
+    """Give several sentences in a voice, as ``speak``; the program is started once for all of them where it can be.
+
+    Raises MissingDependencyError: the synthesiser is not installed (the message names the package).
+    Raises InputError: no such synthesiser or voice, a text without a word, or one that the synthesiser cannot say.
+    """
+    lexicon = lexicon or Lexicon()
+    synthesiser = _synthesiser(voice)
+    words = [words_of(text) for text in texts]
+    with tempfile.TemporaryDirectory(prefix="lipmotion-voices-") as folder:
+        plain = [" ".join(text.split()) for text in texts]
+        said = synthesiser.say(voice.name, plain, Path(folder)) if plain else iter(())
+        for one, said_words in zip(said, words, strict=True):
+            audio = one.audio
+            yield audio, labelled(one.phones, synthesiser.labels, said_words, lexicon, audio.duration_s)
+
+
+def _synthesiser(voice: SyntheticVoice) -> Synthesiser:
+    synthesiser = SYNTHESISERS.get(voice.synthesiser)
+    if synthesiser is None:
+        raise InputError(f"unknown synthesiser {voice.synthesiser!r}; required one of: {', '.join(SYNTHESISERS)}")
+    names = [known.name for known in synthesiser.voices()]
+    if not names:
+        raise MissingDependencyError(
+            f"{synthesiser.name} is not installed, or has no English voice: apt install {synthesiser.package}"
+        )
+    if voice.name not in names:
+        raise InputError(f"{synthesiser.name} has no voice {voice.name!r} here; it has: {', '.join(names)}")
+    return synthesiser

@@ -1,0 +1,127 @@
+"""A synthesiser's phones to those of the inventory, each with its word, pauses as the project's aligner names them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import groupby
+
+from lipmotion.errors import InputError
+from lipmotion.speech.recogniser import SHORT_PAUSE_S
+from lipmotion.speech.voices.sounds import Labels
+from lipmotion.types import Span, Timeline, Unit
+from lipmotion.units import PAUSE, SILENCE, VISEME_OF, Lexicon, is_silent, phone_classes
+from lipmotion.units.lexicon import REDUCED
+
+GAP, ALIKE, OTHER, UNLIKE = 0.7, 0.3, 0.8, 1.5
+"""What it costs to match a phone with none, with a form of itself, with another of its kind (vowel, consonant), or with
+one of the other kind."""
+VOWELS = phone_classes()["vowel"]
+Phones = Sequence[tuple[str, float, float]]
+
+
+def labelled(
+    said: Timeline[str], table: Labels, words: Sequence[str], lexicon: Lexicon, duration_s: float
+) -> Timeline[Unit]:
+    """Return what a synthesiser says of its phones as the project's own aligner would.
+
+    said       : its labels in time
+    table      : labels to phones (``sounds``)
+    duration_s : of the sound: what no label covers, before, between and after them, is silent
+    Raises InputError: a label that is not in the table, or no phone at all.
+    """
+    phones = _joined(_covered(_translated(said, table), duration_s))
+    spoken = [phone for phone, _, _ in phones if not is_silent(phone)]
+    if not spoken:
+        raise InputError("the synthesiser says no phone; give another text")
+    named = iter(with_words(spoken, words, lexicon))
+    last = len(phones) - 1
+    spans = [
+        Span(start, end, Unit(_silence(0 < place < last, end - start)))
+        if is_silent(phone)
+        else Span(start, end, next(named))
+        for place, (phone, start, end) in enumerate(phones)
+    ]
+    return Timeline(tuple(spans))
+
+
+def with_words(phones: Sequence[str], words: Sequence[str], lexicon: Lexicon) -> list[Unit]:
+    """Return phones with their words, AH, ER and IH reduced where the dictionary reduces them.
+
+    Both follow from the cheapest match with the words' first pronunciations; a phone that matches none is part of the
+    word before it.
+    """
+    wanted = [(phone, word) for word in words for phone in lexicon.pronunciations(word)[0]]
+    units, word = [], wanted[0][1]
+    for phone, match in zip(phones, matches(phones, [phone for phone, _ in wanted]), strict=True):
+        meant, word = wanted[match] if match >= 0 else ("", word)
+        units.append(Unit(meant if REDUCED.get(phone) == meant else phone, word=word))
+    return units
+
+
+def matches(found: Sequence[str], wanted: Sequence[str]) -> list[int]:
+    """Return which of the wanted phones each of those found stands for, -1 for none: least cost in all.
+
+    Source: Wagner & Fischer 1974 (edit distance).
+    """
+    costs = [[GAP * column for column in range(len(wanted) + 1)]]
+    for row, phone in enumerate(found):
+        above, line = costs[-1], [GAP * (row + 1)]
+        for column, other in enumerate(wanted):
+            same = above[column] + _cost(phone, other)
+            line.append(min(same, above[column + 1] + GAP, line[column] + GAP))
+        costs.append(line)
+    matched, row, column = [-1] * len(found), len(found), len(wanted)
+    while row and column:
+        if costs[row][column] == costs[row - 1][column - 1] + _cost(found[row - 1], wanted[column - 1]):
+            row, column = row - 1, column - 1
+            matched[row] = column
+        elif costs[row][column] == costs[row - 1][column] + GAP:
+            row -= 1
+        else:
+            column -= 1
+    return matched
+
+
+def _cost(phone: str, other: str) -> float:
+    if phone == other:
+        return 0.0
+    if REDUCED.get(phone, phone) == REDUCED.get(other, other) or VISEME_OF[phone] == VISEME_OF[other]:
+        return ALIKE
+    return OTHER if (phone in VOWELS) == (other in VOWELS) else UNLIKE
+
+
+def _translated(said: Timeline[str], table: Labels) -> list[tuple[str, float, float]]:
+    phones: list[tuple[str, float, float]] = []
+    for span in said:
+        if span.label not in table:
+            raise InputError(f"the synthesiser says {span.label!r}, which is no phone; known are: {' '.join(table)}")
+        names = table[span.label]
+        if not names and phones:
+            phones[-1] = (*phones[-1][:2], span.end_s)
+        each_s = span.duration_s / max(len(names), 1)
+        phones += [(name, span.start_s + i * each_s, span.start_s + (i + 1) * each_s) for i, name in enumerate(names)]
+    return [(name, start, end) for name, start, end in phones if end > start]
+
+
+def _covered(phones: Phones, duration_s: float) -> list[tuple[str, float, float]]:
+    """Fill what is not covered with silence, and cut what is past the end of the sound."""
+    covered: list[tuple[str, float, float]] = []
+    now = 0.0
+    for phone, start, end in phones:
+        covered += [(SILENCE, now, min(start, duration_s)), (phone, start, min(end, duration_s))]
+        now = min(end, duration_s)
+    covered.append((SILENCE, now, duration_s))
+    return [(phone, start, end) for phone, start, end in covered if end > start]
+
+
+def _joined(phones: Phones) -> list[tuple[str, float, float]]:
+    """Return neighbouring silences as one."""
+    joined: list[tuple[str, float, float]] = []
+    for silent, run in groupby(phones, key=lambda phone: is_silent(phone[0])):
+        part = list(run)
+        joined += [(SILENCE, part[0][1], part[-1][2])] if silent else part
+    return joined
+
+
+def _silence(inside: bool, duration_s: float) -> str:
+    return PAUSE if inside and duration_s < SHORT_PAUSE_S else SILENCE

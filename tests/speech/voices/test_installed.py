@@ -1,0 +1,187 @@
+"""Which voices there are, and what they say: with fakes everywhere, with the synthesisers where they are."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lipmotion.errors import InputError, LipMotionError, MissingDependencyError
+from lipmotion.pipeline.model import Model
+from lipmotion.speech.mfcc import mfcc
+from lipmotion.speech.noise import noisy
+from lipmotion.speech.recogniser import Recogniser
+from lipmotion.speech.voices import base, espeak_events
+from lipmotion.speech.voices.base import SyntheticVoice
+from lipmotion.speech.voices.flite import phones_in
+from lipmotion.speech.voices.installed import SYNTHESISERS, installed_voices, speak, speak_all
+from lipmotion.units import PHONES, Lexicon, is_silent, words_of
+
+FAKED = [
+    SyntheticVoice("kal16", "flite", "kal"),
+    SyntheticVoice("slt", "flite", "slt"),
+    SyntheticVoice("cmu_us_slt_arctic_hts", "festival", "slt"),
+    SyntheticVoice("kal_diphone", "festival", "kal"),
+    SyntheticVoice("en-us+f2", "espeak-ng", "espeak-f2"),
+]
+EACH = [FAKED[0], FAKED[2], FAKED[4]]
+HARD = ['"Hello" \\ (sil) %s', "Hello; `ls` $HOME", "Helló"]
+
+
+@pytest.mark.usefixtures("faked")
+def test_voices_are_listed() -> None:
+    assert installed_voices() == tuple(FAKED)
+
+
+@pytest.mark.usefixtures("bare")
+def test_without_synthesisers_there_are_none() -> None:
+    assert installed_voices() == ()
+    for voice in EACH:
+        with pytest.raises(MissingDependencyError, match=f"apt install {voice.synthesiser}"):
+            speak("Hello", voice)
+
+
+@pytest.mark.parametrize("voice", FAKED)
+@pytest.mark.usefixtures("faked")
+def test_a_voice_says_phones_in_time(voice: SyntheticVoice) -> None:
+    audio, units = speak("Hello", voice)
+    assert audio.rate_hz == 16_000
+    assert audio.duration_s == pytest.approx(1.0)
+    found = [(span.label.phone, span.label.word, round(span.start_s, 6)) for span in units]
+    assert found == [
+        ("sil", "", 0.0),
+        ("hh", "hello", 0.2),
+        ("ax", "hello", 0.3),
+        ("l", "hello", 0.4),
+        ("ow", "hello", 0.5),
+        ("sil", "", 0.9),
+    ]
+
+
+@pytest.mark.parametrize("voice", EACH)
+@pytest.mark.parametrize("text", HARD)
+@pytest.mark.usefixtures("faked")
+def test_any_letters_reach_the_synthesiser(voice: SyntheticVoice, text: str) -> None:
+    assert len(list(speak_all([text, text], voice, Lexicon({"helló": (("hh", "ax", "l", "ow"),)})))) == 2
+
+
+@pytest.mark.parametrize("voice", EACH)
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("they crash", "failed with 1 .no such sound"),
+        ("nonsense", "nonsense"),
+        ("no bytes", "cannot be run|nonsense"),
+        ("... ", "holds no word"),
+    ],
+)
+def test_errors_are_clear_and_nothing_stays(faked: Path, voice: SyntheticVoice, text: str, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        speak(text, voice)
+    assert list(faked.iterdir()) == []
+
+
+def test_a_sentence_that_festival_leaves_out_is_missed(faked: Path) -> None:
+    with pytest.raises(InputError, match="1 of 2 sentences"):
+        list(speak_all(["hello", "stop here"], FAKED[2]))
+    assert list(faked.iterdir()) == []
+
+
+@pytest.mark.parametrize("voice", EACH)
+def test_a_program_that_hangs_is_stopped(faked: Path, voice: SyntheticVoice, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(base, "START_S", 1.0)
+    monkeypatch.setattr(base, "EACH_S", 0.0)
+    with pytest.raises(InputError, match="did not end within 1 s"):
+        speak("hang", voice)
+    assert list(faked.iterdir()) == []
+
+
+@pytest.mark.parametrize("voice", EACH)
+def test_temporary_files_go_even_if_not_all_is_heard(faked: Path, voice: SyntheticVoice) -> None:
+    said = speak_all(["hello", "hello"], voice)
+    next(said)
+    assert len(list(faked.iterdir())) == 1
+    said.close()
+    assert list(faked.iterdir()) == []
+
+
+@pytest.mark.usefixtures("faked")
+def test_no_texts_are_nothing() -> None:
+    assert list(speak_all([], FAKED[0])) == []
+
+
+@pytest.mark.parametrize(
+    ("voice", "message"),
+    [
+        (SyntheticVoice("a", "dectalk", "a"), "'dectalk'; required one of: flite, festival"),
+        (SyntheticVoice("rms", "flite", "rms"), "no voice 'rms' here; it has: kal16, slt"),
+    ],
+)
+@pytest.mark.usefixtures("faked")
+def test_unknown_voices(voice: SyntheticVoice, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        speak("Hello", voice)
+
+
+def test_flite_begins_again_at_each_utterance() -> None:
+    phones = phones_in("pau:0.2 ay:0.5 \npau:0.1 y:0.3 \n")
+    assert [(span.label, span.start_s, span.end_s) for span in phones] == [
+        ("pau", 0, 0.2),
+        ("ay", 0.2, 0.5),
+        ("pau", 0.5, 0.6),
+        ("y", 0.6, 0.8),
+    ]
+
+
+def test_without_the_library_the_program_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(espeak_events, "LIBRARIES", ("libnothing.so.0",))
+    with pytest.raises(SystemExit, match=r"libnothing.so.0 is installed; apt install libespeak-ng1"):
+        espeak_events._library()
+
+
+@pytest.fixture(params=sorted(SYNTHESISERS))
+def real(request: pytest.FixtureRequest) -> SyntheticVoice:
+    """The last voice of each synthesiser that is installed."""
+    try:
+        voices = SYNTHESISERS[request.param].voices()
+    except LipMotionError:
+        voices = ()
+    if not voices:
+        pytest.skip(f"{request.param} is not installed")
+    return voices[-1]
+
+
+TEXTS = ["Please put both blue bowls on the table.", "The judge measured the beige garage.", "They enjoy a good thing."]
+
+
+def test_real_voices_say_what_the_dictionary_says(real: SyntheticVoice) -> None:
+    lexicon = Lexicon()
+    for text, (audio, units) in zip(TEXTS, speak_all(TEXTS, real), strict=True):
+        words = words_of(text)
+        assert [span.label.word for span in units if not is_silent(span.label.phone)] != []
+        assert list(dict.fromkeys(span.label.word for span in units if span.label.word)) == list(dict.fromkeys(words))
+        assert {span.label.phone for span in units} <= set(PHONES)
+        assert units[0].start_s == 0
+        assert units[-1].end_s == pytest.approx(audio.duration_s)
+        assert all(a.end_s == b.start_s for a, b in pairwise(units))
+        expected = sum(len(lexicon.pronunciations(word)[0]) for word in words)
+        assert sum(not is_silent(span.label.phone) for span in units) == pytest.approx(expected, abs=2)
+
+
+def test_real_voices_say_the_same_again(real: SyntheticVoice) -> None:
+    first, again = speak(TEXTS[0], real), speak(TEXTS[0], real)
+    assert np.array_equal(first[0].samples, again[0].samples)
+    assert first[1] == again[1]
+
+
+def test_the_times_of_real_voices_are_those_that_the_aligner_hears(real: SyntheticVoice, toy_model: Model) -> None:
+    recogniser, late_s = Recogniser(toy_model.phones, "general"), []
+    for audio, units in speak_all(TEXTS, real):
+        room = noisy(audio, "white", 50)
+        placed = recogniser.place(room, mfcc(room), units)
+        said, heard = ([span for span in part if not is_silent(span.label.phone)] for part in (units, placed))
+        late_s += [a.start_s - b.start_s for a, b in zip(said, heard, strict=True)]
+    assert np.median(np.abs(late_s)) < 0.014
+    assert abs(np.median(late_s)) < 0.01

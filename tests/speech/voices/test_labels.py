@@ -1,0 +1,106 @@
+"""A synthesiser's phones as the project's aligner would name them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lipmotion.errors import InputError
+from lipmotion.speech.voices import labels as module
+from lipmotion.speech.voices.labels import labelled, matches, with_words
+from lipmotion.speech.voices.sounds import ARPABET, ESPEAK
+from lipmotion.types import Span, Timeline, Unit
+from lipmotion.units import PHONES, Lexicon
+from oracles.edits import least_cost
+
+LEXICON = Lexicon({"butter": (("b", "ah", "t", "axr"),), "is": (("ix", "z"),), "it": (("ih", "t"),)})
+SOUNDS = [phone for phone in PHONES if phone not in ("sil", "sp")]
+
+
+def timeline(*labels: tuple[str, float, float]) -> Timeline[str]:
+    return Timeline(tuple(Span(start, end, label) for label, start, end in labels))
+
+
+def cost_of(found: Sequence[str], wanted: Sequence[str]) -> float:
+    matched = matches(found, wanted)
+    pairs = [(f, wanted[m]) for f, m in zip(found, matched, strict=True) if m >= 0]
+    gaps = len(found) + len(wanted) - 2 * len(pairs)
+    return sum(module._cost(*pair) for pair in pairs) + module.GAP * gaps
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.sampled_from(SOUNDS), max_size=5), st.lists(st.sampled_from(SOUNDS), max_size=5))
+def test_matches_are_the_cheapest(found: list[str], wanted: list[str]) -> None:
+    matched = [match for match in matches(found, wanted) if match >= 0]
+    assert matched == sorted(set(matched))
+    assert cost_of(found, wanted) == pytest.approx(least_cost(found, wanted, module._cost, module.GAP))
+
+
+def test_unstressed_vowels_are_reduced_and_words_known() -> None:
+    said = "b ah dh t er ih z ih t".split()  # dh: nobody's
+    assert with_words(said, ["butter", "is", "it"], LEXICON) == [
+        Unit("b", word="butter"),
+        Unit("ah", word="butter"),
+        Unit("dh", word="butter"),
+        Unit("t", word="butter"),
+        Unit("axr", word="butter"),
+        Unit("ix", word="is"),
+        Unit("z", word="is"),
+        Unit("ih", word="it"),
+        Unit("t", word="it"),
+    ]
+
+
+def test_what_the_synthesiser_says_stays() -> None:
+    lexicon = Lexicon({"either": (("iy", "dh", "axr"),)})
+    assert [unit.phone for unit in with_words(["ay", "dh", "er"], ["either"], lexicon)] == ["ay", "dh", "axr"]
+
+
+def test_pauses_are_named_by_place_and_length() -> None:
+    said = timeline(
+        ("pau", 0.0, 0.1), ("ih", 0.1, 0.2), ("pau", 0.2, 0.35), ("t", 0.35, 0.4), ("pau", 0.4, 0.65), ("ih", 0.65, 1.0)
+    )
+    units = labelled(said, ARPABET, ["it"], LEXICON, 1.1)
+    assert [span.label.phone for span in units] == ["sil", "ih", "sp", "t", "sil", "ih", "sil"]
+    assert [span.start_s for span in units] == pytest.approx([0, 0.1, 0.2, 0.35, 0.4, 0.65, 1.0])
+    assert units[-1].end_s == pytest.approx(1.1)
+
+
+def test_what_is_not_covered_is_silent_and_what_is_too_late_is_cut() -> None:
+    said = timeline(("ih", 0.1, 0.2), ("t", 0.3, 0.6), ("t", 0.7, 0.8))
+    units = labelled(said, ARPABET, ["it"], LEXICON, 0.5)
+    assert [(span.label.phone, span.start_s, span.end_s) for span in units] == [
+        ("sil", 0.0, 0.1),
+        ("ih", 0.1, 0.2),
+        ("sp", 0.2, 0.3),
+        ("t", 0.3, 0.5),
+    ]
+
+
+def test_several_phones_share_a_label_and_parts_join() -> None:
+    said = timeline(("A@", 0.0, 0.2), (";", 0.2, 0.3), ("t", 0.3, 0.3), ("z", 0.3, 0.4))
+    units = labelled(said, ESPEAK, ["is"], LEXICON, 0.4)
+    assert [(span.label.phone, span.start_s, span.end_s) for span in units] == [
+        ("aa", 0.0, 0.1),
+        ("r", 0.1, pytest.approx(0.3)),
+        ("z", 0.3, 0.4),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("said", "message"),
+    [(timeline(("xx", 0.0, 0.1)), "'xx', which is no phone"), (timeline(("pau", 0.0, 0.1)), "no phone; give")],
+)
+def test_it_says_what_is_wrong(said: Timeline[str], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        labelled(said, ARPABET, ["it"], LEXICON, 0.2)
+
+
+def test_tables_lead_to_the_inventory() -> None:
+    for table in (ARPABET, ESPEAK):
+        assert {phone for phones in table.values() for phone in phones} <= set(PHONES)
+    spoken = {phone for phones in ESPEAK.values() for phone in phones}
+    assert set(PHONES) - spoken == {"sp"}
