@@ -8,7 +8,7 @@ import pytest
 
 from cli.conftest import Run, is_one_error
 from lipmotion.corpora.store import Corpus
-from lipmotion.experiment import folds, learning_curve, unit_sets
+from lipmotion.experiment import comparison, folds, learning_curve, unit_sets
 from lipmotion.measures.bootstrap import interval
 from lipmotion.pipeline import evaluate
 
@@ -16,7 +16,7 @@ from lipmotion.pipeline import evaluate
 @pytest.fixture(autouse=True)
 def few_draws(monkeypatch: pytest.MonkeyPatch) -> None:
     """And the first two unit sets of the paper beside the one that they are compared with."""
-    for module in (unit_sets, evaluate):
+    for module in (comparison, evaluate):
         monkeypatch.setattr(module, "interval", partial(interval, draws=20))
     monkeypatch.setattr(unit_sets, "PAPER", {name: unit_sets.PAPER[name] for name in ("2vis", "pbVis", "phone")})
 

@@ -26,7 +26,7 @@ class Fit(Generic[ModelT]):
 
 
 class Animator(ABC, Generic[ModelT]):
-    """Learns to make motion of speech, and makes it. What was learned is the model, what came out the ``Generation``."""
+    """Learns to make motion of speech. What was learned is the model, what came out is the ``Generation``."""
 
     @property
     def hears_f0(self) -> bool:
