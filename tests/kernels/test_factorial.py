@@ -167,15 +167,18 @@ def test_single_precision_is_close_however_loud(spread):
     assert found.log_likelihood == pytest.approx(wanted.log_likelihood, rel=1e-6)
 
 
-def test_a_state_far_behind_comes_back_in_single_precision():
-    """Evidence speaks 150 nats against what it says later, which single precision cannot keep."""
-    audio, visual, evidence = random_model(9, 6, ((2, 2), (1, 1)), pairs=0)
-    audio = audio._replace(enter=np.eye(2), initial=np.full((2, 2), 0.25))
-    evidence.audio[:] = 0
-    evidence.audio[:3, ::2], evidence.audio[3:, 1::2] = -50, -200
-    single = Evidence.of(*(part.astype(np.float32) for part in evidence[:2]))
-    found = factorial_posteriors(audio, visual, single)
-    assert found.audio[:, ::2].sum(axis=1) == pytest.approx(np.ones(6))
+@pytest.mark.parametrize("third", [-60.0, -200.0])
+def test_a_unit_far_behind_comes_back_in_single_precision(third):
+    """Evidence speaks 72 nats against a unit, later 85 against the other; a third, worse, is never so far behind."""
+    audio, visual, _ = random_model(9, 1, ((2, 3), (1, 1)), pairs=0)
+    same = np.full((2, 3), 0.5)
+    audio = audio._replace(
+        stay=same, onward=same[:1], leave=same[0], enter=np.eye(3), initial=same / 3, final=same + 0.5
+    )
+    log_density = np.repeat([[-72.0, 0, third] * 2, [0, -85.0, third] * 2], 20, axis=0) / 20
+    evidence = Evidence.of(log_density.astype(np.float32), np.zeros((40, 1), np.float32))
+    found = factorial_posteriors(audio, visual, evidence)
+    assert found.audio[:, ::3].sum(axis=1) == pytest.approx(np.ones(40), abs=1e-4)
 
 
 @given(seed=SEEDS, frames=st.integers(1, 4), stretch=st.integers(1, 5))
