@@ -16,7 +16,7 @@ from lipmotion.kernels import factorial_steps
 from lipmotion.kernels.choice import numba_works
 from lipmotion.kernels.loops import Array, Density, Evidence, Loop, LoopCounts, Moves
 
-ROOM_BYTES = 2**28
+ROOM_BYTES = 2**27
 """Forward probabilities of as many frames as fit are kept at once, if they are not many more than √T."""
 LEAST_OVERLAP = 1e-20
 """In single precision: where forward and backward probabilities (sums 1) meet less, both may lack what matters."""
