@@ -182,7 +182,8 @@ def test_a_model_with_an_array_cut_short_is_damaged(trained):
 
 def test_trees_can_be_read(trained):
     text = trained.engine.trees(trained.model)
-    assert "leaf (" in text
+    assert ("leaf (" in text) is (trained.engine.name != "coupled")  # whose states are tied by unit alone
+    assert text
     assert max(map(len, text.splitlines())) < 200
 
 

@@ -55,7 +55,6 @@ def coupled_arrays(model: CoupledModel) -> dict[str, NDArray[Any]]:
 def _group_arrays(group: Group) -> dict[str, NDArray[Any]]:
     return {
         "streams": np.array(group.streams),
-        "edges": np.array([0, *(columns.stop for columns in group.columns)]),
         "weights": np.array(group.weights),
         "tie": group.tie.astype(np.int32),
         "log_weights": group.mixtures.log_weights,
@@ -106,7 +105,7 @@ def coupled_from_arrays(arrays: Arrays, config: CoupledConfig) -> CoupledModel:
         if sorted(stream for group in groups for stream in group.streams) != list(range(len(streams))):
             raise ValueError("streams that no group has, or two")
         chains = Chains(streams, transitions, groups)
-        follow = _follow(arrays, structure, visual) if "around/mean" in arrays else None
+        follow = _follow(arrays, structure, visual) if config.dynamic and config.follows else None
         gain, rest = arrays["gain"].astype(float), arrays["rest"].astype(float)
         return CoupledModel(chains, space, visual, follow, gain, rest, closure)
     except (KeyError, ValueError, TypeError, IndexError, OverflowError, InputError) as error:

@@ -114,23 +114,6 @@ def _together(job: tuple[Chains, Sequence[Recording]]) -> Expected:
     return Expected(sums, arcs, visits, log_likelihood, frames)
 
 
-def joined(observed: Sequence[Observed]) -> Observed:
-    """Return recordings one after the other."""
-    streams = range(len(observed[0].streams))
-    masks = [[o.seen[s] for o in observed] for s in streams]
-    return Observed(
-        tuple(np.concatenate([o.streams[s] for o in observed]) for s in streams),
-        tuple(
-            None
-            if all(mask is None for mask in own)
-            else np.concatenate(
-                [np.ones(o.frames, bool) if mask is None else mask for o, mask in zip(observed, own, strict=True)]
-            )
-            for own in masks
-        ),
-    )
-
-
 def _each(function: Callable[[Any], Expected], jobs: Iterable[Any], workers: int) -> Iterator[Expected]:
     """Give the results in order. Kernels and matrix products run without the interpreter's lock."""
     if workers < 2:

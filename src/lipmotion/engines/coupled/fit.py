@@ -32,6 +32,7 @@ from lipmotion.engines.coupled.train import Labelled, Schedule, Step, growing_ch
 from lipmotion.engines.coupled.visual import visual_streams
 from lipmotion.engines.trajectory.closure import learned_closure
 from lipmotion.engines.trajectory.space import motion_in_space
+from lipmotion.errors import CorpusError
 from lipmotion.kernels.banded import generate
 from lipmotion.stats.windows import within
 from lipmotion.types import FRAME_RATE_HZ, Example, Monitor, Progress, Timeline, Unit, part_of
@@ -63,6 +64,8 @@ def growing_models(
     """
     structure = structure_of(config.structure, config.chains, config.states, config.asynchrony, config.crosses)
     space, values = motion_in_space(examples, config.components)
+    if all(is_silent(span.label.phone) for example in examples for span in example.speech.units):
+        raise CorpusError(f"nothing is said in {len(examples)} examples; learn from speech")
     seen = [within(example.valid) for example in examples]
     visual = visual_streams(space, values, seen, config.dynamic)
     data = [

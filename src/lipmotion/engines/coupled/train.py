@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.coupled.densities import Group, Observed, Single, no_sums
-from lipmotion.engines.coupled.expectation import Expected, Recording, expected, joined, maximised
+from lipmotion.engines.coupled.expectation import Expected, Recording, expected, maximised
 from lipmotion.engines.coupled.lattice import within
 from lipmotion.engines.coupled.model import Chains
 from lipmotion.engines.coupled.product import Grammar, Joint, Product, reachable
@@ -27,7 +27,7 @@ Index = NDArray[np.intp]
 
 SLACK_S = 0.05
 """A phone may be said this long before and after its label."""
-FLOOR_SHARE = 0.01
+FLOOR_SHARE, LEAST_VARIANCE = 0.01, 1e-4
 """No variance falls under this share of the stream's own."""
 VITERBI_STEPS = 2
 FIRST_SHARE = 0.1
@@ -91,7 +91,7 @@ def growing_chains(
     workers: int = 1,
 ) -> Iterator[Chains]:
     """Give the chains that ``train_chains`` learns with 1, 2, 4, … Gaussians: each as if those were all."""
-    floors = tuple(_floor(stream) for stream in joined([one.observed for one in data]).streams)
+    floors = variance_floors([one.observed for one in data])
     chains = _flat_start(structure, streams, data, how)
     product, ties = chains.transitions.product, [group.tie for group in chains.groups]
     recordings = [
@@ -207,8 +207,17 @@ def _unknown(count: int, size: int) -> Mixtures:
     return Mixtures(np.zeros((count, 1), np.float32), np.zeros(shape, np.float32), np.ones(shape, np.float32))
 
 
-def _floor(values: Single) -> Single:
-    return np.maximum(FLOOR_SHARE * values.var(axis=0), 1e-8).astype(np.float32)
+def variance_floors(observed: Sequence[Observed]) -> tuple[Single, ...]:
+    """Return the least variance of every stream [each shape=(D_s,)], by its variance where it was seen."""
+    floors = []
+    for stream in range(len(observed[0].streams)):
+        masks = [one.seen[stream] for one in observed]
+        rows = [
+            one.streams[stream] if mask is None else one.streams[stream][mask]
+            for one, mask in zip(observed, masks, strict=True)
+        ]
+        floors.append(np.maximum(FLOOR_SHARE * np.concatenate(rows).var(axis=0), LEAST_VARIANCE).astype(np.float32))
+    return tuple(floors)
 
 
 def _learned_along(
