@@ -13,7 +13,7 @@ from lipmotion.engines.coupled.learned import CoupledModel
 from lipmotion.errors import InputError
 from lipmotion.experiment.comparison import correlation_tally
 from lipmotion.pipeline.evaluate import Recorded, clips
-from lipmotion.types import Example, Monitor, Progress, part_of, silent_monitor
+from lipmotion.types import Example, Monitor, silent_monitor
 
 CANDIDATES = (1, 2, 4, 8)
 
@@ -51,27 +51,32 @@ def chosen_mixtures(
     Source: Xie & Liu 2007, §7.1.
     Raises InputError: no candidate, or one that is no power of two. Raises as ``Engine.fit``.
     """
-    if not candidates or any(number < 1 or number & (number - 1) for number in candidates):
-        found = ", ".join(map(str, candidates)) or "none"
-        raise InputError(f"numbers of Gaussians {found}; required: powers of two, as 1,2,4,8")
+    check_numbers(candidates)
     if kept_aside is None and len(candidates) > 1:
         raise InputError(f"{len(candidates)} numbers of Gaussians and no recordings to choose with; give one number")
     most = max(candidates)
     tried: dict[int, float] = {}
     best: tuple[int, CoupledModel, float] | None = None
-    for number, made, seconds in _grown(examples, _with(config, most), part_of(monitor, 0, 0.9)):
+    for number, made, seconds in _grown(examples, _with(config, most), monitor):
         if number not in candidates:
             continue
         model = made()
-        monitor(Progress(f"trying {number} Gaussians", number, most, 0.9 * number / most))
-        engine = CoupledEngine(_with(config, number))
-        tried[number] = _acc(kept_aside, condition, engine, model) if kept_aside is not None else 0.0
+        if kept_aside is not None:
+            engine = CoupledEngine(_with(config, number))
+            tried[number] = _acc(kept_aside, condition, engine, model)
         if best is None or tried[number] > tried[best[0]]:
             best = number, model, seconds
     if best is None:
         raise InputError("chains with as many Gaussians as were asked for did not come about")
     number, model, seconds = best
-    return Choice(CoupledEngine(_with(config, number)), model, seconds, tried if kept_aside is not None else {})
+    return Choice(CoupledEngine(_with(config, number)), model, seconds, tried)
+
+
+def check_numbers(candidates: Sequence[int]) -> None:
+    """Raise InputError unless there are some numbers, all of them powers of two."""
+    if not candidates or any(number < 1 or number & (number - 1) for number in candidates):
+        found = ", ".join(map(str, candidates)) or "none"
+        raise InputError(f"numbers of Gaussians {found}; required: powers of two, as 1,2,4,8")
 
 
 def _with(config: CoupledConfig, number: int) -> CoupledConfig:

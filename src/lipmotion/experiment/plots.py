@@ -10,7 +10,7 @@ import numpy as np
 
 from lipmotion.engines.coupled.conversion import converted
 from lipmotion.engines.coupled.engine import CoupledEngine
-from lipmotion.errors import MissingDependencyError
+from lipmotion.errors import ExportError, MissingDependencyError
 from lipmotion.experiment.noise import AUDIO_ONLY
 from lipmotion.experiment.rivals import Contender
 from lipmotion.files import whole_file
@@ -31,6 +31,18 @@ def import_figure() -> Any:
             f'pictures need matplotlib, which cannot be imported ({error}); pip install "lipmotion[plots]"'
         ) from error
     return Figure
+
+
+def check_plots(folder: Path) -> None:
+    """Find out before the long work whether pictures can be drawn, and written into a folder that may yet be made.
+
+    Raises MissingDependencyError: no matplotlib. Raises ExportError: the folder cannot be made.
+    """
+    import_figure()
+    if not folder.parent.is_dir():
+        raise ExportError(f"{folder}: the folder {folder.parent} does not exist; create it first")
+    if folder.exists() and not folder.is_dir():
+        raise ExportError(f"{folder}: is a file; give a folder for the pictures")
 
 
 def draw_plots(chains: Contender, found: Recorded, folder: Path) -> None:

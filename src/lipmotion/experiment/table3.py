@@ -15,9 +15,9 @@ from lipmotion.corpora.store import Corpus
 from lipmotion.errors import InputError
 from lipmotion.experiment.comparison import Tally, correlation_tally, distance_tally, openings_of
 from lipmotion.experiment.learning_curve import check_lists, steps_of
-from lipmotion.experiment.mixtures import CANDIDATES
+from lipmotion.experiment.mixtures import CANDIDATES, check_numbers
 from lipmotion.experiment.noise import AUDIO_ONLY, in_noise
-from lipmotion.experiment.plots import draw_plots, import_figure
+from lipmotion.experiment.plots import check_plots, draw_plots
 from lipmotion.experiment.rivals import BEST, Contender, chosen_rivals, trained_rivals
 from lipmotion.experiment.trial import channels_with_opening, opening_row, shuffled
 from lipmotion.measures import curves
@@ -25,7 +25,7 @@ from lipmotion.measures.report import without_nan
 from lipmotion.pipeline.evaluate import Clip, Recorded, clips, figures_of, recorded
 from lipmotion.pipeline.train import FEWEST, phones_and_examples
 from lipmotion.pipeline.workers import working
-from lipmotion.speech.noise import KINDS
+from lipmotion.speech.noise import FEWEST_TALKERS, KINDS
 from lipmotion.speech.recogniser import recogniser as cached_recogniser
 from lipmotion.stats.checkpoint import NOTHING_KEPT
 from lipmotion.stats.hmm.model import HmmConfig
@@ -34,6 +34,7 @@ from lipmotion.units import Lexicon
 
 STATES = 5
 """Per unit, in the paper."""
+BABBLE = "babble"
 RATIOS_DB = (20.0, 10.0, 5.0, 0.0)
 
 
@@ -53,6 +54,8 @@ class Noises:
         unknown = [kind for kind in self.kinds if kind not in KINDS]
         if unknown:
             raise InputError(f"unknown noise {unknown[0]!r}; required some of: {', '.join(KINDS)}")
+        if BABBLE in self.kinds and len(self.talkers) < FEWEST_TALKERS:
+            raise InputError(f"a babble of {len(self.talkers)} talkers; required at least {FEWEST_TALKERS}: --talkers")
 
 
 def table3(
@@ -88,8 +91,10 @@ def table3(
     Raises InputError: no such system, sizes that the list does not have, numbers that are no powers of two.
     Raises CorpusError: no utterances to train on, to choose with, or of this split, or motion without an opening.
     Raises MissingDependencyError: a system or the pictures need a package that is not installed.
+    Raises ExportError: the pictures cannot be written.
     """
     names = chosen_rivals(systems)
+    check_numbers(mixtures)
     listed = tuple(order) if order is not None else shuffled(corpus.required("train"), seed)
     held_out, kept_aside = corpus.required(split), corpus.required("val") if len(mixtures) > 1 else ()
     check_lists(corpus, listed, (*held_out, *kept_aside))
@@ -97,7 +102,7 @@ def table3(
     setup = _Setup(corpus, names, held_out, kept_aside, states, tuple(mixtures), recogniser, lexicon, workers)
     channels = channels_with_opening(corpus, held_out)
     if plots is not None:
-        import_figure()  # before the long work
+        check_plots(plots)
     shares = 0.9 * np.cumsum([0, *steps]) / sum(steps)
     rows: list[dict[str, Any]] = []
     for count, (start, stop) in zip(steps, pairwise(shares), strict=True):
