@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -206,15 +205,3 @@ def relearned(group: Group, sums: Sums, floors: Sequence[Single], least: float, 
         mixtures.means[known, :, columns] = np.where(seen, mean, mixtures.means[known, :, columns])
         mixtures.variances[known, :, columns] = np.where(seen, variance, mixtures.variances[known, :, columns])
     return replace(group, mixtures=mixtures)
-
-
-def density_posteriors(posterior: Single, tie: Index, count: int) -> Single:
-    """Return the posterior of every density [shape=(T, G)] from that of joint states [shape=(T, S)].
-
-    tie : the density of each joint state [shape=(S,)]
-    """
-    order = np.argsort(tie, kind="stable")
-    present, starts = np.unique(tie[order], return_index=True)
-    result: NDArray[Any] = np.zeros((len(posterior), count), posterior.dtype)
-    result[:, present] = np.add.reduceat(posterior.take(order, axis=1), starts, axis=1)
-    return result
