@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.kernels.arcs import Layout, Weights, laid_out, weights_of
+from lipmotion.kernels.arcs import PADDED, Layout, Weights, laid_out, weights_of
 from lipmotion.kernels.choice import numba_works
 
 Index = NDArray[np.intp]
@@ -282,8 +282,8 @@ def _probabilities(log: Array) -> tuple[Array, float]:
 
 
 def _turned(layout: Layout, weights: Weights) -> Array:
-    """Return the weights of all blocks, targets as rows, sources as columns."""
-    turned = [np.empty((0, layout.blocks[:, 3].max(initial=0)))]
+    """Return the weights of all blocks, targets as rows, sources as columns, padded."""
+    turned = [np.empty((0, -(-layout.blocks[:, 3].max(initial=0) // PADDED) * PADDED))]
     for _, targets, first, sources in layout.blocks:
         matrix = np.zeros((targets, turned[0].shape[1]))
         matrix[:, :sources] = weights.blocks[first : first + sources, :targets].T
