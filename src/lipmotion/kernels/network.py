@@ -116,21 +116,16 @@ class Expectation(NamedTuple):
         log_final: NDArray[np.floating[Any]],
     ) -> Expectation:
         """Return a network ready."""
-        arc_log, log_initial, log_final = (log.astype(np.float64) for log in (arc_log, log_initial, log_final))
         layout = laid_out(arc_from, arc_start)
-        weights = weights_of(layout, np.exp(arc_log), 0.0)
-        turned, chunks = _turned(layout, weights), Chunks.of(layout, weights)
+        weights, turned, chunks = _weighted(layout, arc_log)
+        arc_log, log_initial, log_final = (log.astype(np.float64) for log in (arc_log, log_initial, log_final))
         return cls(arc_from, arc_log, arc_start, log_initial, log_final, layout, weights, turned, chunks)
 
     def with_arcs(self, arc_log: NDArray[np.floating[Any]], log_initial: NDArray[np.floating[Any]]) -> Expectation:
         """Return the network with other probabilities [shapes=(E,), (S,)]; nothing is laid out anew."""
-        weights = weights_of(self.layout, np.exp(arc_log.astype(np.float64)), 0.0)
-        return self._replace(
-            arc_log=arc_log.astype(np.float64),
-            log_initial=log_initial.astype(np.float64),
-            weights=weights,
-            turned=_turned(self.layout, weights),
-        )
+        weights, turned, chunks = _weighted(self.layout, arc_log)
+        changed = self._replace(weights=weights, turned=turned, chunks=chunks)
+        return changed._replace(arc_log=arc_log.astype(np.float64), log_initial=log_initial.astype(np.float64))
 
     def over(self, log_emission: NDArray[np.floating[Any]], columns: Index, frames: Index) -> Expected:
         """Return what recordings say, one after the other in ``log_emission``.
@@ -279,6 +274,12 @@ def _probabilities(log: Array) -> tuple[Array, float]:
     best = float(log.max())
     best = best if np.isfinite(best) else 0.0
     return np.exp(log - best), best
+
+
+def _weighted(layout: Layout, arc_log: NDArray[np.floating[Any]]) -> tuple[Weights, Array, Chunks]:
+    """Return the probabilities of arcs, given by their logarithms [shape=(E,)], in all forms that kernels take."""
+    weights = weights_of(layout, np.exp(arc_log.astype(np.float64)), 0.0)
+    return weights, _turned(layout, weights), Chunks.of(layout, weights)
 
 
 def _turned(layout: Layout, weights: Weights) -> Array:

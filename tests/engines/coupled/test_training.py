@@ -1,4 +1,5 @@
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -57,7 +58,7 @@ def test_the_likelihood_rises_at_every_step(kind, sets, limit):
     mixtures = (4,) if kind == HMM else (4, 2)
     train_chains(of, ("speech", "seen"), sentences(), Schedule(mixtures, (1.0, 1.0), most=8), steps.append)
     assert {step.mixtures[0] for step in steps} == {1, 2, 4}
-    for one, other in zip(steps, steps[1:], strict=False):
+    for one, other in pairwise(steps):
         if one.mixtures == other.mixtures:
             assert other.log_likelihood >= one.log_likelihood - 1e-5
 
