@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 EXACT = 1500
 """Up to so many rows or columns all components are computed, and the first are kept; of larger tables only those."""
-ROWS = 1024
+ROWS = 256
 """Rows of a large table that are centred at a time."""
 SPARE = 16
 """Directions that are searched beside those that are wanted: they make the search converge."""
-TOLERANCE, MOST_PASSES = 1e-5, 12
+TOLERANCE, MOST_PASSES = 1e-4, 12
 """The search ends when a pass over the table adds less than this share of the variance found, or after so many."""
 RANK_TOLERANCE = 1e-10
 """Components with less than this share of the largest one's variance are rounding."""
