@@ -43,7 +43,7 @@ def learned_eigenlips(
         _crops(utterance)[frames[part - (end - len(frames))]]
         for utterance, frames, part, end in zip(utterances, seen, parts, ends, strict=True)
     ]
-    sizes = {pictures.shape[1:] for pictures in taken}
+    sizes = {some.shape[1:] for some in taken}
     if len(sizes) > 1:
         raise CorpusError(f"mouth pictures of {len(sizes)} sizes; prepare all recordings again with one lipmotion")
     return fit_eigenlips(np.concatenate(taken), components)
