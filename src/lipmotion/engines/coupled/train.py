@@ -29,6 +29,8 @@ SLACK_S = 0.05
 FLOOR_SHARE, LEAST_VARIANCE = 0.01, 1e-4
 """No variance falls under this share of the stream's own."""
 VITERBI_STEPS = 2
+FRAMES_A_GAUSSIAN = 25.0
+"""A density is split if it has so many frames for each Gaussian that it would have."""
 FIRST_SHARE = 0.1
 """Of the probability of how recordings begin: shared by all units, said first or not."""
 CONVERGED = 0.02
@@ -82,11 +84,11 @@ def train_chains(
     chains = _viterbi_start(structure, streams, data, how, floors)
     recordings = _recordings(chains, data)
     while True:
-        chains = _converged(chains, recordings, floors, how.most, heard, workers)
+        chains, said = _converged(chains, recordings, floors, how.most, heard, workers)
         now = components(chains)
         if all(n >= most for n, most in zip(now, how.mixtures, strict=True)):
             return chains
-        chains = split(chains, how.mixtures)
+        chains = split(chains, how.mixtures, said)
 
 
 def _recordings(chains: Chains, data: Sequence[Labelled]) -> list[Recording]:
@@ -126,13 +128,26 @@ def components(chains: Chains) -> tuple[int, ...]:
     return tuple(group.mixtures.size[1] for group in chains.groups)
 
 
-def split(chains: Chains, most: Sequence[int]) -> Chains:
-    """Return chains with twice as many Gaussians in the densities of those groups that have fewer than ``most``."""
+def split(chains: Chains, most: Sequence[int], said: Expected) -> Chains:
+    """Return chains with twice as many Gaussians in the densities of those groups that have fewer than ``most``.
+
+    said : by the recordings; a density with too little data keeps what it has, the new halves are switched off
+    """
     groups = [
-        replace(group, mixtures=group.mixtures.split()) if now < target else group
-        for group, now, target in zip(chains.groups, components(chains), most, strict=True)
+        replace(group, mixtures=_split(group.mixtures, sums.count)) if now < target else group
+        for group, sums, now, target in zip(chains.groups, said.groups, components(chains), most, strict=True)
     ]
     return replace(chains, groups=tuple(groups))
+
+
+def _split(mixtures: Mixtures, count: NDArray[np.float64]) -> Mixtures:
+    """Return twice as many components; ``count`` are the frames of each now [shape=(M, G)]."""
+    halves, now = mixtures.split(), mixtures.log_weights.shape[1]
+    few = count.sum(axis=0) < FRAMES_A_GAUSSIAN * 2 * np.isfinite(mixtures.log_weights).sum(axis=1)
+    halves.log_weights[few, :now] = mixtures.log_weights[few]
+    halves.means[few, :now] = mixtures.means[few]
+    halves.log_weights[few, now:] = -np.inf
+    return halves
 
 
 def allowed_units(structure: Structure, phones: Timeline[Unit], frames: int) -> NDArray[np.bool_]:
@@ -296,7 +311,8 @@ def _converged(
     most: int,
     heard: Callable[[Step], None],
     workers: int,
-) -> Chains:
+) -> tuple[Chains, Expected]:
+    """Return chains after EM, and what recordings said of those before its last step."""
     last = -np.inf
     for _ in range(most):
         said = expected(chains, recordings, workers)
@@ -306,4 +322,4 @@ def _converged(
         if figure - last < CONVERGED:
             break
         last = figure
-    return chains
+    return chains, said
