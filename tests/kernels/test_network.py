@@ -208,3 +208,18 @@ def test_recordings_left_by_single_precision_spoil_no_others():
     assert found.posterior == pytest.approx(exact.posterior, abs=1e-4)
     assert found.counts == pytest.approx(exact.counts, abs=1e-3)
     assert found.log_likelihood == pytest.approx(exact.log_likelihood, rel=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_other_probabilities_on_the_same_arcs(seed):
+    """Nothing of the old ones is left: blocks, runs, and beginnings."""
+    (old, _), (new, _) = phone_loop(seed), phone_loop(seed + 10)
+    log_emission = np.random.default_rng(seed).normal(0, 2, (30, len(old["emission"])))
+    columns, frames = np.arange(len(old["emission"])), np.array([30])
+    arrays = ("arc_from", "arc_log", "arc_start", "log_initial", "log_final")
+    initial = np.random.default_rng(seed).normal(-3, 1, len(columns))
+    changed = Expectation.of(*(old[name] for name in arrays)).with_arcs(new["arc_log"], initial)
+    fresh = Expectation.of(*((new | {"log_initial": initial})[name] for name in arrays))
+    one, other = (network.over(log_emission, columns, frames) for network in (changed, fresh))
+    for found, expected in zip(one, other, strict=True):
+        np.testing.assert_array_equal(found, expected)

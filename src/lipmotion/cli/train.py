@@ -9,6 +9,7 @@ from pathlib import Path
 from lipmotion.cli.options import add_machine_readable, list_or_all
 
 UNITS = "what is modelled: phone (default), eVis, sVis, pbVis, 2vis, or a table file (docs/unit-sets.md)"
+VISUAL = "what is learned: geometry (tracked or given motion, default), eigenlips (mouth pictures), or both"
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -21,6 +22,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser.add_argument("--lexicon", type=Path, metavar="FILE", help="pronunciations: WORD PHONE PHONE ... a line")
     parser.add_argument("--engine", default="trajectory", help="trajectory (default), or joint: the paper's own system")
     parser.add_argument("--units", default="phone", metavar="SET", help=UNITS)
+    parser.add_argument("--visual", default="geometry", metavar="WHAT", help=VISUAL)
     parser.add_argument("--workers", type=int, help="processes (default: one a core)")
     add_machine_readable(parser)
     parser.set_defaults(run=run)
@@ -45,6 +47,7 @@ def run(options: argparse.Namespace) -> None:
         unit_set(options.units)  # before the long work
         engine = engine_named(options.engine, {"units": options.units})
         chosen = {"engine": engine, "split": split, "speakers": options.speaker, "lexicon": lexicon, "workers": workers}
+        chosen["visual"] = options.visual
         with unfinished_work(options.output) as work:
             model, result = train(Corpus.open(options.corpus), **chosen, monitor=report.hear, work=work)
             save_model(model, options.output)

@@ -46,4 +46,5 @@ def retreat(before: Joint, backward: Joint, leaving: Joint, audio: Moves, visual
         return factorial_steps.retreat(before, backward, leaving, audio, visual, density)
     scale = 1 / overlap
     closed = Closed(by_audio * scale, by_visual * scale, by_pair * scale, overlap)
-    return Retreat(closed, after, before[-units:] @ moved[:units].T * scale, leaving.T @ first * scale)
+    audio_entered, visual_entered = before[-units:] @ moved[:units].T, leaving.T @ first
+    return Retreat(closed, after, np.float64(scale) * audio_entered, np.float64(scale) * visual_entered)

@@ -67,7 +67,9 @@ def retreat(before: Joint, backward: Joint, leaving: Joint, audio: Moves, visual
     scale = 1 / found.overlap if found.overlap > 0 else 0.0
     audio_entered = before[-units_audio:] @ moved[:units_audio].T
     visual_entered = leaving.T @ backward[:, :units_visual]
-    return Retreat(found, emitted(beta, density)[0], audio_entered * scale, visual_entered * scale)
+    return Retreat(
+        found, emitted(beta, density)[0], np.float64(scale) * audio_entered, np.float64(scale) * visual_entered
+    )
 
 
 def closed(forward: Joint, backward: Joint, density: Density) -> Closed:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.kernels.arcs import Layout, Weights, laid_out, weights_of
+from lipmotion.kernels.arcs import PADDED, Layout, Weights, laid_out, weights_of
 from lipmotion.kernels.choice import numba_works
 
 Index = NDArray[np.intp]
@@ -116,21 +116,16 @@ class Expectation(NamedTuple):
         log_final: NDArray[np.floating[Any]],
     ) -> Expectation:
         """Return a network ready."""
-        arc_log, log_initial, log_final = (log.astype(np.float64) for log in (arc_log, log_initial, log_final))
         layout = laid_out(arc_from, arc_start)
-        weights = weights_of(layout, np.exp(arc_log), 0.0)
-        turned, chunks = _turned(layout, weights), Chunks.of(layout, weights)
+        weights, turned, chunks = _weighted(layout, arc_log)
+        arc_log, log_initial, log_final = (log.astype(np.float64) for log in (arc_log, log_initial, log_final))
         return cls(arc_from, arc_log, arc_start, log_initial, log_final, layout, weights, turned, chunks)
 
     def with_arcs(self, arc_log: NDArray[np.floating[Any]], log_initial: NDArray[np.floating[Any]]) -> Expectation:
         """Return the network with other probabilities [shapes=(E,), (S,)]; nothing is laid out anew."""
-        weights = weights_of(self.layout, np.exp(arc_log.astype(np.float64)), 0.0)
-        return self._replace(
-            arc_log=arc_log.astype(np.float64),
-            log_initial=log_initial.astype(np.float64),
-            weights=weights,
-            turned=_turned(self.layout, weights),
-        )
+        weights, turned, chunks = _weighted(self.layout, arc_log)
+        changed = self._replace(weights=weights, turned=turned, chunks=chunks)
+        return changed._replace(arc_log=arc_log.astype(np.float64), log_initial=log_initial.astype(np.float64))
 
     def over(self, log_emission: NDArray[np.floating[Any]], columns: Index, frames: Index) -> Expected:
         """Return what recordings say, one after the other in ``log_emission``.
@@ -281,9 +276,15 @@ def _probabilities(log: Array) -> tuple[Array, float]:
     return np.exp(log - best), best
 
 
+def _weighted(layout: Layout, arc_log: NDArray[np.floating[Any]]) -> tuple[Weights, Array, Chunks]:
+    """Return the probabilities of arcs, given by their logarithms [shape=(E,)], in all forms that kernels take."""
+    weights = weights_of(layout, np.exp(arc_log.astype(np.float64)), 0.0)
+    return weights, _turned(layout, weights), Chunks.of(layout, weights)
+
+
 def _turned(layout: Layout, weights: Weights) -> Array:
-    """Return the weights of all blocks, targets as rows, sources as columns."""
-    turned = [np.empty((0, layout.blocks[:, 3].max(initial=0)))]
+    """Return the weights of all blocks, targets as rows, sources as columns, padded."""
+    turned = [np.empty((0, -(-layout.blocks[:, 3].max(initial=0) // PADDED) * PADDED))]
     for _, targets, first, sources in layout.blocks:
         matrix = np.zeros((targets, turned[0].shape[1]))
         matrix[:, :sources] = weights.blocks[first : first + sources, :targets].T

@@ -20,6 +20,7 @@ from lipmotion.pipeline.fingerprint import fingerprint
 from lipmotion.pipeline.labels import labelled
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.transcribe import phones_in_time, report_guesses
+from lipmotion.pipeline.visual import GEOMETRY, as_learned, check_visual, learned_eigenlips
 from lipmotion.pipeline.workers import working
 from lipmotion.speech.f0 import log_f0
 from lipmotion.speech.phones import train_phones
@@ -72,6 +73,7 @@ def train(
     engine: Engine[Any] | None = None,
     recogniser: HmmConfig | None = None,
     lexicon: Lexicon | None = None,
+    visual: str = GEOMETRY,
     monitor: Monitor = silent_monitor,
     work: Path | None = None,
     workers: int = 1,
@@ -84,6 +86,8 @@ def train(
     speakers   : theirs only; all by default
     engine     : with its configuration; the trajectory engine by default
     recogniser : configuration of the phone models
+    visual     : ``geometry``: the channels that were tracked or given; ``eigenlips``: principal components of the mouth
+                 pictures (docs/eigenlips.md); ``both``
     monitor    : hears how far it is, and which utterances are left out
     work       : a folder that keeps what is finished, so that the same call goes on from there after it was stopped
                  (``files.unfinished_work`` gives one); the model is the same to the byte
@@ -93,7 +97,9 @@ def train(
     of the others or, where there are none, by those of the shipped model.
     Nothing here is random: the same corpus gives the same model.
     Raises CorpusError: no such utterances, or nothing in them to learn from.
+    Raises InputError: no such ``visual``.
     """
+    check_visual(visual)
     lexicon = lexicon or Lexicon()
     engine = engine or engine_named("trajectory", {})
     chosen = tuple(names) if names is not None else corpus.required(split, speakers)
@@ -101,7 +107,10 @@ def train(
         raise CorpusError(f"{corpus.path}: an empty list of names was given; name at least one utterance")
     recogniser = recogniser or HmmConfig()
     utterances = [corpus.utterance(name) for name in chosen]
-    checkpoint = Checkpoint(work, fingerprint(corpus, chosen, engine, recogniser, lexicon)) if work else NOTHING_KEPT
+    eigenlips = learned_eigenlips(utterances) if visual != GEOMETRY else None
+    utterances = [as_learned(utterance, visual, eigenlips) for utterance in utterances]
+    job = fingerprint(corpus, chosen, engine, recogniser, lexicon, visual) if work else ""
+    checkpoint = Checkpoint(work, job) if work else NOTHING_KEPT
     with working(min(workers, len(chosen) // FEWEST)) as team:
         listening = part_of(monitor, 0, 0.9)
         phones, examples, skipped = phones_and_examples(
@@ -112,7 +121,9 @@ def train(
     about = _about(corpus, utterances, "given names" if names is not None else split or "all", len(used))
     if speakers:
         about["speakers"] = sorted(set(speakers))
-    return Model(phones, engine, fit.model, about), TrainReport(used, skipped, fit.figures)
+    if eigenlips is not None:
+        about |= {"visual": visual, "eigenlips": eigenlips.summary}
+    return Model(phones, engine, fit.model, about, eigenlips=eigenlips), TrainReport(used, skipped, fit.figures)
 
 
 def phones_and_examples(

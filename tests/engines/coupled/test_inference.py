@@ -3,7 +3,6 @@ import pytest
 
 from engines.coupled.tiny import THREE, TWO, chains, observed, structure
 from lipmotion.engines.coupled.conversion import statistics
-from lipmotion.engines.coupled.lattice import within
 from lipmotion.engines.coupled.systems import COUPLED, FACTORIAL, HMM, MULTISTREAM
 from lipmotion.engines.coupled.transitions import Transitions
 from oracles import coupled as oracle
@@ -30,11 +29,14 @@ def test_posteriors_are_those_of_all_paths(kind, sets, limit, seen):
     lattice = found.everywhere
     result = found.posteriors(found.evidence(data, lattice), lattice)
     joint, counts, log_likelihood = oracle.posteriors(found, data)
-    np.testing.assert_allclose(result.joint, joint[:, result.states], atol=2e-5)
+    for chain, states in enumerate(found.transitions.product.chain_states):
+        for state in range(found.structure.counts[chain]):
+            np.testing.assert_allclose(result.chains[chain][:, state], joint[:, states == state].sum(axis=1), atol=2e-5)
+    np.testing.assert_array_equal(result.best, joint.argmax(axis=1))
     assert result.log_likelihood == pytest.approx(log_likelihood, rel=1e-5)
     product = found.transitions.product
     expected = [counts.get(pair, 0.0) for pair in zip(product.arc_from.tolist(), product.arc_to.tolist(), strict=True)]
-    np.testing.assert_allclose(result.arcs, expected, atol=5e-5)
+    np.testing.assert_allclose(result.counts, expected, atol=5e-5)
     for number, group in enumerate(found.groups):
         for density in range(group.mixtures.size[0]):
             np.testing.assert_allclose(
@@ -125,7 +127,7 @@ def test_a_multistream_hmm_that_hears_only_is_the_audio_hmm():
     heard = made(MULTISTREAM, (THREE,), 1, weights=(1.0, 0.0))
     seen, unseen = observed(6), observed(6, seen=False)
     one, other = (heard.posteriors(heard.evidence(x, heard.everywhere), heard.everywhere) for x in (seen, unseen))
-    np.testing.assert_allclose(one.joint, other.joint, atol=1e-6)
+    np.testing.assert_allclose(one.chains[0], other.chains[0], atol=1e-6)
     posterior, _ = single_chain(heard, 0, heard.transitions.advance[0], seen)
     np.testing.assert_allclose(one.densities[0], posterior, atol=2e-5)
 
@@ -140,21 +142,21 @@ def test_one_gaussian_each_makes_hmm_and_multistream_hmm_the_same():
     apart = type(apart)(apart.streams, joint.transitions, tuple(groups))
     data = observed(6)
     one, other = (x.posteriors(x.evidence(data, x.everywhere), x.everywhere) for x in (joint, apart))
-    np.testing.assert_allclose(one.joint, other.joint, atol=1e-6)
+    np.testing.assert_allclose(one.chains[0], other.chains[0], atol=1e-6)
     assert one.log_likelihood == pytest.approx(other.log_likelihood, rel=1e-6)
 
 
 def test_a_lattice_of_all_units_is_the_whole_and_a_smaller_one_forbids():
     found, data = made(COUPLED, (THREE, TWO), 1), observed(5)
-    product, ties = found.transitions.product, [group.tie for group in found.groups]
+    product = found.transitions.product
     allowed = np.ones((5, 3), bool)
     result = found.posteriors(found.evidence(data, found.everywhere), found.everywhere)
-    free = within(product, ties, allowed)
+    free = found.lattice(allowed)
     same = found.posteriors(found.evidence(data, free), free)
     assert same.log_likelihood == pytest.approx(result.log_likelihood, rel=1e-6)
     allowed[:, 1] = False
     allowed[2:, 2] = False
-    part = within(product, ties, allowed)
+    part = found.lattice(allowed)
     less = found.posteriors(found.evidence(data, part), part)
     said = [
         (path, score)
@@ -162,4 +164,4 @@ def test_a_lattice_of_all_units_is_the_whole_and_a_smaller_one_forbids():
         if all(allowed[t, product.joints[state].units[0]] for t, state in enumerate(path))
     ]
     assert less.log_likelihood == pytest.approx(np.logaddexp.reduce([score for _, score in said]), rel=1e-5)
-    np.testing.assert_allclose(less.joint.sum(axis=1), 1, atol=1e-5)
+    np.testing.assert_allclose(less.chains[0].sum(axis=1), 1, atol=1e-5)

@@ -34,14 +34,12 @@ class Expected:
     """What recordings say.
 
     groups : sums for each group
-    arcs   : how often each arc was followed [shape=(E,)]
-    visits : frames spent in each joint state [shape=(S,)]
+    counts : what transitions are learned from
     log_likelihood, frames : of the recordings that have a path
     """
 
     groups: tuple[Sums, ...]
-    arcs: NDArray[np.float64]
-    visits: NDArray[np.float64]
+    counts: NDArray[np.float64]
     log_likelihood: float
     frames: int
 
@@ -49,8 +47,7 @@ class Expected:
         """Return both together."""
         return Expected(
             tuple(a.plus(b) for a, b in zip(self.groups, other.groups, strict=True)),
-            self.arcs + other.arcs,
-            self.visits + other.visits,
+            self.counts + other.counts,
             self.log_likelihood + other.log_likelihood,
             self.frames + other.frames,
         )
@@ -87,15 +84,14 @@ def maximised(
         else group
         for group, sums in zip(chains.groups, said.groups, strict=True)
     ]
-    transitions = chains.transitions.relearned(said.arcs) if moves else chains.transitions
+    transitions = chains.transitions.relearned(said.counts) if moves else chains.transitions
     return replace(chains, groups=tuple(groups), transitions=transitions)
 
 
 def _together(job: tuple[Chains, Sequence[Recording]]) -> Expected:
     chains, recordings = job
-    product = chains.transitions.product
     sums = tuple(no_sums(group) for group in chains.groups)
-    arcs, visits = np.zeros(len(product.arc_from)), np.zeros(len(product.joints))
+    counts = np.zeros(chains.transitions.count)
     log_likelihood, frames = 0.0, 0
     for recording in recordings:
         observed, lattice = recording.observed, recording.lattice
@@ -107,11 +103,10 @@ def _together(job: tuple[Chains, Sequence[Recording]]) -> Expected:
             sums, chains.groups, lattice.densities, posteriors.densities, evidence.shares, strict=True
         ):
             one.add(group, observed, chosen, posterior, shares)
-        arcs[lattice.arcs] += posteriors.arcs
-        visits[posteriors.states] += posteriors.joint.sum(axis=0)
+        counts[lattice.counts] += posteriors.counts
         log_likelihood += posteriors.log_likelihood
         frames += observed.frames
-    return Expected(sums, arcs, visits, log_likelihood, frames)
+    return Expected(sums, counts, log_likelihood, frames)
 
 
 def _each(function: Callable[[Any], Expected], jobs: Iterable[Any], workers: int) -> Iterator[Expected]:
