@@ -8,6 +8,9 @@ from typing import Any
 
 from lipmotion.cli.experiments import add_experiment_arguments, one_thread_each, run_experiment
 from lipmotion.cli.options import list_or_all, numbers
+from lipmotion.cli.train import VISUAL
+
+OPTIONS = ("sizes", "systems", "states", "mixtures", "visual", "transcripts")
 
 
 def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -21,6 +24,7 @@ def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser.add_argument("--states", type=int, default=5, help="a unit, in the paper's systems (default: 5)")
     gaussians = "a state may have, in the paper's systems; chosen with the list val (default: 1,2,4,8)"
     parser.add_argument("--mixtures", type=numbers, default=[1, 2, 4, 8], metavar="K,K,...", help=gaussians)
+    parser.add_argument("--visual", default="geometry", metavar="WHAT", help=VISUAL)
     parser.add_argument("--transcripts", action="store_true", help="compare also with the words known")
     parser.add_argument("--noise", default="", metavar="KIND,KIND", help="hear the clips in white noise, in babble")
     parser.add_argument("--snr", type=numbers, default=[20, 10, 5, 0], metavar="DB,...", help="at these ratios")
@@ -43,7 +47,7 @@ def run(options: argparse.Namespace) -> None:
     def experiment(corpus: Corpus, **given: Any) -> dict[str, Any]:
         kinds = tuple(kind for kind in options.noise.split(",") if kind)
         talkers = tuple(talkers_in(options.talkers)) if options.talkers else ()
-        chosen = {name: getattr(options, name) for name in ("sizes", "systems", "states", "mixtures", "transcripts")}
+        chosen = {name: getattr(options, name) for name in OPTIONS}
         return table3(
             corpus,
             split=list_or_all(options.split),

@@ -15,6 +15,7 @@ from lipmotion.experiment.noise import AUDIO_ONLY
 from lipmotion.experiment.rivals import Contender
 from lipmotion.files import whole_file
 from lipmotion.pipeline.evaluate import Clip, Recorded, clips
+from lipmotion.types import GREY
 
 EIGHT, SIX = 8, 6
 DOTS_AN_INCH = 110
@@ -110,7 +111,7 @@ def _predicted(figure: Any, found: Recorded, made: list[Clip]) -> Any:
 def _labelled(axes: Any, found: Recorded, title: str) -> None:
     name = found.channels[0]
     unit = next(c.unit for c in found.utterances[0].track.motion.channels if c.name == name).replace("_", " ")
-    axes.set_ylabel(f"{name} ({unit}s)")
+    axes.set_ylabel(f"{name} ({unit}{'s' if unit != GREY else ' levels'})")
     axes.set_title(title, fontsize="medium")
     axes.grid(alpha=0.3)
 

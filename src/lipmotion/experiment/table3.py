@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import InputError
@@ -22,8 +23,9 @@ from lipmotion.experiment.rivals import BEST, Contender, chosen_rivals, trained_
 from lipmotion.experiment.trial import channels_with_opening, opening_row, shuffled
 from lipmotion.measures import curves
 from lipmotion.measures.report import without_nan
-from lipmotion.pipeline.evaluate import Clip, Recorded, clips, figures_of, recorded
+from lipmotion.pipeline.evaluate import OPENING, Clip, Recorded, clips, figures_of, recorded
 from lipmotion.pipeline.train import FEWEST, phones_and_examples
+from lipmotion.pipeline.visual import EIGENLIPS, GEOMETRY, as_learned, check_visual, learned_eigenlips
 from lipmotion.pipeline.workers import working
 from lipmotion.speech.noise import FEWEST_TALKERS, KINDS
 from lipmotion.speech.recogniser import recogniser as cached_recogniser
@@ -32,6 +34,7 @@ from lipmotion.stats.hmm.model import HmmConfig
 from lipmotion.types import Audio, Monitor, counted, part_of, silent_monitor
 from lipmotion.units import Lexicon
 
+Array = NDArray[np.float64]
 STATES = 5
 """Per unit, in the paper."""
 BABBLE = "babble"
@@ -67,6 +70,7 @@ def table3(
     systems: Sequence[str] | None = None,
     states: int = STATES,
     mixtures: Sequence[int] = CANDIDATES,
+    visual: str = GEOMETRY,
     transcripts: bool = False,
     noises: Noises | None = None,
     plots: Path | None = None,
@@ -82,6 +86,7 @@ def table3(
     systems     : names of ``rivals.RIVALS``; by default all that can be
     states      : per unit, of the paper's systems
     mixtures    : Gaussians per state that these may have, chosen with the list ``val`` for each size
+    visual      : what of a face is learned and compared, as ``train`` has it; eigenlips are those of the training
     transcripts : compare also with the words known
     noises      : that the systems hear ``split`` in as well, those of the largest size
     plots       : a folder for pictures like Figs. 7, 10 and 11 of the paper, of the largest size
@@ -95,26 +100,28 @@ def table3(
     """
     names = chosen_rivals(systems)
     check_numbers(mixtures)
+    check_visual(visual)
     listed = tuple(order) if order is not None else shuffled(corpus.required("train"), seed)
     held_out, kept_aside = corpus.required(split), corpus.required("val") if len(mixtures) > 1 else ()
     check_lists(corpus, listed, (*held_out, *kept_aside))
     steps = steps_of(sizes if sizes is not None else [len(listed)], len(listed))
-    setup = _Setup(corpus, names, held_out, kept_aside, states, tuple(mixtures), recogniser, lexicon, workers)
-    channels = channels_with_opening(corpus, held_out)
+    setup = _Setup(corpus, names, held_out, kept_aside, states, tuple(mixtures), visual, recogniser, lexicon, workers)
+    if visual != EIGENLIPS:
+        channels_with_opening(corpus, held_out)  # before the long work
     if plots is not None:
         check_plots(plots)
     shares = 0.9 * np.cumsum([0, *steps]) / sum(steps)
     rows: list[dict[str, Any]] = []
     for count, (start, stop) in zip(steps, pairwise(shares), strict=True):
         part = part_of(monitor, float(start), float(stop), f"{count} clips: ")
-        tried = setup.trained(listed[:count], channels, part)
+        tried = setup.trained(listed[:count], part)
         rows.append({"names": count} | _size(tried, transcripts, seed))
     loud = _in_noise(tried, noises or Noises(), seed, part_of(monitor, 0.9, 1))
     if plots is not None:
         draw_plots(tried.contenders[BEST], tried.found, plots)
     about = {"split": split or "all", "clips": len(held_out), "seed": seed, "states": states, "workers": workers}
     about |= {"order": "given" if order is not None else "shuffled", "mixtures": list(mixtures)}
-    about |= {"channels": list(channels), "closed_under": tried.found.closed_under}
+    about |= {"visual": visual, "channels": list(tried.found.channels), "closed_under": tried.found.closed_under}
     figures: dict[str, Any] = without_nan(about | {"rows": rows, "noise": loud})
     return figures
 
@@ -136,20 +143,27 @@ class _Setup:
     kept_aside: Sequence[str]
     states: int
     mixtures: tuple[int, ...]
+    visual: str
     recogniser: HmmConfig | None
     lexicon: Lexicon | None
     workers: int
 
-    def trained(self, names: Sequence[str], channels: Sequence[str], monitor: Monitor) -> _Tried:
+    def trained(self, names: Sequence[str], monitor: Monitor) -> _Tried:
         """Return all systems, trained on the same phones of some utterances."""
         lexicon, config = self.lexicon or Lexicon(), self.recogniser or HmmConfig()
         utterances = [self.corpus.utterance(name) for name in sorted(names)]
+        eigenlips = learned_eigenlips(utterances) if self.visual != GEOMETRY else None
+        utterances = [as_learned(utterance, self.visual, eigenlips) for utterance in utterances]
         with working(min(self.workers, len(utterances) // FEWEST)) as team:
             finding = part_of(monitor, 0, 0.2)
             phones, examples, _ = phones_and_examples(utterances, config, lexicon, finding, NOTHING_KEPT, team.each)
-        listen = partial(recorded, self.corpus, cached_recogniser(phones), channels=channels, lexicon=lexicon)
+        listen = partial(recorded, self.corpus, cached_recogniser(phones), lexicon=lexicon)
+        listen = partial(listen, visual=self.visual, eigenlips=eigenlips)
         found = listen(names=self.held_out, monitor=part_of(monitor, 0.2, 0.25))
-        kept_aside = listen(names=self.kept_aside, monitor=part_of(monitor, 0.25, 0.3)) if self.kept_aside else None
+        kept_aside = None
+        if self.kept_aside:
+            listening = part_of(monitor, 0.25, 0.3)
+            kept_aside = listen(names=self.kept_aside, channels=found.channels, monitor=listening)
         training = part_of(monitor, 0.3, 1)
         contenders = trained_rivals(self.systems, examples, kept_aside, self.states, self.mixtures, training)
         return _Tried(tuple(example.name for example in examples), found, contenders)
@@ -175,27 +189,37 @@ def _rows(found: Recorded, condition: str, contenders: Mapping[str, Contender], 
 
 
 def _row(found: Recorded, made: Sequence[Clip], best: Sequence[Clip], seed: int) -> dict[str, Any]:
-    figures, tallies, others = figures_of(made, found, seed), _tallies(found, made), _tallies(found, best)
+    figures, others = figures_of(made, found, seed), _tallies(found, best)
+    row: dict[str, Any] = {}
+    for name, tally in _tallies(found, made).items():
+        ends = {"95": tally.interval(seed), "gain_95": tally.gain(others[name], seed)}
+        row |= {name: tally.value} | {f"{name}_{key}": interval for key, interval in ends.items()}
+    still = not np.ptp(np.concatenate([clip.generated for clip in made]), axis=0).any()
+    row |= {"lag_ms": None if still else figures["lag_ms"], "opening": None}
+    if OPENING not in found.channels:
+        return row
     lips, (generated, original) = figures["closures_p_b_m"], openings_of(found, made)
-    row: dict[str, Any] = {"amse": figures["amse"], "acc": figures["acc"]}
-    for name, tally in tallies.items():
-        row |= {f"{name}_95": tally.interval(seed), f"{name}_gain_95": tally.gain(others[name], seed)}
-    row["lag_ms"] = figures["lag_ms"] if np.ptp(np.concatenate(generated)) > 0 else None
-    row["rmse"] = float(curves.rmse(generated, original)[0])
-    return row | {
-        "opening": opening_row(figures),
-        "false_per_minute": lips["false_per_minute"],
-        "original_per_minute": lips["original_per_minute"],
-    }
+    opening = opening_row(figures) | {"rmse": float(curves.rmse(generated, original)[0])}
+    return row | {"opening": opening | {key: lips[key] for key in ("false_per_minute", "original_per_minute")}}
 
 
 def _tallies(found: Recorded, made: Sequence[Clip]) -> dict[str, Tally]:
-    generated, original = [clip.generated for clip in made], [clip.original for clip in made]
-    return {
-        "amse": distance_tally(generated, original),
-        "acc": correlation_tally(generated, original),
-        "opening_acc": correlation_tally(*openings_of(found, made)),
-    }
+    """Return AMSE and ACC of geometry, or of eigenlips where there is nothing else; beside it those of the opening."""
+    pictured = np.array([name in found.pictured for name in found.channels])
+    parts = {"": pictured} if pictured.all() else {"": ~pictured, "eigenlips_": pictured}
+    tallies = {}
+    for part, columns in parts.items():
+        if columns.any():
+            generated, original = ([side[:, columns] for side in sides] for sides in _sides(made))
+            tallies[f"{part}amse"] = distance_tally(generated, original)
+            tallies[f"{part}acc"] = correlation_tally(generated, original)
+    if OPENING in found.channels:
+        tallies["opening_acc"] = correlation_tally(*openings_of(found, made))
+    return tallies
+
+
+def _sides(made: Sequence[Clip]) -> tuple[list[Array], list[Array]]:
+    return [clip.generated for clip in made], [clip.original for clip in made]
 
 
 def _in_noise(tried: _Tried, noises: Noises, seed: int, monitor: Monitor) -> list[dict[str, Any]]:
