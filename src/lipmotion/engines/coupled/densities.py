@@ -127,7 +127,7 @@ class Ready:
 
 def _among(form: Quadratic, chosen: Index) -> Quadratic:
     """Return the matrix of some densities."""
-    if len(chosen) == form.constant.shape[1]:
+    if np.array_equal(chosen, np.arange(form.constant.shape[1])):
         return form
     columns = form.form.reshape(len(form.form), *form.constant.shape)[:, :, chosen]
     return Quadratic(columns.reshape(len(columns), -1), form.constant[:, chosen])

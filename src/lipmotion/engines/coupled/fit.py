@@ -25,7 +25,7 @@ from lipmotion.engines.coupled.following import (
     fit_following,
     fit_surroundings,
 )
-from lipmotion.engines.coupled.learned import CoupledModel
+from lipmotion.engines.coupled.learned import CALM_S, CoupledModel
 from lipmotion.engines.coupled.model import Chains
 from lipmotion.engines.coupled.systems import HMM, Structure, structure_of
 from lipmotion.engines.coupled.train import Labelled, Schedule, Step, growing_chains
@@ -42,8 +42,6 @@ Array = NDArray[np.float64]
 ResultT = TypeVar("ResultT")
 SPEECH = "speech"
 LARGEST_GAIN = 2.0
-CALM_S = 0.15
-"""Silence this far from speech is rest."""
 
 
 def fit_coupled(examples: Sequence[Example], config: CoupledConfig, monitor: Monitor) -> CoupledModel:
