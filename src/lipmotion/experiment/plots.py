@@ -97,7 +97,7 @@ def _convergence(figure: Any, found: Recorded, chains: Contender) -> Any:
 
 
 def _predicted(figure: Any, found: Recorded, made: list[Clip]) -> Any:
-    drawn = figure(figsize=(10, 1.9 * len(made)), layout="constrained")
+    drawn = figure(figsize=(10, 2.2 * len(made)), layout="constrained")
     every = drawn.subplots(len(made), 1, squeeze=False)[:, 0]
     for axes, clip, utterance in zip(every, made, found.utterances, strict=False):
         axes.plot(clip.time_s, clip.original[:, 0], "k:", label="recorded")
