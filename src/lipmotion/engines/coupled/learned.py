@@ -19,8 +19,8 @@ from lipmotion.engines.trajectory.space import MotionSpace
 from lipmotion.types import FRAME_RATE_HZ
 
 Array = NDArray[np.float64]
-CALM_S = 0.15
-"""Silence this far from speech is rest: what the mouth does there is no speech."""
+CALM_S = 0.45
+"""Silence this far from speech is rest: nearer, the mouth closes or gets ready."""
 MOST_SPEECH = 0.05
 """Of the probability of speech in a silent frame."""
 FIRM = 100.0
