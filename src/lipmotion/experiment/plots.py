@@ -91,7 +91,7 @@ def _convergence(figure: Any, found: Recorded, chains: Contender) -> Any:
     axes.set_xlabel("step of EM (0: means along the best path)")
     axes.set_ylabel("log likelihood of sound and lips (nats a frame)")
     axes.set_title(f"Convergence of the conversion, {len(found.utterances)} recordings")
-    axes.legend(fontsize="small", ncols=2)
+    drawn.legend(loc="outside right upper", fontsize="small")
     axes.grid(alpha=0.3)
     return drawn
 

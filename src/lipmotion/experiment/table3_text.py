@@ -21,12 +21,12 @@ HEAD = (
 def table(figures: Mapping[str, Any]) -> str:
     """Return the figures of ``table3`` as text."""
     order = {"given": "the list given", "shuffled": f"the training list shuffled with seed {figures['seed']}"}
-    chosen = ", ".join(map(str, figures["mixtures"]))
+    chosen = " or ".join(map(str, figures["mixtures"])) + (", the best on val" if len(figures["mixtures"]) > 1 else "")
     closed = f"; closed under {figures['closed_under']:.4f}" if figures["closed_under"] is not None else ""
     lines = [
         f"the first N clips of {order[figures['order']]}; split {figures['split']}: {figures['clips']} clips",
-        f"{figures['states']} states a unit and {chosen} Gaussians a state, the best on val (K), in the systems of the "
-        f"paper; AMSE, ACC of {_compared(figures['channels'])}{closed}",
+        f"paper's systems: {figures['states']} states a unit, Gaussians a state (K): {chosen}; "
+        f"AMSE, ACC of {_compared(figures['channels'])}{closed}",
     ]
     for size in figures["rows"]:
         for condition, rows in size["conditions"].items():
