@@ -234,3 +234,12 @@ def test_corpora_that_cannot_be_used(toy_corpus: Corpus, tmp_path: Path) -> None
         table3(renamed(toy_corpus, tmp_path, "smile", "frown"))
     with pytest.raises(CorpusError, match="no utterances of split 'val'"):
         table3(copied(toy_corpus, tmp_path / "b", lambda u: replace(u, split="test") if u.split == "val" else u))
+
+
+def test_the_document_shows_the_figures_beside_it() -> None:
+    results = Path(__file__).parents[2] / "docs" / "results"
+    text = (results / "table3.md").read_text(encoding="utf-8")
+    for name in ("table3", "table3-noise"):
+        figures = json.loads((results / f"{name}.json").read_text(encoding="utf-8"))
+        assert f"```text\n{table(figures)}\n```" in text
+        assert BEST in figures["rows"][0]["training"]
