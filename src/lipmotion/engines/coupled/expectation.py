@@ -23,10 +23,14 @@ LEAST_FRAMES = 3.0
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """What is observed, and where the chains can be meanwhile."""
+    """What is observed, and where the chains can be meanwhile.
+
+    weight : how often it counts
+    """
 
     observed: Observed
     lattice: Lattice
+    weight: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,13 +41,15 @@ class Expected:
     arcs   : how often each arc was followed [shape=(E,)]
     visits : frames spent in each joint state [shape=(S,)]
     log_likelihood, frames : of the recordings that have a path
+
+    All by the weights of the recordings.
     """
 
     groups: tuple[Sums, ...]
     arcs: NDArray[np.float64]
     visits: NDArray[np.float64]
     log_likelihood: float
-    frames: int
+    frames: float
 
     def plus(self, other: Expected) -> Expected:
         """Return both together."""
@@ -96,9 +102,9 @@ def _together(job: tuple[Chains, Sequence[Recording]]) -> Expected:
     product = chains.transitions.product
     sums = tuple(no_sums(group) for group in chains.groups)
     arcs, visits = np.zeros(len(product.arc_from)), np.zeros(len(product.joints))
-    log_likelihood, frames = 0.0, 0
+    log_likelihood, frames = 0.0, 0.0
     for recording in recordings:
-        observed, lattice = recording.observed, recording.lattice
+        observed, lattice, weight = recording.observed, recording.lattice, recording.weight
         evidence = chains.evidence(observed, lattice)
         posteriors = chains.posteriors(evidence, lattice)
         if not np.isfinite(posteriors.log_likelihood):
@@ -106,11 +112,11 @@ def _together(job: tuple[Chains, Sequence[Recording]]) -> Expected:
         for one, group, chosen, posterior, shares in zip(
             sums, chains.groups, lattice.densities, posteriors.densities, evidence.shares, strict=True
         ):
-            one.add(group, observed, chosen, posterior, shares)
-        arcs[lattice.arcs] += posteriors.arcs
-        visits[posteriors.states] += posteriors.joint.sum(axis=0)
-        log_likelihood += posteriors.log_likelihood
-        frames += observed.frames
+            one.add(group, observed, chosen, posterior if weight == 1 else posterior * np.float32(weight), shares)
+        arcs[lattice.arcs] += weight * posteriors.arcs
+        visits[posteriors.states] += weight * posteriors.joint.sum(axis=0)
+        log_likelihood += weight * posteriors.log_likelihood
+        frames += weight * observed.frames
     return Expected(sums, arcs, visits, log_likelihood, frames)
 
 

@@ -13,7 +13,7 @@ from lipmotion.engines.coupled.densities import Observed, Single, density_poster
 from lipmotion.engines.coupled.following import Following, Surroundings
 from lipmotion.engines.coupled.lattice import Lattice
 from lipmotion.engines.coupled.model import Chains, Evidence, Posteriors
-from lipmotion.engines.coupled.visual import VisualStream
+from lipmotion.engines.coupled.visual import VisualStream, unseen
 from lipmotion.engines.trajectory.closure import Closure
 from lipmotion.engines.trajectory.space import MotionSpace
 
@@ -42,8 +42,7 @@ class CoupledModel:
 
     def unseen(self, features: Single) -> Observed:
         """Return speech [shape=(T, 39)] with nothing seen."""
-        nothing = tuple(np.zeros((len(features), len(stream.mean)), np.float32) for stream in self.visual)
-        return Observed((features, *nothing), (None, *(np.zeros(len(features), bool) for _ in nothing)))
+        return unseen(features, self.visual)
 
     def statistics(
         self, observed: Observed, evidence: Evidence, posteriors: Posteriors, lattice: Lattice

@@ -80,11 +80,7 @@ def train_chains(
     """
     floors = variance_floors([one.observed for one in data])
     chains = _flat_start(structure, streams, data, how)
-    product, ties = chains.transitions.product, [group.tie for group in chains.groups]
-    recordings = [
-        Recording(one.observed, within(product, ties, allowed_units(structure, one.phones, one.observed.frames)))
-        for one in data
-    ]
+    recordings = [recording(chains, one) for one in data]
     paths = [labelled_path(chains.transitions.product, one.phones, one.observed.frames) for one in data]
     for _ in range(1 + VITERBI_STEPS):
         chains = _learned_along(chains, recordings, paths, floors)
@@ -92,11 +88,21 @@ def train_chains(
     visits = np.bincount(np.concatenate(paths), minlength=len(chains.transitions.product.joints))
     chains = replace(chains, transitions=chains.transitions.tied(visits))
     while True:
-        chains = _converged(chains, recordings, floors, how.most, heard, workers)
+        chains = converged(chains, recordings, floors, how.most, heard, workers)
         now = components(chains)
         if all(n >= most for n, most in zip(now, how.mixtures, strict=True)):
             return chains
         chains = split(chains, how.mixtures)
+
+
+def recording(chains: Chains, one: Labelled, weight: float = 1.0) -> Recording:
+    """Return what was observed with the part of the chains that its labels allow.
+
+    weight : how often it counts
+    """
+    allowed = allowed_units(chains.structure, one.phones, one.observed.frames)
+    ties = [group.tie for group in chains.groups]
+    return Recording(one.observed, within(chains.transitions.product, ties, allowed), weight)
 
 
 def components(chains: Chains) -> tuple[int, ...]:
@@ -260,20 +266,27 @@ def _followed(product: Product, paths: Sequence[Index]) -> NDArray[np.float64]:
     return np.bincount(places[keys[places] == jumps], minlength=len(keys)).astype(float)
 
 
-def _converged(
+def converged(
     chains: Chains,
     recordings: Sequence[Recording],
     floors: Sequence[Single],
     most: int,
     heard: Callable[[Step], None],
     workers: int,
+    *,
+    speech_only: bool = False,
 ) -> Chains:
+    """Return chains after steps of EM, ``most`` or as many as get on.
+
+    speech_only : learn the densities of speech, and keep all else
+    """
+    streams = range(1 if speech_only else len(chains.streams))
     last = -np.inf
     for _ in range(most):
         said = expected(chains, recordings, workers)
         figure = said.log_likelihood / said.frames
         heard(Step(components(chains), figure))
-        chains = maximised(chains, said, floors, streams=range(len(chains.streams)))
+        chains = maximised(chains, said, floors, streams=streams, moves=not speech_only)
         if figure - last < CONVERGED:
             break
         last = figure
