@@ -4,7 +4,14 @@ from __future__ import annotations
 
 import argparse
 import os
+from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from lipmotion.pipeline.voices import SpokenSentence
+    from lipmotion.types import Monitor
+    from lipmotion.units import Lexicon
 
 from lipmotion.cli.options import add_machine_readable, list_or_all
 
@@ -19,8 +26,12 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser.add_argument("--split", default="train", help="train, val, test or all (default: train)")
     parser.add_argument("--speaker", action="append", default=[], metavar="NAME", help="this one only (repeatable)")
     parser.add_argument("--lexicon", type=Path, metavar="FILE", help="pronunciations: WORD PHONE PHONE ... a line")
-    parser.add_argument("--engine", default="trajectory", help="trajectory (default), or joint: the paper's own system")
+    parser.add_argument("--engine", default="trajectory", help="trajectory (default), joint, or coupled")
     parser.add_argument("--units", default="phone", metavar="SET", help=UNITS)
+    parser.add_argument("--voices", action="store_true", help="learn from installed synthetic voices as well (coupled)")
+    parser.add_argument(
+        "--recordings", type=Path, metavar="FOLDER", help="and from transcribed speech of others (coupled)"
+    )
     parser.add_argument("--workers", type=int, help="processes (default: one a core)")
     add_machine_readable(parser)
     parser.set_defaults(run=run)
@@ -36,6 +47,7 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.files import unfinished_work
     from lipmotion.pipeline.model import save_model
     from lipmotion.pipeline.train import train
+    from lipmotion.pipeline.voices import heard
     from lipmotion.units import Lexicon, unit_set
 
     workers = options.workers or os.cpu_count() or 1
@@ -43,8 +55,9 @@ def run(options: argparse.Namespace) -> None:
         split = list_or_all(options.split)
         lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
         unit_set(options.units)  # before the long work
-        engine = engine_named(options.engine, {"units": options.units})
+        engine = engine_named(options.engine, {"units": options.units} if options.units != "phone" else {})
         chosen = {"engine": engine, "split": split, "speakers": options.speaker, "lexicon": lexicon, "workers": workers}
+        chosen["voices"] = heard(_others(options, lexicon, report.hear))
         with unfinished_work(options.output) as work:
             model, result = train(Corpus.open(options.corpus), **chosen, monitor=report.hear, work=work)
             save_model(model, options.output)
@@ -52,3 +65,18 @@ def run(options: argparse.Namespace) -> None:
         text = ", ".join(f"{value} {name}" for name, value in figures.items())
         text = f"{options.output}: {text}; use it: lipmotion animate SPEECH -o FILE --model {options.output}"
         report.finish(text, model=str(options.output), **figures)
+
+
+def _others(options: argparse.Namespace, lexicon: Lexicon | None, monitor: Monitor) -> Iterator[SpokenSentence]:
+    """Give what other speakers say, but the synthetic ones who are for judging."""
+    from lipmotion.pipeline.model import load_model
+    from lipmotion.pipeline.voices import is_for_judging, many_voices, recorded_voices
+    from lipmotion.speech.recogniser import Recogniser
+    from lipmotion.speech.voices.installed import installed_voices
+
+    if options.recordings:
+        general = Recogniser(load_model().phones, "general")
+        yield from recorded_voices(options.recordings, general, lexicon=lexicon, monitor=monitor)
+    if options.voices:
+        voices = [voice for voice in installed_voices() if not is_for_judging(voice.speaker)]
+        yield from many_voices(voices=voices, lexicon=lexicon)

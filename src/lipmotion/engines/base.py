@@ -36,6 +36,11 @@ class Engine(ABC, Generic[ModelT]):
         """Whether it wants ``Speech.log_f0``."""
         return False
 
+    @property
+    def hears_others(self) -> bool:
+        """Whether it learns from examples in which no motion was seen: speech of other speakers."""
+        return False
+
     @abstractmethod
     def fit(self, examples: Sequence[Example], monitor: Monitor, checkpoint: Checkpoint = NOTHING_KEPT) -> Fit[ModelT]:
         """Learn from speech with its motion.

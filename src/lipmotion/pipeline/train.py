@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib import metadata
@@ -20,6 +20,7 @@ from lipmotion.pipeline.fingerprint import fingerprint
 from lipmotion.pipeline.labels import labelled
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.transcribe import phones_in_time, report_guesses
+from lipmotion.pipeline.voices import Heard
 from lipmotion.pipeline.workers import working
 from lipmotion.speech.f0 import log_f0
 from lipmotion.speech.phones import train_phones
@@ -34,6 +35,7 @@ from lipmotion.types import (
     Features,
     Monitor,
     Motion,
+    Progress,
     Speech,
     Timeline,
     Track,
@@ -69,6 +71,7 @@ def train(
     split: str | None = "train",
     names: Sequence[str] | None = None,
     speakers: Sequence[str] = (),
+    voices: Iterable[Heard] = (),
     engine: Engine[Any] | None = None,
     recogniser: HmmConfig | None = None,
     lexicon: Lexicon | None = None,
@@ -82,6 +85,8 @@ def train(
     split      : the list to train on; None: all utterances
     names      : these utterances only, whatever their list (learning curves)
     speakers   : theirs only; all by default
+    voices     : speech of other speakers, without motion, for the second stage of training (``pipeline.voices.heard``);
+                 only for engines that have one (``coupled``). What is kept in ``work`` does not depend on them
     engine     : with its configuration; the trajectory engine by default
     recogniser : configuration of the phone models
     monitor    : hears how far it is, and which utterances are left out
@@ -92,7 +97,8 @@ def train(
     Phones that are labelled are taken as they are. Utterances without a transcript are recognised, by the phone models
     of the others or, where there are none, by those of the shipped model.
     Nothing here is random: the same corpus gives the same model.
-    Raises CorpusError: no such utterances, or nothing in them to learn from.
+    Raises CorpusError: no such utterances, or nothing in them to learn from. InputError: voices, and an engine that has
+    no use for them.
     """
     lexicon = lexicon or Lexicon()
     engine = engine or engine_named("trajectory", {})
@@ -100,6 +106,7 @@ def train(
     if not chosen:
         raise CorpusError(f"{corpus.path}: an empty list of names was given; name at least one utterance")
     recogniser = recogniser or HmmConfig()
+    others = list(_others(engine, voices, monitor))
     utterances = [corpus.utterance(name) for name in chosen]
     checkpoint = Checkpoint(work, fingerprint(corpus, chosen, engine, recogniser, lexicon)) if work else NOTHING_KEPT
     with working(min(workers, len(chosen) // FEWEST)) as team:
@@ -107,11 +114,13 @@ def train(
         phones, examples, skipped = phones_and_examples(
             utterances, recogniser, lexicon, listening, checkpoint, team.each
         )
-    fit = engine.fit(examples, part_of(monitor, 0.9, 1, "learning motion: "), checkpoint)
+    fit = engine.fit([*examples, *others], part_of(monitor, 0.9, 1, "learning motion: "), checkpoint)
     used = tuple(example.name for example in examples)
     about = _about(corpus, utterances, "given names" if names is not None else split or "all", len(used))
     if speakers:
         about["speakers"] = sorted(set(speakers))
+    if others:
+        about["voices"] = sorted({example.name for example in others})
     return Model(phones, engine, fit.model, about), TrainReport(used, skipped, fit.figures)
 
 
@@ -207,6 +216,20 @@ def _examples(
         name, reason = next(iter(skipped.items()))
         raise CorpusError(f"none of {len(skipped)} utterances could be used; the first, {name}: {reason}")
     return examples, skipped
+
+
+def _others(engine: Engine[Any], voices: Iterable[Heard], monitor: Monitor) -> Iterator[Example]:
+    """Give speech of others as examples in which no motion was seen, by the names of the speakers."""
+    for number, (features, units, speaker) in enumerate(voices, start=1):
+        if not engine.hears_others:
+            raise InputError(
+                f"the {engine.name} engine cannot learn from other voices without motion; use the coupled engine, or "
+                "leave the voices out"
+            )
+        monitor(Progress("hearing other voices", number, number, 0.0))
+        frames = len(features.values)
+        unseen = Motion(np.zeros((frames, 0)), FRAME_RATE_HZ, ())
+        yield Example(speaker, Speech(features, units), unseen, np.zeros(frames, bool))
 
 
 def _about(corpus: Corpus, utterances: Sequence[Utterance], split: str, used: int) -> dict[str, Any]:

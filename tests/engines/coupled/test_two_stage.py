@@ -23,7 +23,8 @@ from lipmotion.types import Example, Motion, Span, Timeline, Unit, silent_monito
 from oracles.joint import mixture
 from oracles.networks import posteriors
 
-SMALL = {"states": 2, "mixtures": 2, "more_mixtures": 2, "components": 2}
+SMALL = {"states": 1, "asynchrony": 0, "mixtures": 1, "more_mixtures": 2, "components": 1}
+PLAIN = {"follows": False, "full_range": False}
 STRUCTURES = {
     "hmm": "phone",
     "multistream": "phone",
@@ -48,14 +49,14 @@ def trained(kind: str = "coupled", mixtures: int = 2) -> Chains:
     structure = structure_of(kind, STRUCTURES[kind], 2, 1, True)
     groups = 1 if kind == "hmm" else 2
     how = Schedule((mixtures, 1)[:groups], (1.0, 1.0))
-    return train_chains(structure, ("speech", "lips"), labelled(examples(6)), how)
+    return train_chains(structure, ("speech", "lips"), labelled(examples(4)), how)
 
 
 def stranger(example: Example, seed: int = 5) -> Example:
     """The same said by someone who sounds otherwise, lips unseen."""
     turned = np.linalg.qr(np.random.default_rng(seed).normal(size=(39, 39)))[0]
     values = example.speech.features.values
-    mixed = (0.5 * values + 0.7 * values @ turned).astype(np.float32)
+    mixed = (0.3 * values + 0.8 * values @ turned).astype(np.float32)
     features = replace(example.speech.features, values=mixed)
     frames = len(values)
     return Example(
@@ -111,7 +112,7 @@ def speech_posteriors(chains: Chains, one: Labelled) -> np.ndarray:
 
 
 def learned(before: Mixtures, density: int, gamma: np.ndarray, x: np.ndarray, floor: np.ndarray):
-    """Return shares, means and variances of one density by the book; components of less than two frames end.
+    """Return shares, means and variances of one density by the book; none ends for want of data.
 
     gamma : how often it was in the density in each frame [shape=(T,)]
     """
@@ -122,12 +123,11 @@ def learned(before: Mixtures, density: int, gamma: np.ndarray, x: np.ndarray, fl
     ]
     weight = np.exp(parts - np.logaddexp.reduce(parts, axis=1)[:, None]) * gamma[:, None]
     total = weight.sum(axis=0)
-    alive = total >= 2
     means, variances = before.means[density].astype(float), before.variances[density].astype(float)
-    for part in np.flatnonzero(alive):
+    for part in np.flatnonzero(total > 0.5):
         means[part] = weight[:, part] @ x / total[part]
         variances[part] = np.maximum(weight[:, part] @ (x - means[part]) ** 2 / total[part], floor)
-    return np.where(alive, total, 0) / total[alive].sum(), means, variances
+    return total / total.sum(), means, variances
 
 
 def test_a_step_is_that_of_the_split_model() -> None:
@@ -138,7 +138,7 @@ def test_a_step_is_that_of_the_split_model() -> None:
     gamma, x = 50 * speech_posteriors(chains, own), own.observed.streams[0]
     before, (floor, _) = chains.groups[0].mixtures, variance_floors([own.observed])
     visited = np.flatnonzero(gamma.sum(axis=0) >= 3)
-    assert len(visited) == 4
+    assert len(visited) >= 3
     for density in visited:
         shares, means, variances = learned(before, density, gamma[:, density], x, floor)
         assert np.exp(found.log_weights[density]) == pytest.approx(shares, abs=1e-3)
@@ -151,9 +151,9 @@ def test_a_step_is_that_of_the_split_model() -> None:
 @pytest.mark.parametrize("kind", STRUCTURES)
 def test_every_step_raises_the_likelihood(kind: str) -> None:
     steps: list[Step] = []
-    chains = trained(kind)
-    others = unseen(examples(6, seed=9))
-    with_more_speech(chains, labelled(examples(6)), others, MoreSpeech(4, 8, 0.5), steps.append)
+    with_more_speech(
+        trained(kind), labelled(examples(4)), unseen(examples(4, seed=9)), MoreSpeech(4, 6, 0.5), steps.append
+    )
     for _, run in groupby(steps, lambda step: step.mixtures):
         figures = [step.log_likelihood for step in run]
         assert len(figures) > 2
@@ -165,7 +165,7 @@ def test_every_step_raises_the_likelihood(kind: str) -> None:
 @pytest.mark.parametrize("kind", STRUCTURES)
 def test_lips_and_moves_stay(kind: str) -> None:
     chains = trained(kind)
-    found = with_more_speech(chains, labelled(examples(6)), unseen(examples(6, seed=9)), MoreSpeech(4, 2, 1.0))
+    found = with_more_speech(chains, labelled(examples(3)), unseen(examples(3, seed=9)), MoreSpeech(4, 2, 1.0))
     assert found.transitions is chains.transitions
     before, after = chains.groups[-1].of_stream(1), found.groups[-1].of_stream(1)
     assert after.means.tobytes() == before.means.tobytes()
@@ -175,8 +175,8 @@ def test_lips_and_moves_stay(kind: str) -> None:
 
 def test_lips_of_the_first_stage_are_not_looked_at() -> None:
     own, others = labelled(examples(3)), unseen(examples(3, seed=9))
-    blind = [replace(one, observed=one.observed.missing(1)) for one in own]
-    found = [with_more_speech(trained(), given, others, MoreSpeech(2, 2, 1.0)) for given in (own, blind)]
+    elsewhere = [replace(one, observed=one.observed.given(1, one.observed.streams[1][::-1])) for one in own]
+    found = [with_more_speech(trained(), given, others, MoreSpeech(2, 2, 1.0)) for given in (own, elsewhere)]
     assert found[0].groups[0].mixtures.means.tobytes() == found[1].groups[0].mixtures.means.tobytes()
 
 
@@ -199,7 +199,7 @@ def fitted(sentences: Sequence[Example], **options: object) -> tuple[CoupledEngi
 
 
 def arrays(sentences: Sequence[Example], **options: object) -> list[bytes]:
-    engine, model = fitted(sentences, **options)
+    engine, model = fitted(sentences, **PLAIN | options)
     return [array.tobytes() for array in engine.to_arrays(model).values()]
 
 

@@ -44,9 +44,9 @@ class CoupledConfig:
     crosses: bool = True
     mixtures: int = 4
     visual_mixtures: int = 1
-    more_mixtures: int = 4
-    more_steps: int = 4
-    more_weight: float = 1.0
+    more_mixtures: int = 8
+    more_steps: int = 8
+    more_weight: float = 0.3
     audio_weight: float = 1.0
     visual_weight: float = 1.0
     conversion: str = TRAJECTORY

@@ -180,17 +180,20 @@ def component_posteriors(posterior: Single, shares: Single | None) -> Single:
     return posterior[:, None] if shares is None else shares * posterior[:, None]
 
 
-def relearned(group: Group, sums: Sums, floors: Sequence[Single], least: float, streams: Sequence[int]) -> Group:
+def relearned(
+    group: Group, sums: Sums, floors: Sequence[Single], least: float, streams: Sequence[int], fewest: float = 2.0
+) -> Group:
     """Return the group with the mixtures that explain the sums best.
 
     floors  : the least variance of every stream [each shape=(D_s,)]
     least   : densities with less data than so many frames stay as they are
     streams : those whose means and variances are learned; of others they stay
+    fewest  : components with less data than so many frames end
     """
     mixtures = group.mixtures.copy()
     known = np.flatnonzero(sums.count.sum(axis=0) >= least)
     count = sums.count.T[known]
-    alive = count >= np.minimum(2.0, count.max(axis=1, keepdims=True))
+    alive = count >= np.minimum(fewest, count.max(axis=1, keepdims=True))
     weights = np.where(alive, count, 0)
     with np.errstate(divide="ignore"):
         mixtures.log_weights[known] = np.log(weights / weights.sum(axis=1, keepdims=True))

@@ -81,14 +81,16 @@ def maximised(
     *,
     streams: Sequence[int],
     moves: bool = True,
+    fewest: float = 2.0,
 ) -> Chains:
     """Return the chains that explain best what recordings said.
 
     floors  : the least variance of each stream [each shape=(D_s,)]
     streams : those whose densities are learned;  moves : learn the transitions
+    fewest  : components with less data than so many frames end; with 0 none does, and the likelihood never falls
     """
     groups = [
-        relearned(group, sums, [floors[s] for s in group.streams], LEAST_FRAMES, streams)
+        relearned(group, sums, [floors[s] for s in group.streams], LEAST_FRAMES, streams, fewest)
         if set(group.streams) & set(streams)
         else group
         for group, sums in zip(chains.groups, said.groups, strict=True)

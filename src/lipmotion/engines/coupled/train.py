@@ -278,15 +278,15 @@ def converged(
 ) -> Chains:
     """Return chains after steps of EM, ``most`` or as many as get on.
 
-    speech_only : learn the densities of speech, and keep all else
+    speech_only : learn the densities of speech, and keep all else; then no component ends
     """
-    streams = range(1 if speech_only else len(chains.streams))
+    how = {"streams": [0], "moves": False, "fewest": 0.0} if speech_only else {"streams": range(len(chains.streams))}
     last = -np.inf
     for _ in range(most):
         said = expected(chains, recordings, workers)
         figure = said.log_likelihood / said.frames
         heard(Step(components(chains), figure))
-        chains = maximised(chains, said, floors, streams=streams, moves=not speech_only)
+        chains = maximised(chains, said, floors, **how)
         if figure - last < CONVERGED:
             break
         last = figure
