@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import shutil
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,7 +10,10 @@ import pytest
 from cli.conftest import Run, is_one_error
 from lipmotion.corpora.store import Corpus
 from lipmotion.pipeline.model import load_model, save_model
+from lipmotion.pipeline.toy import toy_sentences
 from lipmotion.pipeline.train import train
+from lipmotion.pipeline.voices import SpokenSentence
+from lipmotion.speech.voices.base import SyntheticVoice
 from lipmotion.units import unit_set
 
 
@@ -73,6 +78,34 @@ def test_units_of_a_table_that_is_not_needed_again(run: Run, toy_corpus: Corpus,
     assert figures[0] == figures[1]
 
 
+def test_other_voices_are_learned_from_but_those_for_judging(
+    run: Run, toy_corpus: Corpus, toy_speech: Path, here: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of two installed voices, slt judges; and a friend was recorded."""
+    spoken = []
+
+    def say(*, voices: list[SyntheticVoice], **_: object) -> Iterator[SpokenSentence]:
+        for voice in voices:
+            spoken.append(voice.speaker)
+            sentence = toy_sentences(3)[0]
+            yield SpokenSentence(voice.name, voice.speaker, sentence.audio, sentence.units)
+
+    both = tuple(SyntheticVoice(name, "flite", name) for name in ("slt", "rms"))
+    monkeypatch.setattr("lipmotion.speech.voices.installed.installed_voices", lambda: both)
+    monkeypatch.setattr("lipmotion.pipeline.voices.many_voices", say)
+    (here / "open" / "friend").mkdir(parents=True)
+    shutil.copy(toy_speech, here / "open" / "friend" / "one.wav")
+    (here / "open" / "friend" / "one.txt").write_text(" ".join(toy_corpus.utterance("toy00").words or ()))
+    done = run("train", toy_corpus.path, "-o", "m", "--engine", "coupled", "--voices", "--recordings", "open")
+    assert done.code == 0
+    assert spoken == ["rms"]
+    assert load_model(here / "m").about["voices"] == ["friend", "rms"]
+    assert "voices" in "\n".join(run("info", "m").out)
+    refused = run("train", toy_corpus.path, "-o", "other", "--voices")
+    assert is_one_error(refused, 3)
+    assert "the trajectory engine cannot learn from other voices" in refused.err[0]
+
+
 @pytest.mark.parametrize(
     ("arguments", "code", "words"),
     [
@@ -85,7 +118,8 @@ def test_units_of_a_table_that_is_not_needed_again(run: Run, toy_corpus: Corpus,
         (["CORPUS", "-o", "m", "--lexicon", "missing"], 3, "missing: no such lexicon file"),
         (["CORPUS", "-o", "m", "--units", "evis"], 3, "no unit set 'evis'; there are: 2vis, sVis, pbVis"),
         (["CORPUS", "-o", "m", "--units", "folder"], 3, "folder: "),
-        (["CORPUS", "-o", "m", "--engine", "joined"], 3, "no engine 'joined'; there are: trajectory, joint"),
+        (["CORPUS", "-o", "m", "--engine", "coupled", "--recordings", "missing"], 4, "missing: no such folder"),
+        (["CORPUS", "-o", "m", "--engine", "joined"], 3, "no engine 'joined'; there are: trajectory, coupled, joint"),
     ],
 )
 def test_what_cannot_be_used(
