@@ -9,10 +9,10 @@ import pytest
 
 from cli.conftest import Run, is_one_error
 from lipmotion.corpora.store import Corpus
-from lipmotion.pipeline.model import load_model, save_model
+from lipmotion.pipeline.model import Model, load_model, save_model
 from lipmotion.pipeline.toy import toy_sentences
-from lipmotion.pipeline.train import train
-from lipmotion.pipeline.voices import SpokenSentence
+from lipmotion.pipeline.train import TrainReport, train
+from lipmotion.pipeline.voices import Heard, SpokenSentence
 from lipmotion.speech.voices.base import SyntheticVoice
 from lipmotion.units import unit_set
 
@@ -79,31 +79,41 @@ def test_units_of_a_table_that_is_not_needed_again(run: Run, toy_corpus: Corpus,
 
 
 def test_other_voices_are_learned_from_but_those_for_judging(
-    run: Run, toy_corpus: Corpus, toy_speech: Path, here: Path, monkeypatch: pytest.MonkeyPatch
+    run: Run, toy_model: Model, toy_corpus: Corpus, toy_speech: Path, here: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Of two installed voices, slt judges; and a friend was recorded."""
-    spoken = []
+    speakers: list[list[str]] = []
 
     def say(*, voices: list[SyntheticVoice], **_: object) -> Iterator[SpokenSentence]:
-        for voice in voices:
-            spoken.append(voice.speaker)
-            sentence = toy_sentences(3)[0]
-            yield SpokenSentence(voice.name, voice.speaker, sentence.audio, sentence.units)
+        sentence = toy_sentences(3)[0]
+        return (SpokenSentence(v.name, v.speaker, sentence.audio, sentence.units) for v in voices)
+
+    def learn(*_: object, voices: Iterator[Heard], **__: object) -> tuple[Model, TrainReport]:
+        speakers.append([one.speaker for one in voices])
+        return toy_model, TrainReport((), {}, {})
 
     both = tuple(SyntheticVoice(name, "flite", name) for name in ("slt", "rms"))
     monkeypatch.setattr("lipmotion.speech.voices.installed.installed_voices", lambda: both)
     monkeypatch.setattr("lipmotion.pipeline.voices.many_voices", say)
+    monkeypatch.setattr("lipmotion.pipeline.train.train", learn)
     (here / "open" / "friend").mkdir(parents=True)
     shutil.copy(toy_speech, here / "open" / "friend" / "one.wav")
     (here / "open" / "friend" / "one.txt").write_text(" ".join(toy_corpus.utterance("toy00").words or ()))
-    done = run("train", toy_corpus.path, "-o", "m", "--engine", "coupled", "--voices", "--recordings", "open")
-    assert done.code == 0
-    assert spoken == ["rms"]
-    assert load_model(here / "m").about["voices"] == ["friend", "rms"]
-    assert "voices" in "\n".join(run("info", "m").out)
+    for arguments in (["--voices", "--recordings", "open"], ["--voices"], []):
+        assert run("train", toy_corpus.path, "-o", "m", "--engine", "coupled", *arguments).code == 0
+    assert speakers == [["friend", "rms"], ["rms"], []]
+
+
+def test_an_engine_without_a_use_for_voices(
+    run: Run, toy_corpus: Corpus, here: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sentence = toy_sentences(3)[0]
+    one = SpokenSentence("one", "rms", sentence.audio, sentence.units)
+    monkeypatch.setattr("lipmotion.pipeline.voices.many_voices", lambda **_: iter([one]))
     refused = run("train", toy_corpus.path, "-o", "other", "--voices")
     assert is_one_error(refused, 3)
     assert "the trajectory engine cannot learn from other voices" in refused.err[0]
+    assert list(here.iterdir()) == []
 
 
 @pytest.mark.parametrize(

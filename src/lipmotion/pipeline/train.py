@@ -106,7 +106,7 @@ def train(
     if not chosen:
         raise CorpusError(f"{corpus.path}: an empty list of names was given; name at least one utterance")
     recogniser = recogniser or HmmConfig()
-    others = list(_others(engine, voices, monitor))
+    others = list(examples_of_others(engine, voices, monitor))
     utterances = [corpus.utterance(name) for name in chosen]
     checkpoint = Checkpoint(work, fingerprint(corpus, chosen, engine, recogniser, lexicon)) if work else NOTHING_KEPT
     with working(min(workers, len(chosen) // FEWEST)) as team:
@@ -141,6 +141,25 @@ def phones_and_examples(
     phones = _phones(utterances, lexicon, recogniser, learning, checkpoint, each)
     examples, skipped = _examples(utterances, Recogniser(phones), lexicon, finding, checkpoint, each)
     return phones, examples, skipped
+
+
+def examples_of_others(
+    engine: Engine[Any], voices: Iterable[Heard], monitor: Monitor = silent_monitor
+) -> Iterator[Example]:
+    """Give speech of others as examples in which no motion was seen, by the names of the speakers.
+
+    Raises InputError: the engine has no use for them.
+    """
+    for number, (features, units, speaker) in enumerate(voices, start=1):
+        if not engine.hears_others:
+            raise InputError(
+                f"the {engine.name} engine cannot learn from other voices without motion; use the coupled engine, or "
+                "leave the voices out"
+            )
+        monitor(Progress("hearing other voices", number, number, 0.0))
+        frames = len(features.values)
+        unseen = Motion(np.zeros((frames, 0)), FRAME_RATE_HZ, ())
+        yield Example(speaker, Speech(features, units), unseen, np.zeros(frames, bool))
 
 
 def labels_of(utterance: Utterance, phones: Recogniser, lexicon: Lexicon) -> Timeline[Unit]:
@@ -216,20 +235,6 @@ def _examples(
         name, reason = next(iter(skipped.items()))
         raise CorpusError(f"none of {len(skipped)} utterances could be used; the first, {name}: {reason}")
     return examples, skipped
-
-
-def _others(engine: Engine[Any], voices: Iterable[Heard], monitor: Monitor) -> Iterator[Example]:
-    """Give speech of others as examples in which no motion was seen, by the names of the speakers."""
-    for number, (features, units, speaker) in enumerate(voices, start=1):
-        if not engine.hears_others:
-            raise InputError(
-                f"the {engine.name} engine cannot learn from other voices without motion; use the coupled engine, or "
-                "leave the voices out"
-            )
-        monitor(Progress("hearing other voices", number, number, 0.0))
-        frames = len(features.values)
-        unseen = Motion(np.zeros((frames, 0)), FRAME_RATE_HZ, ())
-        yield Example(speaker, Speech(features, units), unseen, np.zeros(frames, bool))
 
 
 def _about(corpus: Corpus, utterances: Sequence[Utterance], split: str, used: int) -> dict[str, Any]:
