@@ -4,8 +4,8 @@
     python benchmarks/two_stage.py [--clips 100] [--sentences 15] [--only "two stages" ...]
 
 One JSON object a line: a model each. ``own``: ACC of opening on the validation list of build/grid-s1; ``strangers``:
-its mean over the clips of build/grid-others; ``phones``: for speakers who only judge, the share of frames of speech whose
-most probable phone is the labelled one, and the same of visemes, words unknown.
+its mean over the clips of build/grid-others; ``phones``: for speakers who only judge, the share of frames of speech
+whose most probable phone is the labelled one, and the same of visemes, words unknown.
 """
 
 from __future__ import annotations
