@@ -23,7 +23,7 @@ import lipmotion
 from lipmotion.corpora.grid import sentence
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import engine_named
-from lipmotion.engines.coupled.learned import CoupledModel, chain_posteriors
+from lipmotion.engines.coupled.learned import CoupledModel
 from lipmotion.pipeline.evaluate import evaluate
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.prompts import prompts
@@ -144,7 +144,7 @@ def right(model: CoupledModel, said: Sequence[Heard]) -> tuple[float, float]:
     for one in said:
         observed = model.unseen(np.asarray(one.features.values))
         evidence = model.chains.evidence(observed, model.chains.everywhere)
-        states = chain_posteriors(model.chains, model.chains.posteriors(evidence, model.chains.everywhere), 0)
+        states = model.chains.posteriors(evidence, model.chains.everywhere).chains[0]
         units = states.reshape(len(states), len(kind), -1).sum(axis=2)
         unit, viseme = units.argmax(axis=1), (units @ member).argmax(axis=1)
         for frame, number in labelled(one.units, len(units), structure):

@@ -182,3 +182,44 @@ def test_chains_that_allow_nothing_together_have_no_path():
     assert found.log_likelihood[0] == -np.inf
     assert not found.posterior.any()
     assert not found.counts.any()
+
+
+@pytest.mark.parametrize(("against", "frames"), [(3.0, 40), (20.0, 3), (100.0, 3)])
+def test_a_state_far_behind_comes_back_in_single_precision(against, frames):
+    """Evidence speaks for a state up to 300 nats, and then more for another that cannot be reached from it."""
+    arcs = {(0, 0): 0.0, (1, 1): 0.0}
+    expectation = Expectation.of(**arrays_of(arcs, 2), log_initial=np.log([0.5, 0.5]), log_final=np.zeros(2))
+    log_emission = np.zeros((3 * frames, 2), np.float32)
+    log_emission[:frames, 0], log_emission[frames:, 1] = -against, -against
+    found = expectation.over_chains([log_emission], [expectation.layout.order], np.array([3 * frames]))
+    posterior = found.posterior[:, expectation.layout.place]
+    assert posterior[:, 0] == pytest.approx(np.ones(3 * frames), abs=1e-5)
+    assert found.log_likelihood[0] == pytest.approx(np.log(0.5) - frames * against, rel=1e-6)
+    assert found.counts == pytest.approx([3 * frames - 1, 0], abs=1e-3)
+
+
+def test_recordings_left_by_single_precision_spoil_no_others():
+    expectation, factors, columns = chained(10, 90, 3.0)
+    factors = [factor.astype(np.float32) for factor in factors]
+    factors[0][40:50] *= 300
+    frames = np.array([30, 30, 30])
+    found = expectation.over_chains(factors, columns, frames)
+    exact = expectation.over_chains([factor.astype(float) for factor in factors], columns, frames)
+    assert found.posterior == pytest.approx(exact.posterior, abs=1e-4)
+    assert found.counts == pytest.approx(exact.counts, abs=1e-3)
+    assert found.log_likelihood == pytest.approx(exact.log_likelihood, rel=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_other_probabilities_on_the_same_arcs(seed):
+    """Nothing of the old ones is left: blocks, runs, and beginnings."""
+    (old, _), (new, _) = phone_loop(seed), phone_loop(seed + 10)
+    log_emission = np.random.default_rng(seed).normal(0, 2, (30, len(old["emission"])))
+    columns, frames = np.arange(len(old["emission"])), np.array([30])
+    arrays = ("arc_from", "arc_log", "arc_start", "log_initial", "log_final")
+    initial = np.random.default_rng(seed).normal(-3, 1, len(columns))
+    changed = Expectation.of(*(old[name] for name in arrays)).with_arcs(new["arc_log"], initial)
+    fresh = Expectation.of(*((new | {"log_initial": initial})[name] for name in arrays))
+    one, other = (network.over(log_emission, columns, frames) for network in (changed, fresh))
+    for found, expected in zip(one, other, strict=True):
+        np.testing.assert_array_equal(found, expected)

@@ -18,14 +18,17 @@ AGAIN = ("not a whole utterance", "delete this folder and prepare again")
 
 
 def _damaged(name: str, code: int, *says: str, verb: str = "train") -> Callable[[Callable[[Path], object]], None]:
-    """Put a copy of the corpus, damaged, into the table."""
+    """Put a copy of the corpus, damaged, into the table.
+
+    verb : what is done with it, and options
+    """
 
     def keep(damage: Callable[[Path], object]) -> None:
         @case(GROUP, name, code, *says)
         def _(bench: Bench) -> list[object]:
             path = bench.copied_corpus()
             damage(path)
-            return ["train", path, "-o", "m"] if verb == "train" else ["corpus", "info", path]
+            return [*verb.split(), path, *(["-o", "m"] if verb.startswith("train") else [])]
 
     return keep
 
@@ -47,6 +50,20 @@ def _listed(corpus: Path, **changes: object) -> None:
 def _described(corpus: Path, **changes: object) -> None:
     path = _first(corpus) / "entry.json"
     path.write_text(json.dumps(_entry(path.parent) | changes), encoding="utf-8")
+
+
+PICTURED = "train --visual eigenlips"
+
+
+@_damaged("no mouth pictures for eigenlips", 4, "no mouth pictures, which eigenlips need; prepare", verb=PICTURED)
+def _(corpus: Path) -> None:
+    _described(corpus, crops=False)
+
+
+@_damaged("mouth pictures of another size", 4, "mouth pictures of 2 sizes; prepare", verb=PICTURED)
+def _(corpus: Path) -> None:
+    first = _first(corpus)
+    np.save(first / "crops.npy", np.zeros((_entry(first)["frames"], 9, 9, 3), np.uint8))
 
 
 for _name, _damage in {
@@ -92,7 +109,7 @@ def _(corpus: Path) -> None:
     (_first(corpus) / "entry.json").write_text("{")
 
 
-@_damaged("info of a description that is no JSON", 4, *AGAIN, verb="info")
+@_damaged("info of a description that is no JSON", 4, *AGAIN, verb="corpus info")
 def _(corpus: Path) -> None:
     (_first(corpus) / "entry.json").write_text("{")
 
@@ -159,7 +176,7 @@ def _(corpus: Path) -> None:
     path.symlink_to("/dev/zero")
 
 
-@_damaged("an utterance that is a link", 0, verb="info")
+@_damaged("an utterance that is a link", 0, verb="corpus info")
 def _(corpus: Path) -> None:
     path = _first(corpus)
     path.rename(corpus / "moved").rename(corpus.parent / path.name)

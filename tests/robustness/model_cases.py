@@ -137,3 +137,11 @@ def _(bench: Bench) -> list[object]:
 @case(GROUP, "an adaptation of a wrong shape", 6, "the adaptation is damaged", "adapt the model again")
 def _(bench: Bench) -> list[object]:
     return bench.animate(None, "--model", bench.changed_model({"adaptation/own.npy": npy(np.zeros((39, 39)))}))
+
+
+@case(GROUP, "eigenlips of a wrong shape", 6, "the eigenlips are damaged", "train the model again")
+def _(bench: Bench) -> list[object]:
+    return bench.animate(None, "--model", bench.changed_model({"eigenlips/mean.npy": npy(np.zeros((3, 9)))}))
+
+
+_header("eigenlips that it says it has", "the model says visual 'both', which its eigenlips do not fit", visual="both")

@@ -52,6 +52,11 @@ for _verb in ("evaluate", "train"):
             return [*what, *options]
 
 
+@case(GROUP, "train --visual of an unknown name", 3, "visual is 'pixels', required one of: geometry, eigenlips, both")
+def _(bench: Bench) -> list[object]:
+    return ["train", bench.corpus, "-o", "m", "--visual", "pixels"]
+
+
 @case(GROUP, "corpus prompts --count -1", 3, "-1 prompts asked for, required at least 1")
 def _(_bench: Bench) -> list[object]:
     return ["corpus", "prompts", "--count=-1"]

@@ -3,7 +3,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lipmotion.stats.pca import fit_pca
+from lipmotion.stats import pca as module
+from lipmotion.stats.pca import evenly, fit_pca
+from oracles.components import components, share
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -43,3 +45,53 @@ def test_a_line_is_one_component():
     pca = fit_pca(line, 1)
     assert pca.basis[0] == pytest.approx([0.6, 0, 0.8])  # the sign too: the largest entry is positive
     assert pca.restore(pca.project(line)) == pytest.approx(line)
+
+
+def spectrum(seed: int, count: int, dimensions: int) -> np.ndarray:
+    """Numbers whose components have clearly different variances, and some noise."""
+    draw = np.random.default_rng(seed)
+    scores = draw.normal(0, 1, (count, 8)) * 10 * 0.7 ** np.arange(8)
+    return scores @ draw.normal(0, 1, (8, dimensions)) + 0.01 * draw.normal(0, 1, (count, dimensions)) + 5
+
+
+@pytest.mark.parametrize(("count", "dimensions"), [(60, 20), (20, 60), (40, 40)])
+@given(seed=SEEDS)
+@settings(deadline=None, max_examples=15)
+def test_components_are_those_of_the_svd(count, dimensions, seed):
+    values = spectrum(seed, count, dimensions)
+    pca = fit_pca(values, 5)
+    mean, basis = components(values, 5)
+    assert pca.mean == pytest.approx(mean)
+    assert pca.basis == pytest.approx(basis, abs=1e-6)
+
+
+@pytest.mark.parametrize(("count", "dimensions"), [(90, 50), (50, 90)])
+@pytest.mark.parametrize("kind", [np.float32, np.uint8])
+def test_a_large_table_is_searched_for_its_first_components(count, dimensions, kind, monkeypatch):
+    values = spectrum(3, count, dimensions)
+    values = (255 * (values - values.min()) / np.ptp(values)).astype(kind)
+    monkeypatch.setattr(module, "EXACT", 10)
+    monkeypatch.setattr(module, "ROWS", 16)
+    pca = fit_pca(values, 5)
+    _, basis = components(values.astype(float), 5)
+    assert pca.basis @ pca.basis.T == pytest.approx(np.eye(5), abs=1e-5)
+    assert share(values, pca.basis) == pytest.approx(share(values, basis), rel=1e-4)
+    assert pca.basis == pytest.approx(basis, abs=0.02)
+    assert np.array_equal(fit_pca(values, 5).basis, pca.basis)
+
+
+def test_few_rows_span_few_components():
+    rows = np.repeat(spectrum(1, 4, 30), 2, axis=0)
+    pca = fit_pca(rows, 10)
+    assert pca.basis.shape == (3, 30)  # four different points: three directions
+    assert pca.restore(pca.project(rows)) == pytest.approx(rows)
+    assert fit_pca(np.ones((4, 30)), 3).basis.shape == (0, 30)
+
+
+def test_places_are_spread_evenly():
+    assert evenly(4, 8).tolist() == [1, 3, 5, 7]
+    assert evenly(9, 3).tolist() == [0, 1, 2]
+    assert evenly(5, 0).tolist() == []
+    chosen = evenly(980, 33_000)
+    assert (np.diff(chosen) > 30).all()
+    assert (chosen[0], chosen[-1]) == (16, 32_983)

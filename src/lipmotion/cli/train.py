@@ -8,14 +8,15 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from lipmotion.cli.options import add_machine_readable, list_or_all
+
 if TYPE_CHECKING:
     from lipmotion.pipeline.voices import SpokenSentence
     from lipmotion.types import Monitor
     from lipmotion.units import Lexicon
 
-from lipmotion.cli.options import add_machine_readable, list_or_all
-
 UNITS = "what is modelled: phone (default), eVis, sVis, pbVis, 2vis, or a table file (docs/unit-sets.md)"
+VISUAL = "what is learned: geometry (tracked or given motion, default), eigenlips (mouth pictures), or both"
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -28,6 +29,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser.add_argument("--lexicon", type=Path, metavar="FILE", help="pronunciations: WORD PHONE PHONE ... a line")
     parser.add_argument("--engine", default="trajectory", help="trajectory (default), joint, or coupled")
     parser.add_argument("--units", default="phone", metavar="SET", help=UNITS)
+    parser.add_argument("--visual", default="geometry", metavar="WHAT", help=VISUAL)
     parser.add_argument("--voices", action="store_true", help="learn from installed synthetic voices as well (coupled)")
     parser.add_argument(
         "--recordings", type=Path, metavar="FOLDER", help="and from transcribed speech of others (coupled)"
@@ -57,6 +59,7 @@ def run(options: argparse.Namespace) -> None:
         unit_set(options.units)  # before the long work
         engine = engine_named(options.engine, {"units": options.units} if options.units != "phone" else {})
         chosen = {"engine": engine, "split": split, "speakers": options.speaker, "lexicon": lexicon, "workers": workers}
+        chosen["visual"] = options.visual
         chosen["voices"] = heard(_others(options, lexicon, report.hear))
         with unfinished_work(options.output) as work:
             model, result = train(Corpus.open(options.corpus), **chosen, monitor=report.hear, work=work)

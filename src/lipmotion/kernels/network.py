@@ -8,11 +8,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.kernels.arcs import Layout, Weights, laid_out, weights_of
+from lipmotion.kernels.arcs import PADDED, Layout, Weights, laid_out, weights_of
 from lipmotion.kernels.choice import numba_works
 
 Index = NDArray[np.intp]
 Array = NDArray[np.float64]
+CHUNK = 16
+"""Arcs of a run are followed so many at once."""
+FRAMES_AT_ONCE = 256
+"""Of which roots are taken: they stay near the processor."""
 LOWEST_ROOT = -80.0
 """Of the logarithm of a density's eighth root: exp of less is denormal in single precision, and slow."""
 
@@ -59,12 +63,37 @@ class Expected(NamedTuple):
     log_likelihood: Array
 
 
+class Chunks(NamedTuple):
+    """Runs of arcs, each padded to whole chunks.
+
+    runs   : [shape=(R, 4)], first target's place, first source's place, chunks, position in ``weight``
+    weight : [shape=(M,)], 0 for what pads
+    arcs   : [shape=(N,)], the positions of arcs of runs
+    """
+
+    runs: NDArray[np.uintp]
+    weight: Array
+    arcs: Index
+
+    @classmethod
+    def of(cls, layout: Layout, weights: Weights) -> Chunks:
+        """Return the runs of a layout."""
+        runs = layout.runs.copy()
+        runs[:, 2] = -(-runs[:, 2] // CHUNK) * CHUNK
+        runs[:, 3] = np.cumsum(runs[:, 2]) - runs[:, 2]
+        weight = np.zeros(runs[:, 2].sum())
+        arcs = np.arange(len(weights.runs)) + np.repeat(runs[:, 3] - layout.runs[:, 3], layout.runs[:, 2])
+        weight[arcs] = weights.runs
+        return cls(runs.astype(np.uintp), weight, arcs)
+
+
 class Expectation(NamedTuple):
     """A network ready for forward–backward; arrays as in ``network_posteriors``.
 
     layout  : of the arcs
     weights : their probabilities, laid out
     turned  : those of blocks, targets as rows, sources as columns
+    chunks  : those of runs
     """
 
     arc_from: Index
@@ -75,6 +104,7 @@ class Expectation(NamedTuple):
     layout: Layout
     weights: Weights
     turned: Array
+    chunks: Chunks
 
     @classmethod
     def of(
@@ -86,20 +116,16 @@ class Expectation(NamedTuple):
         log_final: NDArray[np.floating[Any]],
     ) -> Expectation:
         """Return a network ready."""
-        arc_log, log_initial, log_final = (log.astype(np.float64) for log in (arc_log, log_initial, log_final))
         layout = laid_out(arc_from, arc_start)
-        weights = weights_of(layout, np.exp(arc_log), 0.0)
-        return cls(arc_from, arc_log, arc_start, log_initial, log_final, layout, weights, _turned(layout, weights))
+        weights, turned, chunks = _weighted(layout, arc_log)
+        arc_log, log_initial, log_final = (log.astype(np.float64) for log in (arc_log, log_initial, log_final))
+        return cls(arc_from, arc_log, arc_start, log_initial, log_final, layout, weights, turned, chunks)
 
     def with_arcs(self, arc_log: NDArray[np.floating[Any]], log_initial: NDArray[np.floating[Any]]) -> Expectation:
         """Return the network with other probabilities [shapes=(E,), (S,)]; nothing is laid out anew."""
-        weights = weights_of(self.layout, np.exp(arc_log.astype(np.float64)), 0.0)
-        return self._replace(
-            arc_log=arc_log.astype(np.float64),
-            log_initial=log_initial.astype(np.float64),
-            weights=weights,
-            turned=_turned(self.layout, weights),
-        )
+        weights, turned, chunks = _weighted(self.layout, arc_log)
+        changed = self._replace(weights=weights, turned=turned, chunks=chunks)
+        return changed._replace(arc_log=arc_log.astype(np.float64), log_initial=log_initial.astype(np.float64))
 
     def over(self, log_emission: NDArray[np.floating[Any]], columns: Index, frames: Index) -> Expected:
         """Return what recordings say, one after the other in ``log_emission``.
@@ -128,14 +154,15 @@ class Expectation(NamedTuple):
         """
         if not numba_works():
             return self._over(log_emissions, columns, frames, None)
-        from lipmotion.kernels.compiled import network
-
-        roots, bests = zip(*map(_roots, log_emissions), strict=True)
-        firsts = np.cumsum([0, *(root.shape[1] for root in roots[:-1])])
-        root, best = network.products(np.hstack(roots), np.stack(columns) + firsts[:, None])
-        with np.errstate(divide="ignore"):
-            best = 8 * np.log(best) + np.sum(bests, axis=0, dtype=np.float64)
-        return self._over(log_emissions, columns, frames, self._compiled(root, best, frames))
+        single = log_emissions[0].dtype == np.float32
+        expected = self._compiled(*_products(log_emissions, columns), frames, single)
+        edges = np.append(0, np.cumsum(frames))
+        for u in np.flatnonzero(np.isneginf(expected.log_likelihood)) if single else []:
+            mine = slice(edges[u], edges[u + 1])
+            again = self._compiled(*_products([log[mine] for log in log_emissions], columns), frames[u : u + 1])
+            expected.posterior[mine], expected.log_likelihood[u] = again.posterior, again.log_likelihood[0]
+            expected.counts[:] += again.counts
+        return self._over(log_emissions, columns, frames, expected)
 
     def _over(
         self,
@@ -160,24 +187,28 @@ class Expectation(NamedTuple):
             expected.counts[:] += counts
         return expected
 
-    def _compiled(self, root: NDArray[Any], best: NDArray[Any], frames: Index) -> Expected:
+    def _compiled(self, root: NDArray[Any], best: NDArray[Any], frames: Index, single: bool = False) -> Expected:
         """Return what recordings say, where there are paths within reach.
 
         root : [shape=(T, S)], by place, the eighth roots of densities relative to ``best``; becomes the posteriors
         best : [shape=(T,)], logarithms
+        single : whether states may be in single precision (0 and -inf for a recording for which that is not enough)
         """
         from lipmotion.kernels.compiled import network
 
+        run_weight: NDArray[Any] = self.chunks.weight.astype(np.float32 if single else np.float64)
+        kernel = network.forward_backward_single if single else network.forward_backward
         layout, edges = self.layout, np.append(0, np.cumsum(frames))
         (initial, first), (final, last) = (
             _probabilities(log[layout.order]) for log in (self.log_initial, self.log_final)
         )
-        run_counts, leaving, entering, scales, ends = network.forward_backward(
-            root, edges, initial, final, layout.runs.astype(np.uintp), self.weights.runs,
-            layout.blocks, layout.block_sources, self.weights.blocks.astype(root.dtype), self.turned.astype(root.dtype),
+        run_counts, leaving, entering, scales, ends = kernel(
+            root, edges, initial, final, self.chunks.runs, run_weight,
+            layout.blocks.astype(np.uintp), layout.block_sources.astype(np.uintp),
+            self.weights.blocks.astype(root.dtype), self.turned.astype(root.dtype),
         )  # fmt: skip
         counts = np.zeros(len(self.arc_log))
-        counts[layout.run_arcs] = run_counts * self.weights.runs
+        counts[layout.run_arcs] = run_counts[self.chunks.arcs] * self.weights.runs
         _count_blocks(counts, layout, self.weights, leaving, entering)
         with np.errstate(divide="ignore"):
             log_likelihood = np.add.reduceat(np.log(scales) + best, edges[:-1]) + (np.log(ends) + first + last)
@@ -219,6 +250,25 @@ def _roots(log_density: NDArray[np.floating[Any]]) -> tuple[NDArray[Any], NDArra
     return np.exp(np.maximum(root, LOWEST_ROOT, out=root), out=root), best
 
 
+def _products(
+    log_densities: Sequence[NDArray[np.floating[Any]]], columns: Sequence[Index]
+) -> tuple[NDArray[Any], Array]:
+    """Return the roots of joint densities, by place, relative to the best of each frame, and its logarithm."""
+    from lipmotion.kernels.compiled import network
+
+    firsts = np.cumsum([0, *(log.shape[1] for log in log_densities[:-1])])
+    shifted = (np.stack(columns) + firsts[:, None]).astype(np.uint32)
+    frames = len(log_densities[0])
+    joint, best = np.empty((frames, shifted.shape[1]), log_densities[0].dtype), np.empty(frames)
+    for start in range(0, frames, FRAMES_AT_ONCE):
+        mine = slice(start, start + FRAMES_AT_ONCE)
+        roots, bests = zip(*(_roots(log[mine]) for log in log_densities), strict=True)
+        network.products(np.hstack(roots), shifted, joint[mine], best[mine])
+        with np.errstate(divide="ignore"):
+            best[mine] = 8 * np.log(best[mine]) + np.sum(bests, axis=0, dtype=np.float64)
+    return joint, best
+
+
 def _probabilities(log: Array) -> tuple[Array, float]:
     """Return probabilities relative to the greatest, and its logarithm."""
     best = float(log.max())
@@ -226,9 +276,15 @@ def _probabilities(log: Array) -> tuple[Array, float]:
     return np.exp(log - best), best
 
 
+def _weighted(layout: Layout, arc_log: NDArray[np.floating[Any]]) -> tuple[Weights, Array, Chunks]:
+    """Return the probabilities of arcs, given by their logarithms [shape=(E,)], in all forms that kernels take."""
+    weights = weights_of(layout, np.exp(arc_log.astype(np.float64)), 0.0)
+    return weights, _turned(layout, weights), Chunks.of(layout, weights)
+
+
 def _turned(layout: Layout, weights: Weights) -> Array:
-    """Return the weights of all blocks, targets as rows, sources as columns."""
-    turned = [np.empty((0, layout.blocks[:, 3].max(initial=0)))]
+    """Return the weights of all blocks, targets as rows, sources as columns, padded."""
+    turned = [np.empty((0, -(-layout.blocks[:, 3].max(initial=0) // PADDED) * PADDED))]
     for _, targets, first, sources in layout.blocks:
         matrix = np.zeros((targets, turned[0].shape[1]))
         matrix[:, :sources] = weights.blocks[first : first + sources, :targets].T

@@ -15,9 +15,10 @@ def table(figures: Mapping[str, Any]) -> str:
     lines[0] += f"; closed under {closed:.4f}" if closed is not None else ""
     lines += [f"left out, for they do not move: {', '.join(still)}"] if still else []
     for name, condition in figures["conditions"].items():
-        size = max(9, *map(len, condition["channels"]))
+        rows = condition["channels"] | _pictured(condition)
+        size = max(9, *map(len, rows))
         lines += ["", name, f"  {'channel':{size}}{'ACC':>7}{'per clip':>10}{'nRMSE':>7}{'variance':>10}{'jerk':>7}"]
-        for channel, row in condition["channels"].items():
+        for channel, row in rows.items():
             lines.append(
                 f"  {channel:{size}}{number(row['acc'], '7.3f')}{number(row['acc_per_clip'], '10.3f')}"
                 f"{number(row['nrmse'], '7.3f')}{number(row['global_variance'], '10.2f')}"
@@ -27,11 +28,21 @@ def table(figures: Mapping[str, Any]) -> str:
     return "\n".join(lines)
 
 
+def _pictured(condition: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the row of the means over all eigenlips, if there are some."""
+    means = condition.get("eigenlips")
+    return {f"{len(means['channels'])} eigenlips": means} if means else {}
+
+
 def _rest(condition: Mapping[str, Any]) -> list[str]:
     lines = [
         f"  mean ACC {condition['acc']:.3f}; AMSE {condition['amse']:.4f}; "
         f"lag of {condition['leading']} {condition['lag_ms']:+.1f} ms"
     ]
+    if "eigenlips" in condition and condition["channels"]:
+        lines.append(
+            f"  AMSE of the eigenlips {condition['eigenlips']['amse']:.1f}, in grey levels and this model's space"
+        )
     if "closures" not in condition:
         return lines
     low, high = condition["opening_acc_95"]
@@ -39,6 +50,7 @@ def _rest(condition: Mapping[str, Any]) -> list[str]:
     quiet, original = condition["silence"]["generated"], condition["silence"]["original"]
     return [
         f"  opening ACC 95 % interval {low:.3f} to {high:.3f};{lines[0][1:]}",
+        *lines[1:],
         f"  closures: score {number(closures['score'], '.3f')} of {closures['original']}, precision "
         f"{number(closures['precision'], '.3f')} of {closures['generated']}, timing "
         f"{number(closures['timing_ms'], '+.0f')} ms",

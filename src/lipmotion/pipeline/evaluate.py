@@ -20,9 +20,11 @@ from lipmotion.pipeline.hear import hear, hear_unsaid
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.train import labels_of
 from lipmotion.pipeline.transcribe import report_guesses
+from lipmotion.pipeline.visual import GEOMETRY, as_learned
 from lipmotion.speech.recogniser import Recogniser
 from lipmotion.speech.recogniser import recogniser as cached_recogniser
-from lipmotion.types import Monitor, Motion, Speech, Timeline, Unit, Utterance, counted, part_of, silent_monitor
+from lipmotion.stats.eigenlips import Eigenlips
+from lipmotion.types import GREY, Monitor, Motion, Speech, Timeline, Unit, Utterance, counted, part_of, silent_monitor
 from lipmotion.units import VISEMES, Lexicon, is_silent
 
 ModelT = TypeVar("ModelT")
@@ -45,6 +47,7 @@ class Recorded:
     reference  : what is spoken, utterance by utterance
     conditions : what an engine is told of that, by name: ``audio only``, ``with transcript``
     phones     : what found them
+    eigenlips  : the space of mouth pictures, if coefficients in it are compared
     """
 
     utterances: Sequence[Utterance]
@@ -54,6 +57,13 @@ class Recorded:
     reference: Sequence[Timeline[Unit]]
     conditions: Mapping[str, Sequence[Timeline[Unit]]]
     phones: Recogniser
+    eigenlips: Eigenlips | None = None
+
+    @property
+    def pictured(self) -> tuple[str, ...]:
+        """The channels that are eigenlips."""
+        names = {channel.name for channel in self.eigenlips.channels} if self.eigenlips is not None else ()
+        return tuple(name for name in self.channels if name in names)
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,8 +94,9 @@ def evaluate(
     recogniser : as in ``animate``
     monitor  : hears how far it is
 
-    Compared are the lip distances or, in a corpus without them, every channel that moves in the recordings; figures
-    of closing, and of silence, need the channel ``opening``. What cannot be computed is None.
+    Compared are the lip distances or, in a corpus without them, every channel that moves in the recordings; beside
+    them, or in their place, the eigenlips of a model that has some. Figures of closing, and of silence, need the
+    channel ``opening``. What cannot be computed is None.
     The reference for what is speech and where its p, b, m are is the labelled phones, else the forced alignment, or
     recognition where nothing is transcribed. The mouth counts as closed relative to the corpus's own training list
     (without one: to the split itself).
@@ -93,7 +104,16 @@ def evaluate(
     Raises AlignmentError: a transcript does not fit into its recording.
     """
     phones = cached_recogniser(model.phones, recogniser, model.adaptation)
-    found = recorded(corpus, phones, split=split, speakers=speakers, lexicon=lexicon, monitor=monitor)
+    found = recorded(
+        corpus,
+        phones,
+        split=split,
+        speakers=speakers,
+        lexicon=lexicon,
+        monitor=monitor,
+        visual=model.visual,
+        eigenlips=model.eigenlips,
+    )
     figures = {
         "split": split or "all",
         "clips": len(found.utterances),
@@ -117,15 +137,18 @@ def recorded(
     channels: Sequence[str] | None = None,
     lexicon: Lexicon | None = None,
     monitor: Monitor = silent_monitor,
+    visual: str = GEOMETRY,
+    eigenlips: Eigenlips | None = None,
 ) -> Recorded:
     """Return the recordings of a split, and their phones as ``phones`` finds them. Raises as ``evaluate``.
 
     names    : these utterances only, whatever their list
     channels : compare these, whether they move or not
+    visual, eigenlips : of the model: which channels it has, and the space of the pictures among them
     """
     lexicon = lexicon or Lexicon()
     chosen = names if names is not None else corpus.required(split, speakers)
-    utterances = [corpus.utterance(name) for name in chosen]
+    utterances = [as_learned(corpus.utterance(name), visual, eigenlips) for name in chosen]
     compared, still = (tuple(channels), ()) if channels is not None else compared_channels(utterances)
     report_guesses([word for utterance in utterances for word in utterance.words or ()], lexicon)
     heard = counted(utterances, "finding the phones", part_of(monitor, 0, 0.4))
@@ -137,22 +160,25 @@ def recorded(
     conditions = {"audio only": [phones.recognise(u.audio, u.features) for u in heard]}
     if all(utterance.words or utterance.phones for utterance in utterances):
         conditions[WITH_TRANSCRIPT] = reference
-    return Recorded(utterances, compared, still, threshold, reference, conditions, phones)
+    return Recorded(utterances, compared, still, threshold, reference, conditions, phones, eigenlips)
 
 
 def compared_channels(utterances: Sequence[Utterance]) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return the channels to compare, and those left out because they are still.
 
+    All eigenlips are compared, whether they move or not: their figures are means over a known number.
     Raises CorpusError: the utterances have different channels, or nothing moves.
     """
     channels = utterances[0].track.motion.channels
     if any(utterance.track.motion.channels != channels for utterance in utterances):
         raise CorpusError("the utterances have different motion channels; evaluate one kind, with --speaker or --split")
     names = utterances[0].track.motion.names
+    pictured = tuple(channel.name for channel in channels if channel.unit == GREY)
     if set(names) >= set(DISTANCES):
-        return DISTANCES, ()
+        return (*DISTANCES, *pictured), ()
     originals = [np.asarray(utterance.track.motion.values, float) for utterance in utterances]
     moves = curves.moving(originals, [channel.unit for channel in channels])
+    moves |= np.array([channel.unit == GREY for channel in channels])
     if not moves.any():
         raise CorpusError(f"none of {len(names)} motion channels moves in these {len(utterances)} utterances")
     moving = tuple(name for name, moved in zip(names, moves, strict=True) if moved)
@@ -223,7 +249,10 @@ def _clip(
 
 
 def figures_of(clips: Sequence[Clip], found: Recorded, seed: int) -> dict[str, Any]:
-    """Return the figures of one condition; NaN where there is none."""
+    """Return the figures of one condition; NaN where there is none.
+
+    Channels in grey levels are summed up apart: as ``eigenlips``, or as the whole where there are no others.
+    """
     compared, threshold = found.channels, found.closed_under
     generated, original = [clip.generated for clip in clips], [clip.original for clip in clips]
     rate_hz = float(1 / np.median(np.diff(clips[0].time_s)))
@@ -240,18 +269,29 @@ def figures_of(clips: Sequence[Clip], found: Recorded, seed: int) -> dict[str, A
         }
         for i, name in enumerate(compared)
     }
-    spread = np.concatenate(original).std(axis=0)
+    pictures = {name: per_channel[name] for name in found.pictured}
+    pictured = np.array([name in pictures for name in compared])
+    whole = ~pictured if not pictured.all() else pictured
+    spread = np.where(whole, np.concatenate(original).std(axis=0), 0)
     leading = compared.index(OPENING) if OPENING in compared else int(spread.argmax())
     figures = {
-        "channels": per_channel,
-        "acc": float(acc.mean()),
-        "amse": curves.mean_distance(generated, original),
+        "channels": {name: row for name, row in per_channel.items() if name not in pictures},
+        "acc": float(acc[whole].mean()),
+        "amse": curves.mean_distance(_columns(generated, whole), _columns(original, whole)),
         "leading": compared[leading],
         "lag_ms": curves.lag_ms(_column(generated, leading), _column(original, leading), rate_hz),
     }
+    if pictures:
+        amse = curves.mean_distance(_columns(generated, pictured), _columns(original, pictured))
+        figures["eigenlips"] = _means(list(pictures.values())) | {"amse": amse, "channels": pictures}
     if threshold is None:
         return figures
     return figures | _opening_figures(clips, compared.index(OPENING), threshold, rate_hz, seed)
+
+
+def _means(rows: Sequence[Mapping[str, float]]) -> dict[str, Any]:
+    """Return the mean of each figure over channels. Source: Xie & Liu 2007, Eq. 21, of the correlation."""
+    return {figure: float(np.mean([row[figure] for row in rows])) for figure in rows[0]}
 
 
 def _opening_figures(clips: Sequence[Clip], column: int, threshold: float, rate_hz: float, seed: int) -> dict[str, Any]:
@@ -278,6 +318,10 @@ def _on_kept_frames(clip: Clip, phones: Sequence[str], rate_hz: float) -> list[t
         for start_s, end_s, phone in clip.spoken
         if phone in phones
     ]
+
+
+def _columns(side: curves.Clips, columns: NDArray[np.bool_]) -> list[NDArray[np.float64]]:
+    return [clip[:, columns] for clip in side]
 
 
 def _column(side: curves.Clips, column: int) -> list[NDArray[np.float64]]:

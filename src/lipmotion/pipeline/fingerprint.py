@@ -14,17 +14,18 @@ from typing import Any
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import Engine
 from lipmotion.files import sha256_of
+from lipmotion.pipeline.visual import GEOMETRY
 from lipmotion.stats.hmm.model import HmmConfig
 from lipmotion.units import Lexicon
 
-NOT_LEARNED_FROM = ("crops.npy",)
-"""Large files of an utterance that training does not read."""
+PICTURES = "crops.npy"
+"""A large file of an utterance, which only eigenlips are learned from."""
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 """A matrix product's last bits may depend on how many threads it is shared among."""
 
 
 def fingerprint(
-    corpus: Corpus, names: Sequence[str], engine: Engine[Any], recogniser: HmmConfig, lexicon: Lexicon
+    corpus: Corpus, names: Sequence[str], engine: Engine[Any], recogniser: HmmConfig, lexicon: Lexicon, visual: str
 ) -> str:
     """Return a digest of the utterances' content, the configuration, the user's words, and what computes."""
     digest = hashlib.sha256()
@@ -32,6 +33,7 @@ def fingerprint(
         "engine": [engine.name, asdict(engine.config)],
         "recogniser": asdict(recogniser),
         "words": lexicon.user,
+        "visual": visual,
         "versions": {name: metadata.version(name) for name in ("lipmotion", "numpy", "scipy", "pocketsphinx")},
         "machine": [platform.machine(), os.cpu_count(), [os.environ.get(name) for name in THREADS]],
     }
@@ -39,7 +41,7 @@ def fingerprint(
     for name in names:
         digest.update(f"\n{name}\n".encode())
         for path in sorted(corpus.folder(name).iterdir()):
-            if path.name not in NOT_LEARNED_FROM:
+            if path.name != PICTURES or visual != GEOMETRY:
                 digest.update(f"{path.name}\n".encode())
                 digest.update(bytes.fromhex(sha256_of(path)))
     return digest.hexdigest()

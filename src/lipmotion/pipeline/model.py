@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 
 from lipmotion.engines import Engine, engine_named
 from lipmotion.errors import InputError, ModelFormatError
+from lipmotion.pipeline.visual import EIGENLIPS, GEOMETRY
 from lipmotion.speech.adaptation import Adaptation, adaptation_arrays, adaptation_from_arrays
 from lipmotion.stats.archive import UNREADABLE, read_archive, read_archive_header, write_archive
+from lipmotion.stats.eigenlips import Eigenlips, eigenlips_arrays, eigenlips_from_arrays
 from lipmotion.stats.hmm.model import HmmConfig, UnitHmm, hmm_arrays, hmm_from_arrays
 
 FORMAT = "lipmotion.model"
@@ -31,6 +33,7 @@ class Model:
     learned    : what the engine learned
     about      : corpus, split, seed, versions, licence, attribution: whatever a user must know
     adaptation : how it hears the voice that it was adapted to, if it was
+    eigenlips  : the space of mouth pictures, if their coefficients are among what was learned
     """
 
     phones: UnitHmm
@@ -38,6 +41,12 @@ class Model:
     learned: Any
     about: Mapping[str, Any]
     adaptation: Adaptation | None = None
+    eigenlips: Eigenlips | None = None
+
+    @property
+    def visual(self) -> str:
+        """Which channels were learned: one of ``visual.VISUALS``."""
+        return str(self.about.get("visual", GEOMETRY if self.eigenlips is None else EIGENLIPS))
 
 
 def save_model(model: Model, path: str | Path) -> None:
@@ -49,6 +58,8 @@ def save_model(model: Model, path: str | Path) -> None:
     arrays |= {f"engine/{key}": array for key, array in model.engine.to_arrays(model.learned).items()}
     if model.adaptation is not None:
         arrays |= {f"adaptation/{key}": array for key, array in adaptation_arrays(model.adaptation).items()}
+    if model.eigenlips is not None:
+        arrays |= {f"eigenlips/{key}": array for key, array in eigenlips_arrays(model.eigenlips).items()}
     header = {
         "format": FORMAT,
         "version": VERSION,
@@ -107,7 +118,7 @@ def _shipped() -> Model:
 
 def _read(path: Path) -> Model:
     header = read_header(path)
-    arrays: dict[str, dict[str, NDArray[Any]]] = {"phones": {}, "engine": {}, "adaptation": {}}
+    arrays: dict[str, dict[str, NDArray[Any]]] = {part: {} for part in _PARTS}
     try:
         for name, array in read_archive(path).items():
             part, _, key = name.partition("/")
@@ -116,12 +127,15 @@ def _read(path: Path) -> Model:
         phones = hmm_from_arrays(arrays["phones"], _numbers(header["recogniser"]))
         learned = engine.from_arrays(arrays["engine"])
         adaptation = adaptation_from_arrays(arrays["adaptation"]) if arrays["adaptation"] else None
+        eigenlips = eigenlips_from_arrays(arrays["eigenlips"]) if arrays["eigenlips"] else None
     except ModelFormatError as error:
         raise ModelFormatError(f"{path}: {error}") from error
     except UNREADABLE as error:
         raise ModelFormatError(f"{path}: the model is damaged ({error}); train or download it again") from error
     about = {key: value for key, value in header.items() if key not in _OWN_KEYS}
-    return Model(phones, engine, learned, about, adaptation)
+    if (about.get("visual", GEOMETRY) != GEOMETRY) != (eigenlips is not None):
+        raise ModelFormatError(f"{path}: the model says visual {about.get('visual')!r}, which its eigenlips do not fit")
+    return Model(phones, engine, learned, about, adaptation, eigenlips)
 
 
 def _numbers(options: Mapping[str, Any]) -> HmmConfig:
@@ -133,4 +147,5 @@ def _numbers(options: Mapping[str, Any]) -> HmmConfig:
     return config
 
 
+_PARTS = ("phones", "engine", "adaptation", "eigenlips")
 _OWN_KEYS = ("format", "version", "engine", "configuration", "recogniser")

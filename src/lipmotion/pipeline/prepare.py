@@ -26,7 +26,7 @@ from lipmotion.types import Item, Monitor, Progress, Track, Utterance, silent_mo
 from lipmotion.vision.packages import versions
 from lipmotion.vision.track import track
 
-RECIPE = "3"
+RECIPE = "4"
 """Raised whenever the same video would give other numbers: older utterances are then made again."""
 STAGE = "preparing recordings"
 

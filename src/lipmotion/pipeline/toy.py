@@ -17,6 +17,7 @@ from lipmotion.errors import ExportError, InputError
 from lipmotion.export.mp4 import write_mp4
 from lipmotion.faces.character import render
 from lipmotion.files import whole_file
+from lipmotion.pipeline.toy_mouth import toy_mouths
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.synthesise import synthesise
 from lipmotion.types import Audio, Channel, Motion, Timeline, Track, Unit, Utterance
@@ -195,7 +196,7 @@ def _usual_s(phone: str) -> float:
 
 def _utterance(sentence: ToySentence) -> Utterance:
     motion = toy_motion(sentence.units, CAMERA_HZ)
-    track = Track(motion, np.ones(len(motion.values), dtype=bool))
+    track = Track(motion, np.ones(len(motion.values), dtype=bool), toy_mouths(motion))
     source = {"file": "", "licence": "synthesised by lipmotion"}
     return Utterance(sentence.name, sentence.audio, mfcc(sentence.audio), track, sentence.words, sentence.split, source)
 

@@ -20,6 +20,7 @@ from lipmotion.pipeline.fingerprint import fingerprint
 from lipmotion.pipeline.labels import labelled
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.transcribe import phones_in_time, report_guesses
+from lipmotion.pipeline.visual import GEOMETRY, as_learned, check_visual, learned_eigenlips
 from lipmotion.pipeline.voices import Heard
 from lipmotion.pipeline.workers import working
 from lipmotion.speech.f0 import log_f0
@@ -75,6 +76,7 @@ def train(
     engine: Engine[Any] | None = None,
     recogniser: HmmConfig | None = None,
     lexicon: Lexicon | None = None,
+    visual: str = GEOMETRY,
     monitor: Monitor = silent_monitor,
     work: Path | None = None,
     workers: int = 1,
@@ -89,6 +91,8 @@ def train(
                  only for engines that have one (``coupled``). What is kept in ``work`` does not depend on them
     engine     : with its configuration; the trajectory engine by default
     recogniser : configuration of the phone models
+    visual     : ``geometry``: the channels that were tracked or given; ``eigenlips``: principal components of the mouth
+                 pictures (docs/eigenlips.md); ``both``
     monitor    : hears how far it is, and which utterances are left out
     work       : a folder that keeps what is finished, so that the same call goes on from there after it was stopped
                  (``files.unfinished_work`` gives one); the model is the same to the byte
@@ -97,9 +101,10 @@ def train(
     Phones that are labelled are taken as they are. Utterances without a transcript are recognised, by the phone models
     of the others or, where there are none, by those of the shipped model.
     Nothing here is random: the same corpus gives the same model.
-    Raises CorpusError: no such utterances, or nothing in them to learn from. InputError: voices, and an engine that has
-    no use for them.
+    Raises CorpusError: no such utterances, or nothing in them to learn from.
+    Raises InputError: no such ``visual``, or voices and an engine that has no use for them.
     """
+    check_visual(visual)
     lexicon = lexicon or Lexicon()
     engine = engine or engine_named("trajectory", {})
     chosen = tuple(names) if names is not None else corpus.required(split, speakers)
@@ -108,7 +113,10 @@ def train(
     recogniser = recogniser or HmmConfig()
     others = list(examples_of_others(engine, voices, monitor))
     utterances = [corpus.utterance(name) for name in chosen]
-    checkpoint = Checkpoint(work, fingerprint(corpus, chosen, engine, recogniser, lexicon)) if work else NOTHING_KEPT
+    eigenlips = learned_eigenlips(utterances) if visual != GEOMETRY else None
+    utterances = [as_learned(utterance, visual, eigenlips) for utterance in utterances]
+    job = fingerprint(corpus, chosen, engine, recogniser, lexicon, visual) if work else ""
+    checkpoint = Checkpoint(work, job) if work else NOTHING_KEPT
     with working(min(workers, len(chosen) // FEWEST)) as team:
         listening = part_of(monitor, 0, 0.9)
         phones, examples, skipped = phones_and_examples(
@@ -121,7 +129,9 @@ def train(
         about["speakers"] = sorted(set(speakers))
     if others:
         about["voices"] = sorted({example.name for example in others})
-    return Model(phones, engine, fit.model, about), TrainReport(used, skipped, fit.figures)
+    if eigenlips is not None:
+        about |= {"visual": visual, "eigenlips": eigenlips.summary}
+    return Model(phones, engine, fit.model, about, eigenlips=eigenlips), TrainReport(used, skipped, fit.figures)
 
 
 def phones_and_examples(

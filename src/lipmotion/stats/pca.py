@@ -3,9 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+EXACT = 1500
+"""Up to so many rows or columns all components are computed, and the first are kept; of larger tables only those."""
+ROWS = 256
+"""Rows of a large table that are centred at a time."""
+SPARE = 16
+"""Directions that are searched beside those that are wanted: they make the search converge."""
+TOLERANCE, MOST_PASSES = 1e-4, 12
+"""The search ends when a pass over the table adds less than this share of the variance found, or after so many."""
+RANK_TOLERANCE = 1e-10
+"""Components with less than this share of the largest one's variance are rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,11 +40,68 @@ class Pca:
         return coordinates @ self.basis + self.mean
 
 
-def fit_pca(values: NDArray[np.float64], components: int) -> Pca:
-    """Return the first principal components of values [shape=(N, D)]; at most D of them."""
-    mean = values.mean(axis=0)
-    centred = values - mean
-    _, vectors = np.linalg.eigh(centred.T @ centred)
-    basis = vectors[:, ::-1][:, : min(components, values.shape[1])].T
+def fit_pca(values: NDArray[Any], components: int) -> Pca:
+    """Return the first principal components of numbers [shape=(N, D)]; at most D of them, and no more than N < D span.
+
+    The entry of each that is the furthest from 0 is positive, so the same values have the same components.
+    Cost: O(N·D·min(N, D)) and min(N, D)³ up to ``EXACT`` rows or columns; of larger tables O(N·D·components) a pass,
+    with ``ROWS`` rows of memory, in single precision and up to ``TOLERANCE`` of the variance.
+    """
+    mean = values.mean(axis=0, dtype=np.float64)
+    if min(values.shape) > EXACT:
+        basis = _leading(values, mean, components)
+    elif values.shape[0] < values.shape[1]:
+        basis = _of_rows(values - mean, components)
+    else:
+        basis = _of_columns(values - mean, components)
     signs = np.sign(basis[np.arange(len(basis)), np.abs(basis).argmax(axis=1)])
     return Pca(mean, basis * signs[:, None])
+
+
+def _of_columns(centred: NDArray[np.float64], components: int) -> NDArray[np.float64]:
+    _, vectors = np.linalg.eigh(centred.T @ centred)
+    return vectors[:, ::-1][:, : min(components, centred.shape[1])].T
+
+
+def _of_rows(centred: NDArray[np.float64], components: int) -> NDArray[np.float64]:
+    """Return the same from the products of N < D rows: XXᵀu = λu gives XᵀX(Xᵀu) = λ(Xᵀu)."""
+    squares, vectors = np.linalg.eigh(centred @ centred.T)
+    kept = np.arange(len(squares))[::-1][:components]
+    kept = kept[squares[kept] > RANK_TOLERANCE * squares[-1]]
+    return (vectors[:, kept] / np.sqrt(squares[kept])).T @ centred
+
+
+def _leading(values: NDArray[Any], mean: NDArray[np.float64], components: int) -> NDArray[np.float64]:
+    """Return the first components of a large table by block power iteration from some of its own rows.
+
+    Source: Halko, Martinsson & Tropp 2011, §4.5 (subspace iteration) and §5.1; Rayleigh-Ritz at its end.
+    """
+    size = min(components + SPARE, *values.shape)
+    start = values[evenly(size, len(values))] - mean
+    directions = np.linalg.qr(start.T.astype(np.float32))[0]
+    found = 0.0
+    for _ in range(MOST_PASSES):
+        product = _covariance_times(values, mean, directions)
+        squares, turn = np.linalg.eigh((directions.T @ product).astype(np.float64))
+        before, found = found, float(squares[-components:].sum())
+        if found - before <= TOLERANCE * found:
+            break
+        directions = np.linalg.qr(product)[0]
+    return (directions @ turn[:, ::-1][:, :components].astype(np.float32)).T.astype(np.float64)
+
+
+def _covariance_times(
+    values: NDArray[Any], mean: NDArray[np.float64], directions: NDArray[np.float32]
+) -> NDArray[np.float32]:
+    """Return XᵀXQ of the centred X, which is never whole in memory."""
+    total, centre = np.zeros_like(directions), mean.astype(np.float32)
+    for start in range(0, len(values), ROWS):
+        rows = values[start : start + ROWS] - centre
+        total += rows.T @ (rows @ directions)
+    return total
+
+
+def evenly(count: int, total: int) -> NDArray[np.intp]:
+    """Return ``count`` of ``total`` places, evenly spread [shape=(min(count, total),)]."""
+    count = min(count, total)
+    return ((np.arange(count) + 0.5) * total / max(count, 1)).astype(np.intp)

@@ -4,7 +4,7 @@ from lipmotion.types.audio import Audio
 from lipmotion.types.each import Each
 from lipmotion.types.features import FRAME_RATE_HZ, Features
 from lipmotion.types.generation import Constraints, Example, Generation, Pin, Speech, Trace
-from lipmotion.types.motion import EYE_DISTANCE, WEIGHT, Channel, Motion
+from lipmotion.types.motion import EYE_DISTANCE, GREY, WEIGHT, Channel, Motion
 from lipmotion.types.progress import Item, Monitor, Progress, counted, part_of, silent_monitor
 from lipmotion.types.timeline import Span, Timeline, Unit
 from lipmotion.types.utterance import Track, Utterance
@@ -12,6 +12,7 @@ from lipmotion.types.utterance import Track, Utterance
 __all__ = [
     "EYE_DISTANCE",
     "FRAME_RATE_HZ",
+    "GREY",
     "WEIGHT",
     "Audio",
     "Channel",

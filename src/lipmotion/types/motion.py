@@ -14,6 +14,8 @@ EYE_DISTANCE = "eye_distance"
 """The unit of all tracked distances: that between the outer eye corners."""
 WEIGHT = "weight"
 """The unit of blendshapes: 0 is absent, 1 is whole; never less than 0."""
+GREY = "grey"
+"""The unit of eigenlips: coefficients of an orthonormal basis of pictures in grey levels, 0 to 255."""
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,14 +17,37 @@ ROUNDS = 3
 distances, the third by less than 1e-9."""
 
 
-def head_frame(points: Array, layout: Sequence[int]) -> Array:
-    """Return the points without the motion of the head.
+@dataclass(frozen=True, eq=False)
+class HeadPose:
+    """Where the head is, frame by frame: a point x of it lies at (scale · turn · x + shift) / unit in its own frame.
+
+    turn : [shape=(T, 3, 3)];  scale : [shape=(T,), > 0];  shift : [shape=(T, 3)]
+    unit : eye distance of the mean face
+    """
+
+    turn: Array
+    scale: Array
+    shift: Array
+    unit: float
+
+    def still(self, points: Array) -> Array:
+        """Return points [shape=(T, N, 3)] in the head's frame."""
+        turned = self.scale[:, None, None] * (points @ self.turn.transpose(0, 2, 1))
+        moved: Array = (turned + self.shift[:, None, :]) / self.unit
+        return moved
+
+    def plane(self, depth: float) -> Array:
+        """Return where points of the head's plane z = depth are seen: affine maps [shape=(T, 2, 3)] of (x, y)."""
+        back = self.turn.transpose(0, 2, 1) / self.scale[:, None, None]
+        origin = back @ (np.array([0, 0, depth]) * self.unit - self.shift)[:, :, None]
+        return np.concatenate([back[:, :2, :2] * self.unit, origin[:, :2]], axis=2)
+
+
+def head_pose(points: Array, layout: Sequence[int]) -> HeadPose:
+    """Return where a head is.
 
     points : array [shape=(T, N, 3)], any unit, x to the speaker's left, y up, z out of the face
     layout : the face-mesh index of each of the N points; holds all of RIGID_POINTS
-    Returns array [shape=(T, N, 3)]: origin between the outer eye corners of the mean face, unit their distance,
-    x to the speaker's left, y up, z out of the face.
-    Every frame is turned, moved and scaled as a whole, so speech is left as it was.
     Source: Umeyama 1991 (one frame), Gower 1975 (the mean face).
     Cost: O(T·N), T singular value decompositions of 3 × 3.
     """
@@ -32,9 +56,18 @@ def head_frame(points: Array, layout: Sequence[int]) -> Array:
     face = _mean_face(rigid)
     turn, scale, shift = similarity(rigid, face)
     axes, origin, unit = _head_axes(face)
-    turn, shift = axes @ turn, (shift - origin) @ axes.T
-    moved: Array = (scale[:, None, None] * (points @ turn.transpose(0, 2, 1)) + shift[:, None, :]) / unit
-    return moved
+    return HeadPose(axes @ turn, scale, (shift - origin) @ axes.T, unit)
+
+
+def head_frame(points: Array, layout: Sequence[int]) -> Array:
+    """Return the points without the motion of the head.
+
+    points, layout : as in ``head_pose``
+    Returns array [shape=(T, N, 3)]: origin between the outer eye corners of the mean face, unit their distance,
+    x to the speaker's left, y up, z out of the face.
+    Every frame is turned, moved and scaled as a whole, so speech is left as it was.
+    """
+    return head_pose(points, layout).still(points)
 
 
 def similarity(points: Array, target: Array) -> tuple[Array, Array, Array]:

@@ -14,7 +14,7 @@ from lipmotion.vision.follow import Follower
 from lipmotion.vision.frames import Video, open_video
 from lipmotion.vision.landmarks import DISTANCES, EYE_CORNERS, JAW_POINTS, LIP_POINTS, TRACKED_POINTS
 from lipmotion.vision.looks import mouth_of, strange_mouths
-from lipmotion.vision.mouth import mouth_crop
+from lipmotion.vision.mouth import eyes_to_image, face_to_image, mouth_crop
 from lipmotion.vision.pose import head_frame
 from lipmotion.vision.timing import at_constant_rate, frame_count, nearest, nominal_rate_hz
 
@@ -39,23 +39,20 @@ CHANNELS = tuple(
 
 @dataclass(eq=False)
 class _Sighting:
-    """What was found in the frames so far; ``points``, ``mouths`` and ``crops`` only of those that show the face."""
+    """What was found in the frames so far; ``points`` and ``mouths`` only of those that show the face."""
 
     times_s: list[float] = field(default_factory=list)
     seen: list[bool] = field(default_factory=list)
     points: list[Array] = field(default_factory=list)
     mouths: list[NDArray[np.uint8]] = field(default_factory=list)
-    crops: list[NDArray[np.uint8]] = field(default_factory=list)
 
-    def add(self, time_s: float, image: NDArray[np.uint8], points: Array | None, keep_crop: bool) -> None:
+    def add(self, time_s: float, image: NDArray[np.uint8], points: Array | None) -> None:
         self.times_s.append(time_s)
         self.seen.append(points is not None)
         if points is not None:
-            crop = mouth_crop(image, points[[COLUMN[i] for i in EYE_CORNERS], :2])
+            eyes = points[[COLUMN[i] for i in EYE_CORNERS], :2]
             self.points.append(points)
-            self.mouths.append(mouth_of(crop))
-            if keep_crop:
-                self.crops.append(crop)
+            self.mouths.append(mouth_of(mouth_crop(image, eyes_to_image(eyes))))
 
     def leave_out(self, wrong: NDArray[np.bool_]) -> int:
         """Take out some of the frames that show a face [shape=(number of them,)]; return how many."""
@@ -64,7 +61,6 @@ class _Sighting:
         right = np.flatnonzero(~wrong)
         self.points = [self.points[n] for n in right]
         self.mouths = [self.mouths[n] for n in right]
-        self.crops = [self.crops[n] for n in right] if self.crops else []
         return int(wrong.sum())
 
 
@@ -83,7 +79,7 @@ def track(path: Path, *, crops: bool = True) -> Track:
     sighting = _Sighting()
     with open_video(path) as video, Follower() as follower:
         for frame in video.frames:
-            sighting.add(frame.time_s, frame.image, follower.points(frame.image), crops)
+            sighting.add(frame.time_s, frame.image, follower.points(frame.image))
     others = sighting.leave_out(~follower.person()[sighting.seen])
     covered = sighting.leave_out(strange_mouths(np.stack(sighting.mouths))) if sighting.mouths else 0
     times_s = np.array(sighting.times_s)
@@ -95,7 +91,19 @@ def track(path: Path, *, crops: bool = True) -> Track:
         *([f"the mouth is covered, or the picture damaged, in {covered} frames"] if covered else []),
     )
     _check(path, sighting, video, rate_hz, notes)
-    return replace(_assembled(sighting, rate_hz, frame_count(times_s, rate_hz)), notes=notes)
+    mouths = _mouths(path, sighting) if crops else None
+    return replace(_assembled(sighting, mouths, rate_hz, frame_count(times_s, rate_hz)), notes=notes)
+
+
+def _mouths(path: Path, sighting: _Sighting) -> NDArray[np.uint8]:
+    """Return the mouth image of every frame that shows the face.
+
+    The video is decoded once more: where the head is depends on all frames, and they do not fit into memory.
+    """
+    maps = iter(face_to_image(np.stack(sighting.points)))
+    with open_video(path) as video:
+        shown = zip(sighting.seen, video.frames, strict=False)
+        return np.stack([mouth_crop(frame.image, next(maps)) for seen, frame in shown if seen])
 
 
 def _damage(video: Video, times_s: Array, rate_hz: float) -> list[str]:
@@ -150,11 +158,11 @@ def _check(path: Path, sighting: _Sighting, video: Video, rate_hz: float, notes:
         )
 
 
-def _assembled(sighting: _Sighting, rate_hz: float, count: int) -> Track:
+def _assembled(sighting: _Sighting, mouths: NDArray[np.uint8] | None, rate_hz: float, count: int) -> Track:
     times_s = np.array(sighting.times_s)[sighting.seen]
     values = at_constant_rate(times_s, motion_values(np.stack(sighting.points)), rate_hz, count)
     wanted_s = np.arange(count) / rate_hz
     index = nearest(times_s, wanted_s)
     seen = np.abs(times_s[index] - wanted_s) * rate_hz <= 0.5
-    crops = np.stack(sighting.crops)[index] if sighting.crops else None
+    crops = mouths[index] if mouths is not None else None
     return Track(Motion(values, rate_hz, CHANNELS), seen, crops)

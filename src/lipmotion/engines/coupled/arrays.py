@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from lipmotion.engines.coupled.config import CoupledConfig
 from lipmotion.engines.coupled.densities import Group
 from lipmotion.engines.coupled.following import OFFSETS, Following, Surroundings
+from lipmotion.engines.coupled.free import FreeProduct, FreeTransitions
 from lipmotion.engines.coupled.learned import CoupledModel
 from lipmotion.engines.coupled.model import Chains
-from lipmotion.engines.coupled.product import Grammar, Product, reachable
-from lipmotion.engines.coupled.systems import Structure
+from lipmotion.engines.coupled.product import Grammar, reachable
+from lipmotion.engines.coupled.systems import FACTORIAL, Structure
 from lipmotion.engines.coupled.transitions import Transitions
 from lipmotion.engines.coupled.visual import VisualStream
 from lipmotion.engines.trajectory.frame import SINGLE, frame_arrays, frame_from_arrays
@@ -40,8 +41,11 @@ def coupled_arrays(model: CoupledModel) -> dict[str, NDArray[Any]]:
         arrays[f"chain_{number}/bigram"] = product.grammar.bigrams[number].astype(np.float32)
         arrays[f"chain_{number}/first"] = product.grammar.firsts[number].astype(np.float32)
         arrays[f"chain_{number}/units"] = np.array(list(chain.of.items()))
-        arrays[f"chain_{number}/rows"] = chains.transitions.rows[number].astype(np.int32)
         arrays[f"chain_{number}/advance"] = chains.transitions.advance[number]
+        if isinstance(chains.transitions, Transitions):
+            arrays[f"chain_{number}/rows"] = chains.transitions.rows[number].astype(np.int32)
+    if isinstance(chains.transitions, FreeTransitions):
+        arrays["pairs"] = chains.transitions.pairs.astype(np.int32)
     for number, group in enumerate(chains.groups):
         arrays |= {f"group_{number}/{key}": array for key, array in _group_arrays(group).items()}
     for number, stream in enumerate(model.visual):
@@ -88,20 +92,14 @@ def coupled_from_arrays(arrays: Arrays, config: CoupledConfig) -> CoupledModel:
     try:
         _, space, closure = frame_from_arrays(arrays, SINGLE.name)
         structure = _structure(arrays, config)
-        product = _product(arrays, structure)
+        transitions = _transitions(arrays, structure)
         streams = tuple(map(str, arrays["streams"]))
-        count = len(structure.chains)
         _check(arrays, {"gain": (space.dimensions,), "rest": (space.dimensions,)})
-        transitions = Transitions(
-            product,
-            tuple(_rows(arrays, chain, len(product.joints)) for chain in range(count)),
-            tuple(_probabilities(arrays[f"chain_{chain}/advance"]) for chain in range(count)),
-        )
         visual = tuple(
             _visual(arrays, number, name, space.dimensions, config.dynamic) for number, name in enumerate(streams[1:])
         )
         widths = [39, *(len(stream.mean) for stream in visual)]
-        groups = tuple(_groups(arrays, len(product.joints), widths))
+        groups = tuple(_groups(arrays, transitions.product.chain_states.shape[1], widths))
         if sorted(stream for group in groups for stream in group.streams) != list(range(len(streams))):
             raise ValueError("streams that no group has, or two")
         chains = Chains(streams, transitions, groups)
@@ -121,7 +119,22 @@ def _structure(arrays: Arrays, config: CoupledConfig) -> Structure:
     return Structure(config.structure, tuple(sets), config.states, limit, config.crosses)
 
 
-def _product(arrays: Arrays, structure: Structure) -> Product:
+def _transitions(arrays: Arrays, structure: Structure) -> Transitions | FreeTransitions:
+    chains = range(len(structure.chains))
+    grammar = _grammar(arrays, structure)
+    advance = tuple(_probabilities(arrays[f"chain_{chain}/advance"]) for chain in chains)
+    if structure.kind == FACTORIAL and structure.limit is None and len(chains) == 2:
+        first, second = advance
+        _check(arrays, {f"chain_{chain}/advance": (structure.counts[chain],) for chain in chains})
+        pairs = arrays["pairs"].astype(np.intp)
+        for chain, count in enumerate(structure.counts):
+            _within(pairs[:, chain], count)
+        return FreeTransitions(FreeProduct(structure, grammar), (first, second), pairs)
+    product = reachable(structure, grammar)
+    return Transitions(product, tuple(_rows(arrays, chain, len(product.joints)) for chain in chains), advance)
+
+
+def _grammar(arrays: Arrays, structure: Structure) -> Grammar:
     bigrams, firsts = [], []
     for chain, units in enumerate(structure.units):
         bigram, first = arrays[f"chain_{chain}/bigram"], arrays[f"chain_{chain}/first"]
@@ -130,7 +143,7 @@ def _product(arrays: Arrays, structure: Structure) -> Product:
             raise ValueError("probabilities that are not more than 0")
         bigrams.append(bigram.astype(float))
         firsts.append(first.astype(float))
-    return reachable(structure, Grammar(tuple(bigrams), tuple(firsts)))
+    return Grammar(tuple(bigrams), tuple(firsts))
 
 
 def _rows(arrays: Arrays, chain: int, count: int) -> NDArray[np.intp]:

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.coupled.densities import Group, Observed, Single, component_posteriors
-from lipmotion.engines.coupled.lattice import Lattice
-from lipmotion.engines.coupled.model import Chains, Evidence, Posteriors
+from lipmotion.engines.coupled.lattice import Lattice, Posteriors
+from lipmotion.engines.coupled.model import Chains, Evidence
 
 Array = NDArray[np.float64]
 SOFT, VITERBI = "soft", "viterbi"

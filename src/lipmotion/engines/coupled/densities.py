@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +12,8 @@ from lipmotion.stats.mixture import Mixtures, Quadratic, with_squares
 
 Index = NDArray[np.intp]
 Single = NDArray[np.float32]
+LEAST_COMPONENT_FRAMES = 0.1
+"""A component with less data than so many frames keeps its mean and variance."""
 LEAST_LOG_SHARE = np.float32(-50)
 
 
@@ -126,7 +127,7 @@ class Ready:
 
 def _among(form: Quadratic, chosen: Index) -> Quadratic:
     """Return the matrix of some densities."""
-    if len(chosen) == form.constant.shape[1]:
+    if np.array_equal(chosen, np.arange(form.constant.shape[1])):
         return form
     columns = form.form.reshape(len(form.form), *form.constant.shape)[:, :, chosen]
     return Quadratic(columns.reshape(len(columns), -1), form.constant[:, chosen])
@@ -180,44 +181,27 @@ def component_posteriors(posterior: Single, shares: Single | None) -> Single:
     return posterior[:, None] if shares is None else shares * posterior[:, None]
 
 
-def relearned(
-    group: Group, sums: Sums, floors: Sequence[Single], least: float, streams: Sequence[int], fewest: float = 2.0
-) -> Group:
+def relearned(group: Group, sums: Sums, floors: Sequence[Single], least: float, streams: Sequence[int]) -> Group:
     """Return the group with the mixtures that explain the sums best.
 
     floors  : the least variance of every stream [each shape=(D_s,)]
     least   : densities with less data than so many frames stay as they are
     streams : those whose means and variances are learned; of others they stay
-    fewest  : components with less data than so many frames end
     """
     mixtures = group.mixtures.copy()
     known = np.flatnonzero(sums.count.sum(axis=0) >= least)
     count = sums.count.T[known]
-    alive = count >= np.minimum(fewest, count.max(axis=1, keepdims=True))
-    weights = np.where(alive, count, 0)
     with np.errstate(divide="ignore"):
-        mixtures.log_weights[known] = np.log(weights / weights.sum(axis=1, keepdims=True))
+        mixtures.log_weights[known] = np.log(count / count.sum(axis=1, keepdims=True))
     for stream, columns, products, floor in zip(group.streams, group.columns, sums.products, floors, strict=True):
         if stream not in streams:
             continue
         frames = products[:, known, -1].T[:, :, None]
         first, second = np.split(products[:, known, :-1].transpose(1, 0, 2), 2, axis=2)
-        seen = alive[:, :, None] & (frames > 0.5)
+        seen = frames > LEAST_COMPONENT_FRAMES
         safe = np.where(seen, frames, 1)
         mean = first / safe
         variance = np.maximum(second / safe - mean * mean, floor)
         mixtures.means[known, :, columns] = np.where(seen, mean, mixtures.means[known, :, columns])
         mixtures.variances[known, :, columns] = np.where(seen, variance, mixtures.variances[known, :, columns])
     return replace(group, mixtures=mixtures)
-
-
-def density_posteriors(posterior: Single, tie: Index, count: int) -> Single:
-    """Return the posterior of every density [shape=(T, G)] from that of joint states [shape=(T, S)].
-
-    tie : the density of each joint state [shape=(S,)]
-    """
-    order = np.argsort(tie, kind="stable")
-    present, starts = np.unique(tie[order], return_index=True)
-    result: NDArray[Any] = np.zeros((len(posterior), count), posterior.dtype)
-    result[:, present] = np.add.reduceat(posterior.take(order, axis=1), starts, axis=1)
-    return result

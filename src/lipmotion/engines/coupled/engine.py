@@ -15,7 +15,7 @@ from lipmotion.engines.coupled.config import PATH, TRAJECTORY, CoupledConfig
 from lipmotion.engines.coupled.conversion import converted, path_means
 from lipmotion.engines.coupled.densities import Single
 from lipmotion.engines.coupled.fit import fit_coupled
-from lipmotion.engines.coupled.lattice import Lattice, within
+from lipmotion.engines.coupled.lattice import Lattice
 from lipmotion.engines.coupled.learned import CoupledModel
 from lipmotion.engines.coupled.train import allowed_units
 from lipmotion.engines.trajectory.closure import closing_spans
@@ -64,7 +64,7 @@ class CoupledEngine(Engine[CoupledModel]):
     ) -> Fit[CoupledModel]:
         model = fit_coupled(examples, self.config, monitor)
         frames = sum(int(example.valid.sum()) for example in examples)
-        return Fit(model, {"frames": frames, "joint_states": len(model.chains.transitions.product.joints)})
+        return Fit(model, {"frames": frames, "joint_states": model.chains.transitions.product.chain_states.shape[1]})
 
     def generate(self, model: CoupledModel, speech: Speech, constraints: Constraints | None = None) -> Generation:  # noqa: D102
         features = np.asarray(speech.features.values)
@@ -99,7 +99,7 @@ class CoupledEngine(Engine[CoupledModel]):
             return chains.everywhere
         frames = len(speech.features.values)
         allowed = allowed_units(chains.structure, speech.units, frames)[wanted]
-        return within(chains.transitions.product, [group.tie for group in chains.groups], allowed)
+        return chains.lattice(allowed)
 
     def _statistics(
         self, model: CoupledModel, features: Single, lattice: Lattice

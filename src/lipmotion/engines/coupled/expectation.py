@@ -38,16 +38,14 @@ class Expected:
     """What recordings say.
 
     groups : sums for each group
-    arcs   : how often each arc was followed [shape=(E,)]
-    visits : frames spent in each joint state [shape=(S,)]
+    counts : what transitions are learned from
     log_likelihood, frames : of the recordings that have a path
 
     All by the weights of the recordings.
     """
 
     groups: tuple[Sums, ...]
-    arcs: NDArray[np.float64]
-    visits: NDArray[np.float64]
+    counts: NDArray[np.float64]
     log_likelihood: float
     frames: float
 
@@ -55,8 +53,7 @@ class Expected:
         """Return both together."""
         return Expected(
             tuple(a.plus(b) for a, b in zip(self.groups, other.groups, strict=True)),
-            self.arcs + other.arcs,
-            self.visits + other.visits,
+            self.counts + other.counts,
             self.log_likelihood + other.log_likelihood,
             self.frames + other.frames,
         )
@@ -81,29 +78,26 @@ def maximised(
     *,
     streams: Sequence[int],
     moves: bool = True,
-    fewest: float = 2.0,
 ) -> Chains:
     """Return the chains that explain best what recordings said.
 
     floors  : the least variance of each stream [each shape=(D_s,)]
     streams : those whose densities are learned;  moves : learn the transitions
-    fewest  : components with less data than so many frames end; with 0 none does, and the likelihood never falls
     """
     groups = [
-        relearned(group, sums, [floors[s] for s in group.streams], LEAST_FRAMES, streams, fewest)
+        relearned(group, sums, [floors[s] for s in group.streams], LEAST_FRAMES, streams)
         if set(group.streams) & set(streams)
         else group
         for group, sums in zip(chains.groups, said.groups, strict=True)
     ]
-    transitions = chains.transitions.relearned(said.arcs) if moves else chains.transitions
+    transitions = chains.transitions.relearned(said.counts) if moves else chains.transitions
     return replace(chains, groups=tuple(groups), transitions=transitions)
 
 
 def _together(job: tuple[Chains, Sequence[Recording]]) -> Expected:
     chains, recordings = job
-    product = chains.transitions.product
     sums = tuple(no_sums(group) for group in chains.groups)
-    arcs, visits = np.zeros(len(product.arc_from)), np.zeros(len(product.joints))
+    counts = np.zeros(chains.transitions.count)
     log_likelihood, frames = 0.0, 0.0
     for recording in recordings:
         observed, lattice, weight = recording.observed, recording.lattice, recording.weight
@@ -115,11 +109,10 @@ def _together(job: tuple[Chains, Sequence[Recording]]) -> Expected:
             sums, chains.groups, lattice.densities, posteriors.densities, evidence.shares, strict=True
         ):
             one.add(group, observed, chosen, posterior if weight == 1 else posterior * np.float32(weight), shares)
-        arcs[lattice.arcs] += weight * posteriors.arcs
-        visits[posteriors.states] += weight * posteriors.joint.sum(axis=0)
+        counts[lattice.counts] += weight * posteriors.counts
         log_likelihood += weight * posteriors.log_likelihood
         frames += weight * observed.frames
-    return Expected(sums, arcs, visits, log_likelihood, frames)
+    return Expected(sums, counts, log_likelihood, frames)
 
 
 def _each(function: Callable[[Any], Expected], jobs: Iterable[Any], workers: int) -> Iterator[Expected]:

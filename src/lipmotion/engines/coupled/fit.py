@@ -23,7 +23,7 @@ from lipmotion.engines.coupled.following import (
     fit_following,
     fit_surroundings,
 )
-from lipmotion.engines.coupled.learned import CoupledModel, chain_posteriors
+from lipmotion.engines.coupled.learned import CoupledModel
 from lipmotion.engines.coupled.model import Chains
 from lipmotion.engines.coupled.more_speech import MoreSpeech, with_more_speech
 from lipmotion.engines.coupled.systems import HMM, Structure, structure_of
@@ -183,7 +183,7 @@ def _follow(model: CoupledModel, data: Sequence[Labelled]) -> tuple[Surroundings
 def _believed(chains: Chains, one: Labelled, which: Sequence[int]) -> tuple[NDArray[np.float32], ...]:
     evidence = chains.evidence(speech_alone(one.observed), chains.everywhere)
     posteriors = chains.posteriors(evidence, chains.everywhere)
-    return tuple(chain_posteriors(chains, posteriors, chain) for chain in which)
+    return tuple(posteriors.chains[chain] for chain in which)
 
 
 def _kinds(structure: Structure, chain: int) -> NDArray[np.intp]:

@@ -1,79 +1,81 @@
-"""The part of a product in which a recording can be: all of it, or that of the units said."""
+"""The part of a product in which a recording can be, and inference there."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.coupled.product import Product
-from lipmotion.kernels.network import Expectation
+from lipmotion.engines.coupled.densities import Single
 
 Index = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
-class Lattice:
-    """Some joint states of a product and the arcs between them; probabilities are those of the whole.
+class Lattice(ABC):
+    """Some joint states of a product; probabilities are those of the whole.
 
-    states    : which they are [shape=(S',)]
-    arcs      : which they are [shape=(E',)], sorted by target
-    network   : the same, laid out, without probabilities
+    counts    : which of the numbers that transitions are learned from it can tell [shape=(C',)]
     densities : those needed of each group [each shape=(G',)]
-    ties      : the position there of each state's [each shape=(S',)]
+    ties      : for each group, the position there of the density of each joint state [each shape=(S',)]
     spoken    : the unit of the first chain behind each density of the first group [shape=(G',)]
     allowed   : the units that may be said in each frame [shape=(T, U)]; None: all
     """
 
-    states: Index
-    arcs: Index
-    network: Expectation
+    counts: Index
     densities: tuple[Index, ...]
     ties: tuple[Index, ...]
     spoken: Index
     allowed: NDArray[np.bool_] | None
 
+    def masked(self, logs: Sequence[Single]) -> tuple[Single, ...]:
+        """Return log densities [each shape=(T, G')] without what may not be said."""
+        if self.allowed is None:
+            return tuple(logs)
+        return (np.where(self.allowed[:, self.spoken], logs[0], np.float32(-np.inf)), *logs[1:])
 
-def whole(product: Product, ties: Sequence[Index]) -> Lattice:
-    """Return all of a product.
+    @abstractmethod
+    def posteriors(self, transitions: Any, logs: Sequence[Single]) -> Posteriors:
+        """Return what a recording says about the chains.
 
-    ties : the density of each joint state in every group [each shape=(S,)]
+        transitions : those that the lattice is of
+        logs : log densities of all groups [each shape=(T, G')]
+        """
+
+    @abstractmethod
+    def best_path(self, transitions: Any, logs: Sequence[Single]) -> tuple[Index, float]:
+        """Return the most probable joint states [shape=(T,)] and their log probability (-inf: there is no path)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Posteriors:
+    """Probabilities of states given a recording.
+
+    chains    : of the states of each chain [each shape=(T, N_c)]
+    densities : of the densities of each group that the lattice needs [each shape=(T, G')]
+    best      : the most probable joint state of every frame [shape=(T,)]
+    counts    : what transitions are learned from [shape=(C',)]
+    log_likelihood : of the recording; -inf where there is no path, and then all else is 0
     """
-    return _of(product, ties, np.ones(len(product.joints), bool), None)
+
+    chains: tuple[Single, ...]
+    densities: tuple[Single, ...]
+    best: Index
+    counts: NDArray[np.float64]
+    log_likelihood: float
 
 
-def within(product: Product, ties: Sequence[Index], allowed: NDArray[np.bool_]) -> Lattice:
-    """Return the part of a product that only some units can reach.
+def summed(posterior: Single, tie: Index, count: int) -> Single:
+    """Return the posterior of every density [shape=(T, G)] from that of joint states [shape=(T, S)].
 
-    allowed : the units of the first chain that may be said in each frame [shape=(T, U)]
+    tie : the density of each joint state [shape=(S,)]
     """
-    structure = product.structure
-    said = allowed.any(axis=0)
-    inside = np.ones(len(product.joints), bool)
-    for chain, states in enumerate(product.chain_states):
-        fitting = np.zeros(len(structure.units[chain]), bool)
-        fitting[np.asarray(structure.follows[chain])[said]] = True
-        inside &= fitting[states // structure.states]
-    return _of(product, ties, inside, allowed)
-
-
-def _of(
-    product: Product, ties: Sequence[Index], inside: NDArray[np.bool_], allowed: NDArray[np.bool_] | None
-) -> Lattice:
-    states = np.flatnonzero(inside)
-    arcs = np.flatnonzero(inside[product.arc_from] & inside[product.arc_to])
-    place = np.cumsum(inside) - 1
-    arc_from, arc_to = place[product.arc_from[arcs]], place[product.arc_to[arcs]]
-    network = Expectation.of(
-        arc_from,
-        np.zeros(len(arcs)),
-        np.searchsorted(arc_to, np.arange(len(states))),
-        np.zeros(len(states)),
-        np.zeros(len(states)),
-    )
-    densities, positions = zip(*(np.unique(tie[states], return_inverse=True) for tie in ties), strict=True)
-    spoken = np.zeros(len(densities[0]), np.intp)
-    spoken[positions[0]] = product.chain_states[0][states] // product.structure.states
-    return Lattice(states, arcs, network, densities, positions, spoken, allowed)
+    order = np.argsort(tie, kind="stable")
+    present, starts = np.unique(tie[order], return_index=True)
+    result = np.zeros((len(posterior), count), np.float32)
+    result[:, present] = np.add.reduceat(posterior.take(order, axis=1), starts, axis=1)
+    return result

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.coupled.conversion import statistics
-from lipmotion.engines.coupled.densities import Observed, Single, density_posteriors
+from lipmotion.engines.coupled.densities import Observed, Single
 from lipmotion.engines.coupled.following import Following, Surroundings
-from lipmotion.engines.coupled.lattice import Lattice
-from lipmotion.engines.coupled.model import Chains, Evidence, Posteriors
+from lipmotion.engines.coupled.lattice import Lattice, Posteriors
+from lipmotion.engines.coupled.model import Chains, Evidence
 from lipmotion.engines.coupled.visual import VisualStream, unseen
 from lipmotion.engines.trajectory.closure import Closure
 from lipmotion.engines.trajectory.space import MotionSpace
@@ -56,7 +56,7 @@ class CoupledModel:
                 precision, weighted = statistics(self.chains, posteriors, evidence, lattice, number + 1)
                 mean = weighted / np.maximum(precision, 1e-300)
             else:
-                gate = chain_posteriors(self.chains, posteriors, self.chains.structure.chain_of(number + 1))
+                gate = posteriors.chains[self.chains.structure.chain_of(number + 1)]
                 following = self.follow[1][number]
                 mean, precision = following.means(around, gate), following.precisions(gate)
             means[:, :, stream.columns], precisions[:, :, stream.columns] = stream.restored(mean, precision)
@@ -84,10 +84,4 @@ class CoupledModel:
     def _around(self, features: Single, posteriors: Posteriors) -> Single | None:
         if self.follow is None:
             return None
-        return self.follow[0](features, chain_posteriors(self.chains, posteriors, 0))
-
-
-def chain_posteriors(chains: Chains, posteriors: Posteriors, chain: int) -> Single:
-    """Return the posteriors of one chain's states [shape=(T, N)]."""
-    states = chains.transitions.product.chain_states[chain][posteriors.states]
-    return density_posteriors(posteriors.joint, states, chains.structure.counts[chain])
+        return self.follow[0](features, posteriors.chains[0])

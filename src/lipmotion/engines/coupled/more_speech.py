@@ -65,7 +65,7 @@ def with_more_speech(
     now = components(chains)
     most = now if chains.structure.kind == HMM else (max(how.mixtures, now[0]), *now[1:])
     while True:
-        chains = converged(chains, recordings, floors, how.steps, heard, workers, speech_only=True)
+        chains, said = converged(chains, recordings, floors, how.steps, heard, workers, speech_only=True)
         if components(chains) == most:
             return chains
-        chains = split(chains, most)
+        chains = split(chains, most, said)

@@ -88,10 +88,8 @@ class Product:
         return places - places[0]
 
     def name(self, state: int) -> str:
-        """Return what a joint state is, in words: ``b.1 | bi.2``, each chain's unit and state, counted from 1."""
-        joint = self.joints[state]
-        names = [self.structure.units[chain][unit] for chain, unit in enumerate(joint.units)]
-        return " | ".join(f"{name}.{place + 1}" for name, place in zip(names, joint.states, strict=True))
+        """Return what a joint state is, in words."""
+        return self.structure.name(self.chain_states[:, state].tolist())
 
 
 def reachable(structure: Structure, grammar: Grammar) -> Product:

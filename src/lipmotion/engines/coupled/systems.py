@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -77,6 +78,12 @@ class Structure:
     def chain_of(self, stream: int) -> int:
         """Return the chain that a stream is on: speech on the first, all others in order on the rest."""
         return min(stream, len(self.chains) - 1)
+
+    def name(self, states: Sequence[int]) -> str:
+        """Return what the states of all chains are, in words: ``b.1 | bi.2``, unit and place, counted from 1."""
+        found = (divmod(state, self.states) for state in states)
+        named = zip(self.units, found, strict=True)
+        return " | ".join(f"{units[unit]}.{place + 1}" for units, (unit, place) in named)
 
     def state(self, unit: int, state: int) -> int:
         """Return the number of a state within its chain."""

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from lipmotion.engines.coupled.densities import Group, Observed, Single, no_sums
 from lipmotion.engines.coupled.expectation import Expected, Recording, expected, maximised
-from lipmotion.engines.coupled.lattice import within
 from lipmotion.engines.coupled.model import Chains
+from lipmotion.engines.coupled.pairs import with_pairs
 from lipmotion.engines.coupled.product import Grammar, Joint, Product, reachable
-from lipmotion.engines.coupled.systems import HMM, Structure
-from lipmotion.engines.coupled.transitions import first_transitions
+from lipmotion.engines.coupled.systems import COUPLED, FACTORIAL, HMM, Structure
+from lipmotion.engines.coupled.transitions import Transitions, first_transitions
 from lipmotion.engines.trajectory.joint.labels import in_frames
 from lipmotion.stats.bigram import estimate_bigram
 from lipmotion.stats.mixture import Mixtures
@@ -29,6 +29,8 @@ SLACK_S = 0.05
 FLOOR_SHARE, LEAST_VARIANCE = 0.01, 1e-4
 """No variance falls under this share of the stream's own."""
 VITERBI_STEPS = 2
+FRAMES_A_GAUSSIAN = 25.0
+"""A density is split if it has so many frames for each Gaussian that it would have."""
 FIRST_SHARE = 0.1
 """Of the probability of how recordings begin: shared by all units, said first or not."""
 CONVERGED = 0.02
@@ -79,20 +81,38 @@ def train_chains(
     Source: Xie & Liu 2007, §3.4 and Appendix A, with scaled recursions.
     """
     floors = variance_floors([one.observed for one in data])
-    chains = _flat_start(structure, streams, data, how)
+    chains = _viterbi_start(structure, streams, data, how, floors)
     recordings = [recording(chains, one) for one in data]
-    paths = [labelled_path(chains.transitions.product, one.phones, one.observed.frames) for one in data]
-    for _ in range(1 + VITERBI_STEPS):
-        chains = _learned_along(chains, recordings, paths, floors)
-        paths = [_best(chains, one) for one in recordings]
-    visits = np.bincount(np.concatenate(paths), minlength=len(chains.transitions.product.joints))
-    chains = replace(chains, transitions=chains.transitions.tied(visits))
     while True:
-        chains = converged(chains, recordings, floors, how.most, heard, workers)
+        chains, said = converged(chains, recordings, floors, how.most, heard, workers)
         now = components(chains)
         if all(n >= most for n, most in zip(now, how.mixtures, strict=True)):
             return chains
-        chains = split(chains, how.mixtures)
+        chains = split(chains, how.mixtures, said)
+
+
+def _viterbi_start(
+    structure: Structure,
+    streams: tuple[str, ...],
+    data: Sequence[Labelled],
+    how: Schedule,
+    floors: Sequence[Single],
+) -> Chains:
+    """Return chains learned along the labels, then along best paths; without a limit they begin with one."""
+    first = replace(structure, limit=min(1, structure.states - 1)) if structure.limit is None else structure
+    transitions = first_transitions(reachable(first, grammar_of(first, data)))
+    chains = _flat_start(streams, transitions, data, how)
+    recordings = [recording(chains, one) for one in data]
+    paths = [labelled_path(transitions.product, one.phones, one.observed.frames) for one in data]
+    for _ in range(1 + VITERBI_STEPS):
+        chains, transitions = _learned_along(chains, transitions, recordings, paths, floors)
+        paths = [_best(chains, one) for one in recordings]
+    visits = np.bincount(np.concatenate(paths), minlength=len(transitions.product.joints))
+    if structure.kind == COUPLED:
+        return replace(chains, transitions=transitions.tied(visits))
+    if structure.kind == FACTORIAL and len(structure.chains) == 2:
+        return with_pairs(chains, transitions, visits, structure)
+    return chains
 
 
 def recording(chains: Chains, one: Labelled, weight: float = 1.0) -> Recording:
@@ -101,8 +121,7 @@ def recording(chains: Chains, one: Labelled, weight: float = 1.0) -> Recording:
     weight : how often it counts
     """
     allowed = allowed_units(chains.structure, one.phones, one.observed.frames)
-    ties = [group.tie for group in chains.groups]
-    return Recording(one.observed, within(chains.transitions.product, ties, allowed), weight)
+    return Recording(one.observed, chains.lattice(allowed), weight)
 
 
 def components(chains: Chains) -> tuple[int, ...]:
@@ -110,13 +129,26 @@ def components(chains: Chains) -> tuple[int, ...]:
     return tuple(group.mixtures.size[1] for group in chains.groups)
 
 
-def split(chains: Chains, most: Sequence[int]) -> Chains:
-    """Return chains with twice as many Gaussians in the densities of those groups that have fewer than ``most``."""
+def split(chains: Chains, most: Sequence[int], said: Expected) -> Chains:
+    """Return chains with twice as many Gaussians in the densities of those groups that have fewer than ``most``.
+
+    said : by the recordings; a density with too little data keeps what it has, the new halves are switched off
+    """
     groups = [
-        replace(group, mixtures=group.mixtures.split()) if now < target else group
-        for group, now, target in zip(chains.groups, components(chains), most, strict=True)
+        replace(group, mixtures=_split(group.mixtures, sums.count)) if now < target else group
+        for group, sums, now, target in zip(chains.groups, said.groups, components(chains), most, strict=True)
     ]
     return replace(chains, groups=tuple(groups))
+
+
+def _split(mixtures: Mixtures, count: NDArray[np.float64]) -> Mixtures:
+    """Return twice as many components; ``count`` are the frames of each now [shape=(M, G)]."""
+    halves, now = mixtures.split(), mixtures.log_weights.shape[1]
+    few = count.sum(axis=0) < FRAMES_A_GAUSSIAN * 2 * np.isfinite(mixtures.log_weights).sum(axis=1)
+    halves.log_weights[few, :now] = mixtures.log_weights[few]
+    halves.means[few, :now] = mixtures.means[few]
+    halves.log_weights[few, now:] = -np.inf
+    return halves
 
 
 def allowed_units(structure: Structure, phones: Timeline[Unit], frames: int) -> NDArray[np.bool_]:
@@ -155,10 +187,9 @@ def labelled_path(product: Product, phones: Timeline[Unit], frames: int) -> Inde
     return path
 
 
-def _flat_start(structure: Structure, streams: tuple[str, ...], data: Sequence[Labelled], how: Schedule) -> Chains:
+def _flat_start(streams: tuple[str, ...], transitions: Transitions, data: Sequence[Labelled], how: Schedule) -> Chains:
     """Return chains that know which units follow which, and nothing of what they emit."""
-    product = reachable(structure, grammar_of(structure, data))
-    groups = []
+    product, structure, groups = transitions.product, transitions.product.structure, []
     together = [tuple(range(len(streams)))] if structure.kind == HMM else [(s,) for s in range(len(streams))]
     dimensions = [stream.shape[1] for stream in data[0].observed.streams]
     for members in together:
@@ -173,7 +204,7 @@ def _flat_start(structure: Structure, streams: tuple[str, ...], data: Sequence[L
                 product.chain_states[chain],
             )
         )
-    return Chains(streams, first_transitions(product), tuple(groups))
+    return Chains(streams, transitions, tuple(groups))
 
 
 def grammar_of(structure: Structure, data: Sequence[Labelled]) -> Grammar:
@@ -213,9 +244,13 @@ def variance_floors(observed: Sequence[Observed]) -> tuple[Single, ...]:
 
 
 def _learned_along(
-    chains: Chains, recordings: Sequence[Recording], paths: Sequence[Index], floors: Sequence[Single]
-) -> Chains:
-    """Return chains that explain best what was observed along paths of joint states."""
+    chains: Chains,
+    transitions: Transitions,
+    recordings: Sequence[Recording],
+    paths: Sequence[Index],
+    floors: Sequence[Single],
+) -> tuple[Chains, Transitions]:
+    """Return chains, and their transitions, that explain best what was observed along paths of joint states."""
     groups = []
     for group in chains.groups:
         sums = no_sums(group)
@@ -223,16 +258,20 @@ def _learned_along(
             chosen, place = np.unique(group.tie[path], return_inverse=True)
             sums.add(group, one.observed, chosen, np.eye(len(chosen), dtype=np.float32)[place], None)
         groups.append(sums)
-    said = Expected(tuple(groups), _followed(chains.transitions.product, paths), np.empty(0), 0.0, 1)
-    chains = maximised(chains, said, floors, streams=range(len(chains.streams)))
+    followed = _followed(transitions.product, paths)
+    said = Expected(tuple(groups), followed, 0.0, 1)
+    chains = maximised(chains, said, floors, streams=range(len(chains.streams)), moves=False)
+    transitions = transitions.relearned(followed)
     structure = chains.structure
-    return replace(
+    learned = replace(
         chains,
+        transitions=transitions,
         groups=tuple(
             _borrowed(group, sums.count.sum(axis=0) > 0, structure, structure.chain_of(group.streams[0]))
             for group, sums in zip(chains.groups, groups, strict=True)
         ),
     )
+    return learned, transitions
 
 
 def _borrowed(group: Group, known: NDArray[np.bool_], structure: Structure, chain: int) -> Group:
@@ -275,19 +314,19 @@ def converged(
     workers: int,
     *,
     speech_only: bool = False,
-) -> Chains:
-    """Return chains after steps of EM, ``most`` or as many as get on.
+) -> tuple[Chains, Expected]:
+    """Return chains after EM, and what recordings said of those before its last step.
 
-    speech_only : learn the densities of speech, and keep all else; then no component ends
+    most : steps, fewer if they do not get on;  speech_only : learn the densities of speech, and keep all else
     """
-    how = {"streams": [0], "moves": False, "fewest": 0.0} if speech_only else {"streams": range(len(chains.streams))}
+    streams = range(1 if speech_only else len(chains.streams))
     last = -np.inf
     for _ in range(most):
         said = expected(chains, recordings, workers)
         figure = said.log_likelihood / said.frames
         heard(Step(components(chains), figure))
-        chains = maximised(chains, said, floors, **how)
+        chains = maximised(chains, said, floors, streams=streams, moves=not speech_only)
         if figure - last < CONVERGED:
             break
         last = figure
-    return chains
+    return chains, said

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,6 @@ from numpy.typing import NDArray
 
 from lipmotion.engines.coupled.product import Product
 from lipmotion.engines.coupled.systems import COUPLED
-from lipmotion.kernels.network import Expectation
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -38,7 +38,18 @@ class Transitions:
     rows: tuple[Index, ...]
     advance: tuple[Array, ...]
 
+    @cached_property
+    def log_initial(self) -> Array:
+        """Log probability of beginning in each joint state [shape=(S,)]."""
+        with np.errstate(divide="ignore"):
+            return np.log(self.product.initial)
+
     @property
+    def count(self) -> int:
+        """How many numbers transitions are learned from: one an arc."""
+        return len(self.product.arc_from)
+
+    @cached_property
     def arc_log(self) -> Array:
         """Log probability of every arc [shape=(E,)]."""
         weight = self.product.base.copy()
@@ -46,14 +57,6 @@ class Transitions:
             weight *= self._factor(chain)
         total = np.bincount(self.product.arc_from, weight, len(self.product.joints))
         return np.log(weight / total[self.product.arc_from])
-
-    def expectation(self) -> Expectation:
-        """Return the product network ready for forward–backward; a recording may end anywhere."""
-        with np.errstate(divide="ignore"):
-            initial = np.log(self.product.initial)
-        return Expectation.of(
-            self.product.arc_from, self.arc_log, self.product.arc_start, initial, np.zeros(len(initial))
-        )
 
     def relearned(self, counts: Array) -> Transitions:
         """Return the tables that explain best how often arcs were followed [shape=(E,)].

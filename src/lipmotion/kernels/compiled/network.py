@@ -3,62 +3,86 @@
 They are in double precision; products with blocks, whose terms are made alike first, in the evidence's own. Nothing
 under ``LEAST`` is kept, so no product is denormal, which would be many times slower; and a state without forward
 probability gets no backward one, which else might grow without limit.
+
+In single precision, half the memory, what cannot be held is made ``TINY``, and never less. Forward and backward
+probabilities of every frame would multiply to 1 in sum; where something that matters was lost or made up on the way,
+they do not, and the recording is left to double precision.
 """
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.kernels.compiled.compiler import compiled_to_rounding
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]
+"""float64, or float32 where states are in single precision."""
 Index = NDArray[np.intp]
 Unsigned = NDArray[np.uintp]
 """Signed indices might count from the end, which keeps loops from being vectors."""
+CHUNK = 16
+"""Runs are padded to multiples of this, so that loops over them, made of vectors, have no remainder."""
 LEAST, LEAST_POSTERIOR, LEAST_SHARE = 1e-140, 1e-12, 1e-25
 
 
 LEAST_ROOT = 1.9e-35
 """exp(-80): a density not above its eighth power counts as none."""
 
+TINY, LEAST_SCALE, OFF = 1e-24, 1e-12, 1e-4
+"""The least of all probabilities; of a frame's scale; and how far from 1 the sum of posteriors may be."""
+FRAMES_SUMMED = 256
+"""Of which single-precision sums are made."""
+
 
 @compiled_to_rounding
-def products(roots: Array, columns: Index) -> tuple[Array, Array]:
-    """Return the roots of joint densities relative to the best of each frame, and its root.
+def products(roots: Array, columns: NDArray[np.uint32], joint: Array, best: Array) -> None:
+    """Fill in the roots of joint densities relative to the best of each frame, and its root.
 
     roots   : float32 or float64 [shape=(T, G)], of all chains side by side, each relative to its own best
     columns : [shape=(C, S)], by place, those of each chain
-    Returns [shape=(T, S)], as precise as ``roots``, and [shape=(T,)]; where all are nothing, 0.
+    joint   : [shape=(T, S)], as precise as ``roots``
+    best    : [shape=(T,)]; where all are nothing, 0
     """
-    joint, best = np.empty((len(roots), columns.shape[1]), roots.dtype), np.empty(len(roots))
-    factor, product = np.empty(roots.shape[1]), np.empty(columns.shape[1])
+    states = columns.shape[1]
+    factor, product, tops = np.empty(roots.shape[1], roots.dtype), np.empty(states), np.empty(8)
     for t in range(len(roots)):
         for g in range(len(factor)):
             factor[g] = roots[t, g] if roots[t, g] > LEAST_ROOT else 0.0
-        product[:] = 1.0
-        for c in range(len(columns)):
-            for s in range(len(product)):
-                product[s] *= factor[columns[c, s]]
-        best[t] = product.max()
+        for s in range(states):
+            product[s] = factor[columns[0, s]]
+        for c in range(1, len(columns)):
+            column = columns[c]
+            for s in range(states):
+                product[s] *= factor[column[s]]
+        tops[:] = 0.0
+        for s in range(0, states - 7, 8):
+            for k in range(8):
+                tops[k] = max(tops[k], product[s + k])
+        for s in range(states // 8 * 8, states):
+            tops[0] = max(tops[0], product[s])
+        best[t] = tops.max()
         scale = 1 / best[t] if best[t] > 0 else 0.0
-        for s in range(len(product)):
+        row = joint[t]
+        for s in range(states):
             root = product[s] * scale
-            joint[t, s] = root if root > LEAST_ROOT else 0.0
-    return joint, best
+            row[s] = root if root > LEAST_ROOT else 0.0
 
 
 @compiled_to_rounding
 def forward_backward(
     emission: Array, edges: Index, initial: Array, final: Array, runs: Unsigned, run_weight: Array,
-    blocks: Index, block_sources: Index, block_weight: Array, turned: Array,
+    blocks: Unsigned, block_sources: Unsigned, block_weight: Array, turned: Array,
 ) -> tuple[Array, Array, Array, Array, Array]:  # fmt: skip
     """Return what recordings say about a network; ``emission`` becomes the posteriors.
 
     emission     : float32 or float64 [shape=(T, S)], by place, one recording after the other: the eighth roots of
                    densities relative to the best of each frame
     edges        : [shape=(U + 1,)], where each begins, and T
-    runs ... block_weight : of the layout and its weights (``kernels.arcs``)
+    runs, run_weight : of the layout and its weights (``kernels.arcs``), lengths in chunks, padded with arcs of weight 0
+    blocks ... block_weight : likewise
     turned       : the weights of blocks, targets as rows
     Returns how often each run arc is followed, divided by its weight [shape=(N,)]; the forward probabilities of all
     blocks' sources and, of the next frame, backward ones of their targets, whose products over time count block arcs
@@ -74,7 +98,7 @@ def forward_backward(
     longest = 0
     for u in range(len(ends)):
         longest = max(longest, edges[u + 1] - edges[u])
-    forward, beta, onward = np.empty((longest, S)), np.empty(S), np.empty(S)
+    forward, beta, onward = np.zeros((longest, S + CHUNK)), np.zeros(S + CHUNK), np.zeros(S + CHUNK)
     room = np.empty(max(block_weight.shape[1], turned.shape[1]), block_weight.dtype)
     share = np.empty(max(len(block_weight), len(turned)), block_weight.dtype)
     for u in range(len(ends)):
@@ -83,51 +107,49 @@ def forward_backward(
         alpha = forward[: len(density)]
         for t in range(len(alpha)):
             if t == 0:
-                alpha[t] = initial
+                alpha[t, :S] = initial
             else:
                 alpha[t] = 0
                 _forward_runs(alpha, t, runs, run_weight)
-                _forward_blocks(alpha[t - 1], alpha[t], blocks, block_sources, block_weight, leave[t - 1], room, share)
+                _forward_blocks(alpha, t, blocks, block_sources, block_weight, leave, room, share)
             scale[t] = _emit(alpha, density, t)
             if scale[t] <= 0:
                 break
-        ends[u] = (alpha[-1] * final).sum() if scale.min() > 0 else 0.0
+        ends[u] = (alpha[-1, :S] * final).sum() if scale.min() > 0 else 0.0
         if ends[u] <= 0:
             ends[u] = 0
             density[:], leave[:] = 0, 0
             continue
-        beta[:] = final / ends[u]
+        beta[:S] = final / ends[u]
         for t in range(len(alpha) - 1, -1, -1):
             _close(density, alpha, t, beta, onward, 1 / scale[t])
             if t > 0:
                 beta[:] = 0
-                _backward_runs(alpha[t - 1], onward, beta, runs, run_weight, counts)
-                _backward_blocks(onward, beta, blocks, block_sources, turned, enter[t - 1], room, share)
+                _backward_runs(alpha, t - 1, onward, beta, runs, run_weight, counts)
+                _backward_blocks(onward, beta, blocks, block_sources, turned, enter, t - 1, room, share)
     return counts, leaving, entering, scales, ends
 
 
 @compiled_to_rounding
 def _forward_runs(alpha: Array, t: int, runs: Unsigned, weight: Array) -> None:
-    into, out = alpha[t], alpha[t - 1]
     for r in range(len(runs)):
         target, source, length, first = runs[r, 0], runs[r, 1], runs[r, 2], runs[r, 3]
         for i in range(length):
-            into[target + i] += weight[first + i] * out[source + i]
+            alpha[t, target + i] += weight[first + i] * alpha[t - 1, source + i]
 
 
 @compiled_to_rounding
 def _forward_blocks(
-    before: Array, after: Array, blocks: Index, sources: Index, weight: Array, leaving: Array, room: Array, share: Array
+    alpha: Array, t: int, blocks: Unsigned, sources: Unsigned, weight: Array, leaving: Array, room: Array, share: Array
 ) -> None:
     for b in range(len(blocks)):
-        target, targets, first, count = blocks[b]
-        enter, leave = room[: weight.shape[1]], leaving[first : first + count]
+        target, targets, first, count = blocks[b, 0], blocks[b, 1], blocks[b, 2], blocks[b, 3]
         for s in range(count):
-            leave[s] = before[sources[first + s]]
-        total = _times(leave, weight[first : first + count], share, enter)
-        into = after[target : target + targets]
-        for i in range(len(into)):
-            into[i] += total * enter[i]
+            leaving[t - 1, first + s] = alpha[t - 1, sources[first + s]]
+        total = _shares(leaving, t - 1, first, count, share)
+        _times(share, count, weight, first, room)
+        for i in range(targets):
+            alpha[t, target + i] += total * room[i]
 
 
 @compiled_to_rounding
@@ -141,12 +163,12 @@ def _density(root: float) -> float:
 def _emit(alpha: Array, emission: Array, t: int) -> float:
     """Multiply by the densities, make the sum 1; return what it was."""
     total = 0.0
-    for i in range(alpha.shape[1]):
+    for i in range(emission.shape[1]):
         density = _density(emission[t, i])
         alpha[t, i] *= density if density > LEAST else 0.0
         total += alpha[t, i]
     scale = 1 / total if total > 0 else 0.0
-    for i in range(alpha.shape[1]):
+    for i in range(emission.shape[1]):
         alpha[t, i] = alpha[t, i] * scale if alpha[t, i] * scale > LEAST else 0.0
     return total
 
@@ -154,7 +176,7 @@ def _emit(alpha: Array, emission: Array, t: int) -> float:
 @compiled_to_rounding
 def _close(emission: Array, alpha: Array, t: int, beta: Array, onward: Array, scale: float) -> None:
     """Fill in what is handed back from this frame; make of its densities its posteriors."""
-    for i in range(len(beta)):
+    for i in range(emission.shape[1]):
         back = beta[i] if alpha[t, i] > 0 and beta[i] > LEAST else 0.0
         handed = back * _density(emission[t, i]) * scale
         onward[i] = handed if handed > LEAST else 0.0
@@ -163,50 +185,169 @@ def _close(emission: Array, alpha: Array, t: int, beta: Array, onward: Array, sc
 
 
 @compiled_to_rounding
-def _backward_runs(alpha: Array, onward: Array, beta: Array, runs: Unsigned, weight: Array, counts: Array) -> None:
+def _backward_runs(
+    alpha: Array, t: int, onward: Array, beta: Array, runs: Unsigned, weight: Array, counts: Array
+) -> None:
     for r in range(len(runs)):
         target, source, length, first = runs[r, 0], runs[r, 1], runs[r, 2], runs[r, 3]
         for i in range(length):
             beta[source + i] += weight[first + i] * onward[target + i]
         for i in range(length):
-            counts[first + i] += alpha[source + i] * onward[target + i]
-
-
-@compiled_to_rounding
-def _times(row: Array, matrix: Array, share: Array, product: Array) -> float:
-    """Multiply a row, relative to its sum, by a matrix, four of its rows at a time; return that sum.
-
-    share : room for the row, in the matrix's precision
-    """
-    total = 0.0
-    for r in range(len(row)):
-        total += row[r]
-    scale = 1 / total if total > 0 else 0.0
-    for r in range(len(row)):
-        share[r] = row[r] * scale if row[r] * scale > LEAST_SHARE else 0.0
-    product[:] = 0
-    whole = len(row) // 4 * 4
-    for r in range(0, whole, 4):
-        a, b, c, d = share[r], share[r + 1], share[r + 2], share[r + 3]
-        for i in range(len(product)):
-            product[i] += a * matrix[r, i] + b * matrix[r + 1, i] + c * matrix[r + 2, i] + d * matrix[r + 3, i]
-    for r in range(whole, len(row)):
-        a = share[r]
-        for i in range(len(product)):
-            product[i] += a * matrix[r, i]
-    return total
+            counts[first + i] += alpha[t, source + i] * onward[target + i]
 
 
 @compiled_to_rounding
 def _backward_blocks(
-    onward: Array, beta: Array, blocks: Index, sources: Index, turned: Array, entering: Array, room: Array, share: Array
-) -> None:
-    start = 0
+    onward: Array, beta: Array, blocks: Unsigned, sources: Unsigned, turned: Array, entering: Array, t: int,
+    room: Array, share: Array,
+) -> None:  # fmt: skip
+    start = np.uintp(0)
     for b in range(len(blocks)):
-        target, targets, first, count = blocks[b]
-        back, hand = room[: turned.shape[1]], entering[start : start + targets]
-        hand[:] = onward[target : target + targets]
-        total = _times(hand, turned[start : start + targets], share, back)
+        target, targets, first, count = blocks[b, 0], blocks[b, 1], blocks[b, 2], blocks[b, 3]
+        for i in range(targets):
+            entering[t, start + i] = onward[target + i]
+        total = _shares(entering, t, start, targets, share)
+        _times(share, targets, turned, start, room)
         for s in range(count):
-            beta[sources[first + s]] += total * back[s]
+            beta[sources[first + s]] += total * room[s]
         start += targets
+
+
+@compiled_to_rounding
+def _shares(values: Array, t: int, first: Any, count: Any, share: Array) -> float:
+    """Fill in what some values of a row are relative to their sum; return that."""
+    total = 0.0
+    for i in range(count):
+        total += values[t, first + i]
+    scale = 1 / total if total > 0 else 0.0
+    for i in range(count):
+        part = values[t, first + i] * scale
+        share[i] = part if part > LEAST_SHARE else 0.0
+    return total
+
+
+@compiled_to_rounding
+def _times(row: Array, count: Any, matrix: Array, first: Any, product: Array) -> None:
+    """Multiply a row by as many rows of a matrix, four of them at a time."""
+    wide = matrix.shape[1]
+    product[:] = 0
+    for r in range(0, count // 4 * 4, 4):
+        a, b, c, d = row[r], row[r + 1], row[r + 2], row[r + 3]
+        w, x, y, z = first + r, first + r + 1, first + r + 2, first + r + 3
+        for i in range(wide):
+            product[i] += a * matrix[w, i] + b * matrix[x, i] + c * matrix[y, i] + d * matrix[z, i]
+    for r in range(count // 4 * 4, count):
+        for i in range(wide):
+            product[i] += row[r] * matrix[first + r, i]
+
+
+@compiled_to_rounding
+def forward_backward_single(
+    emission: Array, edges: Index, initial: Array, final: Array, runs: Unsigned, run_weight: Array,
+    blocks: Unsigned, block_sources: Unsigned, block_weight: Array, turned: Array,
+) -> tuple[Array, Array, Array, Array, Array]:  # fmt: skip
+    """Return what ``forward_backward`` does, in single precision, but an end's scale is 0 where the recording is left.
+
+    What is in ``emission`` there then has no meaning.
+    """
+    T, S = emission.shape
+    targets, longest = 0, 0
+    for b in range(len(blocks)):
+        targets += blocks[b, 1]
+    counts, scales, ends = np.zeros(len(run_weight)), np.ones(T), np.zeros(len(edges) - 1)
+    leaving, entering = np.zeros((T, len(block_sources))), np.zeros((T, targets))
+    for u in range(len(ends)):
+        longest = max(longest, edges[u + 1] - edges[u])
+    forward, few = np.empty((longest, S + CHUNK), np.float32), np.empty(len(counts), np.float32)
+    beta, onward = np.zeros(S + CHUNK, np.float32), np.zeros(S + CHUNK, np.float32)
+    mine = np.zeros(len(counts))
+    room = np.empty(max(block_weight.shape[1], turned.shape[1]), np.float32)
+    share = np.empty(max(len(block_weight), len(turned)), np.float32)
+    for u in range(len(ends)):
+        frames = slice(edges[u], edges[u + 1])
+        density, scale, leave, enter = emission[frames], scales[frames], leaving[frames], entering[frames]
+        alpha = forward[: len(density)]
+        sure = _forward_single(
+            alpha, density, scale, initial, runs, run_weight, blocks, block_sources, block_weight, leave, room, share
+        )
+        met = (alpha[-1, :S] * final).sum() if sure else 0.0
+        if met > LEAST_SCALE * scale[-1]:
+            beta[:S] = final / met
+            mine[:] = 0
+            sure = _backward_single(
+                alpha, density, scale, beta, onward, runs, run_weight, mine, few,
+                blocks, block_sources, turned, enter, room, share,
+            )  # fmt: skip
+            ends[u] = met / scale[-1] if sure else 0.0
+        if ends[u] > 0:
+            counts += mine
+        else:
+            leave[:] = 0
+    return counts, leaving, entering, scales, ends
+
+
+@compiled_to_rounding
+def _forward_single(
+    alpha: Array, density: Array, scale: Array, initial: Array, runs: Unsigned, run_weight: Array,
+    blocks: Unsigned, sources: Unsigned, block_weight: Array, leave: Array, room: Array, share: Array,
+) -> bool:  # fmt: skip
+    """Fill in forward probabilities, each frame's relative to the one before, and what they sum to; whether sure."""
+    for t in range(len(alpha)):
+        alpha[t] = TINY
+        if t == 0:
+            alpha[t, : len(initial)] = initial
+        else:
+            _forward_runs(alpha, t, runs, run_weight)
+            _forward_blocks(alpha, t, blocks, sources, block_weight, leave, room, share)
+        scale[t] = _emit_single(alpha, density, t, 1 / scale[t - 1] if t > 0 else 1.0)
+        if not scale[t] > LEAST_SCALE:
+            return False
+    return True
+
+
+@compiled_to_rounding
+def _backward_single(
+    alpha: Array, density: Array, scale: Array, beta: Array, onward: Array, runs: Unsigned, run_weight: Array,
+    counts: Array, few: Array, blocks: Unsigned, sources: Unsigned, turned: Array, enter: Array,
+    room: Array, share: Array,
+) -> bool:  # fmt: skip
+    """Make posteriors of densities, and add to counts; return whether they are sure."""
+    few[:] = TINY
+    for t in range(len(alpha) - 1, -1, -1):
+        total = _close_single(density, alpha, t, beta, onward, 1 / scale[t - 1] if t > 0 else 1.0)
+        if not abs(total - 1) < OFF:
+            return False
+        if t > 0:
+            beta[:] = TINY
+            _backward_runs(alpha, t - 1, onward, beta, runs, run_weight, few)
+            _backward_blocks(onward, beta, blocks, sources, turned, enter, t - 1, room, share)
+        if t % FRAMES_SUMMED == 0:
+            counts += few
+            few[:] = TINY
+    return True
+
+
+@compiled_to_rounding
+def _emit_single(alpha: Array, emission: Array, t: int, scale: float) -> float:
+    """Multiply by the densities and a scale; return the sum."""
+    total = 0.0
+    for i in range(emission.shape[1]):
+        product = np.float64(alpha[t, i]) * (_density(emission[t, i]) * scale)
+        kept = product if product > TINY else TINY
+        alpha[t, i] = kept
+        total += kept
+    return total
+
+
+@compiled_to_rounding
+def _close_single(emission: Array, alpha: Array, t: int, beta: Array, onward: Array, scale: float) -> float:
+    """Fill in what is handed back from this frame; make of its densities its posteriors; return their sum."""
+    total = 0.0
+    for i in range(emission.shape[1]):
+        back = np.float64(beta[i])
+        handed = back * (_density(emission[t, i]) * scale)
+        onward[i] = handed if handed > TINY else TINY
+        posterior = alpha[t, i] * back
+        total += posterior
+        emission[t, i] = posterior if posterior > LEAST_POSTERIOR else 0.0
+    return total

@@ -1,0 +1,196 @@
+"""Steps of factorial hidden Markov models, compiled: few passes over the joint states.
+
+Densities multiply in double precision, and nothing under a least value is kept: no product is denormal, which would be
+many times slower.  Weights are of axis 0 or 1, ``_0`` or ``_1``; U is the number of units of an axis.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.kernels.compiled.compiler import compiled_to_rounding
+
+Array = NDArray[Any]
+Index = NDArray[np.intp]
+LEAST_TOTAL = 1e-7
+"""Of products that are kept as they are: when they sum to less, they are made greater first."""
+
+
+@compiled_to_rounding
+def moved_to_last(before: Array, stay: Array, onward: Array, entering: Array, count: int) -> Array:
+    """Return the last ``count`` columns of joint states, moved one frame on along axis 0.
+
+    entering : [shape=(U, M)], what enters the first states
+    """
+    last, into_last = before[:, before.shape[1] - count :], entering[:, before.shape[1] - count :]
+    after = np.empty((len(before), count), before.dtype)
+    for i in range(len(before)):
+        _move(last, stay, onward, into_last, i, after[i])
+    return after
+
+
+@compiled_to_rounding
+def moved_back(after: Array, stay: Array, onward: Array, left: Array) -> Array:
+    """Return joint states moved one frame back along axis 1.
+
+    left : [shape=(N, U)], what last states hand on
+    """
+    before, units = np.empty_like(after), left.shape[1]
+    inner = after.shape[1] - units
+    for i in range(len(after)):
+        into, out = before[i], after[i]
+        behind = out[units:]
+        for j in range(inner):
+            into[j] = stay[j] * out[j] + onward[j] * behind[j]
+        last, out_last, stay_last, mine = into[inner:], out[inner:], stay[inner:], left[i]
+        for j in range(units):
+            last[j] = stay_last[j] * out_last[j] + mine[j]
+    return before
+
+
+@compiled_to_rounding
+def forward(
+    before: Array, stay_0: Array, onward_0: Array, entering_0: Array, stay_1: Array, onward_1: Array, entering_1: Array,
+    density_0: Array, density_1: Array, pair_0: Index, pair_1: Index, pair: Array, least: float, kept: float,
+    after: Array,
+) -> float:  # fmt: skip
+    """Fill in joint states moved one frame on along both axes, times densities, sum 1; return what the sum was.
+
+    entering_0, entering_1 : [shapes=(U, M), (N, U)], what enters first states
+    pair_0 ... pair : states of pairs, sorted by the first, and their densities
+    least, kept : products of less are 0, as are shares of the sum
+    """
+    moved, prior = np.empty(before.shape[1], before.dtype), np.empty(before.shape[1], before.dtype)
+    boost, total = 1.0, 0.0
+    for _ in range(2):
+        total, p = 0.0, 0
+        for i in range(len(before)):
+            _move(before, stay_0, onward_0, entering_0, i, moved)
+            _move_along(moved, stay_1, onward_1, entering_1[i], prior)
+            _emit(prior, density_0[i] * boost, density_1, least, after[i])
+            p = _emit_pairs(prior, i, p, pair_0, pair_1, pair, boost, least, after[i])
+            total += _sum(after[i])
+        if total >= LEAST_TOTAL or total <= 0:
+            break
+        boost /= total
+    _share(after, total, kept)
+    return total / boost
+
+
+@compiled_to_rounding
+def backward(
+    before: Array, moved: Array, stay: Array, onward: Array, left: Array,
+    density_0: Array, density_1: Array, pair_0: Index, pair_1: Index, pair: Array, least: float, kept: float,
+    after: Array, posterior_0: Array, posterior_1: Array, posterior_pair: Array,
+) -> float:  # fmt: skip
+    """Fill in backward probabilities times densities, sum 1, and posteriors times their sum; return what the sum of the
+    former was.
+
+    before : forward probabilities
+    moved  : backward probabilities that have moved back along axis 1, and are to move along axis 0
+    left   : [shape=(U, M)], what last states hand on
+    """
+    beta = np.empty(before.shape[1], before.dtype)
+    units, boost, total = len(left), 1.0, 0.0
+    inner = len(before) - units
+    for _ in range(2):
+        total, p = 0.0, 0
+        posterior_1[:] = 0
+        for i in range(len(before)):
+            if i < inner:
+                _combine(moved[i], stay[i], moved[i + units], onward[i], beta)
+            else:
+                _combine(moved[i], stay[i], left[i - inner], 1.0, beta)
+            posterior_0[i] = _meet(before[i], beta, posterior_1)
+            q = p
+            while q < len(pair_0) and pair_0[q] == i:
+                posterior_pair[q] = np.float64(before[i, pair_1[q]]) * beta[pair_1[q]]
+                q += 1
+            _emit(beta, density_0[i] * boost, density_1, least, after[i])
+            p = _emit_pairs(beta, i, p, pair_0, pair_1, pair, boost, least, after[i])
+            total += _sum(after[i])
+        if total >= LEAST_TOTAL or total <= 0:
+            break
+        boost /= total
+    _share(after, total, kept)
+    return total / boost
+
+
+@compiled_to_rounding
+def _combine(one: Array, weight: float, other: Array, other_weight: float, into: Array) -> None:
+    mine, its = into.dtype.type(weight), into.dtype.type(other_weight)
+    for j in range(len(into)):
+        into[j] = mine * one[j] + its * other[j]
+
+
+@compiled_to_rounding
+def _move(before: Array, stay: Array, onward: Array, entering: Array, i: int, into: Array) -> None:
+    """Fill in row i, one frame on along axis 0."""
+    units = len(entering)
+    if i < units:
+        _combine(before[i], stay[i], entering[i], 1.0, into)
+    else:
+        _combine(before[i], stay[i], before[i - units], onward[i - units], into)
+
+
+@compiled_to_rounding
+def _move_along(before: Array, stay: Array, onward: Array, entering: Array, into: Array) -> None:
+    """Fill in a row, one frame on along itself."""
+    units = len(entering)
+    for j in range(units):
+        into[j] = stay[j] * before[j] + entering[j]
+    rest, mine, weight = into[units:], before[units:], stay[units:]
+    for j in range(len(onward)):
+        rest[j] = weight[j] * mine[j] + onward[j] * before[j]
+
+
+@compiled_to_rounding
+def _emit(prior: Array, own: float, density: Array, least: float, into: Array) -> None:
+    for j in range(len(prior)):
+        partly = np.float64(prior[j]) * own
+        product = (partly if partly > least else 0.0) * density[j]
+        into[j] = product if product > least else 0.0
+
+
+@compiled_to_rounding
+def _emit_pairs(
+    prior: Array, i: int, p: int, pair_0: Index, pair_1: Index, pair: Array, boost: float, least: float, into: Array
+) -> int:
+    """Give row i's pairs, the first of which is at p, their own densities; return where the next row's begin."""
+    while p < len(pair_0) and pair_0[p] == i:
+        product = np.float64(prior[pair_1[p]]) * (pair[p] * boost)
+        into[pair_1[p]] = product if product > least else 0.0
+        p += 1
+    return p
+
+
+@compiled_to_rounding
+def _sum(row: Array) -> float:
+    total = 0.0
+    for j in range(len(row)):
+        total += row[j]
+    return total
+
+
+@compiled_to_rounding
+def _meet(one: Array, other: Array, sums: Array) -> float:
+    """Add products to ``sums`` and return what they sum to."""
+    total = 0.0
+    for j in range(len(one)):
+        product = np.float64(one[j]) * other[j]
+        sums[j] += product
+        total += product
+    return total
+
+
+@compiled_to_rounding
+def _share(joint: Array, total: float, kept: float) -> None:
+    """Make the sum 1."""
+    flat = joint.reshape(joint.size)
+    scale = 1 / total if total > 0 else 0.0
+    for j in range(len(flat)):
+        share = flat[j] * scale
+        flat[j] = share if share > kept else 0.0

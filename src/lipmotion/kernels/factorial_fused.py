@@ -1,0 +1,50 @@
+"""One frame of a factorial hidden Markov model, as ``factorial_steps``, compiled but for products of matrices."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from lipmotion.kernels import factorial_steps
+from lipmotion.kernels.compiled import factorial
+from lipmotion.kernels.factorial_steps import Closed, Joint, Retreat
+from lipmotion.kernels.loops import Density, Moves
+
+LEAST = {np.dtype(np.float32): (1e-37, 1e-30), np.dtype(np.float64): (1e-140, 1e-140)}
+"""Products of less are 0, as are shares of a frame."""
+
+
+def advance(before: Joint, audio: Moves, visual: Moves, density: Density) -> tuple[Joint, Joint, float]:
+    """Return what ``factorial_steps.advance`` does."""
+    entering = audio.leaving.T @ before[-len(audio.leaving) :]
+    moved = factorial.moved_to_last(before, audio.stay, audio.onward, entering, len(visual.leaving))
+    after = np.empty_like(before)
+    total = factorial.forward(
+        before, audio.stay, audio.onward, entering, visual.stay, visual.onward, moved @ visual.leaving,
+        density.audio, density.visual, density.pair_audio, density.pair_visual, density.pair, *LEAST[before.dtype],
+        after,
+    )  # fmt: skip
+    if total > 0:
+        return after, moved, math.log(total) + density.best
+    return factorial_steps.advance(before, audio, visual, density)
+
+
+def retreat(before: Joint, backward: Joint, leaving: Joint, audio: Moves, visual: Moves, density: Density) -> Retreat:
+    """Return what ``factorial_steps.retreat`` does."""
+    units, first = len(audio.leaving), backward[:, : len(visual.leaving)]
+    moved = factorial.moved_back(backward, visual.stay, visual.onward, first @ visual.leaving.T)
+    after = np.empty_like(before)
+    by_audio, by_visual, by_pair = np.empty(before.shape[0]), np.empty(before.shape[1]), np.empty(len(density.pair))
+    total = factorial.backward(
+        before, moved, audio.stay, audio.onward, audio.leaving @ moved[:units],
+        density.audio, density.visual, density.pair_audio, density.pair_visual, density.pair, *LEAST[before.dtype],
+        after, by_audio, by_visual, by_pair,
+    )  # fmt: skip
+    overlap = float(by_audio.sum())
+    if not (total > 0 and overlap > 0):
+        return factorial_steps.retreat(before, backward, leaving, audio, visual, density)
+    scale = 1 / overlap
+    closed = Closed(by_audio * scale, by_visual * scale, by_pair * scale, overlap)
+    audio_entered, visual_entered = before[-units:] @ moved[:units].T, leaving.T @ first
+    return Retreat(closed, after, np.float64(scale) * audio_entered, np.float64(scale) * visual_entered)

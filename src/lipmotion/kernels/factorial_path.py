@@ -1,0 +1,117 @@
+"""The most probable states of factorial hidden Markov models (``kernels.loops``)."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.kernels.loops import Array, Evidence, Index, Loop
+
+
+def factorial_best_path(
+    audio: Loop, visual: Loop, evidence: Evidence, stretch: int | None = None
+) -> tuple[Index, Index, float]:
+    """Return the most probable states of both loops [shapes=(T,)] and the log probability of path and evidence.
+
+    stretch : frames whose decisions are kept at once, while those of the others are taken twice; None: √T
+    Where there is no path: states 0, and -inf.  Of paths as good as each other, one.
+    Source: Viterbi, along one loop's axis and then along the other's.
+    Cost: time O(T·Na·Nv·(Ua + Uv)), memory O(stretch + T/stretch) times Na·Nv.
+    """
+    frames = len(evidence.audio)
+    stretch = stretch or math.isqrt(max(frames - 1, 0)) + 1
+    search = _Search(_LogMoves.of(audio), _LogMoves.of(visual), evidence)
+    with np.errstate(divide="ignore"):
+        initial, final = (
+            np.add.outer(*(np.log(getattr(loop, name).ravel()) for loop in (audio, visual)))
+            for name in ("initial", "final")
+        )
+    score = initial + search.log_density(0)
+    befores = []
+    for start in range(1, frames, stretch):
+        befores.append((start, score))
+        score, _ = search.through(start, min(start + stretch, frames), score)
+    path = np.zeros((frames, 2), np.intp)
+    score = score + final
+    best = float(score.max())
+    if best == -np.inf:
+        return path[:, 0], path[:, 1], best
+    path[-1] = np.unravel_index(int(score.argmax()), score.shape)
+    for start, before in reversed(befores):
+        _, decisions = search.through(start, min(start + stretch, frames), before)
+        for t in range(start + len(decisions) - 1, start - 1, -1):
+            path[t - 1] = search.behind(decisions[t - start], *path[t])
+    return path[:, 0], path[:, 1], best
+
+
+_Decisions = tuple[NDArray[Any], NDArray[Any]]
+"""Of each loop, where each joint state was come to from [shape=(N, M)], its own states first."""
+
+
+class _LogMoves(NamedTuple):
+    """Log probabilities of a loop, as ``loops.Moves``."""
+
+    stay: Array
+    onward: Array
+    leaving: Array
+
+    @classmethod
+    def of(cls, loop: Loop) -> _LogMoves:
+        with np.errstate(divide="ignore"):
+            leaving = np.log(loop.leave)[:, None] + np.log(loop.enter)
+            return cls(np.log(loop.stay.ravel()), np.log(loop.onward.ravel()), leaving)
+
+    def forward(self, score: Array) -> tuple[Array, NDArray[Any]]:
+        """Return the best scores one frame on, along axis 0, and the decisions: U stay, U + 1 onward, else the unit."""
+        units = len(self.leaving)
+        after = score + self.stay[:, None]
+        decision = np.full(score.shape, units, np.min_scalar_type(units + 1))
+        moved = score[: len(self.onward)] + self.onward[:, None]
+        better = moved > after[units:]
+        after[units:][better] = moved[better]
+        decision[units:][better] = units + 1
+        for unit, weight in enumerate(self.leaving):
+            moved = score[len(score) - units + unit] + weight[:, None]
+            better = moved > after[:units]
+            after[:units][better] = moved[better]
+            decision[:units][better] = unit
+        return after, decision
+
+    def behind(self, state: int, decision: int) -> int:
+        """Return the state one frame back."""
+        units = len(self.leaving)
+        if decision < units:
+            return len(self.stay) - units + decision
+        return state - units if decision > units else state
+
+
+class _Search(NamedTuple):
+    audio: _LogMoves
+    visual: _LogMoves
+    evidence: Evidence
+
+    def log_density(self, t: int) -> Array:
+        """Return the log density of every joint state."""
+        evidence = self.evidence
+        joint = np.add.outer(evidence.audio[t], evidence.visual[t], dtype=np.float64)
+        joint[tuple(evidence.pairs.T)] = evidence.pair[t]
+        return joint
+
+    def through(self, start: int, stop: int, score: Array) -> tuple[Array, list[_Decisions]]:
+        """Return the scores of the last frame of a stretch, and the decisions on the way."""
+        decisions = []
+        for t in range(start, stop):
+            score, by_audio = self.audio.forward(score)
+            turned, by_visual = self.visual.forward(np.ascontiguousarray(score.T))
+            score = turned.T + self.log_density(t)
+            decisions.append((by_audio, by_visual))
+        return score, decisions
+
+    def behind(self, decisions: _Decisions, audio: int, visual: int) -> tuple[int, int]:
+        """Return both states one frame back: the visual loop moved last."""
+        by_audio, by_visual = decisions
+        visual = self.visual.behind(visual, int(by_visual[visual, audio]))
+        return self.audio.behind(audio, int(by_audio[audio, visual])), visual

@@ -1,0 +1,104 @@
+"""One frame of a factorial hidden Markov model, forward and backward, by NumPy."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.kernels.loops import Density, Moves
+
+Joint = NDArray[np.floating[Any]]
+"""[shape=(Na, Nv)]"""
+LEAST_TOTAL = 1e-100
+"""Of what is emitted: less is computed again in logarithms."""
+
+
+class Closed(NamedTuple):
+    """What forward and backward probabilities say of a frame.
+
+    audio, visual, pair : [shapes=(Na,), (Nv,), (P,)], posteriors
+    overlap             : the sum of the products of both, which posteriors are relative to
+    """
+
+    audio: NDArray[np.float64]
+    visual: NDArray[np.float64]
+    pair: NDArray[np.float64]
+    overlap: float
+
+
+class Retreat(NamedTuple):
+    """What a step back says.
+
+    closed : of the frame before
+    backward : its backward probabilities and densities, multiplied, sum 1
+    audio_entered, visual_entered : [shapes=(U, U)], how often units were expected to follow each other, divided by
+        the probability that they do
+    """
+
+    closed: Closed
+    backward: Joint
+    audio_entered: Joint
+    visual_entered: Joint
+
+
+def advance(before: Joint, audio: Moves, visual: Moves, density: Density) -> tuple[Joint, Joint, float]:
+    """Return forward probabilities one frame on (sum 1), those that have moved in the audio loop only and are in last
+    visual states [shape=(Na, Uv)], and the log of what the former are divided by (-inf: all are 0).
+    """
+    moved = audio.forward(before)
+    joint, log_total = emitted(visual.forward(moved.T).T, density)
+    return joint, moved[:, -len(visual.leaving) :], log_total
+
+
+def retreat(before: Joint, backward: Joint, leaving: Joint, audio: Moves, visual: Moves, density: Density) -> Retreat:
+    """Return what a step back says.
+
+    before   : forward probabilities of the frame before
+    backward : backward probabilities and densities of this frame, multiplied
+    leaving  : as ``advance`` returned from ``before``
+    density  : of the frame before
+    """
+    units_audio, units_visual = len(audio.leaving), len(visual.leaving)
+    moved = visual.backward(backward.T).T
+    beta = audio.backward(moved)
+    found = closed(before, beta, density)
+    scale = 1 / found.overlap if found.overlap > 0 else 0.0
+    audio_entered = before[-units_audio:] @ moved[:units_audio].T
+    visual_entered = leaving.T @ backward[:, :units_visual]
+    return Retreat(
+        found, emitted(beta, density)[0], np.float64(scale) * audio_entered, np.float64(scale) * visual_entered
+    )
+
+
+def closed(forward: Joint, backward: Joint, density: Density) -> Closed:
+    """Return posteriors of a frame."""
+    joint = np.multiply(forward, backward, dtype=np.float64)
+    overlap = float(joint.sum())
+    joint /= overlap if overlap > 0 else 1
+    return Closed(joint.sum(axis=1), joint.sum(axis=0), joint[density.pair_audio, density.pair_visual], overlap)
+
+
+def emitted(prior: Joint, density: Density) -> tuple[Joint, float]:
+    """Return probabilities times densities, sum 1, and the log of what they are divided by (-inf: all are 0)."""
+    joint = prior * density.audio[:, None] * density.visual
+    joint[density.pair_audio, density.pair_visual] = prior[density.pair_audio, density.pair_visual] * density.pair
+    total = float(joint.sum(dtype=np.float64))
+    if not total > LEAST_TOTAL:
+        return _emitted_in_logs(prior, density)
+    return (joint / total).astype(prior.dtype, copy=False), np.log(total) + density.best
+
+
+def _emitted_in_logs(prior: Joint, density: Density) -> tuple[Joint, float]:
+    audio, visual, pair = density.logs
+    joint = np.add.outer(audio, visual, dtype=np.float64)
+    joint[density.pair_audio, density.pair_visual] = pair
+    with np.errstate(divide="ignore"):
+        joint += np.log(prior, dtype=np.float64)
+    best = float(joint.max())
+    if not np.isfinite(best):
+        return np.zeros_like(prior), -np.inf
+    joint = np.exp(joint - best)
+    total = float(joint.sum())
+    return (joint / total).astype(prior.dtype), np.log(total) + best

@@ -1,0 +1,70 @@
+"""Chains small enough to list all of their paths."""
+
+from itertools import pairwise
+
+import numpy as np
+
+from lipmotion.engines.coupled.densities import Group, Observed
+from lipmotion.engines.coupled.model import Chains
+from lipmotion.engines.coupled.product import Grammar, reachable
+from lipmotion.engines.coupled.systems import COUPLED, HMM, Structure
+from lipmotion.engines.coupled.transitions import first_transitions
+from lipmotion.stats.mixture import Mixtures
+from lipmotion.units import PHONES, UnitSet
+from lipmotion.units.unit_set import CLOSED
+
+BILABIAL = ("p", "b", "m", "em")
+SHUT = (*BILABIAL, "sil", "sp")
+THREE = UnitSet(
+    "three", {phone: CLOSED if phone in SHUT else "round" if phone in ("uw", "ow", "w") else "open" for phone in PHONES}
+)
+TWO = UnitSet("two", {phone: CLOSED if phone in SHUT else "open" for phone in PHONES})
+"""What looks alike on the second chain: round and open."""
+
+
+def structure(kind=COUPLED, chains=(THREE, TWO), states=2, limit=1, crosses=True) -> Structure:
+    return Structure(kind, chains, states, limit, crosses)
+
+
+def grammar(of: Structure, seed=0) -> Grammar:
+    draw = np.random.default_rng(seed)
+    counts = [len(units) for units in of.units]
+    return Grammar(
+        tuple(draw.dirichlet(np.ones(count), count) for count in counts),
+        tuple(draw.dirichlet(np.ones(count)) for count in counts),
+    )
+
+
+def mixtures(count, components, size, seed) -> Mixtures:
+    draw = np.random.default_rng(seed)
+    weights = draw.dirichlet(np.ones(components), count)
+    return Mixtures(
+        np.log(weights).astype(np.float32),
+        draw.normal(0, 1, (count, components, size)).astype(np.float32),
+        draw.uniform(0.5, 2, (count, components, size)).astype(np.float32),
+    )
+
+
+def chains(of: Structure | None = None, components=(2, 2), sizes=(2, 1), seed=0, weights=(1.0, 1.0)) -> Chains:
+    """Chains of random densities and tables, one stream of speech and one that is seen."""
+    of = of or structure()
+    product = reachable(of, grammar(of, seed))
+    transitions = first_transitions(product)
+    draw = np.random.default_rng([seed, 1])
+    advance = tuple(draw.uniform(0.2, 0.8, len(table)) for table in transitions.advance)
+    transitions = type(transitions)(product, transitions.rows, advance)
+    together = [(0, 1)] if of.kind == HMM else [(0,), (1,)]
+    groups = []
+    for number, members in enumerate(together):
+        chain = of.chain_of(members[0])
+        edges = np.cumsum([0, *(sizes[s] for s in members)]).tolist()
+        columns = tuple(slice(a, b) for a, b in pairwise(edges))
+        found = mixtures(of.counts[chain], components[number], edges[-1], [seed, 2, number])
+        groups.append(Group(members, columns, found, tuple(weights[s] for s in members), product.chain_states[chain]))
+    return Chains(("speech", "seen"), transitions, tuple(groups))
+
+
+def observed(frames=4, sizes=(2, 1), seed=0, seen=True) -> Observed:
+    draw = np.random.default_rng([seed, 3])
+    streams = tuple(draw.normal(0, 1, (frames, size)).astype(np.float32) for size in sizes)
+    return Observed(streams, (None, None if seen else np.zeros(frames, bool)))

@@ -1,0 +1,199 @@
+from itertools import product
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from lipmotion.kernels import factorial
+from lipmotion.kernels.factorial import factorial_posteriors
+from lipmotion.kernels.factorial_path import factorial_best_path
+from lipmotion.kernels.loops import Evidence, Loop
+from lipmotion.kernels.network import network_posteriors
+from oracles import factorial as oracle
+from oracles.paths import path_score
+
+SEEDS = st.integers(0, 2**32 - 1)
+SHARED = settings(deadline=None, max_examples=20, suppress_health_check=[HealthCheck.function_scoped_fixture])
+
+
+@pytest.fixture(params=["numpy", "compiled"], autouse=True)
+def form(request, monkeypatch) -> str:
+    """Everything holds for both forms."""
+    if request.param == "compiled":
+        pytest.importorskip("numba")
+    monkeypatch.setattr(factorial, "numba_works", lambda: request.param == "compiled")
+    return request.param
+
+
+def random_loop(draw, states: int, units: int) -> Loop:
+    stay = draw.uniform(0.3, 0.9, (states, units))
+    enter = draw.dirichlet(np.ones(units), size=units)
+    initial = draw.dirichlet(np.ones(units * states)).reshape(states, units)
+    return Loop(stay, 1 - stay[:-1], 1 - stay[-1], enter, initial, draw.uniform(0.1, 1, (states, units)))
+
+
+def random_model(seed: int, frames: int, shapes=((2, 2), (2, 1)), spread: float = 2.0, pairs: int = 3):
+    draw = np.random.default_rng([seed, 3])
+    audio, visual = (random_loop(draw, *shape) for shape in shapes)
+    sizes = audio.stay.size, visual.stay.size
+    chosen = draw.choice(sizes[0] * sizes[1], size=min(pairs, sizes[0] * sizes[1]), replace=False)
+    logs = (draw.normal(-20, spread, (frames, size)) for size in sizes)
+    own = draw.normal(-38, spread, (frames, len(chosen)))
+    return audio, visual, Evidence(*logs, own, np.stack(np.unravel_index(chosen, sizes), axis=1))
+
+
+def agree(model, tolerance=1e-9, **options) -> None:
+    found = factorial_posteriors(*model, **options)
+    joint, counts, log_likelihood = oracle.posteriors(*model)
+    assert found.audio == pytest.approx(joint.sum(axis=2), abs=tolerance)
+    assert found.visual == pytest.approx(joint.sum(axis=1), abs=tolerance)
+    pairs = model[2].pairs
+    assert found.pair == pytest.approx(joint[:, pairs[:, 0], pairs[:, 1]], abs=tolerance)
+    for mine, wanted in zip((found.audio_counts, found.visual_counts), counts, strict=True):
+        for name, values in wanted.items():
+            assert getattr(mine, name) == pytest.approx(values, abs=tolerance)
+    assert found.audio_counts.initial.ravel() == pytest.approx(joint[0].sum(axis=1), abs=tolerance)
+    assert found.log_likelihood == pytest.approx(log_likelihood, abs=1e-8)
+
+
+@given(seed=SEEDS, frames=st.integers(1, 4), spread=st.sampled_from([0.1, 2.0, 20.0, 300.0]))
+@SHARED
+def test_agrees_with_the_enumeration_of_all_joint_paths(seed, frames, spread):
+    agree(random_model(seed, frames, spread=spread))
+
+
+@pytest.mark.parametrize("shapes", [((1, 2), (2, 2)), ((1, 1), (3, 1)), ((3, 1), (1, 2))])
+def test_loops_of_any_shape_agree_with_the_enumeration(shapes):
+    agree(random_model(1, 3, shapes))
+
+
+@pytest.mark.parametrize("precision", [np.float32, np.float64])
+def test_agrees_with_the_network_of_all_joint_states(precision):
+    audio, visual, evidence = random_model(2, 40, ((3, 5), (2, 4)), 5.0, 20)
+    evidence = Evidence(*(part.astype(precision) for part in evidence[:3]), evidence.pairs)
+    found = factorial_posteriors(audio, visual, evidence)
+    log_density, initial, final = oracle.joint_logs(audio, visual, evidence)
+    arcs = sorted(oracle.joint_arcs(audio, visual).items(), key=lambda item: item[0][1])
+    sources, targets = np.array([arc for arc, _ in arcs]).T
+    logs = np.log([probability for _, probability in arcs])
+    states = np.arange(log_density.shape[1])
+    starts = np.searchsorted(targets, states)
+    joint, _, log_likelihood = network_posteriors(log_density, states, sources, logs, starts, initial, final)
+    joint = joint.reshape(40, 15, 8)
+    tolerance = 1e-9 if precision is np.float64 else 2e-5
+    assert found.audio == pytest.approx(joint.sum(axis=2), abs=tolerance)
+    assert found.visual == pytest.approx(joint.sum(axis=1), abs=tolerance)
+    assert found.log_likelihood == pytest.approx(log_likelihood, rel=1e-9 if precision is np.float64 else 1e-6)
+
+
+def test_beside_a_single_state_a_loop_is_a_plain_hidden_markov_model():
+    audio, visual, evidence = random_model(3, 30, ((3, 4), (1, 1)), pairs=0)
+    visual = Loop(*(np.ones_like(part) for part in visual))._replace(leave=np.zeros(1))
+    found = factorial_posteriors(audio, visual, evidence)
+    arcs = {}
+    for source, target, *_, probability in oracle.steps(audio):
+        arcs[target, source] = arcs.get((target, source), 0.0) + probability
+    (targets, sources), logs = np.array(sorted(arcs)).T, np.log([arcs[arc] for arc in sorted(arcs)])
+    states = np.arange(12)
+    ends = np.log(audio.initial).ravel(), np.log(audio.final).ravel()
+    starts = np.searchsorted(targets, states)
+    posterior, _, log_likelihood = network_posteriors(evidence.audio, states, sources, logs, starts, *ends)
+    assert found.audio == pytest.approx(posterior, abs=1e-10)
+    assert found.visual == pytest.approx(np.ones((30, 1)))
+    assert found.log_likelihood == pytest.approx(log_likelihood + evidence.visual.sum(), abs=1e-8)
+
+
+@pytest.mark.parametrize("precision", [np.float32, np.float64])
+def test_posteriors_sum_to_one_and_counts_are_as_many_as_steps(precision):
+    audio, visual, evidence = random_model(4, 150, ((3, 6), (3, 4)), 20.0, 10)
+    evidence = Evidence(*(part.astype(precision) for part in evidence[:3]), evidence.pairs)
+    found = factorial_posteriors(audio, visual, evidence)
+    tolerance = 1e-9 if precision is np.float64 else 1e-4
+    for posterior, counts in ((found.audio, found.audio_counts), (found.visual, found.visual_counts)):
+        assert posterior.sum(axis=1) == pytest.approx(np.ones(150), abs=1e-6)
+        assert sum(c.sum() for c in counts[:3]) == pytest.approx(149, abs=149 * tolerance)
+        frames = posterior.reshape(150, *counts.stay.shape)
+        assert counts.enter.sum(axis=0) + counts.stay[0] == pytest.approx(frames[1:, 0].sum(axis=0), abs=tolerance)
+
+
+@pytest.mark.parametrize("stretch", [1, 2, 7, 36, 37, 38, 100])
+def test_frames_computed_twice_change_nothing(stretch):
+    model = random_model(5, 37, ((3, 3), (2, 2)))
+    wanted, found = factorial_posteriors(*model, stretch=37), factorial_posteriors(*model, stretch=stretch)
+    for ours, theirs in zip(found[:3], wanted[:3], strict=True):
+        assert np.array_equal(ours, theirs)
+    for ours, theirs in zip((*found[3], *found[4]), (*wanted[3], *wanted[4]), strict=True):
+        assert np.array_equal(ours, theirs)
+    assert found.log_likelihood == pytest.approx(wanted.log_likelihood, rel=1e-12)
+
+
+@given(seed=SEEDS)
+@SHARED
+def test_masked_states_and_pairs_agree_with_the_enumeration(seed):
+    audio, visual, evidence = random_model(seed, 4, pairs=4)
+    draw = np.random.default_rng([seed, 4])
+    masked = [np.where(draw.random(part.shape) < 0.3, -np.inf, part) for part in evidence[:3]]
+    agree((audio, visual, Evidence(*masked, evidence.pairs)))
+
+
+def test_a_pair_of_its_own_density_may_be_where_both_states_are_masked():
+    audio, visual, evidence = random_model(6, 3, pairs=1)
+    a, v = evidence.pairs[0]
+    evidence.audio[1, a], evidence.visual[1, v] = -np.inf, -np.inf
+    agree((audio, visual, evidence))
+    evidence.audio[1], evidence.visual[1] = -np.inf, -np.inf
+    agree((audio, visual, evidence))
+
+
+def test_impossible_evidence_says_so():
+    audio, visual, evidence = random_model(7, 5, pairs=0)
+    evidence.visual[3] = -np.inf
+    found = factorial_posteriors(audio, visual, evidence)
+    assert found.log_likelihood == -np.inf
+    assert not any(part.any() for part in (*found[:3], *found.audio_counts, *found.visual_counts))
+    assert factorial_best_path(audio, visual, evidence)[2] == -np.inf
+
+
+@pytest.mark.parametrize("spread", [5.0, 100.0, 1e3])
+def test_single_precision_is_close_however_loud(spread):
+    audio, visual, evidence = random_model(8, 60, ((3, 8), (3, 5)), spread, 30)
+    single = Evidence(*(part.astype(np.float32) for part in evidence[:3]), evidence.pairs)
+    double = Evidence(*(part.astype(np.float64) for part in single[:3]), evidence.pairs)
+    found, wanted = (factorial_posteriors(audio, visual, given) for given in (single, double))
+    assert found.audio == pytest.approx(wanted.audio, abs=1e-4)
+    assert found.pair == pytest.approx(wanted.pair, abs=1e-4)
+    assert found.audio_counts.enter == pytest.approx(wanted.audio_counts.enter, abs=1e-3)
+    assert found.log_likelihood == pytest.approx(wanted.log_likelihood, rel=1e-6)
+
+
+@pytest.mark.parametrize("third", [-60.0, -66.0, -200.0])
+def test_a_unit_far_behind_comes_back_in_single_precision(third):
+    """Evidence speaks 72 nats against a unit, later 85 against the other; a third, worse, is never so far behind."""
+    audio, visual, _ = random_model(9, 1, ((2, 3), (1, 1)), pairs=0)
+    same = np.full((2, 3), 0.5)
+    audio = audio._replace(
+        stay=same, onward=same[:1], leave=same[0], enter=np.eye(3), initial=same / 3, final=same + 0.5
+    )
+    log_density = np.repeat([[-72.0, 0, third] * 2, [0, -85.0, third] * 2], 20, axis=0) / 20
+    evidence = Evidence.of(log_density.astype(np.float32), np.zeros((40, 1), np.float32))
+    found = factorial_posteriors(audio, visual, evidence)
+    assert found.audio[:, ::3].sum(axis=1) == pytest.approx(np.ones(40), abs=1e-4)
+
+
+@given(seed=SEEDS, frames=st.integers(1, 4), stretch=st.integers(1, 5))
+@SHARED
+def test_the_best_path_is_the_best_of_all(seed, frames, stretch):
+    audio, visual, evidence = random_model(seed, frames)
+    log_density, *ends = oracle.joint_logs(audio, visual, evidence)
+    ways = {}
+    for (a, b, *_, p), (c, d, *_, q) in product(oracle.steps(audio), oracle.steps(visual)):
+        arc = a * visual.stay.size + c, b * visual.stay.size + d
+        ways[arc] = max(ways.get(arc, -np.inf), np.log(p * q))
+    states = np.arange(log_density.shape[1])
+    scores = {
+        path: path_score(path, log_density, states, ways, *ends) for path in product(states.tolist(), repeat=frames)
+    }
+    one, other, score = factorial_best_path(audio, visual, evidence, stretch)
+    assert score == pytest.approx(max(scores.values()), abs=1e-9)
+    assert scores[tuple((one * visual.stay.size + other).tolist())] == pytest.approx(score, abs=1e-9)

@@ -1,0 +1,88 @@
+"""Coupled chains by enumeration: every path of joint states, every component."""
+
+from itertools import pairwise, product
+
+import numpy as np
+
+
+def log_gaussian(x, mean, variance):
+    """Log density of a diagonal Gaussian."""
+    return float(-0.5 * np.sum(np.log(2 * np.pi * variance) + (x - mean) ** 2 / variance))
+
+
+def log_density(group, density, observed, frame):
+    """Log density of a frame under one density of a group, all of its streams, weighted and where seen."""
+    mixtures, terms = group.mixtures, []
+    for component in range(mixtures.log_weights.shape[1]):
+        total = float(mixtures.log_weights[density, component])
+        for stream, columns, weight in zip(group.streams, group.columns, group.weights, strict=True):
+            seen = observed.seen[stream]
+            if seen is not None and not seen[frame]:
+                continue
+            mean = mixtures.means[density, component, columns].astype(float)
+            variance = mixtures.variances[density, component, columns].astype(float)
+            total += weight * log_gaussian(observed.streams[stream][frame], mean, variance)
+        terms.append(total)
+    return np.logaddexp.reduce(terms), np.array(terms)
+
+
+def paths(chains, observed):
+    """Give every path of joint states that is possible, with the log of its probability and the densities along it."""
+    found = chains.transitions.product
+    arcs = dict(
+        zip(zip(found.arc_from.tolist(), found.arc_to.tolist(), strict=True), chains.transitions.arc_log, strict=True)
+    )
+    initial = found.initial
+    emission = np.array(
+        [
+            [
+                sum(log_density(group, group.tie[state], observed, frame)[0] for group in chains.groups)
+                for state in range(len(found.joints))
+            ]
+            for frame in range(observed.frames)
+        ]
+    )
+
+    def onward(path, score):
+        if len(path) == observed.frames:
+            yield path, score
+            return
+        for state in range(len(found.joints)):
+            arc = arcs.get((path[-1], state))
+            if arc is not None:
+                yield from onward((*path, state), score + arc + emission[len(path), state])
+
+    for state in np.flatnonzero(initial > 0).tolist():
+        yield from onward((state,), np.log(initial[state]) + emission[0, state])
+
+
+def posteriors(chains, observed):
+    """Return posteriors of joint states [shape=(T, S)], expected arc counts by pair, and the log likelihood."""
+    every = list(paths(chains, observed))
+    scores = np.array([score for _, score in every])
+    log_likelihood = np.logaddexp.reduce(scores)
+    joint = np.zeros((observed.frames, len(chains.transitions.product.joints)))
+    counts: dict[tuple[int, int], float] = {}
+    for (path, _), weight in zip(every, np.exp(scores - log_likelihood), strict=True):
+        joint[np.arange(len(path)), path] += weight
+        for pair in pairwise(path):
+            counts[pair] = counts.get(pair, 0.0) + weight
+    return joint, counts, float(log_likelihood)
+
+
+def component_statistics(chains, observed, number, stream):
+    """Return Σ γ(q, k) Σ⁻¹ and Σ γ(q, k) Σ⁻¹ μ of a stream [each shape=(T, D)], term by term."""
+    joint, _, _ = posteriors(chains, observed)
+    group = chains.groups[number]
+    columns = group.columns[group.streams.index(stream)]
+    size = columns.stop - columns.start
+    precision, weighted = np.zeros((observed.frames, size)), np.zeros((observed.frames, size))
+    for frame, state in product(range(observed.frames), range(joint.shape[1])):
+        density = group.tie[state]
+        total, terms = log_density(group, density, observed, frame)
+        for component, term in enumerate(terms):
+            share = joint[frame, state] * np.exp(term - total)
+            inverse = 1 / group.mixtures.variances[density, component, columns].astype(float)
+            precision[frame] += share * inverse
+            weighted[frame] += share * inverse * group.mixtures.means[density, component, columns]
+    return precision, weighted

@@ -1,0 +1,59 @@
+"""Factorial hidden Markov models as one network of joint states, whose paths are enumerated."""
+
+from itertools import product
+
+import numpy as np
+
+from oracles import networks
+
+
+def steps(loop):
+    """Give every way of a loop from one frame to the next: states, what is counted, its position, and probability."""
+    n, units = loop.stay.shape
+    for state, unit in product(range(n), range(units)):
+        here = state * units + unit
+        yield here, here, "stay", (state, unit), loop.stay[state, unit]
+        if state + 1 < n:
+            yield here, here + units, "onward", (state, unit), loop.onward[state, unit]
+        else:
+            for other in range(units):
+                yield here, other, "enter", (unit, other), loop.leave[unit] * loop.enter[unit, other]
+
+
+def joint_arcs(audio, visual):
+    """Return the probabilities of all arcs between joint states by source and target."""
+    arcs, wide = {}, visual.stay.size
+    for (a, b, *_, p), (c, d, *_, q) in product(steps(audio), steps(visual)):
+        if p * q > 0:
+            arcs[a * wide + c, b * wide + d] = arcs.get((a * wide + c, b * wide + d), 0.0) + p * q
+    return arcs
+
+
+def joint_logs(audio, visual, evidence):
+    """Return log densities [shape=(T, Na·Nv)] and log probabilities of beginning and ending in joint states."""
+    log_density = evidence.audio[:, :, None].astype(float) + evidence.visual[:, None, :]
+    for position, (a, b) in enumerate(evidence.pairs):
+        log_density[:, a, b] = evidence.pair[:, position]
+    with np.errstate(divide="ignore"):
+        ends = [np.log(np.outer(getattr(audio, end), getattr(visual, end))).ravel() for end in ("initial", "final")]
+    return log_density.reshape(len(log_density), -1), *ends
+
+
+def posteriors(audio, visual, evidence):
+    """Return joint posteriors [shape=(T, Na, Nv)], counts of each loop by what is counted, and the log likelihood."""
+    log_density, initial, final = joint_logs(audio, visual, evidence)
+    arcs = joint_arcs(audio, visual)
+    logs = {arc: float(np.log(probability)) for arc, probability in arcs.items()}
+    states = np.arange(log_density.shape[1])
+    posterior, followed, log_likelihood = networks.posteriors(log_density, states, logs, initial, final)
+    counts = [
+        {name: np.zeros_like(getattr(loop, name)) for name in ("stay", "onward", "enter")} for loop in (audio, visual)
+    ]
+    wide = visual.stay.size
+    for (a, b, name, at, p), (c, d, other, where, q) in product(steps(audio), steps(visual)):
+        if p * q > 0:
+            arc = a * wide + c, b * wide + d
+            share = followed[arc] * p * q / arcs[arc]
+            counts[0][name][at] += share
+            counts[1][other][where] += share
+    return posterior.reshape(len(posterior), audio.stay.size, wide), counts, log_likelihood
