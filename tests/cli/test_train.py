@@ -93,7 +93,7 @@ def test_other_voices_are_learned_from_but_those_for_judging(
         return toy_model, TrainReport((), {}, {})
 
     both = tuple(SyntheticVoice(name, "flite", name) for name in ("slt", "rms"))
-    monkeypatch.setattr("lipmotion.speech.voices.installed.installed_voices", lambda: both)
+    monkeypatch.setattr("lipmotion.pipeline.voices.installed_voices", lambda: both)
     monkeypatch.setattr("lipmotion.pipeline.voices.many_voices", say)
     monkeypatch.setattr("lipmotion.pipeline.train.train", learn)
     (here / "open" / "friend").mkdir(parents=True)

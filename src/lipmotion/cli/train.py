@@ -4,16 +4,9 @@ from __future__ import annotations
 
 import argparse
 import os
-from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from lipmotion.cli.options import add_machine_readable, list_or_all
-
-if TYPE_CHECKING:
-    from lipmotion.pipeline.voices import SpokenSentence
-    from lipmotion.types import Monitor
-    from lipmotion.units import Lexicon
 
 UNITS = "what is modelled: phone (default), eVis, sVis, pbVis, 2vis, or a table file (docs/unit-sets.md)"
 VISUAL = "what is learned: geometry (tracked or given motion, default), eigenlips (mouth pictures), or both"
@@ -49,7 +42,7 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.files import unfinished_work
     from lipmotion.pipeline.model import save_model
     from lipmotion.pipeline.train import train
-    from lipmotion.pipeline.voices import heard
+    from lipmotion.pipeline.voices import other_voices
     from lipmotion.units import Lexicon, unit_set
 
     workers = options.workers or os.cpu_count() or 1
@@ -60,7 +53,8 @@ def run(options: argparse.Namespace) -> None:
         engine = engine_named(options.engine, {"units": options.units} if options.units != "phone" else {})
         chosen = {"engine": engine, "split": split, "speakers": options.speaker, "lexicon": lexicon, "workers": workers}
         chosen["visual"] = options.visual
-        chosen["voices"] = heard(_others(options, lexicon, report.hear))
+        heard = {"recordings": options.recordings, "lexicon": lexicon, "monitor": report.hear}
+        chosen["voices"] = other_voices(synthetic=options.voices, **heard)
         with unfinished_work(options.output) as work:
             model, result = train(Corpus.open(options.corpus), **chosen, monitor=report.hear, work=work)
             save_model(model, options.output)
@@ -68,18 +62,3 @@ def run(options: argparse.Namespace) -> None:
         text = ", ".join(f"{value} {name}" for name, value in figures.items())
         text = f"{options.output}: {text}; use it: lipmotion animate SPEECH -o FILE --model {options.output}"
         report.finish(text, model=str(options.output), **figures)
-
-
-def _others(options: argparse.Namespace, lexicon: Lexicon | None, monitor: Monitor) -> Iterator[SpokenSentence]:
-    """Give what other speakers say, but the synthetic ones who are for judging."""
-    from lipmotion.pipeline.model import load_model
-    from lipmotion.pipeline.voices import is_for_judging, many_voices, recorded_voices
-    from lipmotion.speech.recogniser import Recogniser
-    from lipmotion.speech.voices.installed import installed_voices
-
-    if options.recordings:
-        general = Recogniser(load_model().phones, "general")
-        yield from recorded_voices(options.recordings, general, lexicon=lexicon, monitor=monitor)
-    if options.voices:
-        voices = [voice for voice in installed_voices() if not is_for_judging(voice.speaker)]
-        yield from many_voices(voices=voices, lexicon=lexicon)

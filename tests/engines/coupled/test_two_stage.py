@@ -79,12 +79,12 @@ def unseen(sentences: Sequence[Example]) -> list[Labelled]:
     ]
 
 
-def four_frames() -> Labelled:
+def three_frames() -> Labelled:
     """Where a silence becomes a t, lips seen: so short that all paths can be tried."""
     (whole,) = labelled(examples(1))
     start = round(whole.phones.spans[1].start_s * RATE_HZ) - 2
-    phones = Timeline((Span(0.0, 0.02, Unit("sil")), Span(0.02, 0.04, Unit("t"))))
-    return Labelled(whole.observed.part(slice(start, start + 4)), phones)
+    phones = Timeline((Span(0.0, 0.02, Unit("sil")), Span(0.02, 0.03, Unit("t"))))
+    return Labelled(whole.observed.part(slice(start, start + 3)), phones)
 
 
 def speech_posteriors(chains: Chains, one: Labelled) -> np.ndarray:
@@ -132,7 +132,7 @@ def learned(before: Mixtures, density: int, gamma: np.ndarray, x: np.ndarray, fl
 
 def test_a_step_is_that_of_the_split_model() -> None:
     """Own speech and that of others, together fifty times the same."""
-    chains, own = trained(), four_frames()
+    chains, own = trained(), three_frames()
     other = replace(own, observed=own.observed.missing(1))
     found = with_more_speech(chains, [own], [other], MoreSpeech(2, 1, 49.0)).groups[0].mixtures
     gamma, x = 50 * speech_posteriors(chains, own), own.observed.streams[0]
