@@ -65,7 +65,8 @@ def main() -> None:
     parser.add_argument("--only", action="append", choices=list(MODELS), help="repeatable; default: all")
     options = parser.parse_args()
     corpus, strangers = Corpus.open("build/grid-s1"), Corpus.open(options.strangers)
-    utterances = [corpus.utterance(name) for name in corpus.names("train")[: options.clips]]
+    names = corpus.names("train")
+    utterances = [corpus.utterance(name) for name in names[:: max(len(names) // options.clips, 1)][: options.clips]]
     phones = lipmotion.load_model("build/grid-s1-train.lipmotion").phones
     examples = [example(one, Recogniser(phones)) for one in utterances]
     others, judges = speakers(options.corpora, options.sentences)

@@ -10,7 +10,7 @@ import pytest
 
 from engines.synthetic import RATE_HZ, examples
 from lipmotion.engines.coupled.config import CoupledConfig
-from lipmotion.engines.coupled.densities import Observed
+from lipmotion.engines.coupled.densities import LEAST_COMPONENT_FRAMES, Observed
 from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.engines.coupled.expectation import expected
 from lipmotion.engines.coupled.learned import CoupledModel
@@ -124,7 +124,7 @@ def learned(before: Mixtures, density: int, gamma: np.ndarray, x: np.ndarray, fl
     weight = np.exp(parts - np.logaddexp.reduce(parts, axis=1)[:, None]) * gamma[:, None]
     total = weight.sum(axis=0)
     means, variances = before.means[density].astype(float), before.variances[density].astype(float)
-    for part in np.flatnonzero(total > 0.5):
+    for part in np.flatnonzero(total > LEAST_COMPONENT_FRAMES):
         means[part] = weight[:, part] @ x / total[part]
         variances[part] = np.maximum(weight[:, part] @ (x - means[part]) ** 2 / total[part], floor)
     return total / total.sum(), means, variances
