@@ -42,7 +42,7 @@ class CoupledConfig:
     states: int = 3
     asynchrony: int = 1
     crosses: bool = True
-    mixtures: int = 4
+    mixtures: int = 8
     visual_mixtures: int = 1
     more_mixtures: int = 8
     more_steps: int = 8
