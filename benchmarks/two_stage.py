@@ -76,7 +76,7 @@ def main() -> None:
     for name in options.only or MODELS:
         kinds, config = MODELS[name]
         more = [one for kind in kinds.split() for one in others[kind]]
-        engine = engine_named("coupled", config)
+        engine = engine_named("coupled", {"mixtures": 4} | config)
         started_s = time.perf_counter()
         fit = engine.fit([*examples, *examples_of_others(engine, more)], silent_monitor)
         model, minutes = Model(phones, engine, fit.model, {}), sum(one.features.duration_s for one in more) / 60
