@@ -25,11 +25,8 @@ class Fit(Generic[ModelT]):
     figures: Mapping[str, float]
 
 
-class Engine(ABC, Generic[ModelT]):
-    """Holds its configuration only. What was learned is the model, what came out is the ``Generation``."""
-
-    name: ClassVar[str]
-    config: Any
+class Animator(ABC, Generic[ModelT]):
+    """Learns to make motion of speech. What was learned is the model, what came out is the ``Generation``."""
 
     @property
     def hears_f0(self) -> bool:
@@ -60,6 +57,13 @@ class Engine(ABC, Generic[ModelT]):
 
         Raises InputError: a constraint names no channel, or lies outside the recording.
         """
+
+
+class Engine(Animator[ModelT]):
+    """An animator whose models are kept in files. Holds its configuration only."""
+
+    name: ClassVar[str]
+    config: Any
 
     @abstractmethod
     def trees(self, model: ModelT) -> str:

@@ -6,20 +6,20 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from lipmotion.engines import Engine
+from lipmotion.engines import Animator
 from lipmotion.errors import AlignmentError
 from lipmotion.speech.f0 import log_f0
 from lipmotion.speech.recogniser import Recogniser
 from lipmotion.types import Audio, Features, Speech, Timeline, Unit
 
 
-def hear(engine: Engine[Any], audio: Audio, features: Features, units: Timeline[Unit]) -> Speech:
+def hear(engine: Animator[Any], audio: Audio, features: Features, units: Timeline[Unit]) -> Speech:
     """Return a recording with its phones in time, and with its F0 where the engine wants it."""
     return Speech(features, units, log_f0(audio) if engine.hears_f0 else None)
 
 
 def hear_unsaid(
-    engine: Engine[Any],
+    engine: Animator[Any],
     learned: Any,
     audio: Audio,
     features: Features,

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import itertools
 import os
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
@@ -27,7 +29,7 @@ from lipmotion.engines.coupled.learned import CALM_S, CoupledModel
 from lipmotion.engines.coupled.model import Chains
 from lipmotion.engines.coupled.more_speech import MoreSpeech, with_more_speech
 from lipmotion.engines.coupled.systems import HMM, Structure, structure_of
-from lipmotion.engines.coupled.train import Labelled, Schedule, Step, train_chains
+from lipmotion.engines.coupled.train import Labelled, Schedule, Step, growing_chains
 from lipmotion.engines.coupled.visual import VisualStream, unseen, visual_streams
 from lipmotion.engines.trajectory.closure import learned_closure
 from lipmotion.engines.trajectory.space import motion_in_space
@@ -52,6 +54,16 @@ def fit_coupled(examples: Sequence[Example], config: CoupledConfig, monitor: Mon
     Raises CorpusError: no example with motion that was seen, or examples of different channels.
     Raises InputError: no such unit set, or a structure that does not fit together.
     """
+    return deque(growing_models(examples, config, monitor), maxlen=1)[0]()
+
+
+def growing_models(
+    examples: Sequence[Example], config: CoupledConfig, monitor: Monitor
+) -> Iterator[Callable[[], CoupledModel]]:
+    """Give what makes the models with 1, 2, 4, … Gaussians that ``fit_coupled`` learns on its way, itself the last.
+
+    Raises as ``fit_coupled``.
+    """
     structure = structure_of(config.structure, config.chains, config.states, config.asynchrony, config.crosses)
     moving = [example for example in examples if within(example.valid).any()]
     space, values = motion_in_space(moving or examples, config.components)
@@ -72,40 +84,42 @@ def fit_coupled(examples: Sequence[Example], config: CoupledConfig, monitor: Mon
         for example in examples
         if not within(example.valid).any()
     ]
-    chains = _chains(structure, visual, data, others, config, part_of(monitor, 0, 0.7))
-    model = CoupledModel(chains, space, visual, None, np.ones(space.dimensions), rest, closure)
-    if config.dynamic and config.follows:
-        monitor(Progress("following the sound", 1, 1, 0.75))
-        model = replace(model, follow=_follow(model, data))
-    if config.dynamic and config.full_range:
-        model = replace(model, gain=_gain(model, data, values))
-    monitor(Progress("following the sound", 1, 1, 1.0))
-    return model
+    first, second = (0.4, 0.7) if others else (0.7, 0.7)
+
+    def model_of(chains: Chains) -> CoupledModel:
+        if others:
+            chains = _second_stage(chains, data, others, config, part_of(monitor, first, second))
+        model = CoupledModel(chains, space, visual, None, np.ones(space.dimensions), rest, closure)
+        if config.dynamic and config.follows:
+            monitor(Progress("following the sound", 1, 1, 0.75))
+            model = replace(model, follow=_follow(model, data))
+        if config.dynamic and config.full_range:
+            model = replace(model, gain=_gain(model, data, values))
+        monitor(Progress("following the sound", 1, 1, 1.0))
+        return model
+
+    names, how = (SPEECH, *(stream.name for stream in visual)), _schedule(structure, visual, config)
+    steps = how.most * max(how.mixtures).bit_length()
+    told = _told("chains", steps, part_of(monitor, 0, first))
+    for chains in growing_chains(structure, names, data, how, told, workers()):
+        yield partial(model_of, chains)
 
 
-def _chains(
-    structure: Structure,
-    visual: Sequence[VisualStream],
-    data: Sequence[Labelled],
-    others: Sequence[Labelled],
-    config: CoupledConfig,
-    monitor: Monitor,
-) -> Chains:
-    """Return the chains after both stages of training, the second only where there is speech without motion."""
+def _schedule(structure: Structure, visual: Sequence[VisualStream], config: CoupledConfig) -> Schedule:
     mixtures = (config.mixtures, *(config.visual_mixtures for _ in visual))
-    how = Schedule(
+    return Schedule(
         mixtures[:1] if structure.kind == HMM else mixtures,
         (config.audio_weight, *(config.visual_weight for _ in visual)),
     )
-    first, second = (part_of(monitor, 0, 0.5), part_of(monitor, 0.5, 1)) if others else (monitor, monitor)
-    names = (SPEECH, *(stream.name for stream in visual))
-    steps = how.most * max(how.mixtures).bit_length()
-    chains = train_chains(structure, names, data, how, _told("chains", steps, first), workers())
-    if not others:
-        return chains
+
+
+def _second_stage(
+    chains: Chains, data: Sequence[Labelled], others: Sequence[Labelled], config: CoupledConfig, monitor: Monitor
+) -> Chains:
+    """Return the chains after the second stage of training, on speech without motion as well."""
     more = MoreSpeech(config.more_mixtures, config.more_steps, config.more_weight)
     steps = more.steps * max(more.mixtures // config.mixtures, 1).bit_length()
-    return with_more_speech(chains, data, others, more, _told("more speech", steps, second), workers())
+    return with_more_speech(chains, data, others, more, _told("more speech", steps, monitor), workers())
 
 
 def workers() -> int:

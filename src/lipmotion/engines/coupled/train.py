@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -80,14 +81,27 @@ def train_chains(
     heard : is told every step; within a number of components the log likelihood never falls
     Source: Xie & Liu 2007, §3.4 and Appendix A, with scaled recursions.
     """
+    return deque(growing_chains(structure, streams, data, how, heard, workers), maxlen=1)[0]
+
+
+def growing_chains(
+    structure: Structure,
+    streams: tuple[str, ...],
+    data: Sequence[Labelled],
+    how: Schedule,
+    heard: Callable[[Step], None] = lambda _: None,
+    workers: int = 1,
+) -> Iterator[Chains]:
+    """Give the chains that ``train_chains`` learns with 1, 2, 4, … Gaussians: each as if those were all."""
     floors = variance_floors([one.observed for one in data])
     chains = _viterbi_start(structure, streams, data, how, floors)
     recordings = [recording(chains, one) for one in data]
     while True:
         chains, said = converged(chains, recordings, floors, how.most, heard, workers)
+        yield chains
         now = components(chains)
         if all(n >= most for n, most in zip(now, how.mixtures, strict=True)):
-            return chains
+            return
         chains = split(chains, how.mixtures, said)
 
 
