@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from lipmotion.engines.coupled.conversion import statistics
 from lipmotion.engines.coupled.densities import Observed, Single
 from lipmotion.engines.coupled.following import Following, Surroundings
-from lipmotion.engines.coupled.lattice import Lattice, Posteriors
-from lipmotion.engines.coupled.model import Chains, Evidence
+from lipmotion.engines.coupled.model import Chains, Inferred
 from lipmotion.engines.coupled.visual import VisualStream
 from lipmotion.engines.trajectory.closure import Closure
 from lipmotion.engines.trajectory.space import MotionSpace
@@ -45,19 +44,19 @@ class CoupledModel:
         nothing = tuple(np.zeros((len(features), len(stream.mean)), np.float32) for stream in self.visual)
         return Observed((features, *nothing), (None, *(np.zeros(len(features), bool) for _ in nothing)))
 
-    def statistics(
-        self, observed: Observed, evidence: Evidence, posteriors: Posteriors, lattice: Lattice
-    ) -> tuple[Array, Array]:
+    def statistics(self, inferred: Inferred) -> tuple[Array, Array]:
         """Return means and precisions of the motion in its space [each shape=(T, 3, Q)]."""
-        shape = (observed.frames, 3, self.space.dimensions)
+        shape = (inferred.observed.frames, 3, self.space.dimensions)
         means, precisions = np.zeros(shape), np.zeros(shape)
-        around = self._around(observed.streams[0], posteriors)
+        around = self.around(inferred)
         for number, stream in enumerate(self.visual):
             if around is None or self.follow is None:
-                precision, weighted = statistics(self.chains, posteriors, evidence, lattice, number + 1)
+                precision, weighted = statistics(
+                    self.chains, inferred.posteriors, inferred.evidence, inferred.lattice, number + 1
+                )
                 mean = weighted / np.maximum(precision, 1e-300)
             else:
-                gate = posteriors.chains[self.chains.structure.chain_of(number + 1)]
+                gate = inferred.posteriors.chains[self.chains.structure.chain_of(number + 1)]
                 following = self.follow[1][number]
                 mean, precision = following.means(around, gate), following.precisions(gate)
             means[:, :, stream.columns], precisions[:, :, stream.columns] = stream.restored(mean, precision)
@@ -82,7 +81,8 @@ class CoupledModel:
         precisions[:, 1:] = 0
         return means, precisions
 
-    def _around(self, features: Single, posteriors: Posteriors) -> Single | None:
+    def around(self, inferred: Inferred) -> Single | None:
+        """Return what visual means follow, in numbers [shape=(T, F + 1)]; None: they follow nothing."""
         if self.follow is None:
             return None
-        return self.follow[0](features, posteriors.chains[0])
+        return self.follow[0](inferred.observed.streams[0], inferred.posteriors.chains[0])
