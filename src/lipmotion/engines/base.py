@@ -78,15 +78,21 @@ class Engine(ABC, Generic[ModelT]):
 
     @property
     def has_chains(self) -> bool:
-        """Whether ``beliefs`` has something to say."""
+        """Whether it has chains of states that ``beliefs`` tells of."""
         return False
+
+    def check_chains(self) -> None:
+        """Raise InputError unless the engine has chains."""
+        if not self.has_chains:
+            raise InputError(
+                f"the engine {self.name!r} has no chains of states whose posteriors could be shown; give a model that "
+                "was trained with --engine coupled"
+            )
 
     def beliefs(self, model: ModelT, speech: Speech) -> tuple[ChainBelief, ...]:  # noqa: ARG002
         """Return what is believed of every chain of states over time. Raises InputError: the engine has no chains."""
-        raise InputError(
-            f"an engine {self.name!r} has no chains of states whose probabilities could be shown; train a model of the "
-            "engine 'coupled'"
-        )
+        self.check_chains()
+        return ()
 
     @abstractmethod
     def trees(self, model: ModelT) -> str:

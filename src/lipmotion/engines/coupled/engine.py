@@ -137,7 +137,7 @@ class CoupledEngine(Engine[CoupledModel]):
 
     @property
     def has_chains(self) -> bool:
-        """Whether ``beliefs`` has something to say."""
+        """Whether it has chains of states that ``beliefs`` tells of."""
         return True
 
     def beliefs(self, model: CoupledModel, speech: Speech) -> tuple[ChainBelief, ...]:  # noqa: D102
