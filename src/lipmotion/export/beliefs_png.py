@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image, ImageChops, ImageDraw, ImageFont
 
 from lipmotion.types import ChainBelief, Generation
 from lipmotion.units import is_silent
@@ -27,7 +27,6 @@ TICK = 80
 WHITE, INK, GREY, PALE = (255, 255, 255), (30, 34, 42), (120, 126, 136), (228, 231, 236)
 COLOURS = ((23, 92, 166), (176, 62, 24), (38, 122, 62))
 """One a chain."""
-Image3 = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -65,17 +64,18 @@ def draw(generation: Generation, beliefs: Sequence[ChainBelief]) -> Image.Image:
     height = TITLE + sum(TITLE + ROW * len(names) + GAP for _, names, _ in panels) + TITLE + CURVE + 2 * TITLE
     picture = Image.new("RGB", (LEFT + axis.columns + RIGHT, height), WHITE)
     pen = Pen(ImageDraw.Draw(picture), axis)
+    pen.phones(generation, height - 2 * TITLE)
     y = TITLE
     for title, names, colours in panels:
         pen.text(LEFT, y + 2, title, INK)
         y += TITLE
-        band = Image.fromarray(colours.transpose(1, 0, 2)).resize((axis.columns, ROW * len(names)), 0)
-        picture.paste(band, (LEFT, y))
         pen.rows(y, names)
+        area = (LEFT, y, LEFT + axis.columns, y + ROW * len(names))
+        band = Image.fromarray(colours.transpose(1, 0, 2)).resize((axis.columns, ROW * len(names)), 0)
+        picture.paste(ImageChops.darker(band, picture.crop(area)), area)
         y += ROW * len(names) + GAP
-    pen.text(LEFT, y + 2, f"{curve} of the mouth that is generated" if curve == "opening" else curve, INK)
+    pen.text(LEFT, y + 2, f"{curve} (generated)", INK)
     pen.curve(y + TITLE, generation.motion[curve])
-    pen.phones(generation, y + TITLE + CURVE)
     pen.times(y + TITLE + CURVE)
     return picture
 
@@ -90,7 +90,7 @@ def _panels(axis: Axis, belief: ChainBelief, first: str, number: int) -> list[tu
     if belief.leads:
         named = [f"{lead:+d}" if lead else "0" for lead in belief.leads]
         title = f"asynchrony: states that {belief.name} is ahead of {first}"
-        panels.append((title, named, _shaded(axis, belief.lead, GREY)))
+        panels.append((title, named, _shaded(axis, belief.lead, INK)))
     return panels
 
 
@@ -125,11 +125,12 @@ class Pen:
 
     def curve(self, y: float, values: NDArray[Any]) -> None:
         """Draw a curve [shape=(T,)] with its least and largest value."""
-        columns = self.axis.averaged(values[:, None])[:, 0]
-        low, high = float(min(columns.min(), 0)), float(columns.max())
-        heights = y + CURVE - (columns - low) / max(high - low, 1e-9) * (CURVE - 8)
+        shown = values if len(values) < self.axis.columns else self.axis.averaged(values[:, None])[:, 0]
+        low, high = float(min(shown.min(), 0)), float(shown.max())
+        heights = y + CURVE - (shown - low) / max(high - low, 1e-9) * (CURVE - 8)
+        places = LEFT + (np.arange(len(shown)) + 0.5) / len(shown) * self.axis.columns
         self.on.rectangle([LEFT, y, LEFT + self.axis.columns, y + CURVE], outline=GREY)
-        self.on.line([(LEFT + x, float(h)) for x, h in enumerate(heights)], fill=INK, width=2)
+        self.on.line(list(zip(places.tolist(), heights.tolist(), strict=True)), fill=INK, width=2)
         self.text(LEFT - 6, y + 8, f"{high:.2f}", INK, "rm")
         self.text(LEFT - 6, y + CURVE, f"{low:.2f}", INK, "rm")
 

@@ -6,12 +6,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from textwrap import wrap
 
-import numpy as np
-
 from lipmotion.engines.base import frame_of
 from lipmotion.errors import InputError
 from lipmotion.pipeline.hear import heard
 from lipmotion.pipeline.model import Model, load_model
+from lipmotion.speech.mfcc import frame_count
 from lipmotion.speech.read import read_audio
 from lipmotion.types import (
     FRAME_RATE_HZ,
@@ -53,13 +52,13 @@ def explain(
     chosen = model if isinstance(model, Model) else load_model(model)
     audio = speech if isinstance(speech, Audio) else read_audio(Path(speech))
     times = [at_s] if isinstance(at_s, int | float) else at_s
-    frames = [_frame(time_s, audio.duration_s) for time_s in times]
+    count = frame_count(audio.samples)
+    frames = [_frame(time_s, count) for time_s in times]
     known = heard(chosen, audio, transcript=transcript, units=units, lexicon=lexicon, recogniser=recogniser)
     return chosen.engine.explain(chosen.learned, known, frames)
 
 
-def _frame(time_s: float, duration_s: float) -> int:
-    frames = int(np.floor(duration_s * FRAME_RATE_HZ + 1e-9)) + 1
+def _frame(time_s: float, frames: int) -> int:
     frame = frame_of(time_s, frames, FRAME_RATE_HZ)
     if frame is None:
         raise InputError(f"{time_s} s lies outside the recording (0 to {(frames - 1) / FRAME_RATE_HZ:.2f} s)")

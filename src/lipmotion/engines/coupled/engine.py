@@ -14,6 +14,7 @@ from lipmotion.engines.coupled.arrays import coupled_arrays, coupled_from_arrays
 from lipmotion.engines.coupled.config import PATH, TRAJECTORY, CoupledConfig
 from lipmotion.engines.coupled.conversion import converted, path_means
 from lipmotion.engines.coupled.densities import Single
+from lipmotion.engines.coupled.description import described
 from lipmotion.engines.coupled.explanation import explained, joined, units_believed
 from lipmotion.engines.coupled.fit import fit_coupled
 from lipmotion.engines.coupled.lattice import Lattice
@@ -149,11 +150,7 @@ class CoupledEngine(Engine[CoupledModel]):
         return tuple(joined(parts) for parts in zip(*found, strict=True))
 
     def trees(self, model: CoupledModel) -> str:  # noqa: D102
-        structure = model.chains.structure
-        return "\n".join(
-            f"{chain.name}: {len(units)} units of {structure.states} states"
-            for chain, units in zip(structure.chains, structure.units, strict=True)
-        )
+        return described(model)
 
     def to_arrays(self, model: CoupledModel) -> dict[str, NDArray[Any]]:  # noqa: D102
         return coupled_arrays(model)
