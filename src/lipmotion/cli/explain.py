@@ -23,13 +23,12 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 def run(options: argparse.Namespace) -> None:
     """Call ``lipmotion.explain`` and print what it found."""
     import json
-    from dataclasses import asdict
 
-    from lipmotion.pipeline.explain import explain, explanation_text
+    from lipmotion.pipeline.explain import explain, explanation_document, explanation_text
 
     found = explain(speech=options.speech, at_s=options.at, **speech_arguments(options))
     if options.json:
         for explanation in found:
-            print(json.dumps(asdict(explanation)))
+            print(json.dumps(explanation_document(explanation)))
     else:
         print("\n\n".join(map(explanation_text, found)))

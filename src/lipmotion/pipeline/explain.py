@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from textwrap import wrap
+from typing import Any
 
 from lipmotion.engines.base import frame_of
 from lipmotion.errors import InputError
@@ -63,6 +65,15 @@ def _frame(time_s: float, frames: int) -> int:
     if frame is None:
         raise InputError(f"{time_s} s lies outside the recording (0 to {(frames - 1) / FRAME_RATE_HZ:.2f} s)")
     return frame
+
+
+def explanation_document(explanation: Explanation) -> dict[str, Any]:
+    """Return an explanation as JSON holds it (docs/explain.md)."""
+    document = asdict(explanation)
+    for written, chain in zip(document["chains"], explanation.chains, strict=True):
+        if chain.lead:
+            written["expected_lead"] = chain.expected_lead
+    return document
 
 
 def explanation_text(explanation: Explanation) -> str:

@@ -29,8 +29,8 @@ def _chains(model: CoupledModel) -> Iterator[str]:
     yield f"{structure.kind}: {KINDS[structure.kind]}"
     if len(structure.chains) > 1:
         apart = "any number of states" if structure.limit is None else f"up to {structure.limit} state(s)"
-        units = "" if structure.crosses or structure.limit is None else ", units left together"
-        yield f"  asynchrony: {apart} apart{units}"
+        together = "" if structure.crosses or structure.limit is None else ", units left together"
+        yield f"  asynchrony: {apart} apart{together}"
     count = len(product.joints) if isinstance(product, Product) else product.chain_states.shape[1]
     yield f"  joint states: {count}"
     for number, (chain, units) in enumerate(zip(structure.chains, structure.units, strict=True), start=1):
