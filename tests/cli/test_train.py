@@ -98,7 +98,7 @@ def test_units_of_a_table_that_is_not_needed_again(run: Run, toy_corpus: Corpus,
         (["CORPUS", "-o", "m", "--engine", "coupled", "--units", "eVis"], 3, '--set chains="phone viseme"'),
         (["CORPUS", "-o", "m", "--system", "ph-HMM"], 3, "add --engine coupled"),
         (["CORPUS", "-o", "m", "--set", "tree=1"], 3, "no option 'tree'; there are: parts, silent_parts"),
-        (["CORPUS", "-o", "m", "--engine", "joined"], 3, "no engine 'joined'; there are: trajectory, joint"),
+        (["CORPUS", "-o", "m", "--engine", "joined"], 3, "no engine 'joined'; there are: trajectory, coupled, joint"),
     ],
 )
 def test_what_cannot_be_used(
