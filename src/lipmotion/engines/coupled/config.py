@@ -39,7 +39,7 @@ class CoupledConfig:
     states: int = 3
     asynchrony: int = 1
     crosses: bool = True
-    mixtures: int = 4
+    mixtures: int = 8
     visual_mixtures: int = 1
     audio_weight: float = 1.0
     visual_weight: float = 1.0

@@ -23,7 +23,7 @@ from lipmotion.engines.coupled.following import (
     fit_following,
     fit_surroundings,
 )
-from lipmotion.engines.coupled.learned import CoupledModel
+from lipmotion.engines.coupled.learned import CALM_S, CoupledModel
 from lipmotion.engines.coupled.model import Chains
 from lipmotion.engines.coupled.systems import HMM, Structure, structure_of
 from lipmotion.engines.coupled.train import Labelled, Schedule, Step, train_chains
@@ -40,8 +40,6 @@ Array = NDArray[np.float64]
 ResultT = TypeVar("ResultT")
 SPEECH = "speech"
 LARGEST_GAIN = 2.0
-CALM_S = 0.15
-"""Silence this far from speech is rest."""
 
 
 def fit_coupled(examples: Sequence[Example], config: CoupledConfig, monitor: Monitor) -> CoupledModel:
@@ -146,7 +144,7 @@ def _follow(model: CoupledModel, data: Sequence[Labelled]) -> tuple[Surroundings
     ]
     around = fit_surroundings(axes, heard)
     return around, tuple(
-        fit_following(around, heard, stream, _kinds(structure, chain)) for stream, chain in enumerate(others)
+        fit_following(around, heard, stream, *_kinds(structure, chain)) for stream, chain in enumerate(others)
     )
 
 
@@ -156,11 +154,12 @@ def _believed(chains: Chains, one: Labelled, which: Sequence[int]) -> tuple[NDAr
     return tuple(posteriors.chains[chain] for chain in which)
 
 
-def _kinds(structure: Structure, chain: int) -> NDArray[np.intp]:
-    """Return a number for the viseme of each state of a chain [shape=(N,)]."""
+def _kinds(structure: Structure, chain: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return a number for the viseme and place of each state of a chain [shape=(N,)], and the viseme of each [(E,)]."""
     visemes = [VISEME_OF[structure.chains[chain].phones(unit)[0]] for unit in structure.units[chain]]
     numbers = np.unique(visemes, return_inverse=True)[1]
-    return np.repeat(numbers, structure.states).astype(np.intp)
+    family = np.repeat(np.arange(numbers.max() + 1), structure.states)
+    return (numbers[:, None] * structure.states + np.arange(structure.states)).ravel().astype(np.intp), family
 
 
 def _gain(model: CoupledModel, data: Sequence[Labelled], values: Sequence[Array]) -> Array:

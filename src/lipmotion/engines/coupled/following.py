@@ -2,8 +2,8 @@
 
 The visual chain of the paper has one mean a state, which says nothing of the neighbours: lips in a k are those of its
 vowels. Here the mean of a state is linear in the sound around the frame and in the posteriors of the first chain around
-it: a soft context, for no phone need be decided. One regression serves all states, one for each viseme is drawn towards
-it, and the visual chain's posteriors weigh them.
+it: a soft context, for no phone need be decided. Each state of each viseme has a regression, drawn towards that of the
+viseme, and this towards that of all; the visual chain's posteriors weigh them.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ SOUND_WEIGHT = 0.1
 CONSTANT = 1.0
 SHARED_RIDGE = 1e-4
 """Of the frames."""
-OWN_RIDGE = 3.0
+OWN_RIDGE = 5.0
 LEAST_GATE = 0.01
 LEAST_FRAMES = 20.0
 
@@ -139,12 +139,15 @@ def fit_surroundings(belief: Single, heard: Sequence[Heard]) -> Surroundings:
     return Surroundings(sound, belief, mean.astype(np.float32), basis)
 
 
-def fit_following(around: Surroundings, heard: Sequence[Heard], stream: int, kind: NDArray[np.intp]) -> Following:
+def fit_following(
+    around: Surroundings, heard: Sequence[Heard], stream: int, kind: NDArray[np.intp], family: NDArray[np.intp]
+) -> Following:
     """Return how a visual stream follows its surroundings.
 
-    kind : the regression of each state of its chain [shape=(N_v,)]
+    kind   : the regression of each state of its chain [shape=(N_v,)]
+    family : of each regression [shape=(E,)]; each is drawn towards that of its family, and this towards that of all
     """
-    outputs, inputs, count = heard[0].targets[stream].shape[1], around.basis.shape[1] + 1, int(kind.max()) + 1
+    outputs, inputs, count = heard[0].targets[stream].shape[1], around.basis.shape[1] + 1, len(family)
     moments = [no_moments(inputs, outputs) for _ in range(count)]
     for one in heard:
         z, weight = _frames(around, one), gates(one.gates[stream], kind, count)[one.seen]
@@ -156,7 +159,12 @@ def fit_following(around: Surroundings, heard: Sequence[Heard], stream: int, kin
     every = sum(moments[1:], moments[0])
     frames = sum(int(one.seen.sum()) for one in heard)
     shared = ridge(every, np.zeros_like(every.targets), SHARED_RIDGE * frames)
-    own = np.array([ridge(one, shared, OWN_RIDGE) for one in moments], np.float32)
+    families = [
+        ridge(sum(members[1:], members[0]), shared, OWN_RIDGE)
+        for members in ([moments[i] for i in np.flatnonzero(family == f)] for f in range(int(family.max()) + 1))
+    ]
+    pairs = zip(moments, family.tolist(), strict=True)
+    own = np.array([ridge(one, families[f], OWN_RIDGE) for one, f in pairs], np.float32)
     following = Following(kind, own, np.ones((len(kind), outputs), np.float32))
     return Following(kind, own, _variances(following, around, heard, stream))
 

@@ -15,8 +15,15 @@ from lipmotion.engines.coupled.model import Chains, Inferred
 from lipmotion.engines.coupled.visual import VisualStream
 from lipmotion.engines.trajectory.closure import Closure
 from lipmotion.engines.trajectory.space import MotionSpace
+from lipmotion.types import FRAME_RATE_HZ
 
 Array = NDArray[np.float64]
+CALM_S = 0.45
+"""Silence this far from speech is rest: nearer, the mouth closes or gets ready."""
+MOST_SPEECH = 0.05
+"""Of the probability of speech in a silent frame."""
+FIRM = 100.0
+"""How many times more precise the pose at rest is than what is around it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +67,23 @@ class CoupledModel:
                 following = self.follow[1][number]
                 mean, precision = following.means(around, gate), following.precisions(gate)
             means[:, :, stream.columns], precisions[:, :, stream.columns] = stream.restored(mean, precision)
+        resting = self._resting(posteriors.chains[0])
+        means[resting] = 0
+        means[resting, 0] = self.rest
+        precisions[resting] *= FIRM
         return means, precisions
+
+    def _resting(self, posterior: Single) -> NDArray[np.bool_]:
+        """Return which frames are silence away from speech [shape=(T,)].
+
+        posterior : of the first chain's states [shape=(T, N)]
+        """
+        structure = self.chains.structure
+        silent = np.repeat([structure.chains[0].silent(unit) for unit in structure.units[0]], structure.states)
+        spoken = posterior @ (~silent).astype(np.float32) > MOST_SPEECH
+        reach = round(CALM_S * FRAME_RATE_HZ)
+        near = np.cumsum(np.pad(spoken.astype(np.intp), (reach + 1, reach)))
+        return np.asarray(near[2 * reach + 1 :] == near[: -2 * reach - 1])
 
     def seen(self, observed: Observed, values: Array) -> Observed:
         """Return what was observed, with motion in the space [shape=(T, Q)] as if it had been seen."""

@@ -19,7 +19,7 @@ FIRST_ADVANCE = 0.2
 """Probability of moving on in a frame before anything is known: 50 ms a state."""
 LEAST_FRAMES = 50.0
 """A joint state with fewer frames in training moves on as all with the same own state and the same lead do."""
-LEAST, SWEEPS, ENOUGH = 1e-5, 200, 1e-9
+LEAST, SWEEPS, ENOUGH = 1e-5, 50, 1e-6
 
 
 @dataclass(frozen=True, eq=False)
