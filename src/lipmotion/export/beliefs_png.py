@@ -22,6 +22,8 @@ CURVE = 90
 LEAST = 0.05
 """Units that never are this probable have no row."""
 STEPS_S = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 60, 120, 300, 600, 1800)
+LEAST_ROOM = 8
+"""Pixels a phone, on average."""
 TICK = 80
 """Least pixels between two times on the axis."""
 WHITE, INK, GREY, PALE = (255, 255, 255), (30, 34, 42), (120, 126, 136), (228, 231, 236)
@@ -135,7 +137,9 @@ class Pen:
         self.text(LEFT - 6, y + CURVE, f"{low:.2f}", INK, "rm")
 
     def phones(self, generation: Generation, bottom: float) -> None:
-        """Write the phones on top where there is room, and rule lines where they begin."""
+        """Write the phones on top and rule lines where they begin, if there is room for them."""
+        if len(generation.units) * LEAST_ROOM > self.axis.columns:
+            return
         free = 0.0
         for span in generation.units:
             left, right = self.axis.x(span.start_s), self.axis.x(span.end_s)

@@ -101,7 +101,7 @@ def _rows(explanation: Explanation) -> Iterator[tuple[str, str]]:
         yield f"Gaussian of {gaussian.stream}", _gaussian(gaussian)
         yield from _values(gaussian.channels)
     for regression in explanation.regressions:
-        yield f"{regression.stream} follows", _followed(regression)
+        yield f"mean of {regression.stream}", _followed(regression)
         yield from _values(regression.channels)
     values = _values(explanation.motion)
     yield "generated", next(values)[1]
@@ -135,7 +135,9 @@ def _gaussian(gaussian: Gaussian) -> str:
 
 
 def _followed(regression: Regression) -> str:
-    return f"what is heard and believed around the frame, by the regressions of {_listed(regression.shares)}"
+    if regression.shares[0].name == "rest":
+        return "the pose at rest: silence away from speech"
+    return f"follows what is heard and believed around the frame, by the regressions of {_listed(regression.shares)}"
 
 
 def _values(channels: Mapping[str, Value]) -> Iterator[tuple[str, str]]:

@@ -69,9 +69,9 @@ class Gaussian:
 
 @dataclass(frozen=True)
 class Regression:
-    """The mean of a stream that follows what is heard, and believed, around a frame.
+    """The mean of a stream where it is not that of a density: it follows what is heard and believed around the frame.
 
-    shares   : how much each regression says, largest first
+    shares   : how much each regression says, largest first; ``rest`` in silence away from speech
     channels : what they say together, and its deviation
     """
 

@@ -9,6 +9,7 @@ from engines.coupled.tiny import THREE, TWO, chains, observed, structure
 from engines.synthetic import CHANNELS, examples, speech, timeline
 from lipmotion.engines import engine_named
 from lipmotion.engines.coupled.explanation import (
+    _regression_name,
     chain_states,
     explained,
     joint_state,
@@ -17,8 +18,10 @@ from lipmotion.engines.coupled.explanation import (
     units_believed,
 )
 from lipmotion.engines.coupled.systems import COUPLED, FACTORIAL, HMM, MULTISTREAM, SYSTEMS
-from lipmotion.types import Explanation
+from lipmotion.engines.trajectory import generation
+from lipmotion.types import Explanation, Likely
 from lipmotion.types.progress import silent_monitor
+from lipmotion.units import VISEME_OF
 from oracles import coupled as oracle
 
 KINDS = [
@@ -107,7 +110,7 @@ def fitted(name):
 
 def explanation(name, row):
     model, inferred = fitted(name)
-    return explained(Explanation(row / 100, row, None, "", {}), model, inferred, row)
+    return explained([Explanation(row / 100, row, None, "", {})], model, inferred, [row])[0]
 
 
 @pytest.mark.parametrize("name", ["ph-HMM", "ph-vi-CHMM", "ph-vi-FHMM"])
@@ -159,12 +162,43 @@ def test_the_regressions_share_what_is_believed_of_the_visual_chain():
     mean = model.follow[1][0].means(around, gate)
     for row in (64, 75, 91):
         (found,) = explanation("ph-vi-CHMM", row).regressions
-        units = model.chains.structure.units[1]
+        names = [model.chains.structure.state_name(1, state) for state in range(gate.shape[1])]
         for share in found.shares:
-            unit = units.index(share.name)
-            assert share.probability == pytest.approx(gate[row, 3 * unit : 3 * unit + 3].sum(), abs=0.02)
+            assert share.probability == pytest.approx(gate[row, names.index(share.name)], abs=0.02)
         opening = mean[row, 0] * model.visual[0].deviation[0] + model.visual[0].mean[0]
         assert found.channels["opening"].value == pytest.approx(opening)
+
+
+def test_in_silence_away_from_speech_the_mean_is_the_pose_at_rest():
+    model, inferred = fitted("ph-vi-CHMM")
+    assert model.resting(inferred.posteriors.chains[0])[5]
+    (found,) = explanation("ph-vi-CHMM", 5).regressions
+    assert found.shares == (Likely("rest", 1.0),)
+    assert found.channels["opening"].value == pytest.approx(model.rest[0])
+
+
+def test_a_regression_of_several_places_is_named_by_its_viseme():
+    of = structure(chains=(THREE, TWO))
+    kind = np.repeat(np.arange(len(of.units[0])), of.states)
+    first = VISEME_OF[of.chains[0].phones(of.units[0][0])[0]]
+    assert _regression_name(of, 0, kind, 0) == first
+    assert _regression_name(of, 0, np.arange(len(kind)), 1) == f"{first}.2"
+
+
+def test_recordings_of_several_stretches_are_explained_as_one(monkeypatch):
+    monkeypatch.setattr(generation, "STRETCH", 60)
+    monkeypatch.setattr(generation, "MARGIN", 50)
+    engine, (model, _) = engine_named("coupled", {**SYSTEMS["ph-vi-CHMM"], "mixtures": 2}), fitted("ph-vi-CHMM")
+    spoken = speech(timeline(SENTENCE))
+    beliefs = engine.beliefs(model, spoken)
+    result = engine.generate(model, spoken)
+    frames = [3, 59, 60, 61, 119, 120, 150]
+    for row, found in zip(frames, engine.explain(model, spoken, frames), strict=True):
+        assert found.state == result.trace.states[result.trace.frames[row]] == found.joint.name
+        assert list(found.chains[1].lead.values()) == pytest.approx(beliefs[1].lead[row].tolist())
+        for chain, own in enumerate(found.chains):
+            unit = beliefs[chain].units.index(own.states[0].name.rpartition(".")[0])
+            assert beliefs[chain].probability[row, unit] >= own.states[0].probability - 1e-6
 
 
 def test_what_has_no_path_has_no_chains():
@@ -172,4 +206,4 @@ def test_what_has_no_path_has_no_chains():
     impossible = type(inferred.posteriors)(*[*vars(inferred.posteriors).values()][:4], -np.inf)
     nothing = Explanation(0.0, 0, None, "", {})
     lost = type(inferred)(inferred.observed, inferred.lattice, inferred.evidence, impossible)
-    assert explained(nothing, model, lost, 0) is nothing
+    assert explained([nothing], model, lost, [0]) == [nothing]

@@ -127,13 +127,13 @@ class CoupledEngine(Engine[CoupledModel]):
 
     def explain(self, model: CoupledModel, speech: Speech, frames: Sequence[int]) -> tuple[Explanation, ...]:  # noqa: D102
         result = self.generate(model, speech)
-        features, found = np.asarray(speech.features.values), {}
+        features, found = np.asarray(speech.features.values), dict[int, Explanation]()
         for inner, outer in stretches(len(features)):
             inside = [frame for frame in frames if inner.start <= frame < inner.stop]
             if inside:
                 inferred = self.inferred(model, features[outer], self.lattice(model, speech, outer))
-                for frame in inside:
-                    found[frame] = explained(traced(result, frame), model, inferred, frame - outer.start)
+                known, rows = [traced(result, frame) for frame in inside], [frame - outer.start for frame in inside]
+                found.update(zip(inside, explained(known, model, inferred, rows), strict=True))
         return tuple(found[frame] for frame in frames)
 
     @property

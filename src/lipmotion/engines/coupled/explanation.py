@@ -15,32 +15,41 @@ from lipmotion.engines.coupled.lattice import Posteriors
 from lipmotion.engines.coupled.learned import CoupledModel
 from lipmotion.engines.coupled.model import Chains, Inferred
 from lipmotion.engines.coupled.product import Product
+from lipmotion.engines.coupled.systems import Structure
+from lipmotion.engines.coupled.visual import VisualStream
 from lipmotion.types import ChainBelief, ChainStates, Explanation, Gaussian, Likely, Regression, Value
 from lipmotion.units import VISEME_OF
 
 Array = NDArray[np.float64]
 MOST_STATES = 3
 """States of a chain that are named."""
+REST = "rest"
+"""What the mean comes from in silence away from speech."""
 LEAST = 0.005
 """What is less probable is not named."""
 
 
-def explained(frame: Explanation, model: CoupledModel, inferred: Inferred, row: int) -> Explanation:
-    """Return the explanation of a frame with what the chains know of it.
+def explained(
+    frames: Sequence[Explanation], model: CoupledModel, inferred: Inferred, rows: Sequence[int]
+) -> list[Explanation]:
+    """Return explanations of frames with what the chains know of them.
 
-    row : the frame among those of ``inferred``
+    rows : the frames among those of ``inferred``
     What no path of the chains leads through stays as it is.
     """
     if not np.isfinite(inferred.posteriors.log_likelihood):
-        return frame
+        return list(frames)
     streams = range(len(model.chains.streams))
-    return replace(
-        frame,
-        chains=chain_states(model.chains, inferred.posteriors, row),
-        joint=joint_state(model.chains, inferred.posteriors, row),
-        gaussians=tuple(_gaussian(model, inferred, row, stream) for stream in streams),
-        regressions=_regressions(model, inferred, row),
-    )
+    return [
+        replace(
+            frame,
+            chains=chain_states(model.chains, inferred.posteriors, row),
+            joint=joint_state(model.chains, inferred.posteriors, row),
+            gaussians=tuple(_gaussian(model, inferred, row, stream) for stream in streams),
+            regressions=regressions,
+        )
+        for frame, row, regressions in zip(frames, rows, _regressions(model, inferred, rows), strict=True)
+    ]
 
 
 def chain_states(chains: Chains, posteriors: Posteriors, row: int) -> tuple[ChainStates, ...]:
@@ -132,6 +141,11 @@ def _gaussian(model: CoupledModel, inferred: Inferred, row: int, stream: int) ->
     if seen is None or seen[row]:
         error = inferred.observed.streams[stream][row] - mean
         distance = float(np.sqrt(np.mean(error * error / variance)))
+    channels: Mapping[str, Value] = {}
+    if stream:
+        visual = model.visual[stream - 1]
+        means, precisions = visual.restored(mean[None], 1 / variance[None])
+        channels = _in_channels(model, visual, means[0, 0], 1 / precisions[0, 0])
     return Gaussian(
         chains.streams[stream],
         _density_name(chains, group.tie, density),
@@ -139,7 +153,7 @@ def _gaussian(model: CoupledModel, inferred: Inferred, row: int, stream: int) ->
         len(weight),
         float(weight[component, place]),
         distance,
-        _in_channels(model, stream - 1, mean, 1 / variance) if stream else {},
+        channels,
     )
 
 
@@ -151,30 +165,51 @@ def _density_name(chains: Chains, tie: NDArray[np.intp], density: int) -> str:
     )
 
 
-def _regressions(model: CoupledModel, inferred: Inferred, row: int) -> tuple[Regression, ...]:
-    around = model.around(inferred)
-    if around is None or model.follow is None:
-        return ()
-    structure, here, found = model.chains.structure, slice(row, row + 1), []
-    for stream, following in enumerate(model.follow[1]):
-        chain = structure.chain_of(stream + 1)
-        gate = inferred.posteriors.chains[chain][here]
-        firsts = [structure.chains[chain].phones(unit)[0] for unit in structure.units[chain]]
-        kinds = dict(zip(following.kind[:: structure.states].tolist(), map(VISEME_OF.get, firsts), strict=True))
+def _regressions(model: CoupledModel, inferred: Inferred, rows: Sequence[int]) -> list[tuple[Regression, ...]]:
+    """Return what the means of frames come from where they are not those of the densities, frame by frame."""
+    if not all(stream.dynamic for stream in model.visual):
+        return [() for _ in rows]
+    means, precisions = model.statistics(inferred)
+    resting, found = model.resting(inferred.posteriors.chains[0]), []
+    for row in rows:
+        shares = [(Likely(REST, 1.0),)] * len(model.visual) if resting[row] else _shares(model, inferred, row)
+        found.append(
+            tuple(
+                Regression(
+                    stream.name,
+                    own,
+                    _in_channels(model, stream, means[row, 0, columns], 1 / precisions[row, 0, columns]),
+                )
+                for stream, own, columns in ((s, own, s.columns) for s, own in zip(model.visual, shares, strict=False))
+            )
+        )
+    return found
+
+
+def _shares(model: CoupledModel, inferred: Inferred, row: int) -> list[tuple[Likely, ...]]:
+    """Return how much each regression of every visual stream says; none where means follow nothing."""
+    structure, found = model.chains.structure, []
+    for number, following in enumerate(model.follow[1] if model.follow is not None else ()):
+        chain = structure.chain_of(number + 1)
+        gate = inferred.posteriors.chains[chain][row : row + 1]
         share = gates(gate, following.kind, len(following.coefficients))[0]
-        names = [str(kinds.get(kind)) for kind in range(len(share))]
-        mean, precision = following.means(around[here], gate)[0], following.precisions(gate)[0]
-        channels = _in_channels(model, stream, mean, precision)
-        found.append(Regression(model.visual[stream].name, _likely(names, share), channels))
-    return tuple(found)
+        found.append(_likely([_regression_name(structure, chain, following.kind, k) for k in range(len(share))], share))
+    return found
 
 
-def _in_channels(model: CoupledModel, visual: int, mean: Array, precision: Array) -> Mapping[str, Value]:
-    """Return the mean and deviation of the channels of a visual stream from those of its numbers [shapes=(D,)]."""
-    stream, space = model.visual[visual], model.space
-    means, precisions = stream.restored(mean[None], precision[None])
+def _regression_name(structure: Structure, chain: int, kind: NDArray[np.intp], number: int) -> str:
+    """Return the viseme, and the place if all are at the same, of the states that a regression serves: ``bi.2``."""
+    units, places = np.divmod(np.flatnonzero(kind == number), structure.states)
+    phones = {structure.chains[chain].phones(structure.units[chain][unit])[0] for unit in units}
+    viseme = "/".join(sorted({VISEME_OF[phone] for phone in phones}))
+    return f"{viseme}.{places[0] + 1}" if len(set(places.tolist())) == 1 else viseme
+
+
+def _in_channels(model: CoupledModel, stream: VisualStream, means: Array, variances: Array) -> Mapping[str, Value]:
+    """Return the means and deviations of a visual stream's channels from those in its dimensions [shapes=(q,)]."""
+    space = model.space
     values, variance = np.zeros((1, space.dimensions)), np.full((1, space.dimensions), np.nan)
-    values[:, stream.columns], variance[:, stream.columns] = means[:, 0], 1 / precisions[:, 0]
+    values[:, stream.columns], variance[:, stream.columns] = means, variances
     motion, spread = space.restore(values, variance)
     found = zip(space.channels, motion[0].tolist(), np.sqrt(spread[0]).tolist(), strict=True)
     return {channel.name: Value(value, deviation) for channel, value, deviation in found if np.isfinite(deviation)}

@@ -67,13 +67,13 @@ class CoupledModel:
                 following = self.follow[1][number]
                 mean, precision = following.means(around, gate), following.precisions(gate)
             means[:, :, stream.columns], precisions[:, :, stream.columns] = stream.restored(mean, precision)
-        resting = self._resting(posteriors.chains[0])
+        resting = self.resting(inferred.posteriors.chains[0])
         means[resting] = 0
         means[resting, 0] = self.rest
         precisions[resting] *= FIRM
         return means, precisions
 
-    def _resting(self, posterior: Single) -> NDArray[np.bool_]:
+    def resting(self, posterior: Single) -> NDArray[np.bool_]:
         """Return which frames are silence away from speech [shape=(T,)].
 
         posterior : of the first chain's states [shape=(T, N)]
