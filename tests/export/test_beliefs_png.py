@@ -60,6 +60,12 @@ def test_units_that_are_never_likely_have_no_row() -> None:
     assert heights[1] - heights[0] == ROW
 
 
+def test_where_nothing_is_likely_there_is_a_picture_all_the_same() -> None:
+    few = draw(generated(), [belief("phone", np.full((FRAMES, 30), 1 / 30))])
+    assert few.height > draw(generated(), [belief("phone", halves())]).height
+    assert draw(generated(), [belief("phone", np.zeros((FRAMES, 3)))]).height > 0
+
+
 def test_the_asynchrony_is_a_panel_of_its_own() -> None:
     lead = np.tile([0.1, 0.3, 0.6], (FRAMES, 1))
     alone = draw(generated(), [belief("phone", halves())])
@@ -83,6 +89,16 @@ def test_a_column_of_a_long_recording_is_the_mean_of_its_frames() -> None:
     shown = pixels(draw(generated(8 * WIDEST), [belief("phone", believed)]))
     row = shown[2 * TITLE + ROW // 2, LEFT + 10 : LEFT + WIDEST // 2 - 10]
     assert (row == [round(255 + 0.25 * (part - 255)) for part in COLOURS[0]]).all()
+
+
+def test_phones_are_written_where_there_is_room() -> None:
+    dense = Timeline(tuple(Span(s / 100, (s + 1) / 100, Unit("aa", "aa")) for s in range(FRAMES)))
+    strips = []
+    for units in (Timeline(()), dense, generated().units):
+        picture = draw(replace(generated(), units=units), [belief("phone", halves())])
+        strips.append(pixels(picture.crop((LEFT, 0, picture.width, TITLE - 4))).min())
+    assert strips[:2] == [255, 255]
+    assert strips[2] < 200
 
 
 def test_motion_without_an_opening_shows_its_first_channel() -> None:

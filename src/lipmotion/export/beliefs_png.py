@@ -85,7 +85,8 @@ def draw(generation: Generation, beliefs: Sequence[ChainBelief]) -> Image.Image:
 def _panels(axis: Axis, belief: ChainBelief, first: str, number: int) -> list[tuple[str, list[str], NDArray[np.uint8]]]:
     """Return title, names of rows and colours [shape=(columns, rows, 3)] of what is shown of a chain."""
     colour = COLOURS[number % len(COLOURS)]
-    shown = np.flatnonzero(belief.probability.max(axis=0) >= LEAST)
+    most = belief.probability.max(axis=0)
+    shown = np.flatnonzero(most >= min(LEAST, most.max()))
     shown = shown[np.argsort(belief.probability[:, shown].argmax(axis=0), kind="stable")]
     names = [belief.units[unit] for unit in shown]
     panels = [(f"chain {number + 1}: {belief.name}", names, _shaded(axis, belief.probability[:, shown], colour))]

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 from lipmotion.errors import ExportError
-from lipmotion.export.beliefs_png import draw
 from lipmotion.files import check_target, whole_file
 from lipmotion.pipeline.hear import heard
 from lipmotion.pipeline.model import Model
@@ -49,6 +48,8 @@ def write_beliefs(path: Path, generation: Generation, beliefs: tuple[ChainBelief
 
     Raises ExportError: another suffix, or the file cannot be written.
     """
+    from lipmotion.export.beliefs_png import draw
+
     check_picture(path)
     with whole_file(path) as unfinished:
         draw(generation, beliefs).save(unfinished, optimize=True)
