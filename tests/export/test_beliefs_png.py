@@ -32,7 +32,7 @@ def generated(frames: int = FRAMES, name: str = "opening") -> Generation:
 def halves(frames: int = FRAMES) -> np.ndarray:
     """The first unit in the first half, the second in the other; the third now and then, the fourth hardly ever."""
     early = (np.arange(frames) < frames // 2).astype(float)
-    sometimes = np.where(np.arange(frames) == frames - 1, 0.3, 0.2)
+    sometimes = np.where(np.arange(frames) == frames - 1, 0.5, 0.2)
     return np.stack([1 - early, early, sometimes, np.full(frames, 0.04)], axis=1)
 
 

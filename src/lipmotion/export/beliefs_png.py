@@ -82,17 +82,20 @@ def draw(generation: Generation, beliefs: Sequence[ChainBelief]) -> Image.Image:
     return picture
 
 
-def _panels(axis: Axis, belief: ChainBelief, first: str, number: int) -> list[tuple[str, list[str], NDArray[np.uint8]]]:
+def _panels(
+    axis: Axis, belief: ChainBelief, leader: str, number: int
+) -> list[tuple[str, list[str], NDArray[np.uint8]]]:
     """Return title, names of rows and colours [shape=(columns, rows, 3)] of what is shown of a chain."""
     colour = COLOURS[number % len(COLOURS)]
     most = belief.probability.max(axis=0)
     shown = np.flatnonzero(most >= min(LEAST, most.max()))
-    shown = shown[np.argsort(belief.probability[:, shown].argmax(axis=0), kind="stable")]
+    first = (belief.probability[:, shown] >= most[shown] / 2).argmax(axis=0)
+    shown = shown[np.argsort(first, kind="stable")]
     names = [belief.units[unit] for unit in shown]
     panels = [(f"chain {number + 1}: {belief.name}", names, _shaded(axis, belief.probability[:, shown], colour))]
     if belief.leads:
         named = [f"{lead:+d}" if lead else "0" for lead in belief.leads]
-        title = f"asynchrony: states that {belief.name} is ahead of {first}"
+        title = f"asynchrony: states that {belief.name} is ahead of {leader}"
         panels.append((title, named, _shaded(axis, belief.lead, INK)))
     return panels
 

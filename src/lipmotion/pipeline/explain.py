@@ -137,7 +137,7 @@ def _gaussian(gaussian: Gaussian) -> str:
 def _followed(regression: Regression) -> str:
     if regression.shares[0].name == "rest":
         return "the pose at rest: silence away from speech"
-    return f"follows what is heard and believed around the frame, by the regressions of {_listed(regression.shares)}"
+    return f"follows what is heard and believed around the frame: {_listed(regression.shares)}"
 
 
 def _values(channels: Mapping[str, Value]) -> Iterator[tuple[str, str]]:
