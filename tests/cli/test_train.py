@@ -65,6 +65,16 @@ def test_the_papers_own_system(run: Run, toy_corpus: Corpus, here: Path) -> None
     assert "motion: " in "\n".join(run("info", "joint", "--trees").out)
 
 
+def test_a_system_of_the_coupled_engine(run: Run, toy_corpus: Corpus, here: Path) -> None:
+    wanted = ["--engine", "coupled", "--system", "ph-MSHMM", "--set", "chains=2vis", "--set", "follows=no"]
+    assert run("train", toy_corpus.path, "-o", "m", *wanted).code == 0
+    config = load_model(here / "m").engine.config
+    assert (config.structure, config.chains, config.follows) == ("multistream", "2vis", False)
+    said = run("info", "m", "--trees").out
+    assert said[0].startswith("multistream: one chain")
+    assert "chain 1: 2vis, 2 units of 3 states" in said
+
+
 def test_units_of_a_table_that_is_not_needed_again(run: Run, toy_corpus: Corpus, here: Path) -> None:
     units = unit_set("eVis")
     table = here / "mine.txt"
@@ -129,6 +139,9 @@ def test_an_engine_without_a_use_for_voices(
         (["CORPUS", "-o", "m", "--units", "evis"], 3, "no unit set 'evis'; there are: 2vis, sVis, pbVis"),
         (["CORPUS", "-o", "m", "--units", "folder"], 3, "folder: "),
         (["CORPUS", "-o", "m", "--engine", "coupled", "--recordings", "missing"], 4, "missing: no such folder"),
+        (["CORPUS", "-o", "m", "--engine", "coupled", "--units", "eVis"], 3, '--set chains="phone viseme"'),
+        (["CORPUS", "-o", "m", "--system", "ph-HMM"], 3, "add --engine coupled"),
+        (["CORPUS", "-o", "m", "--set", "tree=1"], 3, "no option 'tree'; there are: parts, silent_parts"),
         (["CORPUS", "-o", "m", "--engine", "joined"], 3, "no engine 'joined'; there are: trajectory, coupled, joint"),
     ],
 )

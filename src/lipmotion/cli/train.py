@@ -8,6 +8,8 @@ from pathlib import Path
 
 from lipmotion.cli.options import add_machine_readable, list_or_all
 
+ENGINE = "trajectory (default), coupled: chains of states for speech and lips, or joint: Hofer 2008's own system"
+SYSTEM = "of the coupled engine: ph-HMM, ph-MSHMM, ph-FHMM, ph-vi-FHMM, ph-CHMM or ph-vi-CHMM (default)"
 UNITS = "what is modelled: phone (default), eVis, sVis, pbVis, 2vis, or a table file (docs/unit-sets.md)"
 VISUAL = "what is learned: geometry (tracked or given motion, default), eigenlips (mouth pictures), or both"
 
@@ -20,8 +22,12 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser.add_argument("--split", default="train", help="train, val, test or all (default: train)")
     parser.add_argument("--speaker", action="append", default=[], metavar="NAME", help="this one only (repeatable)")
     parser.add_argument("--lexicon", type=Path, metavar="FILE", help="pronunciations: WORD PHONE PHONE ... a line")
-    parser.add_argument("--engine", default="trajectory", help="trajectory (default), joint, or coupled")
-    parser.add_argument("--units", default="phone", metavar="SET", help=UNITS)
+    parser.add_argument("--engine", default="trajectory", help=ENGINE)
+    parser.add_argument("--system", metavar="NAME", help=SYSTEM)
+    parser.add_argument("--units", metavar="SET", help=UNITS)
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="NAME=VALUE", help="any option of the engine (repeatable)"
+    )
     parser.add_argument("--visual", default="geometry", metavar="WHAT", help=VISUAL)
     parser.add_argument("--voices", action="store_true", help="learn from installed synthetic voices as well (coupled)")
     parser.add_argument(
@@ -38,19 +44,18 @@ def run(options: argparse.Namespace) -> None:
 
     from lipmotion.cli.progress import reporting
     from lipmotion.corpora.store import Corpus
-    from lipmotion.engines import engine_named
+    from lipmotion.engines import engine_as_told
     from lipmotion.files import unfinished_work
     from lipmotion.pipeline.model import save_model
     from lipmotion.pipeline.train import train
     from lipmotion.pipeline.voices import other_voices
-    from lipmotion.units import Lexicon, unit_set
+    from lipmotion.units import Lexicon
 
     workers = options.workers or os.cpu_count() or 1
     with reporting(options) as report:
         split = list_or_all(options.split)
         lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
-        unit_set(options.units)  # before the long work
-        engine = engine_named(options.engine, {"units": options.units} if options.units != "phone" else {})
+        engine = engine_as_told(options.engine, system=options.system, units=options.units, settings=options.set)
         chosen = {"engine": engine, "split": split, "speakers": options.speaker, "lexicon": lexicon, "workers": workers}
         chosen["visual"] = options.visual
         heard = {"recordings": options.recordings, "lexicon": lexicon, "monitor": report.hear}

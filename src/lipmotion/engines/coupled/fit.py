@@ -212,9 +212,7 @@ def _gain(model: CoupledModel, data: Sequence[Labelled], values: Sequence[Array]
 
     def spread(one: Labelled) -> Array:
         observed = speech_alone(one.observed)
-        evidence = chains.evidence(observed, chains.everywhere)
-        posteriors = chains.posteriors(evidence, chains.everywhere)
-        motion, _ = generate(*model.statistics(observed, evidence, posteriors, chains.everywhere))
+        motion, _ = generate(*model.statistics(chains.inferred(observed, chains.everywhere)))
         deviation: Array = motion[one.observed.seen[1]].std(axis=0)
         return deviation
 
