@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from lipmotion.corpora.store import Corpus
+from lipmotion.engines import engine_named
 from lipmotion.pipeline.model import Model, save_model
 from lipmotion.pipeline.toy import ToySentence, toy_sentences, toy_utterances
 from lipmotion.pipeline.train import train
@@ -43,6 +44,21 @@ def toy_model_file(toy_model: Model, tmp_path_factory: pytest.TempPathFactory) -
     """The toy model as it is saved."""
     path = tmp_path_factory.mktemp("model") / "toy.lipmotion"
     save_model(toy_model, path)
+    return path
+
+
+@pytest.fixture(scope="session")
+def coupled_model(toy_corpus: Corpus) -> Model:
+    """A small coupled model of the toy corpus."""
+    engine = engine_named("coupled", {"chains": "sVis 2vis", "mixtures": 2})
+    return train(toy_corpus, recogniser=HmmConfig(mixtures=1, iterations=2), engine=engine)[0]
+
+
+@pytest.fixture(scope="session")
+def coupled_model_file(coupled_model: Model, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The coupled model as it is saved."""
+    path = tmp_path_factory.mktemp("coupled") / "coupled.lipmotion"
+    save_model(coupled_model, path)
     return path
 
 

@@ -21,10 +21,11 @@ if TYPE_CHECKING:
     from lipmotion.pipeline.animate import animate, write
     from lipmotion.pipeline.cues import cues, write_cues
     from lipmotion.pipeline.evaluate import evaluate
+    from lipmotion.pipeline.explain import explain
     from lipmotion.pipeline.model import Model, load_model, save_model
     from lipmotion.pipeline.prepare import prepare
     from lipmotion.pipeline.train import train
-    from lipmotion.types import Audio, Constraints, Generation, Motion, Pin, Span, Timeline, Unit
+    from lipmotion.types import Audio, Constraints, Explanation, Generation, Motion, Pin, Span, Timeline, Unit
     from lipmotion.units import Lexicon
 
 __all__ = [
@@ -32,6 +33,7 @@ __all__ = [
     "Constraints",
     "Corpus",
     "CueSheet",
+    "Explanation",
     "Generation",
     "Lexicon",
     "Model",
@@ -45,6 +47,7 @@ __all__ = [
     "cues",
     "engine_named",
     "evaluate",
+    "explain",
     "load_model",
     "prepare",
     "read_motion",
@@ -64,6 +67,7 @@ _HOMES = {
     "cues": "lipmotion.pipeline.cues",
     "engine_named": "lipmotion.engines",
     "evaluate": "lipmotion.pipeline.evaluate",
+    "explain": "lipmotion.pipeline.explain",
     "load_model": "lipmotion.pipeline.model",
     "prepare": "lipmotion.pipeline.prepare",
     "read_motion": "lipmotion.export.base",

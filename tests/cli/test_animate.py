@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 import pytest
+from PIL import Image
 
 from cli.conftest import Run, is_one_error
 from lipmotion.export.base import read_motion
@@ -173,3 +174,31 @@ def test_units_that_cannot_be_used(run: Run, basics: tuple[object, ...], here: P
     done = run(*basics, "-o", "a.json", "--units", "missing.json")
     assert (done.code, len(done.err)) == (3, 1)
     assert not (here / "a.json").exists()
+
+
+def test_a_picture_of_the_posteriors(run: Run, coupled_model_file: Path, toy_speech: Path, here: Path) -> None:
+    basics = ("animate", toy_speech, "--model", coupled_model_file, "-o")
+    assert run(*basics, "a.json", "--posteriors", "a.png") == (0, ["a.json", "a.png"], [])
+    with Image.open(here / "a.png") as picture:
+        assert picture.format == "PNG"
+        assert 600 < picture.width <= 2200
+    run(*basics, "b.json")
+    assert (here / "a.json").read_bytes() == (here / "b.json").read_bytes()
+    assert sorted(path.name for path in here.iterdir()) == ["a.json", "a.png", "b.json"]
+
+
+@pytest.mark.parametrize(
+    ("picture", "code", "words"),
+    [
+        ("a.png", 3, "the engine 'trajectory' has no chains of states"),
+        ("a.jpg", 7, "a.jpg: unknown format '.jpg'; required: .png"),
+        ("missing/a.png", 7, "the folder missing does not exist"),
+    ],
+)
+def test_posteriors_that_cannot_be_drawn(
+    run: Run, basics: tuple[object, ...], here: Path, picture: str, code: int, words: str
+) -> None:
+    done = run(*basics, "-o", "a.json", "--posteriors", picture)
+    assert is_one_error(done, code)
+    assert words in done.err[0]
+    assert list(here.iterdir()) == []

@@ -27,6 +27,16 @@ def test_its_trees_can_be_printed(run: Run, toy_model_file: Path) -> None:
     assert sum("leaf (" in line for line in done.out) >= 18
 
 
+def test_the_chains_of_a_coupled_model(run: Run, coupled_model_file: Path) -> None:
+    done = run("info", coupled_model_file, "--trees")
+    assert (done.code, done.err) == (0, [])
+    assert done.out[0].startswith("coupled: chains whose moves depend on all chains")
+    assert "  asynchrony: up to 1 state(s) apart" in done.out
+    assert "chain 2: 2vis, 2 units of 3 states" in done.out
+    assert any(line.startswith("stream geometry: ") and "6 densities of 1 Gaussian" in line for line in done.out)
+    assert any(line.startswith("means of geometry: ") for line in done.out)
+
+
 def test_the_shipped_model_is_the_default(run: Run) -> None:
     done = run("info")
     assert done.out == run("info", shipped_path()).out

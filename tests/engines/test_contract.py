@@ -83,6 +83,39 @@ def test_the_trace_names_a_state_for_every_frame(trained):
     assert all(result.trace.states)
 
 
+def test_every_frame_has_an_explanation(trained):
+    spoken = speech(timeline(SENTENCE))
+    result = trained.generate(spoken)
+    frames = range(len(result.motion.values))
+    found = trained.engine.explain(trained.model, spoken, frames)
+    assert [one.frame for one in found] == list(frames)
+    assert [one.state for one in found] == [result.trace.states[state] for state in result.trace.frames]
+    assert [[one.motion[name].value for name in result.motion.names] for one in found] == result.motion.values.tolist()
+    deviations = np.array([[value.deviation for value in one.motion.values()] for one in found])
+    assert deviations**2 == pytest.approx(result.variance)
+    assert found[65].span in result.units.spans
+    assert found[65].span.start_s <= 0.65 < found[65].span.end_s
+    for one in found:
+        assert len(one.chains) == len(found[0].chains)
+        assert bool(one.chains) is bool(one.gaussians) is trained.engine.has_chains
+    assert trained.engine.explain(trained.model, spoken, [7, 3, 7]) == (found[7], found[3], found[7])
+
+
+def test_beliefs_are_probabilities_or_an_input_error(trained):
+    spoken = speech(timeline(SENTENCE))
+    if not trained.engine.has_chains:
+        with pytest.raises(InputError, match="no chains of states"):
+            trained.engine.beliefs(trained.model, spoken)
+        return
+    first, *others = trained.engine.beliefs(trained.model, spoken)
+    for one in (first, *others):
+        assert one.probability.shape == (len(spoken.features.values), len(one.units))
+        assert one.probability.sum(axis=1) == pytest.approx(1, abs=1e-4)
+        assert one.lead.shape == (len(one.probability), len(one.leads))
+    assert first.leads == ()
+    assert all(one.lead.sum(axis=1) == pytest.approx(1, abs=1e-4) for one in others if one.leads)
+
+
 def test_units_keep_their_times_and_say_what_they_resolved_to(trained):
     spoken = speech(timeline(SENTENCE))
     result = trained.generate(spoken)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
 from lipmotion.cli.speech import add_speech_arguments, speech_arguments
 
@@ -17,18 +18,28 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser.add_argument("--rate", type=float, metavar="HZ", help="frames per second of motion files (default: 100)")
     parser.add_argument("--channels", metavar="NAME,NAME", help="write only these to motion files: opening,width,...")
     parser.add_argument("--fps", type=float, default=25.0, help="frames per second of videos (default: 25)")
+    parser.add_argument(
+        "--posteriors", type=Path, metavar="FILE.png", help="draw what the chains of a coupled model believe over time"
+    )
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:
     """Call ``lipmotion.animate`` and ``lipmotion.write``."""
     from lipmotion.pipeline.animate import animate, check_outputs, write
+    from lipmotion.pipeline.beliefs import animate_with_beliefs, check_picture, write_beliefs
 
     check_outputs(options.output, options.speech, rate_hz=options.rate, fps=options.fps)
+    if options.posteriors:
+        check_picture(options.posteriors, options.speech)
     told = speech_arguments(options)
     channels = options.channels.split(",") if options.channels is not None else None
-    result = animate(options.speech, **told)
+    if options.posteriors:
+        result, beliefs = animate_with_beliefs(options.speech, **told)
+        write_beliefs(options.posteriors, result, beliefs)
+    else:
+        result = animate(options.speech, **told)
     about = {"speech": options.speech, "model": told["model"], "channels": channels}
     write(result, options.output, rate_hz=options.rate, fps=options.fps, **about)
-    for path in options.output:
+    for path in [*options.output, *filter(None, [options.posteriors])]:
         print(path)

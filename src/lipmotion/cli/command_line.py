@@ -9,11 +9,11 @@ import logging
 import sys
 from collections.abc import Sequence
 
-from lipmotion.cli import adapt, animate, corpus, cues, evaluate, experiment, info, train
+from lipmotion.cli import adapt, animate, corpus, cues, evaluate, experiment, explain, info, train
 from lipmotion.cli.output import refused
 from lipmotion.cli.stop import Stopper
 
-VERBS = (animate, cues, corpus, train, adapt, evaluate, experiment, info)
+VERBS = (animate, explain, cues, corpus, train, adapt, evaluate, experiment, info)
 EXIT_CODES = """exit codes: 0 done, 1 a bug, 2 wrong command line, 3 unusable input, 4 corpus, 5 alignment,
 6 model file, 7 output, 8 missing package, 130 interrupted, 143 terminated"""
 

@@ -10,7 +10,9 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb."""
     parser = verbs.add_parser("info", help="say what a model is, and whose recordings it comes from")
     parser.add_argument("model", type=Path, nargs="?", help="default: the model that ships with the package")
-    parser.add_argument("--trees", action="store_true", help="print its decision trees, and nothing else")
+    parser.add_argument(
+        "--trees", action="store_true", help="print its decision trees, or its chains, and nothing else"
+    )
     parser.set_defaults(run=run)
 
 

@@ -8,13 +8,18 @@ from typing import Any
 
 
 def add_speech_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the recording, and what ``lipmotion.animate`` may be told about it."""
+    """Add the recording, what ``lipmotion.animate`` may be told about it, and the model."""
+    add_hearing_arguments(parser)
+    parser.add_argument("--model", type=Path, help="trained model (default: the one that ships with the package)")
+
+
+def add_hearing_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the recording, and what may be told about it."""
     parser.add_argument("speech", type=Path, help="audio or video file")
     parser.add_argument("--transcript", metavar="TEXT|FILE", help="what is said, if known")
     parser.add_argument("--lexicon", type=Path, metavar="FILE", help="pronunciations: WORD PHONE PHONE ... a line")
     parser.add_argument("--units", type=Path, metavar="FILE", help="phones of an earlier .json or .npz, edited or not")
     add_recogniser_argument(parser)
-    parser.add_argument("--model", type=Path, help="trained model (default: the one that ships with the package)")
 
 
 def add_recogniser_argument(parser: argparse.ArgumentParser) -> None:

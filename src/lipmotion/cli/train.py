@@ -8,6 +8,8 @@ from pathlib import Path
 
 from lipmotion.cli.options import add_machine_readable, list_or_all
 
+ENGINE = "trajectory (default), coupled: chains of states for speech and lips, or joint: Hofer 2008's own system"
+SYSTEM = "of the coupled engine: ph-HMM, ph-MSHMM, ph-FHMM, ph-vi-FHMM, ph-CHMM or ph-vi-CHMM (default)"
 UNITS = "what is modelled: phone (default), eVis, sVis, pbVis, 2vis, or a table file (docs/unit-sets.md)"
 VISUAL = "what is learned: geometry (tracked or given motion, default), eigenlips (mouth pictures), or both"
 
@@ -20,9 +22,13 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser.add_argument("--split", default="train", help="train, val, test or all (default: train)")
     parser.add_argument("--speaker", action="append", default=[], metavar="NAME", help="this one only (repeatable)")
     parser.add_argument("--lexicon", type=Path, metavar="FILE", help="pronunciations: WORD PHONE PHONE ... a line")
-    parser.add_argument("--engine", default="trajectory", help="trajectory (default), or joint: the paper's own system")
-    parser.add_argument("--units", default="phone", metavar="SET", help=UNITS)
+    parser.add_argument("--engine", default="trajectory", help=ENGINE)
+    parser.add_argument("--system", metavar="NAME", help=SYSTEM)
+    parser.add_argument("--units", metavar="SET", help=UNITS)
+    parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="any option of the engine")
     parser.add_argument("--visual", default="geometry", metavar="WHAT", help=VISUAL)
+    parser.add_argument("--voices", action="store_true", help="learn from installed synthetic voices as well (coupled)")
+    parser.add_argument("--recordings", type=Path, metavar="FOLDER", help="and from transcribed speech (coupled)")
     parser.add_argument("--workers", type=int, help="processes (default: one a core)")
     add_machine_readable(parser)
     parser.set_defaults(run=run)
@@ -34,24 +40,26 @@ def run(options: argparse.Namespace) -> None:
 
     from lipmotion.cli.progress import reporting
     from lipmotion.corpora.store import Corpus
-    from lipmotion.engines import engine_named
+    from lipmotion.engines import engine_as_told
     from lipmotion.files import unfinished_work
     from lipmotion.pipeline.model import save_model
     from lipmotion.pipeline.train import train
-    from lipmotion.units import Lexicon, unit_set
+    from lipmotion.pipeline.voices import other_voices
+    from lipmotion.units import Lexicon
 
     workers = options.workers or os.cpu_count() or 1
     with reporting(options) as report:
         split = list_or_all(options.split)
         lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
-        unit_set(options.units)  # before the long work
-        engine = engine_named(options.engine, {"units": options.units})
+        engine = engine_as_told(options.engine, system=options.system, units=options.units, settings=options.set)
         chosen = {"engine": engine, "split": split, "speakers": options.speaker, "lexicon": lexicon, "workers": workers}
         chosen["visual"] = options.visual
+        heard = {"recordings": options.recordings, "lexicon": lexicon, "monitor": report.hear}
+        chosen["voices"] = other_voices(synthetic=options.voices, **heard)
         with unfinished_work(options.output) as work:
             model, result = train(Corpus.open(options.corpus), **chosen, monitor=report.hear, work=work)
             save_model(model, options.output)
         figures = {"used": len(result.used), "minutes": model.about["minutes"], "skipped": len(result.skipped)}
         text = ", ".join(f"{value} {name}" for name, value in figures.items())
-        text = f"{options.output}: {text}; use it: lipmotion animate SPEECH -o FILE --model {options.output}"
-        report.finish(text, model=str(options.output), **figures)
+        use = f"use it: lipmotion animate SPEECH -o FILE --model {options.output}"
+        report.finish(f"{options.output}: {text}; {use}", model=str(options.output), **figures)

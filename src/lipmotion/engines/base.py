@@ -10,8 +10,20 @@ from typing import Any, ClassVar, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.errors import InputError
 from lipmotion.stats.checkpoint import NOTHING_KEPT, Checkpoint
-from lipmotion.types import Constraints, Example, Generation, Monitor, Speech, Timeline, Unit
+from lipmotion.types import (
+    ChainBelief,
+    Constraints,
+    Example,
+    Explanation,
+    Generation,
+    Monitor,
+    Speech,
+    Timeline,
+    Unit,
+    Value,
+)
 
 ModelT = TypeVar("ModelT")
 Arrays = Mapping[str, NDArray[Any]]
@@ -31,6 +43,11 @@ class Animator(ABC, Generic[ModelT]):
     @property
     def hears_f0(self) -> bool:
         """Whether it wants ``Speech.log_f0``."""
+        return False
+
+    @property
+    def hears_others(self) -> bool:
+        """Whether it learns from examples in which no motion was seen: speech of other speakers."""
         return False
 
     @abstractmethod
@@ -60,6 +77,32 @@ class Engine(Animator[ModelT]):
     name: ClassVar[str]
     config: Any
 
+    def explain(self, model: ModelT, speech: Speech, frames: Sequence[int]) -> tuple[Explanation, ...]:
+        """Return what stands behind some frames of what ``generate`` makes of speech.
+
+        frames : numbers from 0 to T - 1
+        """
+        result = self.generate(model, speech)
+        return tuple(traced(result, frame) for frame in frames)
+
+    @property
+    def has_chains(self) -> bool:
+        """Whether it has chains of states that ``beliefs`` tells of."""
+        return False
+
+    def check_chains(self) -> None:
+        """Raise InputError unless the engine has chains."""
+        if not self.has_chains:
+            raise InputError(
+                f"the engine {self.name!r} has no chains of states whose posteriors could be shown; give a model that "
+                "was trained with --engine coupled"
+            )
+
+    def beliefs(self, model: ModelT, speech: Speech) -> tuple[ChainBelief, ...]:  # noqa: ARG002
+        """Return what is believed of every chain of states over time. Raises InputError: the engine has no chains."""
+        self.check_chains()
+        return ()
+
     @abstractmethod
     def trees(self, model: ModelT) -> str:
         """Return the decision trees of a model for people to read."""
@@ -71,6 +114,21 @@ class Engine(Animator[ModelT]):
     @abstractmethod
     def from_arrays(self, arrays: Arrays) -> ModelT:
         """Return the model again. Raises ModelFormatError: an array is missing or has the wrong shape."""
+
+
+def traced(result: Generation, frame: int) -> Explanation:
+    """Return what a result itself says of one of its frames."""
+    motion, trace = result.motion, result.trace
+    time_s = frame / motion.rate_hz
+    deviations = np.sqrt(result.variance[frame]).tolist()
+    values = zip(motion.names, motion.values[frame].tolist(), deviations, strict=True)
+    return Explanation(
+        time_s,
+        frame,
+        next((span for span in result.units if span.start_s <= time_s < span.end_s), None),
+        trace.states[trace.frames[frame]],
+        {name: Value(value, deviation) for name, value, deviation in values},
+    )
 
 
 def frame_of(time_s: float, frames: int, rate_hz: float) -> int | None:

@@ -2,31 +2,23 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
 
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export.base import MOTION_SUFFIXES, write_motion
 from lipmotion.files import as_text, check_distinct, check_target
-from lipmotion.pipeline.hear import hear, hear_unsaid
+from lipmotion.pipeline.hear import heard
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.pipeline.transcribe import read_transcript, transcribe
-from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.read import read_audio
-from lipmotion.speech.recogniser import recogniser as cached_recogniser
 from lipmotion.types import Audio, Constraints, Generation, Timeline, Unit
-from lipmotion.units import Lexicon, words_of
+from lipmotion.units import Lexicon
 
 VIDEO_SUFFIX = ".mp4"
 SOUND_RATE_HZ = 48_000
 """The sound track of a rendered video."""
 SLOWEST_HZ, FASTEST_HZ = 1.0, 1000.0
 """Frame rates that files are written at; a mistyped one must not fill the memory."""
-LATE_S = 0.1
-"""Units may end this long after the sound: editors round."""
-LOG = logging.getLogger("lipmotion")
 
 
 def animate(
@@ -53,35 +45,10 @@ def animate(
     Raises AlignmentError: the transcript does not fit into the recording.
     """
     chosen = model if isinstance(model, Model) else load_model(model)
-    phones = cached_recogniser(chosen.phones, recogniser, chosen.adaptation)
     audio = speech if isinstance(speech, Audio) else read_audio(Path(speech))
-    features = mfcc(audio)
-    if units is not None:
-        _check_units(units, audio.duration_s)
-        heard = hear(chosen.engine, audio, features, units)
-    else:
-        text = read_transcript(transcript) if isinstance(transcript, Path) else transcript
-        words = words_of(text) if text is not None else None
-        found = partial(transcribe, phones, audio, features, words, lexicon or Lexicon())
-        if words is not None:
-            heard = hear(chosen.engine, audio, features, found())
-        else:
-            heard = hear_unsaid(chosen.engine, chosen.learned, audio, features, phones, found)
+    known = heard(chosen, audio, transcript=transcript, units=units, lexicon=lexicon, recogniser=recogniser)
     del audio  # of a long recording it is much
-    return chosen.engine.generate(chosen.learned, heard, constraints)
-
-
-def _check_units(units: Timeline[Unit], duration_s: float) -> None:
-    if not len(units):
-        raise InputError(
-            "the units are an empty list (a .csv has none); give those of a .json or .npz, or leave them out"
-        )
-    if units[-1].end_s > duration_s + LATE_S:
-        LOG.warning(
-            "the units go on to %.2f s, the recording ends at %.2f s: are they those of another?",
-            units[-1].end_s,
-            duration_s,
-        )
+    return chosen.engine.generate(chosen.learned, known, constraints)
 
 
 def write(

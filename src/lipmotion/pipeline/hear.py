@@ -2,15 +2,50 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
+from pathlib import Path
 from typing import Any
 
 from lipmotion.engines import Animator
-from lipmotion.errors import AlignmentError
+from lipmotion.errors import AlignmentError, InputError
+from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.transcribe import read_transcript, transcribe
 from lipmotion.speech.f0 import log_f0
+from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.recogniser import Recogniser
+from lipmotion.speech.recogniser import recogniser as cached_recogniser
 from lipmotion.types import Audio, Features, Speech, Timeline, Unit
+from lipmotion.units import Lexicon, words_of
+
+LATE_S = 0.1
+"""Units may end this long after the sound: editors round."""
+LOG = logging.getLogger("lipmotion")
+
+
+def heard(
+    model: Model,
+    audio: Audio,
+    *,
+    transcript: str | Path | None = None,
+    units: Timeline[Unit] | None = None,
+    lexicon: Lexicon | None = None,
+    recogniser: str = "auto",
+) -> Speech:
+    """Return a recording as the engine of a model hears it; arguments, and what is raised, as of ``animate``."""
+    phones = cached_recogniser(model.phones, recogniser, model.adaptation)
+    features = mfcc(audio)
+    if units is not None:
+        _check_units(units, audio.duration_s)
+        return hear(model.engine, audio, features, units)
+    text = read_transcript(transcript) if isinstance(transcript, Path) else transcript
+    words = words_of(text) if text is not None else None
+    found = partial(transcribe, phones, audio, features, words, lexicon or Lexicon())
+    if words is not None:
+        return hear(model.engine, audio, features, found())
+    return hear_unsaid(model.engine, model.learned, audio, features, phones, found)
 
 
 def hear(engine: Animator[Any], audio: Audio, features: Features, units: Timeline[Unit]) -> Speech:
@@ -39,3 +74,16 @@ def hear_unsaid(
         return replace(speech, units=phones.place(audio, features, found), said=False)
     except AlignmentError:
         return replace(speech, units=recognise(), said=False)
+
+
+def _check_units(units: Timeline[Unit], duration_s: float) -> None:
+    if not len(units):
+        raise InputError(
+            "the units are an empty list (a .csv has none); give those of a .json or .npz, or leave them out"
+        )
+    if units[-1].end_s > duration_s + LATE_S:
+        LOG.warning(
+            "the units go on to %.2f s, the recording ends at %.2f s: are they those of another?",
+            units[-1].end_s,
+            duration_s,
+        )

@@ -2,6 +2,15 @@
 
 from lipmotion.types.audio import Audio
 from lipmotion.types.each import Each
+from lipmotion.types.explanation import (
+    ChainBelief,
+    ChainStates,
+    Explanation,
+    Gaussian,
+    Likely,
+    Regression,
+    Value,
+)
 from lipmotion.types.features import FRAME_RATE_HZ, Features
 from lipmotion.types.generation import Constraints, Example, Generation, Pin, Speech, Trace
 from lipmotion.types.motion import EYE_DISTANCE, GREY, WEIGHT, Channel, Motion
@@ -15,17 +24,23 @@ __all__ = [
     "GREY",
     "WEIGHT",
     "Audio",
+    "ChainBelief",
+    "ChainStates",
     "Channel",
     "Constraints",
     "Each",
     "Example",
+    "Explanation",
     "Features",
+    "Gaussian",
     "Generation",
     "Item",
+    "Likely",
     "Monitor",
     "Motion",
     "Pin",
     "Progress",
+    "Regression",
     "Span",
     "Speech",
     "Timeline",
@@ -33,6 +48,7 @@ __all__ = [
     "Track",
     "Unit",
     "Utterance",
+    "Value",
     "counted",
     "part_of",
     "silent_monitor",

@@ -9,24 +9,29 @@ from typing import Any, ClassVar, final
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.base import Arrays, Engine, Fit
+from lipmotion.engines.base import Arrays, Engine, Fit, traced
 from lipmotion.engines.coupled.arrays import coupled_arrays, coupled_from_arrays
 from lipmotion.engines.coupled.config import PATH, TRAJECTORY, CoupledConfig
 from lipmotion.engines.coupled.conversion import converted, path_means
 from lipmotion.engines.coupled.densities import Single
+from lipmotion.engines.coupled.description import described
+from lipmotion.engines.coupled.explanation import explained, joined, units_believed
 from lipmotion.engines.coupled.fit import fit_coupled
 from lipmotion.engines.coupled.lattice import Lattice
 from lipmotion.engines.coupled.learned import CoupledModel
+from lipmotion.engines.coupled.model import Inferred
 from lipmotion.engines.coupled.train import allowed_units
 from lipmotion.engines.trajectory.closure import closing_spans
 from lipmotion.engines.trajectory.dynamic_range import widened
-from lipmotion.engines.trajectory.generation import Statistics, generated_motion, resolved
+from lipmotion.engines.trajectory.generation import Statistics, generated_motion, resolved, stretches
 from lipmotion.kernels.banded import generate
 from lipmotion.stats.checkpoint import NOTHING_KEPT, Checkpoint
 from lipmotion.types import (
     FRAME_RATE_HZ,
+    ChainBelief,
     Constraints,
     Example,
+    Explanation,
     Generation,
     Monitor,
     Motion,
@@ -51,6 +56,10 @@ class CoupledEngine(Engine[CoupledModel]):
 
     config: CoupledConfig
     name: ClassVar[str] = "coupled"
+
+    @property
+    def hears_others(self) -> bool:  # noqa: D102
+        return True
 
     def fit(  # noqa: D102
         self,
@@ -102,28 +111,50 @@ class CoupledEngine(Engine[CoupledModel]):
     ) -> tuple[Statistics, NDArray[np.intp]]:
         """Return means and precisions [each shape=(T, 3, Q)], and the most probable joint state of every frame."""
         chains, observed = model.chains, model.unseen(features)
-        evidence = chains.evidence(observed, lattice)
         if self.config.conversion == PATH:
-            path, _ = chains.best_path(evidence, lattice)
+            path, _ = chains.best_path(chains.evidence(observed, lattice), lattice)
             return model.frames([path_means(chains, path, s + 1) for s in range(len(model.visual))]), path
+        inferred = self.inferred(model, features, lattice)
         if self.config.conversion != TRAJECTORY:
             streams = converted(chains, observed, lattice, self.config.em).streams[1:]
-            posteriors = chains.posteriors(evidence, lattice)
-            return model.frames(streams), posteriors.best
-        posteriors = chains.posteriors(evidence, lattice)
-        found = model.statistics(observed, evidence, posteriors, lattice)
-        for _ in range(self.config.steps):
-            evidence = chains.evidence(model.seen(observed, generate(*found)[0]), lattice)
-            posteriors = chains.posteriors(evidence, lattice)
-            found = model.statistics(observed, evidence, posteriors, lattice)
-        return found, posteriors.best
+            return model.frames(streams), inferred.posteriors.best
+        return model.statistics(inferred), inferred.posteriors.best
+
+    def inferred(self, model: CoupledModel, features: Single, lattice: Lattice) -> Inferred:
+        """Return what some frames of speech [shape=(T, 39)] say about the chains, after all steps of ``trajectory``."""
+        observed = model.unseen(features)
+        found = model.chains.inferred(observed, lattice)
+        for _ in range(self.config.steps if self.config.conversion == TRAJECTORY else 0):
+            values = generate(*model.statistics(found))[0]
+            found = model.chains.inferred(model.seen(observed, values), lattice)
+        return found
+
+    def explain(self, model: CoupledModel, speech: Speech, frames: Sequence[int]) -> tuple[Explanation, ...]:  # noqa: D102
+        result = self.generate(model, speech)
+        features, found = np.asarray(speech.features.values), dict[int, Explanation]()
+        for inner, outer in stretches(len(features)):
+            inside = [frame for frame in frames if inner.start <= frame < inner.stop]
+            if inside:
+                inferred = self.inferred(model, features[outer], self.lattice(model, speech, outer))
+                known, rows = [traced(result, frame) for frame in inside], [frame - outer.start for frame in inside]
+                found.update(zip(inside, explained(known, model, inferred, rows), strict=True))
+        return tuple(found[frame] for frame in frames)
+
+    @property
+    def has_chains(self) -> bool:
+        """Whether it has chains of states that ``beliefs`` tells of."""
+        return True
+
+    def beliefs(self, model: CoupledModel, speech: Speech) -> tuple[ChainBelief, ...]:  # noqa: D102
+        features, found = np.asarray(speech.features.values), []
+        for inner, outer in stretches(len(features)):
+            inferred = self.inferred(model, features[outer], self.lattice(model, speech, outer))
+            kept = slice(inner.start - outer.start, inner.stop - outer.start)
+            found.append(units_believed(model.chains, inferred.posteriors, kept))
+        return tuple(joined(parts) for parts in zip(*found, strict=True))
 
     def trees(self, model: CoupledModel) -> str:  # noqa: D102
-        structure = model.chains.structure
-        return "\n".join(
-            f"{chain.name}: {len(units)} units of {structure.states} states"
-            for chain, units in zip(structure.chains, structure.units, strict=True)
-        )
+        return described(model)
 
     def to_arrays(self, model: CoupledModel) -> dict[str, NDArray[Any]]:  # noqa: D102
         return coupled_arrays(model)

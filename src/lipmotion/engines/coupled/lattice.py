@@ -52,6 +52,18 @@ class Lattice(ABC):
 
 
 @dataclass(frozen=True, eq=False)
+class Joint:
+    """The posterior of joint states.
+
+    states      : which they are [shape=(S',)]
+    probability : of each [shape=(T, S')]
+    """
+
+    states: Index
+    probability: Single
+
+
+@dataclass(frozen=True, eq=False)
 class Posteriors:
     """Probabilities of states given a recording.
 
@@ -60,6 +72,7 @@ class Posteriors:
     best      : the most probable joint state of every frame [shape=(T,)]
     counts    : what transitions are learned from [shape=(C',)]
     log_likelihood : of the recording; -inf where there is no path, and then all else is 0
+    joint     : of joint states; None where there are too many to list
     """
 
     chains: tuple[Single, ...]
@@ -67,6 +80,7 @@ class Posteriors:
     best: Index
     counts: NDArray[np.float64]
     log_likelihood: float
+    joint: Joint | None = None
 
 
 def summed(posterior: Single, tie: Index, count: int) -> Single:

@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from lipmotion.engines.coupled.conversion import statistics
 from lipmotion.engines.coupled.densities import Observed, Single
 from lipmotion.engines.coupled.following import Following, Surroundings
-from lipmotion.engines.coupled.lattice import Lattice, Posteriors
-from lipmotion.engines.coupled.model import Chains, Evidence
-from lipmotion.engines.coupled.visual import VisualStream
+from lipmotion.engines.coupled.model import Chains, Inferred
+from lipmotion.engines.coupled.visual import VisualStream, unseen
 from lipmotion.engines.trajectory.closure import Closure
 from lipmotion.engines.trajectory.space import MotionSpace
 from lipmotion.types import FRAME_RATE_HZ
@@ -49,32 +48,31 @@ class CoupledModel:
 
     def unseen(self, features: Single) -> Observed:
         """Return speech [shape=(T, 39)] with nothing seen."""
-        nothing = tuple(np.zeros((len(features), len(stream.mean)), np.float32) for stream in self.visual)
-        return Observed((features, *nothing), (None, *(np.zeros(len(features), bool) for _ in nothing)))
+        return unseen(features, self.visual)
 
-    def statistics(
-        self, observed: Observed, evidence: Evidence, posteriors: Posteriors, lattice: Lattice
-    ) -> tuple[Array, Array]:
+    def statistics(self, inferred: Inferred) -> tuple[Array, Array]:
         """Return means and precisions of the motion in its space [each shape=(T, 3, Q)]."""
-        shape = (observed.frames, 3, self.space.dimensions)
+        shape = (inferred.observed.frames, 3, self.space.dimensions)
         means, precisions = np.zeros(shape), np.zeros(shape)
-        around = self._around(observed.streams[0], posteriors)
+        around = self.around(inferred)
         for number, stream in enumerate(self.visual):
             if around is None or self.follow is None:
-                precision, weighted = statistics(self.chains, posteriors, evidence, lattice, number + 1)
+                precision, weighted = statistics(
+                    self.chains, inferred.posteriors, inferred.evidence, inferred.lattice, number + 1
+                )
                 mean = weighted / np.maximum(precision, 1e-300)
             else:
-                gate = posteriors.chains[self.chains.structure.chain_of(number + 1)]
+                gate = inferred.posteriors.chains[self.chains.structure.chain_of(number + 1)]
                 following = self.follow[1][number]
                 mean, precision = following.means(around, gate), following.precisions(gate)
             means[:, :, stream.columns], precisions[:, :, stream.columns] = stream.restored(mean, precision)
-        resting = self._resting(posteriors.chains[0])
+        resting = self.resting(inferred.posteriors.chains[0])
         means[resting] = 0
         means[resting, 0] = self.rest
         precisions[resting] *= FIRM
         return means, precisions
 
-    def _resting(self, posterior: Single) -> NDArray[np.bool_]:
+    def resting(self, posterior: Single) -> NDArray[np.bool_]:
         """Return which frames are silence away from speech [shape=(T,)].
 
         posterior : of the first chain's states [shape=(T, N)]
@@ -105,7 +103,8 @@ class CoupledModel:
         precisions[:, 1:] = 0
         return means, precisions
 
-    def _around(self, features: Single, posteriors: Posteriors) -> Single | None:
+    def around(self, inferred: Inferred) -> Single | None:
+        """Return what visual means follow, in numbers [shape=(T, F + 1)]; None: they follow nothing."""
         if self.follow is None:
             return None
-        return self.follow[0](features, posteriors.chains[0])
+        return self.follow[0](inferred.observed.streams[0], inferred.posteriors.chains[0])

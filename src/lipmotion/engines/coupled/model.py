@@ -66,6 +66,11 @@ class Chains:
         """Return what a recording says about the chains."""
         return lattice.posteriors(self.transitions, evidence.log)
 
+    def inferred(self, observed: Observed, lattice: Lattice) -> Inferred:
+        """Return what a recording says about the chains, with what that rests on."""
+        evidence = self.evidence(observed, lattice)
+        return Inferred(observed, lattice, evidence, self.posteriors(evidence, lattice))
+
     def best_path(self, evidence: Evidence, lattice: Lattice) -> tuple[Index, float]:
         """Return the most probable joint states [shape=(T,)] and their log probability (-inf: there is no path)."""
         return lattice.best_path(self.transitions, evidence.log)
@@ -80,3 +85,13 @@ class Evidence:
 
     log: tuple[Single, ...]
     shares: tuple[Single | None, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Inferred:
+    """What a recording says about chains, with what that rests on."""
+
+    observed: Observed
+    lattice: Lattice
+    evidence: Evidence
+    posteriors: Posteriors

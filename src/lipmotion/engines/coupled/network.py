@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.coupled.densities import Single
-from lipmotion.engines.coupled.lattice import Lattice, Posteriors, summed
+from lipmotion.engines.coupled.lattice import Joint, Lattice, Posteriors, summed
 from lipmotion.engines.coupled.transitions import Transitions
 from lipmotion.kernels.network import Expectation
 from lipmotion.kernels.viterbi import best_path
@@ -47,6 +47,7 @@ class NetworkLattice(Lattice):
             self.states[order[found.posterior.argmax(axis=1)]],
             found.counts,
             float(found.log_likelihood[0]),
+            Joint(self.states[order], found.posterior),
         )
 
     def best_path(self, transitions: Transitions, logs: Sequence[Single]) -> tuple[Index, float]:  # noqa: D102

@@ -81,9 +81,12 @@ class Structure:
 
     def name(self, states: Sequence[int]) -> str:
         """Return what the states of all chains are, in words: ``b.1 | bi.2``, unit and place, counted from 1."""
-        found = (divmod(state, self.states) for state in states)
-        named = zip(self.units, found, strict=True)
-        return " | ".join(f"{units[unit]}.{place + 1}" for units, (unit, place) in named)
+        return " | ".join(self.state_name(chain, state) for chain, state in enumerate(states))
+
+    def state_name(self, chain: int, state: int) -> str:
+        """Return what a state of one chain is, in words: ``b.1``."""
+        unit, place = divmod(state, self.states)
+        return f"{self.units[chain][unit]}.{place + 1}"
 
     def state(self, unit: int, state: int) -> int:
         """Return the number of a state within its chain."""

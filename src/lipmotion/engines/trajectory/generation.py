@@ -44,7 +44,7 @@ def generated_motion(
     """
     precise = np.float64 if frames <= DOUBLE_FRAMES else np.float32
     motion, spread = (np.empty((frames, len(space.channels)), precise) for _ in range(2))
-    for inner, outer in _stretches(frames):
+    for inner, outer in stretches(frames):
         inside = {(frame - outer.start, c): v for (frame, c), v in pins.items() if outer.start <= frame < outer.stop}
         spans = [
             slice(span.start - outer.start, span.stop - outer.start)
@@ -80,7 +80,7 @@ def resolved(constraints: Constraints | None, space: MotionSpace, frames: int) -
     return pins
 
 
-def _stretches(frames: int) -> Iterator[tuple[slice, slice]]:
+def stretches(frames: int) -> Iterator[tuple[slice, slice]]:
     """Give the frames of each stretch, and those with what lies around it; a shorter recording is one stretch."""
     for start in range(0, frames, STRETCH):
         stop = min(start + STRETCH, frames)

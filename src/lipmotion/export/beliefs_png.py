@@ -1,0 +1,164 @@
+"""A picture of what chains believe over time: phones, units of each chain, asynchrony, opening."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageChops, ImageDraw, ImageFont
+
+from lipmotion.types import ChainBelief, Generation
+from lipmotion.units import is_silent
+
+WIDEST = 2000
+"""Columns of a plot; of a longer recording each is the mean of several frames."""
+NARROWEST = 600
+ROW, GAP, LEFT, RIGHT, TITLE = 16, 14, 120, 16, 20
+CURVE = 90
+"""Height of the plot of the opening."""
+LEAST = 0.05
+"""Units that never are this probable have no row."""
+STEPS_S = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 60, 120, 300, 600, 1800)
+LEAST_ROOM = 8
+"""Pixels a phone, on average."""
+TICK = 80
+"""Least pixels between two times on the axis."""
+WHITE, INK, GREY, PALE = (255, 255, 255), (30, 34, 42), (120, 126, 136), (228, 231, 236)
+COLOURS = ((23, 92, 166), (176, 62, 24), (38, 122, 62))
+"""One a chain."""
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Time from left to right.
+
+    frames  : of the recording;  rate_hz : their rate
+    columns : pixels that they take
+    """
+
+    frames: int
+    rate_hz: float
+    columns: int
+
+    def x(self, time_s: float) -> float:
+        """Return where a time is."""
+        return LEFT + float(np.clip(time_s * self.rate_hz / self.frames, 0, 1)) * self.columns
+
+    def averaged(self, values: NDArray[Any]) -> NDArray[np.float64]:
+        """Return values of frames [shape=(T, K)] as those of columns [shape=(columns, K)]."""
+        edges = np.linspace(0, self.frames, self.columns + 1)
+        first = np.minimum(edges[:-1].astype(int), self.frames - 1)
+        if self.columns < self.frames:
+            counts = np.diff([*first, self.frames])
+            return np.add.reduceat(values.astype(float), first, axis=0) / counts[:, None]
+        return values[first].astype(float)
+
+
+def draw(generation: Generation, beliefs: Sequence[ChainBelief]) -> Image.Image:
+    """Return the picture. Its rows, from above: phones, units of each chain, asynchrony, opening, time."""
+    frames, rate_hz = len(generation.motion.values), generation.motion.rate_hz
+    axis = Axis(frames, rate_hz, int(np.clip(2 * frames, NARROWEST, WIDEST)))
+    panels = [panel for number, one in enumerate(beliefs) for panel in _panels(axis, one, beliefs[0].name, number)]
+    curve = _curve_name(generation)
+    height = TITLE + sum(TITLE + ROW * len(names) + GAP for _, names, _ in panels) + TITLE + CURVE + 2 * TITLE
+    picture = Image.new("RGB", (LEFT + axis.columns + RIGHT, height), WHITE)
+    pen = Pen(ImageDraw.Draw(picture), axis)
+    pen.phones(generation, height - 2 * TITLE)
+    y = TITLE
+    for title, names, colours in panels:
+        pen.text(LEFT, y + 2, title, INK)
+        y += TITLE
+        pen.rows(y, names)
+        area = (LEFT, y, LEFT + axis.columns, y + ROW * len(names))
+        band = Image.fromarray(colours.transpose(1, 0, 2)).resize((axis.columns, ROW * len(names)), 0)
+        picture.paste(ImageChops.darker(band, picture.crop(area)), area)
+        y += ROW * len(names) + GAP
+    pen.text(LEFT, y + 2, f"{curve} (generated)", INK)
+    pen.curve(y + TITLE, generation.motion[curve])
+    pen.times(y + TITLE + CURVE)
+    return picture
+
+
+def _panels(
+    axis: Axis, belief: ChainBelief, leader: str, number: int
+) -> list[tuple[str, list[str], NDArray[np.uint8]]]:
+    """Return title, names of rows and colours [shape=(columns, rows, 3)] of what is shown of a chain."""
+    colour = COLOURS[number % len(COLOURS)]
+    most = belief.probability.max(axis=0)
+    shown = np.flatnonzero(most >= min(LEAST, most.max()))
+    first = (belief.probability[:, shown] >= most[shown] / 2).argmax(axis=0)
+    shown = shown[np.argsort(first, kind="stable")]
+    names = [belief.units[unit] for unit in shown]
+    panels = [(f"chain {number + 1}: {belief.name}", names, _shaded(axis, belief.probability[:, shown], colour))]
+    if belief.leads:
+        named = [f"{lead:+d}" if lead else "0" for lead in belief.leads]
+        title = f"asynchrony: states that {belief.name} is ahead of {leader}"
+        panels.append((title, named, _shaded(axis, belief.lead, INK)))
+    return panels
+
+
+def _shaded(axis: Axis, probability: NDArray[Any], colour: tuple[int, int, int]) -> NDArray[np.uint8]:
+    share = np.clip(axis.averaged(probability), 0, 1)[:, :, None]
+    return np.round(255 + share * (np.array(colour, float) - 255)).astype(np.uint8)
+
+
+def _curve_name(generation: Generation) -> str:
+    names = generation.motion.names
+    return "opening" if "opening" in names else names[0]
+
+
+@dataclass(frozen=True)
+class Pen:
+    """Draws what is not shaded."""
+
+    on: ImageDraw.ImageDraw
+    axis: Axis
+
+    def text(self, x: float, y: float, text: str, colour: tuple[int, int, int], anchor: str = "la") -> None:
+        """Write at a place."""
+        self.on.text((x, y), text, fill=colour, font=ImageFont.load_default(12), anchor=anchor)
+
+    def rows(self, y: float, names: Sequence[str]) -> None:
+        """Name rows and rule lines between them."""
+        right = LEFT + self.axis.columns
+        for number, name in enumerate(names):
+            self.on.line([(LEFT, y + ROW * number), (right, y + ROW * number)], fill=PALE)
+            self.text(LEFT - 6, y + ROW * (number + 0.5), name, INK, "rm")
+        self.on.rectangle([LEFT, y, right, y + ROW * len(names)], outline=GREY)
+
+    def curve(self, y: float, values: NDArray[Any]) -> None:
+        """Draw a curve [shape=(T,)] with its least and largest value."""
+        shown = values if len(values) < self.axis.columns else self.axis.averaged(values[:, None])[:, 0]
+        low, high = float(min(shown.min(), 0)), float(shown.max())
+        heights = y + CURVE - (shown - low) / max(high - low, 1e-9) * (CURVE - 8)
+        places = LEFT + (np.arange(len(shown)) + 0.5) / len(shown) * self.axis.columns
+        self.on.rectangle([LEFT, y, LEFT + self.axis.columns, y + CURVE], outline=GREY)
+        self.on.line(list(zip(places.tolist(), heights.tolist(), strict=True)), fill=INK, width=2)
+        self.text(LEFT - 6, y + 8, f"{high:.2f}", INK, "rm")
+        self.text(LEFT - 6, y + CURVE, f"{low:.2f}", INK, "rm")
+
+    def phones(self, generation: Generation, bottom: float) -> None:
+        """Write the phones on top and rule lines where they begin, if there is room for them."""
+        if len(generation.units) * LEAST_ROOM > self.axis.columns:
+            return
+        free = 0.0
+        for span in generation.units:
+            left, right = self.axis.x(span.start_s), self.axis.x(span.end_s)
+            self.on.line([(left, TITLE - 4), (left, bottom)], fill=PALE)
+            width = self.on.textlength(span.label.phone, font=ImageFont.load_default(12))
+            start = (left + right - width) / 2
+            if start > free:
+                self.text(start, 3, span.label.phone, GREY if is_silent(span.label.phone) else INK)
+                free = start + width + 2
+
+    def times(self, y: float) -> None:
+        """Draw the axis of time."""
+        length_s = self.axis.frames / self.axis.rate_hz
+        step_s = next((s for s in STEPS_S if s / length_s * self.axis.columns >= TICK), STEPS_S[-1])
+        for number in range(int(length_s / step_s) + 1):
+            x = self.axis.x(number * step_s)
+            self.on.line([(x, y), (x, y + 5)], fill=INK)
+            self.text(x, y + 8, f"{number * step_s:g} s", INK, "ma")

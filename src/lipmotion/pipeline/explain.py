@@ -1,0 +1,150 @@
+"""Why a frame is what it is: ``explain(model, speech, at_s) → explanations``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from textwrap import wrap
+from typing import Any
+
+from lipmotion.engines.base import frame_of
+from lipmotion.errors import InputError
+from lipmotion.pipeline.hear import heard
+from lipmotion.pipeline.model import Model, load_model
+from lipmotion.speech.mfcc import frame_count
+from lipmotion.speech.read import read_audio
+from lipmotion.types import (
+    FRAME_RATE_HZ,
+    Audio,
+    ChainStates,
+    Explanation,
+    Gaussian,
+    Likely,
+    Regression,
+    Timeline,
+    Unit,
+    Value,
+)
+from lipmotion.units import Lexicon
+
+LINE = 110
+"""Letters of a line of text, its name aside."""
+SHOWN = 6
+"""Channels in a line of text; points are left out where there is anything else."""
+
+
+def explain(
+    model: Model | str | Path | None,
+    speech: str | Path | Audio,
+    at_s: float | Sequence[float],
+    *,
+    transcript: str | Path | None = None,
+    units: Timeline[Unit] | None = None,
+    lexicon: Lexicon | None = None,
+    recogniser: str = "auto",
+) -> tuple[Explanation, ...]:
+    """Return what stands behind some frames of what ``animate`` makes of the same speech.
+
+    model : from ``load_model``, or its file; None: the shipped one
+    at_s  : one or several times, in seconds: the nearest 10 ms frame of each
+    All other arguments, and what is raised, as of ``animate``.
+    Raises InputError: a time lies outside the recording.
+    """
+    chosen = model if isinstance(model, Model) else load_model(model)
+    audio = speech if isinstance(speech, Audio) else read_audio(Path(speech))
+    times = [at_s] if isinstance(at_s, int | float) else at_s
+    count = frame_count(audio.samples)
+    frames = [_frame(time_s, count) for time_s in times]
+    known = heard(chosen, audio, transcript=transcript, units=units, lexicon=lexicon, recogniser=recogniser)
+    return chosen.engine.explain(chosen.learned, known, frames)
+
+
+def _frame(time_s: float, frames: int) -> int:
+    frame = frame_of(time_s, frames, FRAME_RATE_HZ)
+    if frame is None:
+        raise InputError(f"{time_s} s lies outside the recording (0 to {(frames - 1) / FRAME_RATE_HZ:.2f} s)")
+    return frame
+
+
+def explanation_document(explanation: Explanation) -> dict[str, Any]:
+    """Return an explanation as JSON holds it (docs/explain.md)."""
+    document = asdict(explanation)
+    for written, chain in zip(document["chains"], explanation.chains, strict=True):
+        if chain.lead:
+            written["expected_lead"] = chain.expected_lead
+    return document
+
+
+def explanation_text(explanation: Explanation) -> str:
+    """Return an explanation as lines for people to read."""
+    rows = list(_rows(explanation))
+    width = max(len(name) for name, _ in rows) + 2
+    lines = [f"{explanation.time_s:.2f} s (frame {explanation.frame})"]
+    for name, text in rows:
+        first, *others = wrap(text, LINE, break_long_words=False, break_on_hyphens=False) or [""]
+        lines += [f"  {name:{width}}{first}", *(f"  {'':{width}}{other}" for other in others)]
+    return "\n".join(lines)
+
+
+def _rows(explanation: Explanation) -> Iterator[tuple[str, str]]:
+    yield "phone", _phone(explanation)
+    yield "state", explanation.state
+    for number, chain in enumerate(explanation.chains):
+        yield f"chain {number + 1}: {chain.name}", _listed(chain.states)
+    if explanation.joint is not None and len(explanation.chains) > 1:
+        yield "together", _listed([explanation.joint])
+    for chain in explanation.chains:
+        if chain.lead:
+            yield "asynchrony", _lead(chain, explanation.chains[0].name)
+    for gaussian in explanation.gaussians:
+        yield f"Gaussian of {gaussian.stream}", _gaussian(gaussian)
+        yield from _values(gaussian.channels)
+    for regression in explanation.regressions:
+        yield f"mean of {regression.stream}", _followed(regression)
+        yield from _values(regression.channels)
+    values = _values(explanation.motion)
+    yield "generated", next(values)[1]
+    yield from values
+
+
+def _phone(explanation: Explanation) -> str:
+    span = explanation.span
+    if span is None:
+        return "none"
+    word = f" in {span.label.word!r}" if span.label.word else ""
+    return f"{span.label.phone}{word}, {span.start_s:.2f} to {span.end_s:.2f} s, modelled by {span.label.unit}"
+
+
+def _listed(found: Sequence[Likely]) -> str:
+    return "   ".join(f"{one.name} {one.probability:.2f}" for one in found)
+
+
+def _lead(chain: ChainStates, first: str) -> str:
+    shares = "   ".join(
+        f"{states:+d}: {share:.2f}" if states else f"0: {share:.2f}" for states, share in chain.lead.items()
+    )
+    side = "ahead of" if chain.expected_lead >= 0 else "behind"
+    return f"{chain.name} {abs(chain.expected_lead):.2f} states {side} {first}   ({shares})"
+
+
+def _gaussian(gaussian: Gaussian) -> str:
+    number = f" number {gaussian.component} of {gaussian.components}" if gaussian.components > 1 else ""
+    distance = f", {gaussian.distance:.2f} deviations away" if gaussian.distance is not None else ""
+    return f"{gaussian.density}{number}, responsible for {gaussian.responsibility:.2f}{distance}"
+
+
+def _followed(regression: Regression) -> str:
+    if regression.shares[0].name == "rest":
+        return "the pose at rest: silence away from speech"
+    return f"follows what is heard and believed around the frame: {_listed(regression.shares)}"
+
+
+def _values(channels: Mapping[str, Value]) -> Iterator[tuple[str, str]]:
+    names = [name for name in channels if name[:2] not in ("x_", "y_", "z_")] or list(channels)
+    for start in range(0, min(len(names), SHOWN), 3):
+        shown = names[start : min(start + 3, SHOWN)]
+        text = "   ".join(f"{name} {channels[name].value:6.3f} ± {channels[name].deviation:.3f}" for name in shown)
+        yield "", text
+    if len(channels) > min(len(names), SHOWN):
+        yield "", f"and {len(channels) - min(len(names), SHOWN)} more channels (--json has all)"

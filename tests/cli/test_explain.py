@@ -1,0 +1,54 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from cli.conftest import Run, is_one_error
+
+pytestmark = pytest.mark.usefixtures("here")
+
+
+def test_a_frame_of_a_coupled_model(run: Run, coupled_model_file: Path, toy_speech: Path) -> None:
+    done = run("explain", coupled_model_file, toy_speech, "--at", "0.8", "--transcript", "See Bob, papa & mama!")
+    assert (done.code, done.err) == (0, [])
+    assert done.out[0] == "0.80 s (frame 80)"
+    assert [line for line in done.out if line.startswith("  asynchrony ")]
+
+
+def test_several_times_and_any_engine(run: Run, toy_model_file: Path, toy_speech: Path) -> None:
+    done = run("explain", toy_model_file, toy_speech, "--at", "0.8", "--at", "0.5")
+    assert [line for line in done.out if line and not line.startswith(" ")] == [
+        "0.80 s (frame 80)",
+        "0.50 s (frame 50)",
+    ]
+
+
+def test_for_machines(run: Run, coupled_model_file: Path, toy_speech: Path) -> None:
+    done = run("explain", coupled_model_file, toy_speech, "--at", "0.8", "--at", "0.5", "--json")
+    assert [json.loads(line)["frame"] for line in done.out] == [80, 50]
+
+
+@pytest.mark.parametrize(
+    ("options", "code", "words"),
+    [
+        (["MODEL", "SPEECH", "--at", "99"], 3, "99.0 s lies outside the recording (0 to "),
+        (["MODEL", "SPEECH", "--at=-1"], 3, "-1.0 s lies outside the recording"),
+        (["MODEL", "SPEECH", "--at", "nan"], 3, "nan s lies outside the recording"),
+        (["missing", "SPEECH", "--at", "1"], 3, "missing: no such model"),
+        (["MODEL", "missing.wav", "--at", "1"], 3, "missing.wav: no such file"),
+        (["SPEECH", "MODEL", "--at", "1"], 6, "not a lipmotion model"),
+    ],
+)
+def test_what_cannot_be_explained(
+    run: Run, coupled_model_file: Path, toy_speech: Path, options: list[str], code: int, words: str
+) -> None:
+    given = {"MODEL": coupled_model_file, "SPEECH": toy_speech}
+    done = run("explain", *[given.get(option, option) for option in options])
+    assert is_one_error(done, code)
+    assert words in done.err[0]
+
+
+def test_a_time_is_needed(run: Run, coupled_model_file: Path, toy_speech: Path) -> None:
+    assert run("explain", coupled_model_file, toy_speech).code == 2

@@ -1,0 +1,77 @@
+"""Why a frame is what it is, from a model and a recording."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import lipmotion
+from lipmotion.errors import InputError
+from lipmotion.pipeline.explain import explanation_document, explanation_text
+from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.toy import ToySentence
+
+WORDS = "See Bob, papa & mama!"
+
+
+def test_it_explains_what_animate_makes(coupled_model: Model, toy_sentence: ToySentence, toy_speech: Path) -> None:
+    result = lipmotion.animate(toy_speech, model=coupled_model, transcript=WORDS)
+    one, other = lipmotion.explain(coupled_model, toy_speech, [0.804, 1.0], transcript=WORDS)
+    assert (one.frame, one.time_s, other.frame) == (80, 0.8, 100)
+    assert one.state == result.trace.states[result.trace.frames[80]]
+    assert [value.value for value in one.motion.values()] == pytest.approx(result.motion.values[80].tolist())
+    assert one.span in result.units.spans
+    (same,) = lipmotion.explain(coupled_model, toy_sentence.audio, 0.8, units=result.units)
+    assert same.state == one.state
+    assert [chain.name for chain in one.chains] == ["sVis", "2vis"]
+    assert sum(one.chains[1].lead.values()) == pytest.approx(1, abs=1e-4)
+
+
+def test_a_model_file_and_any_engine(toy_model_file: Path, toy_speech: Path) -> None:
+    (found,) = lipmotion.explain(toy_model_file, toy_speech, 0.8)
+    assert "speech." in found.state or found.state == "rest"
+    assert (found.chains, found.gaussians, found.joint) == ((), (), None)
+
+
+@pytest.mark.parametrize("time_s", [-0.1, 1e6, float("nan"), float("inf")])
+def test_a_time_outside_the_recording(coupled_model: Model, toy_sentence: ToySentence, time_s: float) -> None:
+    frames = len(lipmotion.animate(toy_sentence.audio, model=coupled_model).motion.values)
+    with pytest.raises(InputError, match=rf"outside the recording \(0 to {(frames - 1) / 100:.2f} s\)"):
+        lipmotion.explain(coupled_model, toy_sentence.audio, [0.1, time_s])
+
+
+def test_the_last_frame_is_inside(coupled_model: Model, toy_sentence: ToySentence) -> None:
+    result = lipmotion.animate(toy_sentence.audio, model=coupled_model)
+    (last,) = lipmotion.explain(coupled_model, toy_sentence.audio, float(result.motion.time_s[-1]))
+    assert last.frame == len(result.motion.values) - 1
+
+
+def test_the_text_names_everything(coupled_model: Model, toy_sentence: ToySentence) -> None:
+    (found,) = lipmotion.explain(coupled_model, toy_sentence.audio, 0.8, transcript=WORDS)
+    text = explanation_text(found)
+    lines = text.splitlines()
+    assert lines[0] == "0.80 s (frame 80)"
+    for start in ("phone", "state", "chain 1: sVis", "chain 2: 2vis", "together", "asynchrony", "Gaussian of speech"):
+        assert any(line.startswith(f"  {start} ") for line in lines)
+    assert found.state in text
+    for gaussian in found.gaussians:
+        assert f"{gaussian.density} " in text
+    opening = found.motion["opening"]
+    assert f"opening {opening.value:6.3f} ± {opening.deviation:.3f}" in text
+    assert max(map(len, lines)) < 150
+    assert text == "\n".join(line.rstrip() for line in lines)
+
+
+def test_the_document_is_json_with_all_channels(coupled_model: Model, toy_sentence: ToySentence) -> None:
+    (found,) = lipmotion.explain(coupled_model, toy_sentence.audio, 0.8)
+    document = json.loads(json.dumps(explanation_document(found), allow_nan=False))
+    assert document["frame"] == 80
+    assert list(document["motion"]) == list(found.motion)
+    lead = document["chains"][1]["lead"]
+    expected = sum(int(states) * probability for states, probability in lead.items())
+    assert document["chains"][1]["expected_lead"] == pytest.approx(expected)
+    assert "expected_lead" not in document["chains"][0]
+    assert np.isfinite(document["gaussians"][1]["channels"]["opening"]["deviation"])
