@@ -8,7 +8,7 @@ import pytest
 
 from cli.conftest import Run, is_one_error
 from lipmotion.corpora.store import Corpus
-from lipmotion.experiment import folds, learning_curve, unit_sets
+from lipmotion.experiment import comparison, folds, learning_curve, table3_text, unit_sets
 from lipmotion.measures.bootstrap import interval
 from lipmotion.pipeline import evaluate
 
@@ -16,7 +16,7 @@ from lipmotion.pipeline import evaluate
 @pytest.fixture(autouse=True)
 def few_draws(monkeypatch: pytest.MonkeyPatch) -> None:
     """And the first two unit sets of the paper beside the one that they are compared with."""
-    for module in (unit_sets, evaluate):
+    for module in (comparison, evaluate):
         monkeypatch.setattr(module, "interval", partial(interval, draws=20))
     monkeypatch.setattr(unit_sets, "PAPER", {name: unit_sets.PAPER[name] for name in ("2vis", "pbVis", "phone")})
 
@@ -64,7 +64,21 @@ def test_a_program_reads_them(run: Run, toy_corpus: Corpus) -> None:
     assert json.loads(done.out[-1])["figures"]["order"] == "shuffled"
 
 
-LEARNING_CURVE, FOLDS = "learning-curve CORPUS", "folds CORPUS"
+def test_table3_of_some_systems(run: Run, toy_corpus: Corpus, here: Path) -> None:
+    (here / "order.txt").write_text("\n".join(toy_corpus.names("train")))
+    chosen = ("--systems", "ph-MSHMM;loudness", "--states", "2", "--mixtures", "1", "--order", "order.txt")
+    chosen = (*chosen, "--sizes", "8,3", "--noise", "white", "--snr", "5", "--plots", "pictures", "--workers", "1")
+    done = run("experiment", "table3", toy_corpus.path, *chosen, "-o", "a.json")
+    assert (done.code, done.err) == (0, [])
+    figures = json.loads((here / "a.json").read_text())
+    assert "\n".join(done.out) == table3_text.table(figures)
+    assert [row["names"] for row in figures["rows"]] == [3, 8]
+    assert (figures["order"], figures["mixtures"], figures["states"]) == ("given", [1], 2)
+    assert [(row["kind"], row["snr_db"]) for row in figures["noise"]] == [("white", 5)]
+    assert len(list((here / "pictures").iterdir())) == 3
+
+
+LEARNING_CURVE, FOLDS, TABLE3 = "learning-curve CORPUS", "folds CORPUS", "table3 CORPUS"
 
 
 @pytest.mark.parametrize(
@@ -78,6 +92,11 @@ LEARNING_CURVE, FOLDS = "learning-curve CORPUS", "folds CORPUS"
         (f"{LEARNING_CURVE} --split all", 4, "are in the split that is compared with"),
         (f"{FOLDS} --folds 1", 3, "1 folds; required: from 2 to 8"),
         (f"{FOLDS} -o missing/a.json", 7, "the folder missing does not exist"),
+        (f"{TABLE3} --systems ph-RNN", 3, "no system 'ph-RNN'; there are: ph-HMM"),
+        (f"{TABLE3} --mixtures 3", 3, "numbers of Gaussians 3; required: powers of two"),
+        (f"{TABLE3} --noise babble", 3, "a babble of 0 talkers; required at least 2: --talkers"),
+        (f"{TABLE3} --talkers missing", 3, "missing: no such folder; give one with recordings of other people"),
+        (f"{TABLE3} --plots missing/a", 7, "the folder missing does not exist"),
         ("folds missing", 4, "missing: no such corpus; make one"),
     ],
 )

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import shutil
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -7,8 +9,11 @@ import pytest
 
 from cli.conftest import Run, is_one_error
 from lipmotion.corpora.store import Corpus
-from lipmotion.pipeline.model import load_model, save_model
-from lipmotion.pipeline.train import train
+from lipmotion.pipeline.model import Model, load_model, save_model
+from lipmotion.pipeline.toy import toy_sentences
+from lipmotion.pipeline.train import TrainReport, train
+from lipmotion.pipeline.voices import Heard, SpokenSentence
+from lipmotion.speech.voices.base import SyntheticVoice
 from lipmotion.units import unit_set
 
 
@@ -83,6 +88,44 @@ def test_units_of_a_table_that_is_not_needed_again(run: Run, toy_corpus: Corpus,
     assert figures[0] == figures[1]
 
 
+def test_other_voices_are_learned_from_but_those_for_judging(
+    run: Run, toy_model: Model, toy_corpus: Corpus, toy_speech: Path, here: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of two installed voices, slt judges; and a friend was recorded."""
+    speakers: list[list[str]] = []
+
+    def say(*, voices: list[SyntheticVoice], **_: object) -> Iterator[SpokenSentence]:
+        sentence = toy_sentences(3)[0]
+        return (SpokenSentence(v.name, v.speaker, sentence.audio, sentence.units) for v in voices)
+
+    def learn(*_: object, voices: Iterator[Heard], **__: object) -> tuple[Model, TrainReport]:
+        speakers.append([one.speaker for one in voices])
+        return toy_model, TrainReport((), {}, {})
+
+    both = tuple(SyntheticVoice(name, "flite", name) for name in ("slt", "rms"))
+    monkeypatch.setattr("lipmotion.pipeline.voices.installed_voices", lambda: both)
+    monkeypatch.setattr("lipmotion.pipeline.voices.many_voices", say)
+    monkeypatch.setattr("lipmotion.pipeline.train.train", learn)
+    (here / "open" / "friend").mkdir(parents=True)
+    shutil.copy(toy_speech, here / "open" / "friend" / "one.wav")
+    (here / "open" / "friend" / "one.txt").write_text(" ".join(toy_corpus.utterance("toy00").words or ()))
+    for arguments in (["--voices", "--recordings", "open"], ["--voices"], []):
+        assert run("train", toy_corpus.path, "-o", "m", "--engine", "coupled", *arguments).code == 0
+    assert speakers == [["friend", "rms"], ["rms"], []]
+
+
+def test_an_engine_without_a_use_for_voices(
+    run: Run, toy_corpus: Corpus, here: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sentence = toy_sentences(3)[0]
+    one = SpokenSentence("one", "rms", sentence.audio, sentence.units)
+    monkeypatch.setattr("lipmotion.pipeline.voices.many_voices", lambda **_: iter([one]))
+    refused = run("train", toy_corpus.path, "-o", "other", "--voices")
+    assert is_one_error(refused, 3)
+    assert "the trajectory engine cannot learn from other voices" in refused.err[0]
+    assert list(here.iterdir()) == []
+
+
 @pytest.mark.parametrize(
     ("arguments", "code", "words"),
     [
@@ -95,6 +138,7 @@ def test_units_of_a_table_that_is_not_needed_again(run: Run, toy_corpus: Corpus,
         (["CORPUS", "-o", "m", "--lexicon", "missing"], 3, "missing: no such lexicon file"),
         (["CORPUS", "-o", "m", "--units", "evis"], 3, "no unit set 'evis'; there are: 2vis, sVis, pbVis"),
         (["CORPUS", "-o", "m", "--units", "folder"], 3, "folder: "),
+        (["CORPUS", "-o", "m", "--engine", "coupled", "--recordings", "missing"], 4, "missing: no such folder"),
         (["CORPUS", "-o", "m", "--engine", "coupled", "--units", "eVis"], 3, '--set chains="phone viseme"'),
         (["CORPUS", "-o", "m", "--system", "ph-HMM"], 3, "add --engine coupled"),
         (["CORPUS", "-o", "m", "--set", "tree=1"], 3, "no option 'tree'; there are: parts, silent_parts"),

@@ -5,7 +5,7 @@ from functools import partial
 
 import pytest
 
-from lipmotion.experiment import unit_sets as experiment
+from lipmotion.experiment import comparison
 from lipmotion.measures.bootstrap import interval
 from lipmotion.pipeline import evaluate as evaluation
 
@@ -14,6 +14,6 @@ from lipmotion.pipeline import evaluate as evaluation
 def few_draws() -> Iterator[None]:
     """Intervals of 50 draws: what they say is tested with the measures."""
     with pytest.MonkeyPatch.context() as patch:
-        for module in (experiment, evaluation):
+        for module in (comparison, evaluation):
             patch.setattr(module, "interval", partial(interval, draws=50))
         yield

@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,11 +9,13 @@ import pytest
 
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import engine_named
-from lipmotion.errors import CorpusError
+from lipmotion.errors import CorpusError, InputError
 from lipmotion.pipeline import train as module
 from lipmotion.pipeline.model import Model, save_model
 from lipmotion.pipeline.toy import toy_sentences
 from lipmotion.pipeline.train import labels_of, model_motion, train
+from lipmotion.pipeline.voices import Heard
+from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.recogniser import Recogniser
 from lipmotion.stats.hmm.model import HmmConfig
 from lipmotion.types import Channel, Motion, Timeline, Track, Unit, Utterance
@@ -217,3 +219,32 @@ def test_camera_frames_become_model_frames() -> None:
     assert motion.values[:101, 0] == pytest.approx(np.sin(np.arange(101) / 100 * 2 * np.pi), abs=0.01)
     assert valid[:101].all()
     assert not valid[103:].any()  # half a camera frame after the last one
+
+
+def others() -> Iterator[Heard]:
+    """Two speakers of whom nothing was seen."""
+    for number, sentence in enumerate(toy_sentences(4)):
+        yield Heard(mfcc(sentence.audio), sentence.units, ("bert", "anna")[number % 2])
+
+
+def test_voices_of_others_teach_engines_that_have_a_use_for_them(toy_corpus: Corpus) -> None:
+    stages: list[str] = []
+    plain = {"states": 1, "asynchrony": 0, "mixtures": 1, "follows": False, "full_range": False}
+    engine = engine_named("coupled", plain | {"more_mixtures": 1})
+    chosen = {"names": TRAINED[:4], "recogniser": SMALL, "engine": engine}
+    model, report = train(toy_corpus, **chosen, voices=others(), monitor=lambda event: stages.append(event.stage))
+    alone, _ = train(toy_corpus, **chosen)
+    assert model.about["voices"] == ["anna", "bert"]
+    assert model.about["utterances"] == 4
+    assert report.used == TRAINED[:4]
+    assert "voices" not in alone.about
+    assert {"hearing other voices", "learning motion: more speech"} <= set(stages)
+    speech, lips = ([one.learned.chains.groups[group].mixtures.means for one in (model, alone)] for group in (0, 1))
+    assert np.abs(speech[0] - speech[1]).max() > 0.1
+    assert lips[0].tobytes() == lips[1].tobytes()
+
+
+@pytest.mark.parametrize("name", ["trajectory", "joint"])
+def test_other_engines_have_no_use_for_voices(toy_corpus: Corpus, name: str) -> None:
+    with pytest.raises(InputError, match=f"the {name} engine cannot learn from other voices"):
+        train(toy_corpus, engine=engine_named(name, {}), voices=others())

@@ -1,15 +1,15 @@
-"""``lipmotion experiment unit-sets|learning-curve|folds``: systems trained and compared on a corpus."""
+"""``lipmotion experiment unit-sets|learning-curve|folds|table3``: systems trained and compared on a corpus."""
 
 from __future__ import annotations
 
 import argparse
 
-from lipmotion.cli import folds, learning_curve, unit_sets
+from lipmotion.cli import folds, learning_curve, table3, unit_sets
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb."""
     parser = verbs.add_parser("experiment", help="train and compare systems on a corpus, as the papers did")
     actions = parser.add_subparsers(title="experiments", required=True, metavar="EXPERIMENT")
-    for experiment in (unit_sets, learning_curve, folds):
+    for experiment in (unit_sets, learning_curve, folds, table3):
         experiment.add(actions)

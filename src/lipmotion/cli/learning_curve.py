@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from lipmotion.cli.experiments import add_experiment_arguments, one_thread_each, run_experiment
-from lipmotion.cli.options import list_or_all
+from lipmotion.cli.options import list_or_all, numbers
 
 
 def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -16,7 +16,7 @@ def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     order = "names of recordings, one a line (default: the training list, shuffled with seed 0)"
     parser.add_argument("--order", type=Path, metavar="FILE", help=order)
     sizes = "train on so many, one after another (default: 20,50,100,200 and all)"
-    parser.add_argument("--sizes", type=_sizes, metavar="N,N,...", help=sizes)
+    parser.add_argument("--sizes", type=numbers, metavar="N,N,...", help=sizes)
     parser.add_argument("--split", default="test", help="compare on val or test (default: test)")
     add_experiment_arguments(parser)
     parser.set_defaults(run=run)
@@ -35,10 +35,3 @@ def run(options: argparse.Namespace) -> None:
         return learning_curve(corpus, order=order, sizes=options.sizes, split=list_or_all(options.split), **given)
 
     run_experiment(options, experiment, table)
-
-
-def _sizes(text: str) -> list[int]:
-    try:
-        return [int(part) for part in text.split(",")]
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(f"{text!r}; required: numbers with commas between them") from error

@@ -15,3 +15,11 @@ def add_machine_readable(parser: argparse.ArgumentParser) -> None:
 def list_or_all(split: str) -> str | None:
     """Return the list that ``--split`` names; None for ``all``."""
     return None if split == "all" else split
+
+
+def numbers(text: str) -> list[int]:
+    """Return whole numbers with commas between them."""
+    try:
+        return [int(part) for part in text.split(",")]
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"{text!r}; required: numbers with commas between them") from error

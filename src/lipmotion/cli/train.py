@@ -29,6 +29,10 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "--set", action="append", default=[], metavar="NAME=VALUE", help="any option of the engine (repeatable)"
     )
     parser.add_argument("--visual", default="geometry", metavar="WHAT", help=VISUAL)
+    parser.add_argument("--voices", action="store_true", help="learn from installed synthetic voices as well (coupled)")
+    parser.add_argument(
+        "--recordings", type=Path, metavar="FOLDER", help="and from transcribed speech of others (coupled)"
+    )
     parser.add_argument("--workers", type=int, help="processes (default: one a core)")
     add_machine_readable(parser)
     parser.set_defaults(run=run)
@@ -44,6 +48,7 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.files import unfinished_work
     from lipmotion.pipeline.model import save_model
     from lipmotion.pipeline.train import train
+    from lipmotion.pipeline.voices import other_voices
     from lipmotion.units import Lexicon
 
     workers = options.workers or os.cpu_count() or 1
@@ -53,6 +58,8 @@ def run(options: argparse.Namespace) -> None:
         engine = engine_as_told(options.engine, system=options.system, units=options.units, settings=options.set)
         chosen = {"engine": engine, "split": split, "speakers": options.speaker, "lexicon": lexicon, "workers": workers}
         chosen["visual"] = options.visual
+        heard = {"recordings": options.recordings, "lexicon": lexicon, "monitor": report.hear}
+        chosen["voices"] = other_voices(synthetic=options.voices, **heard)
         with unfinished_work(options.output) as work:
             model, result = train(Corpus.open(options.corpus), **chosen, monitor=report.hear, work=work)
             save_model(model, options.output)

@@ -37,15 +37,17 @@ class Fit(Generic[ModelT]):
     figures: Mapping[str, float]
 
 
-class Engine(ABC, Generic[ModelT]):
-    """Holds its configuration only. What was learned is the model, what came out is the ``Generation``."""
-
-    name: ClassVar[str]
-    config: Any
+class Animator(ABC, Generic[ModelT]):
+    """Learns to make motion of speech. What was learned is the model, what came out is the ``Generation``."""
 
     @property
     def hears_f0(self) -> bool:
         """Whether it wants ``Speech.log_f0``."""
+        return False
+
+    @property
+    def hears_others(self) -> bool:
+        """Whether it learns from examples in which no motion was seen: speech of other speakers."""
         return False
 
     @abstractmethod
@@ -67,6 +69,13 @@ class Engine(ABC, Generic[ModelT]):
 
         Raises InputError: a constraint names no channel, or lies outside the recording.
         """
+
+
+class Engine(Animator[ModelT]):
+    """An animator whose models are kept in files. Holds its configuration only."""
+
+    name: ClassVar[str]
+    config: Any
 
     def explain(self, model: ModelT, speech: Speech, frames: Sequence[int]) -> tuple[Explanation, ...]:
         """Return what stands behind some frames of what ``generate`` makes of speech.

@@ -50,8 +50,8 @@ def learning_curve(
     """
     listed = tuple(order) if order is not None else shuffled(corpus.required("train"), seed)
     held_out = corpus.required(split)
-    steps = _steps(sizes, len(listed))
-    _check(corpus, listed, held_out)
+    steps = steps_of(sizes, len(listed))
+    check_lists(corpus, listed, held_out)
     channels = channels_with_opening(corpus, held_out)
     shares = np.cumsum([0, *steps]) / sum(steps)
     tried = partial(trial, corpus, recogniser=recogniser, lexicon=lexicon, workers=workers)
@@ -66,8 +66,12 @@ def learning_curve(
     return figures
 
 
-def _steps(sizes: Sequence[int] | None, listed: int) -> list[int]:
-    """Return the sizes, each once, the smallest first."""
+def steps_of(sizes: Sequence[int] | None, listed: int) -> list[int]:
+    """Return the sizes, each once, the smallest first; the default ones where none are given.
+
+    listed : how many names there are
+    Raises InputError: sizes under 1 or over the list, or an empty list.
+    """
     if not listed:
         raise InputError("the list of utterances to train on is empty; give one name a line")
     steps = sorted(set(sizes)) if sizes is not None else [*(n for n in SIZES if n < listed), listed]
@@ -77,7 +81,8 @@ def _steps(sizes: Sequence[int] | None, listed: int) -> list[int]:
     return steps
 
 
-def _check(corpus: Corpus, listed: Sequence[str], held_out: Sequence[str]) -> None:
+def check_lists(corpus: Corpus, listed: Sequence[str], held_out: Sequence[str]) -> None:
+    """Raise CorpusError where names to train on are not in the corpus, twice in the list, or among those held out."""
     known, kept = set(corpus.names()), set(held_out)
     wrong = {
         "are not in the corpus; take them out, or prepare them": [name for name in listed if name not in known],

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import engine_named
+from lipmotion.experiment.comparison import correlation_tally, mark, openings_of, score_tally
 from lipmotion.experiment.trial import channels_with_opening, opening_row
 from lipmotion.measures import curves
-from lipmotion.measures.bootstrap import interval
-from lipmotion.measures.closures import found_closings
 from lipmotion.measures.report import number, without_nan
-from lipmotion.pipeline.evaluate import OPENING, Clip, Recorded, clips, figures_of, recorded
+from lipmotion.pipeline.evaluate import Clip, Recorded, clips, figures_of, recorded
 from lipmotion.pipeline.train import FEWEST, phones_and_examples
 from lipmotion.pipeline.workers import working
 from lipmotion.speech.recogniser import recogniser as cached_recogniser
@@ -24,7 +20,6 @@ from lipmotion.stats.hmm.model import HmmConfig
 from lipmotion.types import Example, Monitor, counted, part_of, silent_monitor
 from lipmotion.units import UNIT_SETS, Lexicon
 
-Array = NDArray[np.float64]
 PAPER: dict[str, float] = {"2vis": 66.5, "pbVis": 67.7, "sVis": 67.4, "eVis": 68.8, "phone": 65.2}
 """Closure scores of Table 1, its rows in their order."""
 BASELINE = "phone"
@@ -93,50 +88,17 @@ def _block(
 
 
 def _row(found: Recorded, units: str, made: Sequence[Clip], baseline: Sequence[Clip], seed: int) -> dict[str, Any]:
-    figures = figures_of(made, found, seed)
-    (generated, original), (other, _) = _openings(found, made), _openings(found, baseline)
+    (generated, original), (other, _) = openings_of(found, made), openings_of(found, baseline)
     threshold = found.closed_under or 0.0
-    hits, count = found_closings(generated, original, threshold)
-    other_hits, _ = found_closings(other, original, threshold)
+    score, acc = score_tally(generated, original, threshold), correlation_tally(generated, original)
     return {
         "units": UNIT_SETS[units].count,
         "paper": PAPER[units],
-        "score_95": interval(_score, hits, count, seed),
-        "score_gain_95": _gain(_score, hits, other_hits, count, seed),
-        "acc_gain_95": _gain(_acc, generated, other, original, seed),
+        "score_95": score.interval(seed),
+        "score_gain_95": score.gain(score_tally(other, original, threshold), seed),
+        "acc_gain_95": acc.gain(correlation_tally(other, original), seed),
         "rmse": float(curves.rmse(generated, original)[0]),
-    } | opening_row(figures)
-
-
-def _openings(found: Recorded, made: Sequence[Clip]) -> tuple[list[Array], list[Array]]:
-    """Return the generated and the recorded opening of every clip [each shape=(T, 1)]."""
-    column = slice(found.channels.index(OPENING), found.channels.index(OPENING) + 1)
-    return [clip.generated[:, column] for clip in made], [clip.original[:, column] for clip in made]
-
-
-def _score(hits: curves.Clips, count: curves.Clips) -> float:
-    total = np.sum(count)
-    return float(100 * np.sum(hits) / total) if total else float("nan")
-
-
-def _acc(generated: curves.Clips, original: curves.Clips) -> float:
-    return float(curves.pooled_correlation(generated, original)[0])
-
-
-def _gain(
-    figure: Callable[[curves.Clips, curves.Clips], float],
-    own: curves.Clips,
-    other: curves.Clips,
-    original: curves.Clips,
-    seed: int,
-) -> tuple[float, float]:
-    """Return the paired interval of what a figure is more than that of another system on the same clips."""
-
-    def difference(both: curves.Clips, original: curves.Clips) -> float:
-        return figure([b[..., :1] for b in both], original) - figure([b[..., 1:] for b in both], original)
-
-    both = [np.concatenate(pair, axis=-1) for pair in zip(own, other, strict=True)]
-    return interval(difference, both, original, seed)
+    } | opening_row(figures_of(made, found, seed))
 
 
 def table(figures: Mapping[str, Any]) -> str:
@@ -160,16 +122,10 @@ HEAD = (
 
 def _line(units: str, row: Mapping[str, Any]) -> str:
     low, high = row["score_95"]
-    score = f"{number(row['score'], '.1f')}{_mark(row['score_gain_95'])} ({number(low, '.1f')}–{number(high, '.1f')})"
-    acc = "{:.3f}{} ({:.3f}–{:.3f})".format(row["acc"], _mark(row["acc_gain_95"]), *row["acc_95"])
+    score = f"{number(row['score'], '.1f')}{mark(row['score_gain_95'])} ({number(low, '.1f')}–{number(high, '.1f')})"
+    acc = "{:.3f}{} ({:.3f}–{:.3f})".format(row["acc"], mark(row["acc_gain_95"]), *row["acc_95"])
     return (
         f"  {units:6} {row['units']:5} {row['paper']:6.1f}  {score:22}{number(row['precision'], '9.1f')}"
         f"{number(row['recall_p_b_m'], '7.1f')}{number(row['timing_ms'], '+8.0f')}  {acc:22}"
         f"{row['rmse']:6.4f}{row['nrmse']:9.3f}{row['global_variance']:10.2f}"
     )
-
-
-def _mark(gain: Sequence[float | None]) -> str:
-    """Return a star where the interval of a difference leaves out 0."""
-    low, high = gain
-    return "*" if low is not None and high is not None and (low > 0 or high < 0) else ""

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.corpora.store import Corpus
-from lipmotion.engines import Engine
+from lipmotion.engines import Animator
 from lipmotion.errors import AlignmentError, CorpusError
 from lipmotion.measures import curves
 from lipmotion.measures.bootstrap import interval
@@ -208,7 +208,7 @@ def _reference(utterance: Utterance, phones: Recogniser, lexicon: Lexicon) -> Ti
         raise AlignmentError(f"{utterance.name}: {error}; correct its transcript, or leave it out") from error
 
 
-def clips(found: Recorded, condition: str, engine: Engine[ModelT], learned: ModelT) -> list[Clip]:
+def clips(found: Recorded, condition: str, engine: Animator[ModelT], learned: ModelT) -> list[Clip]:
     """Return what an engine makes of recordings, beside the originals. Raises CorpusError: it has other channels."""
     made = []
     for utterance, units, reference in zip(found.utterances, found.conditions[condition], found.reference, strict=True):
@@ -218,7 +218,7 @@ def clips(found: Recorded, condition: str, engine: Engine[ModelT], learned: Mode
 
 
 def _heard(
-    engine: Engine[ModelT], learned: ModelT, found: Recorded, utterance: Utterance, units: Timeline[Unit], said: bool
+    engine: Animator[ModelT], learned: ModelT, found: Recorded, utterance: Utterance, units: Timeline[Unit], said: bool
 ) -> Speech:
     """Return an utterance as ``animate`` hears it."""
     if said:
@@ -227,7 +227,7 @@ def _heard(
 
 
 def _clip(
-    engine: Engine[ModelT],
+    engine: Animator[ModelT],
     learned: ModelT,
     compared: Sequence[str],
     utterance: Utterance,

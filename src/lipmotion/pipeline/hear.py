@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from lipmotion.engines import Engine
+from lipmotion.engines import Animator
 from lipmotion.errors import AlignmentError, InputError
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.transcribe import read_transcript, transcribe
@@ -48,13 +48,13 @@ def heard(
     return hear_unsaid(model.engine, model.learned, audio, features, phones, found)
 
 
-def hear(engine: Engine[Any], audio: Audio, features: Features, units: Timeline[Unit]) -> Speech:
+def hear(engine: Animator[Any], audio: Audio, features: Features, units: Timeline[Unit]) -> Speech:
     """Return a recording with its phones in time, and with its F0 where the engine wants it."""
     return Speech(features, units, log_f0(audio) if engine.hears_f0 else None)
 
 
 def hear_unsaid(
-    engine: Engine[Any],
+    engine: Animator[Any],
     learned: Any,
     audio: Audio,
     features: Features,

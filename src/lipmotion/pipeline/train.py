@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib import metadata
@@ -21,6 +21,7 @@ from lipmotion.pipeline.labels import labelled
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.transcribe import phones_in_time, report_guesses
 from lipmotion.pipeline.visual import GEOMETRY, as_learned, check_visual, learned_eigenlips
+from lipmotion.pipeline.voices import Heard
 from lipmotion.pipeline.workers import working
 from lipmotion.speech.f0 import log_f0
 from lipmotion.speech.phones import train_phones
@@ -35,6 +36,7 @@ from lipmotion.types import (
     Features,
     Monitor,
     Motion,
+    Progress,
     Speech,
     Timeline,
     Track,
@@ -70,6 +72,7 @@ def train(
     split: str | None = "train",
     names: Sequence[str] | None = None,
     speakers: Sequence[str] = (),
+    voices: Iterable[Heard] = (),
     engine: Engine[Any] | None = None,
     recogniser: HmmConfig | None = None,
     lexicon: Lexicon | None = None,
@@ -84,6 +87,8 @@ def train(
     split      : the list to train on; None: all utterances
     names      : these utterances only, whatever their list (learning curves)
     speakers   : theirs only; all by default
+    voices     : speech of other speakers, without motion, for the second stage of training (``pipeline.voices.heard``);
+                 only for engines that have one (``coupled``). What is kept in ``work`` does not depend on them
     engine     : with its configuration; the trajectory engine by default
     recogniser : configuration of the phone models
     visual     : ``geometry``: the channels that were tracked or given; ``eigenlips``: principal components of the mouth
@@ -97,7 +102,7 @@ def train(
     of the others or, where there are none, by those of the shipped model.
     Nothing here is random: the same corpus gives the same model.
     Raises CorpusError: no such utterances, or nothing in them to learn from.
-    Raises InputError: no such ``visual``.
+    Raises InputError: no such ``visual``, or voices and an engine that has no use for them.
     """
     check_visual(visual)
     lexicon = lexicon or Lexicon()
@@ -106,6 +111,7 @@ def train(
     if not chosen:
         raise CorpusError(f"{corpus.path}: an empty list of names was given; name at least one utterance")
     recogniser = recogniser or HmmConfig()
+    others = list(examples_of_others(engine, voices, monitor))
     utterances = [corpus.utterance(name) for name in chosen]
     eigenlips = learned_eigenlips(utterances) if visual != GEOMETRY else None
     utterances = [as_learned(utterance, visual, eigenlips) for utterance in utterances]
@@ -116,11 +122,13 @@ def train(
         phones, examples, skipped = phones_and_examples(
             utterances, recogniser, lexicon, listening, checkpoint, team.each
         )
-    fit = engine.fit(examples, part_of(monitor, 0.9, 1, "learning motion: "), checkpoint)
+    fit = engine.fit([*examples, *others], part_of(monitor, 0.9, 1, "learning motion: "), checkpoint)
     used = tuple(example.name for example in examples)
     about = _about(corpus, utterances, "given names" if names is not None else split or "all", len(used))
     if speakers:
         about["speakers"] = sorted(set(speakers))
+    if others:
+        about["voices"] = sorted({example.name for example in others})
     if eigenlips is not None:
         about |= {"visual": visual, "eigenlips": eigenlips.summary}
     return Model(phones, engine, fit.model, about, eigenlips=eigenlips), TrainReport(used, skipped, fit.figures)
@@ -143,6 +151,25 @@ def phones_and_examples(
     phones = _phones(utterances, lexicon, recogniser, learning, checkpoint, each)
     examples, skipped = _examples(utterances, Recogniser(phones), lexicon, finding, checkpoint, each)
     return phones, examples, skipped
+
+
+def examples_of_others(
+    engine: Engine[Any], voices: Iterable[Heard], monitor: Monitor = silent_monitor
+) -> Iterator[Example]:
+    """Give speech of others as examples in which no motion was seen, by the names of the speakers.
+
+    Raises InputError: the engine has no use for them.
+    """
+    for number, (features, units, speaker) in enumerate(voices, start=1):
+        if not engine.hears_others:
+            raise InputError(
+                f"the {engine.name} engine cannot learn from other voices without motion; use the coupled engine, or "
+                "leave the voices out"
+            )
+        monitor(Progress("hearing other voices", number, number, 0.0))
+        frames = len(features.values)
+        unseen = Motion(np.zeros((frames, 0)), FRAME_RATE_HZ, ())
+        yield Example(speaker, Speech(features, units), unseen, np.zeros(frames, bool))
 
 
 def labels_of(utterance: Utterance, phones: Recogniser, lexicon: Lexicon) -> Timeline[Unit]:

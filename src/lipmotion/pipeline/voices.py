@@ -18,6 +18,7 @@ import numpy as np
 from lipmotion.corpora.base import AUDIO_SUFFIXES
 from lipmotion.corpora.labels import labels_beside
 from lipmotion.errors import AlignmentError, CorpusError, InputError, MissingDependencyError
+from lipmotion.pipeline.model import load_model
 from lipmotion.pipeline.prompts import prompts
 from lipmotion.pipeline.transcribe import phones_in_time
 from lipmotion.speech.agreement import DOUBTFUL, agreement
@@ -133,6 +134,27 @@ def recorded_voices(
 def heard(sentences: Iterable[SpokenSentence]) -> Iterator[Heard]:
     """Give sentences as models hear them. Nothing is kept."""
     return (Heard(mfcc(sentence.audio), sentence.phones, sentence.speaker) for sentence in sentences)
+
+
+def other_voices(
+    *,
+    synthetic: bool = False,
+    recordings: str | Path | None = None,
+    lexicon: Lexicon | None = None,
+    monitor: Monitor = silent_monitor,
+) -> Iterator[Heard]:
+    """Give what ``train --voices --recordings`` learns from besides a corpus.
+
+    synthetic  : all installed voices but those that are for judging
+    recordings : a folder of transcribed recordings, aligned by the general phone models
+    Raises MissingDependencyError, CorpusError: as ``many_voices`` and ``recorded_voices``.
+    """
+    if recordings is not None:
+        general = Recogniser(load_model().phones, "general")
+        yield from heard(recorded_voices(recordings, general, lexicon=lexicon, monitor=monitor))
+    if synthetic:
+        chosen = [voice for voice in installed_voices() if not is_for_judging(voice.speaker)]
+        yield from heard(many_voices(voices=chosen, lexicon=lexicon))
 
 
 def _in_voice(voice: SyntheticVoice, texts: Sequence[str], lexicon: Lexicon | None) -> list[SpokenSentence]:

@@ -23,6 +23,9 @@ class CoupledConfig:
     crosses    : let chains leave a unit at different times
     mixtures, visual_mixtures : Gaussians per state of speech, and of what is seen (powers of two); of ``hmm`` the first
                  counts for both
+    more_mixtures, more_steps, more_weight : of the second stage of training, on speech without motion: Gaussians per
+                 state of speech, steps of EM for each number of them, and how much a frame of it counts beside one of
+                 speech with motion
     audio_weight, visual_weight : exponents of the densities
     conversion : ``trajectory``: parameter generation from expected precisions and means of value, slope and curvature;
                  ``em``: the paper's, frame by frame;  ``viterbi``: means along the best path
@@ -41,6 +44,9 @@ class CoupledConfig:
     crosses: bool = True
     mixtures: int = 8
     visual_mixtures: int = 1
+    more_mixtures: int = 8
+    more_steps: int = 8
+    more_weight: float = 0.3
     audio_weight: float = 1.0
     visual_weight: float = 1.0
     conversion: str = TRAJECTORY
@@ -63,7 +69,7 @@ class CoupledConfig:
                 raise InputError(f"{field.name} is {value!r}, required a number from 0")
             if field.type == "str" and not isinstance(value, str):
                 raise InputError(f"{field.name} is {value!r}, required text")
-        for name in ("mixtures", "visual_mixtures"):
+        for name in ("mixtures", "visual_mixtures", "more_mixtures"):
             if getattr(self, name) & (getattr(self, name) - 1):
                 raise InputError(f"{name} is {getattr(self, name)}, required a power of two")
         choices = {"structure": STRUCTURES, "conversion": CONVERSIONS, "start": STARTS, "update": UPDATES}

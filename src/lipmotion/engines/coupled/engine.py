@@ -57,6 +57,10 @@ class CoupledEngine(Engine[CoupledModel]):
     config: CoupledConfig
     name: ClassVar[str] = "coupled"
 
+    @property
+    def hears_others(self) -> bool:  # noqa: D102
+        return True
+
     def fit(  # noqa: D102
         self,
         examples: Sequence[Example],

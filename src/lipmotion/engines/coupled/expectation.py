@@ -23,10 +23,14 @@ LEAST_FRAMES = 3.0
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """What is observed, and where the chains can be meanwhile."""
+    """What is observed, and where the chains can be meanwhile.
+
+    weight : how often it counts
+    """
 
     observed: Observed
     lattice: Lattice
+    weight: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,12 +40,14 @@ class Expected:
     groups : sums for each group
     counts : what transitions are learned from
     log_likelihood, frames : of the recordings that have a path
+
+    All by the weights of the recordings.
     """
 
     groups: tuple[Sums, ...]
     counts: NDArray[np.float64]
     log_likelihood: float
-    frames: int
+    frames: float
 
     def plus(self, other: Expected) -> Expected:
         """Return both together."""
@@ -92,9 +98,9 @@ def _together(job: tuple[Chains, Sequence[Recording]]) -> Expected:
     chains, recordings = job
     sums = tuple(no_sums(group) for group in chains.groups)
     counts = np.zeros(chains.transitions.count)
-    log_likelihood, frames = 0.0, 0
+    log_likelihood, frames = 0.0, 0.0
     for recording in recordings:
-        observed, lattice = recording.observed, recording.lattice
+        observed, lattice, weight = recording.observed, recording.lattice, recording.weight
         evidence = chains.evidence(observed, lattice)
         posteriors = chains.posteriors(evidence, lattice)
         if not np.isfinite(posteriors.log_likelihood):
@@ -102,10 +108,10 @@ def _together(job: tuple[Chains, Sequence[Recording]]) -> Expected:
         for one, group, chosen, posterior, shares in zip(
             sums, chains.groups, lattice.densities, posteriors.densities, evidence.shares, strict=True
         ):
-            one.add(group, observed, chosen, posterior, shares)
-        counts[lattice.counts] += posteriors.counts
-        log_likelihood += posteriors.log_likelihood
-        frames += observed.frames
+            one.add(group, observed, chosen, posterior if weight == 1 else posterior * np.float32(weight), shares)
+        counts[lattice.counts] += weight * posteriors.counts
+        log_likelihood += weight * posteriors.log_likelihood
+        frames += weight * observed.frames
     return Expected(sums, counts, log_likelihood, frames)
 
 

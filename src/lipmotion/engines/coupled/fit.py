@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import itertools
 import os
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
@@ -25,9 +27,10 @@ from lipmotion.engines.coupled.following import (
 )
 from lipmotion.engines.coupled.learned import CALM_S, CoupledModel
 from lipmotion.engines.coupled.model import Chains
+from lipmotion.engines.coupled.more_speech import MoreSpeech, with_more_speech
 from lipmotion.engines.coupled.systems import HMM, Structure, structure_of
-from lipmotion.engines.coupled.train import Labelled, Schedule, Step, train_chains
-from lipmotion.engines.coupled.visual import visual_streams
+from lipmotion.engines.coupled.train import Labelled, Schedule, Step, growing_chains
+from lipmotion.engines.coupled.visual import VisualStream, unseen, visual_streams
 from lipmotion.engines.trajectory.closure import learned_closure
 from lipmotion.engines.trajectory.space import motion_in_space
 from lipmotion.errors import CorpusError
@@ -45,39 +48,78 @@ LARGEST_GAIN = 2.0
 def fit_coupled(examples: Sequence[Example], config: CoupledConfig, monitor: Monitor) -> CoupledModel:
     """Return a model of speech with its motion.
 
+    Examples in which no motion was seen are for the second stage of training, which makes the densities of speech those
+    of more speakers (``more_speech``). They teach nothing before it; after it, what follows from the beliefs of these
+    densities is learned from the examples with motion only.
     Raises CorpusError: no example with motion that was seen, or examples of different channels.
     Raises InputError: no such unit set, or a structure that does not fit together.
     """
+    return deque(growing_models(examples, config, monitor), maxlen=1)[0]()
+
+
+def growing_models(
+    examples: Sequence[Example], config: CoupledConfig, monitor: Monitor
+) -> Iterator[Callable[[], CoupledModel]]:
+    """Give what makes the models with 1, 2, 4, … Gaussians that ``fit_coupled`` learns on its way, itself the last.
+
+    Raises as ``fit_coupled``.
+    """
     structure = structure_of(config.structure, config.chains, config.states, config.asynchrony, config.crosses)
-    space, values = motion_in_space(examples, config.components)
-    if all(is_silent(span.label.phone) for example in examples for span in example.speech.units):
-        raise CorpusError(f"nothing is said in {len(examples)} examples; learn from speech")
-    seen = [within(example.valid) for example in examples]
+    moving = [example for example in examples if within(example.valid).any()]
+    space, values = motion_in_space(moving or examples, config.components)
+    if all(is_silent(span.label.phone) for example in moving for span in example.speech.units):
+        raise CorpusError(f"nothing is said in {len(moving)} examples with motion; learn from speech")
+    seen = [within(example.valid) for example in moving]
     visual = visual_streams(space, values, seen, config.dynamic)
     data = [
         Labelled(
             Observed((_features(example), *(stream.observed(x) for stream in visual)), (None, *(mask for _ in visual))),
             example.speech.units,
         )
-        for example, x, mask in zip(examples, values, seen, strict=True)
+        for example, x, mask in zip(moving, values, seen, strict=True)
     ]
-    names = (SPEECH, *(stream.name for stream in visual))
+    rest, closure = _rest(moving, values, seen), learned_closure(space.direct_names, values, moving)
+    others = [
+        Labelled(unseen(_features(example), visual), example.speech.units)
+        for example in examples
+        if not within(example.valid).any()
+    ]
+    first, second = (0.4, 0.7) if others else (0.7, 0.7)
+
+    def model_of(chains: Chains) -> CoupledModel:
+        if others:
+            chains = _second_stage(chains, data, others, config, part_of(monitor, first, second))
+        model = CoupledModel(chains, space, visual, None, np.ones(space.dimensions), rest, closure)
+        if config.dynamic and config.follows:
+            monitor(Progress("following the sound", 1, 1, 0.75))
+            model = replace(model, follow=_follow(model, data))
+        if config.dynamic and config.full_range:
+            model = replace(model, gain=_gain(model, data, values))
+        monitor(Progress("following the sound", 1, 1, 1.0))
+        return model
+
+    names, how = (SPEECH, *(stream.name for stream in visual)), _schedule(structure, visual, config)
+    steps = how.most * max(how.mixtures).bit_length()
+    told = _told("chains", steps, part_of(monitor, 0, first))
+    for chains in growing_chains(structure, names, data, how, told, workers()):
+        yield partial(model_of, chains)
+
+
+def _schedule(structure: Structure, visual: Sequence[VisualStream], config: CoupledConfig) -> Schedule:
     mixtures = (config.mixtures, *(config.visual_mixtures for _ in visual))
-    how = Schedule(
+    return Schedule(
         mixtures[:1] if structure.kind == HMM else mixtures,
         (config.audio_weight, *(config.visual_weight for _ in visual)),
     )
-    chains = train_chains(structure, names, data, how, _told(how, part_of(monitor, 0, 0.7)), workers())
-    rest = _rest(examples, values, seen)
-    closure = learned_closure(space.direct_names, values, examples)
-    model = CoupledModel(chains, space, visual, None, np.ones(space.dimensions), rest, closure)
-    if config.dynamic and config.follows:
-        monitor(Progress("following the sound", 1, 1, 0.75))
-        model = replace(model, follow=_follow(model, data))
-    if config.dynamic and config.full_range:
-        model = replace(model, gain=_gain(model, data, values))
-    monitor(Progress("following the sound", 1, 1, 1.0))
-    return model
+
+
+def _second_stage(
+    chains: Chains, data: Sequence[Labelled], others: Sequence[Labelled], config: CoupledConfig, monitor: Monitor
+) -> Chains:
+    """Return the chains after the second stage of training, on speech without motion as well."""
+    more = MoreSpeech(config.more_mixtures, config.more_steps, config.more_weight)
+    steps = more.steps * max(more.mixtures // config.mixtures, 1).bit_length()
+    return with_more_speech(chains, data, others, more, _told("more speech", steps, monitor), workers())
 
 
 def workers() -> int:
@@ -89,14 +131,16 @@ def _features(example: Example) -> NDArray[np.float32]:
     return np.asarray(example.speech.features.values)
 
 
-def _told(how: Schedule, monitor: Monitor) -> Callable[[Step], None]:
-    """Return what reports the steps of training; how many there will be is not known beforehand."""
-    total = how.most * max(how.mixtures).bit_length()
+def _told(stage: str, most: int, monitor: Monitor) -> Callable[[Step], None]:
+    """Return what reports the steps of a stage of training; how many there will be is not known beforehand.
+
+    most : steps, if none is left out
+    """
     done = itertools.count(1)
 
     def tell(step: Step) -> None:
         number = next(done)
-        monitor(Progress("chains", number, total, number / total, step.log_likelihood))
+        monitor(Progress(stage, number, most, number / most, step.log_likelihood))
 
     return tell
 

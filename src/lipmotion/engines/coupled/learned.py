@@ -12,7 +12,7 @@ from lipmotion.engines.coupled.conversion import statistics
 from lipmotion.engines.coupled.densities import Observed, Single
 from lipmotion.engines.coupled.following import Following, Surroundings
 from lipmotion.engines.coupled.model import Chains, Inferred
-from lipmotion.engines.coupled.visual import VisualStream
+from lipmotion.engines.coupled.visual import VisualStream, unseen
 from lipmotion.engines.trajectory.closure import Closure
 from lipmotion.engines.trajectory.space import MotionSpace
 from lipmotion.types import FRAME_RATE_HZ
@@ -48,8 +48,7 @@ class CoupledModel:
 
     def unseen(self, features: Single) -> Observed:
         """Return speech [shape=(T, 39)] with nothing seen."""
-        nothing = tuple(np.zeros((len(features), len(stream.mean)), np.float32) for stream in self.visual)
-        return Observed((features, *nothing), (None, *(np.zeros(len(features), bool) for _ in nothing)))
+        return unseen(features, self.visual)
 
     def statistics(self, inferred: Inferred) -> tuple[Array, Array]:
         """Return means and precisions of the motion in its space [each shape=(T, 3, Q)]."""

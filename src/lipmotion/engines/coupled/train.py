@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -80,23 +81,28 @@ def train_chains(
     heard : is told every step; within a number of components the log likelihood never falls
     Source: Xie & Liu 2007, §3.4 and Appendix A, with scaled recursions.
     """
+    return deque(growing_chains(structure, streams, data, how, heard, workers), maxlen=1)[0]
+
+
+def growing_chains(
+    structure: Structure,
+    streams: tuple[str, ...],
+    data: Sequence[Labelled],
+    how: Schedule,
+    heard: Callable[[Step], None] = lambda _: None,
+    workers: int = 1,
+) -> Iterator[Chains]:
+    """Give the chains that ``train_chains`` learns with 1, 2, 4, … Gaussians: each as if those were all."""
     floors = variance_floors([one.observed for one in data])
     chains = _viterbi_start(structure, streams, data, how, floors)
-    recordings = _recordings(chains, data)
+    recordings = [recording(chains, one) for one in data]
     while True:
-        chains, said = _converged(chains, recordings, floors, how.most, heard, workers)
+        chains, said = converged(chains, recordings, floors, how.most, heard, workers)
+        yield chains
         now = components(chains)
         if all(n >= most for n, most in zip(now, how.mixtures, strict=True)):
-            return chains
+            return
         chains = split(chains, how.mixtures, said)
-
-
-def _recordings(chains: Chains, data: Sequence[Labelled]) -> list[Recording]:
-    structure = chains.structure
-    return [
-        Recording(one.observed, chains.lattice(allowed_units(structure, one.phones, one.observed.frames)))
-        for one in data
-    ]
 
 
 def _viterbi_start(
@@ -110,7 +116,7 @@ def _viterbi_start(
     first = replace(structure, limit=min(1, structure.states - 1)) if structure.limit is None else structure
     transitions = first_transitions(reachable(first, grammar_of(first, data)))
     chains = _flat_start(streams, transitions, data, how)
-    recordings = _recordings(chains, data)
+    recordings = [recording(chains, one) for one in data]
     paths = [labelled_path(transitions.product, one.phones, one.observed.frames) for one in data]
     for _ in range(1 + VITERBI_STEPS):
         chains, transitions = _learned_along(chains, transitions, recordings, paths, floors)
@@ -121,6 +127,15 @@ def _viterbi_start(
     if structure.kind == FACTORIAL and len(structure.chains) == 2:
         return with_pairs(chains, transitions, visits, structure)
     return chains
+
+
+def recording(chains: Chains, one: Labelled, weight: float = 1.0) -> Recording:
+    """Return what was observed with the part of the chains that its labels allow.
+
+    weight : how often it counts
+    """
+    allowed = allowed_units(chains.structure, one.phones, one.observed.frames)
+    return Recording(one.observed, chains.lattice(allowed), weight)
 
 
 def components(chains: Chains) -> tuple[int, ...]:
@@ -304,21 +319,27 @@ def _followed(product: Product, paths: Sequence[Index]) -> NDArray[np.float64]:
     return np.bincount(places[keys[places] == jumps], minlength=len(keys)).astype(float)
 
 
-def _converged(
+def converged(
     chains: Chains,
     recordings: Sequence[Recording],
     floors: Sequence[Single],
     most: int,
     heard: Callable[[Step], None],
     workers: int,
+    *,
+    speech_only: bool = False,
 ) -> tuple[Chains, Expected]:
-    """Return chains after EM, and what recordings said of those before its last step."""
+    """Return chains after EM, and what recordings said of those before its last step.
+
+    most : steps, fewer if they do not get on;  speech_only : learn the densities of speech, and keep all else
+    """
+    streams = range(1 if speech_only else len(chains.streams))
     last = -np.inf
     for _ in range(most):
         said = expected(chains, recordings, workers)
         figure = said.log_likelihood / said.frames
         heard(Step(components(chains), figure))
-        chains = maximised(chains, said, floors, streams=range(len(chains.streams)))
+        chains = maximised(chains, said, floors, streams=streams, moves=not speech_only)
         if figure - last < CONVERGED:
             break
         last = figure

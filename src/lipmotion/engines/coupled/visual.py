@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.engines.coupled.densities import Observed
 from lipmotion.engines.trajectory.space import MotionSpace
 from lipmotion.stats.windows import with_dynamics
 from lipmotion.types import EYE_DISTANCE
@@ -73,3 +74,9 @@ def visual_streams(
         name = "eigenlips" if kind == GREY else "geometry"
         streams.append(VisualStream(name, columns, dynamic, rows.mean(axis=0), deviation))
     return tuple(streams)
+
+
+def unseen(features: NDArray[np.float32], visual: Sequence[VisualStream]) -> Observed:
+    """Return speech [shape=(T, 39)] with nothing seen."""
+    nothing = tuple(np.zeros((len(features), len(stream.mean)), np.float32) for stream in visual)
+    return Observed((features, *nothing), (None, *(np.zeros(len(features), bool) for _ in nothing)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +25,7 @@ class Moments:
     products: Array
     targets: Array
 
-    def add(self, z: NDArray[np.float32], r: NDArray[np.float32]) -> None:
+    def add(self, z: NDArray[np.floating[Any]], r: NDArray[np.floating[Any]]) -> None:
         """Take in frames [shapes=(N, F), (N, P)]."""
         np.add(self.products, z.T @ z, out=self.products)
         np.add(self.targets, z.T @ r, out=self.targets)

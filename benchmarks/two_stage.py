@@ -1,0 +1,170 @@
+"""What a second stage of training, on speech of others without motion, is worth to coupled models.
+
+    lipmotion corpus prepare ../shared/corpora/grid-others -o build/grid-others
+    python benchmarks/two_stage.py [--clips 100] [--sentences 15] [--only "two stages" ...]
+
+Phones of GRID are placed by those of build/grid-s1-train.lipmotion (``make model``; it never heard that list).
+
+One JSON object a line: a model each. ``own``: ACC of opening on the validation list of build/grid-s1; ``strangers``:
+its mean over the clips of build/grid-others; ``phones``: for speakers who only judge, the share of frames of speech
+whose most probable phone is the labelled one, and the same of visemes, words unknown.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import lipmotion
+from lipmotion.corpora.grid import sentence
+from lipmotion.corpora.store import Corpus
+from lipmotion.engines import engine_named
+from lipmotion.engines.coupled.learned import CoupledModel
+from lipmotion.pipeline.evaluate import evaluate
+from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.prompts import prompts
+from lipmotion.pipeline.train import examples_of_others, model_motion
+from lipmotion.pipeline.voices import Heard, heard, is_for_judging, many_voices, recorded_voices
+from lipmotion.speech.mfcc import mfcc
+from lipmotion.speech.recogniser import Recogniser
+from lipmotion.speech.voices.installed import installed_voices
+from lipmotion.types import Example, Speech, Timeline, Unit, Utterance, silent_monitor
+from lipmotion.units import VISEME_OF, Lexicon, is_silent
+
+SENTENCES, JUDGED = 60, 15
+"""Those said for judging are the last of the sixty, and nobody says them in training."""
+OPEN = {"sense_and_*": "austen-reader", "*_corpus": "michael", "common_voice_en_*": "common-voice"}
+MODELS: dict[str, tuple[str, dict[str, Any]]] = {
+    "one stage": ("", {}),
+    "one stage, 8 Gaussians": ("", {"mixtures": 8}),
+    "one stage, 16 Gaussians": ("", {"mixtures": 16}),
+    "two stages": ("voices recordings", {}),
+    "two stages, weight 1": ("voices recordings", {"more_weight": 1.0}),
+    "two stages, weight 0.1": ("voices recordings", {"more_weight": 0.1}),
+    "two stages, 4 Gaussians": ("voices recordings", {"more_mixtures": 4}),
+    "two stages, 16 Gaussians": ("voices recordings", {"more_mixtures": 16}),
+    "two stages, 2 steps": ("voices recordings", {"more_steps": 2}),
+    "two stages, recordings only": ("recordings", {}),
+    "two stages, voices only": ("voices", {}),
+}
+
+
+def main() -> None:
+    """Print one JSON object a line."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--corpora", type=Path, default=Path("../shared/corpora"))
+    parser.add_argument("--strangers", type=Path, default=Path("build/grid-others"))
+    parser.add_argument("--clips", type=int, default=100)
+    parser.add_argument("--sentences", type=int, default=15, help="in each synthetic voice")
+    parser.add_argument("--only", action="append", choices=list(MODELS), help="repeatable; default: all")
+    options = parser.parse_args()
+    corpus, strangers = Corpus.open("build/grid-s1"), Corpus.open(options.strangers)
+    names = corpus.names("train")
+    utterances = [corpus.utterance(name) for name in names[:: max(len(names) // options.clips, 1)][: options.clips]]
+    phones = lipmotion.load_model("build/grid-s1-train.lipmotion").phones
+    examples = [example(one, Recogniser(phones)) for one in utterances]
+    others, judges = speakers(options.corpora, options.sentences)
+    for who, said in (("GRID s1, val", corpus.names("val")), ("GRID, five others", strangers.names(None))):
+        known = corpus if "s1" in who else strangers
+        judges[who] = [aligned(known.utterance(name), Recogniser(phones)) for name in said]
+    for name in options.only or MODELS:
+        kinds, config = MODELS[name]
+        more = [one for kind in kinds.split() for one in others[kind]]
+        engine = engine_named("coupled", {"mixtures": 4} | config)
+        started_s = time.perf_counter()
+        fit = engine.fit([*examples, *examples_of_others(engine, more)], silent_monitor)
+        model, minutes = Model(phones, engine, fit.model, {}), sum(one.features.duration_s for one in more) / 60
+        figures = {"seconds": round(time.perf_counter() - started_s), "minutes of others": round(minutes, 1)}
+        figures |= {"own": own(model, corpus), "strangers": unknown(model, strangers)}
+        told = {"model": name, "clips": len(examples)} | figures
+        print(json.dumps(told | {"phones": {who: right(fit.model, said) for who, said in judges.items()}}), flush=True)
+
+
+def speakers(corpora: Path, count: int) -> tuple[dict[str, list[Heard]], dict[str, list[Heard]]]:
+    """Return whom to learn from, by kind, and who judges, by name."""
+    texts = [prompt.text for prompt in prompts(count=SENTENCES).chosen]
+    learned = [voice for voice in installed_voices() if not is_for_judging(voice.speaker)]
+    judging = [voice for voice in installed_voices() if is_for_judging(voice.speaker)]
+    general = Recogniser(lipmotion.load_model().phones, "general")
+    recordings = list(heard(recorded_voices(corpora / "speech-open", general, speakers=OPEN)))
+    others = {
+        "voices": list(heard(many_voices(texts[: min(count, SENTENCES - JUDGED)], learned))),
+        "recordings": [one for one in recordings if not is_for_judging(one.speaker)],
+    }
+    judges: dict[str, list[Heard]] = {}
+    for one in (*heard(many_voices(texts[-JUDGED:], judging)), *recordings):
+        if is_for_judging(one.speaker):
+            judges.setdefault(one.speaker, []).append(one)
+    return others, judges
+
+
+def example(utterance: Utterance, phones: Recogniser) -> Example:
+    """Return an utterance as engines learn from it."""
+    motion, valid = model_motion(utterance.track, len(utterance.features.values))
+    return Example(utterance.name, Speech(*aligned(utterance, phones)[:2]), motion, valid)
+
+
+def aligned(utterance: Utterance, phones: Recogniser) -> Heard:
+    """Return a sentence of GRID with its phones in time."""
+    features, words = mfcc(utterance.audio), utterance.words or sentence(utterance.name)
+    return Heard(features, phones.align(utterance.audio, features, words or (), Lexicon()), utterance.speaker)
+
+
+def own(model: Model, corpus: Corpus) -> dict[str, float]:
+    """Return the ACC of opening on the validation list, by condition."""
+    conditions = evaluate(model, corpus, split="val")["conditions"]
+    return {name: round(found["channels"]["opening"]["acc"], 3) for name, found in conditions.items()}
+
+
+def unknown(model: Model, strangers: Corpus) -> dict[str, float]:
+    """Return the mean ACC of opening over clips of strangers, by condition."""
+    found: dict[str, list[float]] = {"audio only": [], "with transcript": []}
+    for name in strangers.names(None):
+        one = strangers.utterance(name)
+        seen, recorded = np.asarray(one.track.seen), one.track.motion
+        for condition, words in (
+            ("audio only", None),
+            ("with transcript", " ".join(one.words or sentence(name) or ())),
+        ):
+            motion = lipmotion.animate(one.audio, transcript=words, model=model).motion
+            generated = np.interp(recorded.time_s, motion.time_s, motion["opening"])
+            found[condition].append(float(np.corrcoef(generated[seen], recorded["opening"][seen])[0, 1]))
+    return {condition: round(float(np.mean(values)), 3) for condition, values in found.items()}
+
+
+def right(model: CoupledModel, said: Sequence[Heard]) -> tuple[float, float]:
+    """Return the shares of frames of speech whose most probable phone, and viseme, are the labelled ones."""
+    structure = model.chains.structure
+    visemes = np.array([VISEME_OF[structure.chains[0].phones(unit)[0]] for unit in structure.units[0]])
+    kinds, kind = np.unique(visemes, return_inverse=True)
+    member = np.eye(len(kinds))[kind]
+    found: list[tuple[bool, bool]] = []
+    for one in said:
+        observed = model.unseen(np.asarray(one.features.values))
+        evidence = model.chains.evidence(observed, model.chains.everywhere)
+        states = model.chains.posteriors(evidence, model.chains.everywhere).chains[0]
+        units = states.reshape(len(states), len(kind), -1).sum(axis=2)
+        unit, viseme = units.argmax(axis=1), (units @ member).argmax(axis=1)
+        for frame, number in labelled(one.units, len(units), structure):
+            found.append((unit[frame] == number, viseme[frame] == kind[number]))
+    phones, looks = np.mean(found, axis=0)
+    return round(float(phones), 3), round(float(looks), 3)
+
+
+def labelled(units: Timeline[Unit], frames: int, structure: Any) -> Iterable[tuple[int, int]]:
+    """Give every frame of speech with the number of its unit."""
+    for span in units:
+        if not is_silent(span.label.phone):
+            number = structure.units[0].index(structure.chains[0].unit(span.label.phone))
+            for frame in range(int(np.ceil(100 * span.start_s)), min(int(np.ceil(100 * span.end_s)), frames)):
+                yield frame, number
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,61 @@
+"""``lipmotion experiment table3``: Table 3 of Xie & Liu 2007, on a corpus."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from lipmotion.cli.experiments import add_experiment_arguments, one_thread_each, run_experiment
+from lipmotion.cli.options import list_or_all, numbers
+from lipmotion.cli.train import VISUAL
+
+OPTIONS = ("sizes", "systems", "states", "mixtures", "visual", "transcripts")
+
+
+def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the experiment to ``lipmotion experiment``."""
+    parser = actions.add_parser("table3", help="which structure of chains predicts lips (Xie & Liu 2007, Table 3)")
+    parser.add_argument("--split", default="test", help="compare on test, or another list (default: test)")
+    parser.add_argument("--order", type=Path, metavar="FILE", help="names, one a line (default: train, shuffled)")
+    parser.add_argument("--sizes", type=numbers, metavar="N,N,...", help="train on so many (default: all of them)")
+    systems = "these only, with semicolons between them (default: all)"
+    parser.add_argument("--systems", type=lambda text: text.split(";"), metavar="NAME;NAME", help=systems)
+    parser.add_argument("--states", type=int, default=5, help="a unit, in the paper's systems (default: 5)")
+    gaussians = "a state may have, in the paper's systems; chosen with the list val (default: 1,2,4,8)"
+    parser.add_argument("--mixtures", type=numbers, default=[1, 2, 4, 8], metavar="K,K,...", help=gaussians)
+    parser.add_argument("--visual", default="geometry", metavar="WHAT", help=VISUAL)
+    parser.add_argument("--transcripts", action="store_true", help="compare also with the words known")
+    parser.add_argument("--noise", default="", metavar="KIND,KIND", help="hear the clips in white noise, in babble")
+    parser.add_argument("--snr", type=numbers, default=[20, 10, 5, 0], metavar="DB,...", help="at these ratios")
+    parser.add_argument("--talkers", type=Path, metavar="FOLDER", help="recordings of others, for the babble")
+    parser.add_argument("--plots", type=Path, metavar="FOLDER", help="write pictures like Figs. 7, 10 and 11 there")
+    add_experiment_arguments(parser)
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Call ``experiment.table3`` and print its table."""
+    one_thread_each()
+
+    from lipmotion.corpora.splits import names_in
+    from lipmotion.corpora.store import Corpus
+    from lipmotion.experiment.noise import talkers_in
+    from lipmotion.experiment.table3 import Noises, table3
+    from lipmotion.experiment.table3_text import table
+
+    def experiment(corpus: Corpus, **given: Any) -> dict[str, Any]:
+        kinds = tuple(kind for kind in options.noise.split(",") if kind)
+        talkers = tuple(talkers_in(options.talkers)) if options.talkers else ()
+        chosen = {name: getattr(options, name) for name in OPTIONS}
+        return table3(
+            corpus,
+            split=list_or_all(options.split),
+            order=names_in(options.order) if options.order else None,
+            noises=Noises(kinds, tuple(map(float, options.snr)), talkers),
+            plots=options.plots,
+            **chosen,
+            **given,
+        )
+
+    run_experiment(options, experiment, table)
