@@ -25,14 +25,10 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser.add_argument("--engine", default="trajectory", help=ENGINE)
     parser.add_argument("--system", metavar="NAME", help=SYSTEM)
     parser.add_argument("--units", metavar="SET", help=UNITS)
-    parser.add_argument(
-        "--set", action="append", default=[], metavar="NAME=VALUE", help="any option of the engine (repeatable)"
-    )
+    parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="any option of the engine")
     parser.add_argument("--visual", default="geometry", metavar="WHAT", help=VISUAL)
     parser.add_argument("--voices", action="store_true", help="learn from installed synthetic voices as well (coupled)")
-    parser.add_argument(
-        "--recordings", type=Path, metavar="FOLDER", help="and from transcribed speech of others (coupled)"
-    )
+    parser.add_argument("--recordings", type=Path, metavar="FOLDER", help="and from transcribed speech (coupled)")
     parser.add_argument("--workers", type=int, help="processes (default: one a core)")
     add_machine_readable(parser)
     parser.set_defaults(run=run)
@@ -65,5 +61,5 @@ def run(options: argparse.Namespace) -> None:
             save_model(model, options.output)
         figures = {"used": len(result.used), "minutes": model.about["minutes"], "skipped": len(result.skipped)}
         text = ", ".join(f"{value} {name}" for name, value in figures.items())
-        text = f"{options.output}: {text}; use it: lipmotion animate SPEECH -o FILE --model {options.output}"
-        report.finish(text, model=str(options.output), **figures)
+        use = f"use it: lipmotion animate SPEECH -o FILE --model {options.output}"
+        report.finish(f"{options.output}: {text}; {use}", model=str(options.output), **figures)
