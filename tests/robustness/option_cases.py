@@ -57,6 +57,31 @@ def _(bench: Bench) -> list[object]:
     return ["train", bench.corpus, "-o", "m", "--visual", "pixels"]
 
 
+for _value in ("-1", "99", "nan", "inf"):
+
+    @case(GROUP, f"explain --at {_value}", 3, "lies outside the recording (0 to")
+    def _(bench: Bench, value: str = _value) -> list[object]:
+        return ["explain", bench.model, bench.speech, f"--at={value}"]
+
+
+_option("--posteriors of a model without chains", 3, ("'trajectory' has no chains",), "--posteriors", "a.png")
+_option("--posteriors as .jpg", 7, ("unknown format '.jpg'; required: .png",), "--posteriors", "a.jpg")
+
+for _name, _options, _says in [
+    ("--set without a value", ("--set", "parts"), "the setting 'parts' has no value; required NAME=VALUE"),
+    ("--set of an unknown option", ("--set", "part=5"), "has no option 'part'; there are: parts"),
+    ("--set of a number that is none", ("--set", "parts=many"), "parts is 'many', required a whole number"),
+    ("--set of a number out of range", ("--set", "parts=4"), "parts is 4, required an odd number from 1"),
+    ("--system of another engine", ("--system", "ph-HMM"), "add --engine coupled"),
+    ("--system of an unknown name", ("--engine", "coupled", "--system", "HMM"), "no system 'HMM'; there are: ph-HMM"),
+    ("--units of chains", ("--engine", "coupled", "--units", "eVis"), "has a unit set a chain; say --set chains="),
+]:
+
+    @case(GROUP, f"train {_name}", 3, _says)
+    def _(bench: Bench, options: tuple[str, ...] = _options) -> list[object]:
+        return ["train", bench.corpus, "-o", "m", *options]
+
+
 @case(GROUP, "corpus prompts --count -1", 3, "-1 prompts asked for, required at least 1")
 def _(_bench: Bench) -> list[object]:
     return ["corpus", "prompts", "--count=-1"]
