@@ -41,7 +41,7 @@ def test_every_event_is_one_json_object_on_a_line(capsys: pytest.CaptureFixture[
         for event in EVENTS:
             report.hear(event)
         logging.getLogger("lipmotion").warning("strange %s", "word")
-        report.finish("done", used=3)
+        report.finish("done", used=3, kind="video")
     out, err = capsys.readouterr()
     assert err == ""
     assert [json.loads(line) for line in out.splitlines()] == [
@@ -52,7 +52,7 @@ def test_every_event_is_one_json_object_on_a_line(capsys: pytest.CaptureFixture[
         {"type": "item", "name": "b", "outcome": "skipped", "reason": "no face\nanywhere"},
         {"type": "progress", "stage": "second", "step": 2, "steps": 2, "value": 1.0},
         {"type": "warning", "message": "strange word"},
-        {"type": "success", "used": 3},
+        {"type": "success", "used": 3, "kind": "video"},
     ]
 
 
@@ -60,7 +60,7 @@ def test_where_nobody_watches_only_warnings_and_the_result_are_said(capsys: pyte
     with reporting(options(machine_readable=False)) as report:
         for event in EVENTS:
             report.hear(event)
-        report.finish("done", used=3)
+        report.finish("done", used=3, kind="video")
     assert capsys.readouterr() == ("done\n", "lipmotion: warning: skipped b: no face anywhere\n")
 
 

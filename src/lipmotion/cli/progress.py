@@ -135,7 +135,7 @@ class _Lines:
     def finish(self, text: str, **figures: Any) -> None:  # noqa: ARG002
         self._say("success", **figures)
 
-    def _say(self, kind: str, **fields: Any) -> None:
+    def _say(self, kind: str, /, **fields: Any) -> None:
         if not self._refused:
             try:
                 print(json.dumps({"type": kind, **fields}), flush=True)
