@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict, deque
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -117,14 +117,25 @@ def reachable(structure: Structure, grammar: Grammar) -> Product:
         waiting.extend(target for target, _, _ in found[joint] if target not in found)
     joints = tuple(sorted(found, key=lambda j: (j.ahead, j.states, j.units[1:], j.units[0])))
     number = {joint: index for index, joint in enumerate(joints)}
-    arcs = sorted(
-        ((number[target], number[source], moved, base) for source, to in found.items() for target, moved, base in to),
-        key=lambda arc: arc[:2],
-    )
-    targets, sources, moves, base = zip(*arcs, strict=True)
+    arcs = [(number[target], number[source], moved, base) for source, to in found.items() for target, moved, base in to]
     initial = np.zeros(len(joints))
     for joint, probability in begins.items():
         initial[number[joint]] = probability
+    return _listed(structure, grammar, joints, arcs, initial)
+
+
+_Arc = tuple[int, int, tuple[bool, ...], float]
+"""Target, source, which chains move, and the probability of the units entered."""
+
+
+def _listed(
+    structure: Structure,
+    grammar: Grammar,
+    joints: tuple[Joint, ...],
+    arcs: Iterable[_Arc],
+    initial: NDArray[np.float64],
+) -> Product:
+    targets, sources, moves, base = zip(*sorted(arcs, key=lambda arc: arc[:2]), strict=True)
     return Product(
         structure,
         grammar,
@@ -157,7 +168,7 @@ def _unlimited(structure: Structure, grammar: Grammar) -> Product:
         for joint in states
     )
     number = {joint: index for index, joint in enumerate(states)}
-    found = sorted(
+    found = (
         (
             number[tuple(arc[1] for arc in together)],
             number[tuple(arc[0] for arc in together)],
@@ -166,21 +177,11 @@ def _unlimited(structure: Structure, grammar: Grammar) -> Product:
         )
         for together in product(*arcs)
     )
-    targets, sources, moves, base = zip(*found, strict=True)
     begins = [np.zeros(count) for count in structure.counts]
     for chain, own in enumerate(begins):
         own[:: structure.states] = grammar.firsts[chain]
     initial = np.array([np.prod([begins[c][state] for c, state in enumerate(joint)]) for joint in states])
-    return Product(
-        structure,
-        grammar,
-        joints,
-        np.array(sources, np.intp),
-        np.array(targets, np.intp),
-        np.array(moves, bool).T,
-        np.array(base, float),
-        initial / initial.sum(),
-    )
+    return _listed(structure, grammar, joints, found, initial)
 
 
 def _chain_arcs(structure: Structure, bigram: NDArray[np.float64]) -> list[tuple[int, int, bool, float]]:
