@@ -159,7 +159,7 @@ def test_a_part_is_missing_or_wrong(changes: dict[str, bytes | None], toy_model_
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"engine": "coupled"}, "no engine 'coupled'; there are: trajectory"),
+        ({"engine": "concatenative"}, "no engine 'concatenative'; there are: trajectory"),
         ({"configuration": {"part": 5}}, "unexpected keyword argument 'part'"),
         ({"configuration": {"parts": 4}}, "parts is 4, required an odd number"),
         ({"recogniser": {"state": 3}}, "unexpected keyword argument 'state'"),
