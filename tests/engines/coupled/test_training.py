@@ -8,6 +8,7 @@ from engines.coupled.tiny import THREE, TWO, chains, observed, structure
 from engines.synthetic import examples
 from lipmotion.engines.coupled.config import CoupledConfig
 from lipmotion.engines.coupled.densities import Observed
+from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.engines.coupled.expectation import Recording, expected, maximised
 from lipmotion.engines.coupled.fit import calm, fit_coupled
 from lipmotion.engines.coupled.systems import COUPLED, FACTORIAL, HMM, MULTISTREAM
@@ -20,7 +21,7 @@ from lipmotion.engines.coupled.train import (
     variance_floors,
 )
 from lipmotion.errors import InputError
-from lipmotion.types import Span, Timeline, Unit
+from lipmotion.types import GREY, Channel, Example, Span, Timeline, Unit
 from lipmotion.types.progress import silent_monitor
 from oracles import coupled as oracle
 
@@ -161,3 +162,27 @@ def test_training_gives_the_same_bytes_again():
 def test_options_that_cannot_be(options):
     with pytest.raises(InputError):
         CoupledConfig(**options)
+
+
+def with_pictures(number: int) -> Example:
+    """An example whose mouth is also a picture: one eigenlip that follows the opening."""
+    plain = examples(number + 1)[number]
+    grey = (500 * plain.motion["opening"] - 40)[:, None]
+    channels = (*plain.motion.channels, Channel("lips_r_01", GREY))
+    return replace(
+        plain, motion=replace(plain.motion, values=np.hstack([plain.motion.values, grey]), channels=channels)
+    )
+
+
+def test_every_stream_has_a_chain_and_a_weight_of_its_own():
+    """Speech, points and pictures on three chains; what weighs nothing says nothing about the states."""
+    data = [with_pictures(number) for number in range(5)]
+    config = CoupledConfig(chains="phone viseme viseme", states=2, mixtures=1, visual_weight=0.5, eigenlips_weight=0.25)
+    model = fit_coupled(data, config, silent_monitor)
+    assert model.chains.streams == ("speech", "geometry", "eigenlips")
+    assert [group.weights for group in model.chains.groups] == [(1.0,), (0.5,), (0.25,)]
+    assert [stream.name for stream in model.visual] == ["geometry", "eigenlips"]
+    assert len(model.chains.structure.chains) == 3
+    generated = CoupledEngine(config).generate(model, data[0].speech).motion
+    for name in ("opening", "lips_r_01"):
+        assert np.corrcoef(generated[name], data[0].motion[name])[0, 1] > 0.8

@@ -26,7 +26,7 @@ class CoupledConfig:
     more_mixtures, more_steps, more_weight : of the second stage of training, on speech without motion: Gaussians per
                  state of speech, steps of EM for each number of them, and how much a frame of it counts beside one of
                  speech with motion
-    audio_weight, visual_weight : exponents of the densities
+    audio_weight, visual_weight, eigenlips_weight : exponents of the densities of speech, of geometry, and of eigenlips
     conversion : ``trajectory``: parameter generation from expected precisions and means of value, slope and curvature;
                  ``em``: the paper's, frame by frame;  ``viterbi``: means along the best path
     start, update, steps : of the EM of conversion (``conversion.Conversion``); ``trajectory`` takes no steps after its
@@ -49,6 +49,7 @@ class CoupledConfig:
     more_weight: float = 0.3
     audio_weight: float = 1.0
     visual_weight: float = 1.0
+    eigenlips_weight: float = 1.0
     conversion: str = TRAJECTORY
     start: str = SOFT
     update: str = EXACT

@@ -30,7 +30,7 @@ from lipmotion.engines.coupled.model import Chains
 from lipmotion.engines.coupled.more_speech import MoreSpeech, with_more_speech
 from lipmotion.engines.coupled.systems import HMM, Structure, structure_of
 from lipmotion.engines.coupled.train import Labelled, Schedule, Step, growing_chains
-from lipmotion.engines.coupled.visual import VisualStream, unseen, visual_streams
+from lipmotion.engines.coupled.visual import EIGENLIPS, GEOMETRY, VisualStream, unseen, visual_streams
 from lipmotion.engines.trajectory.closure import learned_closure
 from lipmotion.engines.trajectory.space import motion_in_space
 from lipmotion.errors import CorpusError
@@ -107,9 +107,10 @@ def growing_models(
 
 def _schedule(structure: Structure, visual: Sequence[VisualStream], config: CoupledConfig) -> Schedule:
     mixtures = (config.mixtures, *(config.visual_mixtures for _ in visual))
+    weights = {GEOMETRY: config.visual_weight, EIGENLIPS: config.eigenlips_weight}
     return Schedule(
         mixtures[:1] if structure.kind == HMM else mixtures,
-        (config.audio_weight, *(config.visual_weight for _ in visual)),
+        (config.audio_weight, *(weights[stream.name] for stream in visual)),
     )
 
 

@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 from lipmotion.engines.coupled.densities import Observed
 from lipmotion.engines.trajectory.space import MotionSpace
 from lipmotion.stats.windows import with_dynamics
-from lipmotion.types import EYE_DISTANCE
+from lipmotion.types import EYE_DISTANCE, GREY
 
 Array = NDArray[np.float64]
 LEAST_DEVIATION = 1e-6
-GREY = "grey"
-"""The unit of eigenlips: grey levels along an orthonormal basis."""
+GEOMETRY, EIGENLIPS = "geometry", "eigenlips"
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +70,7 @@ def visual_streams(
         columns = np.flatnonzero(kinds == kind)
         rows = np.concatenate([stream_rows(x[:, columns], dynamic)[mask] for x, mask in zip(values, seen, strict=True)])
         deviation = np.maximum(rows.std(axis=0), LEAST_DEVIATION)
-        name = "eigenlips" if kind == GREY else "geometry"
+        name = EIGENLIPS if kind == GREY else GEOMETRY
         streams.append(VisualStream(name, columns, dynamic, rows.mean(axis=0), deviation))
     return tuple(streams)
 
