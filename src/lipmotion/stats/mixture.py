@@ -188,19 +188,29 @@ class Quadratic:
         """Return the log density of every mixture [shape=(T, G)], and its components' shares of it [shape=(T, M, G)].
 
         features : ``with_squares`` of what the densities are of
-        Of a single component the share is 1, and not told. Shares under e^``LEAST_LOG_SHARE`` are not told apart:
-        in products smaller ones would be denormal, and slow.
         """
         whole = np.concatenate([self.form, self.constant.reshape(1, -1)])
         shares = (features @ whole).reshape(len(features), *self.constant.shape)
-        if shares.shape[1] == 1:
-            return shares[:, 0], None
-        best = shares.max(axis=1)
-        shares -= best[:, None]
-        np.exp(np.maximum(shares, LEAST_LOG_SHARE, out=shares), out=shares)
-        total = shares.sum(axis=1)
-        shares /= total[:, None]
-        return best + np.log(total), shares
+        return divided_components(shares)
+
+
+def divided_components(
+    components: NDArray[np.float32],
+) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
+    """Return the log density of mixtures [shape=(T, G)], and their components' shares of it [shape=(T, M, G)].
+
+    components : log weight + log density of each [shape=(T, M, G)], changed in place
+    Of a single component the share is 1, and not told (None). Shares under e^``LEAST_LOG_SHARE`` are not told apart:
+    in products smaller ones would be denormal, and slow.
+    """
+    if components.shape[1] == 1:
+        return components[:, 0], None
+    best = components.max(axis=1)
+    components -= best[:, None]
+    np.exp(np.maximum(components, LEAST_LOG_SHARE, out=components), out=components)
+    total = components.sum(axis=1)
+    components /= total[:, None]
+    return best + np.log(total), components
 
 
 def with_squares(x: NDArray[np.float32]) -> NDArray[np.float32]:

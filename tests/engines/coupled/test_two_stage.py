@@ -84,7 +84,9 @@ def three_frames() -> Labelled:
     (whole,) = labelled(examples(1))
     start = round(whole.phones.spans[1].start_s * RATE_HZ) - 2
     phones = Timeline((Span(0.0, 0.02, Unit("sil")), Span(0.02, 0.03, Unit("t"))))
-    return Labelled(whole.observed.part(slice(start, start + 3)), phones)
+    cut = slice(start, start + 3)
+    seen = tuple(None if mask is None else mask[cut] for mask in whole.observed.seen)
+    return Labelled(Observed(tuple(values[cut] for values in whole.observed.streams), seen), phones)
 
 
 def speech_posteriors(chains: Chains, one: Labelled) -> np.ndarray:

@@ -8,13 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.stats.mixture import Mixtures, Quadratic, with_squares
+from lipmotion.stats.mixture import Mixtures, Quadratic, divided_components, with_squares
 
 Index = NDArray[np.intp]
 Single = NDArray[np.float32]
 LEAST_COMPONENT_FRAMES = 0.1
 """A component with less data than so many frames keeps its mean and variance."""
-LEAST_LOG_SHARE = np.float32(-50)
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,11 +42,6 @@ class Observed:
         streams[stream], masks[stream] = values, seen
         return Observed(tuple(streams), tuple(masks))
 
-    def part(self, frames: slice) -> Observed:
-        """Return some of the frames."""
-        seen = tuple(None if mask is None else mask[frames] for mask in self.seen)
-        return Observed(tuple(values[frames] for values in self.streams), seen)
-
 
 @dataclass(frozen=True, eq=False)
 class Group:
@@ -72,10 +66,6 @@ class Group:
         mixtures = self.mixtures
         return Mixtures(mixtures.log_weights, mixtures.means[:, :, columns], mixtures.variances[:, :, columns])
 
-    def weight_of(self, stream: int) -> float:
-        """Return the exponent of one stream."""
-        return self.weights[self.streams.index(stream)]
-
     def ready(self) -> Ready:
         """Return the densities as what features are multiplied by."""
         alone = (self.of_stream(stream) for stream in self.streams)
@@ -97,15 +87,7 @@ class Ready:
         A stream that was not seen is left out, which is exact: its density integrates to 1. Shares are None where
         there is one component.
         """
-        log = self._components(observed, chosen)
-        if log.shape[1] == 1:
-            return log[:, 0], None
-        best = log.max(axis=1)
-        log -= best[:, None]
-        np.exp(np.maximum(log, LEAST_LOG_SHARE, out=log), out=log)
-        total = log.sum(axis=1)
-        log /= total[:, None]
-        return best + np.log(total), log
+        return divided_components(self._components(observed, chosen))
 
     def _components(self, observed: Observed, chosen: Index) -> Single:
         group = self.group

@@ -171,10 +171,10 @@ def calm(units: Timeline[Unit], frames: int) -> NDArray[np.bool_]:
 def _follow(model: CoupledModel, data: Sequence[Labelled]) -> tuple[Surroundings, tuple[Following, ...]]:
     """Return how the visual means follow what is around a frame, believed as when only speech is known."""
     chains = model.chains
-    first = list(_each(lambda one: _believed(chains, one, range(1)), data))
-    axes = belief_axes(posterior for (posterior,) in first)
     structure = chains.structure
     others = [structure.chain_of(stream + 1) for stream in range(len(model.visual))]
+    believed = list(_each(lambda one: _believed(chains, one, (0, *others)), data))
+    axes = belief_axes(posterior for posterior, *_ in believed)
     heard = [
         Heard(
             one.observed.streams[0],
@@ -183,9 +183,7 @@ def _follow(model: CoupledModel, data: Sequence[Labelled]) -> tuple[Surroundings
             one.observed.streams[1:],
             np.asarray(one.observed.seen[1]),
         )
-        for one, (posterior,), gates in zip(
-            data, first, _each(lambda one: _believed(chains, one, others), data), strict=True
-        )
+        for one, (posterior, *gates) in zip(data, believed, strict=True)
     ]
     around = fit_surroundings(axes, heard)
     return around, tuple(
