@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
 from pathlib import Path
 
 
@@ -18,8 +17,6 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Call ``lipmotion.adapt`` and ``lipmotion.save_model``."""
-    os.environ.setdefault("OMP_NUM_THREADS", "1")  # thousands of small matrices: threads would only wait for each other
-
     from lipmotion.files import check_target
     from lipmotion.pipeline.adapt import adapt
     from lipmotion.pipeline.model import save_model

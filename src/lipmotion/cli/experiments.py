@@ -25,13 +25,10 @@ def run_experiment(
 ) -> None:
     """Call ``experiment(corpus, lexicon=..., workers=..., monitor=...)`` and print its table."""
     from lipmotion.corpora.store import Corpus
+    from lipmotion.kernels.threads import one_thread
 
+    @one_thread()
     def compute(**given: Any) -> dict[str, Any]:
         return experiment(Corpus.open(options.corpus), workers=options.workers or os.cpu_count() or 1, **given)
 
     report_figures(options, compute, table)
-
-
-def one_thread_each() -> None:
-    """Keep matrix products to one thread: the processes share the cores. Call it before NumPy is imported."""
-    os.environ.setdefault("OMP_NUM_THREADS", "1")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from functools import partial
 
-from lipmotion.cli.experiments import add_experiment_arguments, one_thread_each, run_experiment
+from lipmotion.cli.experiments import add_experiment_arguments, run_experiment
 
 
 def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -18,8 +18,6 @@ def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Call ``experiment.folds`` and print its table."""
-    one_thread_each()
-
     from lipmotion.experiment.folds import folds, table
 
     run_experiment(options, partial(folds, count=options.folds), table)

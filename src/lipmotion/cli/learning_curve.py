@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from lipmotion.cli.experiments import add_experiment_arguments, one_thread_each, run_experiment
+from lipmotion.cli.experiments import add_experiment_arguments, run_experiment
 from lipmotion.cli.options import list_or_all, numbers
 
 
@@ -24,8 +24,6 @@ def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Call ``experiment.learning_curve`` and print its table."""
-    one_thread_each()
-
     from lipmotion.corpora.splits import names_in
     from lipmotion.corpora.store import Corpus
     from lipmotion.experiment.learning_curve import learning_curve, table

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from lipmotion.cli.experiments import add_experiment_arguments, one_thread_each, run_experiment
+from lipmotion.cli.experiments import add_experiment_arguments, run_experiment
 from lipmotion.cli.options import list_or_all, numbers
 from lipmotion.cli.train import VISUAL
 
@@ -36,8 +36,6 @@ def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Call ``experiment.table3`` and print its table."""
-    one_thread_each()
-
     from lipmotion.corpora.splits import names_in
     from lipmotion.corpora.store import Corpus
     from lipmotion.experiment.noise import talkers_in

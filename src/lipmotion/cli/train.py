@@ -36,8 +36,6 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Call ``lipmotion.train`` and ``lipmotion.save_model``."""
-    os.environ.setdefault("OMP_NUM_THREADS", "1")  # the processes share the cores, not the matrix products in each
-
     from lipmotion.cli.progress import reporting
     from lipmotion.corpora.store import Corpus
     from lipmotion.engines import engine_as_told

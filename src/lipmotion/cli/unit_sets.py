@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from functools import partial
 
-from lipmotion.cli.experiments import add_experiment_arguments, one_thread_each, run_experiment
+from lipmotion.cli.experiments import add_experiment_arguments, run_experiment
 from lipmotion.cli.options import list_or_all
 
 
@@ -20,8 +20,6 @@ def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Call ``experiment.unit_sets`` and print its table."""
-    one_thread_each()
-
     from lipmotion.experiment.unit_sets import table, unit_sets
 
     chosen = {"split": list_or_all(options.split), "closures": options.closures}

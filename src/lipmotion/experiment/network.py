@@ -91,6 +91,7 @@ def import_torch() -> Any:
         raise MissingDependencyError(
             f'the network needs PyTorch, which cannot be imported ({error}); pip install "lipmotion[network]"'
         ) from error
+    torch.set_num_threads(1)  # as all other systems: results do not depend on the number of cores
     return torch
 
 

@@ -7,12 +7,14 @@ from dataclasses import replace
 from pathlib import Path
 
 from lipmotion.errors import InputError
+from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.speech.adapt import adapted
 from lipmotion.speech.read import read_audio
 from lipmotion.types import Audio
 
 
+@one_thread()
 def adapt(model: Model | str | Path | None, recordings: Sequence[str | Path | Audio]) -> Model:
     """Return a model whose phone models are adapted to one voice; it recognises and aligns with them from then on.
 

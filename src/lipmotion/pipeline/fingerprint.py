@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import platform
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -14,14 +13,13 @@ from typing import Any
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import Engine
 from lipmotion.files import sha256_of
+from lipmotion.kernels.threads import blas_kernels
 from lipmotion.pipeline.visual import GEOMETRY
 from lipmotion.stats.hmm.model import HmmConfig
 from lipmotion.units import Lexicon
 
 PICTURES = "crops.npy"
 """A large file of an utterance, which only eigenlips are learned from."""
-THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
-"""A matrix product's last bits may depend on how many threads it is shared among."""
 
 
 def fingerprint(
@@ -35,7 +33,7 @@ def fingerprint(
         "words": lexicon.user,
         "visual": visual,
         "versions": {name: metadata.version(name) for name in ("lipmotion", "numpy", "scipy", "pocketsphinx")},
-        "machine": [platform.machine(), os.cpu_count(), [os.environ.get(name) for name in THREADS]],
+        "machine": [platform.machine(), blas_kernels()],
     }
     digest.update(json.dumps(job, sort_keys=True).encode())
     for name in names:

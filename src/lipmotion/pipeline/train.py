@@ -16,6 +16,7 @@ import numpy as np
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import Engine, engine_named
 from lipmotion.errors import CorpusError, InputError
+from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.fingerprint import fingerprint
 from lipmotion.pipeline.labels import labelled
 from lipmotion.pipeline.model import Model, load_model
@@ -66,6 +67,7 @@ class TrainReport:
     figures: Mapping[str, float]
 
 
+@one_thread()
 def train(
     corpus: Corpus,
     *,

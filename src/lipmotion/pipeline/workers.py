@@ -19,6 +19,7 @@ from multiprocessing.process import BaseProcess
 from typing import Any, TypeVar
 
 from lipmotion.errors import CorpusError
+from lipmotion.kernels.threads import one_thread
 
 GivenT = TypeVar("GivenT")
 FoundT = TypeVar("FoundT")
@@ -73,11 +74,14 @@ class Workers:
 
 @contextmanager
 def working(count: int) -> Iterator[Workers]:
-    """Give ``count`` workers; their processes end when the block is left, at once if by an exception."""
-    if count <= 1:
-        yield Workers(())
-        return
-    with ExitStack() as stack:
+    """Give ``count`` workers; their processes end when the block is left, at once if by an exception.
+
+    Matrix products use one thread inside the block and in every worker, so that results do not depend on ``count``.
+    """
+    with one_thread(), ExitStack() as stack:
+        if count <= 1:
+            yield Workers(())
+            return
         yield Workers([stack.enter_context(_worker()) for _ in range(count)])
 
 
@@ -150,16 +154,17 @@ def _work(end: Any) -> None:
     """Do what is asked for until the pipe ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # where signals cannot be held back
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    while True:
-        try:
-            function, item = end.recv()
-        except EOFError:
-            return
-        try:
-            answer = True, function(item)
-        except Exception as error:
-            answer = False, error
-        end.send(answer)
+    with one_thread():
+        while True:
+            try:
+                function, item = end.recv()
+            except EOFError:
+                return
+            try:
+                answer = True, function(item)
+            except Exception as error:
+                answer = False, error
+            end.send(answer)
 
 
 def _end_with_parent() -> None:

@@ -24,7 +24,7 @@ def general_features(audio: Audio) -> NDArray[np.float32]:
     25.6 ms, centred on their time; no noise removal.
     """
     cepstra = log_mel(checked_samples(audio), _filters()) @ liftered_cosine(FILTERS, 0, CEPSTRA)
-    cepstra -= cepstra.mean(axis=0)
+    cepstra -= cepstra.mean(axis=0, dtype=np.float64).astype(np.float32)
     padded = np.pad(cepstra, ((3, 3), (0, 0)), mode="edge")
 
     def shifted(frames: int) -> NDArray[np.float32]:
