@@ -12,6 +12,7 @@ from lipmotion.measures.bootstrap import interval
 from lipmotion.measures.closures import found_closings
 from lipmotion.measures.curves import Clips
 from lipmotion.pipeline.evaluate import OPENING, Clip, Recorded
+from lipmotion.stats.rounding import varies
 
 Array = NDArray[np.float64]
 
@@ -47,7 +48,7 @@ class Tally:
 def correlation_tally(generated: Clips, original: Clips) -> Tally:
     """Return the mean over channels of ``curves.pooled_correlation`` of clips [each shape=(T_i, P)]."""
     middle, everything = np.concatenate(original).mean(axis=0), np.concatenate(generated)
-    still = np.ptp(everything, axis=0) == 0
+    still = ~varies(everything)
 
     def moments(g: Array, o: Array) -> Array:
         a, b = np.where(still, 0, g - middle), o - middle

@@ -31,6 +31,7 @@ from lipmotion.speech.noise import FEWEST_TALKERS, KINDS
 from lipmotion.speech.recogniser import recogniser as cached_recogniser
 from lipmotion.stats.checkpoint import NOTHING_KEPT
 from lipmotion.stats.hmm.model import HmmConfig
+from lipmotion.stats.rounding import varies
 from lipmotion.types import Audio, Monitor, counted, part_of, silent_monitor
 from lipmotion.units import Lexicon
 
@@ -194,7 +195,7 @@ def _row(found: Recorded, made: Sequence[Clip], best: Sequence[Clip], seed: int)
     for name, tally in _tallies(found, made).items():
         ends = {"95": tally.interval(seed), "gain_95": tally.gain(others[name], seed)}
         row |= {name: tally.value} | {f"{name}_{key}": interval for key, interval in ends.items()}
-    still = not np.ptp(np.concatenate([clip.generated for clip in made]), axis=0).any()
+    still = not varies(np.concatenate([clip.generated for clip in made])).any()
     row |= {"lag_ms": None if still else figures["lag_ms"], "opening": None}
     if OPENING not in found.channels:
         return row

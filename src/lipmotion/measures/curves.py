@@ -10,6 +10,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.stats.rounding import varies
+
 Array = NDArray[np.float64]
 Clips = Sequence[Array]
 STILL_SHARE = 0.01
@@ -17,13 +19,13 @@ STILL_SHARE = 0.01
 
 
 def correlation(generated: Array, original: Array) -> Array:
-    """Return the correlation of every channel over all frames [shape=(P,)]; 0 where one is constant.
+    """Return the correlation of every channel over all frames [shape=(P,)]; 0 where one is constant but for rounding.
 
     Source: Xie & Liu 2007, Eq. 21 (whose ACC is the mean of these over channels).
     """
     a, b = generated - generated.mean(axis=0), original - original.mean(axis=0)
     scale = np.sqrt((a * a).sum(axis=0) * (b * b).sum(axis=0))
-    moves = (np.ptp(generated, axis=0) > 0) & (np.ptp(original, axis=0) > 0) & (scale > 0)
+    moves = varies(generated) & varies(original) & (scale > 0)
     return (a * b).sum(axis=0) / np.where(moves, scale, np.inf)
 
 
@@ -32,7 +34,7 @@ def moving(original: Clips, units: Sequence[str]) -> NDArray[np.bool_]:
     values = np.concatenate(original)
     extents: Array = np.ptp(values, axis=0)
     widest = {unit: max(e for e, other in zip(extents, units, strict=True) if other == unit) for unit in set(units)}
-    return extents > STILL_SHARE * np.array([widest[unit] for unit in units])
+    return varies(values) & (extents > STILL_SHARE * np.array([widest[unit] for unit in units]))
 
 
 def pooled_correlation(generated: Clips, original: Clips) -> Array:

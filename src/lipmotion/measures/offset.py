@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.measures.curves import correlation
+
 Array = NDArray[np.float64]
 
 LEAST_SCORE = 0.5
@@ -75,9 +77,7 @@ def _score(predicted: Array, measured: Array, valid: NDArray[np.bool_], shift: i
     if compared.sum() < max(LEAST_SHARE * len(measured), 2):
         return 0.0
     a, b = predicted[first + shift : count + shift][compared], measured[first:count][compared]
-    a, b = a - a.mean(), b - b.mean()
-    power = float(np.sqrt((a * a).sum() * (b * b).sum()))
-    return float((a * b).sum()) / power if power > 0 else 0.0
+    return float(correlation(a[:, None], b[:, None])[0])
 
 
 def _highest(scores: Array, rate_hz: float) -> tuple[float, float, float]:

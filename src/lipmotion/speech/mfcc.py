@@ -28,8 +28,8 @@ PRE_EMPHASIS = 0.97
 DYNAMIC_RANGE = 1e-8
 """Powers are floored this far below the loudest of the recording (80 dB): digital silence has a logarithm."""
 ROUNDING = 1e-5
-"""Features that deviate by less than this share of the largest log power are constant but for rounding. In silence and in a
-constant they deviate by up to 4e-7 of it, on every processor by another amount; in speech by 8e-4 or more."""
+"""Features that deviate by less than this share of the largest log power are constant but for rounding. In silence and
+in a constant they deviate by up to 4e-7 of it, on every processor by another amount; in speech by 8e-4 or more."""
 LOUDEST = 1e6
 """Samples beyond are damage, whatever their full scale was; their squares would not be finite."""
 KNEE_HZ = 6500.0

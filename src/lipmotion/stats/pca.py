@@ -18,6 +18,8 @@ TOLERANCE, MOST_PASSES = 1e-4, 12
 """The search ends when a pass over the table adds less than this share of the variance found, or after so many."""
 RANK_TOLERANCE = 1e-10
 """Components with less than this share of the largest one's variance are rounding."""
+CONSTANT = 1e-12
+"""Values that deviate from their mean by less than this share of the largest do so by rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,34 +43,43 @@ class Pca:
 
 
 def fit_pca(values: NDArray[Any], components: int) -> Pca:
-    """Return the first principal components of numbers [shape=(N, D)]; at most D of them, and no more than N < D span.
+    """Return the first principal components of numbers [shape=(N, D)]; no more than the numbers span.
 
     The entry of each that is the furthest from 0 is positive, so the same values have the same components.
     Cost: O(N·D·min(N, D)) and min(N, D)³ up to ``EXACT`` rows or columns; of larger tables O(N·D·components) a pass,
     with ``ROWS`` rows of memory, in single precision and up to ``TOLERANCE`` of the variance.
     """
     mean = values.mean(axis=0, dtype=np.float64)
+    least = values.size * (float(np.abs(values).max()) * CONSTANT) ** 2
     if min(values.shape) > EXACT:
         basis = _leading(values, mean, components)
     elif values.shape[0] < values.shape[1]:
-        basis = _of_rows(values - mean, components)
+        basis = _of_rows(values - mean, components, least)
     else:
-        basis = _of_columns(values - mean, components)
+        basis = _of_columns(values - mean, components, least)
     signs = np.sign(basis[np.arange(len(basis)), np.abs(basis).argmax(axis=1)])
     return Pca(mean, basis * signs[:, None])
 
 
-def _of_columns(centred: NDArray[np.float64], components: int) -> NDArray[np.float64]:
-    _, vectors = np.linalg.eigh(centred.T @ centred)
-    return vectors[:, ::-1][:, : min(components, centred.shape[1])].T
+def _of_columns(centred: NDArray[np.float64], components: int, least: float) -> NDArray[np.float64]:
+    squares, vectors = np.linalg.eigh(centred.T @ centred)
+    return vectors[:, _largest(squares, components, least)].T
 
 
-def _of_rows(centred: NDArray[np.float64], components: int) -> NDArray[np.float64]:
+def _of_rows(centred: NDArray[np.float64], components: int, least: float) -> NDArray[np.float64]:
     """Return the same from the products of N < D rows: XXᵀu = λu gives XᵀX(Xᵀu) = λ(Xᵀu)."""
     squares, vectors = np.linalg.eigh(centred @ centred.T)
-    kept = np.arange(len(squares))[::-1][:components]
-    kept = kept[squares[kept] > RANK_TOLERANCE * squares[-1]]
+    kept = _largest(squares, components, least)
     return (vectors[:, kept] / np.sqrt(squares[kept])).T @ centred
+
+
+def _largest(squares: NDArray[np.float64], count: int, least: float) -> NDArray[np.intp]:
+    """Return the places of the largest of rising numbers, without those that are rounding: their directions are chance.
+
+    least : what rounding alone may make of them
+    """
+    places = np.arange(len(squares))[::-1][:count]
+    return places[squares[places] > max(RANK_TOLERANCE * squares[-1], least)]
 
 
 def _leading(values: NDArray[Any], mean: NDArray[np.float64], components: int) -> NDArray[np.float64]:

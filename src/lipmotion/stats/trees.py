@@ -16,6 +16,8 @@ Array = NDArray[np.float64]
 Likelihood = Callable[[Array], Array]
 """Sufficient statistics [shape=(N, K)], the count of frames first -> log likelihood, each under its own density."""
 LEAST_VARIANCE = 1e-12
+TIE = 1e-10
+"""Questions whose gains differ by less than this share of the log likelihood, or of the frames, split alike."""
 
 
 class Question(NamedTuple):
@@ -173,14 +175,18 @@ def grow(
 
 
 def _best_question(answers: Array, statistics: Array, log_likelihood: Likelihood, price: float, least: float) -> int:
-    """Return the question that gains most, or -1 where none gains more than its price."""
+    """Return the question that gains most, the first of several that gain the same, or -1 where none gains more than
+    its price.
+    """
     total = statistics.sum(axis=0)
     yes = answers @ statistics
     allowed = np.nonzero((yes[:, 0] >= least) & (total[0] - yes[:, 0] >= least))[0]
     if not len(allowed):
         return -1
-    gain = log_likelihood(yes[allowed]) + log_likelihood(total - yes[allowed]) - log_likelihood(total[None])
-    best = int(gain.argmax())
+    whole = log_likelihood(total[None])
+    gain = log_likelihood(yes[allowed]) + log_likelihood(total - yes[allowed]) - whole
+    alike = TIE * (np.abs(whole[0]) + total[0])
+    best = int(np.argmax(gain >= gain.max() - alike))  # the first: rounding must not choose among equal splits
     return int(allowed[best]) if gain[best] > price else -1
 
 

@@ -22,6 +22,8 @@ MUST_CLOSE, MUST_BITE = 10_000.0, 100.0
 """Of every p b m and f v one frame must show the shape. Where the hold leaves room for one only, p b m have it."""
 WIDEST = 1.2
 """Wider still is still wide open."""
+LEAST_OPENING = 1e-4
+"""A mean opening under this, in the unit of the motion, is a mouth that stays shut: its rounding is not blown up."""
 LIP_BITING = VISEMES["ld"]
 LEAD_S = 0.02
 """The mouth is ready this long before the sound."""
@@ -98,7 +100,8 @@ def _opening(opening: Array, textbook: Array, voiced: Array) -> Array:
     A scale without offset, for shut lips have none: so "boo" alone is not taken for a mouth wide open.
     """
     wanted = voiced * textbook
-    return np.clip(opening * (wanted @ wanted) / max(float(wanted @ opening), 1e-9), 0.0, WIDEST)
+    least = LEAST_OPENING * max(float(wanted.sum()), 1.0)
+    return np.clip(opening * (wanted @ wanted) / max(float(wanted @ opening), least), 0.0, WIDEST)
 
 
 def _spread(width: Array, textbook: Array, voiced: Array) -> Array:

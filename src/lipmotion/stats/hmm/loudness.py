@@ -6,12 +6,14 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from lipmotion.stats.rounding import varies
+
 LOUD_SHARE = 0.5
 """A frame is loud where the smoothed log energy has risen this far from its 10th to its 95th percentile."""
 
 
 def loud_frames(log_energy: NDArray[np.float32], smoothing: int) -> NDArray[np.bool_]:
-    """Return which frames are loud for this recording.
+    """Return which frames are loud for this recording: none where the energy is constant but for rounding.
 
     log_energy : [shape=(T,)], of any scale
     smoothing  : frames averaged over, an odd number
@@ -19,7 +21,7 @@ def loud_frames(log_energy: NDArray[np.float32], smoothing: int) -> NDArray[np.b
     padded = np.pad(log_energy, smoothing // 2, "edge")
     smooth = np.convolve(padded, np.full(smoothing, 1 / smoothing), "valid")
     quiet, loud = np.quantile(smooth, [0.1, 0.95])
-    return smooth > quiet + LOUD_SHARE * (loud - quiet)
+    return varies(smooth[:, None]) & (smooth > quiet + LOUD_SHARE * (loud - quiet))
 
 
 QUIET = 35 * np.log(10) / 10
