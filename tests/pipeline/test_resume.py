@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from lipmotion.corpora.store import Corpus
 from lipmotion.pipeline import labels
@@ -138,6 +139,19 @@ def test_a_damaged_checkpoint_is_not_used(corpus: Corpus, work: Path, tmp_path: 
     path = work / f"{name}.checkpoint"
     path.write_bytes(path.read_bytes()[:-500])
     assert content(run(corpus, work), tmp_path) == whole
+
+
+@pytest.mark.parametrize(("here", "there"), [(1, 2), (2, 1)])
+def test_threads_of_matrix_products_change_nothing(
+    corpus: Corpus, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, here: int, there: int
+) -> None:
+    """Neither this process's own nor those that the processes it starts would use."""
+    whole = content(run(corpus), tmp_path)
+    monkeypatch.setattr(module, "FEWEST", 1)
+    monkeypatch.setenv("OMP_NUM_THREADS", str(there))
+    with threadpool_limits(here, user_api="blas"):
+        assert content(train(corpus, recogniser=CONFIG, workers=2)[0], tmp_path) == whole
+        assert {each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"} == {here}
 
 
 @pytest.mark.parametrize("stop", [0, 6, 12])

@@ -1,0 +1,76 @@
+"""``python -m portable.results OUT.npz [MODEL ...]``: what is compared between processors, as arrays by name."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+from numpy.typing import NDArray
+
+import lipmotion
+from lipmotion.corpora.store import Corpus
+from lipmotion.engines import engine_named
+from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.toy import toy_sentences, toy_utterances
+from lipmotion.pipeline.train import train
+from lipmotion.speech.f0 import log_f0
+from lipmotion.speech.mfcc import mfcc
+from lipmotion.stats.hmm.model import HmmConfig
+from lipmotion.types import Audio, Generation
+
+RATE_HZ = 16_000
+WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"
+ENGINES = {"trajectory": {}, "joint": {"mixtures": 1}, "coupled": {"chains": "sVis 2vis", "mixtures": 1}}
+Results = Iterator[tuple[str, NDArray[np.generic]]]
+
+
+def nothing_said() -> dict[str, Audio]:
+    """Return sounds of which all features are 0."""
+    values = {"silence": np.zeros(RATE_HZ), "ten minutes of silence": np.zeros(600 * RATE_HZ)}
+    values |= {"constant": np.full(RATE_HZ, 0.3), "faint constant": np.full(3 * RATE_HZ, 1e-6)}
+    values |= {"half the sampling rate": np.tile([0.5, -0.5], RATE_HZ)}
+    return {name: Audio(samples.astype(np.float32), RATE_HZ) for name, samples in values.items()}
+
+
+def front_ends() -> Results:
+    for name, audio in nothing_said().items():
+        yield f"features of {name}", mfcc(audio).values
+    said = toy_sentences(3)[1].audio
+    yield "features of speech", mfcc(said).values
+    yield "F0 of speech", np.nan_to_num(log_f0(said))
+
+
+def generated(name: str, made: Generation) -> Results:
+    yield f"{name}: motion", made.motion.values
+    yield f"{name}: phones", np.array([span.label.phone for span in made.units])
+    yield f"{name}: times", np.array([span.end_s for span in made.units])
+
+
+def animated(name: str, model: Model | None, speech: Audio | Path) -> Results:
+    silent = Audio(np.zeros(2 * RATE_HZ, np.float32), RATE_HZ)
+    yield from generated(f"{name}, speech", lipmotion.animate(speech, model=model))
+    yield from generated(f"{name}, silence", lipmotion.animate(silent, model=model))
+
+
+def trained() -> Results:
+    """Yield what models say that are trained here."""
+    with TemporaryDirectory() as folder:
+        corpus = Corpus.create(Path(folder) / "toy")
+        for utterance in toy_utterances(8):
+            corpus.add(utterance)
+        for name, options in ENGINES.items():
+            engine = engine_named(name, options)
+            model, _ = train(corpus, engine=engine, recogniser=HmmConfig(mixtures=1, iterations=2), split=None)
+            yield from animated(f"{name}, trained here", model, toy_sentences(3)[0].audio)
+
+
+def main(output: str) -> None:
+    results = dict(front_ends()) | dict(animated("the shipped model", None, WELCOME)) | dict(trained())
+    np.savez(output, **results)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

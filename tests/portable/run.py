@@ -1,0 +1,77 @@
+"""``python -m portable.run``: the numeric tests as other processors would run them (``make test-portable``)."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import NamedTuple
+
+from portable.settings import BEFORE_AVX, CORES, different_cores, environment, kernels
+
+TESTS = Path(__file__).parents[1]
+NUMERIC = ("kernels", "stats", "speech", "measures", "engines", "pipeline", "portable", "export", "faces")
+LEFT_OUT = "not recordings and not slow and not video"
+"""These only take longer: what they compute, the others compute as well."""
+
+
+class Outcome(NamedTuple):
+    """What came of the tests under some settings."""
+
+    name: str
+    passed: bool
+    seconds: float
+    last_line: str
+
+
+def settings() -> dict[str, dict[str, str]]:
+    """Return the variables of every setting by its name: each kind of kernels with one thread and with two."""
+    found = {
+        f"{core}, {threads} {'thread' if threads == 1 else 'threads'}": {
+            "OPENBLAS_CORETYPE": core,
+            "OPENBLAS_NUM_THREADS": str(threads),
+        }
+        for core in different_cores()
+        for threads in (1, 2)
+    }
+    return found | {"no AVX, in NumPy neither": BEFORE_AVX}
+
+
+def tested(name: str, changes: dict[str, str], tests: Sequence[str]) -> Outcome:
+    """Run the tests in a process of their own."""
+    began = time.monotonic()
+    command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "-m", LEFT_OUT, *tests]
+    ran = subprocess.run(
+        command, env=environment(changes), capture_output=True, text=True, check=False, cwd=TESTS.parent
+    )
+    if ran.returncode:
+        print(f"--- {name}\n{ran.stdout[-20_000:]}{ran.stderr[-5000:]}", flush=True)
+    lines = [line for line in ran.stdout.splitlines() if line.strip()]
+    return Outcome(name, ran.returncode == 0, time.monotonic() - began, lines[-1] if lines else "")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Print a line for every setting; return 1 where a test failed."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("tests", nargs="*", default=[str(TESTS / folder) for folder in NUMERIC])
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
+    options = parser.parse_args(arguments)
+    for core in CORES:
+        print(f"{core}: {kernels(core)}", flush=True)
+    with ThreadPoolExecutor(options.jobs) as pool:
+        jobs = [pool.submit(tested, name, changes, options.tests) for name, changes in settings().items()]
+        outcomes = [job.result() for job in jobs]
+    for outcome in outcomes:
+        verdict = "passed" if outcome.passed else "FAILED"
+        print(f"{verdict}  {outcome.name:<28} {outcome.seconds:5.0f} s  {outcome.last_line}")
+    print(f"{sum(o.passed for o in outcomes)} passed, {sum(not o.passed for o in outcomes)} failed")
+    return 0 if all(outcome.passed for outcome in outcomes) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
