@@ -1,5 +1,6 @@
 # make demo   installs, then turns a spoken sentence into an animated face with the model in the package
 # make test   installs everything, then runs the tests
+# make test-portable   the numeric tests as other processors would run them
 # make check  lint, types, import contracts
 # make bench  the speed figures of the README
 # make model  trains and measures the model that ships with the package (needs GRID speaker s1)
@@ -12,7 +13,7 @@ BUILD ?= build
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
 SOURCES := $(shell find src -type f -not -name '*.pyc') pyproject.toml README.md
-.PHONY: demo test check bench model requirements clean
+.PHONY: demo test test-portable check bench model requirements clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/core
@@ -21,6 +22,9 @@ demo: $(VENV)/core
 
 test: $(VENV)/dev
 	$(BIN)/python -m pytest
+
+test-portable: $(VENV)/dev
+	PYTHONPATH=tests $(BIN)/python -m portable.run
 
 check: $(VENV)/dev
 	$(BIN)/ruff format --check .
