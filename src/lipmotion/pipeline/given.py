@@ -14,7 +14,7 @@ from lipmotion.export.base import read_motion
 from lipmotion.files import sha256_of
 from lipmotion.speech.recogniser import SHORT_PAUSE_S
 from lipmotion.types import Span, Timeline, Track, Unit
-from lipmotion.units import PAUSE, SILENCE, is_silent
+from lipmotion.units import PAUSE, SILENCE, check_phones, is_silent
 
 DIGESTS = ("sha256", "motion_sha256", "phones_sha256")
 """What the source of an utterance says of its contents; another content is prepared again."""
@@ -56,10 +56,14 @@ def given_phones(recording: Recording, duration_s: float) -> Timeline[Unit] | No
     """Return the labelled phones of a recording from 0 s to the end of its sound, or None if there are none.
 
     Silence is named as recognition names it: a short one between phones is a pause.
-    Raises InputError: the labels go on after the sound.
+    Raises InputError: the labels go on after the sound, or are more than it can hold.
     """
     if recording.phones is None:
         return None
+    try:
+        check_phones(len(recording.phones), duration_s)
+    except InputError as error:
+        raise InputError(f"{recording.file}: {error}") from error
     last = recording.phones[-1]
     end_s = max(last.start_s, 0.0) if last.end_s == float("inf") else last.end_s
     if end_s > duration_s + PHONES_MARGIN_S:

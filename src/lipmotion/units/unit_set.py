@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from lipmotion.errors import InputError
+from lipmotion.errors import InputError, shortened
 from lipmotion.files import text_in
 from lipmotion.units.classes import phone_classes
 from lipmotion.units.phones import PHONES, is_silent
