@@ -6,18 +6,18 @@ import logging
 from collections.abc import Sequence
 from pathlib import Path
 
+from lipmotion.corpora.labels import check_plain
 from lipmotion.errors import shortened
 from lipmotion.files import text_in
 from lipmotion.speech.agreement import DOUBTFUL, agreement
 from lipmotion.speech.recogniser import Recogniser
 from lipmotion.types import Audio, Features, Timeline, Unit
 from lipmotion.units import Lexicon, check_words
+from lipmotion.units.speaking_rate import LARGEST_TRANSCRIPT
 
 LOG = logging.getLogger("lipmotion")
 MOST_GUESSES = 20
 """Words of which it is said one by one how they were guessed."""
-LARGEST_TRANSCRIPT = 1 << 22
-"""Bytes of a transcript's file: what is said in three days of speech."""
 
 
 def transcribe(
@@ -50,9 +50,11 @@ def phones_in_time(
 def read_transcript(path: Path) -> str:
     """Return the text of a file.
 
-    Raises InputError: no such file, larger than ``LARGEST_TRANSCRIPT``, or not UTF-8 text.
+    Raises InputError: no such file, larger than ``LARGEST_TRANSCRIPT``, not UTF-8 text, or labels in time.
     """
-    return text_in(path, "transcript", LARGEST_TRANSCRIPT)
+    text = text_in(path, "transcript", LARGEST_TRANSCRIPT)
+    check_plain(text, str(path))
+    return text
 
 
 def report_doubt(audio: Audio, units: Timeline[Unit]) -> None:

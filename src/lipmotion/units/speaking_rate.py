@@ -10,6 +10,8 @@ CHARACTERS_PER_S = 200
 """Three times the fastest speech on record (655 words a minute), and more for blanks and punctuation."""
 SHORT_TEXT = 10_000
 """Characters that a text may always have: notes and blank lines around the words of a short recording."""
+LARGEST_TRANSCRIPT = 1 << 22
+"""Bytes of a file of words: what is said in three days of speech."""
 PHONES_PER_S = 100
 """Speech is heard in frames of 10 ms: a phone that is shorter on average has no frame of its own."""
 FEW_PHONES = 1000

@@ -5,15 +5,15 @@ from __future__ import annotations
 import math
 import re
 
-from lipmotion.corpora.labels.tier import Label, Tier
+from lipmotion.corpora.labels.tier import Label, Tier, check_count
 from lipmotion.errors import InputError
 
 TICKS_PER_S = 10_000_000
 """HTK counts in 100 ns."""
 SHORTEST_TICKS = 10_000
 """Whole numbers under a millisecond are not times: "20 30 people" is a sentence."""
-WHOLE = re.compile(r"(\d+)\s+(\d+)\s+(\S+)(?:\s.*)?")
-STARTS = re.compile(r"(\d+)\s+([^\d\s]\S*)")
+WHOLE = re.compile(r"(\d{1,18})\s+(\d{1,18})\s+(\S+)(?:\s.*)?")
+STARTS = re.compile(r"(\d{1,18})\s+([^\d\s]\S*)")
 SECONDS = re.compile(r"([-+]?\d*\.\d+)\s+([-+]?\d*\.\d+)(?:\s+(.*))?")
 
 
@@ -41,6 +41,7 @@ def timed_lines(text: str, where: str) -> Tier | None:
 
 
 def _spans(lines: list[tuple[int, str]], form: re.Pattern[str], per_s: int, where: str) -> Tier:
+    check_count(len(lines), where)
     labels = []
     for number, line in lines:
         start, end, text = _fitted(form, number, line, "start end label", where)
@@ -49,6 +50,7 @@ def _spans(lines: list[tuple[int, str]], form: re.Pattern[str], per_s: int, wher
 
 
 def _from_starts(lines: list[tuple[int, str]], where: str) -> Tier:
+    check_count(len(lines), where)
     rows = [(number, _fitted(STARTS, number, line, "start label", where)) for number, line in lines]
     starts_s = [int(row[0]) / TICKS_PER_S for _, row in rows]
     ends_s = [*starts_s[1:], math.inf]

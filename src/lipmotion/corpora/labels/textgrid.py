@@ -5,14 +5,16 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from lipmotion.corpora.labels.tier import Label, Tier
+from lipmotion.corpora.labels.tier import Label, Tier, check_count
 from lipmotion.errors import InputError
 
 TOKEN = re.compile(
-    r'"(?P<text>(?:[^"]|"")*)"|![^\n]*|<(?P<flag>\w+)>|(?<!\S)(?P<number>[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?)(?!\S)'
+    r'"(?P<text>[^"]*(?:""[^"]*)*)"|![^\n]*|<(?P<flag>\w+)>|(?<!\S)(?P<number>[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?)(?!\S)'
 )
 """What Praat itself reads: texts in quotes, flags, numbers that stand alone. All else (``xmin =``) is decoration."""
 MARK = re.compile(r'\s*(?:File type\s*=\s*)?"?oo(Text|Binary)File')
+LONGEST_COUNT = 18
+"""Digits of a count."""
 INTERVALS, POINTS = "IntervalTier", "TextTier"
 
 
@@ -33,6 +35,7 @@ def interval_tiers(text: str, where: str) -> list[Tier]:
     """
     tokens = _tokens(text)
     tiers: list[Tier] = []
+    total = 0
     place = "the header"
     try:
         _take(tokens, "text")
@@ -45,7 +48,10 @@ def interval_tiers(text: str, where: str) -> list[Tier]:
             kind, name = _take(tokens, "text"), _take(tokens, "text")
             place = f"tier {name!r}"
             _pass_range(tokens)
-            labels = [_label(tokens, kind, f"{place}, interval {i + 1}") for i in range(_count(tokens))]
+            count = _count(tokens)
+            total += count
+            check_count(total, where)
+            labels = [_label(tokens, kind, f"{place}, interval {i + 1}") for i in range(count)]
             if kind == INTERVALS:
                 tiers.append(Tier(place, tuple(labels)))
     except _DamagedError as error:
@@ -75,7 +81,7 @@ def _pass_range(tokens: Iterator[tuple[str, str]]) -> None:
 
 def _count(tokens: Iterator[tuple[str, str]]) -> int:
     value = _take(tokens, "number")
-    if not value.isdecimal():
+    if not value.isdecimal() or len(value) > LONGEST_COUNT:
         raise _DamagedError(f"there stands number {value[:40]}, required a count")
     return int(value)
 

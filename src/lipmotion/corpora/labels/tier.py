@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -18,11 +19,13 @@ ROUNDING_S = 1e-3
 """Times are written with three digits or more."""
 IN_CONTEXT = re.compile(r"[^-+]*-([^-+]+)\+.*")
 """HTK's and HTS's names of a phone between its neighbours: ``t-iy+n``, ``x^sil-hh+iy=t@...``."""
-STATE = re.compile(r"\[(\d+)\]$")
+STATE = re.compile(r"\[(\d{1,9})\]$")
+MOST_LABELS = 500_000
+"""Labels of a file: those of states in two hours of speech."""
 REDUCED = frozenset({"ax", "axr", "ix"})
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Label:
     """One label: its time, its text, and where it stands (for messages). An unknown end is infinite."""
 
@@ -38,6 +41,12 @@ class Tier:
 
     name: str
     labels: tuple[Label, ...]
+
+
+def check_count(count: int, where: str) -> None:
+    """Raise InputError for more labels than a recording has."""
+    if count > MOST_LABELS:
+        raise InputError(f"{where}: {count} labels, required at most {MOST_LABELS}; give those of one recording")
 
 
 def is_of_phones(tier: Tier) -> bool:
@@ -147,8 +156,12 @@ def _reduced(labels: Sequence[Label], phones: Sequence[str], words: Tier) -> lis
     """Return the phones, unstressed vowels reduced in every word by the lexicon's rule."""
     result = list(phones)
     middles_s = [(label.start_s + label.end_s) / 2 for label in labels]
+    in_time = sorted(range(len(labels)), key=middles_s.__getitem__)
+    sorted_s = [middles_s[i] for i in in_time]
+    end = 0
     for word in words.labels:
-        inside = [i for i, s in enumerate(middles_s) if word.start_s <= s < word.end_s and not is_silent(phones[i])]
+        start, end = max(end, bisect_left(sorted_s, word.start_s)), max(end, bisect_left(sorted_s, word.end_s))
+        inside = [i for i in sorted(in_time[start:end]) if not is_silent(phones[i])]
         reduced = with_reduced_vowels(word.text.lower(), tuple(phones[i] for i in inside))
         for i, phone in zip(inside, reduced, strict=True):
             result[i] = phone

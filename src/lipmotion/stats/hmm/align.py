@@ -15,6 +15,10 @@ from lipmotion.stats.hmm.model import UnitHmm
 from lipmotion.stats.hmm.network import Network, NetworkBuilder
 
 
+FEW_ARCS, ARCS_A_FRAME = 1_000_000, 10
+"""Arcs of a network that may always be built, and how many more for each frame; sentences need about one a frame."""
+
+
 @dataclass(frozen=True, eq=False)
 class Chain:
     """The states of a sequence of units, one after another.
@@ -101,6 +105,7 @@ def choose_pronunciations(
     Raises AlignmentError: the words do not fit into the frames.
     """
     _check_room(hmm, evidence, words)
+    _check_size(hmm, evidence, words)
     silence = Said(-1, 0, (hmm.table.free[0],))
     slots: list[list[Said]] = [[silence]]
     for word, variants in enumerate(words):
@@ -135,6 +140,21 @@ def _check_room(hmm: UnitHmm, evidence: Evidence, words: Sequence[Sequence[Seque
         raise AlignmentError(
             f"{len(words)} words take at least {least} frames of 10 ms, found {evidence.frames}: the recording is too "
             "short for what should be said in it; give its own transcript"
+        )
+
+
+def _check_size(hmm: UnitHmm, evidence: Evidence, words: Sequence[Sequence[Sequence[str]]]) -> None:
+    """Raise AlignmentError for pronunciations that make a network far beyond the recording."""
+    counts = dict(zip(hmm.table.units, hmm.table.counts, strict=True))
+    arcs, ends = 0, 1
+    for variants in words:
+        arcs += sum(2 * counts[unit] for variant in variants for unit in variant) + ends * len(variants)
+        ends = len(variants) + 1  # each, and the pause
+    most = FEW_ARCS + ARCS_A_FRAME * evidence.frames
+    if arcs > most:
+        raise AlignmentError(
+            f"{len(words)} words in all their pronunciations make {arcs} arcs, required at most {most} for "
+            f"{evidence.frames} frames of 10 ms; give fewer pronunciations"
         )
 
 
