@@ -37,6 +37,8 @@ _FORMATS: dict[str, MotionFormat] = {
 }
 MOTION_SUFFIXES: tuple[str, ...] = tuple(_FORMATS)
 """The suffixes that ``write_motion`` knows."""
+LARGEST_MOTION = 1 << 31
+"""Bytes of a motion file: four hours of a hundred channels."""
 
 
 def write_motion(path: Path, generation: Generation, *, source: dict[str, str], model: dict[str, str]) -> None:
@@ -71,6 +73,9 @@ def read_motion(path: str | Path) -> tuple[Motion, Timeline[Unit]]:
         raise InputError(f"{path}: cannot read motion from {_suffix(path)}; use one of {', '.join(MOTION_SUFFIXES)}")
     check_regular(path, "motion file")
     try:
+        size = path.stat().st_size
+        if size > LARGEST_MOTION:
+            raise InputError(f"{size} bytes, required at most {LARGEST_MOTION}: is it a motion file?")
         motion, units = chosen.read(path)
         if not np.isfinite(motion.values).all():
             raise InputError("there are values that are not finite; interpolate them first")
