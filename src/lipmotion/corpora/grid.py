@@ -17,6 +17,7 @@ RIGHTS = {
 
 SILENCES = frozenset({"sil", "sp"})
 """Marks of a word-time file that are not words."""
+WORD = re.compile(r"[^\W\d_]+(?:['-][^\W\d_]+)*")
 LARGEST_ALIGN = 1 << 16
 """Bytes of a word-time file; GRID's have a hundred."""
 
@@ -84,6 +85,8 @@ def aligned_words(path: Path) -> tuple[str, ...]:
     for number, row in enumerate(rows, 1):
         if len(row) != 3 or not (row[0].isdecimal() and row[1].isdecimal()):
             raise InputError(f"{path}: line {number} is {shortened(' '.join(row))!r}; required: start end word")
+        if not WORD.fullmatch(row[2]):
+            raise InputError(f"{path}: line {number} has {shortened(row[2])!r} where its word should be")
     words = tuple(row[2].lower() for row in rows if row[2].lower() not in SILENCES)
     if not words:
         raise InputError(f"{path}: holds no word; remove the file if the words are not known")

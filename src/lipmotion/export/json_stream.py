@@ -66,8 +66,10 @@ def _rows(text: str, at: int) -> tuple[NDArray[np.float64], int]:
 
     def row(at: int) -> int:
         values, at = _DECODER.raw_decode(text, at)
-        if not isinstance(values, list) or len(values) != (widths[0] if widths else len(values)):
-            raise ValueError(f"row {len(widths) + 1} of the values is not a list of as many numbers as the first: no shape")
+        if not values or not isinstance(values, list) or len(values) != (widths[0] if widths else len(values)):
+            raise ValueError(
+                f"row {len(widths) + 1} of the values is not a list of as many numbers as the first: no shape"
+            )
         numbers.extend(values)
         widths.append(len(values))
         if len(widths) > MOST_ROWS:

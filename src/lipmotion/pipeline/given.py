@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -75,7 +76,15 @@ def given_phones(recording: Recording, duration_s: float) -> Timeline[Unit] | No
     before = Span(0.0, clipped[0].start_s, Unit(SILENCE))
     after = Span(clipped[-1].end_s, duration_s, Unit(SILENCE))
     whole = _merged([span for span in (before, *clipped, after) if span.duration_s > 0])
+    if _spoken(recording.phones) and not _spoken(whole):
+        raise InputError(
+            f"{recording.file}: none of its {len(recording.phones)} labels is a phone that lasts longer than 0 s"
+        )
     return Timeline(tuple(_named(span, inside=0 < i < len(whole) - 1) for i, span in enumerate(whole)))
+
+
+def _spoken(spans: Iterable[Span[Unit]]) -> bool:
+    return any(not is_silent(span.label.phone) for span in spans)
 
 
 def _merged(spans: list[Span[Unit]]) -> list[Span[Unit]]:

@@ -74,6 +74,10 @@ def report_guesses(words: Sequence[str], lexicon: Lexicon) -> None:
     unknown = [word for word in dict.fromkeys(words) if not lexicon.known(word)]
     for word in unknown[:MOST_GUESSES]:
         guessed = " ".join(lexicon.pronunciations(word)[0])
-        LOG.warning("%r is not in the dictionary; read as %r; a lexicon file can say better", *map(shortened, (word, guessed)))
+        LOG.warning(
+            "%r is not in the dictionary; read as %r; a lexicon file can say better", *map(shortened, (word, guessed))
+        )
     if len(unknown) > MOST_GUESSES:
-        LOG.warning("%d more words are not in the dictionary; a lexicon file can say better", len(unknown) - MOST_GUESSES)
+        LOG.warning(
+            "%d more words are not in the dictionary; a lexicon file can say better", len(unknown) - MOST_GUESSES
+        )

@@ -90,9 +90,7 @@ def _add_line(user: dict[str, list[Pronunciation]], line: str) -> None:
     word = VARIANT.sub("", plain(word)).strip("'")  # as in ``words_of``
     variants = user.setdefault(word, [])
     if len(variants) == MOST_VARIANTS:
-        raise InputError(
-            f"more than {MOST_VARIANTS} pronunciations of {shortened(word)!r}; keep those that are said"
-        )
+        raise InputError(f"more than {MOST_VARIANTS} pronunciations of {shortened(word)!r}; keep those that are said")
     variants.append(_user_phones(phones))
 
 

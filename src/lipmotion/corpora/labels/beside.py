@@ -61,9 +61,9 @@ def read_labels(path: Path) -> Labels:
     lines = timed_lines(text, str(path))
     if lines is not None:
         return _chosen([lines], str(path))
-    check_other_labels(text, str(path))
     if len(text) > LARGEST_TRANSCRIPT:
         raise InputError(f"{path}: {len(text)} characters, required at most {LARGEST_TRANSCRIPT}: is it a transcript?")
+    check_other_labels(text, str(path))
     tokens = text.split()
     one_a_line = len(tokens) == sum(bool(line.strip()) for line in text.splitlines())
     if len(tokens) > 1 and one_a_line and all(map(phone_named, tokens)):

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import re
 from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from lipmotion.errors import InputError
+from lipmotion.errors import InputError, shortened
 from lipmotion.types import Span, Timeline, Unit
 from lipmotion.units import PHONES, SILENCE, is_silent, phone_named, with_reduced_vowels, words_of
 
@@ -20,8 +21,8 @@ ROUNDING_S = 1e-3
 IN_CONTEXT = re.compile(r"[^-+]*-([^-+]+)\+.*")
 """HTK's and HTS's names of a phone between its neighbours: ``t-iy+n``, ``x^sil-hh+iy=t@...``."""
 STATE = re.compile(r"\[(\d{1,9})\]$")
-MOST_LABELS = 500_000
-"""Labels of a file: those of states in two hours of speech."""
+MOST_LABELS = 250_000
+"""Labels of a file: those of phones in five hours of speech."""
 REDUCED = frozenset({"ax", "axr", "ix"})
 
 
@@ -46,7 +47,15 @@ class Tier:
 def check_count(count: int, where: str) -> None:
     """Raise InputError for more labels than a recording has."""
     if count > MOST_LABELS:
-        raise InputError(f"{where}: {count} labels, required at most {MOST_LABELS}; give those of one recording")
+        raise InputError(f"{where}: more than {MOST_LABELS} labels; give those of one recording")
+
+
+def required_time(text: str, place: str, where: str) -> float:
+    """Return a number that stands for a time. Raises InputError: it is not finite."""
+    time = float(text)
+    if not math.isfinite(time):
+        raise InputError(f"{where}: {place} has the time {shortened(text)}, required a finite one")
+    return time
 
 
 def is_of_phones(tier: Tier) -> bool:
