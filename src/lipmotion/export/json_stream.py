@@ -1,4 +1,4 @@
-"""A JSON object whose lists are read item by item: rows of numbers take the room of an array, not of Python's objects."""
+"""A JSON object whose lists are read item by item: rows of numbers take no more room than an array."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ _DECODER = json.JSONDecoder()
 def members(text: str, rows_of: str) -> dict[str, Any]:
     """Return the members of an object; a list called ``rows_of`` as an array of numbers [shape=(T, P)].
 
-    Raises json.JSONDecodeError, RecursionError: not one object. Raises ValueError, TypeError, OverflowError: a list that
-    is too long, or rows that are uneven or hold something else than numbers.
+    Raises json.JSONDecodeError, RecursionError: not one object.
+    Raises ValueError, TypeError, OverflowError: a list that is too long, or rows that are uneven or no numbers.
     """
     found: dict[str, Any] = {}
 

@@ -84,7 +84,7 @@ def _add_line(user: dict[str, list[Pronunciation]], line: str) -> None:
         raise InputError(
             f"{len(line)} characters, required at most {LONGEST_LINE}; write one pronunciation of a word a line"
         )
-    word, *phones = line.split("#")[0].split() or [""]
+    word, *phones = line.split("#", maxsplit=1)[0].split() or [""]
     if not word:
         return
     word = VARIANT.sub("", plain(word)).strip("'")  # as in ``words_of``

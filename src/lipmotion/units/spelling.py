@@ -100,8 +100,8 @@ def guess(word: str) -> tuple[str, ...]:
     foreign = sorted(set(re.sub(r"[a-z']", "", word)))
     if foreign or not word.strip("'"):
         raise InputError(
-            f"cannot guess how {shortened(word)!r} is said ({shortened(' '.join(foreign)) or 'no letters'}): add it to a "
-            "lexicon file"
+            f"cannot guess how {shortened(word)!r} is said ({shortened(' '.join(foreign)) or 'no letters'}): "
+            "add it to a lexicon file"
         )
     phones: list[str] = []
     letters = re.sub(r"([b-df-hj-np-tv-z])\1", r"\1", word)  # doubled consonants sound once

@@ -50,15 +50,15 @@ def check_other_labels(text: str, where: str) -> None:
 
 
 def _seems_timed(text: str) -> bool:
-    """Whether every line begins with a number, some with a time, or every other line holds two times."""
+    """Whether most lines begin with a number, some with a time, or every other line holds two times."""
     lines = numbered = timed = twice = 0
     for line in _body(text):
         lines += 1
         numbered += NUMBERED.match(line) is not None
         times = sum(1 for _, _ in zip(TIME.finditer(line), "12", strict=False))
-        timed += times > 0
+        timed += TIME.match(line) is not None
         twice += times > 1
-    return lines > 1 and ((numbered == lines and timed > 0) or 2 * twice >= lines)
+    return lines > 1 and ((2 * numbered > lines and timed > 0) or 2 * twice >= lines)
 
 
 def _body(text: str) -> Iterator[str]:

@@ -132,6 +132,7 @@ def _inner(text: str) -> str | None:
 
 
 def _phone(text: str) -> str | None:
+    text = STATE.sub("", text)
     name = phone_named(text) or phone_named(_inner(text) or "")
     return SILENCE if name is None and _is_silence(text) else name
 

@@ -14,7 +14,6 @@ from lipmotion.stats.hmm.evidence import Evidence
 from lipmotion.stats.hmm.model import UnitHmm
 from lipmotion.stats.hmm.network import Network, NetworkBuilder
 
-
 FEW_ARCS, ARCS_A_FRAME = 1_000_000, 10
 """Arcs of a network that may always be built, and how many more for each frame; sentences need about one a frame."""
 
