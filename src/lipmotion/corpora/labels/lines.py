@@ -15,8 +15,8 @@ TICKS_PER_S = 10_000_000
 """HTK counts in 100 ns."""
 SHORTEST_TICKS = 10_000
 """Whole numbers under a millisecond are not times: "20 30 people" is a sentence."""
-WHOLE = re.compile(r"(\d{1,18})\s+(\d{1,18})\s+(\S+)(?:\s.*)?")
-STARTS = re.compile(r"(\d{1,18})\s+([^\d\s]\S*)")
+WHOLE = re.compile(r"(\d+)\s+(\d+)\s+(\S+)(?:\s.*)?")
+STARTS = re.compile(r"(\d+)\s+([^\d\s]\S*)")
 SECONDS = re.compile(r"([-+]?\d*\.\d+)\s+([-+]?\d*\.\d+)(?:\s+(.*))?")
 
 
@@ -31,13 +31,13 @@ def timed_lines(text: str, where: str) -> Tier | None:
     if SECONDS.fullmatch(first):
         return _spans(_listed(text, where), SECONDS, 1, where)
     whole = WHOLE.fullmatch(first)
-    if whole and int(whole[2]) >= SHORTEST_TICKS:
+    if whole and float(whole[2]) >= SHORTEST_TICKS:
         return _spans(_listed(text, where), WHOLE, TICKS_PER_S, where)
     if not STARTS.fullmatch(first):
         return None
     lines = _listed(text, where)
     last = STARTS.fullmatch(lines[-1][1])
-    return _from_starts(lines, where) if len(lines) > 1 and last and int(last[1]) >= SHORTEST_TICKS else None
+    return _from_starts(lines, where) if len(lines) > 1 and last and float(last[1]) >= SHORTEST_TICKS else None
 
 
 def _lines(text: str) -> Iterator[tuple[int, str]]:
@@ -66,7 +66,7 @@ def _spans(lines: list[tuple[int, str]], form: re.Pattern[str], per_s: int, wher
 
 def _from_starts(lines: list[tuple[int, str]], where: str) -> Tier:
     rows = [(number, _fitted(STARTS, number, line, "start label", where)) for number, line in lines]
-    starts_s = [int(row[0]) / TICKS_PER_S for _, row in rows]
+    starts_s = [required_time(row[0], f"line {number}", where) / TICKS_PER_S for number, row in rows]
     ends_s = [*starts_s[1:], math.inf]
     return Tier(
         "the list of labels",
