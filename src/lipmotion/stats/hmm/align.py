@@ -104,7 +104,6 @@ def choose_pronunciations(
     Raises AlignmentError: the words do not fit into the frames.
     """
     _check_room(hmm, evidence, words)
-    _check_size(hmm, evidence, words)
     silence = Said(-1, 0, (hmm.table.free[0],))
     slots: list[list[Said]] = [[silence]]
     for word, variants in enumerate(words):
@@ -132,29 +131,32 @@ def choose_pronunciations(
 
 
 def _check_room(hmm: UnitHmm, evidence: Evidence, words: Sequence[Sequence[Sequence[str]]]) -> None:
-    """Raise AlignmentError before a network is built that no path fits through, and that may fill the memory."""
-    counts = dict(zip(hmm.table.units, hmm.table.counts, strict=True))
-    least = sum(min(sum(counts[unit] for unit in variant) for variant in variants) for variants in words)
+    """Raise AlignmentError before a network is built that no path fits through, or that may fill the memory."""
+    states = _states_of(hmm, words)
+    least = sum(min(states[id(variants)]) for variants in words)
     if least > evidence.frames:
         raise AlignmentError(
             f"{len(words)} words take at least {least} frames of 10 ms, found {evidence.frames}: the recording is too "
             "short for what should be said in it; give its own transcript"
         )
-
-
-def _check_size(hmm: UnitHmm, evidence: Evidence, words: Sequence[Sequence[Sequence[str]]]) -> None:
-    """Raise AlignmentError for pronunciations that make a network far beyond the recording."""
-    counts = dict(zip(hmm.table.units, hmm.table.counts, strict=True))
-    arcs, ends = 0, 1
-    for variants in words:
-        arcs += sum(2 * counts[unit] for variant in variants for unit in variant) + ends * len(variants)
-        ends = len(variants) + 1  # each, and the pause
+    ends = [1, *(len(variants) + 1 for variants in words)]  # of the word before, and of the pause
+    arcs = sum(2 * sum(states[id(v)]) + len(v) * before for v, before in zip(words, ends, strict=False))
     most = FEW_ARCS + ARCS_A_FRAME * evidence.frames
     if arcs > most:
         raise AlignmentError(
             f"{len(words)} words in all their pronunciations make {arcs} arcs, required at most {most} for "
             f"{evidence.frames} frames of 10 ms; give fewer pronunciations"
         )
+
+
+def _states_of(hmm: UnitHmm, words: Sequence[Sequence[Sequence[str]]]) -> dict[int, list[int]]:
+    """Return how many states each pronunciation of a word has, by the word's identity: few of many words differ."""
+    counts = dict(zip(hmm.table.units, hmm.table.counts, strict=True))
+    different = {id(variants): variants for variants in words}
+    return {
+        number: [sum(counts[unit] for unit in variant) for variant in variants]
+        for number, variants in different.items()
+    }
 
 
 def _append(
