@@ -6,6 +6,14 @@ command line returns for the class; 2 is kept for a wrong command line and 1 for
 
 from __future__ import annotations
 
+SHOWN = 80
+"""Letters of a text from outside that a message repeats."""
+
+
+def shortened(text: str) -> str:
+    """Return a text, or its beginning, as a message repeats it."""
+    return text if len(text) <= SHOWN else text[:SHOWN] + "..."
+
 
 class LipMotionError(Exception):
     """Base of all errors raised on purpose."""

@@ -88,16 +88,16 @@ def check_regular(path: Path, kind: str) -> None:
         raise InputError(f"{path}: is a pipe or a device, required a file; save the {kind} first")
 
 
-def text_in(path: Path, kind: str) -> str:
+def text_in(path: Path, kind: str, largest: int = LARGEST_TEXT) -> str:
     """Return the text of a file, without a byte order mark.
 
-    Raises InputError: no such file, not a file, larger than ``LARGEST_TEXT``, or not UTF-8.
+    Raises InputError: no such file, not a file, larger than ``largest`` bytes, or not UTF-8.
     """
     check_regular(path, f"{kind} file")
     try:
         size = path.stat().st_size
-        if size > LARGEST_TEXT:
-            raise InputError(f"{path}: {size} bytes, required at most {LARGEST_TEXT}: is it a {kind}?")
+        if size > largest:
+            raise InputError(f"{path}: {size} bytes, required at most {largest}: is it a {kind}?")
         return path.read_text(encoding="utf-8-sig")
     except FileNotFoundError as error:
         raise InputError(f"{path}: no such {kind} file") from error

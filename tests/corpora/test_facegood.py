@@ -110,3 +110,16 @@ def test_two_lists_of_names(folder):
     np.save(folder / "ben_bs_name.npy", NAMES)
     with pytest.raises(InputError, match="2 lists of channel names"):
         discover(folder)
+
+
+def test_of_a_licence_the_beginning_is_read(folder):
+    (folder / "LICENSE").write_text("MIT License\n" + "x" * 20_000 + "\nCopyright (c) nobody\n")
+    rights = discover(folder).items[0].rights
+    assert rights == {"licence": "MIT License"}
+
+
+@pytest.mark.parametrize("name", ["=1+1", "@SUM(A1)", "\t=1+1"])
+def test_names_that_a_spreadsheet_would_run(folder, name):
+    np.save(folder / "anna_bs_name.npy", np.array([name, "b", "c"]))
+    with pytest.raises(InputError, match="begins as a spreadsheet's formula"):
+        discover(folder)

@@ -96,3 +96,25 @@ def test_speakers_by_their_folders(tmp_path, folder, speaker):
     (tmp_path / folder / "brwa3s.mpg").touch()
     (item,) = discover(tmp_path / folder).items
     assert item.speaker == speaker
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("0 1 bin\n" * 9000, "72000 bytes, required at most 65536: are they the words of one sentence"),
+        ("0 1 bin\n1 2 \0\n", r"line 2 has '\\x00' where its word should be"),
+        ('0 1 "', "line 1 has '\"' where its word should be"),
+        ("0 1 7", "line 1 has '7' where its word should be"),
+        ("0 1 =cmd|x", r"line 1 has '=cmd\|x' where its word should be"),
+        ("0 x" + "1" * 9000 + " bin", r"line 1 is '0 x1{77}\.\.\.'; required: start end word"),
+    ],
+)
+def test_hostile_word_times_are_refused(tmp_path, text, message):
+    (tmp_path / "a.align").write_text(text)
+    with pytest.raises(InputError, match=message):
+        aligned_words(tmp_path / "a.align")
+
+
+def test_words_of_any_language_are_words(tmp_path):
+    (tmp_path / "a.align").write_text("0 1 Näh\n1 2 o'clock\n2 3 well-known\n3 4 真\n", encoding="utf-8")
+    assert aligned_words(tmp_path / "a.align") == ("näh", "o'clock", "well-known", "真")

@@ -57,3 +57,33 @@ def test_a_name_that_breaks_the_header_is_refused(tmp_path, generation, name):
     with pytest.raises(ExportError, match="does not fit in a table"):
         write_motion(tmp_path / "a.csv", replace(generation, motion=odd), source={}, model={})
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", ["a;b", "a\tb", "a\u2028b", "a\x1bb"])
+def test_a_name_that_other_separators_would_part_is_refused(tmp_path, generation, name):
+    odd = Motion(generation.motion.values[:, :1], 100.0, (Channel(name),))
+    with pytest.raises(ExportError, match=r"does not fit in a table; write .json or .npz"):
+        write_motion(tmp_path / "a.csv", replace(generation, motion=odd), source={}, model={})
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", ["jaw open", "Mouth (L)", "a=b", "p1.x", "öffnen", "a|b", "x-y", "'x"])
+def test_odd_names_come_back(tmp_path, generation, name):
+    odd = Motion(generation.motion.values[:, :1], 100.0, (Channel(name),))
+    write_motion(tmp_path / "a.csv", replace(generation, motion=odd), source={}, model={})
+    assert read_motion(tmp_path / "a.csv")[0].names == (name,)
+
+
+@pytest.mark.parametrize("field", ["=1+1", "@SUM(A1)", "-1", "+x", "\t=1"])
+def test_a_header_that_a_spreadsheet_would_run_is_not_read(tmp_path, field):
+    path = tmp_path / "a.csv"
+    path.write_text(f"time_s,{field}\n0,1\n1,1\n")
+    with pytest.raises(InputError, match="begins as a spreadsheet's formula"):
+        read_motion(path)
+
+
+def test_a_line_without_end_is_not_read_whole(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("time_s," + "a," * 600_000 + "b\n0,1\n")
+    with pytest.raises(InputError, match="fields, required"):
+        read_motion(path)

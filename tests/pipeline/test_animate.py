@@ -195,3 +195,19 @@ def test_files_may_stand_for_model_and_transcript(
     assert by_file.units == animate(toy_speech, model=toy_model, transcript="see papa").units
     with pytest.raises(InputError, match="no such transcript file"):
         animate(toy_speech, model=toy_model, transcript=tmp_path / "other.txt")
+
+
+def test_text_beyond_the_recording_is_refused_before_it_is_split(
+    toy_model: Model, toy_sentence: ToySentence, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr("lipmotion.pipeline.hear.words_of", pytest.fail)
+    (tmp_path / "a.txt").write_text("a " * 20_000)
+    for transcript in ("a " * 20_000, "7" * 40_000, "b" * 40_000, tmp_path / "a.txt"):
+        with pytest.raises(AlignmentError, match="the transcript has 40000 characters, required at most 10552"):
+            animate(toy_sentence.audio, transcript=transcript, model=toy_model)
+
+
+def test_units_beyond_the_recording_are_refused(toy_model: Model, toy_sentence: ToySentence) -> None:
+    units = Timeline(tuple(Span(i / 1e4, (i + 1) / 1e4, Unit("p")) for i in range(2000)))
+    with pytest.raises(InputError, match=r"2000 units in time, required at most 1276 for 2.76 s of sound"):
+        animate(toy_sentence.audio, units=units, model=toy_model)

@@ -194,3 +194,16 @@ def test_a_source_is_not_touched(studio):
     assert set(digest(item)) == {"motion_file", "motion_sha256", "phones_sha256"}
     assert digest(item) == digest(item)
     assert digest(item) != digest(replace(item, phones=spans((0, 1.001, "aa"))))
+
+
+def test_labels_beyond_what_a_recording_holds(tmp_path):
+    spans = tuple(Span(i / 1e5, (i + 1) / 1e5, Unit("p")) for i in range(2000))
+    recording = Recording("a", tmp_path / "a.wav", None, phones=Timeline(spans))
+    with pytest.raises(InputError, match=r"a\.wav: 2000 units in time, required at most 1200 for 2.00 s of sound"):
+        given_phones(recording, 2.0)
+
+
+def test_labels_that_last_no_time(tmp_path):
+    recording = Recording("a", tmp_path / "a.wav", None, phones=Timeline((Span(1.0, 1.0, Unit("p")),) * 3))
+    with pytest.raises(InputError, match="none of its 3 labels is a phone that lasts longer than 0 s"):
+        given_phones(recording, 2.0)

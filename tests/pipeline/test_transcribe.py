@@ -7,7 +7,7 @@ import pytest
 from lipmotion.errors import AlignmentError, InputError
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.toy import ToySentence
-from lipmotion.pipeline.transcribe import report_guesses, transcribe
+from lipmotion.pipeline.transcribe import MOST_GUESSES, report_guesses, transcribe
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.recogniser import Recogniser
 from lipmotion.types import Audio, Features
@@ -108,3 +108,15 @@ def test_it_says_what_is_wrong(phones: Recogniser, audio: Audio, features: Featu
         transcribe(phones, audio, features, ("näh",), Lexicon())
     with pytest.raises(AlignmentError, match="too short"):
         transcribe(phones, audio, features, ("five",) * 60, Lexicon())
+
+
+def test_of_many_guesses_some_are_told(caplog: pytest.LogCaptureFixture) -> None:
+    report_guesses([f"bimab{'ab' * i}" for i in range(MOST_GUESSES + 7)], Lexicon())
+    *each, last = [record.getMessage() for record in caplog.records]
+    assert len(each) == MOST_GUESSES
+    assert last == "7 more words are not in the dictionary; a lexicon file can say better"
+
+
+def test_words_beyond_the_recording_are_refused(phones: Recogniser, audio: Audio, features: Features) -> None:
+    with pytest.raises(AlignmentError, match="nobody says so much"):
+        transcribe(phones, audio, features, ("five",) * 5000, Lexicon())

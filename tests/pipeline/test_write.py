@@ -138,3 +138,11 @@ def test_motion_that_cannot_be_drawn_leaves_no_file(
     with pytest.raises(ExportError, match=r"a\.mp4: the motion has no channel 'opening' to draw a face from"):
         write(shapes, [tmp_path / "a.csv", tmp_path / "a.mp4"], speech=toy_speech, model=toy_model)
     assert not list(tmp_path.iterdir())
+
+
+def test_a_name_for_no_table_is_refused_before_the_first_file(result: Generation, tmp_path: Path) -> None:
+    channels = (replace(result.motion.channels[0], name="a,b"), *result.motion.channels[1:])
+    odd = replace(result, motion=replace(result.motion, channels=channels))
+    with pytest.raises(ExportError, match="'a,b' does not fit in a table"):
+        write(odd, [tmp_path / "a.json", tmp_path / "a.csv"])
+    assert not list(tmp_path.iterdir())

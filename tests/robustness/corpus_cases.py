@@ -218,11 +218,12 @@ def _labelled(name: str, suffix: str, content: bytes | str, *says: str) -> None:
         bench.file(f"a{suffix}", content)
 
 
+ONE_TIER = '"ooTextFile"\n"TextGrid"\n0 1 <exists> 1\n"IntervalTier" "a" 0 1'
 _labelled("binary", ".TextGrid", b"ooBinaryFile\x08TextGrid\x00\xff", "binary TextGrid; save it as a text file")
 _labelled("cut off", ".TextGrid", 'File type = "ooTextFile"\n"TextGrid"\n0\n1\n<exists>\n1\n', "is damaged")
 _labelled("a billion tiers", ".TextGrid", '"ooTextFile"\n"TextGrid"\n0 1 <exists> 1000000000\n', "tier 1 is damaged")
 _labelled("a tier of a billion labels", ".TextGrid", '"ooTextFile"\n"TextGrid"\n0 1 <exists> 1\n"IntervalTier" "a" 0 1 '
-          "1000000000\n0 1 \"b\"\n", "is damaged")  # fmt: skip
+          "1000000000\n0 1 \"b\"\n", "more than 250000 labels; give those of one recording")  # fmt: skip
 _labelled("half a tier", ".TextGrid", '"ooTextFile"\n"TextGrid"\n0 1 <exists> 0.5\n', "is damaged")
 _labelled("times of NaN", ".TextGrid", '"ooTextFile"\n"TextGrid"\n0 nan <exists> 1\n', "is damaged")
 _labelled("times of 1e999", ".TextGrid", '"ooTextFile"\n"TextGrid"\n0 1 <exists> 1e999\n', "is damaged")
@@ -234,12 +235,28 @@ _labelled("a line of another form", ".lab", "0 1000000 p\nhello\n", "line 2 is '
 _labelled("phones of another recording", ".lab", "0 900000000 p\n", "the sound lasts")
 _labelled("a backward label of Audacity", ".txt", "1.5\t0.5\tp\n", "before its start")
 _labelled("no UTF-8", ".txt", b"\xff\xfeh", "a.txt")
-
-
-@_prepared(".lab: an end of a thousand digits, which is the end of the sound", 0)
-def _(bench: Bench) -> None:
-    _spoken(bench)
-    bench.file("a.lab", f"0 {'9' * 1000} p\n")
+_labelled("an end of 5,000 digits", ".lab", f"0 {'9' * 5000} p\n", "line 1 has the time 999", "required a finite one")
+_labelled("an infinite time", ".TextGrid", f'{ONE_TIER} 1\n0 1e999 "p"\n',
+          "has the time 1e999, required a finite one")  # fmt: skip
+_labelled("more labels than its counts say", ".TextGrid", f'{ONE_TIER} 1\n'
+          '0 1 "p"\n1 2 "aa"\n', "more is there than the counts say")  # fmt: skip
+_labelled("250,001 labels", ".lab", "0 1000000 p\n" * 250_001, "more than 250000 labels; give those of one recording")
+_labelled("more phones than frames", ".lab", "".join(f"{i}0000 {i + 1}0000 p\n" for i in range(2000)),
+          "2000 units in time, required at most 1276")  # fmt: skip
+_labelled(
+    "labels in seconds without decimals in the first line", ".txt", "0 0.5 p\n0.5 1.5 aa\n", "its lines hold times"
+)
+_labelled("many recordings in one", ".lab", '#!MLF!#\n"*/a.lab"\n0 1000000 p\n', "is a master label file")
+_labelled("subtitles", ".txt", "1\n00:00:01,000 --> 00:00:02,000\nhello\n", "is a file of subtitles")
+_labelled("a word processor's file", ".txt", "{\\rtf1\\ansi hello}", "required the words alone; save it as text")
+_labelled("UTF-16 without its mark", ".txt", "hello".encode("utf-16-le"), "holds NUL characters: is it UTF-16")
+_labelled(
+    "two million words", ".txt", "a " * 2_000_000, "the transcript has 4000000 characters, required at most 10552"
+)
+_labelled(
+    "a file of 5 MB", ".txt", "a" * 5_000_000, "5000000 characters, required at most 4194304: is it a transcript?"
+)
+_labelled("a file of 20 MB", ".TextGrid", b" " * 20_000_000, "20000000 bytes, required at most 16777216")
 
 
 def _moved(name: str, content: str, *says: str) -> None:
@@ -252,6 +269,9 @@ def _moved(name: str, content: str, *says: str) -> None:
 _moved("of another length", json.dumps(GOOD), "the sound lasts", "required: the same time")
 _moved("NaN", json.dumps(GOOD | {"values": [[float("nan")]]}), "not finite")
 _moved("no JSON", "{", "not JSON")
+_moved("a channel that is a spreadsheet's formula",
+       json.dumps(GOOD | {"channels": [{"name": "=1+1", "unit": "weight"}]}),
+       "begins as a spreadsheet's formula")  # fmt: skip
 
 
 def _weights(name: str, values: bytes, *says: str, names: bytes | None = None, code: int = 4) -> None:
@@ -269,6 +289,12 @@ _weights("NaN", npy(np.full((9, 2), np.nan)), NONE, "not finite; interpolate the
 _weights("another count of channels", npy(np.zeros((9, 3))), NONE, "required numbers of shape (frames, 2)")
 _weights("names that are numbers", npy(np.zeros((9, 2))), "required one row of different texts", names=npy(np.zeros(2)),
          code=3)  # fmt: skip
+
+
+@_prepared("a list of 50,000 other names", 4, "name 50000 recordings that are not in it", "those of another folder?")
+def _(bench: Bench) -> None:
+    _spoken(bench)
+    bench.file("train.txt", "".join(f"name{i}\n" for i in range(50_000)))
 
 
 @_prepared("a name in two lists", 4, "a is in train.txt and in test.txt", "keep one")

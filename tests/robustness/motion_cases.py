@@ -49,6 +49,14 @@ _json("an unknown phone", {"units": [_unit(0, 0.4, "qq")]}, 3, "unknown phone 'q
 _json("a phone that is a list", {"units": [_unit(0, 0.4, ["p"])]}, 3, "unknown phone", "the phones:")
 _json("a time that is a text", {"units": [_unit("soon", 0.4)]}, 3, *DAMAGED)
 _json("a time of 400 digits", {"units": [_unit(10**400, 0.4)]}, 3, *DAMAGED)
+_json("300,000 units", {"units": [_unit(i / 1e6, (i + 1) / 1e6) for i in range(300_000)]}, 3,
+      "300000 units in time, required at most 1276 for 2.76 s of sound; give those of this recording")  # fmt: skip
+_json("two million units", json.dumps(GOOD | {"units": []}).replace("[]", "[" + "0," * 2_000_000 + "0]"), 3, *DAMAGED,
+      "a list of more than 1048576 items")  # fmt: skip
+_json("five million rows", json.dumps(GOOD | {"values": []}).replace("[]", "[" + "[0]," * 5_000_000 + "[0]]"), 3,
+      *DAMAGED, "more than 4194304 rows of values")  # fmt: skip
+_json("a channel that is a spreadsheet's formula", {"channels": [{"name": "=1+1", "unit": "weight"}]}, 3,
+      "the channel name '=1+1' begins as a spreadsheet's formula")  # fmt: skip
 _json("no units", {"units": []}, 3, "the units are an empty list", "or leave them out")
 _json("units that are none", {"units": 7}, 3, *DAMAGED)
 _json("a unit without a phone", {"units": [{"start_s": 0}]}, 3, "has no 'end_s'; export it again")
@@ -65,7 +73,7 @@ _json("an infinite rate", {"rate_hz": float("inf")}, 3, "motion rate is inf Hz, 
 _json("channels of one name", {"channels": GOOD["channels"] * 2, "values": [[1, 1]]}, 3, "channel names repeat")  # type: ignore[operator]
 _json("cut off", json.dumps(GOOD)[:90], 3, "not JSON", "export it again")
 _json("an empty file", "", 3, "not JSON", "export it again")
-_json("100,000 brackets", "[" * 100_000, 3, "not JSON", "export it again")
+_json("100,000 brackets", '{"values": ' + "[" * 100_000, 3, "not JSON", "export it again")
 _json("a list", "[1, 2]", 3, "not a motion document")
 
 
@@ -81,6 +89,8 @@ _csv("words", "hello\nworld\n", "not a table of numbers", "export it again")
 _csv("rows of different lengths", "time_s,a\n0,1\n1\n", "not a table of numbers")
 _csv("uneven times", "time_s,a\n0,1\n1,1\n3,1\n", "must begin at 0 and rise in even steps")
 _csv("infinite times", "time_s,a\n0,1\ninf,1\n", "times that are none, required seconds up to")
+_csv("a channel that is a spreadsheet's formula", "time_s,@SUM(A1)\n0,1\n1,1\n", "begins as a spreadsheet's formula")
+_csv("a line of a million fields", "time_s,a\n0,1\n" + "1," * 1_000_000, "not a table of numbers")
 _csv("NaN", "time_s,a\n0,1\n1,nan\n", "not finite; interpolate them first")
 
 

@@ -82,6 +82,11 @@ for _name, _options, _says in [
         return ["train", bench.corpus, "-o", "m", *options]
 
 
+@case(GROUP, "corpus prompts --text of 30 million bytes", 3, "30000000 bytes, required at most 4194304")
+def _(bench: Bench) -> list[object]:
+    return ["corpus", "prompts", "--text", bench.file("text.txt", b"a " * 15_000_000)]
+
+
 @case(GROUP, "corpus prompts --count -1", 3, "-1 prompts asked for, required at least 1")
 def _(_bench: Bench) -> list[object]:
     return ["corpus", "prompts", "--count=-1"]

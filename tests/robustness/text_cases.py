@@ -9,6 +9,7 @@ from robustness.case import Bench, case
 
 GROUP = "transcripts"
 NO_WORD = ("holds no word", "give the words that are spoken")
+TOO_LONG = ("the transcript has", "characters, required at most 10552 for 2.76 s of sound: nobody says so much")
 TOO_MUCH = ("words take at least", "frames of 10 ms, found", "too short for what should be said")
 
 
@@ -29,8 +30,11 @@ _said("right to left among left to right", "papa \u202eשלום\u202c mama", 3, 
 _said("accents", "näh", 3, "cannot guess how 'näh' is said", "add it to a lexicon file")
 _said("a number of thirty digits", "9" * 30, 0)
 _said("numbers of other scripts", "٣", 0)
-_said("a number of 100,000 digits", "7" * 100_000, 5, *TOO_MUCH)
-_said("100,000 words", "papa " * 100_000, 5, *TOO_MUCH)
+_said("a number of 1,000 digits", "7" * 1000, 5, *TOO_MUCH)
+_said("2,000 words", "papa " * 2000, 5, *TOO_MUCH)
+_said("a number of 20 million digits", "7" * 20_000_000, 5, *TOO_LONG)
+_said("15 million words", "a " * 15_000_000, 5, *TOO_LONG)
+_said("one word of 60 million letters", "b" * 60_000_000, 5, *TOO_LONG)
 _said("one word of 10,000 letters", "ab" * 5000, 5, *TOO_MUCH)
 _said("a name of a file that is not there", "words.txt", 3, "no such transcript file")
 _said("a device", "/dev/zero", 3, "is a pipe or a device, required a file")
@@ -47,6 +51,16 @@ _written("an empty file", b"", 3, *NO_WORD)
 _written("a file in Latin-1", "Bübchen".encode("latin-1"), 3, "not a readable UTF-8 transcript", "save it as UTF-8")
 _written("a file in UTF-16", "papa".encode("utf-16"), 3, "not a readable UTF-8 transcript", "save it as UTF-8")
 _written("a file with a byte order mark", b"\xef\xbb\xbfpapa mama", 0)
+_written("30 million bytes of words", b"a " * 15_000_000, 3, "30000000 bytes, required at most 4194304: is it a")
+_written("a million accents on one letter", b"b" + "\u0316\u0301".encode() * 500_000, 5, *TOO_LONG)
+_written(
+    "a TextGrid", b'"ooTextFile"\n"TextGrid"\n0 1 <exists> 0\n', 3, "holds labels in time, required the words alone"
+)
+_written("HTK's labels", b"0 1000000 p\n1000000 2000000 aa\n", 3, "holds labels in time, required the words alone")
+_written("subtitles", b"1\n00:00:01,000 --> 00:00:02,000\npapa\n", 3, "is a file of subtitles, required the words")
+_written(
+    "UTF-16 without its mark", "papa".encode("utf-16-le"), 3, "holds NUL characters: is it UTF-16 without its mark?"
+)
 _written("a sound as a transcript", b"RIFF\x80\x81\x82", 3, "not a readable UTF-8 transcript")
 
 
@@ -56,7 +70,7 @@ def _(bench: Bench) -> list[object]:
     return bench.animate(None, "--transcript", bench.folder / "words.txt")
 
 
-@case(GROUP, "a file of terabytes", 3, "1099511627776 bytes, required at most 67108864")
+@case(GROUP, "a file of terabytes", 3, "1099511627776 bytes, required at most 4194304")
 def _(bench: Bench) -> list[object]:
     path = bench.file("words.txt", b"")
     os.truncate(path, 2**40)
@@ -85,8 +99,16 @@ _lexicon("the same line twice", b"papa P AA\npapa P AA\n", 0)
 _lexicon("a byte order mark, and lines of Windows", b"\xef\xbb\xbfpapa P AA P AX\r\n", 0)
 _lexicon("Latin-1", "bübchen B UW\n".encode("latin-1"), 3, "not a readable UTF-8 lexicon", "save it as UTF-8")
 _lexicon("NUL bytes", b"\0\0\0\n", 3, "line 1: a word without phones")
-_lexicon("a line of 100,000 phones", b"papa" + b" P" * 100_000, 5, *TOO_MUCH)
+_lexicon("a line of 900 phones", b"papa" + b" P" * 900, 5, *TOO_MUCH)
+_lexicon(
+    "a line of 10 million phones", b"papa" + b" P" * 10_000_000, 3, "line 1: 20000004 characters, required at most 2000"
+)
+_lexicon(
+    "a million pronunciations", b"papa P AA\n" * 1_000_000, 3, "line 33: more than 32 pronunciations of 'papa'; keep"
+)
 _lexicon("a million empty lines", b"\n" * 1_000_000, 0)
+_lexicon("two million lines", b"papa P\n" * 2_000_000, 3, "2000001 lines, required at most 1048576; keep the words")
+_lexicon("40 million bytes", b"#" * 40_000_000, 3, "40000000 bytes, required at most 33554432: is it a lexicon?")
 
 
 @case(LEXICONS, "a device", 3, "is a pipe or a device, required a file")

@@ -95,3 +95,19 @@ def test_nothing_resampled_is_nothing() -> None:
 def test_an_impossible_rate_is_refused(rate_hz: float) -> None:
     with pytest.raises(InputError, match=f"motion rate is {rate_hz} Hz"):
         motion().resampled(rate_hz)
+
+
+@pytest.mark.parametrize(
+    "name", ["=1+1", "+1", "-2+3", "@SUM(A1)", "\t=1", "\r=1", " =1", "＝1", "\u3000＠x", "-x" * 500]
+)
+def test_a_name_is_no_formula_of_a_spreadsheet(name: str) -> None:
+    with pytest.raises(InputError, match=r"begins as a spreadsheet's formula, required another beginning") as caught:
+        Channel(name)
+    assert len(str(caught.value)) < 250
+
+
+@pytest.mark.parametrize(
+    "name", ["opening", "p12.x", "jaw-open", "Mouth Open (L)", "blendShape1.a=b", "öffnen", "", "_x", "|a|b"]
+)
+def test_other_names_are_names(name: str) -> None:
+    assert Channel(name).name == name

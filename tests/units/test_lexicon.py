@@ -6,6 +6,7 @@ import pytest
 
 from lipmotion.errors import InputError, MissingDependencyError
 from lipmotion.units import PHONES, Lexicon, lexicon
+from lipmotion.units.lexicon import LARGEST_LEXICON, LONGEST_LINE, MOST_LINES, MOST_VARIANTS
 
 
 def said(word: str, lexicon: Lexicon | None = None) -> list[str]:
@@ -149,3 +150,37 @@ def test_the_dictionary_is_searched_as_if_line_by_line() -> None:
     for word in words:
         expected = tuple(tuple(line[1:]) for line in lines if line[0].partition("(")[0] == word)
         assert lexicon._dictionary_entries(word) == expected
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("bim B IH M\n" + "bim B" + " B" * LONGEST_LINE, "line 2: 4005 characters, required at most 2000; write one"),
+        (
+            "bim B IH M\n" * (MOST_VARIANTS + 1),
+            "line 33: more than 32 pronunciations of 'bim'; keep those that are said",
+        ),
+        ("\n" * MOST_LINES, "1048577 lines, required at most 1048576; keep the words that are said"),
+        ("#" * (LARGEST_LEXICON + 1), "33554433 bytes, required at most 33554432: is it a lexicon"),
+        ("bim " + "Q" * 500, r"unknown phone 'Q{80}\.\.\.'; the phones"),
+    ],
+)
+def test_what_no_lexicon_holds_is_refused(lexicon_file: Path, text: str, message: str) -> None:
+    lexicon_file.write_text(text)
+    with pytest.raises(InputError, match=message):
+        Lexicon.from_file(lexicon_file)
+
+
+def test_the_most_that_a_lexicon_holds_is_read(lexicon_file: Path) -> None:
+    line = "bim B" + " B" * ((LONGEST_LINE - 5) // 2)
+    lexicon_file.write_text(f"{line}\n" + "bam B AE M\n" * MOST_VARIANTS)
+    found = Lexicon.from_file(lexicon_file).user
+    assert len(found["bim"][0]) == 1 + (LONGEST_LINE - 5) // 2
+    assert len(found["bam"]) == MOST_VARIANTS
+
+
+def test_the_whole_dictionary_can_be_a_user_s_file(lexicon_file: Path) -> None:
+    lexicon_file.write_bytes(lexicon._dictionary())
+    found = Lexicon.from_file(lexicon_file)
+    assert len(found.user) > 125_000
+    assert found.pronunciations("read") == (("r", "eh", "d"), ("r", "iy", "d"))

@@ -70,3 +70,10 @@ def test_the_lexicon_knows_how_any_word_is_said(word: str) -> None:
 def test_it_says_what_it_cannot_guess(word: str, message: str) -> None:
     with pytest.raises(InputError, match=message):
         guess(word)
+
+
+@pytest.mark.parametrize("word", ["ä" * 1000, "".join(map(chr, range(0x3B1, 0x3C9))) * 100 + "日" * 90])
+def test_a_message_repeats_the_beginning_of_a_word(word: str) -> None:
+    with pytest.raises(InputError, match=r"\.\.\.' is said") as caught:
+        guess(word)
+    assert len(str(caught.value)) < 300

@@ -1,12 +1,14 @@
 from __future__ import annotations
 
+import unicodedata
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lipmotion.errors import InputError
 from lipmotion.units import words_of
-from lipmotion.units.transcript import ONES, SCALES, TENS, number_words
+from lipmotion.units.transcript import MOST_MARKS, ONES, SCALES, TENS, number_words, plain
 
 
 @pytest.mark.parametrize(
@@ -102,3 +104,16 @@ def test_any_text_gives_words_or_says_that_there_are_none(text: str) -> None:
         assert word == word.lower()
         assert not any(character.isspace() or character.isdecimal() for character in word)
     assert words_of(" ".join(words)) == words
+
+
+@pytest.mark.parametrize("mark", ["\u0301", "\u0316\u0301", "\u0f73", "\uff9e"])
+def test_a_letter_keeps_thirty_marks(mark: str) -> None:
+    """More would be sorted, which takes the square of the time; half-width and Tibetan marks hide what they are."""
+    many = "a" + mark * 200_000
+    kept = "a" + (mark * 200_000)[:MOST_MARKS]
+    assert plain(many) == unicodedata.normalize("NFKC", kept)
+    assert plain("e\u0301" * 100) == "é" * 100
+
+
+def test_numbers_of_any_length_are_digits() -> None:
+    assert words_of("7" * 10_000) == ("seven",) * 10_000

@@ -204,3 +204,12 @@ def test_the_table_in_the_document_is_one(tmp_path: Path) -> None:
     found = unit_set(written(tmp_path, example))
     assert found.units == ("closed", "teeth", "rounded", "open")
     assert found.silence == ("closed",)
+
+
+def test_a_table_is_small_and_so_are_messages(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="required at most 262144: is it a unit table"):
+        unit_set(written(tmp_path, "#" * 300_000))
+    for text in ("x " + "q" * 9000, "x" * 9000, "x" * 9000 + " b sil"):
+        with pytest.raises(InputError) as caught:
+            unit_set(written(tmp_path, text))
+        assert len(str(caught.value)) < 500

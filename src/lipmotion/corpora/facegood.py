@@ -24,6 +24,8 @@ from lipmotion.types import WEIGHT, Channel, Motion
 KIND = "FACEGOOD blendshape weights"
 NAMES, VALUES = "*_bs_name.npy", "bs_value_"
 RATE_HZ = 30.0
+LICENCE_START = 10_000
+"""Characters of a licence that say which it is, and whose."""
 
 
 def read_facegood(directory: Path) -> Recordings | None:
@@ -99,6 +101,8 @@ def _rights(directory: Path) -> dict[str, str]:
     path = directory / "LICENSE"
     if not path.is_file():
         return {}
-    lines = [line.strip() for line in path.read_text(encoding="utf-8", errors="replace").splitlines() if line.strip()]
+    with path.open(encoding="utf-8", errors="replace") as file:
+        text = file.read(LICENCE_START)
+    lines = [line.strip() for line in text.splitlines() if line.strip()]
     owners = [line for line in lines if line.lower().startswith("copyright")]
     return {"licence": lines[0]} | ({"attribution": owners[0]} if owners else {}) if lines else {}

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from lipmotion.corpora.base import Recording, Recordings, videos
 from lipmotion.corpora.splits import with_splits
-from lipmotion.errors import InputError
+from lipmotion.errors import InputError, shortened
 
 KIND = "GRID corpus"
 RIGHTS = {
@@ -17,6 +17,9 @@ RIGHTS = {
 
 SILENCES = frozenset({"sil", "sp"})
 """Marks of a word-time file that are not words."""
+WORD = re.compile(r"[^\W\d_]+(?:['-][^\W\d_]+)*")
+LARGEST_ALIGN = 1 << 16
+"""Bytes of a word-time file; GRID's have a hundred."""
 
 COMMANDS = {"b": "bin", "l": "lay", "p": "place", "s": "set"}
 COLOURS = {"b": "blue", "g": "green", "r": "red", "w": "white"}
@@ -75,10 +78,15 @@ def aligned_words(path: Path) -> tuple[str, ...]:
 
     Raises InputError: not such a file, or without a word.
     """
+    size = path.stat().st_size
+    if size > LARGEST_ALIGN:
+        raise InputError(f"{path}: {size} bytes, required at most {LARGEST_ALIGN}: are they the words of one sentence?")
     rows = [line.split() for line in path.read_text(encoding="utf-8", errors="replace").splitlines() if line.strip()]
     for number, row in enumerate(rows, 1):
         if len(row) != 3 or not (row[0].isdecimal() and row[1].isdecimal()):
-            raise InputError(f"{path}: line {number} is {' '.join(row)!r}; required: start end word")
+            raise InputError(f"{path}: line {number} is {shortened(' '.join(row))!r}; required: start end word")
+        if not WORD.fullmatch(row[2]):
+            raise InputError(f"{path}: line {number} has {shortened(row[2])!r} where its word should be")
     words = tuple(row[2].lower() for row in rows if row[2].lower() not in SILENCES)
     if not words:
         raise InputError(f"{path}: holds no word; remove the file if the words are not known")

@@ -11,6 +11,10 @@ from lipmotion.files import text_in
 
 SPLITS = ("train", "val", "test")
 LISTS = tuple(f"{split}.txt" for split in SPLITS)
+LARGEST_LIST = 1 << 24
+"""Bytes of a list of names."""
+MOST_MISSING = 20_000
+"""Names without a recording that are reported one by one; more of them are the list of another folder."""
 
 
 def with_splits(found: Recordings, directory: Path) -> Recordings:
@@ -18,15 +22,21 @@ def with_splits(found: Recordings, directory: Path) -> Recordings:
 
     Without lists everything is ``train``. With a train.txt, recordings in no list become problems, for training on
     them was not asked for; so do names without a recording.
-    Raises CorpusError: a name stands in two lists.
+    Raises CorpusError: a name stands in two lists, or more than ``MOST_MISSING`` names have no recording.
     """
     split_of = _read_lists(directory)
     rest = None if (directory / "train.txt").is_file() else "train"
+    known = {item.name for item in found.items} | found.problems.keys()
     problems = {
         name: f"listed in {split}.txt, but there is no such recording"
         for name, split in split_of.items()
-        if name not in {item.name for item in found.items} and name not in found.problems
+        if name not in known
     }
+    if len(problems) > MOST_MISSING:
+        raise CorpusError(
+            f"{directory}: its lists name {len(problems)} recordings that are not in it, at most {MOST_MISSING} may "
+            "be missing; are they those of another folder?"
+        )
     items = []
     for item in found.items:
         split = split_of.get(item.name, rest)
@@ -53,7 +63,7 @@ def names_in(path: Path) -> list[str]:
     Raises CorpusError: no such file, or not UTF-8 text.
     """
     try:
-        lines = text_in(path, "list").splitlines()
+        lines = text_in(path, "list", LARGEST_LIST).splitlines()
     except InputError as error:
         raise CorpusError(f"{error}; required: one name a line") from error
     return [line.strip().replace("/", "-") for line in lines if line.strip()]

@@ -22,19 +22,23 @@ class MotionFormat:
 
     write : path, what to write, and where its speech and its model came from
     read  : path → motion and units; raises InputError
+    check : raises ExportError for motion that does not fit into such a file
     """
 
     write: Callable[[Path, Generation, About, About], None]
     read: Callable[[Path], tuple[Motion, Timeline[Unit]]]
+    check: Callable[[Motion], None] = lambda _: None
 
 
 _FORMATS: dict[str, MotionFormat] = {
     ".json": MotionFormat(motion_json.write, motion_json.read),
-    ".csv": MotionFormat(motion_csv.write, motion_csv.read),
+    ".csv": MotionFormat(motion_csv.write, motion_csv.read, motion_csv.check),
     ".npz": MotionFormat(motion_npz.write, motion_npz.read),
 }
 MOTION_SUFFIXES: tuple[str, ...] = tuple(_FORMATS)
 """The suffixes that ``write_motion`` knows."""
+LARGEST_MOTION = 1 << 31
+"""Bytes of a motion file: four hours of a hundred channels."""
 
 
 def write_motion(path: Path, generation: Generation, *, source: dict[str, str], model: dict[str, str]) -> None:
@@ -43,13 +47,19 @@ def write_motion(path: Path, generation: Generation, *, source: dict[str, str], 
     source, model : what the file says of the speech and of the model (``.csv`` has no room for it, nor for units)
     Raises ExportError: unknown suffix, values that are not finite, or the file cannot be written.
     """
+    check_motion(path, generation.motion)
+    with whole_file(path) as temporary:
+        _FORMATS[path.suffix.lower()].write(temporary, generation, source, model)
+
+
+def check_motion(path: Path, motion: Motion) -> None:
+    """Raise ExportError if motion cannot be written to a file of that name: unknown suffix, or it does not fit."""
     chosen = _FORMATS.get(path.suffix.lower())
     if chosen is None:
         raise ExportError(f"{path}: cannot write motion as {_suffix(path)}; use one of {', '.join(MOTION_SUFFIXES)}")
-    if not np.isfinite(generation.motion.values).all():
+    if not np.isfinite(motion.values).all():
         raise ExportError(f"{path}: the motion has values that are not finite; interpolate them before writing")
-    with whole_file(path) as temporary:
-        chosen.write(temporary, generation, source, model)
+    chosen.check(motion)
 
 
 def read_motion(path: str | Path) -> tuple[Motion, Timeline[Unit]]:
@@ -63,6 +73,9 @@ def read_motion(path: str | Path) -> tuple[Motion, Timeline[Unit]]:
         raise InputError(f"{path}: cannot read motion from {_suffix(path)}; use one of {', '.join(MOTION_SUFFIXES)}")
     check_regular(path, "motion file")
     try:
+        size = path.stat().st_size
+        if size > LARGEST_MOTION:
+            raise InputError(f"{size} bytes, required at most {LARGEST_MOTION}: is it a motion file?")
         motion, units = chosen.read(path)
         if not np.isfinite(motion.values).all():
             raise InputError("there are values that are not finite; interpolate them first")

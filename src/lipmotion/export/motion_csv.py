@@ -2,26 +2,35 @@
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import ExportError, InputError
+from lipmotion.errors import ExportError, InputError, shortened
 from lipmotion.export.rounded import rows
 from lipmotion.types import Channel, Generation, Motion, Timeline, Unit
 
+LONGEST_HEAD = 1 << 20
+"""Characters of a line."""
 LONGEST_S = 1e6
 """More than eleven days of motion are a mistake."""
 
 
-def write(path: Path, generation: Generation, _source: Mapping[str, str], _model: Mapping[str, str]) -> None:
-    """Write a header and one line a frame. Raises ExportError: a channel's name would break the header."""
-    motion = generation.motion
+def check(motion: Motion) -> None:
+    """Raise ExportError if a channel's name would break the header."""
     for name in motion.names:
-        if set(name) & set(',"\r\n'):
-            raise ExportError(f"the channel name {name!r} does not fit in a table; write .json or .npz")
+        if set(name) & set(',;"') or not name.isprintable():
+            raise ExportError(f"the channel name {shortened(name)!r} does not fit in a table; write .json or .npz")
+
+
+def write(path: Path, generation: Generation, _source: Mapping[str, str], _model: Mapping[str, str]) -> None:
+    """Write a header and one line a frame."""
+    motion = generation.motion
     with path.open("w", encoding="utf-8") as file:
         file.write(",".join(["time_s", *motion.names]) + "\n")
         for time_s, row in zip(motion.time_s.tolist(), rows(motion.values), strict=True):
@@ -32,16 +41,26 @@ def write(path: Path, generation: Generation, _source: Mapping[str, str], _model
 def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
     """Read it back; all channels count as eye distances. Raises InputError: not such a table, or uneven times."""
     try:
-        head, *lines = path.read_text(encoding="utf-8-sig").splitlines()
-        table = np.array([line.split(",") for line in lines if line], dtype=np.float64)
+        with path.open(encoding="utf-8-sig") as file:
+            head = file.readline(LONGEST_HEAD).rstrip("\n")
+            first, *names = head.split(",")
+            if first != "time_s" or not names:
+                raise ValueError(f"the first line is {head[:60]!r}, required 'time_s,opening,...'")
+            table = _numbers(file, len(names) + 1)
     except ValueError as error:
         raise InputError(f"not a table of numbers under a header ({error}); export it again") from error
-    first, *names = head.split(",")
-    if first != "time_s" or not names:
-        raise InputError(f"the first line is {head[:60]!r}, required 'time_s,opening,...'")
-    if table.ndim != 2 or table.shape[1] != len(names) + 1:
-        raise InputError(f"the rows have shape {table.shape}, required {len(names) + 1} numbers in each")
     return Motion(table[:, 1:], _rate(table[:, 0]), tuple(Channel(name) for name in names)), Timeline(())
+
+
+def _numbers(file: TextIO, columns: int) -> NDArray[np.float64]:
+    """Return the rows of a table [shape=(T, columns)]. Raises ValueError: a field that is no number, or uneven rows."""
+    numbers = array("d")
+    for number, line in enumerate(iter(partial(file.readline, LONGEST_HEAD), ""), 2):
+        row = line.rstrip("\n")
+        if row and row.count(",") + 1 != columns:
+            raise ValueError(f"line {number} has {row.count(',') + 1} fields, required {columns} numbers in each")
+        numbers.extend(map(float, row.split(",") if row else ()))
+    return np.frombuffer(numbers, np.float64).reshape(-1, columns) if numbers else np.empty((0, columns))
 
 
 def _rate(time_s: NDArray[np.float64]) -> float:

@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from lipmotion.errors import InputError
-from lipmotion.export.document import header, labels, parse
+from lipmotion.export.document import FORMAT, header, labels, parse
+from lipmotion.export.json_stream import members
 from lipmotion.export.rounded import rows
 from lipmotion.types import Generation, Motion, Timeline, Unit
 
@@ -26,7 +27,14 @@ def write(path: Path, generation: Generation, source: Mapping[str, str], model: 
 def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
     """Read it back. Raises InputError: not JSON, or not a motion document."""
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except (ValueError, RecursionError) as error:
+        text = path.read_text(encoding="utf-8")
+        if text.lstrip().startswith("["):
+            raise InputError(f"not a motion document: its 'format' must be {FORMAT!r}")
+        document = members(text, "values")
+    except InputError:
+        raise
+    except (json.JSONDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise InputError(f"not JSON ({error}); export it again") from error
-    return parse(document, document.get("values") if isinstance(document, dict) else None)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"the motion document is damaged ({error}); export it again") from error
+    return parse(document, document.get("values"))

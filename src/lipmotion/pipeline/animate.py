@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.export.base import MOTION_SUFFIXES, write_motion
+from lipmotion.export.base import MOTION_SUFFIXES, check_motion, write_motion
 from lipmotion.files import as_text, check_distinct, check_target
 from lipmotion.pipeline.hear import heard
 from lipmotion.pipeline.model import Model, load_model
@@ -81,6 +81,9 @@ def write(
     written = generation.selected(channels) if channels is not None else generation
     if rate_hz is not None:
         written = written.resampled(rate_hz)
+    for path in paths:
+        if path not in videos:
+            check_motion(path, written.motion)
     for path in paths:
         if path.suffix.lower() == VIDEO_SUFFIX:
             _write_video(generation, path, Path(str(speech)), fps)

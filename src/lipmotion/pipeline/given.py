@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +15,7 @@ from lipmotion.export.base import read_motion
 from lipmotion.files import sha256_of
 from lipmotion.speech.recogniser import SHORT_PAUSE_S
 from lipmotion.types import Span, Timeline, Track, Unit
-from lipmotion.units import PAUSE, SILENCE, is_silent
+from lipmotion.units import PAUSE, SILENCE, check_phones, is_silent
 
 DIGESTS = ("sha256", "motion_sha256", "phones_sha256")
 """What the source of an utterance says of its contents; another content is prepared again."""
@@ -56,10 +57,14 @@ def given_phones(recording: Recording, duration_s: float) -> Timeline[Unit] | No
     """Return the labelled phones of a recording from 0 s to the end of its sound, or None if there are none.
 
     Silence is named as recognition names it: a short one between phones is a pause.
-    Raises InputError: the labels go on after the sound.
+    Raises InputError: the labels go on after the sound, or are more than it can hold.
     """
     if recording.phones is None:
         return None
+    try:
+        check_phones(len(recording.phones), duration_s)
+    except InputError as error:
+        raise InputError(f"{recording.file}: {error}") from error
     last = recording.phones[-1]
     end_s = max(last.start_s, 0.0) if last.end_s == float("inf") else last.end_s
     if end_s > duration_s + PHONES_MARGIN_S:
@@ -71,7 +76,15 @@ def given_phones(recording: Recording, duration_s: float) -> Timeline[Unit] | No
     before = Span(0.0, clipped[0].start_s, Unit(SILENCE))
     after = Span(clipped[-1].end_s, duration_s, Unit(SILENCE))
     whole = _merged([span for span in (before, *clipped, after) if span.duration_s > 0])
+    if _spoken(recording.phones) and not _spoken(whole):
+        raise InputError(
+            f"{recording.file}: none of its {len(recording.phones)} labels is a phone that lasts longer than 0 s"
+        )
     return Timeline(tuple(_named(span, inside=0 < i < len(whole) - 1) for i, span in enumerate(whole)))
+
+
+def _spoken(spans: Iterable[Span[Unit]]) -> bool:
+    return any(not is_silent(span.label.phone) for span in spans)
 
 
 def _merged(spans: list[Span[Unit]]) -> list[Span[Unit]]:

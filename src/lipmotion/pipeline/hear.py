@@ -18,7 +18,7 @@ from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.recogniser import Recogniser
 from lipmotion.speech.recogniser import recogniser as cached_recogniser
 from lipmotion.types import Audio, Features, Speech, Timeline, Unit
-from lipmotion.units import Lexicon, words_of
+from lipmotion.units import Lexicon, check_phones, check_text, words_of
 
 LATE_S = 0.1
 """Units may end this long after the sound: editors round."""
@@ -36,12 +36,11 @@ def heard(
 ) -> Speech:
     """Return a recording as the engine of a model hears it; arguments, and what is raised, as of ``animate``."""
     phones = cached_recogniser(model.phones, recogniser, model.adaptation)
-    features = mfcc(audio)
     if units is not None:
         _check_units(units, audio.duration_s)
-        return hear(model.engine, audio, features, units)
-    text = read_transcript(transcript) if isinstance(transcript, Path) else transcript
-    words = words_of(text) if text is not None else None
+        return hear(model.engine, audio, mfcc(audio), units)
+    words = _words(transcript, audio.duration_s)
+    features = mfcc(audio)
     found = partial(transcribe, phones, audio, features, words, lexicon or Lexicon())
     if words is not None:
         return hear(model.engine, audio, features, found())
@@ -76,11 +75,21 @@ def hear_unsaid(
         return replace(speech, units=recognise(), said=False)
 
 
+def _words(transcript: str | Path | None, duration_s: float) -> tuple[str, ...] | None:
+    """Return what is said. Raises AlignmentError: a text that is too long for the recording."""
+    text = read_transcript(transcript) if isinstance(transcript, Path) else transcript
+    if text is None:
+        return None
+    check_text(text, duration_s)
+    return words_of(text)
+
+
 def _check_units(units: Timeline[Unit], duration_s: float) -> None:
     if not len(units):
         raise InputError(
             "the units are an empty list (a .csv has none); give those of a .json or .npz, or leave them out"
         )
+    check_phones(len(units), duration_s)
     if units[-1].end_s > duration_s + LATE_S:
         LOG.warning(
             "the units go on to %.2f s, the recording ends at %.2f s: are they those of another?",

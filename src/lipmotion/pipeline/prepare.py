@@ -16,13 +16,14 @@ from lipmotion.corpora.base import Recording, Recordings
 from lipmotion.corpora.discover import discover
 from lipmotion.corpora.entry import quantised, read_entry, write_utterance
 from lipmotion.corpora.store import UTTERANCES, Corpus
-from lipmotion.errors import CorpusError, ExportError, InputError, MissingDependencyError
+from lipmotion.errors import AlignmentError, CorpusError, ExportError, InputError, MissingDependencyError
 from lipmotion.files import locked, remove_unfinished, sha256_of
 from lipmotion.pipeline.given import DIGESTS, digest, given_phones, given_track
 from lipmotion.pipeline.workers import working
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.read import read_audio
 from lipmotion.types import Item, Monitor, Progress, Track, Utterance, silent_monitor
+from lipmotion.units import check_words
 from lipmotion.vision.packages import versions
 from lipmotion.vision.track import track
 
@@ -185,7 +186,7 @@ def _process(job: _Job) -> _Outcome:
         write_utterance(job.folder, utterance, job.settings)
     except (MissingDependencyError, ExportError):
         raise  # every other recording would fail in the same way
-    except InputError as error:
+    except (InputError, AlignmentError) as error:
         return _Outcome(name, problem=str(error))
     except Exception as error:  # one strange file must not stop the rest
         return _Outcome(name, problem=f"{job.recording.file}: {type(error).__name__}: {error}")
@@ -208,6 +209,7 @@ def _kept(job: _Job, source: dict[str, str]) -> dict[str, Any] | None:
 
 def _utterance(job: _Job, source: dict[str, str]) -> Utterance:
     audio = quantised(read_audio(job.recording.file))
+    check_words(job.recording.words or (), audio.duration_s)
     return Utterance(
         name=job.recording.name,
         audio=audio,

@@ -6,15 +6,18 @@ import logging
 from collections.abc import Sequence
 from pathlib import Path
 
+from lipmotion.corpora.labels import check_plain
+from lipmotion.errors import shortened
 from lipmotion.files import text_in
 from lipmotion.speech.agreement import DOUBTFUL, agreement
 from lipmotion.speech.recogniser import Recogniser
 from lipmotion.types import Audio, Features, Timeline, Unit
-from lipmotion.units import Lexicon
+from lipmotion.units import Lexicon, check_words
+from lipmotion.units.speaking_rate import LARGEST_TRANSCRIPT
 
 LOG = logging.getLogger("lipmotion")
-SHOWN = 80
-"""Letters of a word that a message repeats."""
+MOST_GUESSES = 20
+"""Words of which it is said one by one how they were guessed."""
 
 
 def transcribe(
@@ -40,12 +43,18 @@ def phones_in_time(
     """Return the same without a word about guesses, for many recordings."""
     if words is None:
         return phones.recognise(audio, features)
+    check_words(words, audio.duration_s)
     return phones.align(audio, features, words, lexicon)
 
 
 def read_transcript(path: Path) -> str:
-    """Return the text of a file. Raises InputError: no such file, or not UTF-8 text."""
-    return text_in(path, "transcript")
+    """Return the text of a file.
+
+    Raises InputError: no such file, larger than ``LARGEST_TRANSCRIPT``, not UTF-8 text, or labels in time.
+    """
+    text = text_in(path, "transcript", LARGEST_TRANSCRIPT)
+    check_plain(text, str(path))
+    return text
 
 
 def report_doubt(audio: Audio, units: Timeline[Unit]) -> None:
@@ -61,9 +70,14 @@ def report_doubt(audio: Audio, units: Timeline[Unit]) -> None:
 
 
 def report_guesses(words: Sequence[str], lexicon: Lexicon) -> None:
-    """Warn of every word whose pronunciation is a guess."""
-    for word in dict.fromkeys(words):
-        if not lexicon.known(word):
-            guessed = " ".join(lexicon.pronunciations(word)[0])
-            short = [text if len(text) <= SHOWN else text[:SHOWN] + "..." for text in (word, guessed)]
-            LOG.warning("%r is not in the dictionary; read as %r; a lexicon file can say better", *short)
+    """Warn of every word whose pronunciation is a guess; of many, say the first ``MOST_GUESSES`` and how many more."""
+    unknown = [word for word in dict.fromkeys(words) if not lexicon.known(word)]
+    for word in unknown[:MOST_GUESSES]:
+        guessed = " ".join(lexicon.pronunciations(word)[0])
+        LOG.warning(
+            "%r is not in the dictionary; read as %r; a lexicon file can say better", *map(shortened, (word, guessed))
+        )
+    if len(unknown) > MOST_GUESSES:
+        LOG.warning(
+            "%d more words are not in the dictionary; a lexicon file can say better", len(unknown) - MOST_GUESSES
+        )

@@ -90,8 +90,11 @@ class Recogniser:
         known_words = {word: lexicon.pronunciations(word) for word in set(words)}
         variants = [known_words[word] for word in words]
         known = [unit for unit in hmm.table.units if not is_silent(unit)]
-        sounds = [[tuple(stand_in(p, known) for p in variant) for variant in choices] for choices in variants]
-        said = choose_pronunciations(hmm, evidence, sounds, PAUSE)
+        sounds = {
+            word: [tuple(stand_in(p, known) for p in variant) for variant in choices]
+            for word, choices in known_words.items()
+        }
+        said = choose_pronunciations(hmm, evidence, [sounds[word] for word in words], PAUSE)
         bounds = align_units(hmm, evidence, [unit for part in said for unit in part.units])
         labels = [
             (phone, words[part.word] if part.word >= 0 else "")

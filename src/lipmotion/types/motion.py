@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Any
+from unicodedata import normalize
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError
+from lipmotion.errors import InputError, shortened
 
 EYE_DISTANCE = "eye_distance"
 """The unit of all tracked distances: that between the outer eye corners."""
@@ -18,12 +19,26 @@ GREY = "grey"
 """The unit of eigenlips: coefficients of an orthonormal basis of pictures in grey levels, 0 to 255."""
 
 
+FORMULA = ("=", "+", "-", "@", "\t", "\r")
+"""A spreadsheet runs a field as a formula that begins with one of these, wide forms of them included."""
+
+
 @dataclass(frozen=True)
 class Channel:
-    """One curve: its name and the unit of its values."""
+    """One curve: its name and the unit of its values.
+
+    Raises InputError: the name is what a spreadsheet takes for a formula.
+    """
 
     name: str
     unit: str = EYE_DISTANCE
+
+    def __post_init__(self) -> None:
+        if self.name.startswith(FORMULA) or normalize("NFKC", self.name.lstrip()[:1]).startswith(FORMULA):
+            raise InputError(
+                f"the channel name {shortened(self.name)!r} begins as a spreadsheet's formula, required another "
+                "beginning than = + - @; rename it"
+            )
 
 
 @dataclass(frozen=True, eq=False)

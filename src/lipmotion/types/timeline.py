@@ -11,7 +11,7 @@ from lipmotion.errors import InputError
 LabelT = TypeVar("LabelT")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Span(Generic[LabelT]):
     """A label that holds from ``start_s`` (included) to ``end_s`` (excluded)."""
 
@@ -25,7 +25,7 @@ class Span(Generic[LabelT]):
         return self.end_s - self.start_s
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Unit:
     """What is spoken in one span: a phone, the model unit it resolved to, and its word."""
 

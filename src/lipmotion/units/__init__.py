@@ -3,6 +3,7 @@
 from lipmotion.units.classes import phone_classes
 from lipmotion.units.lexicon import Lexicon, Pronunciation, phone_named, with_reduced_vowels
 from lipmotion.units.phones import LIP_CLOSING, PAUSE, PHONES, RELATIVES, SILENCE, is_silent, stand_in
+from lipmotion.units.speaking_rate import check_phones, check_text, check_words
 from lipmotion.units.transcript import words_of
 from lipmotion.units.unit_set import UnitSet
 from lipmotion.units.unit_sets import UNIT_SETS, unit_set
@@ -20,6 +21,9 @@ __all__ = [
     "Lexicon",
     "Pronunciation",
     "UnitSet",
+    "check_phones",
+    "check_text",
+    "check_words",
     "is_silent",
     "phone_classes",
     "phone_named",

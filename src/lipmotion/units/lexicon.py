@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, lru_cache
 from importlib.util import find_spec
 from pathlib import Path
 
-from lipmotion.errors import InputError, MissingDependencyError
+from lipmotion.errors import InputError, MissingDependencyError, shortened
 from lipmotion.files import text_in
 from lipmotion.units.phones import PHONES, is_silent
 from lipmotion.units.spelling import guess
@@ -21,8 +22,17 @@ REDUCED = {"ah": "ax", "er": "axr", "ih": "ix"}
 FULL_VOWELS = frozenset("aa ae ao aw ay eh ey iy ow oy uh uw".split())
 WEAK_WORDS = frozenset("a an the of and from was but than that's her were your for if in is it its".split())
 """Words of one syllable that are unstressed in running speech."""
+LARGEST_LEXICON, MOST_LINES = 1 << 25, 1 << 20
+"""Bytes and lines of a user's file; the dictionary of 134,000 words has 3.3 million bytes."""
+LONGEST_LINE = 2000
+"""Characters of a word, its phones and a comment."""
+VARIANT = re.compile(r"\(\d+\)$")
+"""The dictionary's number of a further pronunciation."""
+MOST_VARIANTS = 32
+"""Pronunciations of a word: alignment tries each after each of the word before. The dictionary's most are six."""
 
 
+@lru_cache(maxsize=4096)
 def phone_named(label: str) -> str | None:
     """Return the phone that a label means, or None. ARPAbet in either case, stressed or not, or the project's own."""
     name = re.sub(r"\d$", "", label.lower())
@@ -44,16 +54,16 @@ class Lexicon:
         """Read ``word PHONE PHONE ...`` lines, one pronunciation a line; ``#`` starts a comment.
 
         Phones are ARPAbet in either case, with or without stress digits, or the project's own names.
-        Raises InputError: no such file, not UTF-8, no phones after a word, or an unknown phone (with its line).
+        Raises InputError: no such file, not UTF-8, more than a lexicon holds (``LARGEST_LEXICON``, ``MOST_LINES``,
+        ``LONGEST_LINE``, ``MOST_VARIANTS``), no phones after a word, or an unknown phone (with its line).
         """
-        user: dict[str, tuple[Pronunciation, ...]] = {}
-        for number, line in enumerate(text_in(Path(path), "lexicon").splitlines(), start=1):
-            word, *phones = line.split("#")[0].split() or [""]
-            if not word:
-                continue
-            word = re.sub(r"\(\d+\)$", "", plain(word)).strip("'")  # as in ``words_of``
-            user[word] = (*user.get(word, ()), _user_phones(phones, f"{path}, line {number}"))
-        return cls(user)
+        user: dict[str, list[Pronunciation]] = {}
+        for number, line in enumerate(_lines(Path(path)), start=1):
+            try:
+                _add_line(user, line)
+            except InputError as error:
+                raise InputError(f"{path}, line {number}: {error}") from error
+        return cls({word: tuple(variants) for word, variants in user.items()})
 
     def known(self, word: str) -> bool:
         """Whether the word is in the user's file or in the dictionary."""
@@ -68,16 +78,49 @@ class Lexicon:
         return tuple(dict.fromkeys(variants)) or (with_reduced_vowels(word, guess(word)),)
 
 
-def _user_phones(phones: list[str], where: str) -> Pronunciation:
+def _add_line(user: dict[str, list[Pronunciation]], line: str) -> None:
+    """Add the pronunciation in a line, if there is one."""
+    if len(line) > LONGEST_LINE:
+        raise InputError(
+            f"{len(line)} characters, required at most {LONGEST_LINE}; write one pronunciation of a word a line"
+        )
+    word, *phones = line.split("#", maxsplit=1)[0].split() or [""]
+    if not word:
+        return
+    word = VARIANT.sub("", plain(word)).strip("'")  # as in ``words_of``
+    variants = user.setdefault(word, [])
+    if len(variants) == MOST_VARIANTS:
+        raise InputError(f"more than {MOST_VARIANTS} pronunciations of {shortened(word)!r}; keep those that are said")
+    variants.append(_user_phones(phones))
+
+
+def _lines(path: Path) -> Iterator[str]:
+    """Give the lines of a lexicon one by one. Raises InputError: not a text, or more than a lexicon holds."""
+    text = text_in(path, "lexicon", LARGEST_LEXICON)
+    count = text.count("\n") + 1
+    if count > MOST_LINES:
+        raise InputError(f"{path}: {count} lines, required at most {MOST_LINES}; keep the words that are said")
+    start = 0
+    for number in range(1, count + 1):
+        end = text.find("\n", start) if number < count else len(text)
+        yield text[start:end]
+        start = end + 1
+
+
+def _user_phones(phones: list[str]) -> Pronunciation:
     if not phones:
-        raise InputError(f"{where}: a word without phones; write the word, then its phones")
-    result = []
-    for phone in phones:
-        name = phone_named(phone)
-        if name is None or is_silent(name):
-            raise InputError(f"{where}: unknown phone {phone!r}; the phones are: {' '.join(PHONES)}")
-        result.append(name)
-    return tuple(result)
+        raise InputError("a word without phones; write the word, then its phones")
+    names = tuple([name for name in map(_spoken_phone, phones) if name])
+    if len(names) < len(phones):
+        wrong = next(phone for phone in phones if not _spoken_phone(phone))
+        raise InputError(f"unknown phone {shortened(wrong)!r}; the phones are: {' '.join(PHONES)}")
+    return names
+
+
+@lru_cache(maxsize=4096)
+def _spoken_phone(label: str) -> str | None:
+    name = phone_named(label)
+    return None if name is None or is_silent(name) else name
 
 
 def english_data() -> Path:

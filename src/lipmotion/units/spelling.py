@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from lipmotion.errors import InputError
+from lipmotion.errors import InputError, shortened
 
 SPELLINGS: dict[str, str] = {
     # The longest match from the left wins. ARPAbet, lower case; an empty value is a silent letter.
@@ -86,6 +86,10 @@ SPELLINGS: dict[str, str] = {
 }
 LONG_VOWELS = {"a": "ey", "e": "iy", "i": "ay", "o": "ow", "u": "uw"}
 _LONGEST = max(map(len, SPELLINGS))
+_SILENT_E = re.compile(r"e'?s?")
+"""At the end of a word."""
+_LONG_VOWEL = re.compile(r"[aeiou][bcdfgklmnpstvz]e('?s)?$")
+"""Vowel, consonant, final e."""
 
 
 def guess(word: str) -> tuple[str, ...]:
@@ -96,22 +100,25 @@ def guess(word: str) -> tuple[str, ...]:
     foreign = sorted(set(re.sub(r"[a-z']", "", word)))
     if foreign or not word.strip("'"):
         raise InputError(
-            f"cannot guess how {word!r} is said ({' '.join(foreign) or 'no letters'}): add it to a lexicon file"
+            f"cannot guess how {shortened(word)!r} is said ({shortened(' '.join(foreign)) or 'no letters'}): "
+            "add it to a lexicon file"
         )
     phones: list[str] = []
-    rest = re.sub(r"([b-df-hj-np-tv-z])\1", r"\1", word)  # doubled consonants sound once
-    while rest:
-        taken, sound = _next_sound(rest, begun=bool(phones))
+    letters = re.sub(r"([b-df-hj-np-tv-z])\1", r"\1", word)  # doubled consonants sound once
+    at = 0
+    while at < len(letters):
+        taken, sound = _next_sound(letters, at, begun=bool(phones))
         phones += sound.split()
-        rest = rest[taken:]
+        at += taken
     return tuple(phones)
 
 
-def _next_sound(rest: str, *, begun: bool) -> tuple[int, str]:
-    """Return how many letters are used up, and their sound."""
-    if re.fullmatch(r"e'?s?", rest) and begun:  # final e is silent
-        return len(rest), "z" if rest.endswith("s") else ""
-    if re.match(r"[aeiou][bcdfgklmnpstvz]e('?s)?$", rest):  # vowel, consonant, final e: a long vowel
-        return 1, LONG_VOWELS[rest[0]]
-    size = next(n for n in range(_LONGEST, 0, -1) if rest[:n] in SPELLINGS and len(rest) >= n)
+def _next_sound(letters: str, at: int, *, begun: bool) -> tuple[int, str]:
+    """Return how many letters from there on are used up, and their sound."""
+    if _SILENT_E.fullmatch(letters, at) and begun:
+        return len(letters) - at, "z" if letters.endswith("s") else ""
+    if _LONG_VOWEL.match(letters, at):
+        return 1, LONG_VOWELS[letters[at]]
+    rest = letters[at : at + _LONGEST]
+    size = next(n for n in range(len(rest), 0, -1) if rest[:n] in SPELLINGS)
     return size, SPELLINGS[rest[:size]]

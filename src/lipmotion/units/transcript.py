@@ -12,6 +12,8 @@ ONES = (
     "seventeen eighteen nineteen"
 ).split()
 TENS = "_ _ twenty thirty forty fifty sixty seventy eighty ninety".split()
+MOST_MARKS = 30
+"""Accents on one letter; no language has so many."""
 SCALES = ((10**9, "billion"), (10**6, "million"), (1000, "thousand"), (100, "hundred"))
 
 
@@ -30,7 +32,18 @@ def words_of(text: str) -> tuple[str, ...]:
 
 def plain(text: str) -> str:
     """Return a text in lower case, its characters and apostrophes in one form each."""
-    return unicodedata.normalize("NFKC", text).lower().replace("’", "'")
+    return unicodedata.normalize("NFKC", _few_marks(text)).lower().replace("’", "'")
+
+
+def _few_marks(text: str) -> str:
+    """Return a text with at most ``MOST_MARKS`` marks on a letter: they are sorted, which takes the square of the time.
+
+    Source: Unicode Standard Annex 15, Stream-Safe Text Format.
+    """
+    if text.isascii():
+        return text
+    marks = re.escape("".join(c for c in set(text) if unicodedata.combining(unicodedata.normalize("NFKD", c)[0])))
+    return re.sub(f"([{marks}]{{{MOST_MARKS}}})[{marks}]+", r"\1", text) if marks else text
 
 
 def number_words(digits: str) -> list[str]:

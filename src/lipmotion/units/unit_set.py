@@ -7,11 +7,13 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from lipmotion.errors import InputError
+from lipmotion.errors import InputError, shortened
 from lipmotion.files import text_in
 from lipmotion.units.classes import phone_classes
 from lipmotion.units.phones import PHONES, is_silent
 
+LARGEST_TABLE = 1 << 18
+"""Bytes of a table: one of 47 phones has some hundred."""
 CLOSED = "closed"
 """The only unit that silence may share with speech."""
 
@@ -39,9 +41,11 @@ class UnitSet:
             raise InputError(f"unit set {self.name}: phones {'; '.join(wrong)}; required: {' '.join(PHONES)}")
         nameless = [phone for phone, unit in self.of.items() if len(unit.split()) != 1 or unit != unit.strip()]
         if nameless:
-            raise InputError(f"unit set {self.name}: the unit of {nameless[0]} is {self.of[nameless[0]]!r}, not a word")
+            raise InputError(
+                f"unit set {self.name}: the unit of {nameless[0]} is {shortened(self.of[nameless[0]])!r}, not a word"
+            )
         for unit in _mixed(self.of):
-            raise InputError(f"unit set {self.name}: {_ADVICE.format(unit)}")
+            raise InputError(f"unit set {self.name}: {_ADVICE.format(shortened(unit))}")
 
     @cached_property
     def units(self) -> tuple[str, ...]:
@@ -104,24 +108,26 @@ def read_unit_table(path: Path) -> UnitSet:
     unit_line: dict[str, int] = {}
     phone_line: dict[str, int] = {}
     of: dict[str, str] = {}
-    for number, line in enumerate(text_in(path, "unit table").splitlines(), start=1):
+    for number, line in enumerate(text_in(path, "unit table", LARGEST_TABLE).splitlines(), start=1):
         unit, *phones = line.split("#")[0].split() or [""]
         if not unit:
             continue
         where = f"{path}, line {number}"
         if not phones:
-            raise InputError(f"{where}: unit {unit!r} without phones; write the unit, then its phones")
+            raise InputError(f"{where}: unit {shortened(unit)!r} without phones; write the unit, then its phones")
         if unit in unit_line:
-            raise InputError(f"{where}: unit {unit!r} stands in line {unit_line[unit]} already; write it in one line")
+            raise InputError(
+                f"{where}: unit {shortened(unit)!r} stands in line {unit_line[unit]} already; write it in one line"
+            )
         unit_line[unit] = number
         for phone in phones:
             if phone not in PHONES:
-                raise InputError(f"{where}: unknown phone {phone!r}; the phones are: {' '.join(PHONES)}")
+                raise InputError(f"{where}: unknown phone {shortened(phone)!r}; the phones are: {' '.join(PHONES)}")
             if phone in phone_line:
                 raise InputError(f"{where}: phone {phone!r} has a unit in line {phone_line[phone]} already; keep one")
             phone_line[phone], of[phone] = number, unit
     for unit in _mixed(of):
-        raise InputError(f"{path}, line {unit_line[unit]}: {_ADVICE.format(unit)}")
+        raise InputError(f"{path}, line {unit_line[unit]}: {_ADVICE.format(shortened(unit))}")
     try:
         return UnitSet(path.stem, of)
     except InputError as error:

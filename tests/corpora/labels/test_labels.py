@@ -8,8 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lipmotion.corpora.labels import labels_beside, read_labels
+from lipmotion.corpora.labels.beside import LARGEST_LABELS
+from lipmotion.corpora.labels.tier import MOST_LABELS
 from lipmotion.errors import InputError
 from lipmotion.units import PHONES, phone_named
+from lipmotion.units.speaking_rate import LARGEST_TRANSCRIPT
 
 SPOKEN = [phone for phone in PHONES if phone not in ("sil", "sp")]
 
@@ -191,3 +194,30 @@ def test_real_ones(recordings: Path):
     assert phones[0][:2] == (0, 0.13)
     found = labels_beside(folder / "sense_and_sensibility_01_austen_64kb-0880.wav")
     assert found.words == ("he", "was", "not", "an", "ill", "disposed", "young", "man")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (f"0 {'9' * 5000} p\n", "line 1 has the time 9{80}\\.\\.\\., required a finite one"),
+        (f"0 sil\n1000000 p\n{'9' * 5000} aa\n", "line 3 has the time 9"),
+        (f"0.0\t{'9' * 400}.0\tp\n", "line 1 has the time 9"),
+        ("0 1000000 p\n" * (MOST_LABELS + 1), "more than 250000 labels; give those of one recording"),
+        ("a" * (LARGEST_TRANSCRIPT + 1), "4194305 characters, required at most 4194304: is it a transcript"),
+        (" " * (LARGEST_LABELS + 1), "16777217 bytes, required at most 16777216"),
+    ],
+)
+def test_what_no_file_of_labels_holds(read, text, message):
+    with pytest.raises(InputError, match=message):
+        read(text)
+
+
+def test_states_without_neighbours_are_phones(read):
+    found = read("0 1000000 p[2]\n1000000 2000000 p[3]\n2000000 3000000 aa[2]\n3000000 4000000 aa[3]\n")
+    assert rows(found) == [(0, 0.2, "p"), (0.2, 0.4, "aa")]
+    with pytest.raises(InputError, match="which is no phone"):
+        read(f"0 1000000 p\n1000000 2000000 p\n2000000 3000000 p\n3000000 4000000 p[{'9' * 5000}]\n")
+
+
+def test_form_feeds_are_blanks(read):
+    assert read("\x0c" * 3_000_000).words is None

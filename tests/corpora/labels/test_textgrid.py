@@ -134,3 +134,42 @@ def test_a_real_one(recordings: Path):
     assert found.words[:4] == ("he", "began", "a", "confused")
     assert found.words == read_labels(recordings / "speech-open" / "61-70968-0000.lab").words
     assert found.phones is None
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("9\n0.0", "8\n0.0", "what follows the last tier is damaged: more is there than the counts say"),
+        ("9\n0.0", "9" * 5000 + "\n0.0", "tier 'phones' is damaged: there stands number 999"),
+        ("9\n0.0", "250001\n0.0", "more than 250000 labels; give those of one recording"),
+        ("0.6\n0.75", "0.6\n1e999", "tier 'phones', interval 3 has the time 1e999, required a finite one"),
+        ('"IntervalTier"', f'"{"x" * 9000}"', "its kind is 'xxx"),
+        ('"phones"', f'"{"x" * 9000}"\n"', "is damaged: there stands text 0 2 9 0.0 0.4, required a number"),
+    ],
+)
+def test_hostile_grids_are_refused_in_one_short_line(tmp_path, old, new, words):
+    text = short_form(TIERS)
+    assert old in text
+    (tmp_path / "a.TextGrid").write_text(text.replace(old, new))
+    with pytest.raises(InputError, match=re.escape(words)) as caught:
+        read_labels(tmp_path / "a.TextGrid")
+    assert len(str(caught.value)) < 500
+    assert "\n" not in str(caught.value)
+
+
+def test_quotes_in_a_text_are_written_twice() -> None:
+    rows: list[Interval] = [(0, 1, '""'), (1, 2, '""a""""'), (2, 3, ""), (3, 4, '""' * 5000)]
+    (tier,) = interval_tiers(short_form({"words": rows}), "a.TextGrid")
+    assert [label.text for label in tier.labels] == ['"', '"a""', "", '"' * 5000]
+
+
+def test_vowels_are_reduced_word_by_word_in_long_grids(tmp_path):
+    count = 3000
+    phones: list[Interval] = []
+    words: list[Interval] = []
+    for i in range(count):
+        words.append((i, i + 1, "about"))
+        phones += [(i + j / 4, i + (j + 1) / 4, phone) for j, phone in enumerate(("AH", "B", "AW", "T"))]
+    (tmp_path / "a.TextGrid").write_text(short_form({"words": words, "phones": phones}))
+    found = read_labels(tmp_path / "a.TextGrid").phones
+    assert [span.label.phone for span in found] == ["ax", "b", "aw", "t"] * count

@@ -98,3 +98,12 @@ def test_no_words_are_silence():
     assert [
         part.units for part in choose_pronunciations(known_hmm(who), heard(known_hmm(who), features), (), PAUSE)
     ] == [(SILENCE,)] * 2
+
+
+def test_pronunciations_without_number_are_refused_before_a_network_is_built():
+    hmm = random_hmm(2)
+    features = np.zeros((60, 2), np.float32)
+    with pytest.raises(
+        AlignmentError, match=r"4 words in all their pronunciations make \d+ arcs, required at most 1000600"
+    ):
+        choose_pronunciations(hmm, heard(hmm, features), [[("a",)] * 800] * 4, PAUSE)

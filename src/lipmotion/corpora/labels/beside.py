@@ -7,15 +7,19 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from lipmotion.corpora.labels.lines import timed_lines
+from lipmotion.corpora.labels.plain import check_other_labels
 from lipmotion.corpora.labels.textgrid import MARK, interval_tiers, is_textgrid
 from lipmotion.corpora.labels.tier import Tier, is_named_words, is_of_phones, phones_in, words_in
 from lipmotion.errors import InputError
 from lipmotion.types import Timeline, Unit
 from lipmotion.units import phone_named, words_of
+from lipmotion.units.speaking_rate import LARGEST_TRANSCRIPT
 
 FOR_WORDS = (".txt", ".TextGrid", ".textgrid", ".lab")
 """Where words are looked for: a plain text before labels in time, which may say other things than words."""
 FOR_PHONES = (".TextGrid", ".textgrid", ".lab", ".txt")
+LARGEST_LABELS = 1 << 24
+"""Bytes of a file of labels: a day's."""
 
 
 @dataclass(frozen=True)
@@ -57,6 +61,9 @@ def read_labels(path: Path) -> Labels:
     lines = timed_lines(text, str(path))
     if lines is not None:
         return _chosen([lines], str(path))
+    if len(text) > LARGEST_TRANSCRIPT:
+        raise InputError(f"{path}: {len(text)} characters, required at most {LARGEST_TRANSCRIPT}: is it a transcript?")
+    check_other_labels(text, str(path))
     tokens = text.split()
     one_a_line = len(tokens) == sum(bool(line.strip()) for line in text.splitlines())
     if len(tokens) > 1 and one_a_line and all(map(phone_named, tokens)):
@@ -82,6 +89,9 @@ def _chosen(tiers: list[Tier], where: str) -> Labels:
 
 def _text(path: Path) -> str:
     try:
+        size = path.stat().st_size
+        if size > LARGEST_LABELS:
+            raise InputError(f"{path}: {size} bytes, required at most {LARGEST_LABELS}: is it a transcript or labels?")
         content = path.read_bytes()
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterator
+from io import StringIO
+from itertools import islice
 
-from lipmotion.corpora.labels.tier import Label, Tier
+from lipmotion.corpora.labels.tier import MOST_LABELS, Label, Tier, check_count, required_time
 from lipmotion.errors import InputError
 
 TICKS_PER_S = 10_000_000
@@ -24,33 +27,46 @@ def timed_lines(text: str, where: str) -> Tier | None:
     the next one's start; Audacity's ``start end label`` in seconds.  The first line decides which.
     Raises InputError: a later line is of another form, with its number.
     """
-    lines = [(number, line.strip()) for number, line in enumerate(text.splitlines(), 1)]
-    lines = [(number, line) for number, line in lines if line and not line.startswith("\\")]  # Audacity's pitch ranges
-    if not lines:
-        return None
-    first = lines[0][1]
+    first = next((line for _, line in _lines(text)), "")
     if SECONDS.fullmatch(first):
-        return _spans(lines, SECONDS, 1, where)
+        return _spans(_listed(text, where), SECONDS, 1, where)
     whole = WHOLE.fullmatch(first)
-    if whole and int(whole[2]) >= SHORTEST_TICKS:
-        return _spans(lines, WHOLE, TICKS_PER_S, where)
+    if whole and float(whole[2]) >= SHORTEST_TICKS:
+        return _spans(_listed(text, where), WHOLE, TICKS_PER_S, where)
+    if not STARTS.fullmatch(first):
+        return None
+    lines = _listed(text, where)
     last = STARTS.fullmatch(lines[-1][1])
-    if len(lines) > 1 and STARTS.fullmatch(first) and last and int(last[1]) >= SHORTEST_TICKS:
-        return _from_starts(lines, where)
-    return None
+    return _from_starts(lines, where) if len(lines) > 1 and last and float(last[1]) >= SHORTEST_TICKS else None
+
+
+def _lines(text: str) -> Iterator[tuple[int, str]]:
+    """Give the number and the text of every line that is not blank, nor one of Audacity's pitch ranges."""
+    for number, line in enumerate(StringIO(text), 1):
+        stripped = line.strip()
+        if stripped and not stripped.startswith("\\"):
+            yield number, stripped
+
+
+def _listed(text: str, where: str) -> list[tuple[int, str]]:
+    lines = list(islice(_lines(text), MOST_LABELS + 1))
+    check_count(len(lines), where)
+    return lines
 
 
 def _spans(lines: list[tuple[int, str]], form: re.Pattern[str], per_s: int, where: str) -> Tier:
     labels = []
     for number, line in lines:
         start, end, text = _fitted(form, number, line, "start end label", where)
-        labels.append(Label(float(start) / per_s, float(end) / per_s, (text or "").strip(), f"line {number}"))
+        place = f"line {number}"
+        start_s, end_s = (required_time(time, place, where) / per_s for time in (start, end))
+        labels.append(Label(start_s, end_s, (text or "").strip(), place))
     return Tier("the list of labels", tuple(labels))
 
 
 def _from_starts(lines: list[tuple[int, str]], where: str) -> Tier:
     rows = [(number, _fitted(STARTS, number, line, "start label", where)) for number, line in lines]
-    starts_s = [int(row[0]) / TICKS_PER_S for _, row in rows]
+    starts_s = [required_time(row[0], f"line {number}", where) / TICKS_PER_S for number, row in rows]
     ends_s = [*starts_s[1:], math.inf]
     return Tier(
         "the list of labels",

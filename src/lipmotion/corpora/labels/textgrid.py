@@ -5,14 +5,16 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from lipmotion.corpora.labels.tier import Label, Tier
-from lipmotion.errors import InputError
+from lipmotion.corpora.labels.tier import Label, Tier, check_count, required_time
+from lipmotion.errors import InputError, shortened
 
 TOKEN = re.compile(
-    r'"(?P<text>(?:[^"]|"")*)"|![^\n]*|<(?P<flag>\w+)>|(?<!\S)(?P<number>[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?)(?!\S)'
+    r'"(?P<text>[^"]*)"|![^\n]*|<(?P<flag>\w+)>|(?<!\S)(?P<number>[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?)(?!\S)'
 )
 """What Praat itself reads: texts in quotes, flags, numbers that stand alone. All else (``xmin =``) is decoration."""
 MARK = re.compile(r'\s*(?:File type\s*=\s*)?"?oo(Text|Binary)File')
+LONGEST_COUNT = 18
+"""Digits of a count."""
 INTERVALS, POINTS = "IntervalTier", "TextTier"
 
 
@@ -33,6 +35,7 @@ def interval_tiers(text: str, where: str) -> list[Tier]:
     """
     tokens = _tokens(text)
     tiers: list[Tier] = []
+    total = 0
     place = "the header"
     try:
         _take(tokens, "text")
@@ -43,27 +46,48 @@ def interval_tiers(text: str, where: str) -> list[Tier]:
         for number in range(1, tier_count + 1):
             place = f"tier {number}"
             kind, name = _take(tokens, "text"), _take(tokens, "text")
-            place = f"tier {name!r}"
+            place = f"tier {shortened(name)!r}"
             _pass_range(tokens)
-            labels = [_label(tokens, kind, f"{place}, interval {i + 1}") for i in range(_count(tokens))]
+            count = _count(tokens)
+            total += count
+            check_count(total, where)
+            labels = [_label(tokens, kind, f"{place}, interval {i + 1}", where) for i in range(count)]
             if kind == INTERVALS:
                 tiers.append(Tier(place, tuple(labels)))
+        place = "what follows the last tier"
+        if next(tokens, None) is not None:
+            raise _DamagedError("more is there than the counts say")
     except _DamagedError as error:
         raise InputError(f"{where}: {place} is damaged: {error}; save it again in Praat") from error
     return tiers
 
 
 def _tokens(text: str) -> Iterator[tuple[str, str]]:
-    for match in TOKEN.finditer(text):
-        if match.lastgroup:
+    at = 0
+    while match := TOKEN.search(text, at):
+        at = match.end()
+        if match.lastgroup == "text":
+            at = _text_end(text, at)
+            yield "text", text[match.start() + 1 : at - 1]
+        elif match.lastgroup:
             yield match.lastgroup, match[match.lastgroup]
 
 
-def _label(tokens: Iterator[tuple[str, str]], kind: str, place: str) -> Label:
+def _text_end(text: str, at: int) -> int:
+    """Return where a text in quotes ends whose second quote ends at ``at``: a quote in it is written twice."""
+    while text[at : at + 1] == '"':
+        closing = text.find('"', at + 1)
+        if closing < 0:
+            break
+        at = closing + 1
+    return at
+
+
+def _label(tokens: Iterator[tuple[str, str]], kind: str, place: str, where: str) -> Label:
     if kind not in (INTERVALS, POINTS):
-        raise _DamagedError(f"its kind is {kind!r}, required {INTERVALS} or {POINTS}")
-    start_s = float(_take(tokens, "number"))
-    end_s = float(_take(tokens, "number")) if kind == INTERVALS else start_s
+        raise _DamagedError(f"its kind is {shortened(kind)!r}, required {INTERVALS} or {POINTS}")
+    start_s = required_time(_take(tokens, "number"), place, where)
+    end_s = required_time(_take(tokens, "number"), place, where) if kind == INTERVALS else start_s
     return Label(start_s, end_s, _take(tokens, "text").replace('""', '"').strip(), place)
 
 
@@ -75,7 +99,7 @@ def _pass_range(tokens: Iterator[tuple[str, str]]) -> None:
 
 def _count(tokens: Iterator[tuple[str, str]]) -> int:
     value = _take(tokens, "number")
-    if not value.isdecimal():
+    if not value.isdecimal() or len(value) > LONGEST_COUNT:
         raise _DamagedError(f"there stands number {value[:40]}, required a count")
     return int(value)
 
@@ -83,5 +107,5 @@ def _count(tokens: Iterator[tuple[str, str]]) -> int:
 def _take(tokens: Iterator[tuple[str, str]], wanted: str) -> str:
     kind, value = next(tokens, ("the end of the file", ""))
     if kind != wanted:
-        raise _DamagedError(f"there stands {kind} {value[:40]}".rstrip() + f", required a {wanted}")
+        raise _DamagedError(f"there stands {kind} {' '.join(value[:40].split())}".rstrip() + f", required a {wanted}")
     return value

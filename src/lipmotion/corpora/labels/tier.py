@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import re
+from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from lipmotion.errors import InputError
+from lipmotion.errors import InputError, shortened
 from lipmotion.types import Span, Timeline, Unit
 from lipmotion.units import PHONES, SILENCE, is_silent, phone_named, with_reduced_vowels, words_of
 
@@ -18,11 +20,13 @@ ROUNDING_S = 1e-3
 """Times are written with three digits or more."""
 IN_CONTEXT = re.compile(r"[^-+]*-([^-+]+)\+.*")
 """HTK's and HTS's names of a phone between its neighbours: ``t-iy+n``, ``x^sil-hh+iy=t@...``."""
-STATE = re.compile(r"\[(\d+)\]$")
+STATE = re.compile(r"\[(\d{1,9})\]$")
+MOST_LABELS = 250_000
+"""Labels of a file: those of phones in five hours of speech."""
 REDUCED = frozenset({"ax", "axr", "ix"})
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Label:
     """One label: its time, its text, and where it stands (for messages). An unknown end is infinite."""
 
@@ -38,6 +42,20 @@ class Tier:
 
     name: str
     labels: tuple[Label, ...]
+
+
+def check_count(count: int, where: str) -> None:
+    """Raise InputError for more labels than a recording has."""
+    if count > MOST_LABELS:
+        raise InputError(f"{where}: more than {MOST_LABELS} labels; give those of one recording")
+
+
+def required_time(text: str, place: str, where: str) -> float:
+    """Return a number that stands for a time. Raises InputError: it is not finite."""
+    time = float(text)
+    if not math.isfinite(time):
+        raise InputError(f"{where}: {place} has the time {shortened(text)}, required a finite one")
+    return time
 
 
 def is_of_phones(tier: Tier) -> bool:
@@ -114,6 +132,7 @@ def _inner(text: str) -> str | None:
 
 
 def _phone(text: str) -> str | None:
+    text = STATE.sub("", text)
     name = phone_named(text) or phone_named(_inner(text) or "")
     return SILENCE if name is None and _is_silence(text) else name
 
@@ -147,8 +166,12 @@ def _reduced(labels: Sequence[Label], phones: Sequence[str], words: Tier) -> lis
     """Return the phones, unstressed vowels reduced in every word by the lexicon's rule."""
     result = list(phones)
     middles_s = [(label.start_s + label.end_s) / 2 for label in labels]
+    in_time = sorted(range(len(labels)), key=middles_s.__getitem__)
+    sorted_s = [middles_s[i] for i in in_time]
+    end = 0
     for word in words.labels:
-        inside = [i for i, s in enumerate(middles_s) if word.start_s <= s < word.end_s and not is_silent(phones[i])]
+        start, end = max(end, bisect_left(sorted_s, word.start_s)), max(end, bisect_left(sorted_s, word.end_s))
+        inside = [i for i in sorted(in_time[start:end]) if not is_silent(phones[i])]
         reduced = with_reduced_vowels(word.text.lower(), tuple(phones[i] for i in inside))
         for i, phone in zip(inside, reduced, strict=True):
             result[i] = phone

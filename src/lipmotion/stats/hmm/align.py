@@ -14,6 +14,9 @@ from lipmotion.stats.hmm.evidence import Evidence
 from lipmotion.stats.hmm.model import UnitHmm
 from lipmotion.stats.hmm.network import Network, NetworkBuilder
 
+FEW_ARCS, ARCS_A_FRAME = 1_000_000, 10
+"""Arcs of a network that may always be built, and how many more for each frame; sentences need about one a frame."""
+
 
 @dataclass(frozen=True, eq=False)
 class Chain:
@@ -128,14 +131,32 @@ def choose_pronunciations(
 
 
 def _check_room(hmm: UnitHmm, evidence: Evidence, words: Sequence[Sequence[Sequence[str]]]) -> None:
-    """Raise AlignmentError before a network is built that no path fits through, and that may fill the memory."""
-    counts = dict(zip(hmm.table.units, hmm.table.counts, strict=True))
-    least = sum(min(sum(counts[unit] for unit in variant) for variant in variants) for variants in words)
+    """Raise AlignmentError before a network is built that no path fits through, or that may fill the memory."""
+    states = _states_of(hmm, words)
+    least = sum(min(states[id(variants)]) for variants in words)
     if least > evidence.frames:
         raise AlignmentError(
             f"{len(words)} words take at least {least} frames of 10 ms, found {evidence.frames}: the recording is too "
             "short for what should be said in it; give its own transcript"
         )
+    ends = [1, *(len(variants) + 1 for variants in words)]  # of the word before, and of the pause
+    arcs = sum(2 * sum(states[id(v)]) + len(v) * before for v, before in zip(words, ends, strict=False))
+    most = FEW_ARCS + ARCS_A_FRAME * evidence.frames
+    if arcs > most:
+        raise AlignmentError(
+            f"{len(words)} words in all their pronunciations make {arcs} arcs, required at most {most} for "
+            f"{evidence.frames} frames of 10 ms; give fewer pronunciations"
+        )
+
+
+def _states_of(hmm: UnitHmm, words: Sequence[Sequence[Sequence[str]]]) -> dict[int, list[int]]:
+    """Return how many states each pronunciation of a word has, by the word's identity: few of many words differ."""
+    counts = dict(zip(hmm.table.units, hmm.table.counts, strict=True))
+    different = {id(variants): variants for variants in words}
+    return {
+        number: [sum(counts[unit] for unit in variant) for variant in variants]
+        for number, variants in different.items()
+    }
 
 
 def _append(

@@ -1,0 +1,105 @@
+"""A JSON object whose lists are read item by item: rows of numbers take no more room than an array."""
+
+from __future__ import annotations
+
+import json
+import re
+from array import array
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+MOST_ITEMS = 1 << 20
+"""Items of a list that is not rows of numbers."""
+MOST_ROWS = 1 << 22
+"""Rows of numbers: eleven hours of frames of 10 ms."""
+_BLANK = re.compile(r"[ \t\n\r]*")
+_DECODER = json.JSONDecoder()
+
+
+def members(text: str, rows_of: str) -> dict[str, Any]:
+    """Return the members of an object; a list called ``rows_of`` as an array of numbers [shape=(T, P)].
+
+    Raises json.JSONDecodeError, RecursionError: not one object.
+    Raises ValueError, TypeError, OverflowError: a list that is too long, or rows that are uneven or no numbers.
+    """
+    found: dict[str, Any] = {}
+
+    def member(at: int) -> int:
+        key, at = _DECODER.raw_decode(text, at)
+        at = _next(text, _passed(text, _next(text, at), ":"))
+        is_list = text[at : at + 1] == "["
+        if is_list and key == rows_of:
+            found[key], at = _rows(text, at)
+        elif is_list:
+            found[key], at = _items(text, at)
+        else:
+            found[key], at = _DECODER.raw_decode(text, at)
+        return at
+
+    end = _next(text, _each(text, _next(text, 0), "{}", member))
+    if end < len(text):
+        raise json.JSONDecodeError("Extra data", text, end)
+    return found
+
+
+def _items(text: str, at: int) -> tuple[list[Any], int]:
+    """Return the items of a list, and where it ends."""
+    items: list[Any] = []
+
+    def item(at: int) -> int:
+        value, at = _DECODER.raw_decode(text, at)
+        items.append(value)
+        if len(items) > MOST_ITEMS:
+            raise ValueError(f"a list of more than {MOST_ITEMS} items")
+        return at
+
+    return items, _each(text, at, "[]", item)
+
+
+def _rows(text: str, at: int) -> tuple[NDArray[np.float64], int]:
+    """Return the rows of a list of lists of numbers, and where it ends."""
+    numbers = array("d")
+    widths = array("q")
+
+    def row(at: int) -> int:
+        values, at = _DECODER.raw_decode(text, at)
+        if not values or not isinstance(values, list) or len(values) != (widths[0] if widths else len(values)):
+            raise ValueError(
+                f"row {len(widths) + 1} of the values is not a list of as many numbers as the first: no shape"
+            )
+        numbers.extend(values)
+        widths.append(len(values))
+        if len(widths) > MOST_ROWS:
+            raise ValueError(f"more than {MOST_ROWS} rows of values")
+        return at
+
+    end = _each(text, at, "[]", row)
+    table = np.array(numbers, np.float64)
+    return table.reshape(len(widths), widths[0] if widths else 0), end
+
+
+def _each(text: str, at: int, brackets: str, take: Callable[[int], int]) -> int:
+    """Let ``take`` read all that stands between brackets, parted by commas; return where the brackets end."""
+    at = _next(text, _passed(text, at, brackets[0]))
+    if text[at : at + 1] == brackets[1]:
+        return at + 1
+    while True:
+        at = _next(text, take(at))
+        if text[at : at + 1] == brackets[1]:
+            return at + 1
+        at = _next(text, _passed(text, at, ","))
+
+
+def _next(text: str, at: int) -> int:
+    """Return where the next character stands that is no blank."""
+    match = _BLANK.match(text, at)
+    return match.end() if match else at
+
+
+def _passed(text: str, at: int, character: str) -> int:
+    if text[at : at + 1] != character:
+        raise json.JSONDecodeError(f"Expecting {character!r}", text, at)
+    return at + 1
