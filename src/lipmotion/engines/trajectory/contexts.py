@@ -79,11 +79,13 @@ def with_neighbours(units: Timeline[Unit]) -> Iterator[tuple[str, Span[Unit], st
 
 
 def named(spans: Timeline[Unit], units: UnitSet) -> Timeline[Unit]:
-    """Return the timeline with the unit of each phone named, between its neighbours."""
+    """Return the timeline with the unit of each phone named, between its neighbours; units without phones stay."""
+    quiet = units.unit(SILENCE)
+    said = [quiet, *(units.unit_of(span.label) for span in spans), quiet]
     found = []
-    for left, span, right in with_neighbours(spans):
-        before, unit, after = map(units.unit, (left, span.label.phone, right))
-        found.append(replace(span, label=replace(span.label, unit=f"{before}-{unit}+{after}")))
+    for before, span, unit, after in zip(said, spans, said[1:], said[2:], strict=False):
+        name = f"{before}-{unit}+{after}" if span.label.phone else unit
+        found.append(replace(span, label=replace(span.label, unit=name)))
     return Timeline(tuple(found))
 
 
