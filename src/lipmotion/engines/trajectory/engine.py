@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar, final
 
 import numpy as np
@@ -130,6 +130,9 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
 
     def listen(self, model: TrajectoryModel, speech: Speech) -> Timeline[Unit] | None:  # noqa: D102
         return model.listener.phones(speech) if model.listener is not None else None
+
+    def unpinned(self) -> TrajectoryEngine:  # noqa: D102
+        return replace(self, config=replace(self.config, closures=False))
 
     def generate(self, model: TrajectoryModel, speech: Speech, constraints: Constraints | None = None) -> Generation:  # noqa: D102
         features = np.asarray(speech.features.values)

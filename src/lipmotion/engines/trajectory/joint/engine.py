@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar, final
 
 import numpy as np
@@ -141,6 +141,9 @@ class JointEngine(Engine[JointModel]):
         figures = {f"leaves_{name}": float(part.forest.size) for name, part in hmm.parts.items()}
         frames = sum(int(example.valid.sum()) for example in examples)
         return Fit(JointModel(units, space, hmm, closure), {"frames": frames, **figures})
+
+    def unpinned(self) -> JointEngine:  # noqa: D102
+        return replace(self, config=replace(self.config, closures=False))
 
     def generate(self, model: JointModel, speech: Speech, constraints: Constraints | None = None) -> Generation:  # noqa: D102
         frames = len(speech.features.values)
