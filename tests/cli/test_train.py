@@ -60,14 +60,14 @@ def test_speakers_are_chosen(run: Run, toy_corpus: Corpus, here: Path) -> None:
     )
 
 
-def test_the_papers_own_system(run: Run, toy_corpus: Corpus, here: Path) -> None:
+def test_the_joint_engine(run: Run, toy_corpus: Corpus, here: Path) -> None:
     assert run("train", toy_corpus.path, "-o", "joint", "--engine", "joint").code == 0
     assert load_model(here / "joint").engine.name == "joint"
     assert run("evaluate", "joint", toy_corpus.path).code == 0
     assert "motion: " in "\n".join(run("info", "joint", "--trees").out)
 
 
-def test_what_is_given_wins_over_what_the_papers_own_system_recognises(
+def test_what_is_given_wins_over_what_the_joint_engine_recognises(
     run: Run, toy_corpus: Corpus, toy_speech: Path, here: Path
 ) -> None:
     own = ["--units", "eVis", "--set", "recognises=true", "--set", "mixtures=1"]

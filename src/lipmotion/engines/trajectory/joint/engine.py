@@ -1,4 +1,4 @@
-"""The joint engine: the paper's own system."""
+"""The joint engine: one model of five streams, after Hofer 2008."""
 
 from __future__ import annotations
 
@@ -113,7 +113,9 @@ class JointModel:
 class JointEngine(Engine[JointModel]):
     """One model of speech, F0 and motion: recognition or alignment by the heard streams, generation by motion.
 
-    Source: Hofer 2008, §4 and §5.
+    Source: Hofer 2008, §4 and §5.  Deviations: training starts from phones in time (aligned or labelled), not from
+    nothing; the trees of what is heard ask for one neighbour, those of motion for both; unless it ``recognises``, the
+    phones of sound alone are those of the shared recogniser.
     """
 
     config: JointEngineConfig
