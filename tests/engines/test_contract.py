@@ -75,6 +75,12 @@ def test_what_was_learned_comes_back(trained):
         assert np.corrcoef(generated[name], original[name])[0, 1] > 0.9
 
 
+def test_a_unit_without_a_phone_is_refused_by_all_that_do_not_know_it(trained):
+    unknown = Timeline((Span(0.1, 0.4, Unit("", "of another set")),))
+    with pytest.raises(InputError, match=r"without a phone.*; give"):
+        trained.generate(speech(unknown))
+
+
 def test_lips_are_made_to_meet_unless_the_pins_are_taken_away(trained):
     spoken = speech(timeline(SENTENCE))
     free = trained.engine.unpinned()

@@ -11,7 +11,7 @@ from lipmotion.errors import InputError
 from lipmotion.files import text_in
 from lipmotion.types import Unit
 from lipmotion.units.classes import phone_classes
-from lipmotion.units.phones import PHONES, SILENCE, is_silent
+from lipmotion.units.phones import PHONES, SILENCE, is_silent, unknown_phone
 
 CLOSED = "closed"
 """The only unit that silence may share with speech."""
@@ -70,7 +70,7 @@ class UnitSet:
     def unit(self, phone: str) -> str:
         """Return the unit of a phone. Raises InputError: it is not in the inventory."""
         if phone not in self.of:
-            raise InputError(f"unknown phone {phone!r}; the phones: {' '.join(PHONES)}")
+            raise InputError(unknown_phone(phone))
         return self.of[phone]
 
     def unit_of(self, label: Unit) -> str:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.types import FRAME_RATE_HZ, Span, Timeline, Unit
-from lipmotion.units import PHONES, SILENCE, UNIT_SETS, UnitSet, is_silent
+from lipmotion.units import PHONES, SILENCE, UNIT_SETS, UnitSet, is_silent, unknown_phone
 
 RESTING = -1
 """The part of silence that is no part of it."""
@@ -98,7 +98,7 @@ def places(units: Timeline[Unit], frames: int, cut: Cut) -> list[Place]:
     """
     for span in units:
         if span.label.phone not in PHONES:
-            raise InputError(f"unknown phone {span.label.phone!r} at {span.start_s} s; the phones: {' '.join(PHONES)}")
+            raise InputError(unknown_phone(span.label.phone, f" at {span.start_s} s"))
     result = [cut.rest] * frames
     for left, span, right in with_neighbours(units):
         edges = np.ceil(np.array([span.start_s, span.end_s]) * FRAME_RATE_HZ - 1e-6)
