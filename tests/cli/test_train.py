@@ -5,10 +5,12 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from cli.conftest import Run, is_one_error
 from lipmotion.corpora.store import Corpus
+from lipmotion.export.base import read_motion
 from lipmotion.pipeline.model import Model, load_model, save_model
 from lipmotion.pipeline.toy import toy_sentences
 from lipmotion.pipeline.train import TrainReport, train
@@ -58,11 +60,29 @@ def test_speakers_are_chosen(run: Run, toy_corpus: Corpus, here: Path) -> None:
     )
 
 
-def test_the_papers_own_system(run: Run, toy_corpus: Corpus, here: Path) -> None:
+def test_the_joint_engine(run: Run, toy_corpus: Corpus, here: Path) -> None:
     assert run("train", toy_corpus.path, "-o", "joint", "--engine", "joint").code == 0
     assert load_model(here / "joint").engine.name == "joint"
     assert run("evaluate", "joint", toy_corpus.path).code == 0
     assert "motion: " in "\n".join(run("info", "joint", "--trees").out)
+
+
+def test_what_is_given_wins_over_what_the_joint_engine_recognises(
+    run: Run, toy_corpus: Corpus, toy_speech: Path, here: Path
+) -> None:
+    own = ["--units", "eVis", "--set", "recognises=true", "--set", "mixtures=1"]
+    assert run("train", toy_corpus.path, "-o", "m", "--engine", "joint", *own).code == 0
+    told = {"alone": [], "right": ["--transcript", "see bob papa mama"], "wrong": ["--transcript", "we saw a weasel"]}
+    for name, options in (told | {"again": ["--units", "alone.json"]}).items():
+        assert run("animate", toy_speech, "--model", "m", "-o", f"{name}.json", *options).code == 0
+    motion, units = zip(*(read_motion(here / f"{name}.json") for name in (*told, "again")), strict=True)
+    alone, right, wrong, again = (one["opening"] for one in motion)
+    assert np.abs(right - wrong).max() > 0.05
+    assert again[:-30] == pytest.approx(alone[:-30], abs=1e-6)
+    assert units[3] == units[0]
+    phones = [" ".join(span.label.phone for span in one) for one in units]
+    assert phones[1] == "sil s iy b aa b p aa p ax m aa m ax sil"
+    assert {span.label.unit for span in units[0] if not span.label.phone} >= {"bilabial", "low"}
 
 
 def test_a_system_of_the_coupled_engine(run: Run, toy_corpus: Corpus, here: Path) -> None:

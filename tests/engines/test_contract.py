@@ -75,6 +75,22 @@ def test_what_was_learned_comes_back(trained):
         assert np.corrcoef(generated[name], original[name])[0, 1] > 0.9
 
 
+def test_a_unit_without_a_phone_is_refused_by_all_that_do_not_know_it(trained):
+    unknown = Timeline((Span(0.1, 0.4, Unit("", "of another set")),))
+    with pytest.raises(InputError, match=r"without a phone.*; give"):
+        trained.generate(speech(unknown))
+
+
+def test_lips_are_made_to_meet_unless_the_pins_are_taken_away(trained):
+    spoken = speech(timeline(SENTENCE))
+    free = trained.engine.unpinned()
+    assert (trained.engine.config.closures, free.config.closures) == (True, False)
+    assert free.unpinned() == free
+    pinned, opening = (engine.generate(trained.model, spoken).motion["opening"] for engine in (trained.engine, free))
+    lips = [slice(78, 93), slice(98, 113)]
+    assert all(pinned[span].min() <= opening[span].min() + 1e-9 for span in lips)
+
+
 def test_the_trace_names_a_state_for_every_frame(trained):
     result = trained.generate(speech(timeline(SENTENCE)))
     assert len(result.trace.frames) == len(result.motion.values)

@@ -23,14 +23,8 @@ def figures():
             "jerk": figure(".2f", 0.01),
         }
 
-    def condition():
+    def closing():
         return {
-            "channels": {"opening": channel(), "width": channel()},
-            "opening_acc_95": (figure(".3f"), figure(".3f")),
-            "acc": figure(".3f"),
-            "amse": figure(".4f", 0.0001),
-            "leading": "opening",
-            "lag_ms": figure("+.1f", 0.1),
             "closures": {
                 "score": figure(".3f"),
                 "precision": figure(".3f"),
@@ -44,6 +38,23 @@ def figures():
                 "false_per_minute": figure(".1f", 0.1),
                 "original_per_minute": figure(".1f", 0.1),
             },
+        }
+
+    def unpinned():
+        opening = {"acc": figure(".3f")}
+        interval = (figure(".3f"), figure(".3f"))
+        return {"channels": {"opening": opening}, "opening_acc_95": interval, "acc": figure(".3f")} | closing()
+
+    def condition():
+        return {
+            "channels": {"opening": channel(), "width": channel()},
+            "opening_acc_95": (figure(".3f"), figure(".3f")),
+            "acc": figure(".3f"),
+            "amse": figure(".4f", 0.0001),
+            "leading": "opening",
+            "lag_ms": figure("+.1f", 0.1),
+            **closing(),
+            "unpinned": unpinned(),
             "silence": {
                 "generated": {
                     "mean": figure(".4f", 0.0001),
@@ -92,11 +103,19 @@ def test_figures_that_do_not_exist_are_printed_too(part):
     assert "–" in table(result)
 
 
+def test_pins_are_named_where_there_are_some():
+    result, _ = figures()
+    assert "are pinned" in table(result)
+    for condition in result["conditions"].values():
+        del condition["unpinned"]
+    assert "pin" not in table(result)
+
+
 def test_motion_without_an_opening_has_a_shorter_table():
     result, _ = figures()
     result |= {"closed_under": None, "still_channels": ["brow", "ear"]}
     condition = result["conditions"]["audio only"]
-    for part in ("closures", "closures_p_b_m", "silence", "opening_acc_95"):
+    for part in ("closures", "closures_p_b_m", "silence", "opening_acc_95", "unpinned"):
         del condition[part]
     condition["channels"] = {"a_rather_long_name": condition["channels"]["width"]}
     condition["leading"] = "a_rather_long_name"

@@ -41,6 +41,17 @@ class Medium(Engine[Mapping[float, Motion]]):
     def from_arrays(self, arrays: object) -> Any: ...
 
 
+class Shut(Medium):
+    """Never opens the mouth but where it is not pinned."""
+
+    def generate(self, model: Mapping[float, Motion], speech: Speech, _constraints: object = None) -> Generation:
+        result = super().generate(model, speech)
+        return replace(result, motion=replace(result.motion, values=result.motion.values * (0.0, 1.0, 1.0)))
+
+    def unpinned(self) -> Medium:
+        return Medium(self.config)
+
+
 @pytest.fixture(scope="module")
 def known() -> dict[float, Motion]:
     """The true motion of the toy sentences at 100 Hz."""
@@ -67,10 +78,12 @@ def test_all_figures_are_there(figures: dict[str, Any]) -> None:
     assert (figures["split"], figures["clips"]) == ("test", 2)
     assert list(figures["conditions"]) == CONDITIONS
     for condition in figures["conditions"].values():
-        assert list(condition) == FIGURES
-        assert list(condition["channels"]) == ["opening", "width", "outer"]
-        for row in condition["channels"].values():
-            assert list(row) == ["acc", "acc_per_clip", "nrmse", "global_variance", "jerk"]
+        assert list(condition) == [*FIGURES, "unpinned"]
+        for some in (condition, condition["unpinned"]):
+            assert list(some)[: len(FIGURES)] == FIGURES
+            assert list(some["channels"]) == ["opening", "width", "outer"]
+            for row in some["channels"].values():
+                assert list(row) == ["acc", "acc_per_clip", "nrmse", "global_variance", "jerk"]
     assert json.loads(json.dumps(figures)) is not None
     for name in CONDITIONS:
         assert name in table(figures)
@@ -107,6 +120,33 @@ def test_a_perfect_model_has_perfect_figures(toy_model: Model, toy_corpus: Corpu
         lips = condition["closures_p_b_m"]
         assert (lips["recall"], lips["false_per_minute"]) == (1, lips["original_per_minute"])
         assert condition["silence"]["generated"] == pytest.approx(condition["silence"]["original"], abs=1e-6)
+
+
+def test_figures_without_pins_are_those_of_the_engine_without_them(
+    toy_model: Model, toy_corpus: Corpus, known: dict[float, Motion]
+) -> None:
+    figures = evaluate(replace(toy_model, engine=Shut(None), learned=known), toy_corpus)
+    perfect = evaluate(replace(toy_model, engine=Medium(None), learned=known), toy_corpus)
+    for name, condition in figures["conditions"].items():
+        assert condition["unpinned"] == perfect["conditions"][name]
+        assert condition["closures"]["generated"] == 0
+        assert condition["unpinned"]["closures"]["generated"] > 4
+    assert "without pins" in table(figures)
+    assert "pin" not in table(perfect)
+
+
+def test_figures_of_a_trained_engine_without_pins(
+    toy_model: Model, toy_corpus: Corpus, figures: dict[str, Any]
+) -> None:
+    free = evaluate(replace(toy_model, engine=toy_model.engine.unpinned()), toy_corpus)
+    assert {name: one["unpinned"] for name, one in figures["conditions"].items()} == free["conditions"]
+
+
+def test_an_engine_without_pins_has_no_other_figures(
+    toy_model: Model, toy_corpus: Corpus, known: dict[float, Motion]
+) -> None:
+    figures = evaluate(replace(toy_model, engine=Medium(None), learned=known), toy_corpus)
+    assert [list(condition) for condition in figures["conditions"].values()] == [FIGURES, FIGURES]
 
 
 @pytest.mark.parametrize("late", [-8, -4, 4, 8])

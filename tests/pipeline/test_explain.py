@@ -13,6 +13,7 @@ from lipmotion.errors import InputError
 from lipmotion.pipeline.explain import explanation_document, explanation_text
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.toy import ToySentence
+from lipmotion.types import Explanation, Span, Unit, Value
 
 WORDS = "See Bob, papa & mama!"
 
@@ -47,6 +48,12 @@ def test_the_last_frame_is_inside(coupled_model: Model, toy_sentence: ToySentenc
     result = lipmotion.animate(toy_sentence.audio, model=coupled_model)
     (last,) = lipmotion.explain(coupled_model, toy_sentence.audio, float(result.motion.time_s[-1]))
     assert last.frame == len(result.motion.values) - 1
+
+
+def test_a_unit_whose_phone_is_not_known_has_no_phone_in_the_text() -> None:
+    unit = Span(0.7, 0.9, Unit("", "bilabial"))
+    lines = explanation_text(Explanation(0.8, 80, unit, "bilabial.1", {"opening": Value(0.0, 0.1)})).splitlines()
+    assert lines[1] == "  phone      not known, 0.70 to 0.90 s, modelled by bilabial"
 
 
 def test_the_text_names_everything(coupled_model: Model, toy_sentence: ToySentence) -> None:

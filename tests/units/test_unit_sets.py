@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from lipmotion.errors import InputError
 from lipmotion.export.cues.shapes import SHAPES
+from lipmotion.types import Unit
 from lipmotion.units import LIP_CLOSING, PHONES, UNIT_SETS, UnitSet, is_silent, phone_classes, unit_set
 from lipmotion.units.unit_sets import GROUPS
 
@@ -213,3 +214,29 @@ def test_a_table_is_small_and_so_are_messages(tmp_path: Path) -> None:
         with pytest.raises(InputError) as caught:
             unit_set(written(tmp_path, text))
         assert len(str(caught.value)) < 500
+
+
+def test_what_is_spoken_has_the_unit_of_its_phone_or_else_its_own() -> None:
+    units = UNIT_SETS["eVis"]
+    assert units.unit_of(Unit("p", "sil-hidden+aa")) == "bilabial"
+    assert units.unit_of(Unit("", "bilabial")) == "bilabial"
+    for label in (Unit("", "MBP"), Unit("xx", "bilabial"), Unit("")):
+        with pytest.raises(InputError):
+            units.unit_of(label)
+
+
+def test_a_unit_alone_tells_its_phone_only_where_it_has_one() -> None:
+    units = UNIT_SETS["eVis"]
+    assert [units.label(unit) for unit in ("aw", "bilabial", "silence")] == [
+        Unit("aw", "aw"),
+        Unit("", "bilabial"),
+        Unit("sil", "silence"),
+    ]
+    assert UNIT_SETS["2vis"].label("closed") == Unit("", "closed")
+    assert UNIT_SETS["phone"].label("sp") == Unit("sp", "sp")
+
+
+def test_units_within_a_class_of_phones() -> None:
+    assert UNIT_SETS["pbVis"].within(LIP_CLOSING) == ("MBP",)
+    assert UNIT_SETS["2vis"].within(LIP_CLOSING) == ()
+    assert sorted(UNIT_SETS["phone"].within(LIP_CLOSING)) == ["b", "em", "m", "p"]

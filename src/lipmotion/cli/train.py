@@ -8,7 +8,7 @@ from pathlib import Path
 
 from lipmotion.cli.options import add_machine_readable, list_or_all
 
-ENGINE = "trajectory (default), coupled: chains of states for speech and lips, or joint: Hofer 2008's own system"
+ENGINE = "trajectory (default), coupled: chains of states for speech and lips, or joint: one model of five streams"
 SYSTEM = "of the coupled engine: ph-HMM, ph-MSHMM, ph-FHMM, ph-vi-FHMM, ph-CHMM or ph-vi-CHMM (default)"
 UNITS = "what is modelled: phone (default), eVis, sVis, pbVis, 2vis, or a table file (docs/unit-sets.md)"
 VISUAL = "what is learned: geometry (tracked or given motion, default), eigenlips (mouth pictures), or both"

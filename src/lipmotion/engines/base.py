@@ -63,6 +63,10 @@ class Animator(ABC, Generic[ModelT]):
         """Return the phones that the engine's own models hear; None where they do not know the voice."""
         return None
 
+    def unpinned(self) -> Animator[ModelT]:
+        """Return the animator that makes no lips meet in p, b and m, but does as it has learned; by default itself."""
+        return self
+
     @abstractmethod
     def generate(self, model: ModelT, speech: Speech, constraints: Constraints | None = None) -> Generation:
         """Return the motion that goes with speech, at 100 Hz, one row a feature frame.

@@ -7,6 +7,11 @@ from typing import Any
 
 import numpy as np
 
+PINNED = (
+    "p, b and m are pinned: lips are made to meet where the recogniser, with transcript the alignment that places the "
+    "reference, too,\nputs them. What the model does by itself stands under 'without pins'"
+)
+
 
 def table(figures: Mapping[str, Any]) -> str:
     """Return the figures of ``lipmotion.evaluate`` as text."""
@@ -14,6 +19,7 @@ def table(figures: Mapping[str, Any]) -> str:
     lines = [f"split {figures['split']}: {figures['clips']} clips"]
     lines[0] += f"; closed under {closed:.4f}" if closed is not None else ""
     lines += [f"left out, for they do not move: {', '.join(still)}"] if still else []
+    lines += [PINNED] if any("unpinned" in condition for condition in figures["conditions"].values()) else []
     for name, condition in figures["conditions"].items():
         rows = condition["channels"] | _pictured(condition)
         size = max(9, *map(len, rows))
@@ -46,20 +52,37 @@ def _rest(condition: Mapping[str, Any]) -> list[str]:
     if "closures" not in condition:
         return lines
     low, high = condition["opening_acc_95"]
-    closures, phones = condition["closures"], condition["closures_p_b_m"]
     quiet, original = condition["silence"]["generated"], condition["silence"]["original"]
     return [
         f"  opening ACC 95 % interval {low:.3f} to {high:.3f};{lines[0][1:]}",
         *lines[1:],
+        *_closing(condition),
+        f"  silence: opening {number(quiet['mean'], '.4f')} ± {number(quiet['std'], '.4f')} "
+        f"(original {number(original['mean'], '.4f')} ± {number(original['std'], '.4f')}, {quiet['frames']} frames)",
+        *_unpinned(condition),
+    ]
+
+
+def _closing(condition: Mapping[str, Any]) -> list[str]:
+    closures, phones = condition["closures"], condition["closures_p_b_m"]
+    return [
         f"  closures: score {number(closures['score'], '.3f')} of {closures['original']}, precision "
         f"{number(closures['precision'], '.3f')} of {closures['generated']}, timing "
         f"{number(closures['timing_ms'], '+.0f')} ms",
         f"  p b m: recall {number(phones['recall'], '.3f')} of {phones['intervals']}, false closures "
         f"{number(phones['false_per_minute'], '.1f')} a minute (original "
         f"{number(phones['original_per_minute'], '.1f')})",
-        f"  silence: opening {number(quiet['mean'], '.4f')} ± {number(quiet['std'], '.4f')} "
-        f"(original {number(original['mean'], '.4f')} ± {number(original['std'], '.4f')}, {quiet['frames']} frames)",
     ]
+
+
+def _unpinned(condition: Mapping[str, Any]) -> list[str]:
+    free = condition.get("unpinned")
+    if free is None:
+        return []
+    low, high = free["opening_acc_95"]
+    acc = number(free["channels"]["opening"]["acc"], ".3f")
+    head = f"  without pins: ACC of opening {acc} ({low:.3f} to {high:.3f}), mean ACC {free['acc']:.3f}"
+    return [head, *(f"  {line}" for line in _closing(free))]
 
 
 def without_nan(figures: Any) -> Any:

@@ -97,6 +97,7 @@ def evaluate(
     Compared are the lip distances or, in a corpus without them, every channel that moves in the recordings; beside
     them, or in their place, the eigenlips of a model that has some. Figures of closing, and of silence, need the
     channel ``opening``. What cannot be computed is None.
+    Where the engine makes lips meet in p, b and m, ``unpinned`` holds the same figures of what it makes without that.
     The reference for what is speech and where its p, b, m are is the labelled phones, else the forced alignment, or
     recognition where nothing is transcribed. The mouth counts as closed relative to the corpus's own training list
     (without one: to the split itself).
@@ -120,7 +121,7 @@ def evaluate(
         "closed_under": found.closed_under,
         "still_channels": list(found.still),
         "conditions": {
-            name: figures_of(clips(found, name, model.engine, model.learned), found, seed) for name in found.conditions
+            name: _figures_and_unpinned(found, name, model.engine, model.learned, seed) for name in found.conditions
         },
     }
     plain: dict[str, Any] = without_nan(figures)
@@ -210,11 +211,31 @@ def _reference(utterance: Utterance, phones: Recogniser, lexicon: Lexicon) -> Ti
 
 def clips(found: Recorded, condition: str, engine: Animator[ModelT], learned: ModelT) -> list[Clip]:
     """Return what an engine makes of recordings, beside the originals. Raises CorpusError: it has other channels."""
-    made = []
-    for utterance, units, reference in zip(found.utterances, found.conditions[condition], found.reference, strict=True):
-        heard = _heard(engine, learned, found, utterance, units, condition == WITH_TRANSCRIPT)
-        made.append(_clip(engine, learned, found.channels, utterance, heard, reference))
-    return made
+    return _clips(found, _all_heard(found, condition, engine, learned), engine, learned)
+
+
+def _figures_and_unpinned(
+    found: Recorded, condition: str, engine: Animator[ModelT], learned: ModelT, seed: int
+) -> dict[str, Any]:
+    heard = _all_heard(found, condition, engine, learned)
+    figures, unpinned = figures_of(_clips(found, heard, engine, learned), found, seed), engine.unpinned()
+    if unpinned == engine or found.closed_under is None:
+        return figures
+    return figures | {"unpinned": figures_of(_clips(found, heard, unpinned, learned), found, seed)}
+
+
+def _all_heard(found: Recorded, condition: str, engine: Animator[ModelT], learned: ModelT) -> list[Speech]:
+    return [
+        _heard(engine, learned, found, utterance, units, condition == WITH_TRANSCRIPT)
+        for utterance, units in zip(found.utterances, found.conditions[condition], strict=True)
+    ]
+
+
+def _clips(found: Recorded, heard: Sequence[Speech], engine: Animator[ModelT], learned: ModelT) -> list[Clip]:
+    return [
+        _clip(engine, learned, found.channels, utterance, speech, reference)
+        for utterance, speech, reference in zip(found.utterances, heard, found.reference, strict=True)
+    ]
 
 
 def _heard(

@@ -113,7 +113,8 @@ def _phone(explanation: Explanation) -> str:
     if span is None:
         return "none"
     word = f" in {span.label.word!r}" if span.label.word else ""
-    return f"{span.label.phone}{word}, {span.start_s:.2f} to {span.end_s:.2f} s, modelled by {span.label.unit}"
+    phone = span.label.phone or "not known"
+    return f"{phone}{word}, {span.start_s:.2f} to {span.end_s:.2f} s, modelled by {span.label.unit}"
 
 
 def _listed(found: Sequence[Likely]) -> str:

@@ -27,7 +27,11 @@ class Span(Generic[LabelT]):
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """What is spoken in one span: a phone, the model unit it resolved to, and its word."""
+    """What is spoken in one span: a phone, the model unit it resolved to, and its word.
+
+    phone : empty where a model recognised its own unit, which several phones share: which of them it was is not known
+    unit  : between its neighbours (``sil-p+aa``); alone (``bilabial``) where there is no phone
+    """
 
     phone: str
     unit: str = ""

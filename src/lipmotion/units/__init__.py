@@ -2,7 +2,7 @@
 
 from lipmotion.units.classes import phone_classes
 from lipmotion.units.lexicon import Lexicon, Pronunciation, phone_named, with_reduced_vowels
-from lipmotion.units.phones import LIP_CLOSING, PAUSE, PHONES, RELATIVES, SILENCE, is_silent, stand_in
+from lipmotion.units.phones import LIP_CLOSING, PAUSE, PHONES, RELATIVES, SILENCE, is_silent, stand_in, unknown_phone
 from lipmotion.units.speaking_rate import check_phones, check_text, check_words
 from lipmotion.units.transcript import words_of
 from lipmotion.units.unit_set import UnitSet
@@ -29,6 +29,7 @@ __all__ = [
     "phone_named",
     "stand_in",
     "unit_set",
+    "unknown_phone",
     "with_reduced_vowels",
     "words_of",
 ]

@@ -72,6 +72,13 @@ def is_silent(phone: str) -> bool:
     return phone in (SILENCE, PAUSE)
 
 
+def unknown_phone(phone: str, where: str = "") -> str:
+    """Return what to say of a phone that is not in the inventory; an empty one is of a recognised unit."""
+    if not phone:
+        return f"a unit without a phone{where}: only the model that recognised it can use it; give phones instead"
+    return f"unknown phone {phone!r}{where}; the phones: {' '.join(PHONES)}"
+
+
 def stand_in(phone: str, known: Collection[str]) -> str:
     """Return the phone itself if known, else the known phone that sounds most like it.
 

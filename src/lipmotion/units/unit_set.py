@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 from lipmotion.errors import InputError, shortened
 from lipmotion.files import text_in
+from lipmotion.types import Unit
 from lipmotion.units.classes import phone_classes
-from lipmotion.units.phones import PHONES, is_silent
+from lipmotion.units.phones import PHONES, SILENCE, is_silent, unknown_phone
 
 LARGEST_TABLE = 1 << 18
 """Bytes of a table: one of 47 phones has some hundred."""
@@ -73,12 +74,36 @@ class UnitSet:
     def unit(self, phone: str) -> str:
         """Return the unit of a phone. Raises InputError: it is not in the inventory."""
         if phone not in self.of:
-            raise InputError(f"unknown phone {phone!r}; the phones: {' '.join(PHONES)}")
+            raise InputError(unknown_phone(phone))
         return self.of[phone]
+
+    def unit_of(self, label: Unit) -> str:
+        """Return the unit of what is spoken: its phone's, or where it has no phone its own.
+
+        Raises InputError: an unknown phone, or a unit that this set does not have.
+        """
+        if label.phone:
+            return self.unit(label.phone)
+        if label.unit not in self.units:
+            raise InputError(
+                f"unknown unit {label.unit!r} without a phone; give a phone, or one of {' '.join(self.units)}"
+            )
+        return label.unit
+
+    def label(self, unit: str) -> Unit:
+        """Return what is known to be spoken in a unit: its phone, if it has one only or is silence; else the unit."""
+        phones = self.phones(unit)
+        if self.silent(unit) and SILENCE in phones:
+            return Unit(SILENCE, unit)
+        return Unit(phones[0] if len(phones) == 1 else "", unit)
 
     def phones(self, unit: str) -> tuple[str, ...]:
         """Return the phones of a unit."""
         return tuple(phone for phone, other in self.of.items() if other == unit)
+
+    def within(self, phones: Container[str]) -> tuple[str, ...]:
+        """Return the units all of whose phones are among these."""
+        return tuple(unit for unit in self.units if all(phone in phones for phone in self.phones(unit)))
 
     def classes(self) -> dict[str, frozenset[str]]:
         """Return the sets of units that decision trees may ask about, by name, each once.

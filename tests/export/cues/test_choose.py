@@ -12,7 +12,7 @@ from export.cues.conftest import result, spoken, timeline
 from lipmotion.export.cues.choose import choose_cues, usual_hold
 from lipmotion.export.cues.sheet import CueSheet
 from lipmotion.pipeline.toy import ToySentence, toy_sentences
-from lipmotion.types import Channel, Generation, Motion, Timeline
+from lipmotion.types import Channel, Generation, Motion, Timeline, Unit
 from lipmotion.units import LIP_CLOSING, PHONES, VISEMES, is_silent
 
 FRAME_RATES = [12.0, 24.0, 25.0, 30.0, 60.0]
@@ -98,6 +98,13 @@ def test_toy_sentences(sentences: list[ToySentence], fps: float) -> None:
             wanted = {"A": set(LIP_CLOSING), "G": {"f", "v"}, "H": {"l"}, "X": {"sil", "sp"}}
             assert said & wanted.get(cue.label, said)
     assert seen >= set("ABCDFGX")
+
+
+def test_where_no_phone_is_known_the_motion_decides_whether_lips_meet() -> None:
+    known = spoken("p aa p aa", 0.2)
+    labels = [span.label if is_silent(span.label.phone) else Unit("", "some") for span in known.units]
+    spans = tuple(replace(span, label=label) for span, label in zip(known.units, labels, strict=True))
+    assert shapes(choose_cues(replace(known, units=Timeline(spans)), 24.0)) == "XADADX"
 
 
 @pytest.mark.parametrize(

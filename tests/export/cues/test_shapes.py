@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from lipmotion.export.cues.shapes import ANY_OPEN, LOOKS, OPTIONAL, SHAPES, fallback, looks_of
+from lipmotion.export.cues.shapes import ANY, ANY_OPEN, LOOKS, OPTIONAL, SHAPES, fallback, looks_of
 from lipmotion.units import LIP_CLOSING, PHONES, VISEMES, is_silent
 
 BLAIR = "AI E O U FV L MBP WQ etc rest".split()
@@ -13,6 +13,7 @@ def test_every_phone_but_h_has_a_look() -> None:
     assert set(PHONES) - set(LOOKS) == {"hh"}
     assert set(LOOKS) <= set(PHONES)
     assert looks_of("hh") == looks_of("a phone of another language") == ANY_OPEN
+    assert looks_of("") == ANY
 
 
 @pytest.mark.parametrize("phone", PHONES)

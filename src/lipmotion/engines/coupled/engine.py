@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, final
 
 import numpy as np
@@ -70,6 +70,9 @@ class CoupledEngine(Engine[CoupledModel]):
         model = fit_coupled(examples, self.config, monitor)
         frames = sum(int(example.valid.sum()) for example in examples)
         return Fit(model, {"frames": frames, "joint_states": model.chains.transitions.product.chain_states.shape[1]})
+
+    def unpinned(self) -> CoupledEngine:  # noqa: D102
+        return replace(self, config=replace(self.config, closures=False))
 
     def generate(self, model: CoupledModel, speech: Speech, constraints: Constraints | None = None) -> Generation:  # noqa: D102
         features = np.asarray(speech.features.values)

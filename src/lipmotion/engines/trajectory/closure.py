@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,11 +30,15 @@ class Closure:
     follow: NDArray[np.float64]
 
 
-def closing_spans(units: Timeline[Unit], frames: int) -> list[slice]:
-    """Return the frames in which each p, b and m may close the lips."""
+def closing_spans(units: Timeline[Unit], frames: int, closing_units: Container[str] = ()) -> list[slice]:
+    """Return the frames in which each p, b and m may close the lips.
+
+    closing_units : that close them whichever of their phones is said; they count where no phone is known
+    """
     spans = []
     for span in units:
-        if span.label.phone in LIP_CLOSING:
+        label = span.label
+        if label.phone in LIP_CLOSING or (not label.phone and label.unit in closing_units):
             first = max(int(np.ceil((span.start_s - REACH_S) * FRAME_RATE_HZ - 1e-6)), 0)
             stop = min(int(np.floor((span.end_s + REACH_S) * FRAME_RATE_HZ + 1e-6)) + 1, frames)
             if first < stop:

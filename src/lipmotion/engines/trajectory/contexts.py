@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.types import FRAME_RATE_HZ, Span, Timeline, Unit
-from lipmotion.units import PHONES, SILENCE, UNIT_SETS, UnitSet, is_silent
+from lipmotion.units import PHONES, SILENCE, UNIT_SETS, UnitSet, is_silent, unknown_phone
 
 RESTING = -1
 """The part of silence that is no part of it."""
@@ -79,11 +79,13 @@ def with_neighbours(units: Timeline[Unit]) -> Iterator[tuple[str, Span[Unit], st
 
 
 def named(spans: Timeline[Unit], units: UnitSet) -> Timeline[Unit]:
-    """Return the timeline with the unit of each phone named, between its neighbours."""
+    """Return the timeline with the unit of each phone named, between its neighbours; units without phones stay."""
+    quiet = units.unit(SILENCE)
+    said = [quiet, *(units.unit_of(span.label) for span in spans), quiet]
     found = []
-    for left, span, right in with_neighbours(spans):
-        before, unit, after = map(units.unit, (left, span.label.phone, right))
-        found.append(replace(span, label=replace(span.label, unit=f"{before}-{unit}+{after}")))
+    for before, span, unit, after in zip(said, spans, said[1:], said[2:], strict=False):
+        name = f"{before}-{unit}+{after}" if span.label.phone else unit
+        found.append(replace(span, label=replace(span.label, unit=name)))
     return Timeline(tuple(found))
 
 
@@ -96,7 +98,7 @@ def places(units: Timeline[Unit], frames: int, cut: Cut) -> list[Place]:
     """
     for span in units:
         if span.label.phone not in PHONES:
-            raise InputError(f"unknown phone {span.label.phone!r} at {span.start_s} s; the phones: {' '.join(PHONES)}")
+            raise InputError(unknown_phone(span.label.phone, f" at {span.start_s} s"))
     result = [cut.rest] * frames
     for left, span, right in with_neighbours(units):
         edges = np.ceil(np.array([span.start_s, span.end_s]) * FRAME_RATE_HZ - 1e-6)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar, final
 
 import numpy as np
@@ -44,7 +44,7 @@ class TrajectoryConfig:
     tree_factor: what a split of a decision tree must gain, in units of its description length
     least_frames : frames that a leaf of a tree must have
     shrinkage, variance_shrinkage : frames that the mean, and the variance, of the node above count for
-    listens    : let the means follow the sound around the frame (False: the paper's plain Gaussians)
+    listens    : let the means follow the sound around the frame (False: plain Gaussians, at the same fixed times)
     axes       : numbers that the sound around a frame is reduced to
     ridge, shared_ridge : how strongly a regression on the sound is drawn towards that of the node above, and the one
                  that all share towards none
@@ -52,7 +52,7 @@ class TrajectoryConfig:
     trajectory_steps : steps of training for the least error of the generated trajectory (0: none)
     full_range : make movements as large as the original's
     closures   : make the lips meet in every p, b and m, whatever their units are
-    joint      : train the paper's joint model of speech, F0 and motion as well, if there is speech enough: it finds the
+    joint      : train the joint model of speech, F0 and motion as well, if there is speech enough: it finds the
                  phones of voices that it knows (``listening``)
     units      : what is modelled: a unit set's name, or a table's (docs/unit-sets.md); training reads the table
     """
@@ -130,6 +130,9 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
 
     def listen(self, model: TrajectoryModel, speech: Speech) -> Timeline[Unit] | None:  # noqa: D102
         return model.listener.phones(speech) if model.listener is not None else None
+
+    def unpinned(self) -> TrajectoryEngine:  # noqa: D102
+        return replace(self, config=replace(self.config, closures=False))
 
     def generate(self, model: TrajectoryModel, speech: Speech, constraints: Constraints | None = None) -> Generation:  # noqa: D102
         features = np.asarray(speech.features.values)

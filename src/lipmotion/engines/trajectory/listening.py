@@ -111,7 +111,7 @@ def _observed(speech: Speech) -> Observed:
 def _transcribed(example: Example, values: NDArray[np.float64]) -> Transcribed:
     speech = example.speech
     observed = observe(np.asarray(speech.features.values), speech.log_f0, values, example.valid)
-    units, bounds = in_frames(speech.units, observed.frames, PHONES.silence[0], PHONES.unit)
+    units, bounds = in_frames(speech.units, observed.frames, PHONES.silence[0], PHONES.unit_of)
     return Transcribed(observed, units, bounds)
 
 

@@ -83,11 +83,13 @@ _LOOKS: tuple[tuple[str, tuple[Look, ...]], ...] = (
 LOOKS: dict[str, tuple[Look, ...]] = {phone: looks for phones, looks in _LOOKS for phone in phones.split()}
 ANY_OPEN: tuple[Look, ...] = (Look(1, "BCDEF"),)
 """hh, and phones of another inventory: the motion alone decides."""
+ANY: tuple[Look, ...] = (Look(1, "ABCDEF"),)
+"""Speech of which no phone is known: the motion alone decides whether the lips are open, too."""
 
 
 def looks_of(phone: str) -> tuple[Look, ...]:
-    """Return what a phone looks like, part by part."""
-    return LOOKS.get(phone, ANY_OPEN)
+    """Return what a phone (empty: an unknown one) looks like, part by part."""
+    return LOOKS.get(phone, ANY_OPEN) if phone else ANY
 
 
 def fallback(shape: str, drawn: str) -> str:

@@ -18,7 +18,7 @@ def test_every_frame_has_a_unit():
     units, bounds = in_frames(spoken, 13, "sil")
     assert units == ("sil", "a", "t", "sil", "b", "sil")
     assert bounds.tolist() == [0, 2, 5, 6, 7, 10, 13]
-    assert in_frames(spoken, 4, "sil", {"a": "open"}.get)[0] == ("sil", "open")
+    assert in_frames(spoken, 4, "sil", lambda label: {"a": "open"}[label.phone])[0] == ("sil", "open")
     assert in_frames(timeline(), 3, "sil")[0] == ("sil",)
     with pytest.raises(InputError):
         in_frames(spoken, 0, "sil")

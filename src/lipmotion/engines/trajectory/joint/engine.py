@@ -1,9 +1,9 @@
-"""The joint engine: the paper's own system."""
+"""The joint engine: one model of five streams, after Hofer 2008."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar, final
 
 import numpy as np
@@ -38,7 +38,7 @@ from lipmotion.types import (
     Trace,
     Unit,
 )
-from lipmotion.units import UnitSet, unit_set
+from lipmotion.units import LIP_CLOSING, UnitSet, unit_set
 
 
 @dataclass(frozen=True)
@@ -51,11 +51,12 @@ class JointEngineConfig:
     components : dimensions that all point channels are reduced to
     f0         : hear the three streams of F0 (False: they are switched off everywhere)
     sees       : let motion have a say, in training, in when states begin
-    recognises : find the model's own units by its own bigram (False: take the phones that are given in time)
+    recognises : find the model's own units by its own bigram where neither words nor units are given (False: take the
+                 phones in time that the shared recogniser finds). What is given always wins
     paths      : generate from so many sequences of states, drawn from all that may have been said, instead of the
-                 best one; needs ``recognises``
+                 best one, wherever units are recognised; needs ``recognises``
     seed       : of the drawing
-    closures   : make the lips meet in every p, b and m that is given
+    closures   : make the lips meet in every p, b and m, and in every recognised unit of these alone
     """
 
     units: str = "phone"
@@ -112,7 +113,9 @@ class JointModel:
 class JointEngine(Engine[JointModel]):
     """One model of speech, F0 and motion: recognition or alignment by the heard streams, generation by motion.
 
-    Source: Hofer 2008, §4 and §5.
+    Source: Hofer 2008, §4 and §5.  Deviations: training starts from phones in time (aligned or labelled), not from
+    nothing; the trees of what is heard ask for one neighbour, those of motion for both; unless it ``recognises``, the
+    phones of sound alone are those of the shared recogniser.
     """
 
     config: JointEngineConfig
@@ -141,11 +144,14 @@ class JointEngine(Engine[JointModel]):
         frames = sum(int(example.valid.sum()) for example in examples)
         return Fit(JointModel(units, space, hmm, closure), {"frames": frames, **figures})
 
+    def unpinned(self) -> JointEngine:  # noqa: D102
+        return replace(self, config=replace(self.config, closures=False))
+
     def generate(self, model: JointModel, speech: Speech, constraints: Constraints | None = None) -> Generation:  # noqa: D102
         frames = len(speech.features.values)
         pins = resolved(constraints, model.space, frames)
         observed = self._observed(speech)
-        if self.config.recognises:
+        if self.config.recognises and not speech.said:
             spoken, paths = self._recognised(model, observed, speech.features.duration_s)
         else:
             spoken, paths = speech.units, [_aligned(model, observed, speech.units)]
@@ -160,7 +166,7 @@ class JointEngine(Engine[JointModel]):
             frames,
             model.space,
             closure=model.closure,
-            closing=closing_spans(spoken, frames) if self.config.closures else [],
+            closing=closing_spans(spoken, frames, model.units.within(LIP_CLOSING)) if self.config.closures else [],
             pins=pins,
         )
         return Generation(
@@ -196,7 +202,7 @@ class JointEngine(Engine[JointModel]):
 
     def _transcribed(self, example: Example, values: NDArray[np.float64], units: UnitSet) -> Transcribed:
         observed = self._observed(example.speech, values, example.valid)
-        said, bounds = in_frames(example.speech.units, observed.frames, units.silence[0], units.unit)
+        said, bounds = in_frames(example.speech.units, observed.frames, units.silence[0], units.unit_of)
         return Transcribed(observed, said, bounds)
 
     def _recognised(
@@ -204,7 +210,7 @@ class JointEngine(Engine[JointModel]):
     ) -> tuple[Timeline[Unit], list[StatePath]]:
         recogniser = joint_recogniser(model.hmm)
         said = recogniser.recognise(observed)
-        spoken = in_time(said, duration_s, lambda unit: model.units.phones(unit)[0])
+        spoken = in_time(said, duration_s, model.units.label)
         if self.config.paths > 1:
             return spoken, recogniser.sampled_paths(observed, self.config.paths, self.config.seed)
         bounds = np.array([*(one.first for one in said), observed.frames])
@@ -216,7 +222,7 @@ def _also_silent(units: UnitSet) -> tuple[str, ...]:
 
 
 def _aligned(model: JointModel, observed: Observed, units: Timeline[Unit]) -> StatePath:
-    said, bounds = in_frames(units, observed.frames, model.units.silence[0], model.units.unit)
+    said, bounds = in_frames(units, observed.frames, model.units.silence[0], model.units.unit_of)
     return align(model.hmm, observed, said, bounds)
 
 

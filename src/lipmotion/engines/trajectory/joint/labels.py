@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from operator import attrgetter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,13 +14,13 @@ from lipmotion.types import FRAME_RATE_HZ, Span, Timeline, Unit
 
 
 def in_frames(
-    units: Timeline[Unit], frames: int, silence: str, unit_of: Callable[[str], str] = str
+    units: Timeline[Unit], frames: int, silence: str, unit_of: Callable[[Unit], str] = attrgetter("phone")
 ) -> tuple[tuple[str, ...], NDArray[np.intp]]:
     """Return the units of a recording, and the first frame of each with the frame count at the end.
 
     frames  : T > 0; frame n belongs to the unit that holds at n · 10 ms
     silence : the unit in gaps
-    unit_of : gives the unit of a phone; by default the phone itself
+    unit_of : gives the unit of what is spoken; by default the phone itself
     A unit without a frame of its own is left out.
     Raises InputError: no frames.
     """
@@ -35,7 +36,7 @@ def in_frames(
             names.append(silence)
             firsts.append(end)
         if stop > first:
-            names.append(unit_of(span.label.phone))
+            names.append(unit_of(span.label))
             firsts.append(first)
         end = max(end, stop)
     if end < frames:
@@ -44,11 +45,11 @@ def in_frames(
     return tuple(names), np.array([*firsts, frames], np.intp)
 
 
-def in_time(said: Sequence[Said], duration_s: float, phone_of: Callable[[str], str] = str) -> Timeline[Unit]:
+def in_time(said: Sequence[Said], duration_s: float, label_of: Callable[[str], Unit] = Unit) -> Timeline[Unit]:
     """Return recognised units in time: frame n covers (n ± ½) · 10 ms, from 0 s to the end of the recording.
 
-    phone_of : gives a phone of a unit; by default the unit is the phone
+    label_of : gives what is known to be spoken in a unit; by default the unit is the phone
     """
     edges = np.clip((np.array([unit.first for unit in said]) - 0.5) / FRAME_RATE_HZ, 0, duration_s).tolist()
     spans = zip(edges, [*edges[1:], duration_s], said, strict=True)
-    return Timeline(tuple(Span(start_s, end_s, Unit(phone_of(unit.unit))) for start_s, end_s, unit in spans))
+    return Timeline(tuple(Span(start_s, end_s, label_of(unit.unit)) for start_s, end_s, unit in spans))

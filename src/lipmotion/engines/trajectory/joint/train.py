@@ -1,4 +1,4 @@
-"""Training of all streams together: flat start, plain units, trees, units in context, mixtures."""
+"""Training of all streams together: even states, plain units, trees, units in context, mixtures."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ from lipmotion.types import Monitor, Progress, part_of, silent_monitor
 class Transcribed:
     """An utterance and its units.
 
-    bounds : the first frame of each unit, and the frame count at the end [shape=(len(units) + 1,)], for the flat
-             start; None: training begins with states that are all as long
+    bounds : the first frame of each unit, and the frame count at the end [shape=(len(units) + 1,)], to start
+             from; None: a flat start, states that are all as long
     Raises InputError: no units, or bounds that are not those of the units.
     """
 
@@ -72,7 +72,8 @@ def train_joint(
     Within each stage the likelihood never falls.
     Raises CorpusError: no utterance, or none with room for the states of its units.
     Raises InputError: an unknown unit, or no stream that is switched on in training.
-    Source: Hofer 2008, §4 and §6; ties by minimum description length as in ``stats.trees``.
+    Source: Hofer 2008, §4 and §6; ties by minimum description length as in ``stats.trees``.  Deviations: utterances
+    with ``bounds`` start from these, not flat; trees of what is heard ask for one neighbour (``forest.places_asked``).
     """
     if not utterances:
         raise CorpusError("no utterances to train on; give at least one")
@@ -197,7 +198,7 @@ def _without_pauses(units: Sequence[str], inventory: Inventory) -> tuple[str, ..
 def _started(
     hmm: JointHmm, sentences: Sentences, starts: Sequence[tuple[tuple[str, ...], NDArray[np.intp] | None]]
 ) -> JointHmm:
-    """Return the models of units cut into states as long as each other (the flat start)."""
+    """Return the models of units cut into states as long as each other, inside their bounds where they have some."""
 
     def found() -> Iterator[Posterior]:
         for number, (sentence, (units, edges)) in enumerate(zip(sentences.items, starts, strict=True)):
