@@ -10,9 +10,10 @@ Names are imported when they are first used: ``import lipmotion`` alone costs no
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
+TYPE_CHECKING = False  # as in typing, which takes longer to import than Ctrl-C should wait for an answer
 if TYPE_CHECKING:
+    from typing import Any
+
     from lipmotion.corpora.store import Corpus
     from lipmotion.engines import engine_named
     from lipmotion.export.base import read_motion

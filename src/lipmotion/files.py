@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from lipmotion.errors import ExportError, InputError
+from lipmotion.sources import Source, check_apart, is_same
 
 if sys.platform == "win32":
     import msvcrt
@@ -112,20 +113,20 @@ def check_target(target: Path, source: str | Path | None = None) -> None:
     """
     try:
         is_folder = target.is_dir()
-    except OSError as error:  # a name too long
+        _check_parent(_place(target))
+    except OSError as error:  # a name too long, a folder that may not be looked into
         raise ExportError(f"{target}: cannot be written: {error.strerror or error}") from error
     if is_folder:
         raise ExportError(f"{target}: is a folder; give the name of a file in it")
-    _check_parent(target)
-    if source is not None and target.exists() and Path(source).exists() and target.samefile(source):
-        raise ExportError(f"{target}: is the recording itself; give another name")
+    if source is not None:
+        check_apart([target], [Source(Path(source), "recording")])
 
 
 def check_distinct(targets: Sequence[Path]) -> None:
     """Raise ExportError if two outputs are one file."""
-    places = [target.parent.resolve() / target.name for target in targets]
+    places = [os.path.realpath(target) for target in targets]
     for number, place in enumerate(places):
-        if place in places[:number]:
+        if any(place == other or is_same(place, other) for other in places[:number]):
             raise ExportError(f"{targets[number]}: is given twice; give every output another name")
 
 
@@ -139,9 +140,9 @@ def _check_parent(target: Path) -> None:
         raise ExportError(f"{target}: the folder {target.parent} does not exist; create it first")
 
 
-def _temporary(target: Path) -> Path:
+def _temporary(target: Path, suffix: str) -> Path:
     _check_parent(target)
-    return target.with_name(f"{_prefix(target)}{os.getpid()}-{uuid.uuid4().hex[:8]}{target.suffix.lower()}")
+    return target.with_name(f"{_prefix(target)}{os.getpid()}-{uuid.uuid4().hex[:8]}{suffix.lower()}")
 
 
 def _prefix(target: Path) -> str:
@@ -172,17 +173,31 @@ def _is_alive(process: str) -> bool:
     return True
 
 
+def _place(target: Path) -> Path:
+    """Return where an output goes: to what a link points to, so that the link stays one."""
+    try:
+        place = Path(os.path.realpath(target)) if target.is_symlink() else target
+        endless = place.is_symlink()
+    except OSError as error:
+        raise _refused(target, error) from error
+    if endless:
+        raise ExportError(f"{target}: is a link that leads back to itself; give the name of a file")
+    return place
+
+
 @contextmanager
-def whole_file(target: Path) -> Iterator[Path]:
+def whole_file(target: Path, *, follow: bool = True) -> Iterator[Path]:
     """Give a temporary path to write to, with the target's suffix (lower case); rename it to ``target`` on success.
 
+    follow : where ``target`` is a link, write what it points to; else the file takes the place of the link
     Raises ExportError: the folder does not exist, or the file cannot be written (disk full, no permission).
     """
-    temporary = _temporary(target)
-    _sweep(target)
+    place = _place(target) if follow else target
+    temporary = _temporary(place, target.suffix)
     try:
+        _sweep(place)
         yield temporary
-        temporary.replace(target)
+        temporary.replace(place)
     except OSError as error:
         raise _refused(target, error) from error
     finally:
@@ -196,7 +211,7 @@ def whole_folder(target: Path) -> Iterator[Path]:
 
     Raises ExportError: the parent does not exist, or something cannot be written.
     """
-    temporary = _temporary(target)
+    temporary = _temporary(target, target.suffix)
     try:
         temporary.mkdir()
         yield temporary
@@ -223,20 +238,34 @@ def locked(folder: Path) -> Iterator[None]:
     Raises ExportError: another process holds it, or it cannot be made.
     """
     path = folder / LOCK
+    file = None
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        file = _held(path)
-    except FileExistsError as error:
-        raise ExportError(f"{folder}: is a file; give the name of a new or an empty folder") from error
-    except OSError as error:
-        raise _refused(folder, error) from error
-    try:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            file = _held(path)
+        except FileExistsError as error:
+            raise ExportError(f"{folder}: is a file; give the name of a new or an empty folder") from error
+        except OSError as error:
+            raise _refused(folder, error) from error
         yield
     finally:
-        if sys.platform == "win32":
-            file.close()
-        path.unlink(missing_ok=True)
-        file.close()
+        try:
+            _let_go(path, file)
+        except BaseException:  # an interrupt; a second one does not follow at once
+            _let_go(path, file)
+            raise
+
+
+def _let_go(path: Path, file: IO[bytes] | None) -> None:
+    """Delete a lock: that of ``file`` or, where an interrupt came between making and keeping it, one nobody holds."""
+    with suppress(OSError):  # none there, or another's
+        is_held = file is not None and not file.closed
+        with file if file is not None and is_held else path.open("r+b", buffering=0) as lock:
+            if not is_held:
+                _lock(lock)
+            if sys.platform == "win32":
+                lock.close()
+            path.unlink()
 
 
 def _held(path: Path) -> IO[bytes]:
@@ -255,6 +284,9 @@ def _held(path: Path) -> IO[bytes]:
             ) from error
         except FileNotFoundError:
             pass
+        except BaseException:
+            file.close()
+            raise
         file.close()  # whoever held it has just deleted it
     with suppress(OSError):  # a full disk
         file.truncate(0)
@@ -291,7 +323,8 @@ def unfinished_work(target: Path) -> Iterator[Path]:
     Raises ExportError: the file could not be put there, or another process is at work on it.
     """
     check_target(target)
-    folder = target.with_name(target.name + UNFINISHED)
+    target = _place(target)
+    folder = work_folder(target)
     try:
         with locked(folder):
             remove_unfinished(folder)
@@ -306,6 +339,12 @@ def unfinished_work(target: Path) -> Iterator[Path]:
     finally:
         with suppress(OSError):  # there is something in it to go on from
             folder.rmdir()
+
+
+def work_folder(target: Path) -> Path:
+    """Return the folder that ``unfinished_work`` gives."""
+    target = _place(target)
+    return target.with_name(target.name + UNFINISHED)
 
 
 def remove_unfinished(folder: Path) -> None:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import argparse
 import os
-from pathlib import Path
 
 from lipmotion.cli.options import add_machine_readable, list_or_all
+from lipmotion.cli.paths import add_force, add_input, add_output
+from lipmotion.cli.speech import add_lexicon_argument
 
 ENGINE = "trajectory (default), coupled: chains of states for speech and lips, or joint: Hofer 2008's own system"
 SYSTEM = "of the coupled engine: ph-HMM, ph-MSHMM, ph-FHMM, ph-vi-FHMM, ph-CHMM or ph-vi-CHMM (default)"
@@ -17,18 +18,20 @@ VISUAL = "what is learned: geometry (tracked or given motion, default), eigenlip
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb."""
     parser = verbs.add_parser("train", help="train a model on a prepared corpus; again, to go on after a stop")
-    parser.add_argument("corpus", type=Path)
-    parser.add_argument("-o", "--output", type=Path, required=True, metavar="MODEL")
+    add_input(parser, "corpus", what="corpus")
+    add_output(parser, "-o", "--output", keeps=True, required=True, metavar="MODEL")
+    add_force(parser)
     parser.add_argument("--split", default="train", help="train, val, test or all (default: train)")
     parser.add_argument("--speaker", action="append", default=[], metavar="NAME", help="this one only (repeatable)")
-    parser.add_argument("--lexicon", type=Path, metavar="FILE", help="pronunciations: WORD PHONE PHONE ... a line")
+    add_lexicon_argument(parser)
     parser.add_argument("--engine", default="trajectory", help=ENGINE)
     parser.add_argument("--system", metavar="NAME", help=SYSTEM)
-    parser.add_argument("--units", metavar="SET", help=UNITS)
+    add_input(parser, "--units", what="table of units", replaceable=True, type=str, metavar="SET", help=UNITS)
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="any option of the engine")
     parser.add_argument("--visual", default="geometry", metavar="WHAT", help=VISUAL)
     parser.add_argument("--voices", action="store_true", help="learn from installed synthetic voices as well (coupled)")
-    parser.add_argument("--recordings", type=Path, metavar="FOLDER", help="and from transcribed speech (coupled)")
+    others = "and from transcribed speech (coupled)"
+    add_input(parser, "--recordings", what="folder of recordings", metavar="FOLDER", help=others)
     parser.add_argument("--workers", type=int, help="processes (default: one a core)")
     add_machine_readable(parser)
     parser.set_defaults(run=run)

@@ -154,7 +154,7 @@ class Corpus:
 
     def _write_manifest(self) -> None:
         content = {"format": FORMAT, "version": VERSION, "utterances": self._index}
-        with whole_file(self.path / MANIFEST) as unfinished:
+        with whole_file(self.path / MANIFEST, follow=False) as unfinished:  # nothing leads out of a corpus
             text = json.dumps(content, indent=1, sort_keys=True, ensure_ascii=False)
             unfinished.write_text(text + "\n", encoding="utf-8")
 

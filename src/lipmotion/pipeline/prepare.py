@@ -20,6 +20,7 @@ from lipmotion.errors import CorpusError, ExportError, InputError, MissingDepend
 from lipmotion.files import locked, remove_unfinished, sha256_of
 from lipmotion.pipeline.given import DIGESTS, digest, given_phones, given_track
 from lipmotion.pipeline.workers import working
+from lipmotion.sources import Source, check_apart
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.read import read_audio
 from lipmotion.types import Item, Monitor, Progress, Track, Utterance, silent_monitor
@@ -109,6 +110,7 @@ def prepare(
     start_s = time.monotonic()
     if workers is not None and workers < 1:
         raise InputError(f"{workers} processes, required at least 1; leave it out for one a core")
+    check_apart((), [Source(directory, "folder of recordings")], folders=[output])
     found = discover(directory)
     packages = versions() if any(item.curves is None for item in found.items) else {}
     is_new = not output.exists()
