@@ -49,17 +49,27 @@ def check_apart(
 
 def _clash(target: Path, source: Path, *, holds: bool) -> str:
     """Return how an output meets an input: ``is``, ``lies in``, ``belongs to`` or ``holds``; "" where it does not."""
-    place, origin = Path(os.path.realpath(target)), _status(source)
-    if origin is None:
-        return ""
+    place = Path(os.path.realpath(target))
     if is_same(place, source):
         return "is"
-    if stat.S_ISDIR(origin.st_mode):
+    if is_folder(source):
         if any(is_same(folder, source) for folder in place.parents):
             return "lies in"
         if place.is_file() and _is_in(source, place):
             return "belongs to"
-    return "holds" if holds and any(is_same(place, around) for around in Path(os.path.realpath(source)).parents) else ""
+    return (
+        "holds"
+        if holds
+        and _status(source)
+        and any(is_same(place, around) for around in Path(os.path.realpath(source)).parents)
+        else ""
+    )
+
+
+def is_folder(path: Path) -> bool:
+    """Whether a folder of that name is there, however long the name."""
+    found = _status(path)
+    return found is not None and stat.S_ISDIR(found.st_mode)
 
 
 def is_same(path: str | Path, other: str | Path) -> bool:

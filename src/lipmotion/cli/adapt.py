@@ -7,7 +7,7 @@ import os
 from typing import Any
 
 from lipmotion.cli.output import say
-from lipmotion.cli.paths import add_force, add_input, add_output
+from lipmotion.cli.paths import add_input, add_output
 from lipmotion.cli.speech import add_model_argument
 
 
@@ -17,8 +17,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     voice: dict[str, Any] = {"nargs": "+", "metavar": "RECORDING", "help": "audio or video of this voice"}
     add_input(parser, "recordings", what="recording", **voice)
     add_model_argument(parser)
-    add_output(parser, "-o", "--output", required=True, metavar="MODEL")
-    add_force(parser)
+    add_output(parser, "-o", "--output", force=True, required=True, metavar="MODEL")
     parser.set_defaults(run=run)
 
 

@@ -6,7 +6,7 @@ import argparse
 from typing import Any
 
 from lipmotion.cli.output import say
-from lipmotion.cli.paths import add_force, add_output
+from lipmotion.cli.paths import add_output
 from lipmotion.cli.speech import add_speech_arguments, speech_arguments
 
 
@@ -15,8 +15,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = verbs.add_parser("animate", help="turn speech into lip motion or an animated face")
     add_speech_arguments(parser)
     several: dict[str, Any] = {"type": str, "nargs": "+", "action": "extend", "required": True}
-    add_output(parser, "-o", "--output", help="FILE.mp4 .json .csv .npz, or several", **several)
-    add_force(parser)
+    add_output(parser, "-o", "--output", force=True, help="FILE.mp4 .json .csv .npz, or several", **several)
     parser.add_argument("--rate", type=float, metavar="HZ", help="frames per second of motion files (default: 100)")
     parser.add_argument("--channels", metavar="NAME,NAME", help="write only these to motion files: opening,width,...")
     parser.add_argument("--fps", type=float, default=25.0, help="frames per second of videos (default: 25)")

@@ -7,6 +7,7 @@ import errno
 import io
 import logging
 import sys
+import warnings
 from collections.abc import Sequence
 from typing import NoReturn
 
@@ -25,6 +26,7 @@ EXIT_CODES = """exit codes: 0 done, 1 a bug, 2 wrong command line, 3 unusable in
 def run(arguments: Sequence[str] | None, stopper: Stopper, events: Events) -> None:
     """Run one command. Raises whatever it raises; SystemExit: help was asked for, or the command line is wrong."""
     _log_printable()
+    shown, warnings.showwarning = warnings.showwarning, _log_warning
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # a terminal may not know every letter of a file's name
     try:
@@ -38,6 +40,7 @@ def run(arguments: Sequence[str] | None, stopper: Stopper, events: Events) -> No
             raise refused(error) from error
         raise
     finally:
+        warnings.showwarning = shown
         flush_output()
 
 
@@ -77,8 +80,13 @@ class _Printable(logging.Formatter):
         return own(f"warning: {record.getMessage()}")
 
 
+def _log_warning(message: object, *_: object, **__: object) -> None:
+    """Take a warning of Python's own, or of another package: it may quote a file."""
+    logging.getLogger("py.warnings").warning("%s", message)
+
+
 def _log_printable() -> None:
-    """Have warnings, those of Python too, in one line on standard error."""
+    """Have warnings in one line on standard error."""
     handler = logging.StreamHandler()
     handler.setFormatter(_Printable())
     logging.basicConfig(handlers=[handler], level=logging.WARNING)

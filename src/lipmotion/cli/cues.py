@@ -7,7 +7,7 @@ from contextlib import nullcontext
 from typing import Any
 
 from lipmotion.cli.output import flush_output, say, say_lines
-from lipmotion.cli.paths import add_force, add_output
+from lipmotion.cli.paths import add_output
 from lipmotion.cli.speech import add_speech_arguments, speech_arguments
 from lipmotion.cli.status import status_lines
 
@@ -18,8 +18,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     add_speech_arguments(parser)
     add = parser.add_argument
     several: dict[str, Any] = {"nargs": "+", "action": "extend", "default": []}
-    add_output(parser, "-o", "--output", help="FILE.tsv .xml .json .dat", **several)
-    add_force(parser)
+    add_output(parser, "-o", "--output", force=True, help="FILE.tsv .xml .json .dat", **several)
     add("-f", "--format", choices=("tsv", "xml", "json", "dat"), help="(default: the suffix; tsv without a file)")
     add("--fps", type=float, default=24.0, help="frames per second of the animation (default: 24)")
     add("--hold", type=int, metavar="FRAMES", help="least length of a shape (default: as two frames at 24)")

@@ -38,7 +38,7 @@ class Lines(Events):
     def __init__(self) -> None:
         self._over = False
 
-    def start(self, options: Namespace) -> None:  # noqa: ARG002, D102
+    def start(self, options: Namespace) -> None:  # noqa: D102, ARG002
         self.say("start")
 
     def say(self, kind: str, /, **fields: Any) -> None:
@@ -92,7 +92,7 @@ class Status(Events):
         self.say("success", "Info", "Application terminating normally.")
         self._over = True
 
-    def fail(self, reason: str, code: int) -> None:  # noqa: ARG002, D102
+    def fail(self, reason: str, code: int) -> None:  # noqa: D102, ARG002
         with suppress(OSError):  # nobody is there to be told
             self.say("failure", "Fatal", f"Application terminating with error: {reason}", reason=reason)
         self._over = True

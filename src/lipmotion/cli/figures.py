@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 from lipmotion.cli.options import add_machine_readable
-from lipmotion.cli.paths import add_force, add_output
+from lipmotion.cli.paths import add_output
 from lipmotion.cli.speech import add_lexicon_argument
 
 Figures = dict[str, Any]
@@ -16,8 +16,7 @@ Figures = dict[str, Any]
 def add_figures_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the lexicon, where figures go, and ``--machine-readable``."""
     add_lexicon_argument(parser)
-    add_output(parser, "-o", "--output", metavar="FILE.json", help="write all figures here as well")
-    add_force(parser)
+    add_output(parser, "-o", "--output", force=True, metavar="FILE.json", help="write all figures here as well")
     add_machine_readable(parser)
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from lipmotion.files import work_folder
-from lipmotion.sources import Source, check_apart
+from lipmotion.sources import Source, check_apart, is_folder
 
 
 @dataclass(frozen=True)
@@ -19,12 +19,14 @@ class Reads:
     name        : of the option in the namespace
     what        : what it is, in a word
     replaceable : read whole before anything is written
+    is_text     : may be a text instead, or a name that means something: then a folder of that name is not meant
     otherwise   : gives what is read where the argument is left out
     """
 
     name: str
     what: str
     replaceable: bool
+    is_text: bool
     otherwise: Callable[[], Path] | None
 
 
@@ -51,21 +53,23 @@ def add_input(
 ) -> None:
     """Add an argument that names a file or a folder to read; the rest as ``add_argument``."""
     action = parser.add_argument(*names, **({"type": Path} | more))
-    _declare(parser, "reads", Reads(action.dest, what, replaceable, otherwise))
+    _declare(parser, "reads", Reads(action.dest, what, replaceable, action.type is str, otherwise))
 
 
 def add_output(
-    parser: argparse.ArgumentParser, *names: str, is_folder: bool = False, keeps: bool = False, **more: Any
+    parser: argparse.ArgumentParser,
+    *names: str,
+    is_folder: bool = False,
+    keeps: bool = False,
+    force: bool = False,
+    **more: Any,
 ) -> None:
-    """Add an argument that names a file or a folder to write; the rest as ``add_argument``."""
+    """Add an argument that names a file or a folder to write, and with ``force`` that option; the rest as there."""
     action = parser.add_argument(*names, **({"type": Path} | more))
     _declare(parser, "writes", Writes(action.dest, is_folder, keeps))
-
-
-def add_force(parser: argparse.ArgumentParser) -> None:
-    """Add ``--force``."""
-    explained = "let an output replace a text, units or model file that is read; never a recording or a corpus"
-    parser.add_argument("--force", action="store_true", help=explained)
+    if force:
+        explained = "let an output replace a text, units or model file that is read; never a recording or a corpus"
+        parser.add_argument("--force", action="store_true", help=explained)
 
 
 def check_paths(options: argparse.Namespace) -> None:
@@ -82,7 +86,8 @@ def check_paths(options: argparse.Namespace) -> None:
 def _sources(options: argparse.Namespace) -> Iterator[Source]:
     for one in options.reads:
         found = _paths(getattr(options, one.name)) or ([one.otherwise()] if one.otherwise else [])
-        yield from (Source(path, one.what, one.replaceable) for path in found)
+        meant = [path for path in found if not (one.is_text and is_folder(path))]
+        yield from (Source(path, one.what, one.replaceable) for path in meant)
 
 
 def _paths(value: Any) -> list[Path]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from lipmotion.errors import printable
 from lipmotion.experiment.comparison import mark
 from lipmotion.experiment.rivals import BEST, PRINTED
 from lipmotion.measures.report import number
@@ -36,7 +37,7 @@ def table(figures: Mapping[str, Any]) -> str:
     for kind in dict.fromkeys(row["kind"] for row in figures["noise"]):
         lines += ["", *_noise(kind, figures)]
     lines += ["", f"* differs from {BEST}: the 95 % interval of the difference on the same clips leaves out 0"]
-    return "\n".join(lines)
+    return "\n".join(map(printable, lines))
 
 
 def _compared(channels: Sequence[str]) -> str:

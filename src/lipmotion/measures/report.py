@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from lipmotion.errors import printable
+
 
 def table(figures: Mapping[str, Any]) -> str:
     """Return the figures of ``lipmotion.evaluate`` as text."""
@@ -25,7 +27,7 @@ def table(figures: Mapping[str, Any]) -> str:
                 f"{number(row['jerk'], '7.2f')}"
             )
         lines += _rest(condition)
-    return "\n".join(lines)
+    return "\n".join(map(printable, lines))
 
 
 def _pictured(condition: Mapping[str, Any]) -> dict[str, Any]:
