@@ -55,7 +55,7 @@ def _clash(target: Path, source: Path, *, holds: bool) -> str:
     if is_folder(source):
         if any(is_same(folder, source) for folder in place.parents):
             return "lies in"
-        if place.is_file() and _is_in(source, place):
+        if _status(place) and not is_folder(place) and _is_in(source, place):
             return "belongs to"
     return (
         "holds"
