@@ -16,7 +16,7 @@ from lipmotion.cli.events import Events
 from lipmotion.cli.output import flush_output, own, refused, say
 from lipmotion.cli.paths import check_paths
 from lipmotion.cli.stop import Stopper
-from lipmotion.errors import printable
+from lipmotion.printable import printable
 
 VERBS = (animate, explain, cues, corpus, train, adapt, evaluate, experiment, info)
 EXIT_CODES = """exit codes: 0 done, 1 a bug, 2 wrong command line, 3 unusable input, 4 corpus, 5 alignment,

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from lipmotion.errors import InputError, LipMotionError, printable
+from lipmotion.errors import InputError, LipMotionError
+from lipmotion.printable import printable
 
 
 def outcome(error: BaseException) -> tuple[int, str] | None:

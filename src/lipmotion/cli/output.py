@@ -11,7 +11,8 @@ import sys
 from contextlib import suppress
 from typing import Any
 
-from lipmotion.errors import ExportError, printable
+from lipmotion.errors import ExportError
+from lipmotion.printable import printable
 
 LINE_START = "\r\x1b[K"
 """Over what is left of a progress bar, on a terminal."""

@@ -12,7 +12,7 @@ from typing import Any, Protocol
 from lipmotion.cli.events import Lines
 from lipmotion.cli.output import complain, own, say_lines
 from lipmotion.cli.stop import Stopper
-from lipmotion.errors import printable
+from lipmotion.printable import printable
 from lipmotion.types.progress import Item, Progress
 
 

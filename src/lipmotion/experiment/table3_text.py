@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from lipmotion.errors import printable
 from lipmotion.experiment.comparison import mark
 from lipmotion.experiment.rivals import BEST, PRINTED
 from lipmotion.measures.report import number
+from lipmotion.printable import printable
 
 WIDTH = 27
 FEW = 8

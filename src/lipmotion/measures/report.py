@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from lipmotion.errors import printable
+from lipmotion.printable import printable
 
 
 def table(figures: Mapping[str, Any]) -> str:

@@ -9,9 +9,10 @@ from textwrap import wrap
 from typing import Any
 
 from lipmotion.engines.base import frame_of
-from lipmotion.errors import InputError, printable
+from lipmotion.errors import InputError
 from lipmotion.pipeline.hear import heard
 from lipmotion.pipeline.model import Model, load_model
+from lipmotion.printable import printable
 from lipmotion.speech.mfcc import frame_count
 from lipmotion.speech.read import read_audio
 from lipmotion.types import (

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import printable
+from lipmotion.printable import printable
 
 Context = tuple[str, ...]
 """What a state depends on, one name a place (left neighbour, unit, right neighbour)."""

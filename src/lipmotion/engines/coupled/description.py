@@ -9,7 +9,7 @@ from lipmotion.engines.coupled.conversion import group_of
 from lipmotion.engines.coupled.learned import CoupledModel
 from lipmotion.engines.coupled.product import Product
 from lipmotion.engines.coupled.systems import COUPLED, FACTORIAL, HMM, MULTISTREAM
-from lipmotion.errors import printable
+from lipmotion.printable import printable
 
 KINDS = {
     HMM: "one chain, one mixture over all streams",

@@ -17,7 +17,8 @@ from lipmotion.engines.trajectory.generation import Statistics, generated_motion
 from lipmotion.engines.trajectory.learning import Learning
 from lipmotion.engines.trajectory.model import TrajectoryModel, model_arrays, model_from_arrays
 from lipmotion.engines.trajectory.train import fit_trajectory
-from lipmotion.errors import InputError, printable
+from lipmotion.errors import InputError
+from lipmotion.printable import printable
 from lipmotion.stats.checkpoint import NOTHING_KEPT, Checkpoint
 from lipmotion.types import (
     FRAME_RATE_HZ,

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from lipmotion.engines.trajectory.joint.densities import Sums
 from lipmotion.engines.trajectory.joint.inventory import Inventory, Place
 from lipmotion.engines.trajectory.joint.streams import MOTION
-from lipmotion.errors import printable
+from lipmotion.printable import printable
 from lipmotion.stats.trees import Context, Question, Tree, gaussian_likelihood, grow, multispace_likelihood
 
 

@@ -12,7 +12,8 @@ from lipmotion.engines.trajectory.joint.densities import Scale, Tied
 from lipmotion.engines.trajectory.joint.forest import Forest
 from lipmotion.engines.trajectory.joint.inventory import Inventory, Place
 from lipmotion.engines.trajectory.joint.streams import Observed, StreamWeights
-from lipmotion.errors import InputError, printable
+from lipmotion.errors import InputError
+from lipmotion.printable import printable
 from lipmotion.stats.bigram import Bigram
 
 HEARD_ONLY = StreamWeights(motion=0.0)
