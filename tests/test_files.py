@@ -6,9 +6,11 @@ import sys
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from pathlib import Path
+from types import FrameType
 
 import pytest
 
+from lipmotion import files
 from lipmotion.errors import ExportError
 from lipmotion.files import (
     LOCK,
@@ -277,3 +279,37 @@ def test_two_outputs_that_are_one(tmp_path: Path) -> None:
         with pytest.raises(ExportError, match="is given twice"):
             check_distinct([tmp_path / one, tmp_path / other])
     check_distinct([tmp_path / "a", tmp_path / "b", tmp_path / "c"])
+
+
+def interrupted(folder: Path, step: int) -> bool:
+    """Hold a folder for a moment, with an interrupt at a step of doing so; whether there were as many steps."""
+    seen = 0
+
+    def trace(frame: FrameType, event: str, _: object) -> Callable[..., object] | None:
+        nonlocal seen
+        if frame.f_code.co_filename != files.__file__:
+            return None
+        seen += event == "line"
+        if seen == step:
+            seen += 1
+            raise KeyboardInterrupt
+        return trace
+
+    before = sys.gettrace()
+    sys.settrace(trace)
+    try:
+        with locked(folder):
+            pass
+    except KeyboardInterrupt:
+        return True
+    finally:
+        sys.settrace(before)
+    return False
+
+
+def test_an_interrupt_at_any_step_leaves_no_lock(tmp_path: Path) -> None:
+    step = 1
+    while interrupted(tmp_path, step):
+        assert names(tmp_path) == [], step
+        step += 1
+    assert step > 20

@@ -89,6 +89,14 @@ def check_regular(path: Path, kind: str) -> None:
         raise InputError(f"{path}: is a pipe or a device, required a file; save the {kind} first")
 
 
+def check_listable(folder: Path) -> None:
+    """Raise InputError if a folder may not be looked into: what looks for files in it would just find none."""
+    try:
+        os.scandir(folder).close()
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be read: {error.strerror or error}; ask its owner, or copy it") from error
+
+
 def text_in(path: Path, kind: str) -> str:
     """Return the text of a file, without a byte order mark.
 
@@ -241,19 +249,23 @@ def locked(folder: Path) -> Iterator[None]:
     file = None
     try:
         try:
-            folder.mkdir(parents=True, exist_ok=True)
-            file = _held(path)
-        except FileExistsError as error:
-            raise ExportError(f"{folder}: is a file; give the name of a new or an empty folder") from error
-        except OSError as error:
-            raise _refused(folder, error) from error
-        yield
-    finally:
-        try:
+            file = _lock_in(folder)
+            yield
+        finally:
             _let_go(path, file)
-        except BaseException:  # an interrupt; a second one does not follow at once
-            _let_go(path, file)
-            raise
+    except BaseException:  # an interrupt may have come while letting go; a second one does not follow at once
+        _let_go(path, file)
+        raise
+
+
+def _lock_in(folder: Path) -> IO[bytes]:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        return _held(folder / LOCK)
+    except FileExistsError as error:
+        raise ExportError(f"{folder}: is a file; give the name of a new or an empty folder") from error
+    except OSError as error:
+        raise _refused(folder, error) from error
 
 
 def _let_go(path: Path, file: IO[bytes] | None) -> None:
@@ -270,28 +282,39 @@ def _let_go(path: Path, file: IO[bytes] | None) -> None:
 
 def _held(path: Path) -> IO[bytes]:
     while True:
-        file = path.open("a+b", buffering=0)
+        file = None
         try:
+            file = path.open("a+b", buffering=0)
             _lock(file)
-            if os.path.samestat(os.fstat(file.fileno()), path.stat()):
-                break
+            if _is_there(path, file):
+                with suppress(OSError):  # a full disk
+                    file.truncate(0)
+                    file.write(str(os.getpid()).encode())
+                return file
+            file.close()  # whoever held it has just deleted it
         except BlockingIOError as error:
-            file.seek(0)
-            owner = file.read().decode(errors="replace") or "unknown"
-            file.close()
-            raise ExportError(
-                f"{path.parent}: another lipmotion (process {owner}) is at work on it; wait for it, or stop it"
-            ) from error
-        except FileNotFoundError:
-            pass
+            raise _busy(path, file) from error
         except BaseException:
-            file.close()
+            if file is not None:
+                file.close()
             raise
-        file.close()  # whoever held it has just deleted it
-    with suppress(OSError):  # a full disk
-        file.truncate(0)
-        file.write(str(os.getpid()).encode())
-    return file
+
+
+def _is_there(path: Path, file: IO[bytes]) -> bool:
+    try:
+        return os.path.samestat(os.fstat(file.fileno()), path.stat())
+    except FileNotFoundError:
+        return False
+
+
+def _busy(path: Path, file: IO[bytes] | None) -> ExportError:
+    owner = b""
+    if file is not None:
+        with file:
+            file.seek(0)
+            owner = file.read()
+    who = owner.decode(errors="replace") or "unknown"
+    return ExportError(f"{path.parent}: another lipmotion (process {who}) is at work on it; wait for it, or stop it")
 
 
 if sys.platform == "win32":

@@ -12,6 +12,7 @@ from lipmotion.corpora.entry import is_name, read_entry, read_utterance, write_u
 from lipmotion.corpora.splits import SPLITS
 from lipmotion.errors import CorpusError, ExportError
 from lipmotion.files import TEMPORARY, remove_unfinished, text_in, whole_file
+from lipmotion.sources import is_folder
 from lipmotion.types import Utterance
 
 FORMAT = "lipmotion.corpus"
@@ -37,7 +38,7 @@ class Corpus:
     def open(cls, path: str | Path) -> Corpus:
         """Return an existing corpus. Raises CorpusError: missing, not a corpus, or of a newer version."""
         path = Path(path)
-        if not path.is_dir():
+        if not is_folder(path):
             raise CorpusError(f"{path}: no such corpus; make one: lipmotion corpus prepare RECORDINGS -o {path}")
         return cls(path, _read_manifest(path / MANIFEST))
 

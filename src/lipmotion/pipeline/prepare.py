@@ -20,7 +20,7 @@ from lipmotion.errors import CorpusError, ExportError, InputError, MissingDepend
 from lipmotion.files import locked, remove_unfinished, sha256_of
 from lipmotion.pipeline.given import DIGESTS, digest, given_phones, given_track
 from lipmotion.pipeline.workers import working
-from lipmotion.sources import Source, check_apart
+from lipmotion.sources import Source, check_apart, is_folder
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.read import read_audio
 from lipmotion.types import Item, Monitor, Progress, Track, Utterance, silent_monitor
@@ -113,7 +113,7 @@ def prepare(
     check_apart((), [Source(directory, "folder of recordings")], folders=[output])
     found = discover(directory)
     packages = versions() if any(item.curves is None for item in found.items) else {}
-    is_new = not output.exists()
+    is_new = not is_folder(output)
     with locked(output):
         corpus = Corpus.create(output)
         jobs = [_job(item, directory.resolve(), corpus, packages, crops) for item in found.items]
