@@ -12,7 +12,6 @@ from lipmotion.corpora.entry import is_name, read_entry, read_utterance, write_u
 from lipmotion.corpora.splits import SPLITS
 from lipmotion.errors import CorpusError, ExportError
 from lipmotion.files import TEMPORARY, remove_unfinished, text_in, whole_file
-from lipmotion.sources import is_folder
 from lipmotion.types import Utterance
 
 FORMAT = "lipmotion.corpus"
@@ -38,7 +37,11 @@ class Corpus:
     def open(cls, path: str | Path) -> Corpus:
         """Return an existing corpus. Raises CorpusError: missing, not a corpus, or of a newer version."""
         path = Path(path)
-        if not is_folder(path):
+        try:
+            is_there = path.is_dir()
+        except PermissionError as error:
+            raise CorpusError(f"{path}: cannot be read: {error.strerror}; ask its owner, or copy it") from error
+        if not is_there:
             raise CorpusError(f"{path}: no such corpus; make one: lipmotion corpus prepare RECORDINGS -o {path}")
         return cls(path, _read_manifest(path / MANIFEST))
 
