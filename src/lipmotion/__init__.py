@@ -12,8 +12,6 @@ from __future__ import annotations
 
 TYPE_CHECKING = False  # as in typing, which takes longer to import than Ctrl-C should wait for an answer
 if TYPE_CHECKING:
-    from typing import Any
-
     from lipmotion.corpora.store import Corpus
     from lipmotion.engines import engine_named
     from lipmotion.export.base import read_motion
@@ -79,7 +77,7 @@ _HOMES = {
 }
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     if name not in __all__:
         raise AttributeError(f"module 'lipmotion' has no attribute {name!r}")
     from importlib import import_module
