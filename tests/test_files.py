@@ -6,13 +6,16 @@ import sys
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from pathlib import Path
+from types import FrameType
 
 import pytest
 
+from lipmotion import files
 from lipmotion.errors import ExportError
 from lipmotion.files import (
     LOCK,
     TEMPORARY,
+    check_distinct,
     check_target,
     locked,
     remove_unfinished,
@@ -223,3 +226,90 @@ def test_work_without_a_result_leaves_nothing(tmp_path: Path) -> None:
     assert names(tmp_path) == []
     with pytest.raises(ExportError, match="does not exist"), unfinished_work(tmp_path / "missing" / "model"):
         raise AssertionError
+
+
+def test_a_link_is_written_through(tmp_path: Path) -> None:
+    (tmp_path / "there").mkdir()
+    for name, target in (("a.json", "there/b.json"), ("c.json", "a.json")):
+        (tmp_path / name).symlink_to(target)
+    for name in ("c.json", "a.json"):
+        with whole_file(tmp_path / name) as unfinished:
+            assert unfinished.parent == (tmp_path / "there").resolve()
+            unfinished.write_text(name)
+        assert (tmp_path / "there" / "b.json").read_text() == name
+    assert names(tmp_path) == ["a.json", "c.json", "there"]
+    assert names(tmp_path / "there") == ["b.json"]
+    assert all((tmp_path / name).is_symlink() for name in ("a.json", "c.json"))
+
+
+def test_a_link_is_replaced_where_it_must_not_lead_away(tmp_path: Path) -> None:
+    (tmp_path / "precious").write_text("old")
+    (tmp_path / "corpus.json").symlink_to("precious")
+    with whole_file(tmp_path / "corpus.json", follow=False) as unfinished:
+        unfinished.write_text("new")
+    assert not (tmp_path / "corpus.json").is_symlink()
+    assert (tmp_path / "precious").read_text() == "old"
+
+
+def test_a_link_that_leads_nowhere(tmp_path: Path) -> None:
+    (tmp_path / "loop").symlink_to("loop")
+    (tmp_path / "away").symlink_to("missing/b.json")
+    for name, words in (("loop", "leads back to itself"), ("away", "the folder .*missing does not exist")):
+        with pytest.raises(ExportError, match=words):
+            check_target(tmp_path / name)
+        with pytest.raises(ExportError, match=words), whole_file(tmp_path / name):
+            raise AssertionError
+    assert names(tmp_path) == ["away", "loop"]
+
+
+def test_unfinished_work_lies_beside_what_a_link_points_to(tmp_path: Path) -> None:
+    (tmp_path / "there").mkdir()
+    (tmp_path / "m").symlink_to("there/model")
+    with unfinished_work(tmp_path / "m") as folder:
+        assert folder == (tmp_path / "there").resolve() / "model.unfinished"
+    assert names(tmp_path / "there") == []
+
+
+def test_two_outputs_that_are_one(tmp_path: Path) -> None:
+    (tmp_path / "a").touch()
+    (tmp_path / "soft").symlink_to("a")
+    (tmp_path / "new").symlink_to("b")
+    os.link(tmp_path / "a", tmp_path / "hard")
+    for one, other in (("a", "soft"), ("hard", "a"), ("new", "b"), ("c", "../" + tmp_path.name + "/c")):
+        with pytest.raises(ExportError, match="is given twice"):
+            check_distinct([tmp_path / one, tmp_path / other])
+    check_distinct([tmp_path / "a", tmp_path / "b", tmp_path / "c"])
+
+
+def interrupted(folder: Path, step: int) -> bool:
+    """Hold a folder for a moment, with an interrupt at a step of doing so; whether there were as many steps."""
+    seen = 0
+
+    def trace(frame: FrameType, event: str, _: object) -> Callable[..., object] | None:
+        nonlocal seen
+        if frame.f_code.co_filename != files.__file__:
+            return None
+        seen += event == "line"
+        if seen == step:
+            seen += 1
+            raise KeyboardInterrupt
+        return trace
+
+    before = sys.gettrace()
+    sys.settrace(trace)
+    try:
+        with locked(folder):
+            pass
+    except KeyboardInterrupt:
+        return True
+    finally:
+        sys.settrace(before)
+    return False
+
+
+def test_an_interrupt_at_any_step_leaves_no_lock(tmp_path: Path) -> None:
+    step = 1
+    while interrupted(tmp_path, step):
+        assert names(tmp_path) == [], step
+        step += 1
+    assert step > 20

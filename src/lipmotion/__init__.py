@@ -10,8 +10,7 @@ Names are imported when they are first used: ``import lipmotion`` alone costs no
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
+TYPE_CHECKING = False  # as in typing, which takes longer to import than Ctrl-C should wait for an answer
 if TYPE_CHECKING:
     from lipmotion.corpora.store import Corpus
     from lipmotion.engines import engine_named
@@ -78,7 +77,7 @@ _HOMES = {
 }
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     if name not in __all__:
         raise AttributeError(f"module 'lipmotion' has no attribute {name!r}")
     from importlib import import_module

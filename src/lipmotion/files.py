@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from lipmotion.errors import ExportError, InputError
+from lipmotion.sources import Source, check_apart, is_same
 
 if sys.platform == "win32":
     import msvcrt
@@ -88,6 +89,14 @@ def check_regular(path: Path, kind: str) -> None:
         raise InputError(f"{path}: is a pipe or a device, required a file; save the {kind} first")
 
 
+def check_listable(folder: Path) -> None:
+    """Raise InputError if a folder may not be looked into: what looks for files in it would just find none."""
+    try:
+        os.scandir(folder).close()
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be read: {error.strerror or error}; ask its owner, or copy it") from error
+
+
 def text_in(path: Path, kind: str, largest: int = LARGEST_TEXT) -> str:
     """Return the text of a file, without a byte order mark.
 
@@ -112,20 +121,20 @@ def check_target(target: Path, source: str | Path | None = None) -> None:
     """
     try:
         is_folder = target.is_dir()
-    except OSError as error:  # a name too long
+        _check_parent(_place(target))
+    except OSError as error:  # a name too long, a folder that may not be looked into
         raise ExportError(f"{target}: cannot be written: {error.strerror or error}") from error
     if is_folder:
         raise ExportError(f"{target}: is a folder; give the name of a file in it")
-    _check_parent(target)
-    if source is not None and target.exists() and Path(source).exists() and target.samefile(source):
-        raise ExportError(f"{target}: is the recording itself; give another name")
+    if source is not None:
+        check_apart([target], [Source(Path(source), "recording")])
 
 
 def check_distinct(targets: Sequence[Path]) -> None:
     """Raise ExportError if two outputs are one file."""
-    places = [target.parent.resolve() / target.name for target in targets]
+    places = [os.path.realpath(target) for target in targets]
     for number, place in enumerate(places):
-        if place in places[:number]:
+        if any(place == other or is_same(place, other) for other in places[:number]):
             raise ExportError(f"{targets[number]}: is given twice; give every output another name")
 
 
@@ -139,9 +148,9 @@ def _check_parent(target: Path) -> None:
         raise ExportError(f"{target}: the folder {target.parent} does not exist; create it first")
 
 
-def _temporary(target: Path) -> Path:
+def _temporary(target: Path, suffix: str) -> Path:
     _check_parent(target)
-    return target.with_name(f"{_prefix(target)}{os.getpid()}-{uuid.uuid4().hex[:8]}{target.suffix.lower()}")
+    return target.with_name(f"{_prefix(target)}{os.getpid()}-{uuid.uuid4().hex[:8]}{suffix.lower()}")
 
 
 def _prefix(target: Path) -> str:
@@ -172,17 +181,31 @@ def _is_alive(process: str) -> bool:
     return True
 
 
+def _place(target: Path) -> Path:
+    """Return where an output goes: to what a link points to, so that the link stays one."""
+    try:
+        place = Path(os.path.realpath(target)) if target.is_symlink() else target
+        endless = place.is_symlink()
+    except OSError as error:
+        raise _refused(target, error) from error
+    if endless:
+        raise ExportError(f"{target}: is a link that leads back to itself; give the name of a file")
+    return place
+
+
 @contextmanager
-def whole_file(target: Path) -> Iterator[Path]:
+def whole_file(target: Path, *, follow: bool = True) -> Iterator[Path]:
     """Give a temporary path to write to, with the target's suffix (lower case); rename it to ``target`` on success.
 
+    follow : where ``target`` is a link, write what it points to; else the file takes the place of the link
     Raises ExportError: the folder does not exist, or the file cannot be written (disk full, no permission).
     """
-    temporary = _temporary(target)
-    _sweep(target)
+    place = _place(target) if follow else target
+    temporary = _temporary(place, target.suffix)
     try:
+        _sweep(place)
         yield temporary
-        temporary.replace(target)
+        temporary.replace(place)
     except OSError as error:
         raise _refused(target, error) from error
     finally:
@@ -196,7 +219,7 @@ def whole_folder(target: Path) -> Iterator[Path]:
 
     Raises ExportError: the parent does not exist, or something cannot be written.
     """
-    temporary = _temporary(target)
+    temporary = _temporary(target, target.suffix)
     try:
         temporary.mkdir()
         yield temporary
@@ -223,43 +246,75 @@ def locked(folder: Path) -> Iterator[None]:
     Raises ExportError: another process holds it, or it cannot be made.
     """
     path = folder / LOCK
+    file = None
+    try:
+        try:
+            file = _lock_in(folder)
+            yield
+        finally:
+            _let_go(path, file)
+    except BaseException:  # an interrupt may have come while letting go; a second one does not follow at once
+        _let_go(path, file)
+        raise
+
+
+def _lock_in(folder: Path) -> IO[bytes]:
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        file = _held(path)
+        return _held(folder / LOCK)
     except FileExistsError as error:
         raise ExportError(f"{folder}: is a file; give the name of a new or an empty folder") from error
     except OSError as error:
         raise _refused(folder, error) from error
-    try:
-        yield
-    finally:
-        if sys.platform == "win32":
-            file.close()
-        path.unlink(missing_ok=True)
-        file.close()
+
+
+def _let_go(path: Path, file: IO[bytes] | None) -> None:
+    """Delete a lock: that of ``file`` or, where an interrupt came between making and keeping it, one nobody holds."""
+    with suppress(OSError):  # none there, or another's
+        is_held = file is not None and not file.closed
+        with file if file is not None and is_held else path.open("r+b", buffering=0) as lock:
+            if not is_held:
+                _lock(lock)
+            if sys.platform == "win32":
+                lock.close()
+            path.unlink()
 
 
 def _held(path: Path) -> IO[bytes]:
     while True:
-        file = path.open("a+b", buffering=0)
+        file = None
         try:
+            file = path.open("a+b", buffering=0)
             _lock(file)
-            if os.path.samestat(os.fstat(file.fileno()), path.stat()):
-                break
+            if _is_there(path, file):
+                with suppress(OSError):  # a full disk
+                    file.truncate(0)
+                    file.write(str(os.getpid()).encode())
+                return file
+            file.close()  # whoever held it has just deleted it
         except BlockingIOError as error:
+            raise _busy(path, file) from error
+        except BaseException:
+            if file is not None:
+                file.close()
+            raise
+
+
+def _is_there(path: Path, file: IO[bytes]) -> bool:
+    try:
+        return os.path.samestat(os.fstat(file.fileno()), path.stat())
+    except FileNotFoundError:
+        return False
+
+
+def _busy(path: Path, file: IO[bytes] | None) -> ExportError:
+    owner = b""
+    if file is not None:
+        with file:
             file.seek(0)
-            owner = file.read().decode(errors="replace") or "unknown"
-            file.close()
-            raise ExportError(
-                f"{path.parent}: another lipmotion (process {owner}) is at work on it; wait for it, or stop it"
-            ) from error
-        except FileNotFoundError:
-            pass
-        file.close()  # whoever held it has just deleted it
-    with suppress(OSError):  # a full disk
-        file.truncate(0)
-        file.write(str(os.getpid()).encode())
-    return file
+            owner = file.read()
+    who = owner.decode(errors="replace") or "unknown"
+    return ExportError(f"{path.parent}: another lipmotion (process {who}) is at work on it; wait for it, or stop it")
 
 
 if sys.platform == "win32":
@@ -291,7 +346,8 @@ def unfinished_work(target: Path) -> Iterator[Path]:
     Raises ExportError: the file could not be put there, or another process is at work on it.
     """
     check_target(target)
-    folder = target.with_name(target.name + UNFINISHED)
+    target = _place(target)
+    folder = work_folder(target)
     try:
         with locked(folder):
             remove_unfinished(folder)
@@ -306,6 +362,12 @@ def unfinished_work(target: Path) -> Iterator[Path]:
     finally:
         with suppress(OSError):  # there is something in it to go on from
             folder.rmdir()
+
+
+def work_folder(target: Path) -> Path:
+    """Return the folder that ``unfinished_work`` gives."""
+    target = _place(target)
+    return target.with_name(target.name + UNFINISHED)
 
 
 def remove_unfinished(folder: Path) -> None:

@@ -47,7 +47,7 @@ def test_a_wrong_command_line(run: Run, arguments: list[str]) -> None:
     ("error", "code", "line"),
     [
         (LipMotionError("what"), 1, "lipmotion: error: what"),
-        (AlignmentError("two\n  lines"), 5, "lipmotion: error: two lines"),
+        (AlignmentError("two\n  lines"), 5, "lipmotion: error: two\\n  lines"),
         (MissingDependencyError("pip install it"), 8, "lipmotion: error: pip install it"),
         (
             PermissionError(13, "Permission denied", "a.json"),

@@ -7,12 +7,15 @@ import logging
 import os
 import sys
 from argparse import Namespace
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
 
 from cli.conftest import Done, Run
 from lipmotion.cli import evaluate
+from lipmotion.cli.events import Events, Lines
+from lipmotion.cli.main import main
 from lipmotion.cli.progress import reporting
 from lipmotion.cli.stop import Stopper
 from lipmotion.corpora.store import Corpus
@@ -33,7 +36,9 @@ def objects(done: Done) -> list[dict[str, object]]:
 
 
 def options(machine_readable: bool) -> Namespace:
-    return Namespace(machine_readable=machine_readable, stopper=Stopper())
+    return Namespace(
+        machine_readable=machine_readable, stopper=Stopper(), events=Lines() if machine_readable else Events()
+    )
 
 
 def test_every_event_is_one_json_object_on_a_line(capsys: pytest.CaptureFixture[str]) -> None:
@@ -45,7 +50,6 @@ def test_every_event_is_one_json_object_on_a_line(capsys: pytest.CaptureFixture[
     out, err = capsys.readouterr()
     assert err == ""
     assert [json.loads(line) for line in out.splitlines()] == [
-        {"type": "start"},
         {"type": "progress", "stage": "first", "step": 0, "steps": 2, "value": 0.0},
         {"type": "item", "name": "a", "outcome": "prepared", "reason": ""},
         {"type": "progress", "stage": "first", "step": 1, "steps": 2, "value": 0.25},
@@ -61,7 +65,7 @@ def test_where_nobody_watches_only_warnings_and_the_result_are_said(capsys: pyte
         for event in EVENTS:
             report.hear(event)
         report.finish("done", used=3, kind="video")
-    assert capsys.readouterr() == ("done\n", "lipmotion: warning: skipped b: no face anywhere\n")
+    assert capsys.readouterr() == ("done\n", "lipmotion: warning: skipped b: no face\\nanywhere\n")
 
 
 def test_a_terminal_gets_a_bar(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -76,7 +80,7 @@ def test_a_terminal_gets_a_bar(capsys: pytest.CaptureFixture[str], monkeypatch: 
     assert "25%" in err
     assert "second (2/2)" in err
     assert "100%" in err
-    assert "lipmotion: warning: skipped b: no face anywhere\n" in err
+    assert "lipmotion: warning: skipped b: no face\\nanywhere\n" in err
 
 
 def test_training_for_a_program(run: Run, toy_corpus: Corpus, here: Path) -> None:
@@ -109,16 +113,35 @@ def test_a_failure_is_said_to_both(run: Run) -> None:
 @pytest.mark.parametrize(
     ("error", "code", "reason"),
     [
-        (CorpusError("two\nlines"), 4, "two lines"),
+        (CorpusError("two\nlines"), 4, "two\\nlines"),
         (KeyboardInterrupt(), 130, "stopped; run the same command again to go on"),
         (ZeroDivisionError("what"), 1, "ZeroDivisionError: what"),
     ],
 )
-def test_why_it_failed(error: BaseException, code: int, reason: str, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(type(error)), reporting(options(machine_readable=True)):
+def test_why_it_failed(
+    error: BaseException,
+    code: int,
+    reason: str,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def fail(_: Namespace) -> None:
         raise error
-    last = json.loads(capsys.readouterr().out.splitlines()[-1])
-    assert last == {"type": "failure", "reason": reason, "exit_code": code}
+
+    monkeypatch.setattr(evaluate, "run", fail)
+    with suppress(ZeroDivisionError):  # a bug is not hidden
+        assert main(["evaluate", "m", "c", "--machine-readable"]) == code
+    said = capsys.readouterr()
+    start, last = map(json.loads, said.out.splitlines())
+    assert (start, last) == ({"type": "start"}, {"type": "failure", "reason": reason, "exit_code": code})
+    assert said.err.endswith(f"{reason}\n") or code == 1
+
+
+def test_an_error_on_the_command_line_is_a_failure_too(run: Run) -> None:
+    done = run("evaluate", "--machine-readable")
+    assert done.code == 2
+    assert objects(done) == [{"type": "failure", "reason": "wrong command line", "exit_code": 2}]
+    assert done.err[-1].startswith("lipmotion evaluate: error: the following arguments are required")
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no /dev/full here")  # noqa: PTH110

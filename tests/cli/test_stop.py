@@ -1,20 +1,27 @@
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
 import sys
 import time
 from argparse import Namespace
+from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
 
+import lipmotion
+from cli import signalled
 from cli.conftest import Run
 from lipmotion.cli import info
-from lipmotion.cli.stop import Stopper
+from lipmotion.cli.stop import Stopped, Stopper
+from lipmotion.corpora.store import Corpus
 
 LINE = "lipmotion: stopped; run the same command again to go on"
+SOURCE = os.environ | {"PYTHONPATH": str(Path(lipmotion.__file__).parents[1])}
 BOTH = pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals as POSIX has them")
 
@@ -92,20 +99,39 @@ def test_while_packages_are_imported(number: signal.Signals, toy_speech: Path, h
     assert [path.name for path in here.iterdir() if path.name != "__pycache__"] == ["numpy.py"]
 
 
+PAUSING = """
+import os, signal, sys
+from lipmotion.cli.events import Lines
+from lipmotion.cli.main import main
+
+def pausing(self, kind, /, say=Lines.say, **fields):
+    say(self, kind, **fields)
+    if "pronunciations" in fields.get("stage", "") and Lines.say is pausing:
+        Lines.say = say
+        os.kill(os.getpid(), signal.SIGSTOP)
+
+Lines.say = pausing
+sys.exit(main())
+"""
+"""Training that waits, once it has something to go on from."""
+
+
 @BOTH
 def test_training_stopped_in_the_middle_goes_on(
     number: signal.Signals, toy_corpus, here: Path, run_outside: Run
 ) -> None:
     run_outside("train", toy_corpus.path, "-o", "whole.lipmotion")
-    command = [sys.executable, "-m", "lipmotion.cli.main", "train", str(toy_corpus.path), "-o", "m.lipmotion"]
-    with subprocess.Popen([*command, "--machine-readable"], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+    arguments = ["train", str(toy_corpus.path), "-o", "m.lipmotion"]
+    pausing = [sys.executable, "-c", PAUSING, *arguments, "--machine-readable"]
+    with subprocess.Popen(pausing, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         assert process.stdout is not None
         assert process.stderr is not None
-        for line in process.stdout:
-            if b"pronunciations" in line:
-                break
-        second = subprocess.run(command, capture_output=True, text=True, check=False)
+        assert os.WIFSTOPPED(os.waitpid(process.pid, os.WUNTRACED)[1])
+        second = subprocess.run(
+            [sys.executable, "-m", "lipmotion.cli.main", *arguments], capture_output=True, text=True, check=False
+        )
         process.send_signal(number)
+        process.send_signal(signal.SIGCONT)
         rest, said = process.stdout.read(), process.stderr.read()
     assert process.returncode == 128 + number
     assert said.decode() == LINE + "\n"
@@ -139,3 +165,106 @@ def test_impatience_ends_it() -> None:
         assert process.poll() is None
         process.send_signal(signal.SIGINT)
         assert process.wait(30) == 130
+
+
+def signalled_at(step: int, number: int, arguments: Sequence[object]) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, signalled.__file__, str(int(number)), str(step), *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
+
+
+def is_told(done: subprocess.CompletedProcess[str], number: int, alone: bool) -> bool:
+    """Whether a program was told, last and once, how it ended: stopped, or done, as the exit code says."""
+    events = [json.loads(line) for line in (done.stderr if alone else done.stdout).splitlines()]
+    ends = [event for event in events if event["type"] in ("success", "failure")]
+    stopped = done.returncode == 128 + number
+    good = ends == events[-1:] and (ends[0]["type"] == "success") == (done.returncode == 0)
+    if stopped:
+        good &= ends[0]["reason"] == LINE.removeprefix("lipmotion: ") and (alone or done.stderr == f"{LINE}\n")
+    return good
+
+
+@pytest.fixture
+def lines(
+    toy_speech: Path, toy_model_file: Path, toy_corpus: Corpus, here: Path
+) -> dict[str, tuple[list[object], bool, int]]:
+    """Commands; whether standard error is for events alone; the exit code of what comes to its end."""
+    own = ["--model", toy_model_file, "--recogniser", "own"]
+    return {
+        "cues": (["cues", toy_speech, *own, "-o", here / "a.tsv", "--machine-readable"], True, 0),
+        "cues of nothing": (["cues", here / "none.wav", *own, "--machine-readable"], True, 3),
+        "evaluate": (["evaluate", here / "none", toy_corpus.path, "--machine-readable"], False, 3),
+        "train": (["train", here / "none", "-o", here / "m", "--machine-readable"], False, 4),
+    }
+
+
+@pytest.mark.parametrize("name", ["cues", "cues of nothing", "evaluate", "train"])
+def test_whenever_the_signal_comes(name: str, lines: dict[str, tuple[list[object], bool, int]], here: Path) -> None:
+    """From the first call to the last moment of Python, a program is told once how it ended, and nothing is left."""
+    arguments, alone, code = lines[name]
+    assert signalled_at(0, signal.SIGTERM, arguments).returncode == code
+    steps = int((here / "steps").read_text())
+    (here / "steps").unlink()
+    early = [1, 20, steps // 2]
+    late = [steps - 12, steps - 1, signalled.RETURNED, signalled.CLEARED]
+    codes = set()
+    for turn, step in enumerate([*early, *late]):
+        number = (signal.SIGINT, signal.SIGTERM)[turn % 2]
+        done = signalled_at(step, number, arguments)
+        assert done.returncode in (code, 128 + number), (step, done)
+        assert (done.returncode == code) or step in range(1, steps), (step, done)
+        assert is_told(done, number, alone), (step, done)
+        assert {path.name for path in here.iterdir()} <= {"a.tsv"}
+        codes.add(done.returncode)
+    assert codes == {code, 130, 143}
+
+
+def test_a_late_signal_does_not_change_what_is_done(toy_model_file: Path, here: Path) -> None:
+    for number in (signal.SIGINT, signal.SIGTERM):
+        for step in (signalled.RETURNED, signalled.CLEARED):
+            done = signalled_at(step, number, ["info", toy_model_file])
+            assert (done.returncode, done.stderr) == (0, "")
+            assert done.stdout.startswith("file ")
+    assert list(here.iterdir()) == []
+
+
+def test_once_settled_a_signal_comes_too_late() -> None:
+    stopper = Stopper()
+    stopper.listen()
+    try:
+        stopper.settle()
+        signal.raise_signal(signal.SIGTERM)
+        stopper.check()
+        stopper.settle()
+        assert stopper.code is None
+    finally:
+        stopper.leave(for_good=False)
+
+
+def test_what_was_swallowed_is_not_settled() -> None:
+    stopper = Stopper()
+    stopper.listen()
+    try:
+        with suppress(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGTERM)
+        with pytest.raises(Stopped):
+            stopper.settle()
+        assert stopper.code == 143
+    finally:
+        stopper.leave(for_good=False)
+
+
+def test_little_is_loaded_before_signals_are_listened_to() -> None:
+    """Until then Python itself answers, with a traceback."""
+    program = (
+        "import sys; before = set(sys.modules); import lipmotion.cli.main; print(*sorted({*sys.modules} - before))"
+    )
+    done = subprocess.run([sys.executable, "-S", "-c", program], capture_output=True, text=True, check=True, env=SOURCE)
+    loaded = set(done.stdout.split())
+    assert {name for name in loaded if name.startswith("lipmotion")} == {
+        "lipmotion",
+        "lipmotion.cli",
+        "lipmotion.cli.events",
+        "lipmotion.cli.main",
+        "lipmotion.cli.stop",
+    }
+    assert not loaded & {"typing", "re", "json", "argparse", "logging", "numpy", "pathlib"}

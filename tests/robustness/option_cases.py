@@ -141,3 +141,27 @@ def _(bench: Bench) -> list[object]:
 @case(OUTPUTS, "a name that is no UTF-8", 0)
 def _(bench: Bench) -> list[object]:
     return bench.animate(output=os.fsdecode(b"a\xff.json"))
+
+
+def _input(name: str, says: str, *line: str) -> None:
+    @case(OUTPUTS, name, 7, says)
+    def _(bench: Bench) -> list[object]:
+        bench.file("words.txt", "papa mama")
+        (bench.folder / "link.json").symlink_to(bench.speech)
+        given = {"SPEECH": bench.speech, "MODEL": bench.model, "CORPUS": bench.corpus, "BAD": bench.folder}
+        return [
+            given.get(word, word.replace("CORPUS", str(bench.corpus)).replace("BAD", str(bench.folder)))
+            for word in line
+        ]
+
+
+_input(
+    "the transcript",
+    "is the transcript itself; give another name, or add --force to replace it",
+    *("cues", "SPEECH", "--transcript", "BAD/words.txt", "-f", "tsv", "-o", "BAD/words.txt"),
+)
+_input("a link to the recording", "is the recording itself", "animate", "SPEECH", "-o", "BAD/link.json")
+_input("the manifest of the corpus", "lies in the corpus", "train", "CORPUS", "-o", "CORPUS/corpus.json")
+_input("figures in the place of the model", "is the model itself", "evaluate", "MODEL", "CORPUS", "-o", "MODEL")
+_input("a corpus in its recordings", "lies in the folder of recordings", "corpus", "prepare", "BAD", "-o", "BAD/c")
+_input("the recording, with --force", "is the recording itself", "adapt", "SPEECH", "-o", "SPEECH", "--force")

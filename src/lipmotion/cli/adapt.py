@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
+from typing import Any
+
+from lipmotion.cli.output import say
+from lipmotion.cli.paths import add_input, add_output
+from lipmotion.cli.speech import add_model_argument
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb."""
     parser = verbs.add_parser("adapt", help="make a model hear a voice better, from recordings without transcripts")
-    parser.add_argument("recordings", type=Path, nargs="+", metavar="RECORDING", help="audio or video of this voice")
-    parser.add_argument("--model", type=Path, help="trained model (default: the one that ships with the package)")
-    parser.add_argument("-o", "--output", type=Path, required=True, metavar="MODEL")
+    voice: dict[str, Any] = {"nargs": "+", "metavar": "RECORDING", "help": "audio or video of this voice"}
+    add_input(parser, "recordings", what="recording", **voice)
+    add_model_argument(parser)
+    add_output(parser, "-o", "--output", force=True, required=True, metavar="MODEL")
     parser.set_defaults(run=run)
 
 
@@ -21,10 +26,9 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.pipeline.adapt import adapt
     from lipmotion.pipeline.model import save_model
 
-    for recording in options.recordings:
-        check_target(options.output, recording)
+    check_target(options.output)
     model = adapt(options.model, options.recordings)
     save_model(model, options.output)
     done = model.about["adapted"]
     text = f"{done['recordings']} recordings, {done['speech_s']} s of speech"
-    print(f"{options.output}: {text}; use it: lipmotion animate SPEECH -o FILE --model {options.output}")
+    say(f"{options.output}: {text}; use it: lipmotion animate SPEECH -o FILE --model {options.output}")

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
+from typing import Any
 
+from lipmotion.cli.output import say
+from lipmotion.cli.paths import add_output
 from lipmotion.cli.speech import add_speech_arguments, speech_arguments
 
 
@@ -12,15 +14,13 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb."""
     parser = verbs.add_parser("animate", help="turn speech into lip motion or an animated face")
     add_speech_arguments(parser)
-    parser.add_argument(
-        "-o", "--output", nargs="+", action="extend", required=True, help="FILE.mp4 .json .csv .npz, or several"
-    )
+    several: dict[str, Any] = {"type": str, "nargs": "+", "action": "extend", "required": True}
+    add_output(parser, "-o", "--output", force=True, help="FILE.mp4 .json .csv .npz, or several", **several)
     parser.add_argument("--rate", type=float, metavar="HZ", help="frames per second of motion files (default: 100)")
     parser.add_argument("--channels", metavar="NAME,NAME", help="write only these to motion files: opening,width,...")
     parser.add_argument("--fps", type=float, default=25.0, help="frames per second of videos (default: 25)")
-    parser.add_argument(
-        "--posteriors", type=Path, metavar="FILE.png", help="draw what the chains of a coupled model believe over time"
-    )
+    beliefs = "draw what the chains of a coupled model believe over time"
+    add_output(parser, "--posteriors", metavar="FILE.png", help=beliefs)
     parser.set_defaults(run=run)
 
 
@@ -42,4 +42,4 @@ def run(options: argparse.Namespace) -> None:
     about = {"speech": options.speech, "model": told["model"], "channels": channels}
     write(result, options.output, rate_hz=options.rate, fps=options.fps, **about)
     for path in [*options.output, *filter(None, [options.posteriors])]:
-        print(path)
+        say(path)

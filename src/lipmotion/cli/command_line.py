@@ -7,55 +7,62 @@ import errno
 import io
 import logging
 import sys
+import warnings
 from collections.abc import Sequence
+from typing import NoReturn
 
 from lipmotion.cli import adapt, animate, corpus, cues, evaluate, experiment, explain, info, train
-from lipmotion.cli.output import refused
+from lipmotion.cli.events import Events
+from lipmotion.cli.output import flush_output, own, refused, say
+from lipmotion.cli.paths import check_paths
 from lipmotion.cli.stop import Stopper
+from lipmotion.printable import printable
 
 VERBS = (animate, explain, cues, corpus, train, adapt, evaluate, experiment, info)
 EXIT_CODES = """exit codes: 0 done, 1 a bug, 2 wrong command line, 3 unusable input, 4 corpus, 5 alignment,
 6 model file, 7 output, 8 missing package, 130 interrupted, 143 terminated"""
 
 
-def run(arguments: Sequence[str] | None, stopper: Stopper) -> None:
+def run(arguments: Sequence[str] | None, stopper: Stopper, events: Events) -> None:
     """Run one command. Raises whatever it raises; SystemExit: help was asked for, or the command line is wrong."""
-    logging.basicConfig(format="lipmotion: warning: %(message)s", level=logging.WARNING)
+    _log_printable()
+    shown, warnings.showwarning = warnings.showwarning, _log_warning
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # a terminal may not know every letter of a file's name
     try:
-        options = _parser().parse_args(arguments, argparse.Namespace(stopper=stopper))
+        options = parser().parse_args(arguments, argparse.Namespace(stopper=stopper, events=events))
+        events.start(options)
+        check_paths(options)
         options.run(options)
+        stopper.settle()
     except OSError as error:
         if error.errno == errno.ENOSPC and error.filename is None:
             raise refused(error) from error
         raise
     finally:
-        if sys.stdout is not None:
-            _flush()
+        warnings.showwarning = shown
+        flush_output()
 
 
-def _flush() -> None:
-    """Flush now, not when Python ends: nobody could be told then that it failed."""
-    try:
-        sys.stdout.flush()
-    except BrokenPipeError:
-        raise
-    except OSError as error:
-        raise refused(error) from error
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+def parser() -> argparse.ArgumentParser:
+    """Return what knows all verbs."""
+    whole = _Parser(
         prog="lipmotion",
         description="Speech in, lip motion out, with models trained from your own recordings.",
         epilog=EXIT_CODES,
     )
-    parser.add_argument("--version", action=_Version, nargs=0, help="print the version")
-    verbs = parser.add_subparsers(title="verbs", dest="verb", required=True, metavar="VERB")
+    whole.add_argument("--version", action=_Version, nargs=0, help="print the version")
+    verbs = whole.add_subparsers(title="verbs", dest="verb", required=True, metavar="VERB")
     for verb in VERBS:
         verb.add(verbs)
-    return parser
+    return whole
+
+
+class _Parser(argparse.ArgumentParser):
+    """Repeats what it does not understand as printable text."""
+
+    def error(self, message: str) -> NoReturn:
+        super().error(printable(message))
 
 
 class _Version(argparse.Action):
@@ -64,5 +71,22 @@ class _Version(argparse.Action):
     def __call__(self, *_: object) -> None:
         from importlib.metadata import version
 
-        print(f"lipmotion {version('lipmotion')}")
+        say(f"lipmotion {version('lipmotion')}")
         sys.exit(0)
+
+
+class _Printable(logging.Formatter):
+    def format(self, record: logging.LogRecord) -> str:
+        return own(f"warning: {record.getMessage()}")
+
+
+def _log_warning(message: object, *_: object, **__: object) -> None:
+    """Take a warning of Python's own, or of another package: it may quote a file."""
+    logging.getLogger("py.warnings").warning("%s", message)
+
+
+def _log_printable() -> None:
+    """Have warnings in one line on standard error."""
+    handler = logging.StreamHandler()
+    handler.setFormatter(_Printable())
+    logging.basicConfig(handlers=[handler], level=logging.WARNING)

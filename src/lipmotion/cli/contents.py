@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
+
+from lipmotion.cli.output import say
+from lipmotion.cli.paths import add_input
 
 
 def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the action to ``lipmotion corpus``."""
     parser = actions.add_parser("info", help="say what is in a corpus")
-    parser.add_argument("corpus", type=Path)
+    add_input(parser, "corpus", what="corpus")
     parser.set_defaults(run=run)
 
 
@@ -20,4 +22,4 @@ def run(options: argparse.Namespace) -> None:
 
     corpus = Corpus.open(options.corpus)
     for name, value in (*corpus.summary().items(), *(("offset", line) for line in offsets(corpus).lines())):
-        print(f"{name:12} {value}")
+        say(f"{name:12} {value}")

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 from lipmotion.cli import contents, prompts, sync
 from lipmotion.cli.options import add_machine_readable
+from lipmotion.cli.paths import add_input, add_output
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -14,8 +14,9 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = verbs.add_parser("corpus", help="prepare recordings for training")
     actions = parser.add_subparsers(title="actions", required=True, metavar="ACTION")
     prepare = actions.add_parser("prepare", help="make a corpus of a folder of recordings")
-    prepare.add_argument("recordings", type=Path, help="folder of videos, or of sounds with motion (docs/corpora.md)")
-    prepare.add_argument("-o", "--output", type=Path, required=True, metavar="CORPUS")
+    videos = "folder of videos, or of sounds with motion (docs/corpora.md)"
+    add_input(prepare, "recordings", what="folder of recordings", help=videos)
+    add_output(prepare, "-o", "--output", is_folder=True, required=True, metavar="CORPUS")
     prepare.add_argument("--workers", type=int, help="processes (default: one a core)")
     prepare.add_argument("--no-crops", dest="crops", action="store_false", help="do not keep mouth images")
     add_machine_readable(prepare)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import argparse
 from contextlib import nullcontext
-from pathlib import Path
+from typing import Any
 
+from lipmotion.cli.output import flush_output, say, say_lines
+from lipmotion.cli.paths import add_output
 from lipmotion.cli.speech import add_speech_arguments, speech_arguments
 from lipmotion.cli.status import status_lines
 
@@ -15,7 +17,8 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = verbs.add_parser("cues", help="turn speech into mouth shapes for 2D animation (Rhubarb, Moho, OpenToonz)")
     add_speech_arguments(parser)
     add = parser.add_argument
-    add("-o", "--output", type=Path, nargs="+", action="extend", default=[], help="FILE.tsv .xml .json .dat")
+    several: dict[str, Any] = {"nargs": "+", "action": "extend", "default": []}
+    add_output(parser, "-o", "--output", force=True, help="FILE.tsv .xml .json .dat", **several)
     add("-f", "--format", choices=("tsv", "xml", "json", "dat"), help="(default: the suffix; tsv without a file)")
     add("--fps", type=float, default=24.0, help="frames per second of the animation (default: 24)")
     add("--hold", type=int, metavar="FRAMES", help="least length of a shape (default: as two frames at 24)")
@@ -29,7 +32,7 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.pipeline.animate import animate
     from lipmotion.pipeline.cues import check_cue_options, check_cue_outputs, cue_text, cues, write_cues
 
-    with status_lines(options.speech) if options.machine_readable else nullcontext(lambda _: None) as done:
+    with status_lines(options) if options.machine_readable else nullcontext(lambda _: None) as done:
         check_cue_options(options.fps, options.hold, options.shapes)
         check_cue_outputs(options.output, options.speech, options.format)
         done(0.0)
@@ -40,5 +43,8 @@ def run(options: argparse.Namespace) -> None:
         sheet = cues(result, fps=options.fps, hold_frames=options.hold, shapes=options.shapes)
         write_cues(sheet, options.output, speech=options.speech, form=options.format)
         done(1.0)
-        names = "".join(f"{path}\n" for path in options.output)
-        print(names or cue_text(sheet, speech=options.speech, form=options.format or "tsv"), end="", flush=True)
+        for path in options.output:
+            say(path)
+        if not options.output:
+            say_lines(cue_text(sheet, speech=options.speech, form=options.format or "tsv").removesuffix("\n"))
+        flush_output()

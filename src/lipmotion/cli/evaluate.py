@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import Any
 
 from lipmotion.cli.figures import add_figures_arguments, report_figures
 from lipmotion.cli.options import list_or_all
+from lipmotion.cli.paths import add_input
 from lipmotion.cli.speech import add_recogniser_argument
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb."""
     parser = verbs.add_parser("evaluate", help="compare generated with recorded motion")
-    parser.add_argument("model", type=Path)
-    parser.add_argument("corpus", type=Path)
+    add_input(parser, "model", what="model", replaceable=True)
+    add_input(parser, "corpus", what="corpus")
     parser.add_argument("--split", default="test", help="train, val, test or all (default: test)")
     parser.add_argument("--speaker", action="append", default=[], metavar="NAME", help="this one only (repeatable)")
     add_recogniser_argument(parser)

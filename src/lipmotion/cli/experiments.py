@@ -5,15 +5,15 @@ from __future__ import annotations
 import argparse
 import os
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 from lipmotion.cli.figures import add_figures_arguments, report_figures
+from lipmotion.cli.paths import add_input
 
 
 def add_experiment_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the corpus, the processes, and where the figures go."""
-    parser.add_argument("corpus", type=Path)
+    add_input(parser, "corpus", what="corpus")
     parser.add_argument("--workers", type=int, help="processes (default: one a core)")
     add_figures_arguments(parser)
 

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
+from lipmotion.cli.output import say_json, say_lines
+from lipmotion.cli.paths import add_input
 from lipmotion.cli.speech import add_hearing_arguments, speech_arguments
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb."""
     parser = verbs.add_parser("explain", help="say which states and Gaussians a model's motion comes from")
-    parser.add_argument("model", type=Path)
+    add_input(parser, "model", what="model")
     add_hearing_arguments(parser)
     parser.add_argument(
         "--at", type=float, action="append", required=True, metavar="SECONDS", help="which frame (repeatable)"
@@ -22,13 +23,11 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Call ``lipmotion.explain`` and print what it found."""
-    import json
-
     from lipmotion.pipeline.explain import explain, explanation_document, explanation_text
 
     found = explain(speech=options.speech, at_s=options.at, **speech_arguments(options))
     if options.json:
         for explanation in found:
-            print(json.dumps(explanation_document(explanation)))
+            say_json(explanation_document(explanation))
     else:
-        print("\n\n".join(map(explanation_text, found)))
+        say_lines("\n\n".join(map(explanation_text, found)))

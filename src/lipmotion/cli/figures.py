@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 from lipmotion.cli.options import add_machine_readable
+from lipmotion.cli.paths import add_output
+from lipmotion.cli.speech import add_lexicon_argument
 
 Figures = dict[str, Any]
 
 
 def add_figures_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the lexicon, where figures go, and ``--machine-readable``."""
-    parser.add_argument("--lexicon", type=Path, metavar="FILE", help="pronunciations: WORD PHONE PHONE ... a line")
-    parser.add_argument("-o", "--output", type=Path, metavar="FILE.json", help="write all figures here as well")
+    add_lexicon_argument(parser)
+    add_output(parser, "-o", "--output", force=True, metavar="FILE.json", help="write all figures here as well")
     add_machine_readable(parser)
 
 

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
+
+from lipmotion.cli.output import say, say_lines
+from lipmotion.cli.paths import add_input
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb."""
     parser = verbs.add_parser("info", help="say what a model is, and whose recordings it comes from")
-    parser.add_argument("model", type=Path, nargs="?", help="default: the model that ships with the package")
+    shipped = "default: the model that ships with the package"
+    add_input(parser, "model", what="model", nargs="?", help=shipped)
     parser.add_argument(
         "--trees", action="store_true", help="print its decision trees, or its chains, and nothing else"
     )
@@ -23,12 +26,12 @@ def run(options: argparse.Namespace) -> None:
     path = options.model or shipped_path()
     if options.trees:
         model = load_model(path)
-        print(model.engine.trees(model.learned))
+        say_lines(model.engine.trees(model.learned))
         return
     header = read_header(path)
-    print(f"{'file':14} {path} ({path.stat().st_size / 1e6:.1f} MB)")
+    say(f"{'file':14} {path} ({path.stat().st_size / 1e6:.1f} MB)")
     for name, value in header.items():
-        print(f"{name:14} {_plain(value)}")
+        say(f"{name:14} {_plain(value)}")
 
 
 def _plain(value: object) -> str:

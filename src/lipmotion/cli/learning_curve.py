@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import Any
 
 from lipmotion.cli.experiments import add_experiment_arguments, run_experiment
 from lipmotion.cli.options import list_or_all, numbers
+from lipmotion.cli.paths import add_input
 
 
 def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the experiment to ``lipmotion experiment``."""
     parser = actions.add_parser("learning-curve", help="how good models of the first N recordings are")
     order = "names of recordings, one a line (default: the training list, shuffled with seed 0)"
-    parser.add_argument("--order", type=Path, metavar="FILE", help=order)
+    add_input(parser, "--order", what="list", replaceable=True, metavar="FILE", help=order)
     sizes = "train on so many, one after another (default: 20,50,100,200 and all)"
     parser.add_argument("--sizes", type=numbers, metavar="N,N,...", help=sizes)
     parser.add_argument("--split", default="test", help="compare on val or test (default: test)")

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import argparse
-import json
 import logging
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, Protocol
 
-from lipmotion.cli.outcome import outcome
-from lipmotion.cli.output import refused
-from lipmotion.cli.stop import MESSAGE, Stopper
+from lipmotion.cli.events import Lines
+from lipmotion.cli.output import complain, own, say_lines
+from lipmotion.cli.stop import Stopper
+from lipmotion.printable import printable
 from lipmotion.types.progress import Item, Progress
 
 
@@ -31,16 +31,17 @@ class Report(Protocol):
 
 @contextmanager
 def reporting(options: argparse.Namespace) -> Iterator[Report]:
-    """Give what the work reports to, while it lasts; to a program, say also how it started and why it failed."""
-    report = _Lines(options.stopper) if options.machine_readable else _Terminal(options.stopper)
+    """Give what the work reports to, while it lasts."""
+    chosen = _Program(options.stopper, options.events) if options.machine_readable else _Terminal(options.stopper)
+    report: Report = chosen
     logger = logging.getLogger("lipmotion")
     handler = _Warnings(report)
     logger.addHandler(handler)
     logger.propagate = False
     try:
-        with report:
-            yield report
+        yield report
     finally:
+        chosen.close()
         logger.removeHandler(handler)
         logger.propagate = True
 
@@ -62,12 +63,6 @@ class _Terminal:
         self._shown = sys.stderr is not None and sys.stderr.isatty()
         self._bar: Any = None
 
-    def __enter__(self) -> None:
-        """Begin."""
-
-    def __exit__(self, *_: object) -> None:
-        self._close()
-
     def hear(self, event: Progress | Item) -> None:
         self._stopper.check()
         if isinstance(event, Progress):
@@ -76,22 +71,28 @@ class _Terminal:
             self.warn(f"{event.outcome} {event.name}: {event.reason}")
 
     def warn(self, text: str) -> None:
-        line = f"lipmotion: warning: {' '.join(text.split())}"
+        text = f"warning: {text}"
         if self._bar is None:
-            print(line, file=sys.stderr)
+            complain(text)
         else:
-            self._bar.write(line, file=sys.stderr)
+            self._bar.write(own(text), file=sys.stderr)
 
     def finish(self, text: str, **_: Any) -> None:
-        self._close()
-        print(text)
+        self.close()
+        self._stopper.settle()
+        say_lines(text)
+
+    def close(self) -> None:
+        if self._bar is not None:
+            self._bar.close()
+            self._bar = None
 
     def _draw(self, event: Progress) -> None:
         if not self._shown:
             return
         from tqdm import tqdm
 
-        stage = f"{event.stage} ({event.step}/{event.steps})"
+        stage = printable(f"{event.stage} ({event.step}/{event.steps})")
         if self._bar is None:
             layout = "{desc} {percentage:3.0f}% |{bar:20}| {elapsed}, left {remaining}"
             self._bar = tqdm(total=1.0, initial=event.share, desc=stage, bar_format=layout, dynamic_ncols=True)
@@ -99,46 +100,28 @@ class _Terminal:
         self._bar.update(event.share - self._bar.n)
         self._bar.refresh()
 
-    def _close(self) -> None:
-        if self._bar is not None:
-            self._bar.close()
-            self._bar = None
 
+class _Program:
+    """Events for the program that runs this one."""
 
-class _Lines:
-    """One JSON object a line on standard output."""
-
-    def __init__(self, stopper: Stopper) -> None:
-        self._stopper, self._refused = stopper, False
-
-    def __enter__(self) -> None:
-        self._say("start")
-
-    def __exit__(self, _: object, error: BaseException | None, __: object) -> None:
-        if error is None:
-            return
-        stopped = isinstance(error, KeyboardInterrupt) or self._stopper.code is not None
-        known = (self._stopper.code or 130, MESSAGE) if stopped else outcome(error)
-        code, reason = known or (1, f"{type(error).__name__}: {error}")
-        self._say("failure", reason=reason, exit_code=code)
+    def __init__(self, stopper: Stopper, events: Lines) -> None:
+        self._stopper, self._events = stopper, events
 
     def hear(self, event: Progress | Item) -> None:
         self._stopper.check()
         if isinstance(event, Progress):
-            self._say("progress", stage=event.stage, step=event.step, steps=event.steps, value=round(event.share, 4))
+            self._events.say(
+                "progress", stage=event.stage, step=event.step, steps=event.steps, value=round(event.share, 4)
+            )
         else:
-            self._say("item", name=event.name, outcome=event.outcome, reason=event.reason)
+            self._events.say("item", name=event.name, outcome=event.outcome, reason=event.reason)
 
     def warn(self, text: str) -> None:
-        self._say("warning", message=text)
+        self._events.say("warning", message=text)
 
     def finish(self, text: str, **figures: Any) -> None:  # noqa: ARG002
-        self._say("success", **figures)
+        self._stopper.settle()
+        self._events.succeed(**figures)
 
-    def _say(self, kind: str, /, **fields: Any) -> None:
-        if not self._refused:
-            try:
-                print(json.dumps({"type": kind, **fields}), flush=True)
-            except OSError as error:  # a full disk, or a reader that has gone: then there is nobody to work for
-                self._refused = True
-                raise refused(error) from error
+    def close(self) -> None:
+        """Nothing is shown that would have to go."""

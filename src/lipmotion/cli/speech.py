@@ -6,20 +6,43 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from lipmotion.cli.paths import add_input
+
+LEXICON = "pronunciations: WORD PHONE PHONE ... a line"
+MODEL = "trained model (default: the one that ships with the package)"
+
 
 def add_speech_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the recording, what ``lipmotion.animate`` may be told about it, and the model."""
     add_hearing_arguments(parser)
-    parser.add_argument("--model", type=Path, help="trained model (default: the one that ships with the package)")
+    add_model_argument(parser)
 
 
 def add_hearing_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the recording, and what may be told about it."""
-    parser.add_argument("speech", type=Path, help="audio or video file")
-    parser.add_argument("--transcript", metavar="TEXT|FILE", help="what is said, if known")
-    parser.add_argument("--lexicon", type=Path, metavar="FILE", help="pronunciations: WORD PHONE PHONE ... a line")
-    parser.add_argument("--units", type=Path, metavar="FILE", help="phones of an earlier .json or .npz, edited or not")
+    add_input(parser, "speech", what="recording", help="audio or video file")
+    said: dict[str, Any] = {"type": str, "metavar": "TEXT|FILE", "help": "what is said, if known"}
+    add_input(parser, "--transcript", what="transcript", replaceable=True, **said)
+    add_lexicon_argument(parser)
+    edited = "phones of an earlier .json or .npz, edited or not"
+    add_input(parser, "--units", what="units file", replaceable=True, metavar="FILE", help=edited)
     add_recogniser_argument(parser)
+
+
+def add_lexicon_argument(parser: argparse.ArgumentParser) -> None:
+    """Add the pronunciations of words that the dictionary does not have."""
+    add_input(parser, "--lexicon", what="lexicon", replaceable=True, metavar="FILE", help=LEXICON)
+
+
+def add_model_argument(parser: argparse.ArgumentParser) -> None:
+    """Add the model, which may be left out."""
+    add_input(parser, "--model", what="model", replaceable=True, otherwise=_shipped, help=MODEL)
+
+
+def _shipped() -> Path:
+    from lipmotion.pipeline.model import shipped_path
+
+    return shipped_path()
 
 
 def add_recogniser_argument(parser: argparse.ArgumentParser) -> None:

@@ -29,11 +29,13 @@ class Stopper:
 
     An exception that is raised in the middle of an import, or in a callback, may be swallowed or become another one:
     so ``code`` says afterwards whether there was a signal, and ``check`` raises again at the next step of the work.
+    Once the outcome is settled a signal comes too late: what is to be said of it is said, and its exit code returned.
     """
 
     def __init__(self) -> None:
         self.code: int | None = None
-        self._since_s = 0.0
+        self._settled = False
+        self._since_s: float | None = None
         self._hooks = sys.excepthook, sys.unraisablehook
         self._before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
 
@@ -45,24 +47,34 @@ class Stopper:
                     signal.signal(number, self._stop)
 
     def leave(self, *, for_good: bool) -> None:
-        """End; ``for_good``: the process is over, and a late signal must not show a traceback."""
+        """End; ``for_good``: the process is over, and a signal would only spoil its exit code."""
         if not for_good:
             sys.excepthook, sys.unraisablehook = self._hooks
         if threading.current_thread() is threading.main_thread():
             for number, before in self._before.items():
                 if before is not None and before is not signal.SIG_IGN:
-                    signal.signal(number, signal.SIG_DFL if for_good else before)
+                    signal.signal(number, signal.SIG_IGN if for_good else before)
 
     def check(self) -> None:
         """Raise Stopped if there was a signal."""
         if self.code is not None:
             raise Stopped
 
+    def settle(self) -> None:
+        """Let the outcome be what it is now. Raises Stopped if there was a signal before."""
+        if not self._settled:
+            self.check()
+            self._settled = True
+
     def _stop(self, number: int, _: FrameType | None) -> None:
-        if self.code is None:
-            self.code, self._since_s = 128 + number, time.monotonic()
+        now_s = time.monotonic()
+        if self._since_s is not None:
+            if now_s - self._since_s > IMPATIENT_S:
+                os._exit(self.code or 128 + number)
+            return
+        self._since_s = now_s
+        if not self._settled:
+            self.code = 128 + number
             sys.excepthook = _print_nothing  # what swallows an exception may also print it
             sys.unraisablehook = _print_nothing
             raise Stopped
-        if time.monotonic() - self._since_s > IMPATIENT_S:
-            os._exit(self.code)

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
+
+from lipmotion.cli.output import say
+from lipmotion.cli.paths import add_input
 
 
 def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the action to ``lipmotion corpus``."""
     parser = actions.add_parser("sync", help="move the sound of a corpus to where the lips are")
-    parser.add_argument("corpus", type=Path)
+    add_input(parser, "corpus", what="corpus")
     parser.set_defaults(run=run)
 
 
@@ -21,6 +23,6 @@ def run(options: argparse.Namespace) -> None:
     corpus = Corpus.open(options.corpus)
     moved = sync(corpus)
     for collection, late_s in moved.items():
-        print(f"{collection or corpus.path}: sound moved by {-1000 * late_s:+.0f} ms")
+        say(f"{collection or corpus.path}: sound moved by {-1000 * late_s:+.0f} ms")
     if not moved:
-        print(f"{corpus.path}: nothing to move: the sound is in step, or it is not known how late it is")
+        say(f"{corpus.path}: nothing to move: the sound is in step, or it is not known how late it is")

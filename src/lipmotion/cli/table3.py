@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import Any
 
 from lipmotion.cli.experiments import add_experiment_arguments, run_experiment
 from lipmotion.cli.options import list_or_all, numbers
+from lipmotion.cli.paths import add_input, add_output
 from lipmotion.cli.train import VISUAL
 
 OPTIONS = ("sizes", "systems", "states", "mixtures", "visual", "transcripts")
@@ -17,7 +17,8 @@ def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the experiment to ``lipmotion experiment``."""
     parser = actions.add_parser("table3", help="which structure of chains predicts lips (Xie & Liu 2007, Table 3)")
     parser.add_argument("--split", default="test", help="compare on test, or another list (default: test)")
-    parser.add_argument("--order", type=Path, metavar="FILE", help="names, one a line (default: train, shuffled)")
+    order = "names, one a line (default: train, shuffled)"
+    add_input(parser, "--order", what="list", replaceable=True, metavar="FILE", help=order)
     parser.add_argument("--sizes", type=numbers, metavar="N,N,...", help="train on so many (default: all of them)")
     systems = "these only, with semicolons between them (default: all)"
     parser.add_argument("--systems", type=lambda text: text.split(";"), metavar="NAME;NAME", help=systems)
@@ -28,8 +29,9 @@ def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser.add_argument("--transcripts", action="store_true", help="compare also with the words known")
     parser.add_argument("--noise", default="", metavar="KIND,KIND", help="hear the clips in white noise, in babble")
     parser.add_argument("--snr", type=numbers, default=[20, 10, 5, 0], metavar="DB,...", help="at these ratios")
-    parser.add_argument("--talkers", type=Path, metavar="FOLDER", help="recordings of others, for the babble")
-    parser.add_argument("--plots", type=Path, metavar="FOLDER", help="write pictures like Figs. 7, 10 and 11 there")
+    talkers = "recordings of others, for the babble"
+    add_input(parser, "--talkers", what="folder of recordings", metavar="FOLDER", help=talkers)
+    add_output(parser, "--plots", metavar="FOLDER", help="write pictures like Figs. 7, 10 and 11 there")
     add_experiment_arguments(parser)
     parser.set_defaults(run=run)
 

@@ -4,31 +4,33 @@ from __future__ import annotations
 
 import argparse
 import os
-from pathlib import Path
 
 from lipmotion.cli.options import add_machine_readable, list_or_all
+from lipmotion.cli.paths import add_input, add_output
+from lipmotion.cli.speech import add_lexicon_argument
 
 ENGINE = "trajectory (default), coupled: chains of states for speech and lips, or joint: one model of five streams"
 SYSTEM = "of the coupled engine: ph-HMM, ph-MSHMM, ph-FHMM, ph-vi-FHMM, ph-CHMM or ph-vi-CHMM (default)"
 UNITS = "what is modelled: phone (default), eVis, sVis, pbVis, 2vis, or a table file (docs/unit-sets.md)"
+OTHERS = "and from transcribed speech (coupled)"
 VISUAL = "what is learned: geometry (tracked or given motion, default), eigenlips (mouth pictures), or both"
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb."""
     parser = verbs.add_parser("train", help="train a model on a prepared corpus; again, to go on after a stop")
-    parser.add_argument("corpus", type=Path)
-    parser.add_argument("-o", "--output", type=Path, required=True, metavar="MODEL")
+    add_input(parser, "corpus", what="corpus")
+    add_output(parser, "-o", "--output", force=True, keeps=True, required=True, metavar="MODEL")
     parser.add_argument("--split", default="train", help="train, val, test or all (default: train)")
     parser.add_argument("--speaker", action="append", default=[], metavar="NAME", help="this one only (repeatable)")
-    parser.add_argument("--lexicon", type=Path, metavar="FILE", help="pronunciations: WORD PHONE PHONE ... a line")
+    add_lexicon_argument(parser)
     parser.add_argument("--engine", default="trajectory", help=ENGINE)
     parser.add_argument("--system", metavar="NAME", help=SYSTEM)
-    parser.add_argument("--units", metavar="SET", help=UNITS)
+    add_input(parser, "--units", what="table of units", replaceable=True, type=str, metavar="SET", help=UNITS)
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="any option of the engine")
     parser.add_argument("--visual", default="geometry", metavar="WHAT", help=VISUAL)
     parser.add_argument("--voices", action="store_true", help="learn from installed synthetic voices as well (coupled)")
-    parser.add_argument("--recordings", type=Path, metavar="FOLDER", help="and from transcribed speech (coupled)")
+    add_input(parser, "--recordings", what="folder of recordings", metavar="FOLDER", help=OTHERS)
     parser.add_argument("--workers", type=int, help="processes (default: one a core)")
     add_machine_readable(parser)
     parser.set_defaults(run=run)
@@ -45,15 +47,13 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.pipeline.voices import other_voices
     from lipmotion.units import Lexicon
 
-    workers = options.workers or os.cpu_count() or 1
+    split, workers = list_or_all(options.split), options.workers or os.cpu_count() or 1
     with reporting(options) as report:
-        split = list_or_all(options.split)
         lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
         engine = engine_as_told(options.engine, system=options.system, units=options.units, settings=options.set)
         chosen = {"engine": engine, "split": split, "speakers": options.speaker, "lexicon": lexicon, "workers": workers}
-        chosen["visual"] = options.visual
         heard = {"recordings": options.recordings, "lexicon": lexicon, "monitor": report.hear}
-        chosen["voices"] = other_voices(synthetic=options.voices, **heard)
+        chosen |= {"visual": options.visual, "voices": other_voices(synthetic=options.voices, **heard)}
         with unfinished_work(options.output) as work:
             model, result = train(Corpus.open(options.corpus), **chosen, monitor=report.hear, work=work)
             save_model(model, options.output)

@@ -9,6 +9,7 @@ from lipmotion.corpora.facegood import read_facegood
 from lipmotion.corpora.folder import MOTION_SUFFIXES, read_folder
 from lipmotion.corpora.grid import read_grid
 from lipmotion.errors import CorpusError, InputError
+from lipmotion.files import check_listable
 
 
 def discover(directory: Path) -> Recordings:
@@ -20,6 +21,7 @@ def discover(directory: Path) -> Recordings:
         raise InputError(f"{directory}: is a file; give the folder of recordings that it is in")
     if not directory.is_dir():
         raise InputError(f"{directory}: no such folder; give a folder of recordings")
+    check_listable(directory)
     found = read_grid(directory) or read_facegood(directory) or read_folder(directory)
     if not found.items and not found.problems:
         raise CorpusError(

@@ -37,7 +37,11 @@ class Corpus:
     def open(cls, path: str | Path) -> Corpus:
         """Return an existing corpus. Raises CorpusError: missing, not a corpus, or of a newer version."""
         path = Path(path)
-        if not path.is_dir():
+        try:
+            is_there = path.is_dir()
+        except PermissionError as error:
+            raise CorpusError(f"{path}: cannot be read: {error.strerror}; ask its owner, or copy it") from error
+        if not is_there:
             raise CorpusError(f"{path}: no such corpus; make one: lipmotion corpus prepare RECORDINGS -o {path}")
         return cls(path, _read_manifest(path / MANIFEST))
 
@@ -154,7 +158,7 @@ class Corpus:
 
     def _write_manifest(self) -> None:
         content = {"format": FORMAT, "version": VERSION, "utterances": self._index}
-        with whole_file(self.path / MANIFEST) as unfinished:
+        with whole_file(self.path / MANIFEST, follow=False) as unfinished:  # nothing leads out of a corpus
             text = json.dumps(content, indent=1, sort_keys=True, ensure_ascii=False)
             unfinished.write_text(text + "\n", encoding="utf-8")
 

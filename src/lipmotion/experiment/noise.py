@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from lipmotion.errors import InputError
+from lipmotion.files import check_listable
 from lipmotion.pipeline.evaluate import Recorded
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.noise import noisy
@@ -43,6 +44,7 @@ def talkers_in(folder: Path) -> list[Audio]:
     """Return the first half minute of every recording in a folder. Raises InputError: no such folder, or none in it."""
     if not folder.is_dir():
         raise InputError(f"{folder}: no such folder; give one with recordings of other people, for the babble")
+    check_listable(folder)
     found = []
     for path in sorted(folder.iterdir()):
         try:

@@ -27,6 +27,7 @@ from lipmotion.pipeline.evaluate import OPENING, Clip, Recorded, clips, figures_
 from lipmotion.pipeline.train import FEWEST, phones_and_examples
 from lipmotion.pipeline.visual import EIGENLIPS, GEOMETRY, as_learned, check_visual, learned_eigenlips
 from lipmotion.pipeline.workers import working
+from lipmotion.sources import Source, check_apart
 from lipmotion.speech.noise import FEWEST_TALKERS, KINDS
 from lipmotion.speech.recogniser import recogniser as cached_recogniser
 from lipmotion.stats.checkpoint import NOTHING_KEPT
@@ -111,6 +112,7 @@ def table3(
         channels_with_opening(corpus, held_out)  # before the long work
     if plots is not None:
         check_plots(plots)
+        check_apart([plots], [Source(corpus.path, "corpus")])
     shares = 0.9 * np.cumsum([0, *steps]) / sum(steps)
     rows: list[dict[str, Any]] = []
     for count, (start, stop) in zip(steps, pairwise(shares), strict=True):

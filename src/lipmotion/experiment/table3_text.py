@@ -8,6 +8,7 @@ from typing import Any
 from lipmotion.experiment.comparison import mark
 from lipmotion.experiment.rivals import BEST, PRINTED
 from lipmotion.measures.report import number
+from lipmotion.printable import printable
 
 WIDTH = 27
 FEW = 8
@@ -36,7 +37,7 @@ def table(figures: Mapping[str, Any]) -> str:
     for kind in dict.fromkeys(row["kind"] for row in figures["noise"]):
         lines += ["", *_noise(kind, figures)]
     lines += ["", f"* differs from {BEST}: the 95 % interval of the difference on the same clips leaves out 0"]
-    return "\n".join(lines)
+    return "\n".join(map(printable, lines))
 
 
 def _compared(channels: Sequence[str]) -> str:

@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from lipmotion.printable import printable
+
 PINNED = (
     "p, b and m are pinned: lips are made to meet where the recogniser, with transcript the alignment that places the "
     "reference, too,\nputs them. What the model does by itself stands under 'without pins'"
@@ -31,7 +33,7 @@ def table(figures: Mapping[str, Any]) -> str:
                 f"{number(row['jerk'], '7.2f')}"
             )
         lines += _rest(condition)
-    return "\n".join(lines)
+    return "\n".join(map(printable, lines))
 
 
 def _pictured(condition: Mapping[str, Any]) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from lipmotion.engines.base import frame_of
 from lipmotion.errors import InputError
 from lipmotion.pipeline.hear import heard
 from lipmotion.pipeline.model import Model, load_model
+from lipmotion.printable import printable
 from lipmotion.speech.mfcc import frame_count
 from lipmotion.speech.read import read_audio
 from lipmotion.types import (
@@ -84,7 +85,7 @@ def explanation_text(explanation: Explanation) -> str:
     for name, text in rows:
         first, *others = wrap(text, LINE, break_long_words=False, break_on_hyphens=False) or [""]
         lines += [f"  {name:{width}}{first}", *(f"  {'':{width}}{other}" for other in others)]
-    return "\n".join(lines)
+    return "\n".join(map(printable, lines))
 
 
 def _rows(explanation: Explanation) -> Iterator[tuple[str, str]]:

@@ -20,6 +20,7 @@ from lipmotion.errors import AlignmentError, CorpusError, ExportError, InputErro
 from lipmotion.files import locked, remove_unfinished, sha256_of
 from lipmotion.pipeline.given import DIGESTS, digest, given_phones, given_track
 from lipmotion.pipeline.workers import working
+from lipmotion.sources import Source, check_apart, is_folder
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.read import read_audio
 from lipmotion.types import Item, Monitor, Progress, Track, Utterance, silent_monitor
@@ -110,9 +111,10 @@ def prepare(
     start_s = time.monotonic()
     if workers is not None and workers < 1:
         raise InputError(f"{workers} processes, required at least 1; leave it out for one a core")
+    check_apart((), [Source(directory, "folder of recordings")], folders=[output])
     found = discover(directory)
     packages = versions() if any(item.curves is None for item in found.items) else {}
-    is_new = not output.exists()
+    is_new = not is_folder(output)
     with locked(output):
         corpus = Corpus.create(output)
         jobs = [_job(item, directory.resolve(), corpus, packages, crops) for item in found.items]

@@ -24,6 +24,7 @@ from lipmotion.pipeline.transcribe import phones_in_time, report_guesses
 from lipmotion.pipeline.visual import GEOMETRY, as_learned, check_visual, learned_eigenlips
 from lipmotion.pipeline.voices import Heard
 from lipmotion.pipeline.workers import working
+from lipmotion.sources import Source, check_apart
 from lipmotion.speech.f0 import log_f0
 from lipmotion.speech.phones import train_phones
 from lipmotion.speech.recogniser import Recogniser
@@ -107,6 +108,8 @@ def train(
     Raises InputError: no such ``visual``, or voices and an engine that has no use for them.
     """
     check_visual(visual)
+    if work is not None:
+        check_apart((), [Source(corpus.path, "corpus")], folders=[work])
     lexicon = lexicon or Lexicon()
     engine = engine or engine_named("trajectory", {})
     chosen = tuple(names) if names is not None else corpus.required(split, speakers)

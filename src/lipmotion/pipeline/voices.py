@@ -18,6 +18,7 @@ import numpy as np
 from lipmotion.corpora.base import AUDIO_SUFFIXES
 from lipmotion.corpora.labels import labels_beside
 from lipmotion.errors import AlignmentError, CorpusError, InputError, MissingDependencyError
+from lipmotion.files import check_listable
 from lipmotion.pipeline.model import load_model
 from lipmotion.pipeline.prompts import prompts
 from lipmotion.pipeline.transcribe import phones_in_time
@@ -116,6 +117,7 @@ def recorded_voices(
     root, lexicon = Path(folder), lexicon or Lexicon()
     if not root.is_dir():
         raise CorpusError(f"{root}: no such folder; give one of recordings with a .txt, .lab or .TextGrid beside them")
+    check_listable(root)
     found = False
     for path in sorted(path for path in root.rglob("*") if path.suffix.lower() in AUDIO_SUFFIXES):
         name = "-".join(path.relative_to(root).with_suffix("").parts)

@@ -10,6 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.printable import printable
+
 Context = tuple[str, ...]
 """What a state depends on, one name a place (left neighbour, unit, right neighbour)."""
 Array = NDArray[np.float64]
@@ -94,7 +96,7 @@ class Tree:
                 write(int(self.no[node]), depth + 1, "no: ")
 
         write(0, 0, "")
-        return "\n".join(lines)
+        return "\n".join(map(printable, lines))
 
 
 PLACES = ("left", "unit", "right")

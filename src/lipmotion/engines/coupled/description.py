@@ -9,6 +9,7 @@ from lipmotion.engines.coupled.conversion import group_of
 from lipmotion.engines.coupled.learned import CoupledModel
 from lipmotion.engines.coupled.product import Product
 from lipmotion.engines.coupled.systems import COUPLED, FACTORIAL, HMM, MULTISTREAM
+from lipmotion.printable import printable
 
 KINDS = {
     HMM: "one chain, one mixture over all streams",
@@ -21,7 +22,7 @@ LINE = 110
 
 def described(model: CoupledModel) -> str:
     """Return chains, streams and what the means follow, line by line."""
-    return "\n".join([*_chains(model), *_streams(model), *_following(model)])
+    return "\n".join(map(printable, [*_chains(model), *_streams(model), *_following(model)]))
 
 
 def _chains(model: CoupledModel) -> Iterator[str]:

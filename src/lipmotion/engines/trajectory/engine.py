@@ -18,6 +18,7 @@ from lipmotion.engines.trajectory.learning import Learning
 from lipmotion.engines.trajectory.model import TrajectoryModel, model_arrays, model_from_arrays
 from lipmotion.engines.trajectory.train import fit_trajectory
 from lipmotion.errors import InputError
+from lipmotion.printable import printable
 from lipmotion.stats.checkpoint import NOTHING_KEPT, Checkpoint
 from lipmotion.types import (
     FRAME_RATE_HZ,
@@ -164,7 +165,7 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
         )
 
     def trees(self, model: TrajectoryModel) -> str:  # noqa: D102
-        return "\n\n".join(f"{name}\n{tree.text()}" for name, tree in model.emission.forest.items())
+        return "\n\n".join(f"{printable(name)}\n{tree.text()}" for name, tree in model.emission.forest.items())
 
     def to_arrays(self, model: TrajectoryModel) -> dict[str, NDArray[Any]]:  # noqa: D102
         return model_arrays(model)

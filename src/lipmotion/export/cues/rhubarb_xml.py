@@ -8,18 +8,20 @@ from html import escape
 from lipmotion.export.cues.sheet import CueSheet
 
 _NOT_XML = re.compile("[^\t\n\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+_CONTROL = re.compile("[\t\n\x7f]")
 """Characters that XML 1.0 cannot say, in any spelling."""
 
 
 def text(sheet: CueSheet, sound_file: str) -> str:
     """Return the file's text, all of it ASCII; what XML cannot say of a file's name is written as in Python."""
     name = _NOT_XML.sub(lambda found: found[0].encode("unicode_escape").decode(), sound_file)
+    name = _CONTROL.sub(lambda found: f"&#{ord(found[0])};", escape(name, quote=False))
     cues = "".join(
         f'    <mouthCue start="{cue.start_s:.2f}" end="{cue.end_s:.2f}">{cue.label}</mouthCue>\n' for cue in sheet.cues
     )
     document = (
         '<?xml version="1.0" encoding="utf-8"?>\n<rhubarbResult>\n  <metadata>\n'
-        f"    <soundFile>{escape(name, quote=False)}</soundFile>\n    <duration>{sheet.duration_s:.2f}</duration>\n"
+        f"    <soundFile>{name}</soundFile>\n    <duration>{sheet.duration_s:.2f}</duration>\n"
         f"  </metadata>\n  <mouthCues>\n{cues}  </mouthCues>\n</rhubarbResult>\n"
     )
     return document.encode("ascii", "xmlcharrefreplace").decode()

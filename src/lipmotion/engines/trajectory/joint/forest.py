@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from lipmotion.engines.trajectory.joint.densities import Sums
 from lipmotion.engines.trajectory.joint.inventory import Inventory, Place
 from lipmotion.engines.trajectory.joint.streams import MOTION
+from lipmotion.printable import printable
 from lipmotion.stats.trees import Context, Question, Tree, gaussian_likelihood, grow, multispace_likelihood
 
 
@@ -58,7 +59,7 @@ class Forest:
 
     def text(self) -> str:
         """Return all trees for people to read."""
-        return "\n".join(f"state {name}\n{tree.text()}" for name, tree in self.trees.items())
+        return "\n".join(f"state {printable(name)}\n{tree.text()}" for name, tree in self.trees.items())
 
 
 def unit_forest(inventory: Inventory, spoken: Sequence[str]) -> Forest:

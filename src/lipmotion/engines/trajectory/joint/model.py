@@ -13,6 +13,7 @@ from lipmotion.engines.trajectory.joint.forest import Forest
 from lipmotion.engines.trajectory.joint.inventory import Inventory, Place
 from lipmotion.engines.trajectory.joint.streams import Observed, StreamWeights
 from lipmotion.errors import InputError
+from lipmotion.printable import printable
 from lipmotion.stats.bigram import Bigram
 
 HEARD_ONLY = StreamWeights(motion=0.0)
@@ -132,4 +133,6 @@ class JointHmm:
     def text(self) -> str:
         """Return the trees of all streams for people to read."""
         forests = {name: part.forest for name, part in self.parts.items()}
-        return "\n\n".join(f"{name}: {forest.size} leaves\n{forest.text()}" for name, forest in forests.items())
+        return "\n\n".join(
+            f"{printable(name)}: {forest.size} leaves\n{forest.text()}" for name, forest in forests.items()
+        )

@@ -1,0 +1,58 @@
+"""A command that sends itself a signal at a chosen step of its work.
+
+``python signalled.py NUMBER STEP ARGUMENT ...``: the signal, after how many calls of functions since signals are
+listened to (0: never; -1: when ``main`` has returned; -2: when Python clears its modules, at the very end), and the
+arguments of ``lipmotion``. Without a signal it writes to ``steps`` how many calls there were.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from types import FrameType
+
+from lipmotion.cli.main import main
+
+RETURNED, CLEARED = -1, -2
+
+
+class Steps:
+    """Counts calls, and sends a signal at one of them."""
+
+    def __init__(self, step: int, number: int) -> None:
+        self.taken = 0
+        self._step, self._number = step, number
+        self._listening = False
+
+    def watch(self, frame: FrameType, event: str, _: object) -> None:
+        if not self._listening:
+            self._listening = event == "return" and frame.f_code.co_name == "listen"
+        elif event in ("call", "c_return"):
+            self.taken += 1
+            if self.taken == self._step:
+                os.kill(os.getpid(), self._number)
+
+
+class Last:
+    """Sends a signal when it is deleted."""
+
+    def __init__(self, number: int) -> None:
+        self._send = os.kill, os.getpid(), number
+
+    def __del__(self) -> None:
+        kill, process, number = self._send
+        kill(process, number)
+
+
+if __name__ == "__main__":
+    number, step, sys.argv = int(sys.argv[1]), int(sys.argv[2]), ["lipmotion", *sys.argv[3:]]
+    steps, last = Steps(step, number), Last(number) if step == CLEARED else None
+    sys.setprofile(steps.watch)
+    code = main()
+    sys.setprofile(None)
+    if step == RETURNED:
+        os.kill(os.getpid(), number)
+    if step == 0:
+        Path("steps").write_text(str(steps.taken))
+    sys.exit(code)

@@ -1,0 +1,197 @@
+"""Every output of every verb is kept apart from every input of the same call."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from cli.conftest import Run, is_one_error
+from lipmotion.cli.command_line import parser
+from lipmotion.corpora.store import Corpus
+from lipmotion.errors import ExportError
+from lipmotion.pipeline.animate import animate, write
+from lipmotion.pipeline.cues import cues, write_cues
+from lipmotion.pipeline.model import load_model, shipped_path
+from lipmotion.pipeline.prepare import prepare
+from lipmotion.pipeline.train import train
+
+TALKING = "a.wav --transcript t.txt --lexicon l.txt --units u.json --model m.lipmotion"
+FIGURES = "c --lexicon l.txt"
+REFUSED = [
+    # what is read under the name that is written, and the command line
+    ("the recording itself", f"animate {TALKING} -o a.wav"),
+    ("the transcript itself", f"animate {TALKING} -o b.json t.txt"),
+    ("the lexicon itself", f"animate {TALKING} -o b.json -o l.txt"),
+    ("the units file itself", f"animate {TALKING} -o u.json"),
+    ("the model itself", f"animate {TALKING} -o m.lipmotion"),
+    ("the recording itself", f"animate {TALKING} -o b.json --posteriors a.wav"),
+    ("the units file itself", f"animate {TALKING} -o b.json --posteriors u.json"),
+    ("the recording itself", f"cues {TALKING} -o a.wav"),
+    ("the transcript itself", f"cues {TALKING} -f tsv -o t.txt"),
+    ("the units file itself", f"cues {TALKING} -o b.tsv u.json"),
+    ("the recording itself", "adapt b.wav a.wav --model m.lipmotion -o a.wav"),
+    ("the model itself", "adapt a.wav --model m.lipmotion -o m.lipmotion"),
+    ("the corpus itself", "train c -o c"),
+    ("the corpus c", "train c -o c/corpus.json"),
+    ("the corpus c", "train c -o c/m.lipmotion"),
+    ("the lexicon itself", "train c --lexicon l.txt -o l.txt"),
+    ("the table of units itself", "train c --units t.txt -o t.txt"),
+    ("the folder of recordings r", "train c --recordings r -o r/a.wav"),
+    ("the corpus itself", "train d.unfinished -o d"),
+    ("the folder of recordings d.unfinished/r", "train c --recordings d.unfinished/r -o d"),
+    ("the model itself", f"evaluate m.lipmotion {FIGURES} -o m.lipmotion"),
+    ("the corpus c", f"evaluate m.lipmotion {FIGURES} -o c/corpus.json"),
+    ("the lexicon itself", f"evaluate m.lipmotion {FIGURES} -o l.txt"),
+    ("the corpus c", f"experiment unit-sets {FIGURES} -o c/corpus.json"),
+    ("the lexicon itself", f"experiment folds {FIGURES} -o l.txt"),
+    ("the list itself", f"experiment learning-curve {FIGURES} --order t.txt -o t.txt"),
+    ("the list itself", f"experiment table3 {FIGURES} --order t.txt -o t.txt"),
+    ("the folder of recordings r", f"experiment table3 {FIGURES} --talkers r -o r/a.wav"),
+    ("the corpus c", f"experiment table3 {FIGURES} --plots c/pictures"),
+    ("the folder of recordings itself", "corpus prepare r -o r"),
+    ("the folder of recordings r", "corpus prepare r -o r/c"),
+    ("the folder of recordings d.unfinished/r", "corpus prepare d.unfinished/r -o d.unfinished"),
+]
+
+
+@pytest.fixture
+def laid(here: Path, toy_corpus: Corpus) -> Path:
+    """One file of each kind, a corpus, and a folder of recordings; what is in the files does not matter."""
+    for name in ("a.wav", "b.wav", "t.txt", "l.txt", "u.json", "m.lipmotion"):
+        (here / name).write_text(f"what is in {name}")
+    shutil.copytree(toy_corpus.path, here / "c")
+    shutil.copytree(toy_corpus.path, here / "d.unfinished")
+    for folder in (here / "r", here / "d.unfinished" / "r"):
+        folder.mkdir()
+        (folder / "a.wav").write_text("sound")
+    return here
+
+
+def content(folder: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+@pytest.mark.parametrize(("what", "line"), REFUSED, ids=lambda value: value if " -" in value else "")
+def test_an_output_that_is_an_input(run: Run, laid: Path, what: str, line: str) -> None:
+    before = content(laid)
+    done = run(*line.split())
+    assert is_one_error(done, 7), done
+    assert f" {what}; give another name" in done.err[0]
+    assert content(laid) == before
+
+
+@pytest.mark.parametrize("spelled", ["./{}", "../here/{}", "soft", "hard"])
+@pytest.mark.parametrize("name", ["a.wav", "t.txt", "u.json", "m.lipmotion"])
+def test_however_it_is_spelled(run: Run, laid: Path, name: str, spelled: str) -> None:
+    (laid / "soft").symlink_to(name)
+    os.link(laid / name, laid / "hard")
+    before = content(laid)
+    done = run("animate", *TALKING.split(), "-o", spelled.format(name))
+    assert is_one_error(done, 7)
+    assert "itself; give another name" in done.err[0]
+    assert content(laid) == before
+
+
+def test_the_model_that_ships_is_an_input_too(run: Run, laid: Path) -> None:
+    before = shipped_path().read_bytes()
+    done = run("adapt", laid / "a.wav", "-o", shipped_path())
+    assert is_one_error(done, 7)
+    assert "is the model itself" in done.err[0]
+    assert shipped_path().read_bytes() == before
+
+
+@pytest.mark.parametrize("force", [[], ["--force"]])
+def test_a_program_is_told(run: Run, laid: Path, force: list[str]) -> None:
+    done = run("train", "c", "-o", "c/corpus.json", "--machine-readable", *force)
+    assert done.code == 7
+    assert '"exit_code": 7' in done.out[-1]
+    assert laid.is_dir()
+
+
+def test_units_are_replaced_where_that_is_meant(run: Run, here: Path, toy_speech: Path, toy_model_file: Path) -> None:
+    line = ["animate", toy_speech, "--model", toy_model_file, "--recogniser", "own", "-o", "u.json"]
+    assert run(*line).code == 0
+    before = (here / "u.json").read_bytes()
+    assert run(*line, "--units", "u.json").code == 7
+    assert run(*line, "--units", "u.json", "--rate", "50", "--force") == (0, ["u.json"], [])
+    assert (here / "u.json").read_bytes() != before
+
+
+def test_a_model_is_adapted_in_its_place(run: Run, here: Path, toy_speech: Path, toy_model_file: Path) -> None:
+    shutil.copy(toy_model_file, here / "m.lipmotion")
+    assert run("adapt", toy_speech, "--model", "m.lipmotion", "-o", "m.lipmotion", "--force").code == 0
+    assert load_model(here / "m.lipmotion").adaptation is not None
+
+
+@pytest.mark.parametrize("line", ["animate a.wav -o a.wav --force", "adapt a.wav -o a.wav --force"])
+def test_a_recording_is_never_replaced(run: Run, laid: Path, line: str) -> None:
+    done = run(*line.split())
+    assert is_one_error(done, 7)
+    assert "--force" not in done.err[0]
+    assert (laid / "a.wav").read_text() == "what is in a.wav"
+
+
+@pytest.mark.usefixtures("here")
+def test_a_transcript_may_have_the_name_of_a_folder(
+    run: Run, here: Path, toy_speech: Path, toy_model_file: Path
+) -> None:
+    (here / "papa").mkdir()
+    line = ["animate", toy_speech, "--model", toy_model_file, "--recogniser", "own", "--transcript", "papa"]
+    assert run(*line, "-o", "papa/a.json").code == 0
+
+
+def test_a_link_is_written_through(run: Run, here: Path, toy_speech: Path, toy_model_file: Path) -> None:
+    (here / "there").mkdir()
+    (here / "a.json").symlink_to("there/b.json")
+    line = ["animate", toy_speech, "--model", toy_model_file, "--recogniser", "own", "-o", "a.json"]
+    for _ in range(2):
+        assert run(*line) == (0, ["a.json"], [])
+        assert (here / "a.json").is_symlink()
+        assert (here / "there" / "b.json").is_file()
+    assert is_one_error(run(*line, "there/b.json"), 7)
+
+
+def test_every_path_is_declared() -> None:
+    """A verb that adds an argument of the type Path without saying whether it is read or written is found here."""
+    seen = 0
+    for verb in _verbs(parser()):
+        declared = {one.name for kind in ("reads", "writes") for one in verb.get_default(kind) or ()}
+        paths = {action.dest for action in verb._actions if action.type is Path}
+        assert paths <= declared, verb.prog
+        assert {action.dest for action in verb._actions if action.dest == "output"} <= declared
+        seen += len(paths)
+    assert seen > 25
+
+
+def _verbs(found: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
+    yield found
+    for action in found._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for inner in action.choices.values():
+                yield from _verbs(inner)
+
+
+@pytest.mark.parametrize("suffix", [".json", ".mp4"])
+def test_from_python(laid: Path, toy_speech: Path, toy_model_file: Path, suffix: str) -> None:
+    speech = laid / f"speech{suffix}"
+    shutil.copy(toy_speech, speech)
+    made = animate(toy_speech, model=toy_model_file, recogniser="own")
+    corpus = Corpus.open(laid / "c")
+    calls: list[Callable[[], object]] = [
+        lambda: write(made, speech, speech=speech),
+        lambda: write_cues(cues(made), speech, speech=speech, form="json"),
+        lambda: prepare(laid / "r", laid / "r" / "corpus"),
+        lambda: prepare(laid / "r", laid),
+        lambda: train(corpus, work=corpus.path),
+        lambda: train(corpus, work=laid),
+    ]
+    before = content(laid)
+    for call in calls:
+        with pytest.raises(ExportError, match=r"(is|lies in|holds) the (recording|folder of recordings|corpus)"):
+            call()
+    assert content(laid) == before
