@@ -37,7 +37,7 @@ MEDIA_FORMATS = (
 """FFmpeg's names of the containers that hold what they play. All other formats are refused before they open anything:
 playlists (hls, concat, dash, imf), indexes (vobsub), numbered pictures (image2), addresses (sdp, rtsp), devices."""
 MOST_PIXELS = 4096 * 2304
-"""Pixels of one picture: those of a cinema's 4K. Larger ones would fill the memory with a few pictures."""
+"""Pixels of one picture: a little more than 4K has. A decoder may keep sixteen of them."""
 LOCK = f"{TEMPORARY}lock"
 """The file that a process holds while it works on a folder."""
 UNFINISHED = ".unfinished"

@@ -136,7 +136,7 @@ for _name, _content in {
         return bench.animate(bench.file("a.wav", content))
 
 
-@case(GROUP, "a picture", 3, "has no sound track", "give a recording with sound")
+@case(GROUP, "a picture", 3, *NO_RECORDING)
 def _(bench: Bench) -> list[object]:
     Image.new("RGB", (32, 32)).save(bench.folder / "a.png")
     return bench.animate(bench.folder / "a.png")
