@@ -9,6 +9,7 @@ import errno
 import hashlib
 import os
 import platform
+import re
 import shutil
 import sys
 import uuid
@@ -36,6 +37,7 @@ MEDIA_FORMATS = (
 ).split()
 """FFmpeg's names of the containers that hold what they play. All other formats are refused before they open anything:
 playlists (hls, concat, dash, imf), indexes (vobsub), numbered pictures (image2), addresses (sdp, rtsp), devices."""
+DURATION = re.compile(r"(\d{1,6}):(\d\d):(\d\d(?:\.\d{1,9})?)")
 MOST_PIXELS = 4096 * 2304
 """Pixels of one picture: a little more than 4K has. A decoder may keep sixteen of them."""
 LOCK = f"{TEMPORARY}lock"
@@ -86,6 +88,21 @@ def moving_pictures(container: Any) -> list[Any]:
 
     cover = av.stream.Disposition.attached_pic
     return [stream for stream in container.streams.video if not stream.disposition & cover]
+
+
+def stated_duration_s(container: Any, stream: Any) -> float:
+    """Return the duration that an open container states for one of its streams, 0 if none.
+
+    That of the container stands for it where the stream has none of its own, unless there are subtitles, which may last
+    longer than what they belong to.
+    """
+    if stream.duration:
+        return float(stream.duration * stream.time_base)
+    own = DURATION.fullmatch(stream.metadata.get("DURATION", ""))  # Matroska's
+    if own:
+        hours, minutes, seconds = map(float, own.groups())
+        return 3600 * hours + 60 * minutes + seconds
+    return 0.0 if container.streams.subtitles else (container.duration or 0) / 1e6
 
 
 def sha256_of(path: Path) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.files import moving_pictures
+from lipmotion.files import moving_pictures, stated_duration_s
 
 HOLE_S = 0.04
 """A frame this much later than the end of the one before leaves a hole; time stamps are rounded to 1 ms or better."""
@@ -115,9 +115,9 @@ class _Track:
         )
 
     def _stated_s(self) -> float:
-        if self._stream.duration:
-            return float(self._stream.duration * self._stream.time_base)
-        return 0.0 if self._container.streams.video else (self._container.duration or 0) / 1e6
+        if self._container.streams.video and not self._stream.duration:
+            return 0.0
+        return stated_duration_s(self._container, self._stream)
 
     def _frames(self) -> Iterator[Any]:
         """Yield what can be decoded; damaged packets are counted."""

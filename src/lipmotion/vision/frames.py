@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.files import MOST_PIXELS, check_source, moving_pictures, open_media
+from lipmotion.files import MOST_PIXELS, check_source, moving_pictures, open_media, stated_duration_s
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,13 +74,7 @@ def open_video(path: Path) -> Iterator[Video]:
         rates = [float(rate) for rate in (stream.guessed_rate, stream.average_rate) if rate]
         damage: list[str] = []
         with closing(_frames(container, stream, path, damage)) as frames:  # decoding from a closed one would crash
-            yield Video(frames, tuple(rates), _stated_s(container, stream), damage)
-
-
-def _stated_s(container: Any, stream: Any) -> float:
-    if stream.duration:
-        return float(stream.duration * stream.time_base)
-    return (container.duration or 0) / 1e6
+            yield Video(frames, tuple(rates), stated_duration_s(container, stream), damage)
 
 
 def _frames(container: Any, stream: Any, path: Path, damage: list[str]) -> Generator[Frame, None, None]:
