@@ -93,16 +93,21 @@ def moving_pictures(container: Any) -> list[Any]:
 def stated_duration_s(container: Any, stream: Any) -> float:
     """Return the duration that an open container states for one of its streams, 0 if none.
 
-    That of the container stands for it where the stream has none of its own, unless there are subtitles, which may last
-    longer than what they belong to.
+    Where the stream has none of its own, that of the container stands for it. Subtitles may last longer than what they
+    belong to: beside them it is the longest of the sound and the pictures.
     """
     if stream.duration:
         return float(stream.duration * stream.time_base)
-    own = DURATION.fullmatch(stream.metadata.get("DURATION", ""))  # Matroska's
-    if own:
-        hours, minutes, seconds = map(float, own.groups())
-        return 3600 * hours + 60 * minutes + seconds
-    return 0.0 if container.streams.subtitles else (container.duration or 0) / 1e6
+    if not container.streams.subtitles:
+        return (container.duration or 0) / 1e6
+    return max(map(_tagged_s, (*container.streams.video, *container.streams.audio)))
+
+
+def _tagged_s(stream: Any) -> float:
+    """Return the duration of a stream of Matroska, which keeps it as text."""
+    found = DURATION.fullmatch(stream.metadata.get("DURATION", ""))
+    hours, minutes, seconds = map(float, found.groups()) if found else (0.0, 0.0, 0.0)
+    return 3600 * hours + 60 * minutes + seconds
 
 
 def sha256_of(path: Path) -> str:

@@ -234,7 +234,7 @@ def _(bench: Bench) -> list[object]:
 
 
 for _name, _content in {
-    "a VobSub index": "# VobSub index file, v7 (do not modify this line!)\ntimestamp: 00:00:00:000, filepos: 000000000\n",
+    "a VobSub index": "# VobSub index file, v7\ntimestamp: 00:00:00:000, filepos: 000000000\n",
     "an HLS playlist": "#EXTM3U\n#EXT-X-TARGETDURATION:2\n#EXTINF:2,\na.sub\n#EXT-X-ENDLIST\n",
     "a list of files to join": "ffconcat version 1.0\nfile 'a.sub'\n",
     "a session description": "v=0\no=- 0 0 IN IP4 127.0.0.1\ns=x\nc=IN IP4 127.0.0.1\nt=0 0\nm=audio 5004 RTP/AVP 0\n",

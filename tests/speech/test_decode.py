@@ -194,7 +194,7 @@ FOREIGN = {
     "list.wav": "ffconcat version 1.0\nfile 'neighbour.sub'\n",
     "late.wav": "# words\n" * 100 + "ffconcat version 1.0\nfile 'neighbour.sub'\n",
     "list.mpd": '<?xml version="1.0"?>\n<MPD mediaPresentationDuration="PT2S"></MPD>\n',
-    "neighbour.idx": "# VobSub index file, v7 (do not modify this line!)\ntimestamp: 00:00:00:000, filepos: 000000000\n",
+    "neighbour.idx": "# VobSub index file, v7\ntimestamp: 00:00:00:000, filepos: 000000000\n",
     "session.sdp": "v=0\no=- 0 0 IN IP4 127.0.0.1\ns=x\nc=IN IP4 127.0.0.1\nt=0 0\nm=audio 5004 RTP/AVP 0\n",
     "words.vtt": "WEBVTT\n\n00:00.000 --> 00:01.000\nhello\n",
     "tones.sbg": "a: 200+10/20\nNOW a\n",
