@@ -11,7 +11,7 @@ import numpy as np
 from PIL import Image
 
 from robustness.case import Bench, case
-from speech.sound import tone, write_pictures, write_sound
+from speech.sound import tone, write_constant_flac, write_pictures, write_sound, write_stamped
 
 GROUP = "recordings"
 NO_RECORDING = ("not a readable recording", "give an audio or video file")
@@ -136,7 +136,7 @@ for _name, _content in {
         return bench.animate(bench.file("a.wav", content))
 
 
-@case(GROUP, "a picture", 3, "has no sound track", "give a recording with sound")
+@case(GROUP, "a picture", 3, *NO_RECORDING)
 def _(bench: Bench) -> list[object]:
     Image.new("RGB", (32, 32)).save(bench.folder / "a.png")
     return bench.animate(bench.folder / "a.png")
@@ -211,6 +211,39 @@ def _(bench: Bench) -> list[object]:
     path = bench.folder / os.fsdecode(b"a\xff\xfe.wav")
     path.write_bytes(bench.speech.read_bytes())
     return bench.animate(path)
+
+
+@case(GROUP, "holes of a day, ten minutes each", 3, "leave holes of 89248 s beside 3.0 s of sound, at most 660 s")
+def _(bench: Bench) -> list[object]:
+    return bench.animate(write_stamped(bench.folder / "a.mkv", [599.0 * n for n in range(150)]))
+
+
+@case(GROUP, "time stamps to and fro", 3, "beside 8.0 s of sound, at most 760 s are bridged; export the recording")
+def _(bench: Bench) -> list[object]:
+    return bench.animate(write_stamped(bench.folder / "a.mkv", [598.0 * (n % 2) + n / 50 for n in range(400)]))
+
+
+@case(GROUP, "a day of sound in 164 KB", 3, "bytes of sound last 664 s, required at most 661 s (20 bytes a second)")
+def _(bench: Bench) -> list[object]:
+    return bench.animate(write_constant_flac(bench.folder / "a.flac", 80_000))
+
+
+@case(GROUP, "a rate that changes to 1 Hz", 3, "sampled at 1 Hz, required 4000 to 1000000")
+def _(bench: Bench) -> list[object]:
+    return bench.animate(write_constant_flac(bench.folder / "a.flac", 60, rates_hz=(8000, 1)))
+
+
+for _name, _content in {
+    "a VobSub index": "# VobSub index file, v7\ntimestamp: 00:00:00:000, filepos: 000000000\n",
+    "an HLS playlist": "#EXTM3U\n#EXT-X-TARGETDURATION:2\n#EXTINF:2,\na.sub\n#EXT-X-ENDLIST\n",
+    "a list of files to join": "ffconcat version 1.0\nfile 'a.sub'\n",
+    "a session description": "v=0\no=- 0 0 IN IP4 127.0.0.1\ns=x\nc=IN IP4 127.0.0.1\nt=0 0\nm=audio 5004 RTP/AVP 0\n",
+}.items():
+
+    @case(GROUP, _name, 3, *NO_RECORDING, "playlists and indexes of other files are not followed")
+    def _(bench: Bench, content: str = _content) -> list[object]:
+        write_sound(bench.folder / "a.mpg", tone(48_000), 48_000, "mp2", video=True).rename(bench.folder / "a.sub")
+        return bench.animate(bench.file("a.idx", content).rename(bench.folder / "a.m3u8"))
 
 
 @case(GROUP, "a name like an address", 3, "no such file")

@@ -7,6 +7,7 @@ from typing import Any
 
 import av
 import numpy as np
+from PIL import Image
 
 from robustness.case import Bench, case
 from speech.sound import tone, write_pictures, write_sound
@@ -15,15 +16,16 @@ GROUP = "videos"
 NONE = "none of 1 recordings is usable; the first, a:"
 
 
-def _video(bench: Bench, size: tuple[int, int], packets: list[bytes]) -> None:
-    """Write uncompressed pictures, whose content is what it likes, and a second of sound."""
+def _video(bench: Bench, size: tuple[int, int], packets: list[bytes], every: int = 1) -> None:
+    """Write uncompressed pictures, whose content is what it likes, ``every`` 40 ms, and a second of sound."""
     with av.open(str(bench.folder / "a.mkv"), "w") as container:
         stream: Any = container.add_stream("rawvideo", rate=25)
         stream.width, stream.height, stream.pix_fmt = *size, "yuv420p"
         sound: Any = container.add_stream("pcm_s16le", rate=16_000, layout="mono")
         for number, content in enumerate(packets):
             packet = av.Packet(content)
-            packet.stream, packet.pts, packet.dts, packet.time_base = stream, number, number, Fraction(1, 25)
+            packet.stream, packet.time_base = stream, Fraction(1, 25)
+            packet.pts = packet.dts = every * number
             container.mux(packet)
         samples = np.round(tone(16_000) * 32_767).astype("<i2")
         part = av.AudioFrame.from_ndarray(samples, format="s16", layout="mono")
@@ -43,7 +45,7 @@ GREY = bytes([128]) * (64 * 64 * 3 // 2)
 _pictures("nothing but grey", (64, 64), [GREY] * 25, "no face in 25 of 25 frames; required: a face in at least 80%")
 _pictures("one picture", (64, 64), [GREY], "pictures for 0.0 of 1.0 s; required at least half")
 _pictures("pictures of one pixel", (1, 1), [bytes(3)] * 25, "pictures of 1 × 1 pixels, required 16 to 8192; scale")
-_pictures("pictures of 16,000 × 16,000", (16_000, 16_000), [GREY], "pictures of 16000 × 16000 pixels, required 16 to")
+_pictures("pictures of 16,000 × 16,000", (16_000, 16_000), [GREY], "pictures of no size, or of more than 9437184")
 _pictures(
     "pictures that are cut off", (64, 64), [GREY[:100]] * 25, "no picture that can be decoded; export the video again"
 )
@@ -59,6 +61,20 @@ def _(bench: Bench) -> list[object]:
 @case(GROUP, "no sound", 4, NONE, "has no sound track; give a recording with sound")
 def _(bench: Bench) -> list[object]:
     write_pictures(bench.folder / "a.mp4")
+    return ["corpus", "prepare", bench.folder, "-o", "corpus"]
+
+
+@case(GROUP, "a moving GIF, named .mp4", 4, NONE, "has no sound track; give a recording with sound")
+def _(bench: Bench) -> list[object]:
+    grey = [Image.new("L", (64, 64), level) for level in range(0, 250, 10)]
+    grey[0].save(bench.folder / "a.gif", save_all=True, append_images=grey[1:], duration=40)
+    (bench.folder / "a.gif").rename(bench.folder / "a.mp4")
+    return ["corpus", "prepare", bench.folder, "-o", "corpus"]
+
+
+@case(GROUP, "pictures minutes apart", 4, NONE, "0.01 pictures a second, required 1 to 1000; export the video again")
+def _(bench: Bench) -> list[object]:
+    _video(bench, (64, 64), [GREY] * 25, every=2500)
     return ["corpus", "prepare", bench.folder, "-o", "corpus"]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -101,3 +102,44 @@ def _add_pictures(container: Any, stream: Any) -> None:
         frame.pts, frame.time_base = n, Fraction(1, 25)
         container.mux(stream.encode(frame))
     container.mux(stream.encode())
+
+
+def write_stamped(path: Path, stamps_s: Sequence[float], rate_hz: int = 16_000) -> Path:
+    """Write packets of 20 ms of a tone in 8 bits, each with the time stamp that is given, rising or not."""
+    content = np.round(128 + 100 * np.sin(2 * np.pi * 440 * np.arange(rate_hz // 50) / rate_hz)).astype(np.uint8)
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("pcm_u8", rate=rate_hz, layout="mono")
+        for number, stamp_s in enumerate(stamps_s):
+            packet = av.Packet(content.tobytes())
+            packet.stream, packet.time_base = stream, Fraction(1, 1000)
+            packet.dts, packet.pts = number, max(round(1000 * stamp_s), number)  # the container keeps the latter
+            container.mux(packet)
+    return path
+
+
+def write_constant_flac(path: Path, seconds: float, rates_hz: Sequence[int] = (8000,)) -> Path:
+    """Write FLAC frames of 65,535 equal samples, fourteen bytes each; the last frames state the last of the rates."""
+    rate_hz = rates_hz[0]
+    info = (4096).to_bytes(2) + (65_535).to_bytes(2) + bytes(6) + (rate_hz << 44 | 15 << 36).to_bytes(8) + bytes(16)
+    frames = max(round(seconds * rate_hz / 65_535), 2)
+    stated = [rates_hz[n * len(rates_hz) // frames] for n in range(frames)]
+    content = [b"fLaC\x80" + len(info).to_bytes(3) + info]
+    content += [_constant_frame(number, rate) for number, rate in enumerate(stated)]
+    path.write_bytes(b"".join(content))
+    return path
+
+
+def _constant_frame(number: int, rate_hz: int) -> bytes:
+    header = b"\xff\xf8\x7d\x08" + chr(number).encode() + (65_534).to_bytes(2) + rate_hz.to_bytes(2)
+    header += _crc(header, 0x07, 8).to_bytes(1)
+    frame = header + b"\x00\x01\x00"
+    return frame + _crc(frame, 0x8005, 16).to_bytes(2)
+
+
+def _crc(content: bytes, polynomial: int, bits: int) -> int:
+    value, top = 0, 1 << bits
+    for byte in content:
+        value ^= byte << (bits - 8)
+        for _ in range(8):
+            value = (value << 1) ^ (polynomial | top if value << 1 & top else 0)
+    return value

@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 import tracemalloc
 import wave
 from pathlib import Path
+from typing import Any
 
 import av
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from PIL import Image
 
 from lipmotion.errors import InputError
 from lipmotion.files import open_media
 from lipmotion.speech.read import read_audio
-from speech.sound import babble, write_pictures, write_sound
+from speech.opened import opened_in
+from speech.sound import babble, write_constant_flac, write_pictures, write_sound, write_stamped
 
 Samples = NDArray[np.float32]
 MS = 16
@@ -183,26 +187,77 @@ def test_any_name_is_a_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, na
     assert read_audio(Path(name)).duration_s == 2
 
 
-@pytest.mark.parametrize(
-    "content",
-    [
-        "#EXTM3U\n#EXT-X-TARGETDURATION:2\n#EXTINF:2,\nhttp://localhost:9/a.ts\n",
-        "ffconcat version 1.0\nfile 'a.wav'\n",
-        '<?xml version="1.0"?>\n<MPD mediaPresentationDuration="PT2S"></MPD>\n',
-    ],
-)
-def test_a_playlist_is_not_followed(tmp_path: Path, content: str) -> None:
-    write_sound(tmp_path / "a.wav", babble(16_000), 16_000, "pcm_s16le")
-    (tmp_path / "list.wav").write_text(content)
-    with pytest.raises(InputError, match=r"list\.wav: is a playlist, which names recordings elsewhere; give the rec"):
-        read_audio(tmp_path / "list.wav")
+FOREIGN = {
+    # name of the file, what it says; each names its neighbour, a good recording
+    "list.m3u8": "#EXTM3U\n#EXT-X-TARGETDURATION:2\n#EXTINF:2,\nneighbour.sub\n#EXT-X-ENDLIST\n",
+    "address.m3u8": "#EXTM3U\n#EXT-X-TARGETDURATION:2\n#EXTINF:2,\nhttp://localhost:9/a.ts\n",
+    "list.wav": "ffconcat version 1.0\nfile 'neighbour.sub'\n",
+    "late.wav": "# words\n" * 100 + "ffconcat version 1.0\nfile 'neighbour.sub'\n",
+    "list.mpd": '<?xml version="1.0"?>\n<MPD mediaPresentationDuration="PT2S"></MPD>\n',
+    "neighbour.idx": "# VobSub index file, v7\ntimestamp: 00:00:00:000, filepos: 000000000\n",
+    "session.sdp": "v=0\no=- 0 0 IN IP4 127.0.0.1\ns=x\nc=IN IP4 127.0.0.1\nt=0 0\nm=audio 5004 RTP/AVP 0\n",
+    "words.vtt": "WEBVTT\n\n00:00.000 --> 00:01.000\nhello\n",
+    "tones.sbg": "a: 200+10/20\nNOW a\n",
+    "page%03d.png": "neighbour of page001.png",
+}
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="what is opened is asked of Linux")
+@pytest.mark.parametrize("name", FOREIGN)
+def test_nothing_but_the_file_itself_is_opened(tmp_path: Path, name: str) -> None:
+    write_sound(tmp_path / "a.mpg", babble(48_000), 48_000, "mp2", video=True).rename(tmp_path / "neighbour.sub")
+    Image.new("RGB", (64, 48)).save(tmp_path / "page001.png")
+    (tmp_path / name).write_text(FOREIGN[name])
+    with opened_in(tmp_path) as opened, pytest.raises(InputError, match="not a readable recording"):
+        read_audio(tmp_path / name)
+    assert opened <= {name}
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="what is opened is asked of Linux")
+def test_what_is_opened_is_seen(tmp_path: Path) -> None:
+    (tmp_path / "list.ffconcat").write_text(FOREIGN["list.wav"])
+    write_sound(tmp_path / "a.wav", babble(16_000), 16_000, "pcm_s16le").rename(tmp_path / "neighbour.sub")
+    with opened_in(tmp_path) as opened, av.open(str(tmp_path / "list.ffconcat")):
+        pass
+    assert opened == {"list.ffconcat", "neighbour.sub"}
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="what is opened is asked of Linux")
+def test_sound_that_an_mp4_says_is_in_another_file_is_not_sought_there(tmp_path: Path) -> None:
+    write_sound(tmp_path / "b.mov", babble(48_000), 48_000, "aac")
+    content = write_sound(tmp_path / "a.mov", babble(48_000), 48_000, "aac").read_bytes()
+    (tmp_path / "a.mov").write_bytes(referring(content, b"b.mov"))
+    with opened_in(tmp_path) as opened, pytest.raises(InputError, match="holds 0 ms of sound"):
+        read_audio(tmp_path / "a.mov")
+    assert opened == {"a.mov"}
+    with opened_in(tmp_path) as opened, av.open(str(tmp_path / "a.mov"), options={"enable_drefs": "1"}):
+        pass
+    assert opened == {"a.mov", "b.mov"}
+
+
+def referring(content: bytes, name: bytes) -> bytes:
+    """Return a QuickTime file, its index at the end, whose sound is said to lie in the file of this name."""
+    path = b"/" + name
+    alias = bytes(10) + (27).to_bytes(1) + bytes(39) + len(name).to_bytes(1) + name.ljust(63, b"\0") + bytes(16)
+    alias += (1).to_bytes(2) + (1).to_bytes(2) + bytes(16) + (2).to_bytes(2) + len(path).to_bytes(2) + path
+    alias += bytes(len(path) % 2) + b"\xff\xff\0\0"
+    entry = (12 + len(alias)).to_bytes(4) + b"alis" + bytes(4) + alias
+    start = content.index(b"dref") + 12
+    old = int.from_bytes(content[start : start + 4])
+    grown = bytearray(content[:start] + entry + content[start + old :])
+    for kind in (b"moov", b"trak", b"mdia", b"minf", b"dinf", b"dref"):
+        place = content.rindex(kind, 0, start) - 4
+        size = int.from_bytes(content[place : place + 4]) + len(entry) - old
+        grown[place : place + 4] = size.to_bytes(4)
+    return bytes(grown)
 
 
 def test_addresses_are_not_opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: dict[str, object] = {}
+    asked: dict[str, Any] = {}
     monkeypatch.setattr(av, "open", lambda name, **options: asked.update(options, name=name))
     open_media(tmp_path / "a.wav")
-    assert asked == {"name": f"file:{tmp_path / 'a.wav'}", "options": {"protocol_whitelist": "file"}}
+    assert asked["name"] == f"file:{tmp_path / 'a.wav'}"
+    assert asked["options"]["protocol_whitelist"] == "file"
 
 
 @pytest.mark.parametrize(("suffix", "codec"), [("mkv", "pcm_s16le"), ("mkv", "libopus"), ("mp4", "aac")])
@@ -241,6 +296,73 @@ def test_a_recording_cut_short_is_named(tmp_path: Path, caplog: pytest.LogCaptur
 def test_time_stamps_that_jump_far_do_not_fill_the_memory(tmp_path: Path) -> None:
     path = write_sound(tmp_path / "a.mkv", babble(48_000), 48_000, "flac", start_s=90_000, video=True)
     with pytest.raises(InputError, match=r"a\.mkv: the time stamps of its sound jump by 90000 s"):
+        read_audio(path)
+
+
+PEAK = """
+import resource, sys
+from pathlib import Path
+from lipmotion.errors import InputError
+from lipmotion.speech.read import read_audio
+try:
+    read_audio(Path(sys.argv[1]))
+except InputError as error:
+    print(error)
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024)
+"""
+LESS_MB = 500
+
+STAMPS_S = {
+    # many holes that are each allowed
+    "rising": [599.0 * n for n in range(150)],
+    "rising a little": [59.0 * n for n in range(400)],
+    "to and fro": [598.0 * (n % 2) + n / 50 for n in range(400)],
+    "to and fro after good ones": [n / 50 if n < 100 else 10 + 500.0 * (n % 2) for n in range(500)],
+}
+
+
+def peak(path: Path) -> tuple[str, int]:
+    """Return what a process of its own says when it reads a recording, and how many MB it has taken."""
+    done = subprocess.run([sys.executable, "-c", PEAK, path], capture_output=True, text=True, check=True, timeout=120)
+    *said, taken_mb = done.stdout.splitlines()
+    return " ".join(said), int(taken_mb)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is counted as Linux does")
+@pytest.mark.parametrize("name", STAMPS_S)
+def test_holes_are_bounded_all_together(tmp_path: Path, name: str) -> None:
+    said, taken_mb = peak(write_stamped(tmp_path / "a.mkv", STAMPS_S[name]))
+    assert re.search(
+        r"a\.mkv: the time stamps of its sound leave holes of \d+ s beside \d+\.0 s of sound, at most", said
+    )
+    assert taken_mb < LESS_MB
+
+
+def test_speech_with_long_pauses_is_taken_as_it_is(tmp_path: Path) -> None:
+    """A frame every 0.4 s, as codecs send them while nobody speaks, and ten minutes of nothing."""
+    stamps_s = [*(0.4 * n for n in range(250)), *(690 + 0.4 * n for n in range(250))]
+    audio = read_audio(write_stamped(tmp_path / "a.mkv", stamps_s))
+    assert audio.duration_s == pytest.approx(stamps_s[-1] + 0.02, abs=0.001)
+    for stamp_s in (0.4, 40, 99.6, 690, 750.4):
+        first = round(stamp_s * 16_000)
+        assert np.abs(audio.samples[first : first + 320]).max() > 0.5
+        assert np.abs(audio.samples[first + 640 : first + 6000]).max() == 0
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is counted as Linux does")
+def test_sound_out_of_nothing_is_refused(tmp_path: Path) -> None:
+    said, taken_mb = peak(write_constant_flac(tmp_path / "a.flac", 80_000))
+    assert re.search(r"a\.flac: \d+ bytes of sound last \d+ s, required at most \d+ s \(20 bytes a second\)", said)
+    assert taken_mb < LESS_MB
+
+
+def test_minutes_of_digital_silence_are_no_crime(tmp_path: Path) -> None:
+    assert read_audio(write_constant_flac(tmp_path / "a.flac", 60)).duration_s == pytest.approx(60, abs=8)
+
+
+def test_a_rate_that_changes_on_the_way_is_checked_as_the_first(tmp_path: Path) -> None:
+    path = write_constant_flac(tmp_path / "a.flac", 60, rates_hz=(8000, 1))
+    with pytest.raises(InputError, match=r"a\.flac: sampled at 1 Hz, required 4000 to 1000000; export the recording"):
         read_audio(path)
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from lipmotion.pipeline.model import Model
+from lipmotion.speech import joint as module
 from lipmotion.speech.general.acoustic import general_model
 from lipmotion.speech.joint import NOISES, joined, joint_evidence
 from lipmotion.units import PHONES, SILENCE
@@ -30,8 +31,12 @@ def test_phones_never_heard_borrow(toy_model: Model) -> None:
     assert np.array_equal(z, s)
 
 
+@pytest.mark.parametrize("kept", [0, 9])
 @pytest.mark.parametrize("trust", [0.0, 0.4, 1.0])
-def test_evidence_is_the_sum_of_both(toy_model: Model, trust: float) -> None:
+def test_evidence_is_the_sum_of_both(
+    toy_model: Model, trust: float, kept: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "KEPT_FRAMES", kept)
     draw = np.random.default_rng(0)
     own, general = draw.normal(size=(2, 9, 39)).astype(np.float32)
     joint = joined(toy_model.phones)

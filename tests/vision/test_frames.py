@@ -1,9 +1,11 @@
 from __future__ import annotations
 
 import os
+from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
 
+import av
 import numpy as np
 import pytest
 
@@ -131,3 +133,81 @@ def test_any_name_is_a_files(write_video, tmp_path, monkeypatch, name):
 def test_pixels_that_would_fill_the_memory(write_video, shape):
     with pytest.raises(InputError, match=r"pictures of \d+ × 48 pixels, required 16 to 8192; scale the video"):
         all_frames(write_video(size=(320, 48), pixel_shape=shape))
+
+
+def grey_gif(side: int, pictures: int = 5) -> bytes:
+    """Return a moving GIF whose pictures change one pixel of a canvas."""
+    picture = b"\x21\xf9\4\0\4\0\0\0,\0\0\0\0\1\0\1\0\0\2\2\x44\1\0"
+    size = side.to_bytes(2, "little")
+    return b"GIF89a" + size + size + b"\x80\0\0" + b"\0\0\0\xff\xff\xff" + pictures * picture + b";"
+
+
+def test_a_canvas_that_would_fill_the_memory(tmp_path):
+    (tmp_path / "small.gif").write_bytes(grey_gif(64))
+    assert len(all_frames(tmp_path / "small.gif")) == 5
+    (tmp_path / "large.gif").write_bytes(grey_gif(16_000))
+    with pytest.raises(InputError, match=r"large\.gif: pictures of no size, or of more than 9437184 pixels; scale"):
+        all_frames(tmp_path / "large.gif")
+
+
+def test_pictures_larger_than_stated_are_not_decoded(tmp_path):
+    import io
+
+    from PIL import Image
+
+    packets = []
+    for side in (64, 4000):
+        stream = io.BytesIO()
+        Image.new("L", (side, side)).save(stream, "PNG")
+        packets += [stream.getvalue()] * 5
+    with av.open(str(tmp_path / "a.mov"), "w") as container:
+        stream = container.add_stream("png", rate=25)
+        stream.width, stream.height, stream.pix_fmt = 64, 64, "gray"
+        for number, content in enumerate(packets):
+            packet = av.Packet(content)
+            packet.stream, packet.pts, packet.dts, packet.time_base = stream, number, number, Fraction(1, 25)
+            container.mux(packet)
+    with open_video(tmp_path / "a.mov") as video:
+        assert [frame.image.shape for frame in video.frames] == [(64, 64, 3)] * 5
+        assert len(video.damage) == 5
+
+
+def test_more_pixels_than_a_cinema_shows(write_video):
+    assert all_frames(write_video(ticks=[0], size=(4096, 2160)))[0].image.shape == (2160, 4096, 3)
+    with pytest.raises(InputError, match="pictures of 4096 × 3072 pixels, required at most 9437184 in all; scale"):
+        all_frames(write_video(ticks=[0], size=(4096, 3072)))
+
+
+@pytest.mark.parametrize(("name", "subtitles"), [("a.mkv", "subrip"), ("a.mkv", "ass"), ("a.mp4", "mov_text")])
+def test_subtitles_that_go_on_after_the_pictures(tmp_path, name, subtitles):
+    with av.open(str(tmp_path / name), "w") as container:
+        stream, words = container.add_stream("libx264", rate=25), container.add_mux_stream(subtitles)
+        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
+        for number in range(25):
+            frame = av.VideoFrame.from_ndarray(np.full((48, 64, 3), 100, np.uint8), format="rgb24")
+            frame.pts, frame.time_base = number, Fraction(1, 25)
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode())
+        packet = av.Packet(b"words that stay")
+        packet.stream, packet.pts, packet.dts, packet.duration = words, 500, 500, 9000
+        packet.time_base = Fraction(1, 1000)
+        container.mux(packet)
+    with open_video(tmp_path / name) as video:
+        assert len(list(video.frames)) == 25
+        assert video.stated_s == pytest.approx(1, abs=0.05)
+
+
+def test_a_cover_before_the_video_is_not_the_video(tmp_path, write_video):
+    with av.open(str(write_video())) as source, av.open(str(tmp_path / "a.mp4"), "w") as container:
+        cover = container.add_stream("mjpeg", rate=1)
+        cover.width = cover.height = 304
+        cover.pix_fmt, cover.disposition = "yuvj420p", av.stream.Disposition.attached_pic
+        copied = container.add_stream_from_template(source.streams.video[0], opaque=True)
+        picture = av.VideoFrame.from_ndarray(np.full((304, 304, 3), 90, np.uint8), format="rgb24")
+        container.mux([*cover.encode(picture), *cover.encode(None)])
+        for packet in source.demux():
+            if packet.size:
+                packet.stream = copied
+                container.mux(packet)
+    frames = all_frames(tmp_path / "a.mp4")
+    assert [frame.image.shape for frame in frames] == [(48, 64, 3)] * 10

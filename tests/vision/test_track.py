@@ -123,6 +123,19 @@ def test_broken_time_stamps_are_refused(write_video, scripted):
         track(write_video("clip.mkv", ticks=[*range(19), 1000]), crops=False)
 
 
+def test_a_time_stamp_of_years_fills_no_memory(write_video, scripted):
+    scripted([face(0.1)] * 20)
+    with pytest.raises(InputError, match=r"20 frames span 80000000\.\d s, 2000000001 were expected at 25 Hz"):
+        track(write_video("clip.mkv", ticks=[*range(19), 2_000_000_000]), crops=False)
+
+
+@pytest.mark.parametrize(("step", "rate", "told"), [(1000, 25, "0.025"), (1, 4000, "4000")])
+def test_no_lips_are_seen_at_such_a_rate(write_video, scripted, step, rate, told):
+    scripted([face(0.1)] * 20)
+    with pytest.raises(InputError, match=rf"{told} pictures a second, required 1 to 1000; export the video again"):
+        track(write_video("clip.mp4", ticks=range(0, 20 * step, step), rate=rate), crops=False)
+
+
 @pytest.mark.video
 def test_unseen_frames_show_the_nearest_mouth(write_video, scripted):
     pytest.importorskip("cv2")

@@ -124,7 +124,7 @@ def traced(result: Generation, frame: int) -> Explanation:
     """Return what a result itself says of one of its frames."""
     motion, trace = result.motion, result.trace
     time_s = frame / motion.rate_hz
-    deviations = np.sqrt(result.variance[frame]).tolist()
+    deviations = np.sqrt(result.variance_of(slice(frame, frame + 1))[0]).tolist()
     values = zip(motion.names, motion.values[frame].tolist(), deviations, strict=True)
     return Explanation(
         time_s,

@@ -73,7 +73,7 @@ def pooled_offset(scores: Sequence[Array], rate_hz: float, seed: int = 0) -> Off
 def _score(predicted: Array, measured: Array, valid: NDArray[np.bool_], shift: int) -> float:
     count = min(len(predicted) - shift, len(measured))
     first = max(-shift, 0)
-    compared = valid[first:count]
+    compared = valid[first : max(count, first)]
     if compared.sum() < max(LEAST_SHARE * len(measured), 2):
         return 0.0
     a, b = predicted[first + shift : count + shift][compared], measured[first:count][compared]

@@ -10,12 +10,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.files import moving_pictures
+from lipmotion.files import moving_pictures, stated_duration_s
 
 HOLE_S = 0.04
 """A frame this much later than the end of the one before leaves a hole; time stamps are rounded to 1 ms or better."""
 LONGEST_HOLE_S = 600.0
 """Time stamps that jump further are wrong."""
+MOST_SILENCE = 20.0
+"""All holes together may last as long as one, and this many times the sound: a codec that falls silent with the speaker
+still sends 20 ms of every 400. More silence than that is no recording, but would fill the memory."""
+LEAST_BYTES_PER_S = 20.0
+"""A second of the time line takes at least this much of the file, after as long as one hole: no codec for speech needs
+less than 56, digital silence in FLAC 27. Sound out of nothing would fill the memory as well."""
+LOWEST_HZ, HIGHEST_HZ = 4000, 1_000_000
+"""Sampled less often, speech cannot be understood; no recorder samples more often."""
+MOST_CHANNELS = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,9 +56,21 @@ def decode(container: Any, rate_hz: int, channel: int | None = None) -> Decoded:
 
     channel : the one to take; None: the mean of all
     Time 0 is the container's start; in a file without moving pictures, the first sample.
-    Raises InputError: time stamps that jump by more than ``LONGEST_HOLE_S``.
+    Raises InputError: time stamps that jump by more than ``LONGEST_HOLE_S``, or leave more silence than
+    ``MOST_SILENCE`` allows; more sound than the bytes of the track can hold; a rate or channels that no recorder has.
+    Silence is allocated when all of it is known and allowed.
     """
     return _Track(container, rate_hz, channel).decoded()
+
+
+def check_form(name: str, rate_hz: int, channels: int) -> None:
+    """Raise InputError before a mistaken header fills the memory: a rate of 1 Hz makes 16,000 samples out of one."""
+    if not LOWEST_HZ <= rate_hz <= HIGHEST_HZ:
+        raise InputError(
+            f"{name}: sampled at {rate_hz} Hz, required {LOWEST_HZ} to {HIGHEST_HZ}; export the recording again"
+        )
+    if not 1 <= channels <= MOST_CHANNELS:
+        raise InputError(f"{name}: has {channels} channels, required 1 to {MOST_CHANNELS}; export the recording again")
 
 
 class _Track:
@@ -57,6 +78,7 @@ class _Track:
 
     def __init__(self, container: Any, rate_hz: int, channel: int | None) -> None:
         self._container = container
+        self._name = container.name.removeprefix("file:")
         self._stream = container.streams.audio[0]
         self._rate_hz, self._channel = rate_hz, channel
         self._bytes = bytearray()
@@ -67,14 +89,20 @@ class _Track:
         self._clock_s: float | None = None
         self._energies: NDArray[np.float64] | float = 0.0
         self._mean_energy = 0.0
-        self._silence_s = 0.0
-        self._packets = self._damaged = 0
+        self._silence_s = self._sound_s = 0.0
+        self._holes: list[tuple[int, int]] = []  # where in the bytes, and how many
+        self._packets = self._damaged = self._size = 0
 
     def decoded(self) -> Decoded:
         for frame in self._frames():
+            check_form(self._name, frame.sample_rate, frame.layout.nb_channels)
+            self._sound_s += frame.samples / frame.sample_rate
+            self._check_length(self._sound_s)
             self._place(frame)
             self._resample(frame)
         self._flush()
+        self._check_silence()
+        self._fill_holes()
         return Decoded(
             samples=np.frombuffer(self._bytes, np.float32)[self._cut :],
             rate_hz=self._rate_hz,
@@ -87,9 +115,9 @@ class _Track:
         )
 
     def _stated_s(self) -> float:
-        if self._stream.duration:
-            return float(self._stream.duration * self._stream.time_base)
-        return 0.0 if self._container.streams.video else (self._container.duration or 0) / 1e6
+        if self._container.streams.video and not self._stream.duration:
+            return 0.0
+        return stated_duration_s(self._container, self._stream)
 
     def _frames(self) -> Iterator[Any]:
         """Yield what can be decoded; damaged packets are counted."""
@@ -97,6 +125,7 @@ class _Track:
 
         for packet in self._container.demux(self._stream):
             self._packets += packet.size > 0
+            self._size += packet.size
             try:
                 yield from packet.decode()
             except av.FFmpegError:
@@ -111,7 +140,7 @@ class _Track:
             elif time_s - self._clock_s > HOLE_S:
                 self._flush()
                 self._silence_s += time_s - self._clock_s
-                self._add_silence(time_s - self._clock_s)
+                self._holes.append((len(self._bytes), self._silence(time_s - self._clock_s)))
             if self._clock_s is None or abs(time_s - self._clock_s) > HOLE_S:
                 self._clock_s = time_s
         if self._clock_s is not None:
@@ -120,16 +149,45 @@ class _Track:
     def _start(self, time_s: float) -> None:
         has_pictures = bool(moving_pictures(self._container))
         offset_s = time_s - (self._container.start_time or 0) / 1e6 if has_pictures else 0.0
-        self._add_silence(max(offset_s, 0.0))
+        self._bytes += bytes(self._silence(max(offset_s, 0.0)))
         self._cut = max(round(-offset_s * self._rate_hz), 0)
 
-    def _add_silence(self, duration_s: float) -> None:
+    def _silence(self, duration_s: float) -> int:
+        """Return how many bytes of silence bridge a hole."""
         if duration_s > LONGEST_HOLE_S:
             raise InputError(
-                f"{self._container.name.removeprefix('file:')}: the time stamps of its sound jump by {duration_s:.0f} "
-                f"s, at most {LONGEST_HOLE_S:.0f} s are bridged; export the recording again"
+                f"{self._name}: the time stamps of its sound jump by {duration_s:.0f} s, at most "
+                f"{LONGEST_HOLE_S:.0f} s are bridged; export the recording again"
             )
-        self._bytes += bytes(4 * round(duration_s * self._rate_hz))
+        return 4 * round(duration_s * self._rate_hz)
+
+    def _check_silence(self) -> None:
+        most_s = LONGEST_HOLE_S + MOST_SILENCE * self._sound_s
+        if self._silence_s > most_s:
+            raise InputError(
+                f"{self._name}: the time stamps of its sound leave holes of {self._silence_s:.0f} s beside "
+                f"{self._sound_s:.1f} s of sound, at most {most_s:.0f} s are bridged; export the recording again"
+            )
+        self._check_length(self._sound_s + self._silence_s)
+
+    def _check_length(self, length_s: float) -> None:
+        most_s = LONGEST_HOLE_S + self._size / LEAST_BYTES_PER_S
+        if length_s > most_s:
+            raise InputError(
+                f"{self._name}: {self._size} bytes of sound last {length_s:.0f} s, required at most {most_s:.0f} s "
+                f"({LEAST_BYTES_PER_S:.0f} bytes a second); export the recording again"
+            )
+
+    def _fill_holes(self) -> None:
+        """Make room for the silence, in place, from the last hole to the first."""
+        end, moved = len(self._bytes), sum(count for _, count in self._holes)
+        self._bytes += bytes(moved)
+        view = memoryview(self._bytes)
+        for start, count in reversed(self._holes):
+            view[start + moved : end + moved] = view[start:end]
+            moved -= count
+            view[start + moved : start + moved + count] = bytes(count)
+            end = start
 
     def _resample(self, frame: Any) -> None:
         import av

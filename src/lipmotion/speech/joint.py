@@ -21,6 +21,9 @@ NOISES = ("+nsn+", "+spn+")
 ENGLISH_SHARE = 0.5
 """Of the bigram; the rest is that of the own corpus."""
 BIGRAM_WEIGHT, INSERTION = 3.0, -4.0
+KEPT_FRAMES = 400_000
+"""Of a recording up to about an hour, general log densities are kept, for they are asked for twice: 500 bytes a frame.
+Those of a longer one are computed twice."""
 
 
 class Joint(NamedTuple):
@@ -84,12 +87,14 @@ def joint_evidence(
     trust        : what their log densities are multiplied by, 0 to 1
     general      : from ``general_features`` [shape=(T, 39)]
     """
-    heard = general_model().log_density(general)  # kept: it is asked for twice, and 50 kB a second
+    model = general_model()
+    kept = model.log_density(general) if len(general) <= KEPT_FRAMES else None
 
     def log_density(first: int, end: int, chosen: Chosen) -> NDArray[np.float32]:
-        values = heard[first:end, joint.columns if chosen is None else joint.columns[chosen]]
+        heard = kept[first:end] if kept is not None else model.log_density(general[first:end])
+        values = heard[:, joint.columns if chosen is None else joint.columns[chosen]]
         if trust > 0:
             values += np.float32(trust) * joint.hmm.mixtures.log_likelihood(own_features[first:end], chosen)
         return values
 
-    return Evidence(len(heard), log_density)
+    return Evidence(len(general), log_density)

@@ -82,7 +82,9 @@ def regression_delta(values: NDArray[np.float32], reach: int = 2) -> NDArray[np.
     count = len(values)
     slope = np.zeros_like(values)
     for step in range(1, reach + 1):
-        slope += step * (padded[reach + step : reach + step + count] - padded[reach - step : reach - step + count])
+        rise = padded[reach + step : reach + step + count] - padded[reach - step : reach - step + count]
+        rise *= step
+        slope += rise
     slope /= 2 * sum(step * step for step in range(1, reach + 1))
     return slope
 
@@ -145,8 +147,9 @@ def _frames(samples: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def _log_power(power: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return the logarithm, in the place of the powers."""
     floor = np.float32(max(DYNAMIC_RANGE * float(power.max()), 1e-30))
-    log_power: NDArray[np.float32] = np.log(np.maximum(power, floor))
+    log_power: NDArray[np.float32] = np.log(np.maximum(power, floor, out=power), out=power)
     return log_power
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.files import check_source, open_media
-from lipmotion.speech.decode import Decoded, decode
+from lipmotion.speech.decode import Decoded, check_form, decode
 from lipmotion.types import Audio
 
 LOG = logging.getLogger("lipmotion")
@@ -19,9 +19,6 @@ LOG = logging.getLogger("lipmotion")
 SPEECH_RATE_HZ = 16_000
 SHORTEST_S = 0.1
 """Recordings under this hold no sentence; the features need 25 ms around every frame."""
-LOWEST_HZ, HIGHEST_HZ = 4000, 1_000_000
-"""Sampled less often, speech cannot be understood; no recorder samples more often."""
-MOST_CHANNELS = 64
 CANCELLED = 0.05
 """The mean of the channels must keep this share of the loudest channel's energy; else they cancel one another."""
 USABLE = 0.5
@@ -41,7 +38,7 @@ def read_audio(path: Path, rate_hz: int = SPEECH_RATE_HZ) -> Audio:
     cancel one another, as with one of them inverted, the loudest is taken. Both are logged as warnings.
     Memory: the samples returned, and an eighth more.
     Raises InputError: no such file, empty, not a recording, no sound track, less than half of it decodable, too short,
-    or samples not finite.
+    time stamps or a length that it cannot have, or samples not finite.
     """
     check_source(path, "recording")
     sound = _decoded(path, rate_hz, None)
@@ -80,16 +77,9 @@ def _first_track(path: Path, container: Any) -> None:
 
 
 def _check_stream(path: Path, stream: Any) -> None:
-    """Raise InputError before a mistaken header fills the memory: a rate of 1 Hz makes 16,000 samples out of one."""
     if stream.codec_context is None:
         raise InputError(f"{path}: its sound is coded in an unknown way; export it as .wav or .flac")
-    rate_hz, channels = stream.rate or 0, stream.channels or 0
-    if not LOWEST_HZ <= rate_hz <= HIGHEST_HZ:
-        raise InputError(
-            f"{path}: sampled at {rate_hz} Hz, required {LOWEST_HZ} to {HIGHEST_HZ}; export the recording again"
-        )
-    if not 1 <= channels <= MOST_CHANNELS:
-        raise InputError(f"{path}: has {channels} channels, required 1 to {MOST_CHANNELS}; export the recording again")
+    check_form(str(path), stream.rate or 0, stream.channels or 0)
 
 
 def _report_damage(path: Path, sound: Decoded) -> None:

@@ -149,8 +149,10 @@ class Recogniser:
     def _said(self, audio: Audio, features: Features, general_alone: bool) -> tuple[UnitHmm, Evidence]:
         if self.kind == "own":
             return self.own, heard(self.own, self._own_features(audio, features)[0])
-        general = general_features(audio) if self.adaptation is None else self.adaptation.general_features(audio)
         own, trust = (features.values, 0.0) if general_alone else self._own_features(audio, features)
+        if trust == 0:  # they are not heard, and those of a long recording are large
+            own = features.values
+        general = general_features(audio) if self.adaptation is None else self.adaptation.general_features(audio)
         return self.joint.hmm, joint_evidence(self.joint, own, trust, general)
 
     def _own_features(self, audio: Audio, features: Features) -> tuple[NDArray[np.float32], float]:

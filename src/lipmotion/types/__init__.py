@@ -12,7 +12,7 @@ from lipmotion.types.explanation import (
     Value,
 )
 from lipmotion.types.features import FRAME_RATE_HZ, Features
-from lipmotion.types.generation import Constraints, Example, Generation, Pin, Speech, Trace
+from lipmotion.types.generation import Constraints, Example, Generation, Pin, Speech, Spread, Trace
 from lipmotion.types.motion import EYE_DISTANCE, GREY, WEIGHT, Channel, Motion
 from lipmotion.types.progress import Item, Monitor, Progress, counted, part_of, silent_monitor
 from lipmotion.types.timeline import Span, Timeline, Unit
@@ -43,6 +43,7 @@ __all__ = [
     "Regression",
     "Span",
     "Speech",
+    "Spread",
     "Timeline",
     "Trace",
     "Track",

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.types.features import Features
-from lipmotion.types.motion import Motion
+from lipmotion.types.motion import Motion, between_frames
 from lipmotion.types.timeline import Timeline, Unit
 
 
@@ -72,26 +72,52 @@ class Trace:
 
 
 @dataclass(frozen=True, eq=False)
+class Spread:
+    """Variances of P channels that follow from those of fewer dimensions: a long recording's are large.
+
+    reduced : float array [shape=(T, Q)]
+    mixing  : float array [shape=(Q, P)]
+    """
+
+    reduced: NDArray[np.floating[Any]]
+    mixing: NDArray[np.floating[Any]]
+
+
+@dataclass(frozen=True, eq=False)
 class Generation:
     """The result of an engine.
 
-    motion   : the trajectory at 100 Hz
-    variance : float array [shape=(T, P)], the model's own posterior variance, in squared channel units
-    units    : the labels behind it; edit them and generate again
-    trace    : the states behind every frame
+    motion : the trajectory at 100 Hz
+    spread : the model's own posterior variance, in squared channel units: float array [shape=(T, P)], or what it
+             follows from
+    units  : the labels behind it; edit them and generate again
+    trace  : the states behind every frame
     """
 
     motion: Motion
-    variance: NDArray[np.floating[Any]]
+    spread: NDArray[np.floating[Any]] | Spread
     units: Timeline[Unit]
     trace: Trace
+
+    @property
+    def variance(self) -> NDArray[np.floating[Any]]:
+        """The variance of every channel in every frame [shape=(T, P)]; of a long recording, it is computed anew."""
+        return self.variance_of(slice(None))
+
+    def variance_of(self, frames: slice) -> NDArray[np.floating[Any]]:
+        """Return the variance of every channel in some frames."""
+        if isinstance(self.spread, Spread):
+            return self.spread.reduced[frames] @ self.spread.mixing
+        return self.spread[frames]
 
     def selected(self, names: Sequence[str]) -> Generation:
         """Return the result with these channels only, in this order. Raises InputError: no such channel."""
         columns = [self.motion.column(name) for name in names]
         channels = tuple(self.motion.channels[column] for column in columns)
         motion = Motion(self.motion.values[:, columns], self.motion.rate_hz, channels)
-        return replace(self, motion=motion, variance=self.variance[:, columns])
+        if isinstance(self.spread, Spread):
+            return replace(self, motion=motion, spread=replace(self.spread, mixing=self.spread.mixing[:, columns]))
+        return replace(self, motion=motion, spread=self.spread[:, columns])
 
     def resampled(self, rate_hz: float) -> Generation:
         """Return the same result at another rate: values between frames, the state of the nearest frame.
@@ -99,8 +125,12 @@ class Generation:
         Raises InputError: the rate is not more than 0.
         """
         motion = self.motion.resampled(rate_hz)
-        variance = replace(self.motion, values=self.variance).at(motion.time_s)
+        spread = self._spread_at(motion.time_s)
         nearest = np.minimum(np.round(motion.time_s * self.motion.rate_hz).astype(int), len(self.trace.frames) - 1)
-        return replace(
-            self, motion=motion, variance=variance, trace=Trace(self.trace.states, self.trace.frames[nearest])
-        )
+        return replace(self, motion=motion, spread=spread, trace=Trace(self.trace.states, self.trace.frames[nearest]))
+
+    def _spread_at(self, time_s: NDArray[np.float64]) -> NDArray[np.floating[Any]] | Spread:
+        if isinstance(self.spread, Spread):
+            reduced = between_frames(self.spread.reduced, self.motion.rate_hz, time_s)
+            return replace(self.spread, reduced=reduced)
+        return between_frames(self.spread, self.motion.rate_hz, time_s)

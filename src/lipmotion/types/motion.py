@@ -90,12 +90,7 @@ class Motion:
 
         Linear between frames, as every figure is computed (docs: measures); constant beyond both ends.
         """
-        position = np.clip(np.asarray(time_s) * self.rate_hz, 0, len(self.values) - 1)
-        low = np.minimum(position.astype(int), max(len(self.values) - 2, 0))
-        high = np.minimum(low + 1, len(self.values) - 1)
-        share = (position - low)[:, None]
-        values: NDArray[np.float64] = (1 - share) * self.values[low] + share * self.values[high]
-        return values
+        return between_frames(self.values, self.rate_hz, time_s)
 
     def resampled(self, rate_hz: float) -> Motion:
         """Return the same curves at another rate, over the same duration (linear between frames).
@@ -106,3 +101,13 @@ class Motion:
             raise InputError(f"motion rate is {rate_hz} Hz, required more than 0")
         count = int(np.floor((len(self.values) - 1) / self.rate_hz * rate_hz + 1e-9)) + 1
         return Motion(self.at(np.arange(count) / rate_hz), rate_hz, self.channels)
+
+
+def between_frames(rows: NDArray[np.floating[Any]], rate_hz: float, time_s: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return rows [shape=(T, N)], one a frame, at other times, as ``Motion.at`` does [shape=(len(time_s), N)]."""
+    position = np.clip(np.asarray(time_s) * rate_hz, 0, len(rows) - 1)
+    low = np.minimum(position.astype(int), max(len(rows) - 2, 0))
+    high = np.minimum(low + 1, len(rows) - 1)
+    share = (position - low)[:, None]
+    values: NDArray[np.float64] = (1 - share) * rows[low] + share * rows[high]
+    return values

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.files import check_source, moving_pictures, open_media
+from lipmotion.files import MOST_PIXELS, check_source, moving_pictures, open_media, stated_duration_s
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,8 +43,8 @@ class Video:
     damage: list[str]
 
 
-LEAST_PIXELS, MOST_PIXELS = 16, 8192
-"""Width and height of a picture: in a smaller one there is no face, a larger one fills the memory."""
+LEAST_SIDE, LONGEST_SIDE = 16, 8192
+"""Width and height of a picture, in pixels: in a smaller one there is no face, a larger one fills the memory."""
 
 
 @contextmanager
@@ -70,16 +70,11 @@ def open_video(path: Path) -> Iterator[Video]:
         if stream.codec_context is None:
             raise InputError(f"{path}: its pictures are coded in an unknown way; export the video again")
         _check_size(path, stream.width, stream.height, float(stream.sample_aspect_ratio or 1))
+        stream.codec_context.options = {"max_pixels": str(MOST_PIXELS)}
         rates = [float(rate) for rate in (stream.guessed_rate, stream.average_rate) if rate]
         damage: list[str] = []
         with closing(_frames(container, stream, path, damage)) as frames:  # decoding from a closed one would crash
-            yield Video(frames, tuple(rates), _stated_s(container, stream), damage)
-
-
-def _stated_s(container: Any, stream: Any) -> float:
-    if stream.duration:
-        return float(stream.duration * stream.time_base)
-    return (container.duration or 0) / 1e6
+            yield Video(frames, tuple(rates), stated_duration_s(container, stream), damage)
 
 
 def _frames(container: Any, stream: Any, path: Path, damage: list[str]) -> Generator[Frame, None, None]:
@@ -117,10 +112,16 @@ def _pictures(container: Any, stream: Any, damage: list[str]) -> Iterator[Any]:
 
 
 def _check_size(path: Path, width: int, height: int, pixel_shape: float) -> None:
+    if not width or not height:  # FFmpeg does not say what it refuses
+        raise InputError(f"{path}: pictures of no size, or of more than {MOST_PIXELS} pixels; scale the video")
     shown = round(width * pixel_shape)
-    if not (LEAST_PIXELS <= shown <= MOST_PIXELS and LEAST_PIXELS <= height <= MOST_PIXELS):
+    if not (LEAST_SIDE <= shown <= LONGEST_SIDE and LEAST_SIDE <= height <= LONGEST_SIDE):
         raise InputError(
-            f"{path}: pictures of {shown} × {height} pixels, required {LEAST_PIXELS} to {MOST_PIXELS}; scale the video"
+            f"{path}: pictures of {shown} × {height} pixels, required {LEAST_SIDE} to {LONGEST_SIDE}; scale the video"
+        )
+    if shown * height > MOST_PIXELS:
+        raise InputError(
+            f"{path}: pictures of {shown} × {height} pixels, required at most {MOST_PIXELS} in all; scale the video"
         )
 
 

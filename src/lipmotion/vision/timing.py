@@ -16,6 +16,8 @@ TIME_TOLERANCE = 0.05
 CUBIC_GAP = 4.0
 """Gaps of up to this many frames are bridged by a cubic; in longer ones it could swing, so they get a straight line."""
 RATE_WHEN_UNKNOWN_HZ = 25.0
+LOWEST_HZ, HIGHEST_HZ = 1.0, 1000.0
+"""Less often seen, no lips move; no camera is faster. Other rates are those of wrong time stamps."""
 
 
 def nominal_rate_hz(times_s: Array, stated_rates_hz: Sequence[float]) -> float:

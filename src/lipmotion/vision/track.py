@@ -16,7 +16,14 @@ from lipmotion.vision.landmarks import DISTANCES, EYE_CORNERS, JAW_POINTS, LIP_P
 from lipmotion.vision.looks import mouth_of, strange_mouths
 from lipmotion.vision.mouth import eyes_to_image, face_to_image, mouth_crop
 from lipmotion.vision.pose import head_frame
-from lipmotion.vision.timing import at_constant_rate, frame_count, nearest, nominal_rate_hz
+from lipmotion.vision.timing import (
+    HIGHEST_HZ,
+    LOWEST_HZ,
+    at_constant_rate,
+    frame_count,
+    nearest,
+    nominal_rate_hz,
+)
 
 Array = NDArray[np.float64]
 
@@ -138,6 +145,10 @@ def _distance(flat: Array, pair: tuple[int, int]) -> Array:
 
 def _check(path: Path, sighting: _Sighting, video: Video, rate_hz: float, notes: tuple[str, ...]) -> None:
     times_s, seen = np.array(sighting.times_s), np.array(sighting.seen)
+    if not LOWEST_HZ <= rate_hz <= HIGHEST_HZ:
+        raise InputError(
+            f"{path}: {rate_hz:g} pictures a second, required {LOWEST_HZ:g} to {HIGHEST_HZ:g}; export the video again"
+        )
     count = frame_count(times_s, rate_hz)
     told = f" ({'; '.join(notes)})" if notes else ""
     if count < USABLE * video.stated_s * rate_hz:

@@ -40,3 +40,5 @@ def test_a_long_recording_is_kept_in_single_precision(whole, monkeypatch):
     single = ENGINE.generate(MODEL, SPOKEN, Constraints((Pin(3.3, "opening", 0.2), Pin(5.01, "opening", 0.1))))
     assert single.motion.values.dtype == single.variance.dtype == np.float32
     assert single.motion.values == pytest.approx(whole.motion.values, abs=1e-5)
+    assert single.variance == pytest.approx(whole.variance, abs=1e-6)
+    assert single.spread.reduced.shape == (len(SPOKEN.features.values), MODEL.space.dimensions)

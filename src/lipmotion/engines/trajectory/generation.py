@@ -13,13 +13,13 @@ from lipmotion.engines.trajectory.closure import OPENING, Closure, closing_frame
 from lipmotion.engines.trajectory.space import MotionSpace
 from lipmotion.errors import InputError
 from lipmotion.kernels.banded import generate
-from lipmotion.types import FRAME_RATE_HZ, WEIGHT, Constraints
+from lipmotion.types import FRAME_RATE_HZ, WEIGHT, Constraints, Spread
 
 STRETCH, MARGIN = 6000, 500
 """Frames generated at a time, and those around them that are generated again and thrown away: what lies seconds off
 changes nothing, and the memory does not grow with the recording."""
 DOUBLE_FRAMES = 60_000
-"""The motion of recordings beyond ten minutes is kept in single precision."""
+"""The motion of recordings beyond ten minutes is kept in single precision, its variance in the model's space."""
 
 Pins = dict[tuple[int, int], float]
 """Frame and column in the model's space, to the value there."""
@@ -35,15 +35,17 @@ def generated_motion(
     closure: Closure | None,
     closing: Sequence[slice],
     pins: Pins,
-) -> tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]]]:
-    """Return the motion of all channels and its variance [each shape=(T, P)], by parameter generation.
+) -> tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]] | Spread]:
+    """Return the motion of all channels [shape=(T, P)] and its variance, by parameter generation.
 
     statistics : gives means and precisions of some frames
     closure    : how the lips close (None: the motion has no opening);  closing : the frames in which they must
     pins       : from ``resolved``
     """
-    precise = np.float64 if frames <= DOUBLE_FRAMES else np.float32
-    motion, spread = (np.empty((frames, len(space.channels)), precise) for _ in range(2))
+    is_long = frames > DOUBLE_FRAMES
+    precise = np.float32 if is_long else np.float64
+    motion = np.empty((frames, len(space.channels)), precise)
+    spread = np.empty((frames, space.dimensions if is_long else len(space.channels)), precise)
     for inner, outer in stretches(frames):
         inside = {(frame - outer.start, c): v for (frame, c), v in pins.items() if outer.start <= frame < outer.stop}
         spans = [
@@ -53,10 +55,12 @@ def generated_motion(
         ]
         result = _generated(closure, statistics(outer), inside, spans)
         kept = slice(inner.start - outer.start, inner.stop - outer.start)
-        motion[inner], spread[inner] = space.restore(*(values[kept] for values in result))
+        values, variance = (rows[kept] for rows in result)
+        motion[inner], restored = space.restore(values, variance)
+        spread[inner] = variance if is_long else restored
     weights = [channel.unit == WEIGHT for channel in space.channels]
     motion[:, weights] = np.maximum(motion[:, weights], 0)
-    return motion, spread
+    return motion, Spread(spread, space.mixing.astype(precise)) if is_long else spread
 
 
 def resolved(constraints: Constraints | None, space: MotionSpace, frames: int) -> Pins:

@@ -57,6 +57,15 @@ class MotionSpace:
         return motion, spread
 
     @property
+    def mixing(self) -> NDArray[np.float64]:
+        """What the variance of each dimension adds to that of each channel [shape=(Q, P)]."""
+        mixing, count = np.zeros((self.dimensions, len(self.channels))), len(self.direct)
+        mixing[np.arange(count), self.direct] = 1
+        if self.points is not None:
+            mixing[count:, self._reduced] = np.square(self.points.basis)
+        return mixing
+
+    @property
     def _reduced(self) -> NDArray[np.intp]:
         return np.setdiff1d(np.arange(len(self.channels)), self.direct)
 

@@ -25,13 +25,19 @@ def general_features(audio: Audio) -> NDArray[np.float32]:
     """
     cepstra = log_mel(checked_samples(audio), _filters()) @ liftered_cosine(FILTERS, 0, CEPSTRA)
     cepstra -= cepstra.mean(axis=0, dtype=np.float64).astype(np.float32)
+    features = np.empty((len(cepstra), 3 * CEPSTRA), np.float32)
+    features[:, :CEPSTRA] = cepstra
     padded = np.pad(cepstra, ((3, 3), (0, 0)), mode="edge")
+    del cepstra
 
     def shifted(frames: int) -> NDArray[np.float32]:
-        return padded[3 + frames : 3 + frames + len(cepstra)]
+        return padded[3 + frames : 3 + frames + len(features)]
 
-    delta = shifted(2) - shifted(-2)
-    return np.concatenate([cepstra, delta, (shifted(3) - shifted(-1)) - (shifted(1) - shifted(-3))], axis=1)
+    delta, of_delta = (features[:, start : start + CEPSTRA] for start in (CEPSTRA, 2 * CEPSTRA))
+    np.subtract(shifted(2), shifted(-2), out=delta)
+    np.subtract(shifted(3), shifted(-1), out=of_delta)
+    of_delta -= shifted(1) - shifted(-3)
+    return features
 
 
 @cache
