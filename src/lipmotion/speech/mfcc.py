@@ -50,9 +50,11 @@ def mfcc(audio: Audio, warp: float = 1.0) -> Features:
     """
     samples = checked_samples(audio)
     log_powers = log_mel(samples, _filters(warp))
+    rounding = ROUNDING * max(float(log_powers.max()), -float(log_powers.min()))
     cepstra = log_powers @ liftered_cosine(FILTERS, 1, CEPSTRA + 1)
+    del log_powers  # of hours it is much
     static = np.concatenate([cepstra, log_energy(samples)[:, None]], axis=1)
-    return Features(normalised(_with_deltas(static), ROUNDING * float(np.abs(log_powers).max())), audio.duration_s)
+    return Features(normalised(_with_deltas(static), rounding), audio.duration_s)
 
 
 def checked_samples(audio: Audio) -> NDArray[np.float32]:
