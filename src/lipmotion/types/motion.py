@@ -16,6 +16,9 @@ WEIGHT = "weight"
 """The unit of blendshapes: 0 is absent, 1 is whole; never less than 0."""
 GREY = "grey"
 """The unit of eigenlips: coefficients of an orthonormal basis of pictures in grey levels, 0 to 255."""
+LARGEST = {EYE_DISTANCE: 1e4, WEIGHT: 255.0, GREY: 1e5}
+"""Values beyond these are of nothing that moves in a face, even where a table without units holds pixels."""
+LARGEST_OTHER = 1e6
 
 
 @dataclass(frozen=True)
@@ -91,3 +94,13 @@ class Motion:
             raise InputError(f"motion rate is {rate_hz} Hz, required more than 0")
         count = int(np.floor((len(self.values) - 1) / self.rate_hz * rate_hz + 1e-9)) + 1
         return Motion(self.at(np.arange(count) / rate_hz), rate_hz, self.channels)
+
+
+def check_magnitude(channel: Channel, low: float, high: float) -> None:
+    """Raise InputError where a curve from ``low`` to ``high`` is none of a face."""
+    largest = LARGEST.get(channel.unit, LARGEST_OTHER)
+    if not -largest <= low <= high <= largest:
+        raise InputError(
+            f"{channel.name!r} goes from {low:g} to {high:g} {channel.unit}, required within ±{largest:g}; "
+            "say its unit in a .json, or scale it"
+        )

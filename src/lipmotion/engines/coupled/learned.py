@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from lipmotion.engines.coupled.following import Following, Surroundings
 from lipmotion.engines.coupled.model import Chains, Inferred
 from lipmotion.engines.coupled.visual import VisualStream, unseen
 from lipmotion.engines.trajectory.closure import Closure
+from lipmotion.engines.trajectory.reach import Reach
 from lipmotion.engines.trajectory.space import MotionSpace
 from lipmotion.types import FRAME_RATE_HZ
 
@@ -45,6 +47,19 @@ class CoupledModel:
     gain: Array
     rest: Array
     closure: Closure | None
+
+    @cached_property
+    def reach(self) -> Reach:
+        """Between which values the means of all densities, and the pose at rest, lie."""
+        low, high = self.rest.copy(), self.rest.copy()
+        for number, stream in enumerate(self.visual, start=1):
+            group = next(group for group in self.chains.groups if number in group.streams)
+            means = group.of_stream(number).means
+            flat = means.reshape(-1, means.shape[2])
+            poses, _ = stream.restored(flat, np.ones_like(flat))
+            low[stream.columns] = np.minimum(low[stream.columns], poses[:, 0].min(axis=0))
+            high[stream.columns] = np.maximum(high[stream.columns], poses[:, 0].max(axis=0))
+        return Reach(low, high)
 
     def unseen(self, features: Single) -> Observed:
         """Return speech [shape=(T, 39)] with nothing seen."""

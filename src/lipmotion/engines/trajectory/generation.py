@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from lipmotion.engines.base import frame_of
 from lipmotion.engines.trajectory.closure import OPENING, Closure, closing_frames
+from lipmotion.engines.trajectory.reach import Reach
 from lipmotion.engines.trajectory.space import MotionSpace
 from lipmotion.errors import InputError
 from lipmotion.kernels.banded import generate
@@ -31,6 +32,7 @@ def generated_motion(
     statistics: Callable[[slice], Statistics],
     frames: int,
     space: MotionSpace,
+    reach: Reach,
     *,
     closure: Closure | None,
     closing: Sequence[slice],
@@ -39,8 +41,10 @@ def generated_motion(
     """Return the motion of all channels and its variance [each shape=(T, P)], by parameter generation.
 
     statistics : gives means and precisions of some frames
+    reach      : between which values the model's poses lie
     closure    : how the lips close (None: the motion has no opening);  closing : the frames in which they must
     pins       : from ``resolved``
+    Raises ModelFormatError: the motion leaves all that the model's poses, and the pins, span.
     """
     precise = np.float64 if frames <= DOUBLE_FRAMES else np.float32
     motion, spread = (np.empty((frames, len(space.channels)), precise) for _ in range(2))
@@ -52,6 +56,7 @@ def generated_motion(
             if outer.start <= span.start and span.stop <= outer.stop
         ]
         result = _generated(closure, statistics(outer), inside, spans)
+        reach.check(result[0], closure, inside)
         kept = slice(inner.start - outer.start, inner.stop - outer.start)
         motion[inner], spread[inner] = space.restore(*(values[kept] for values in result))
     weights = [channel.unit == WEIGHT for channel in space.channels]

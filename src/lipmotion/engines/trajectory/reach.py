@@ -1,0 +1,93 @@
+"""How far motion may go: what a model's own poses tell of it, and what no face does."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.engines.trajectory.closure import OPENING, Closure
+from lipmotion.engines.trajectory.space import MotionSpace
+from lipmotion.errors import ModelFormatError
+from lipmotion.types import check_magnitude
+
+Array = NDArray[np.float64]
+WIDEST = 20.0
+"""Motion stays within so many times the span of a model's poses: with sound that was never heard, about three."""
+LARGEST_SPREAD = 1000.0
+"""The poses of half of the dimensions span fewer of their own deviations than this: about ten in our models."""
+LARGEST_OFFSET = 1000.0
+"""The mean of points lies fewer of the largest span of a dimension away from 0."""
+WIDE_OPEN = 5.0
+"""Eye distances: more than this, a mouth is not open, and other things must fit as well."""
+NEGATIVE_SHARE = 0.25
+LEAST_SPAN = 1e-3
+
+
+class Reach(NamedTuple):
+    """Between which values the poses of a model lie.
+
+    low, high : [shape=(Q,)]
+    """
+
+    low: Array
+    high: Array
+
+    @property
+    def span(self) -> Array:
+        """How far apart they are."""
+        return self.high - self.low
+
+    def check(self, values: Array, closure: Closure | None, pins: Mapping[tuple[int, int], float]) -> None:
+        """Raise ModelFormatError where motion [shape=(T, Q)] goes where no pose of the model, and no pin, leads."""
+        low, high = self.low.copy(), self.high.copy()
+        for (_, column), value in pins.items():
+            low[column], high[column] = min(low[column], value), max(high[column], value)
+        span = np.maximum(high - low, LEAST_SPAN * (high - low).max())
+        if closure is not None:
+            span = np.maximum(span, np.abs(closure.follow) * (high - low)[closure.column] if pins else 0)
+        margin = WIDEST * span + LEAST_SPAN
+        worst = np.maximum(low - values.min(axis=0), values.max(axis=0) - high) / margin
+        if not worst.max() <= 1:
+            column = int(worst.argmax())
+            raise ModelFormatError(
+                f"the motion would go from {values[:, column].min():g} to {values[:, column].max():g} in dimension "
+                f"{column}, the model's own poses lie between {low[column]:g} and {high[column]:g}: the model is "
+                "damaged; train or download it again"
+            )
+
+
+def reach_of(poses: NDArray[np.floating]) -> Reach:
+    """Return between which values poses [shape=(N, Q)] lie."""
+    return Reach(poses.min(axis=0).astype(float), poses.max(axis=0).astype(float))
+
+
+def check_reach(reach: Reach, space: MotionSpace, closure: Closure | None) -> None:
+    """Raise ValueError where a model's poses are none of a face, or do not fit the other things it knows."""
+    count = len(space.direct)
+    for column, channel in enumerate(space.direct):
+        check_magnitude(space.channels[channel], float(reach.low[column]), float(reach.high[column]))
+    if space.points is not None:
+        largest = float(np.abs(space.points.mean).max())
+        if largest > max(WIDE_OPEN, LARGEST_OFFSET * float(reach.span[count:].max())):
+            raise ValueError(f"points_mean as large as {largest:g} of points that move by {reach.span[count:].max():g}")
+    if closure is not None:
+        _check_opening(float(reach.low[closure.column]), float(reach.high[closure.column]), closure.closed)
+
+
+def _check_opening(low: float, high: float, closed: float) -> None:
+    span = high - low
+    if max(-low, high) > WIDE_OPEN and (low < -NEGATIVE_SHARE * span or low > WIDEST * span):
+        raise ValueError(f"poses whose {OPENING} is {low:g} to {high:g}")
+    if closed > max(high + WIDEST * span, WIDE_OPEN):
+        raise ValueError(f"lips that are closed at {closed:g}, with poses whose {OPENING} is {low:g} to {high:g}")
+
+
+def check_spread(poses: NDArray[np.floating], variances: NDArray[np.floating]) -> None:
+    """Raise ValueError where poses [shape=(N, Q)] lie much farther apart than their own deviations let them."""
+    deviation = np.sqrt(variances.mean(axis=0, dtype=float))
+    spread = float(np.median(np.ptp(poses, axis=0) / deviation))
+    if spread > LARGEST_SPREAD:
+        raise ValueError(f"means that span {spread:.0f} of their deviations, required at most {LARGEST_SPREAD:.0f}")
