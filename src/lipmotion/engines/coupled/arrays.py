@@ -19,7 +19,7 @@ from lipmotion.engines.coupled.systems import FACTORIAL, Structure
 from lipmotion.engines.coupled.transitions import Transitions
 from lipmotion.engines.coupled.visual import VisualStream
 from lipmotion.engines.trajectory.frame import FRAME, SINGLE, frame_arrays, frame_from_arrays
-from lipmotion.engines.trajectory.reach import check_reach
+from lipmotion.engines.trajectory.reach import check_reach, check_rest
 from lipmotion.engines.trajectory.window import FEATURES, WINDOW, window_from
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.stats.bigram import check_sums
@@ -114,6 +114,7 @@ def coupled_from_arrays(arrays: Arrays, config: CoupledConfig) -> CoupledModel:
         chains = Chains(streams, transitions, _groups(arrays, transitions.product.chain_states.shape[1], visual))
         follow = _follow(arrays, structure, visual) if config.dynamic and config.follows else None
         model = CoupledModel(chains, space, visual, follow, poses["gain"], poses["rest"], closure)
+        check_rest(model.rest, model.spoken)
         check_reach(model.reach, space, closure)
         return model
     except (KeyError, ValueError, TypeError, IndexError, OverflowError, InputError) as error:

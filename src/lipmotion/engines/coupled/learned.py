@@ -15,7 +15,7 @@ from lipmotion.engines.coupled.following import Following, Surroundings
 from lipmotion.engines.coupled.model import Chains, Inferred
 from lipmotion.engines.coupled.visual import VisualStream, unseen
 from lipmotion.engines.trajectory.closure import Closure
-from lipmotion.engines.trajectory.reach import Reach
+from lipmotion.engines.trajectory.reach import Reach, reach_of
 from lipmotion.engines.trajectory.space import MotionSpace
 from lipmotion.types import FRAME_RATE_HZ
 
@@ -51,14 +51,18 @@ class CoupledModel:
     @cached_property
     def reach(self) -> Reach:
         """Between which values the means of all densities, and the pose at rest, lie."""
-        low, high = self.rest.copy(), self.rest.copy()
+        found = self.spoken
+        return Reach(np.minimum(found.low, self.rest), np.maximum(found.high, self.rest))
+
+    @property
+    def spoken(self) -> Reach:
+        """Between which values the means of all densities lie."""
+        low, high = np.zeros(self.space.dimensions), np.zeros(self.space.dimensions)
         for number, stream in enumerate(self.visual, start=1):
             group = next(group for group in self.chains.groups if number in group.streams)
-            means = group.of_stream(number).means
+            means = group.of_stream(number).means.astype(float)
             flat = means.reshape(-1, means.shape[2])
-            poses, _ = stream.restored(flat, np.ones_like(flat))
-            low[stream.columns] = np.minimum(low[stream.columns], poses[:, 0].min(axis=0))
-            high[stream.columns] = np.maximum(high[stream.columns], poses[:, 0].max(axis=0))
+            low[stream.columns], high[stream.columns] = reach_of(stream.restored(flat, np.ones_like(flat))[0][:, 0])
         return Reach(low, high)
 
     def unseen(self, features: Single) -> Observed:

@@ -104,6 +104,8 @@ def listener_from_arrays(arrays: Arrays) -> Listener | None:
         return None
     (typical,) = checked(own, TYPICAL)["typical"].tolist()
     hmm = joint_from_arrays({name: array for name, array in own.items() if name not in TYPICAL}, CONFIG)
+    if set(hmm.inventory.names) != set(PHONES.units):
+        raise ValueError(f"the units {' '.join(hmm.inventory.names)}, required {' '.join(PHONES.units)}")
     return Listener(hmm, typical)
 
 

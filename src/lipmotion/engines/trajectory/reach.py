@@ -22,7 +22,9 @@ LARGEST_OFFSET = 1000.0
 """The mean of points lies fewer of the largest span of a dimension away from 0."""
 WIDE_OPEN = 5.0
 """Eye distances: more than this, a mouth is not open, and other things must fit as well."""
-NEGATIVE_SHARE = 0.25
+NEGATIVE_SHARE = 0.05
+FAR_REST = 3.0
+"""The pose at rest lies fewer spans of the poses away from these."""
 LEAST_SPAN = 1e-3
 
 
@@ -75,6 +77,18 @@ def check_reach(reach: Reach, space: MotionSpace, closure: Closure | None) -> No
             raise ValueError(f"points_mean as large as {largest:g} of points that move by {reach.span[count:].max():g}")
     if closure is not None:
         _check_opening(float(reach.low[closure.column]), float(reach.high[closure.column]), closure.closed)
+
+
+def check_rest(rest: Array, reach: Reach) -> None:
+    """Raise ValueError where the pose at rest [shape=(Q,)] is far from all other poses."""
+    span = reach.span + LEAST_SPAN * max(float(reach.span.max()), 1.0)
+    away = np.maximum(reach.low - rest, rest - reach.high) / span
+    column = int(away.argmax())
+    if away[column] > FAR_REST:
+        raise ValueError(
+            f"rest of {rest[column]:g} in dimension {column}, whose poses are {reach.low[column]:g} to "
+            f"{reach.high[column]:g}"
+        )
 
 
 def _check_opening(low: float, high: float, closed: float) -> None:

@@ -71,6 +71,8 @@ def window_from(found: Checked) -> AudioWindow:
     mean, scale = found["window"]
     if not (scale > 0).all():
         raise ValueError("window of features of no spread")
+    if not found["window_basis"].any(axis=0).all():
+        raise ValueError("window_basis with an axis of zeros")
     return AudioWindow(mean, scale, found["window_basis"])
 
 

@@ -197,6 +197,8 @@ class JointEngine(Engine[JointModel]):
             only(arrays, FRAME, (name for name in arrays if name.startswith(PREFIX)))
             units, space, closure = frame_from_arrays(arrays, self.config.units)
             hmm = joint_from_arrays(under(arrays, PREFIX), self.config.joint)
+            if set(hmm.inventory.names) != set(units.units):
+                raise ValueError(f"the units {' '.join(hmm.inventory.names)}, required {' '.join(units.units)}")
             if MOTION not in hmm.parts or len(hmm.parts[MOTION].scale.mean) != 3 * space.dimensions:
                 raise ValueError(f"motion that is not of {space.dimensions} dimensions")
             model = JointModel(units, space, hmm, closure)
