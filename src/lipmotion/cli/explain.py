@@ -22,13 +22,12 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Call ``lipmotion.explain`` and print what it found."""
-    import json
-
+    from lipmotion.json_text import as_json, defined
     from lipmotion.pipeline.explain import explain, explanation_document, explanation_text
 
     found = explain(speech=options.speech, at_s=options.at, **speech_arguments(options))
     if options.json:
         for explanation in found:
-            print(json.dumps(explanation_document(explanation)))
+            print(as_json(defined(explanation_document(explanation))))
     else:
         print("\n\n".join(map(explanation_text, found)))

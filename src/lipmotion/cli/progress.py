@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import logging
 import sys
 from collections.abc import Iterator
@@ -13,6 +12,7 @@ from typing import Any, Protocol
 from lipmotion.cli.outcome import outcome
 from lipmotion.cli.output import refused
 from lipmotion.cli.stop import MESSAGE, Stopper
+from lipmotion.json_text import as_json, defined
 from lipmotion.types.progress import Item, Progress
 
 
@@ -138,7 +138,7 @@ class _Lines:
     def _say(self, kind: str, /, **fields: Any) -> None:
         if not self._refused:
             try:
-                print(json.dumps({"type": kind, **fields}), flush=True)
+                print(as_json(defined({"type": kind, **fields})), flush=True)
             except OSError as error:  # a full disk, or a reader that has gone: then there is nobody to work for
                 self._refused = True
                 raise refused(error) from error

@@ -96,6 +96,14 @@ class Motion:
         return Motion(self.at(np.arange(count) / rate_hz), rate_hz, self.channels)
 
 
+def check_curves(motion: Motion) -> None:
+    """Raise InputError where a curve is not finite, or larger than anything in a face."""
+    if len(motion.values):
+        ends = zip(motion.channels, motion.values.min(axis=0).tolist(), motion.values.max(axis=0).tolist(), strict=True)
+        for channel, low, high in ends:
+            check_magnitude(channel, low, high)
+
+
 def check_magnitude(channel: Channel, low: float, high: float) -> None:
     """Raise InputError where a curve from ``low`` to ``high`` is none of a face."""
     largest = LARGEST.get(channel.unit, LARGEST_OTHER)

@@ -19,7 +19,7 @@ from lipmotion.engines.coupled.systems import FACTORIAL, Structure
 from lipmotion.engines.coupled.transitions import Transitions
 from lipmotion.engines.coupled.visual import VisualStream
 from lipmotion.engines.trajectory.frame import FRAME, SINGLE, frame_arrays, frame_from_arrays
-from lipmotion.engines.trajectory.reach import check_reach, check_rest
+from lipmotion.engines.trajectory.reach import check_poses, check_rest
 from lipmotion.engines.trajectory.window import FEATURES, WINDOW, window_from
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.stats.bigram import check_sums
@@ -106,6 +106,8 @@ def coupled_from_arrays(arrays: Arrays, config: CoupledConfig) -> CoupledModel:
         poses = checked(arrays, POSES, Q=space.dimensions)
         streams = tuple(poses["streams"].tolist())
         _check_names(arrays, structure, len(streams))
+        if structure.counts[0] > arrays["group_0/tie"].size:
+            raise ValueError(f"{structure.counts[0]} states of the first chain, of {arrays['group_0/tie'].size} in all")
         transitions = _transitions(arrays, structure)
         visual = tuple(
             _visual(under(arrays, f"visual_{number}/"), name, space.dimensions, config.dynamic)
@@ -114,8 +116,8 @@ def coupled_from_arrays(arrays: Arrays, config: CoupledConfig) -> CoupledModel:
         chains = Chains(streams, transitions, _groups(arrays, transitions.product.chain_states.shape[1], visual))
         follow = _follow(arrays, structure, visual) if config.dynamic and config.follows else None
         model = CoupledModel(chains, space, visual, follow, poses["gain"], poses["rest"], closure)
-        check_rest(model.rest, model.spoken)
-        check_reach(model.reach, space, closure)
+        check_rest(model.rest, model.poses)
+        check_poses(model.poses, space, closure)
         return model
     except (KeyError, ValueError, TypeError, IndexError, OverflowError, InputError) as error:
         raise ModelFormatError(f"the coupled model is damaged ({error}); train or download it again") from error

@@ -50,12 +50,14 @@ class CoupledModel:
 
     @cached_property
     def reach(self) -> Reach:
-        """Between which values the means of all densities, and the pose at rest, lie."""
-        found = self.spoken
-        return Reach(np.minimum(found.low, self.rest), np.maximum(found.high, self.rest))
+        """Between which values motion lies."""
+        poses, deviation = self.poses, np.zeros(self.space.dimensions)
+        for stream in self.visual:
+            deviation[stream.columns] = stream.deviation[: len(stream.columns)]
+        return Reach(np.minimum(poses.low, self.rest), np.maximum(poses.high, self.rest)).widened(deviation)
 
     @property
-    def spoken(self) -> Reach:
+    def poses(self) -> Reach:
         """Between which values the means of all densities lie."""
         low, high = np.zeros(self.space.dimensions), np.zeros(self.space.dimensions)
         for number, stream in enumerate(self.visual, start=1):

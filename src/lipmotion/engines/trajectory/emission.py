@@ -114,8 +114,8 @@ def emission_arrays(emission: Emission) -> dict[str, NDArray[Any]]:
 def emission_from_arrays(arrays: Arrays, cut: Cut, dimensions: int) -> Emission:
     """Return the densities again. Raises KeyError, ValueError: something is missing, out of place or out of range."""
     forest = trees_from_arrays(arrays)
-    if list(forest) != cut.names:
-        raise ValueError(f"trees for {len(forest)} parts, required {len(cut.names)}: {' '.join(cut.names)}")
+    if len(forest) != cut.speech + cut.silence or list(forest) != cut.names:
+        raise ValueError(f"trees for {len(forest)} parts, required {cut.speech} of speech and {cut.silence} of silence")
     leaves = sum(len(tree.leaves) for tree in forest.values()) + 1
     found = checked(arrays, DENSITIES, L=leaves, Q=dimensions)
     check_spread(found["means"][:, 0], found["variances"][:, 0])

@@ -15,7 +15,7 @@ from lipmotion.engines.trajectory.contexts import Cut
 from lipmotion.engines.trajectory.emission import EMISSION, Emission, emission_arrays, emission_from_arrays
 from lipmotion.engines.trajectory.frame import FRAME, frame_arrays, frame_from_arrays
 from lipmotion.engines.trajectory.listening import LISTENER, Listener, listener_arrays, listener_from_arrays
-from lipmotion.engines.trajectory.reach import Reach, check_reach, reach_of
+from lipmotion.engines.trajectory.reach import Reach, check_poses, reach_of
 from lipmotion.engines.trajectory.space import MotionSpace
 from lipmotion.errors import ModelFormatError
 from lipmotion.stats.schema import POSITIVE, Arrays, Member, checked, only
@@ -43,6 +43,11 @@ class TrajectoryModel:
 
     @cached_property
     def reach(self) -> Reach:
+        """Between which values motion lies."""
+        return self.poses.widened(np.sqrt(self.emission.variances[:, 0].max(axis=0)))
+
+    @property
+    def poses(self) -> Reach:
         """Between which values the means of all states lie."""
         return reach_of(self.emission.means[:, 0])
 
@@ -67,7 +72,7 @@ def model_from_arrays(arrays: Arrays, cut: Callable[[UnitSet], Cut], units: str)
         emission = emission_from_arrays(arrays, cut(of), space.dimensions)
         gain = checked(arrays, GAIN, Q=space.dimensions)["gain"]
         model = TrajectoryModel(of, space, emission, gain, closure, listener_from_arrays(arrays))
-        check_reach(model.reach, space, closure)
+        check_poses(model.poses, space, closure)
         return model
     except (KeyError, ValueError, IndexError, TypeError) as error:
         raise ModelFormatError(f"the trajectory model is damaged ({error}); train or download it again") from error

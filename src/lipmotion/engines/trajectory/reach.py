@@ -16,6 +16,8 @@ from lipmotion.types import check_magnitude
 Array = NDArray[np.float64]
 WIDEST = 20.0
 """Motion stays within so many times the span of a model's poses: with sound that was never heard, about three."""
+DEVIATIONS = 3.0
+"""Motion lies around its poses."""
 LARGEST_SPREAD = 1000.0
 """The poses of half of the dimensions span fewer of their own deviations than this: about ten in our models."""
 LARGEST_OFFSET = 1000.0
@@ -29,7 +31,7 @@ LEAST_SPAN = 1e-3
 
 
 class Reach(NamedTuple):
-    """Between which values the poses of a model lie.
+    """Between which values poses, or motion, of a model lie.
 
     low, high : [shape=(Q,)]
     """
@@ -42,8 +44,12 @@ class Reach(NamedTuple):
         """How far apart they are."""
         return self.high - self.low
 
+    def widened(self, deviation: NDArray[np.floating]) -> Reach:
+        """Return a reach of ``DEVIATIONS`` more to both sides."""
+        return Reach(self.low - DEVIATIONS * deviation, self.high + DEVIATIONS * deviation)
+
     def check(self, values: Array, closure: Closure | None, pins: Mapping[tuple[int, int], float]) -> None:
-        """Raise ModelFormatError where motion [shape=(T, Q)] goes where no pose of the model, and no pin, leads."""
+        """Raise ModelFormatError where motion [shape=(T, Q)] goes that the model, and pins, do not lead to."""
         low, high = self.low.copy(), self.high.copy()
         for (_, column), value in pins.items():
             low[column], high[column] = min(low[column], value), max(high[column], value)
@@ -56,7 +62,7 @@ class Reach(NamedTuple):
             column = int(worst.argmax())
             raise ModelFormatError(
                 f"the motion would go from {values[:, column].min():g} to {values[:, column].max():g} in dimension "
-                f"{column}, the model's own poses lie between {low[column]:g} and {high[column]:g}: the model is "
+                f"{column}, its model reaches from {low[column]:g} to {high[column]:g}: the model is "
                 "damaged; train or download it again"
             )
 
@@ -66,7 +72,7 @@ def reach_of(poses: NDArray[np.floating]) -> Reach:
     return Reach(poses.min(axis=0).astype(float), poses.max(axis=0).astype(float))
 
 
-def check_reach(reach: Reach, space: MotionSpace, closure: Closure | None) -> None:
+def check_poses(reach: Reach, space: MotionSpace, closure: Closure | None) -> None:
     """Raise ValueError where a model's poses are none of a face, or do not fit the other things it knows."""
     count = len(space.direct)
     for column, channel in enumerate(space.direct):

@@ -54,6 +54,8 @@ def joint_from_arrays(arrays: Arrays, config: JointConfig) -> JointHmm:
         named = checked(arrays, NAMES)
         units, free, streams = (tuple(named[key].tolist()) for key in ("units", "free", "streams"))
         only(arrays, NAMES, TIMES, (name for name in arrays if name.partition("/")[0] in streams and "/" in name))
+        if config.states > arrays["log_stay"].size:
+            raise ValueError(f"{config.states} states a unit, of {arrays['log_stay'].size} in all")
         inventory = Inventory(units, free, config.states)
         spoken = tuple(unit for unit, heard in zip(units, named["spoken"], strict=True) if heard)
         if inventory.silence not in spoken:

@@ -24,7 +24,7 @@ from lipmotion.engines.trajectory.joint.model import JointConfig, JointHmm
 from lipmotion.engines.trajectory.joint.recognise import joint_recogniser
 from lipmotion.engines.trajectory.joint.streams import MOTION, Observed, StreamWeights, observe
 from lipmotion.engines.trajectory.joint.train import Transcribed, train_joint
-from lipmotion.engines.trajectory.reach import Reach, check_reach, reach_of
+from lipmotion.engines.trajectory.reach import Reach, check_poses, reach_of
 from lipmotion.engines.trajectory.space import MotionSpace, motion_in_space
 from lipmotion.errors import CorpusError, InputError, ModelFormatError
 from lipmotion.stats.checkpoint import NOTHING_KEPT, Checkpoint
@@ -114,11 +114,15 @@ class JointModel:
 
     @cached_property
     def reach(self) -> Reach:
+        """Between which values motion lies."""
+        return self.poses.widened(self.hmm.parts[MOTION].scale.deviation[: self.space.dimensions])
+
+    @property
+    def poses(self) -> Reach:
         """Between which values the means of all states lie."""
         part, Q = self.hmm.parts[MOTION], self.space.dimensions
-        return reach_of(
-            part.tied.mixtures.means[:, :, :Q].reshape(-1, Q) * part.scale.deviation[:Q] + part.scale.mean[:Q]
-        )
+        means = part.tied.mixtures.means[:, :, :Q].reshape(-1, Q)
+        return reach_of(means * part.scale.deviation[:Q] + part.scale.mean[:Q])
 
 
 @final
@@ -202,7 +206,7 @@ class JointEngine(Engine[JointModel]):
             if MOTION not in hmm.parts or len(hmm.parts[MOTION].scale.mean) != 3 * space.dimensions:
                 raise ValueError(f"motion that is not of {space.dimensions} dimensions")
             model = JointModel(units, space, hmm, closure)
-            check_reach(model.reach, space, closure)
+            check_poses(model.poses, space, closure)
             return model
         except (KeyError, ValueError, IndexError, TypeError) as error:
             raise ModelFormatError(f"the joint model is damaged ({error}); train or download it again") from error
