@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shutil
+import zlib
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -33,7 +35,10 @@ ENTRY = "entry.json"
 KEYS = frozenset(
     "name words split audio_rate_hz duration_s rate_hz frames unseen_frames channels crops source settings".split()
 )
-"""What every description holds. ``speaker`` and ``phones`` came with version 2 of the corpus; without them: unknown."""
+"""What every description holds. ``speaker`` and ``phones`` came with version 2 of the corpus; without them: unknown.
+``checksums`` came later; without them, only arrays that cannot be are noticed."""
+LAZY = "crops"
+"""The array that is not read before it is needed, and has no checksum."""
 LARGEST_FEATURE = 1e3
 """Features are standardised."""
 ARRAYS = {
@@ -108,6 +113,7 @@ def read_utterance(folder: Path) -> Utterance:
             raise ValueError(f"{sizes['T']} frames of features, required {expected} for {audio.duration_s:.2f} s")
         motion = Motion(arrays["motion"].astype(np.float64), entry["rate_hz"], channels)
         check_curves(motion)
+        _check_sums(arrays, entry.get("checksums", {}))
         return Utterance(
             name=entry["name"],
             audio=audio,
@@ -153,7 +159,19 @@ def _description(utterance: Utterance, settings: dict[str, str]) -> dict[str, An
         "notes": utterance.track.notes,
         "source": utterance.source,
         "settings": settings,
+        "checksums": {name: _checksum(array) for name, array in _arrays(utterance).items() if name != LAZY},
     }
+
+
+def _checksum(array: NDArray[Any]) -> int:
+    return zlib.crc32(array.tobytes())
+
+
+def _check_sums(arrays: Mapping[str, NDArray[Any]], checksums: Mapping[str, int]) -> None:
+    """Raise ValueError where an array holds other bytes than were written."""
+    for name, checksum in checksums.items():
+        if name in arrays and _checksum(arrays[name]) != checksum:
+            raise ValueError(f"{name} holds other bytes than were written")
 
 
 def _check_entry(entry: dict[str, Any]) -> None:
@@ -166,6 +184,7 @@ def _check_entry(entry: dict[str, Any]) -> None:
         "source": isinstance(entry["source"], dict) and _is_texts(list(entry["source"].values())),
         "notes": _is_texts(entry.get("notes", [])),
         "settings": isinstance(entry["settings"], dict),
+        "checksums": isinstance(entry.get("checksums", {}), dict),
         "channels": isinstance(entry["channels"], list) and all(map(_is_channel, entry["channels"])),
         "audio_rate_hz": isinstance(entry["audio_rate_hz"], int) and entry["audio_rate_hz"] > 0,
     }

@@ -124,7 +124,7 @@ def coupled_from_arrays(arrays: Arrays, config: CoupledConfig) -> CoupledModel:
 
 
 POSES = {
-    "gain": Member(np.float64, "Q", POSITIVE, 100),
+    "gain": Member(np.float64, "Q", POSITIVE, 10),
     "rest": Member(np.float64, "Q", -1e6, 1e6),
     "streams": Member(np.str_, "S"),
 }

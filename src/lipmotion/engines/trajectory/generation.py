@@ -14,7 +14,7 @@ from lipmotion.engines.trajectory.reach import Reach
 from lipmotion.engines.trajectory.space import MotionSpace
 from lipmotion.errors import InputError
 from lipmotion.kernels.banded import generate
-from lipmotion.types import FRAME_RATE_HZ, WEIGHT, Constraints
+from lipmotion.types import FRAME_RATE_HZ, WEIGHT, Constraints, check_magnitude
 
 STRETCH, MARGIN = 6000, 500
 """Frames generated at a time, and those around them that are generated again and thrown away: what lies seconds off
@@ -78,6 +78,7 @@ def resolved(constraints: Constraints | None, space: MotionSpace, frames: int) -
         if not np.isfinite(wanted.value):
             raise InputError(f"pin at {wanted.time_s} s has the value {wanted.value}, required a finite number")
         column = names.index(wanted.channel)
+        check_magnitude(space.channels[space.direct[column]], wanted.value, wanted.value)
         never_negative = wanted.channel == OPENING or space.channels[space.direct[column]].unit == WEIGHT
         if never_negative and wanted.value < 0:
             raise InputError(f"pin at {wanted.time_s} s sets {wanted.channel} to {wanted.value}, required at least 0")

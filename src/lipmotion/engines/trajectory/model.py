@@ -78,4 +78,4 @@ def model_from_arrays(arrays: Arrays, cut: Callable[[UnitSet], Cut], units: str)
         raise ModelFormatError(f"the trajectory model is damaged ({error}); train or download it again") from error
 
 
-GAIN = {"gain": Member(np.float64, "Q", POSITIVE, 100)}
+GAIN = {"gain": Member(np.float64, "Q", POSITIVE, 10)}

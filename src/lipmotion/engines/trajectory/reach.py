@@ -53,11 +53,10 @@ class Reach(NamedTuple):
         low, high = self.low.copy(), self.high.copy()
         for (_, column), value in pins.items():
             low[column], high[column] = min(low[column], value), max(high[column], value)
-        span = np.maximum(high - low, LEAST_SPAN * (high - low).max())
+        span = _span(low, high)
         if closure is not None:
             span = np.maximum(span, np.abs(closure.follow) * (high - low)[closure.column] if pins else 0)
-        margin = WIDEST * span + LEAST_SPAN
-        worst = np.maximum(low - values.min(axis=0), values.max(axis=0) - high) / margin
+        worst = np.maximum(low - values.min(axis=0), values.max(axis=0) - high) / (WIDEST * span)
         if not worst.max() <= 1:
             column = int(worst.argmax())
             raise ModelFormatError(
@@ -87,14 +86,18 @@ def check_poses(reach: Reach, space: MotionSpace, closure: Closure | None) -> No
 
 def check_rest(rest: Array, reach: Reach) -> None:
     """Raise ValueError where the pose at rest [shape=(Q,)] is far from all other poses."""
-    span = reach.span + LEAST_SPAN * max(float(reach.span.max()), 1.0)
-    away = np.maximum(reach.low - rest, rest - reach.high) / span
+    away = np.maximum(reach.low - rest, rest - reach.high) / _span(reach.low, reach.high)
     column = int(away.argmax())
     if away[column] > FAR_REST:
         raise ValueError(
             f"rest of {rest[column]:g} in dimension {column}, whose poses are {reach.low[column]:g} to "
             f"{reach.high[column]:g}"
         )
+
+
+def _span(low: Array, high: Array) -> Array:
+    """Return how far apart values are; those that hardly differ, a thousandth of what they are, or of 1."""
+    return np.maximum(high - low, LEAST_SPAN * np.maximum(np.maximum(np.abs(low), np.abs(high)), 1))
 
 
 def _check_opening(low: float, high: float, closed: float) -> None:
