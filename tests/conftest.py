@@ -81,3 +81,23 @@ def recordings() -> Path:
     if not folder.is_dir():
         pytest.skip("the real recordings are not here")
     return folder
+
+
+@pytest.fixture(scope="session")
+def joint_model(toy_corpus: Corpus) -> Model:
+    """A joint model of the toy corpus."""
+    return train(toy_corpus, recogniser=HmmConfig(mixtures=1, iterations=2), engine=engine_named("joint", {}))[0]
+
+
+@pytest.fixture(scope="session")
+def pictured_model(toy_corpus: Corpus) -> Model:
+    """A model of lip distances and eigenlips."""
+    return train(toy_corpus, recogniser=HmmConfig(mixtures=1, iterations=2), visual="both")[0]
+
+
+@pytest.fixture(scope="session")
+def pictured_model_file(pictured_model: Model, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The model of lip distances and eigenlips as it is saved."""
+    path = tmp_path_factory.mktemp("pictured") / "pictured.lipmotion"
+    save_model(pictured_model, path)
+    return path

@@ -21,12 +21,15 @@ class Bench:
     """Good input, and a folder for the bad.
 
     folder : beside the current one, which a command must leave empty
+    coupled, pictured : models of another engine, and of eigenlips
     """
 
     folder: Path
     speech: Path
     model: Path
     corpus: Path
+    coupled: Path
+    pictured: Path
 
     def file(self, name: str, content: bytes | str) -> Path:
         path = self.folder / name
@@ -52,10 +55,10 @@ class Bench:
         whose = [] if "--recogniser" in more else ["--recogniser", "own"]
         return ["animate", self.speech if speech is None else speech, *model, *whose, "-o", output, *more]
 
-    def changed_model(self, changes: dict[str, bytes | None], **header: object) -> Path:
-        """Return a copy of the model with other members (None: without them), or another header."""
+    def changed_model(self, changes: dict[str, bytes | None], of: Path | None = None, /, **header: object) -> Path:
+        """Return a copy of a model with other members (None: without them), or another header."""
         path = self.folder / "changed.lipmotion"
-        with zipfile.ZipFile(self.model) as old, zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as new:
+        with zipfile.ZipFile(of or self.model) as old, zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as new:
             for name in old.namelist():
                 content = changes.get(name, old.read(name))
                 if name == "header.json" and content is not None and header:
@@ -66,9 +69,9 @@ class Bench:
                 new.writestr(name, changes[name] or b"")
         return path
 
-    def array(self, name: str) -> NDArray[Any]:
-        """Return one array of the model."""
-        with zipfile.ZipFile(self.model) as file:
+    def array(self, name: str, of: Path | None = None) -> NDArray[Any]:
+        """Return one array of a model."""
+        with zipfile.ZipFile(of or self.model) as file:
             array: NDArray[Any] = np.load(io.BytesIO(file.read(f"{name}.npy")), allow_pickle=False)
         return array.copy()
 

@@ -17,11 +17,18 @@ HANGS_S = 120
 
 
 @pytest.fixture
-def bench(tmp_path: Path, toy_speech: Path, toy_model_file: Path, toy_corpus: Corpus) -> Bench:
+def bench(
+    tmp_path: Path,
+    toy_speech: Path,
+    toy_model_file: Path,
+    toy_corpus: Corpus,
+    coupled_model_file: Path,
+    pictured_model_file: Path,
+) -> Bench:
     """Good input, and a folder for the bad."""
     folder = tmp_path / "bad"
     folder.mkdir()
-    return Bench(folder, toy_speech, toy_model_file, toy_corpus.path)
+    return Bench(folder, toy_speech, toy_model_file, toy_corpus.path, coupled_model_file, pictured_model_file)
 
 
 @pytest.fixture(autouse=True)

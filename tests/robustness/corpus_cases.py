@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from robustness.case import Bench, case, declared, npy
 from robustness.motion_cases import GOOD
@@ -28,7 +29,8 @@ def _damaged(name: str, code: int, *says: str, verb: str = "train") -> Callable[
         def _(bench: Bench) -> list[object]:
             path = bench.copied_corpus()
             damage(path)
-            return [*verb.split(), path, *(["-o", "m"] if verb.startswith("train") else [])]
+            model = [bench.model] if verb == "evaluate" else []
+            return [*verb.split(), *model, path, *(["-o", "m"] if verb.startswith("train") else [])]
 
     return keep
 
@@ -141,7 +143,7 @@ for _array in ("audio", "features", "motion", "seen"):
         path = _first(corpus) / f"{name}.npy"
         path.write_bytes(path.read_bytes()[:-20])
 
-    @_damaged(f"{_array} of texts", 4, *AGAIN, "required one of the kinds")
+    @_damaged(f"{_array} of texts", 4, *AGAIN, "holds <U1, required")
     def _(corpus: Path, name: str = _array) -> None:
         (_first(corpus) / f"{name}.npy").write_bytes(npy(np.array(["a"] * 50)))
 
@@ -167,6 +169,44 @@ for _array in ("features", "motion"):
         values = np.load(path, allow_pickle=False)
         values[3, 0] = np.nan
         np.save(path, values)
+
+
+def _remade(name: str, array: str, remake: Callable[[NDArray[Any]], NDArray[Any]], *says: str, verb: str) -> None:
+    @_damaged(f"{array} {name}: {verb}", 4, *AGAIN, *says, verb=verb)
+    def _(corpus: Path) -> None:
+        for folder in (corpus / "utterances").iterdir():
+            path = folder / f"{array}.npy"
+            np.save(path, remake(np.load(path, allow_pickle=False)))
+
+
+for _verb in ("train", "evaluate"):
+    _remade("times 1e6", "motion", lambda a: a * 1e6, "required within", verb=_verb)
+    _remade("complex", "motion", lambda a: a.astype(complex), "holds complex", verb=_verb)
+    _remade("times 1e6", "features", lambda a: a * 1e6, "required -1000 to 1000", verb=_verb)
+    _remade("of dates", "features", lambda a: a.astype("i8").astype("M8[s]"), "holds datetime64", verb=_verb)
+    _remade("in 32 bits", "audio", lambda a: a.astype(np.float32), "holds float32", verb=_verb)
+    _remade("of numbers", "seen", lambda a: a.astype(np.int64), "holds int64", verb=_verb)
+    _remade("a frame shorter", "seen", lambda a: a[1:], "seen of shape", verb=_verb)
+    _remade("a channel narrower", "motion", lambda a: a[:, 1:], "motion of shape", verb=_verb)
+
+
+_remade("times 1e6", "motion", lambda a: a * 1e6, "required within", verb="experiment unit-sets")
+
+for _array in ("audio", "features", "motion", "seen"):
+
+    @_damaged(f"bytes flipped in the middle of {_array}", 4, *AGAIN)
+    def _(corpus: Path, name: str = _array) -> None:
+        path = _first(corpus) / f"{name}.npy"
+        content = bytearray(path.read_bytes())
+        middle = 128 + (len(content) - 128) // 2
+        content[middle : middle + 4] = bytes(byte ^ 1 for byte in content[middle : middle + 4])
+        path.write_bytes(content)
+
+
+@_damaged("a description with a key twice", 4, *AGAIN, "stands there twice")
+def _(corpus: Path) -> None:
+    path = _first(corpus) / "entry.json"
+    path.write_text(path.read_text(encoding="utf-8").replace("{", '{"name": "a", ', 1), encoding="utf-8")
 
 
 @_damaged("an array that is a device", 4, *AGAIN, "pipe or a device")

@@ -5,13 +5,18 @@ from __future__ import annotations
 import io
 import json
 import struct
+import warnings
 import zipfile
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from robustness.case import Bench, case, declared, npy
 
 GROUP = "models"
+Remake = Callable[[NDArray[Any]], NDArray[Any]]
 NO_MODEL = ("not a lipmotion model", "give a file that `lipmotion train` wrote")
 DAMAGED = ("damaged", "train or download")
 
@@ -57,7 +62,7 @@ _header("an unknown engine", *DAMAGED, "no engine 'quantum'; there are: trajecto
 _header("an engine that is a list", *DAMAGED, engine=[])
 _header("an unknown option", *DAMAGED, "unexpected keyword argument", configuration={"colour": 1})
 _header("an option that is a text", *DAMAGED, configuration={"parts": "5"})
-_header("an option of NaN", *DAMAGED, configuration={"edge_s": float("nan")})
+_header("an option of NaN", *NO_MODEL, "the number NaN, required a finite one", configuration={"edge_s": float("nan")})
 _header("more parts than were learned", *DAMAGED, configuration={"parts": 9})
 _header("a recogniser's option that is a text", *DAMAGED, recogniser={"bigram_weight": "much"})
 
@@ -91,16 +96,77 @@ def _array(name: str, member: str, value: float, *says: str) -> None:
 
 
 _array("NaN among means", "phones/means", np.nan, "means holds values that are not finite")
-_array("a variance of 0", "phones/variances", 0, "variances not more than 0")
-_array("a probability over 1", "phones/log_stay", 0.5, "probabilities not less than 1")
+_array("a variance of 0", "phones/variances", 0, "variances holds 0 to", "required more than 0")
+_array("a probability over 1", "phones/log_stay", 0.5, "log_stay holds", "to less than 0")
 _array("a state without states", "phones/counts", -1)
 _array("NaN in what the engine learned", "engine/means", np.nan, "not finite")
 _array("NaN in how the engine follows the sound", "engine/coefficients", np.nan, "not finite")
 _array("a tree that asks what there is not", "engine/asked", 10**6, "tree")
-_array("a gain of 0", "engine/gain", 0, "a gain")
+_array("a gain of 0", "engine/gain", 0, "gain holds 0 to", "required more than 0")
 _array("an infinite variance of the engine", "engine/variances", np.inf, "not finite")
-_array("a negative variance of the engine", "engine/variances", -1, "not more than 0")
+_array("a negative variance of the engine", "engine/variances", -1, "required more than 0")
 _array("a channel that is not there", "engine/direct", 10**6, "direct channels")
+
+
+def _remade(name: str, member: str, remake: Remake, *says: str, of: str = "model") -> None:
+    @case(GROUP, name, 6, *(says or DAMAGED))
+    def _(bench: Bench) -> list[object]:
+        whole = getattr(bench, of)
+        content = npy(remake(bench.array(member, whole)))
+        return bench.animate(None, "--model", bench.changed_model({f"{member}.npy": content}, whole))
+
+
+FAR = ("the motion would go from", "the model is damaged; train or download it again")
+_remade("coefficients times 1000", "engine/coefficients", lambda a: a.astype(float) * 1000, *FAR)
+_remade("means times 1000", "engine/means", lambda a: a.astype(float) * 1000, *DAMAGED, "of their deviations")
+_remade("complex means", "engine/means", lambda a: a.astype(complex), *DAMAGED, "holds complex128, required fractions")
+_remade("means that are dates", "engine/means", lambda a: a.astype("i8").astype("M8[s]"), *DAMAGED, "holds datetime64")
+_remade("probabilities that do not sum to 1", "phones/bigram", lambda a: a * 0, *DAMAGED, "whose sum is")
+_remade("a question of a fourth neighbour", "engine/questions", lambda a: np.where(a == "0", "3", a))
+for _member, _remake in {
+    "means": lambda a: a.astype(complex),
+    "variances": lambda a: -a,
+    "log_weights": lambda a: a + 1,
+    "tie": lambda a: a + 10**6,
+    "streams": lambda a: a + 9,
+}.items():
+    _remade(f"coupled: {_member} that cannot be", f"engine/group_1/{_member}", _remake, of="coupled")
+_remade("coupled: a bigram times 1000", "engine/chain_0/bigram", lambda a: a * 1000, of="coupled")
+_remade("coupled: a scale times 1000", "engine/visual_0/scale", lambda a: a * 1000, of="coupled")
+_remade("coupled: NaN in rest", "engine/rest", lambda a: a * np.nan, of="coupled")
+_remade("coupled: rest times 1000", "engine/rest", lambda a: a * 1000, *DAMAGED, "rest of", of="coupled")
+_remade("coupled: one state less", "engine/chain_0/advance", lambda a: a[:1], of="coupled")
+_remade("coupled: what is believed, turned over", "engine/around/basis", lambda a: a.T, of="coupled")
+_remade("coupled: what is followed, times 1000", "engine/following_0/coefficients", lambda a: a.astype(float) * 1000,
+        *FAR, of="coupled")  # fmt: skip
+LIPS = ("the eigenlips are damaged", "train the model again")
+_remade("eigenlips: times 1000", "eigenlips/basis", lambda a: a * 1000, *LIPS, of="pictured")
+_remade("eigenlips: components that are alike", "eigenlips/basis", lambda a: a[:, :1] + 0 * a, *LIPS, "orthonormal",
+        of="pictured")  # fmt: skip
+_remade("eigenlips: a negative size", "eigenlips/size", lambda a: -a, *LIPS, "size holds", of="pictured")
+_remade("eigenlips: a mean of NaN", "eigenlips/mean", lambda a: a * np.nan, *LIPS, "not finite", of="pictured")
+_remade("eigenlips: a colour less", "eigenlips/basis", lambda a: a[:2], *LIPS, "basis of shape", of="pictured")
+_remade("eigenlips: complex", "eigenlips/basis", lambda a: a.astype(complex), *LIPS, "complex", of="pictured")
+
+_changed("an array that nothing declares", "engine/more.npy", npy(np.zeros(3)), *DAMAGED, "undeclared 'more'")
+_changed("a part that nothing declares", "more/means.npy", npy(np.zeros(3)), *DAMAGED, "undeclared 'more/means'")
+_changed("a member that is no array", "engine/notes.txt", b"hello", *DAMAGED, "undeclared 'engine/notes.txt'")
+_changed("a header with a key twice", "header.json", b'{"format": "lipmotion.model", "format": "other"}', *NO_MODEL,
+         "the key 'format' stands there twice")  # fmt: skip
+_changed("a header of 1e999", "header.json", b'{"format": "lipmotion.model", "version": 1e999}', *NO_MODEL, "1e999")
+_header("an option of a billion", *DAMAGED, "required at most", configuration={"parts": 10**9 + 1})
+_header("states by the billion", *DAMAGED, engine="joint", configuration={"states": 10**6})
+_header("an option that is true", *DAMAGED, "required a whole number", configuration={"parts": True})
+_header("a truth value that is a text", *DAMAGED, "required true or false", configuration={"listens": "no"})
+
+
+@case(GROUP, "a member that is there twice", 6, *NO_MODEL, "is in it twice")
+def _(bench: Bench) -> list[object]:
+    path = bench.changed_model({})
+    with warnings.catch_warnings(), zipfile.ZipFile(path, "a") as file:
+        warnings.simplefilter("ignore")
+        file.writestr("engine/means.npy", npy(bench.array("engine/means")))
+    return bench.animate(None, "--model", path)
 
 
 @case(GROUP, "a compression that NumPy never uses", 6, *NO_MODEL, "required: deflated or stored")

@@ -26,10 +26,9 @@ def report_figures(
     table: Callable[[Figures], str],
 ) -> None:
     """Call ``compute(lexicon=..., monitor=...)``, write its figures, and print their table."""
-    import json
-
     from lipmotion.cli.progress import reporting
     from lipmotion.files import check_target, whole_file
+    from lipmotion.json_text import as_json, defined
     from lipmotion.units import Lexicon
 
     with reporting(options) as report:
@@ -39,5 +38,5 @@ def report_figures(
         figures = compute(lexicon=lexicon, monitor=report.hear)
         if options.output:
             with whole_file(options.output) as unfinished:
-                unfinished.write_text(json.dumps(figures, indent=1, allow_nan=False) + "\n")
+                unfinished.write_text(as_json(defined(figures), indent=1) + "\n")
         report.finish(table(figures), figures=figures)

@@ -5,13 +5,13 @@ Only this module writes to the standard streams.
 
 from __future__ import annotations
 
-import json
 import os
 import sys
 from contextlib import suppress
 from typing import Any
 
 from lipmotion.errors import ExportError
+from lipmotion.json_text import as_json, defined
 from lipmotion.printable import printable
 
 LINE_START = "\r\x1b[K"
@@ -42,12 +42,12 @@ def own(text: object) -> str:
 
 def say_json(document: Any) -> None:
     """Print a document on one line of standard output, in ASCII."""
-    print(json.dumps(document), flush=True)
+    print(as_json(defined(document)), flush=True)
 
 
 def complain_json(document: Any) -> None:
     """Print a document on one line of standard error, in ASCII."""
-    print(json.dumps(document), file=sys.stderr, flush=True)
+    print(as_json(defined(document)), file=sys.stderr, flush=True)
 
 
 def flush_output() -> None:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import shutil
+import zlib
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -14,15 +15,40 @@ from numpy.typing import NDArray
 from lipmotion.corpora.splits import SPLITS
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.files import check_regular, text_in, whole_folder
-from lipmotion.types import FRAME_RATE_HZ, Audio, Channel, Features, Motion, Span, Timeline, Track, Unit, Utterance
+from lipmotion.json_text import as_json, from_json
+from lipmotion.stats.schema import Member, check
+from lipmotion.types import (
+    FRAME_RATE_HZ,
+    Audio,
+    Channel,
+    Features,
+    Motion,
+    Span,
+    Timeline,
+    Track,
+    Unit,
+    Utterance,
+    check_curves,
+)
 
 ENTRY = "entry.json"
 KEYS = frozenset(
     "name words split audio_rate_hz duration_s rate_hz frames unseen_frames channels crops source settings".split()
 )
-"""What every description holds. ``speaker`` and ``phones`` came with version 2 of the corpus; without them: unknown."""
-KINDS = {"audio": "i", "features": "f", "motion": "f", "seen": "b", "crops": "u"}
-"""The kinds of number in each array."""
+"""What every description holds. ``speaker`` and ``phones`` came with version 2 of the corpus; without them: unknown.
+``checksums`` came later; without them, only arrays that cannot be are noticed."""
+LAZY = "crops"
+"""The array that is not read before it is needed, and has no checksum."""
+LARGEST_FEATURE = 1e3
+"""Features are standardised."""
+ARRAYS = {
+    "audio": Member(np.int16, "N"),
+    "features": Member(np.float32, "T D", -LARGEST_FEATURE, LARGEST_FEATURE),
+    "motion": Member(np.float32, "F P"),
+    "seen": Member(np.bool_, "F"),
+    "crops": Member(np.uint8, "F H W 3", optional=True),
+}
+"""How an utterance is stored: N samples, T frames of sound, F of motion."""
 FULL_SCALE = 32_768
 """16-bit samples per unit of amplitude: recordings of 16 bits come back exactly."""
 
@@ -41,14 +67,16 @@ def write_utterance(folder: Path, utterance: Utterance, settings: dict[str, str]
     """Write one utterance; ``folder`` appears whole, in the place of one that is there.
 
     settings : what the result depends on besides the source; kept to see whether it is up to date
-    Raises InputError: the name cannot be a folder's. Raises ExportError: it cannot be written.
+    Raises InputError: the name cannot be a folder's, or the motion is none of a face.
+    Raises ExportError: it cannot be written.
     """
     if not is_name(utterance.name):
         raise InputError(f"an utterance cannot be named {utterance.name!r}: required: the name of a visible folder")
+    check_curves(utterance.track.motion)
     with whole_folder(folder) as unfinished:
         for name, array in _arrays(utterance).items():
             np.save(unfinished / f"{name}.npy", array)
-        text = json.dumps(_description(utterance, settings), indent=1, sort_keys=True, ensure_ascii=False)
+        text = as_json(_description(utterance, settings), indent=1, sort_keys=True, ensure_ascii=False)
         (unfinished / ENTRY).write_text(text + "\n", encoding="utf-8")
         if folder.exists():
             shutil.rmtree(folder)
@@ -57,7 +85,7 @@ def write_utterance(folder: Path, utterance: Utterance, settings: dict[str, str]
 def read_entry(folder: Path) -> dict[str, Any]:
     """Return the description of an utterance. Raises CorpusError: missing or damaged."""
     try:
-        entry = json.loads(text_in(folder / ENTRY, "description"))
+        entry = from_json(text_in(folder / ENTRY, "description"))
     except (OSError, ValueError, RecursionError) as error:
         raise _damaged(folder, error) from error
     if not isinstance(entry, dict) or not entry.keys() >= KEYS:
@@ -76,19 +104,21 @@ def read_utterance(folder: Path) -> Utterance:
     """
     entry = read_entry(folder)
     try:
-        audio = Audio(_as_float(_load(folder, "audio")), entry["audio_rate_hz"])
         channels = tuple(Channel(**channel) for channel in entry["channels"])
-        values, features, seen = _load(folder, "motion"), _load(folder, "features"), np.array(_load(folder, "seen"))
-        if not np.isfinite(values).all() or not np.isfinite(features).all():
-            raise ValueError("motion or features hold values that are not finite")
-        motion = Motion(values.astype(np.float64), entry["rate_hz"], channels)
-        crops = _load(folder, "crops") if entry["crops"] else None
-        _check_arrays(audio, features, motion, seen, crops)
+        arrays = {name: _load(folder, name) for name in ARRAYS if name != "crops" or entry["crops"]}
+        sizes = check(arrays, ARRAYS, P=len(channels), F=entry["frames"])
+        audio = Audio(_as_float(arrays["audio"]), entry["audio_rate_hz"])
+        expected = int(audio.duration_s * FRAME_RATE_HZ + 1e-9) + 1
+        if sizes["T"] != expected:
+            raise ValueError(f"{sizes['T']} frames of features, required {expected} for {audio.duration_s:.2f} s")
+        motion = Motion(arrays["motion"].astype(np.float64), entry["rate_hz"], channels)
+        check_curves(motion)
+        _check_sums(arrays, entry.get("checksums", {}))
         return Utterance(
             name=entry["name"],
             audio=audio,
-            features=Features(features, audio.duration_s),
-            track=Track(motion, seen, crops, tuple(entry.get("notes", ()))),
+            features=Features(arrays["features"], audio.duration_s),
+            track=Track(motion, np.array(arrays["seen"]), arrays.get("crops"), tuple(entry.get("notes", ()))),
             words=None if entry["words"] is None else tuple(entry["words"]),
             split=entry["split"],
             source=entry["source"],
@@ -129,7 +159,19 @@ def _description(utterance: Utterance, settings: dict[str, str]) -> dict[str, An
         "notes": utterance.track.notes,
         "source": utterance.source,
         "settings": settings,
+        "checksums": {name: _checksum(array) for name, array in _arrays(utterance).items() if name != LAZY},
     }
+
+
+def _checksum(array: NDArray[Any]) -> int:
+    return zlib.crc32(array.tobytes())
+
+
+def _check_sums(arrays: Mapping[str, NDArray[Any]], checksums: Mapping[str, int]) -> None:
+    """Raise ValueError where an array holds other bytes than were written."""
+    for name, checksum in checksums.items():
+        if name in arrays and _checksum(arrays[name]) != checksum:
+            raise ValueError(f"{name} holds other bytes than were written")
 
 
 def _check_entry(entry: dict[str, Any]) -> None:
@@ -142,6 +184,7 @@ def _check_entry(entry: dict[str, Any]) -> None:
         "source": isinstance(entry["source"], dict) and _is_texts(list(entry["source"].values())),
         "notes": _is_texts(entry.get("notes", [])),
         "settings": isinstance(entry["settings"], dict),
+        "checksums": isinstance(entry.get("checksums", {}), dict),
         "channels": isinstance(entry["channels"], list) and all(map(_is_channel, entry["channels"])),
         "audio_rate_hz": isinstance(entry["audio_rate_hz"], int) and entry["audio_rate_hz"] > 0,
     }
@@ -163,21 +206,6 @@ def _is_count(value: Any) -> bool:
     return isinstance(value, int | float) and 0 <= value < float("inf")
 
 
-def _check_arrays(
-    audio: Audio, features: NDArray[Any], motion: Motion, seen: NDArray[np.bool_], crops: NDArray[np.uint8] | None
-) -> None:
-    """Raise ValueError if arrays do not belong together."""
-    frames = len(motion.values)
-    if audio.samples.ndim != 1 or features.ndim != 2 or seen.shape != (frames,) or not frames:
-        shapes = ", ".join(str(array.shape) for array in (audio.samples, features, motion.values, seen))
-        raise ValueError(f"sound, features, motion and seen of shapes {shapes}")
-    expected = int(audio.duration_s * FRAME_RATE_HZ + 1e-9) + 1
-    if len(features) != expected:
-        raise ValueError(f"{len(features)} frames of features, required {expected} for {audio.duration_s:.2f} s")
-    if crops is not None and (crops.ndim != 4 or len(crops) != frames):
-        raise ValueError(f"mouth images of shape {crops.shape} for {frames} frames of motion")
-
-
 def _timeline(rows: Any) -> Timeline[Unit] | None:
     """Return phones in time. Raises ValueError: not rows of start, end and phone, in order."""
     if rows is None:
@@ -195,8 +223,6 @@ def _load(folder: Path, name: str) -> NDArray[Any]:
         raise
     except Exception as error:  # the header is read as a piece of Python, which fails in many ways
         raise ValueError(f"{path.name}: not an array ({type(error).__name__}: {error})") from error
-    if array.dtype.kind not in KINDS[name]:
-        raise ValueError(f"{path.name} holds {array.dtype}, required one of the kinds {KINDS[name]!r}")
     return array
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,6 +11,7 @@ from lipmotion.corpora.entry import is_name, read_entry, read_utterance, write_u
 from lipmotion.corpora.splits import SPLITS
 from lipmotion.errors import CorpusError, ExportError
 from lipmotion.files import TEMPORARY, remove_unfinished, text_in, whole_file
+from lipmotion.json_text import as_json, from_json
 from lipmotion.types import Utterance
 
 FORMAT = "lipmotion.corpus"
@@ -159,7 +159,7 @@ class Corpus:
     def _write_manifest(self) -> None:
         content = {"format": FORMAT, "version": VERSION, "utterances": self._index}
         with whole_file(self.path / MANIFEST, follow=False) as unfinished:  # nothing leads out of a corpus
-            text = json.dumps(content, indent=1, sort_keys=True, ensure_ascii=False)
+            text = as_json(content, indent=1, sort_keys=True, ensure_ascii=False)
             unfinished.write_text(text + "\n", encoding="utf-8")
 
 
@@ -185,7 +185,7 @@ def _motion(entry: dict[str, Any]) -> str:
 
 def _read_manifest(path: Path) -> dict[str, dict[str, Any]]:
     try:
-        content = json.loads(text_in(path, "manifest"))
+        content = from_json(text_in(path, "manifest"))
         found, version = content["format"], content["version"]
     except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise CorpusError(f"{path.parent}: not a corpus (no readable {MANIFEST}); give a prepared corpus") from error

@@ -10,13 +10,14 @@ from lipmotion.errors import InputError
 from lipmotion.export.document import FORMAT, header, labels, parse
 from lipmotion.export.json_stream import members
 from lipmotion.export.rounded import rows
+from lipmotion.json_text import as_json
 from lipmotion.types import Generation, Motion, Timeline, Unit
 
 
 def write(path: Path, generation: Generation, source: Mapping[str, str], model: Mapping[str, str]) -> None:
     """Write one JSON object: format, version, rate_hz, channels, values, units, source, model."""
-    before = json.dumps(header(generation), ensure_ascii=False)
-    after = json.dumps(labels(generation, source, model), ensure_ascii=False)
+    before = as_json(header(generation), ensure_ascii=False)
+    after = as_json(labels(generation, source, model), ensure_ascii=False)
     with path.open("w", encoding="utf-8") as file:
         file.write(f'{before[:-1]}, "values": [\n')
         for number, row in enumerate(rows(generation.motion.values)):

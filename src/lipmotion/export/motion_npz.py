@@ -11,13 +11,14 @@ import numpy as np
 
 from lipmotion.errors import InputError
 from lipmotion.export.document import header, labels, parse
+from lipmotion.json_text import as_json
 from lipmotion.stats.archive import UNREADABLE, array_in, check_archive
 from lipmotion.types import Generation, Motion, Timeline, Unit
 
 
 def write(path: Path, generation: Generation, source: Mapping[str, str], model: Mapping[str, str]) -> None:
     """Write the arrays ``values`` [shape=(T, P)] and ``document``, the JSON format's text without its values."""
-    document = json.dumps({**header(generation), **labels(generation, source, model)}, ensure_ascii=False)
+    document = as_json({**header(generation), **labels(generation, source, model)}, ensure_ascii=False)
     np.savez(path, values=generation.motion.values, document=np.array(document))
 
 

@@ -15,9 +15,11 @@ from lipmotion.engines import Engine, engine_named
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.pipeline.visual import EIGENLIPS, GEOMETRY
 from lipmotion.speech.adaptation import Adaptation, adaptation_arrays, adaptation_from_arrays
+from lipmotion.speech.mfcc import FEATURES
 from lipmotion.stats.archive import UNREADABLE, read_archive, read_archive_header, write_archive
 from lipmotion.stats.eigenlips import Eigenlips, eigenlips_arrays, eigenlips_from_arrays
 from lipmotion.stats.hmm.model import HmmConfig, UnitHmm, hmm_arrays, hmm_from_arrays
+from lipmotion.stats.schema import only, under
 
 FORMAT = "lipmotion.model"
 VERSION = 3
@@ -118,13 +120,19 @@ def _shipped() -> Model:
 
 def _read(path: Path) -> Model:
     header = read_header(path)
-    arrays: dict[str, dict[str, NDArray[Any]]] = {part: {} for part in _PARTS}
+    arrays: dict[str, dict[str, NDArray[Any]]] = {}
     try:
-        for name, array in read_archive(path).items():
-            part, _, key = name.partition("/")
-            arrays[part][key] = array
+        stored = read_archive(path)
+        for part in _PARTS:
+            arrays[part] = under(stored, f"{part}/")
+        only(stored, (f"{part}/{key}" for part, own in arrays.items() for key in own))
         engine = engine_named(header["engine"], header["configuration"])
-        phones = hmm_from_arrays(arrays["phones"], _numbers(header["recogniser"]))
+        _check_options(engine.config)
+        config = HmmConfig(**header["recogniser"])
+        _check_options(config)
+        phones = hmm_from_arrays(arrays["phones"], config)
+        if phones.mixtures.size[2] != FEATURES:
+            raise ValueError(f"phone models of {phones.mixtures.size[2]} features, required {FEATURES}")
         learned = engine.from_arrays(arrays["engine"])
         adaptation = adaptation_from_arrays(arrays["adaptation"]) if arrays["adaptation"] else None
         eigenlips = eigenlips_from_arrays(arrays["eigenlips"]) if arrays["eigenlips"] else None
@@ -138,14 +146,18 @@ def _read(path: Path) -> Model:
     return Model(phones, engine, learned, about, adaptation, eigenlips)
 
 
-def _numbers(options: Mapping[str, Any]) -> HmmConfig:
-    """Return a configuration. Raises TypeError: an unknown option, or one that is no number."""
-    config = HmmConfig(**options)
+def _check_options(config: Any) -> None:
+    """Raise TypeError for an option of another type than its default's, ValueError for one that is never meant."""
     for option in fields(config):
-        if type(getattr(config, option.name)) not in (int, float):
-            raise TypeError(f"{option.name} is {getattr(config, option.name)!r}, required a number")
-    return config
+        value, kind = getattr(config, option.name), type(option.default)
+        if type(value) is not kind and not (kind is float and type(value) is int):
+            raise TypeError(f"{option.name} is {value!r}, required {_WORDS[kind]}")
+        if isinstance(value, int | float) and abs(value) > LARGEST_OPTION:
+            raise ValueError(f"{option.name} is {value}, required at most {LARGEST_OPTION:g}")
 
 
+LARGEST_OPTION = 1e6
+"""Of numbers in a header."""
+_WORDS = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
 _PARTS = ("phones", "engine", "adaptation", "eigenlips")
 _OWN_KEYS = ("format", "version", "engine", "configuration", "recogniser")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +13,7 @@ from lipmotion.speech.general.acoustic import STREAMS
 from lipmotion.speech.general.front_end import general_features
 from lipmotion.speech.mfcc import FEATURES, mfcc
 from lipmotion.stats.affine import identity, transformed
+from lipmotion.stats.schema import STANDARD, Arrays, Member, checked, only
 from lipmotion.types import Audio, Features
 
 WIDEST_WARP = 2.0
@@ -63,21 +63,22 @@ def adaptation_arrays(adaptation: Adaptation) -> dict[str, NDArray[Any]]:
     return {"numbers": numbers, "own": adaptation.own, "general": adaptation.general}
 
 
-def adaptation_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> Adaptation:
+def adaptation_from_arrays(arrays: Arrays) -> Adaptation:
     """Return an adaptation again. Raises ModelFormatError: something is missing, or cannot be a transform."""
     try:
-        for name, shape in (("numbers", (2,)), ("own", (FEATURES, FEATURES + 1)), ("general", _GENERAL)):
-            _check(name, arrays[name], shape)
-        warp, trust = arrays["numbers"].astype(float).tolist()
+        only(arrays, TRANSFORMS)
+        found = checked(arrays, TRANSFORMS)
+        warp, trust = found["numbers"].tolist()
         if not 1 / WIDEST_WARP <= warp <= WIDEST_WARP or not 0 <= trust <= 1:
             raise ValueError(f"a warp of {warp} and a trust of {trust}")
-        return Adaptation(warp, trust, arrays["own"].astype(float), arrays["general"].astype(float))
+        return Adaptation(warp, trust, found["own"], found["general"])
     except (KeyError, ValueError, TypeError) as error:
         raise ModelFormatError(f"the adaptation is damaged ({error}); adapt the model again") from error
 
 
-def _check(name: str, array: NDArray[Any], shape: tuple[int, ...]) -> None:
-    if array.shape != shape:
-        raise ValueError(f"{name} of shape {array.shape}, required {shape}")
-    if not np.isfinite(array).all():
-        raise ValueError(f"{name} holds values that are not finite")
+TRANSFORMS = {
+    "numbers": Member(np.float64, "2"),
+    "own": Member(np.float64, f"{FEATURES} {FEATURES + 1}", -STANDARD, STANDARD),
+    "general": Member(np.float64, " ".join(map(str, _GENERAL)), -STANDARD, STANDARD),
+}
+"""How an adaptation is stored."""

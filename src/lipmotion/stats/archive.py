@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import json
 import math
 import struct
 import zipfile
@@ -17,8 +16,9 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from lipmotion.files import whole_file
+from lipmotion.json_text import as_json, from_json
 
-HEADER = "header.json"
+HEADER, ARRAY = "header.json", ".npy"
 OLDEST_DATE = (1980, 1, 1, 0, 0, 0)
 """The date of everything in the file."""
 LARGE = 1 << 30
@@ -41,9 +41,9 @@ def write_archive(
     """Write a file, whole or not at all. Raises ExportError: it cannot be written."""
     method = zipfile.ZIP_DEFLATED if compressed else zipfile.ZIP_STORED
     with whole_file(path) as unfinished, zipfile.ZipFile(unfinished, "w") as file:
-        file.writestr(_member(HEADER, method), json.dumps(header, indent=1, ensure_ascii=False).encode())
+        file.writestr(_member(HEADER, method), as_json(header, indent=1, ensure_ascii=False).encode())
         for name, array in sorted(arrays.items()):
-            with file.open(_member(f"{name}.npy", method), "w", force_zip64=array.nbytes >= LARGE) as member:
+            with file.open(_member(f"{name}{ARRAY}", method), "w", force_zip64=array.nbytes >= LARGE) as member:
                 np.lib.format.write_array(member, np.asarray(array, order="C"), allow_pickle=False)
 
 
@@ -51,20 +51,25 @@ def read_archive_header(path: Path) -> Any:
     """Return what a file says of itself. Raises one of ``UNREADABLE``."""
     with zipfile.ZipFile(path) as file:
         check_archive(file)
-        return json.loads(file.read(HEADER))
+        return from_json(file.read(HEADER))
 
 
 def read_archive(path: Path) -> dict[str, NDArray[Any]]:
     """Return all arrays of a file by name. Raises one of ``UNREADABLE``: any byte of it is wrong."""
     with zipfile.ZipFile(path) as file:
         check_archive(file)
-        members = {name: file.read(name) for name in set(file.namelist())}  # whole: checksums are compared first
-    return {name.removesuffix(".npy"): array_in(content) for name, content in members.items() if name != HEADER}
+        members = {name: file.read(name) for name in file.namelist() if name != HEADER}  # whole: checksums come first
+    strange = next((name for name in members if not name.endswith(ARRAY)), None)
+    if strange is not None:
+        raise ValueError(f"undeclared {strange!r}, which is no array")
+    return {name.removesuffix(ARRAY): array_in(content) for name, content in members.items()}
 
 
 def check_archive(file: zipfile.ZipFile) -> None:
-    """Raise ValueError if the members of a zip could fill the memory, or are compressed as NumPy never does."""
-    members = file.infolist()
+    """Raise ValueError if members of a zip share a name, could fill the memory, or are compressed in another way."""
+    members, names = file.infolist(), file.namelist()
+    if len(set(names)) < len(names):
+        raise ValueError(f"the part {next(name for name in names if names.count(name) > 1)!r} is in it twice")
     size = sum(member.file_size for member in members)
     largest = max(SMALL_ARCHIVE, LARGEST_RATIO * Path(str(file.filename)).stat().st_size)
     if size > largest:

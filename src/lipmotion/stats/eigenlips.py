@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, ModelFormatError
-from lipmotion.stats.pca import fit_pca
+from lipmotion.stats.pca import check_orthonormal, fit_pca
+from lipmotion.stats.schema import Arrays, Member, checked, only
 from lipmotion.types import GREY, Channel
 
 COLOURS = "rgb"
@@ -107,21 +107,26 @@ def eigenlips_arrays(eigenlips: Eigenlips) -> dict[str, NDArray[Any]]:
     }
 
 
-def eigenlips_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> Eigenlips:
+def eigenlips_from_arrays(arrays: Arrays) -> Eigenlips:
     """Return eigenlips again. Raises ModelFormatError: something is missing, or does not belong together."""
     try:
-        mean, basis, explained = (arrays[name].astype(float) for name in ("mean", "basis", "explained"))
-        height, width = arrays["size"].astype(int).tolist()
-        colours, pixels = len(COLOURS), height * width
-        if mean.shape != (colours, pixels) or basis.shape != (colours, basis.shape[1], pixels):
-            raise ValueError(
-                f"a mean of shape {mean.shape} and a basis of shape {basis.shape}, of {height} × {width} px"
-            )
-        if explained.shape != (colours,) or not all(np.isfinite(part).all() for part in (mean, basis, explained)):
-            raise ValueError("values that are not finite, or not of three colours")
-        return Eigenlips(mean.astype(np.float32), basis.astype(np.float32), explained, (height, width))
+        only(arrays, SIZE, SPACES)
+        height, width = checked(arrays, SIZE)["size"].tolist()
+        found = checked(arrays, SPACES, D=height * width)
+        for basis in found["basis"]:
+            check_orthonormal("basis", basis)
+        return Eigenlips(found["mean"], found["basis"], found["explained"], (height, width))
     except (KeyError, ValueError, TypeError, IndexError) as error:
         raise ModelFormatError(f"the eigenlips are damaged ({error}); train the model again") from error
+
+
+SIZE = {"size": Member(np.intp, "2", 1, 10_000)}
+SPACES = {
+    "mean": Member(np.float32, f"{len(COLOURS)} D", 0, 255),
+    "basis": Member(np.float32, f"{len(COLOURS)} K D", -1.01, 1.01),
+    "explained": Member(np.float64, f"{len(COLOURS)}", 0, 1.01),
+}
+"""How eigenlips are stored."""
 
 
 def _by_colour(images: Images) -> NDArray[np.uint8]:

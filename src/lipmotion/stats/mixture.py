@@ -8,12 +8,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.stats.schema import LARGEST_VARIANCE, POSITIVE, STANDARD, Checked, Member
+
 SPLIT_STEP = 0.2
 """Halves of a split component move apart by this many standard deviations."""
 BLOCK = 256
 """Frames whose components are computed at a time: they fit into the cache."""
 LEAST_LOG_SHARE = np.float32(-50)
 LOG_2PI = float(np.log(2 * np.pi))
+MIXTURES = {
+    "log_weights": Member(np.float32, "G M", -np.inf, 0.1),
+    "means": Member(np.float32, "G M D", -STANDARD, STANDARD),
+    "variances": Member(np.float32, "G M D", POSITIVE, LARGEST_VARIANCE),
+}
+"""Of standardised values; weights may be rounded to half precision."""
+LEAST_WEIGHT, MOST_WEIGHT = 0.5, 1.5
+"""The weights of a density sum to 1 but for rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,3 +236,11 @@ def single_gaussian(x: NDArray[np.float32], count: int) -> Mixtures:
         np.tile(mean, (count, 1, 1)).astype(np.float32),
         np.tile(variance, (count, 1, 1)).astype(np.float32),
     )
+
+
+def mixtures_from(found: Checked) -> Mixtures:
+    """Return mixtures, stored as ``MIXTURES`` says. Raises ValueError: the weights of one do not sum to 1."""
+    total = np.exp(found["log_weights"]).sum(axis=1)
+    if not ((total > LEAST_WEIGHT) & (total < MOST_WEIGHT)).all():
+        raise ValueError("log_weights of a density without a Gaussian of a finite weight, or that do not sum to 1")
+    return Mixtures(*(found[name] for name in MIXTURES))

@@ -16,6 +16,8 @@ SPARE = 16
 """Directions that are searched beside those that are wanted: they make the search converge."""
 TOLERANCE, MOST_PASSES = 1e-4, 12
 """The search ends when a pass over the table adds less than this share of the variance found, or after so many."""
+ORTHONORMAL = 0.01
+"""Rows of a stored basis are orthonormal but for rounding."""
 RANK_TOLERANCE = 1e-10
 """Components with less than this share of the largest one's variance are rounding."""
 CONSTANT = 1e-12
@@ -64,6 +66,13 @@ def fit_pca(values: NDArray[Any], components: int) -> Pca:
 def _of_columns(centred: NDArray[np.float64], components: int, least: float) -> NDArray[np.float64]:
     squares, vectors = np.linalg.eigh(centred.T @ centred)
     return vectors[:, _largest(squares, components, least)].T
+
+
+def check_orthonormal(name: str, basis: NDArray[Any]) -> None:
+    """Raise ValueError unless the rows of a basis [shape=(K, D)] are orthonormal."""
+    worst = float(np.abs(basis @ basis.T - np.eye(len(basis))).max())
+    if not worst <= ORTHONORMAL:
+        raise ValueError(f"{name} of rows that are not orthonormal (products {worst:g} off)")
 
 
 def _of_rows(centred: NDArray[np.float64], components: int, least: float) -> NDArray[np.float64]:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.printable import printable
+from lipmotion.stats.schema import Arrays, Member, checked
 
 Context = tuple[str, ...]
 """What a state depends on, one name a place (left neighbour, unit, right neighbour)."""
@@ -100,6 +101,8 @@ class Tree:
 
 
 PLACES = ("left", "unit", "right")
+_PLACES = [str(place) for place in range(len(PLACES))]
+"""As they are stored."""
 
 
 def gaussian_likelihood(statistics: Array, least_variance: float = LEAST_VARIANCE) -> Array:
@@ -210,19 +213,32 @@ def tree_arrays(trees: Mapping[str, Tree]) -> dict[str, NDArray[Any]]:
     }
 
 
-def trees_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> dict[str, Tree]:
+TREES = {
+    "questions": Member(np.str_, "q 3"),
+    "trees": Member(np.str_, "N"),
+    "sizes": Member(np.int32, "N", 1, 1e6),
+    "asked": Member(np.int32, "S", -1, 1e6),
+    "no": Member(np.int32, "S", -1, 1e6),
+    "frames": Member(np.float64, "S", 0, 1e12),
+}
+"""How trees are stored: N of them with S nodes in all."""
+
+
+def trees_from_arrays(arrays: Arrays) -> dict[str, Tree]:
     """Return the trees again. Raises KeyError, ValueError: something is missing or inconsistent."""
+    found = checked(arrays, TREES)
     questions = tuple(
-        Question(int(place), str(name), frozenset(str(members).split())) for place, name, members in arrays["questions"]
+        Question(_PLACES.index(place), name, frozenset(members.split()))
+        for place, name, members in found["questions"].tolist()
     )
-    ends = np.cumsum(arrays["sizes"])
-    if any(len(arrays[key]) != ends[-1] for key in ("asked", "no", "frames")) or (arrays["sizes"] < 1).any():
-        raise ValueError(f"trees of {ends[-1]} nodes with {len(arrays['asked'])} questions asked")
+    names, sizes, ends = found["trees"].tolist(), found["sizes"], np.cumsum(found["sizes"])
+    if ends[-1] != found.sizes["S"] or len(set(names)) < len(names):
+        raise ValueError(f"trees of {ends[-1]} nodes with {found.sizes['S']} questions asked, or two of one name")
     trees = {}
-    for name, start, end in zip(arrays["trees"].tolist(), ends - arrays["sizes"], ends, strict=True):
-        asked, no = arrays["asked"][start:end].astype(np.int32), arrays["no"][start:end].astype(np.int32)
+    for name, start, end in zip(names, ends - sizes, ends, strict=True):
+        asked, no = found["asked"][start:end], found["no"][start:end]
         _check_nodes(asked, no, len(questions))
-        trees[name] = Tree(questions, asked, no, arrays["frames"][start:end].astype(float))
+        trees[name] = Tree(questions, asked, no, found["frames"][start:end])
     return trees
 
 

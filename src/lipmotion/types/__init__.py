@@ -13,7 +13,7 @@ from lipmotion.types.explanation import (
 )
 from lipmotion.types.features import FRAME_RATE_HZ, Features
 from lipmotion.types.generation import Constraints, Example, Generation, Pin, Speech, Spread, Trace
-from lipmotion.types.motion import EYE_DISTANCE, GREY, WEIGHT, Channel, Motion
+from lipmotion.types.motion import EYE_DISTANCE, GREY, WEIGHT, Channel, Motion, check_curves, check_magnitude
 from lipmotion.types.progress import Item, Monitor, Progress, counted, part_of, silent_monitor
 from lipmotion.types.timeline import Span, Timeline, Unit
 from lipmotion.types.utterance import Track, Utterance
@@ -50,6 +50,8 @@ __all__ = [
     "Unit",
     "Utterance",
     "Value",
+    "check_curves",
+    "check_magnitude",
     "counted",
     "part_of",
     "silent_monitor",

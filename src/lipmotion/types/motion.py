@@ -17,6 +17,9 @@ WEIGHT = "weight"
 """The unit of blendshapes: 0 is absent, 1 is whole; never less than 0."""
 GREY = "grey"
 """The unit of eigenlips: coefficients of an orthonormal basis of pictures in grey levels, 0 to 255."""
+LARGEST = {EYE_DISTANCE: 1e4, WEIGHT: 255.0, GREY: 1e5}
+"""Values beyond these are of nothing that moves in a face, even where a table without units holds pixels."""
+LARGEST_OTHER = 1e6
 
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
@@ -111,3 +114,21 @@ def between_frames(rows: NDArray[np.floating[Any]], rate_hz: float, time_s: NDAr
     share = (position - low)[:, None]
     values: NDArray[np.float64] = (1 - share) * rows[low] + share * rows[high]
     return values
+
+
+def check_curves(motion: Motion) -> None:
+    """Raise InputError where a curve is not finite, or larger than anything in a face."""
+    if len(motion.values):
+        ends = zip(motion.channels, motion.values.min(axis=0).tolist(), motion.values.max(axis=0).tolist(), strict=True)
+        for channel, low, high in ends:
+            check_magnitude(channel, low, high)
+
+
+def check_magnitude(channel: Channel, low: float, high: float) -> None:
+    """Raise InputError where a curve from ``low`` to ``high`` is none of a face."""
+    largest = LARGEST.get(channel.unit, LARGEST_OTHER)
+    if not -largest <= low <= high <= largest:
+        raise InputError(
+            f"{channel.name!r} goes from {low:g} to {high:g} {channel.unit}, required within ±{largest:g}; "
+            "say its unit in a .json, or scale it"
+        )

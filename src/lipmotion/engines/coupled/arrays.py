@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from itertools import pairwise
 from typing import Any
 
@@ -19,13 +18,25 @@ from lipmotion.engines.coupled.product import Grammar, reachable
 from lipmotion.engines.coupled.systems import FACTORIAL, Structure
 from lipmotion.engines.coupled.transitions import Transitions
 from lipmotion.engines.coupled.visual import VisualStream
-from lipmotion.engines.trajectory.frame import SINGLE, frame_arrays, frame_from_arrays
-from lipmotion.engines.trajectory.window import AudioWindow
+from lipmotion.engines.trajectory.frame import FRAME, SINGLE, frame_arrays, frame_from_arrays
+from lipmotion.engines.trajectory.reach import check_poses, check_rest
+from lipmotion.engines.trajectory.window import FEATURES, WINDOW, window_from
 from lipmotion.errors import InputError, ModelFormatError
-from lipmotion.stats.mixture import Mixtures
+from lipmotion.stats.bigram import check_sums
+from lipmotion.stats.mixture import MIXTURES, mixtures_from
+from lipmotion.stats.schema import (
+    BELOW_ONE,
+    LARGEST_VARIANCE,
+    POSITIVE,
+    STANDARD,
+    Arrays,
+    Member,
+    check_index,
+    checked,
+    only,
+    under,
+)
 from lipmotion.units import UnitSet
-
-Arrays = Mapping[str, NDArray[Any]]
 
 
 def coupled_arrays(model: CoupledModel) -> dict[str, NDArray[Any]]:
@@ -88,140 +99,149 @@ def _follow_arrays(model: CoupledModel) -> dict[str, NDArray[Any]]:
 
 
 def coupled_from_arrays(arrays: Arrays, config: CoupledConfig) -> CoupledModel:
-    """Return the model again. Raises ModelFormatError: something is missing, has the wrong shape or is no number."""
+    """Return the model again. Raises ModelFormatError: something is missing, out of place or out of range."""
     try:
         _, space, closure = frame_from_arrays(arrays, SINGLE.name)
         structure = _structure(arrays, config)
+        poses = checked(arrays, POSES, Q=space.dimensions)
+        streams = tuple(poses["streams"].tolist())
+        _check_names(arrays, structure, len(streams))
+        if structure.counts[0] > arrays["group_0/tie"].size:
+            raise ValueError(f"{structure.counts[0]} states of the first chain, of {arrays['group_0/tie'].size} in all")
         transitions = _transitions(arrays, structure)
-        streams = tuple(map(str, arrays["streams"]))
-        _check(arrays, {"gain": (space.dimensions,), "rest": (space.dimensions,)})
         visual = tuple(
-            _visual(arrays, number, name, space.dimensions, config.dynamic) for number, name in enumerate(streams[1:])
+            _visual(under(arrays, f"visual_{number}/"), name, space.dimensions, config.dynamic)
+            for number, name in enumerate(streams[1:])
         )
-        widths = [39, *(len(stream.mean) for stream in visual)]
-        groups = tuple(_groups(arrays, transitions.product.chain_states.shape[1], widths))
-        if sorted(stream for group in groups for stream in group.streams) != list(range(len(streams))):
-            raise ValueError("streams that no group has, or two")
-        chains = Chains(streams, transitions, groups)
+        chains = Chains(streams, transitions, _groups(arrays, transitions.product.chain_states.shape[1], visual))
         follow = _follow(arrays, structure, visual) if config.dynamic and config.follows else None
-        gain, rest = arrays["gain"].astype(float), arrays["rest"].astype(float)
-        return CoupledModel(chains, space, visual, follow, gain, rest, closure)
+        model = CoupledModel(chains, space, visual, follow, poses["gain"], poses["rest"], closure)
+        check_rest(model.rest, model.poses)
+        check_poses(model.poses, space, closure)
+        return model
     except (KeyError, ValueError, TypeError, IndexError, OverflowError, InputError) as error:
         raise ModelFormatError(f"the coupled model is damaged ({error}); train or download it again") from error
+
+
+POSES = {
+    "gain": Member(np.float64, "Q", POSITIVE, 10),
+    "rest": Member(np.float64, "Q", -1e6, 1e6),
+    "streams": Member(np.str_, "S"),
+}
+UNITS = {"units": Member(np.str_, "N 2")}
+CHAIN = {
+    "bigram": Member(np.float64, "U U", POSITIVE, 1.1),
+    "first": Member(np.float64, "U", POSITIVE, 1.1),
+    "advance": Member(np.float64, "R", POSITIVE, BELOW_ONE),
+}
+ROWS = {"rows": Member(np.intp, "J", 0, 1e9)}
+PAIRS = {"pairs": Member(np.intp, "p 2", 0, 1e9)}
+VISUAL = {"columns": Member(np.intp, "C", 0, 1e6), "scale": Member(np.float64, "2 D", -1e6, 1e6)}
+GROUP = {
+    **MIXTURES,
+    "streams": Member(np.intp, "S", 0, 1e6),
+    "weights": Member(np.float64, "S", 0, 1e6, whole=True),
+    "tie": Member(np.intp, "J", 0, 1e9),
+}
+AROUND = {
+    **WINDOW,
+    "belief": Member(np.float32, "N B", -1.01, 1.01),
+    "mean": Member(np.float32, "I", -STANDARD, STANDARD),
+    "basis": Member(np.float32, "I F", -1.01, 1.01),
+}
+FOLLOWING = {
+    "kind": Member(np.intp, "N", 0, 1e6),
+    "coefficients": Member(np.float32, "E F D"),
+    "variances": Member(np.float32, "N D", POSITIVE, LARGEST_VARIANCE),
+}
+"""How a model is stored: its chains, streams, groups of them, and what visual means follow."""
+
+
+def _check_names(arrays: Arrays, structure: Structure, streams: int) -> None:
+    """Raise ValueError where there is an array that nothing declares."""
+    chain = (f"chain_{number}/{key}" for number in range(len(structure.chains)) for key in UNITS | CHAIN | ROWS)
+    seen = (
+        f"{part}_{number}/{key}"
+        for part, table in (("visual", VISUAL), ("following", FOLLOWING))
+        for number in range(streams - 1)
+        for key in table
+    )
+    group = (f"group_{number}/{key}" for number in range(streams) for key in GROUP)
+    only(arrays, FRAME, POSES, PAIRS, chain, seen, group, (f"around/{key}" for key in AROUND))
 
 
 def _structure(arrays: Arrays, config: CoupledConfig) -> Structure:
     sets = []
     for number, name in enumerate(config.chains.split()):
-        pairs = arrays[f"chain_{number}/units"]
-        sets.append(UnitSet(name, {str(phone): str(unit) for phone, unit in pairs}))
+        pairs = checked(under(arrays, f"chain_{number}/"), UNITS)["units"]
+        sets.append(UnitSet(name, dict(pairs.tolist())))
     limit = None if config.asynchrony < 0 else config.asynchrony
     return Structure(config.structure, tuple(sets), config.states, limit, config.crosses)
 
 
 def _transitions(arrays: Arrays, structure: Structure) -> Transitions | FreeTransitions:
-    chains = range(len(structure.chains))
-    grammar = _grammar(arrays, structure)
-    advance = tuple(_probabilities(arrays[f"chain_{chain}/advance"]) for chain in chains)
-    if structure.kind == FACTORIAL and structure.limit is None and len(chains) == 2:
+    mine = [under(arrays, f"chain_{number}/") for number in range(len(structure.chains))]
+    found = [checked(own, CHAIN, U=len(units)) for own, units in zip(mine, structure.units, strict=True)]
+    for each in found:
+        check_sums("first", each["first"].sum(keepdims=True))
+        check_sums("bigram", each["bigram"].sum(axis=1))
+    grammar = Grammar(tuple(each["bigram"] for each in found), tuple(each["first"] for each in found))
+    advance = tuple(each["advance"] for each in found)
+    if structure.kind == FACTORIAL and structure.limit is None and len(found) == 2:
         first, second = advance
-        _check(arrays, {f"chain_{chain}/advance": (structure.counts[chain],) for chain in chains})
-        pairs = arrays["pairs"].astype(np.intp)
+        pairs = checked(arrays, PAIRS)["pairs"]
         for chain, count in enumerate(structure.counts):
-            _within(pairs[:, chain], count)
+            if len(advance[chain]) != count:
+                raise ValueError(f"chain_{chain}/advance of {len(advance[chain])} states, required {count}")
+            check_index(f"pairs of chain {chain}", pairs[:, chain], count)
         return FreeTransitions(FreeProduct(structure, grammar), (first, second), pairs)
     product = reachable(structure, grammar)
-    return Transitions(product, tuple(_rows(arrays, chain, len(product.joints)) for chain in chains), advance)
+    rows = tuple(checked(own, ROWS, J=len(product.joints))["rows"] for own in mine)
+    for chain, row in enumerate(rows):
+        check_index(f"chain_{chain}/rows", row, len(advance[chain]))
+    return Transitions(product, rows, advance)
 
 
-def _grammar(arrays: Arrays, structure: Structure) -> Grammar:
-    bigrams, firsts = [], []
-    for chain, units in enumerate(structure.units):
-        bigram, first = arrays[f"chain_{chain}/bigram"], arrays[f"chain_{chain}/first"]
-        _check(arrays, {f"chain_{chain}/bigram": (len(units), len(units)), f"chain_{chain}/first": (len(units),)})
-        if not (bigram > 0).all() or not (first > 0).all():
-            raise ValueError("probabilities that are not more than 0")
-        bigrams.append(bigram.astype(float))
-        firsts.append(first.astype(float))
-    return Grammar(tuple(bigrams), tuple(firsts))
-
-
-def _rows(arrays: Arrays, chain: int, count: int) -> NDArray[np.intp]:
-    _check(arrays, {f"chain_{chain}/rows": (count,)})
-    return _within(arrays[f"chain_{chain}/rows"], len(arrays[f"chain_{chain}/advance"]))
-
-
-def _within(numbers: NDArray[Any], count: int) -> NDArray[np.intp]:
-    if len(numbers) and not 0 <= numbers.min() <= numbers.max() < count:
-        raise ValueError(f"a number {numbers.max()}, required under {count}")
-    return numbers.astype(np.intp)
-
-
-def _probabilities(values: NDArray[Any]) -> NDArray[np.float64]:
-    if not ((values > 0) & (values < 1)).all():
-        raise ValueError("probabilities that are not between 0 and 1")
-    return values.astype(float)
-
-
-def _visual(arrays: Arrays, number: int, name: str, dimensions: int, dynamic: bool) -> VisualStream:
-    columns = _within(arrays[f"visual_{number}/columns"], dimensions)
-    size = len(columns) * (3 if dynamic else 1)
-    _check(arrays, {f"visual_{number}/scale": (2, size)})
-    mean, deviation = arrays[f"visual_{number}/scale"].astype(float)
+def _visual(arrays: Arrays, name: str, dimensions: int, dynamic: bool) -> VisualStream:
+    columns = checked(arrays, VISUAL)["columns"]
+    check_index(f"columns of {name}", columns, dimensions)
+    if len(set(columns.tolist())) < len(columns):
+        raise ValueError(f"columns of {name} that repeat")
+    mean, deviation = checked(arrays, VISUAL, D=len(columns) * (3 if dynamic else 1))["scale"]
     if not (deviation > 0).all():
-        raise ValueError("deviations that are not more than 0")
+        raise ValueError(f"scale of {name} with deviations that are not more than 0")
     return VisualStream(name, columns, dynamic, mean, deviation)
 
 
-def _groups(arrays: Arrays, states: int, widths: list[int]) -> list[Group]:
-    groups = []
+def _groups(arrays: Arrays, states: int, visual: tuple[VisualStream, ...]) -> tuple[Group, ...]:
+    groups, widths = [], [FEATURES, *(len(stream.mean) for stream in visual)]
     for number in range(sum(key.endswith("/tie") for key in arrays)):
-        mine = {key.partition("/")[2]: array for key, array in arrays.items() if key.startswith(f"group_{number}/")}
-        streams = tuple(_within(mine["streams"], len(widths)).tolist())
+        mine = under(arrays, f"group_{number}/")
+        streams = tuple(checked(mine, {"streams": GROUP["streams"]})["streams"].tolist())
+        check_index(f"group_{number}/streams", np.array(streams), len(widths))
         edges = np.cumsum([0, *(widths[stream] for stream in streams)]).tolist()
-        shape = (*mine["log_weights"].shape, edges[-1])
-        _check(mine, {"tie": (states,), "means": shape, "variances": shape, "weights": (len(streams),)})
-        if not (mine["variances"] > 0).all() or not np.isfinite(mine["log_weights"].max(axis=1)).all():
-            raise ValueError("variances that are not more than 0, or a density without a Gaussian")
-        mixtures = Mixtures(*(mine[key].astype(np.float32) for key in ("log_weights", "means", "variances")))
-        columns = tuple(slice(a, b) for a, b in pairwise(edges))
-        tie = _within(mine["tie"], shape[0])
-        groups.append(Group(streams, columns, mixtures, tuple(mine["weights"].astype(float).tolist()), tie))
-    return groups
+        found = checked(mine, GROUP, J=states, D=edges[-1])
+        check_index(f"group_{number}/tie", found["tie"], found.sizes["G"])
+        columns, weights = tuple(slice(a, b) for a, b in pairwise(edges)), tuple(found["weights"].tolist())
+        groups.append(Group(streams, columns, mixtures_from(found), weights, found["tie"]))
+    if sorted(stream for group in groups for stream in group.streams) != list(range(len(widths))):
+        raise ValueError("streams that no group has, or two")
+    return tuple(groups)
 
 
 def _follow(
     arrays: Arrays, structure: Structure, visual: tuple[VisualStream, ...]
 ) -> tuple[Surroundings, tuple[Following, ...]]:
-    inputs, sound_axes = arrays["around/window_basis"].shape
-    belief_axes = arrays["around/belief"].shape[1]
-    axes = arrays["around/basis"].shape[1]
-    total = sound_axes + belief_axes * len(OFFSETS)
-    _check(arrays, {"around/window": (2, inputs), "around/mean": (total,), "around/basis": (total, axes)})
-    _check(arrays, {"around/belief": (structure.counts[0], belief_axes), "around/window_basis": (inputs, sound_axes)})
-    mean, scale = arrays["around/window"].astype(np.float32)
-    if not (scale > 0).all():
-        raise ValueError("features of no spread")
-    around = Surroundings(
-        AudioWindow(mean, scale, arrays["around/window_basis"].astype(np.float32)),
-        *(arrays[f"around/{key}"].astype(np.float32) for key in ("belief", "mean", "basis")),
-    )
-    found = []
+    mine = under(arrays, "around/")
+    checked(mine, AROUND, N=structure.counts[0])
+    axes = mine["window_basis"].shape[1] + mine["belief"].shape[1] * len(OFFSETS)
+    found = checked(mine, AROUND, N=structure.counts[0], I=axes)
+    around = Surroundings(window_from(found), found["belief"], found["mean"], found["basis"])
+    following = []
     for number, stream in enumerate(visual):
-        mine = {key.partition("/")[2]: array for key, array in arrays.items() if key.startswith(f"following_{number}/")}
-        size, count = len(stream.mean), structure.counts[structure.chain_of(number + 1)]
-        _check(mine, {"kind": (count,), "variances": (count, size)})
-        _check(mine, {"coefficients": (len(mine["coefficients"]), axes + 1, size)})
-        if not (mine["variances"] > 0).all():
-            raise ValueError("variances that are not more than 0")
-        kind = _within(mine["kind"], len(mine["coefficients"]))
-        found.append(Following(kind, mine["coefficients"].astype(np.float32), mine["variances"].astype(np.float32)))
-    return around, tuple(found)
-
-
-def _check(arrays: Arrays, shapes: Mapping[str, tuple[int, ...]]) -> None:
-    for name, shape in shapes.items():
-        if arrays[name].shape != shape:
-            raise ValueError(f"{name} of shape {arrays[name].shape}, required {shape}")
-        if not np.isfinite(arrays[name]).all():
-            raise ValueError(f"{name} holds values that are not finite")
+        count = structure.counts[structure.chain_of(number + 1)]
+        sizes = {"N": count, "F": found.sizes["F"] + 1, "D": len(stream.mean)}
+        own = checked(under(arrays, f"following_{number}/"), FOLLOWING, **sizes)
+        check_index(f"following_{number}/kind", own["kind"], own.sizes["E"])
+        following.append(Following(own["kind"], own["coefficients"], own["variances"]))
+    return around, tuple(following)

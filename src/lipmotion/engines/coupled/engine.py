@@ -88,6 +88,7 @@ class CoupledEngine(Engine[CoupledModel]):
             statistics,
             frames,
             model.space,
+            model.reach,
             closure=model.closure,
             closing=closing_spans(speech.units, frames) if self.config.closures else [],
             pins=resolved(constraints, model.space, frames),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from lipmotion.engines.coupled.following import Following, Surroundings
 from lipmotion.engines.coupled.model import Chains, Inferred
 from lipmotion.engines.coupled.visual import VisualStream, unseen
 from lipmotion.engines.trajectory.closure import Closure
+from lipmotion.engines.trajectory.reach import Reach, reach_of
 from lipmotion.engines.trajectory.space import MotionSpace
 from lipmotion.types import FRAME_RATE_HZ
 
@@ -45,6 +47,25 @@ class CoupledModel:
     gain: Array
     rest: Array
     closure: Closure | None
+
+    @cached_property
+    def reach(self) -> Reach:
+        """Between which values motion lies."""
+        poses, deviation = self.poses, np.zeros(self.space.dimensions)
+        for stream in self.visual:
+            deviation[stream.columns] = stream.deviation[: len(stream.columns)]
+        return Reach(np.minimum(poses.low, self.rest), np.maximum(poses.high, self.rest)).widened(deviation)
+
+    @property
+    def poses(self) -> Reach:
+        """Between which values the means of all densities lie."""
+        low, high = np.zeros(self.space.dimensions), np.zeros(self.space.dimensions)
+        for number, stream in enumerate(self.visual, start=1):
+            group = next(group for group in self.chains.groups if number in group.streams)
+            means = group.of_stream(number).means.astype(float)
+            flat = means.reshape(-1, means.shape[2])
+            low[stream.columns], high[stream.columns] = reach_of(stream.restored(flat, np.ones_like(flat))[0][:, 0])
+        return Reach(low, high)
 
     def unseen(self, features: Single) -> Observed:
         """Return speech [shape=(T, 39)] with nothing seen."""

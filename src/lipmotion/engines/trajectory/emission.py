@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -11,8 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.trajectory.contexts import Cut, Place
-from lipmotion.engines.trajectory.window import AudioWindow
-from lipmotion.stats.trees import Tree, tree_arrays, trees_from_arrays
+from lipmotion.engines.trajectory.reach import check_spread
+from lipmotion.engines.trajectory.window import WINDOW, AudioWindow, window_from
+from lipmotion.stats.schema import POSITIVE, Arrays, Member, checked
+from lipmotion.stats.trees import TREES, Tree, tree_arrays, trees_from_arrays
 
 Array = NDArray[np.float64]
 
@@ -109,45 +111,31 @@ def emission_arrays(emission: Emission) -> dict[str, NDArray[Any]]:
     return arrays
 
 
-def emission_from_arrays(arrays: Mapping[str, NDArray[Any]], cut: Cut, dimensions: int) -> Emission:
-    """Return the densities again. Raises KeyError, ValueError: something is missing or has the wrong shape."""
+def emission_from_arrays(arrays: Arrays, cut: Cut, dimensions: int) -> Emission:
+    """Return the densities again. Raises KeyError, ValueError: something is missing, out of place or out of range."""
     forest = trees_from_arrays(arrays)
-    if list(forest) != cut.names:
-        raise ValueError(f"trees for {len(forest)} parts, required {len(cut.names)}: {' '.join(cut.names)}")
+    if len(forest) != cut.speech + cut.silence or list(forest) != cut.names:
+        raise ValueError(f"trees for {len(forest)} parts, required {cut.speech} of speech and {cut.silence} of silence")
     leaves = sum(len(tree.leaves) for tree in forest.values()) + 1
-    _check("means", arrays, (leaves, 3, dimensions))
-    _check("variances", arrays, (leaves, 3, dimensions))
-    if not (arrays["variances"] > 0).all():
-        raise ValueError("variances that are not more than 0")
-    hearing = _hearing(arrays, leaves, dimensions) if _has_hearing(arrays) else None
-    return Emission(forest, arrays["means"].astype(np.float32), arrays["variances"].astype(np.float32), hearing)
+    found = checked(arrays, DENSITIES, L=leaves, Q=dimensions)
+    check_spread(found["means"][:, 0], found["variances"][:, 0])
+    hearing = _hearing(arrays, leaves, dimensions) if HEARING.keys() & arrays.keys() else None
+    return Emission(forest, found["means"], found["variances"], hearing)
 
 
-_HEARING = ("window", "window_basis", "coefficients", "coefficient_rows")
+DENSITIES = {"means": Member(np.float32, "L 3 Q"), "variances": Member(np.float32, "L 3 Q", POSITIVE)}
+HEARING = {
+    **WINDOW,
+    "coefficients": Member(np.float32, "C A V"),
+    "coefficient_rows": Member(np.int32, "L", -1, 1e6),
+}
+EMISSION = (*TREES, *DENSITIES, *HEARING)
+"""How they are stored: L leaves and C regressions."""
 
 
-def _has_hearing(arrays: Mapping[str, NDArray[Any]]) -> bool:
-    return any(name in arrays for name in _HEARING)
-
-
-def _hearing(arrays: Mapping[str, NDArray[Any]], leaves: int, dimensions: int) -> Hearing:
-    inputs, axes = arrays["window_basis"].shape
-    _check("window", arrays, (2, inputs))
-    _check("window_basis", arrays, (inputs, axes))
-    _check("coefficients", arrays, (len(arrays["coefficients"]), axes, 3 * dimensions))
-    _check("coefficient_rows", arrays, (leaves,))
-    rows = arrays["coefficient_rows"].astype(np.int32)
-    if rows.min() < -1 or rows.max() >= len(arrays["coefficients"]):
-        raise ValueError(f"a density that follows regression {rows.max()} of {len(arrays['coefficients'])}")
-    if not (arrays["window"][1] > 0).all():
-        raise ValueError("features of no spread")
-    mean, scale = arrays["window"].astype(np.float32)
-    window = AudioWindow(mean, scale, arrays["window_basis"].astype(np.float32))
-    return Hearing(window, arrays["coefficients"].astype(np.float32), rows)
-
-
-def _check(name: str, arrays: Mapping[str, NDArray[Any]], shape: Sequence[int]) -> None:
-    if arrays[name].shape != tuple(shape):
-        raise ValueError(f"{name} of shape {arrays[name].shape}, required {tuple(shape)}")
-    if not np.isfinite(arrays[name]).all():
-        raise ValueError(f"{name} holds values that are not finite")
+def _hearing(arrays: Arrays, leaves: int, dimensions: int) -> Hearing:
+    found = checked(arrays, HEARING, L=leaves, V=3 * dimensions)
+    rows = found["coefficient_rows"]
+    if rows.max() >= found.sizes["C"]:
+        raise ValueError(f"a density that follows regression {rows.max()} of {found.sizes['C']}")
+    return Hearing(window_from(found), found["coefficients"], rows)

@@ -153,6 +153,7 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
             statistics,
             frames,
             model.space,
+            model.reach,
             closure=model.closure,
             closing=closing_spans(speech.units, frames) if self.config.closures else [],
             pins=resolved(constraints, model.space, frames),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,8 @@ from numpy.typing import NDArray
 
 from lipmotion.engines.trajectory.closure import OPENING, Closure
 from lipmotion.engines.trajectory.space import MotionSpace
-from lipmotion.stats.pca import Pca
+from lipmotion.stats.pca import Pca, check_orthonormal
+from lipmotion.stats.schema import Arrays, Member, checked, only
 from lipmotion.types import Channel
 from lipmotion.units import UNIT_SETS, UnitSet
 
@@ -33,23 +33,49 @@ def frame_arrays(units: UnitSet, space: MotionSpace, closure: Closure | None) ->
     return arrays
 
 
-def frame_from_arrays(arrays: Mapping[str, NDArray[Any]], units: str) -> tuple[UnitSet, MotionSpace, Closure | None]:
+def frame_from_arrays(arrays: Arrays, units: str) -> tuple[UnitSet, MotionSpace, Closure | None]:
     """Return them again.
 
     units : the name of the unit set; the set itself is in the arrays
-    Raises KeyError, ValueError, IndexError, TypeError: something is missing or has the wrong shape.
+    Raises KeyError, ValueError, IndexError, TypeError: something is missing, out of place or out of range.
     """
-    _check_shapes(arrays)
-    channels = tuple(Channel(str(name), str(unit)) for name, unit in arrays["channels"])
-    direct, points, closure = arrays["direct"].astype(np.intp), None, None
-    if len(direct) < len(channels):
-        points = Pca(arrays["points_mean"].astype(float), arrays["points_basis"].astype(float))
-    space = MotionSpace(channels, direct, points)
+    space = _space(arrays)
+    closure = None
     if OPENING in space.direct_names:
-        column, closed = arrays["closure"]
-        closure = Closure(int(column), float(closed), arrays["closure_follow"].astype(float))
-    of = SINGLE if units == SINGLE.name else UnitSet(units, _mapping(arrays["units"]))
+        found = checked(arrays, CLOSURE, Q=space.dimensions)
+        column, closed = found["closure"]
+        if column != space.direct_names.index(OPENING) or closed < 0:
+            raise ValueError(f"closure of column {column:g} at {closed:g}, required that of {OPENING}, 0 or more")
+        closure = Closure(int(column), float(closed), found["closure_follow"])
+    of = SINGLE if units == SINGLE.name else UnitSet(units, _mapping(checked(arrays, UNITS)["units"]))
     return of, space, closure
+
+
+CHANNELS = {"channels": Member(np.str_, "P 2"), "direct": Member(np.intp, "d", 0, 1e6)}
+POINTS = {
+    "points_mean": Member(np.float64, "R", -1e6, 1e6),
+    "points_basis": Member(np.float64, "K R", -1.01, 1.01),
+}
+CLOSURE = {"closure": Member(np.float64, "2"), "closure_follow": Member(np.float64, "Q")}
+UNITS = {"units": Member(np.str_, "N 2")}
+FRAME = (*CHANNELS, *POINTS, *CLOSURE, *UNITS)
+"""How they are stored: P channels, of which R are reduced to K dimensions."""
+
+
+def _space(arrays: Arrays) -> MotionSpace:
+    named = checked(arrays, CHANNELS)
+    count, direct = named.sizes["P"], named["direct"]
+    channels = tuple(Channel(name, unit) for name, unit in named["channels"].tolist())
+    if len({channel.name for channel in channels}) < count:
+        raise ValueError("channels whose names repeat")
+    if len(set(direct.tolist()) & set(range(count))) < len(direct):
+        raise ValueError(f"direct channels {direct.tolist()}, required different ones under {count}")
+    if len(direct) == count:
+        only(arrays.keys() & POINTS.keys())
+        return MotionSpace(channels, direct, None)
+    found = checked(arrays, POINTS, R=count - len(direct))
+    check_orthonormal("points_basis", found["points_basis"])
+    return MotionSpace(channels, direct, Pca(found["points_mean"], found["points_basis"]))
 
 
 def _mapping(pairs: NDArray[Any]) -> dict[str, str]:
@@ -58,24 +84,3 @@ def _mapping(pairs: NDArray[Any]) -> dict[str, str]:
     if len(of) != len(pairs):
         raise ValueError("a phone with two units")
     return of
-
-
-def _check_shapes(arrays: Mapping[str, NDArray[Any]]) -> None:
-    direct, channels = len(arrays["direct"]), len(arrays["channels"])
-    reduced = len(arrays["points_basis"]) if direct < channels else 0
-    dimensions = direct + reduced
-    required = {
-        "points_mean": (channels - direct,),
-        "points_basis": (reduced, channels - direct),
-        "closure": (2,),
-        "closure_follow": (dimensions,),
-    }
-    for name, shape in required.items():
-        if name in arrays and arrays[name].shape != shape:
-            raise ValueError(f"{name} of shape {arrays[name].shape}, required {shape}")
-        if name in arrays and not np.isfinite(arrays[name]).all():
-            raise ValueError(f"{name} holds values that are not finite")
-    if len(set(arrays["direct"].tolist()) & set(range(channels))) < direct:
-        raise ValueError(f"direct channels {arrays['direct'].tolist()}, required different ones under {channels}")
-    if "closure" in arrays and not 0 <= arrays["closure"][0] < dimensions:
-        raise ValueError(f"closure of column {arrays['closure'][0]}, required one under {dimensions}")

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from lipmotion.engines.base import frame_of
 from lipmotion.engines.trajectory.closure import OPENING, Closure, closing_frames
+from lipmotion.engines.trajectory.reach import Reach
 from lipmotion.engines.trajectory.space import MotionSpace
 from lipmotion.errors import InputError
 from lipmotion.kernels.banded import generate
-from lipmotion.types import FRAME_RATE_HZ, WEIGHT, Constraints, Spread
+from lipmotion.types import FRAME_RATE_HZ, WEIGHT, Constraints, Spread, check_magnitude
 
 STRETCH, MARGIN = 6000, 500
 """Frames generated at a time, and those around them that are generated again and thrown away: what lies seconds off
@@ -31,6 +32,7 @@ def generated_motion(
     statistics: Callable[[slice], Statistics],
     frames: int,
     space: MotionSpace,
+    reach: Reach,
     *,
     closure: Closure | None,
     closing: Sequence[slice],
@@ -39,8 +41,10 @@ def generated_motion(
     """Return the motion of all channels [shape=(T, P)] and its variance, by parameter generation.
 
     statistics : gives means and precisions of some frames
+    reach      : between which values the model's poses lie
     closure    : how the lips close (None: the motion has no opening);  closing : the frames in which they must
     pins       : from ``resolved``
+    Raises ModelFormatError: the motion leaves all that the model's poses, and the pins, span.
     """
     is_long = frames > DOUBLE_FRAMES
     precise = np.float32 if is_long else np.float64
@@ -54,6 +58,7 @@ def generated_motion(
             if outer.start <= span.start and span.stop <= outer.stop
         ]
         result = _generated(closure, statistics(outer), inside, spans)
+        reach.check(result[0], closure, inside)
         kept = slice(inner.start - outer.start, inner.stop - outer.start)
         values, variance = (rows[kept] for rows in result)
         motion[inner], restored = space.restore(values, variance)
@@ -77,6 +82,7 @@ def resolved(constraints: Constraints | None, space: MotionSpace, frames: int) -
         if not np.isfinite(wanted.value):
             raise InputError(f"pin at {wanted.time_s} s has the value {wanted.value}, required a finite number")
         column = names.index(wanted.channel)
+        check_magnitude(space.channels[space.direct[column]], wanted.value, wanted.value)
         never_negative = wanted.channel == OPENING or space.channels[space.direct[column]].unit == WEIGHT
         if never_negative and wanted.value < 0:
             raise InputError(f"pin at {wanted.time_s} s sets {wanted.channel} to {wanted.value}, required at least 0")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,6 +18,7 @@ from lipmotion.engines.trajectory.joint.streams import SPEECH, Observed, observe
 from lipmotion.engines.trajectory.joint.train import Transcribed, train_joint
 from lipmotion.errors import AlignmentError
 from lipmotion.stats.checkpoint import Checkpoint
+from lipmotion.stats.schema import Arrays, Member, checked, under
 from lipmotion.types import FRAME_RATE_HZ, Example, Monitor, Speech, Timeline, Unit
 from lipmotion.units import UNIT_SETS, is_silent
 
@@ -33,6 +34,9 @@ frame under what fits it best). GRID's s1 in other recordings: -6 to 2; five oth
 HEARD_FRAMES = 400
 """So many frames, spread evenly, tell whether a voice is known."""
 _STAGE = "joint"
+LISTENER = "joint_"
+"""What the names of its arrays begin with."""
+TYPICAL = {"typical": Member(np.float64, "1", -1e6, 1e6)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,19 +93,20 @@ def fit_listener(
 
 def listener_arrays(listener: Listener) -> dict[str, NDArray[Any]]:
     """Return a listener as arrays, at half precision."""
-    arrays = {f"joint_{name}": array for name, array in joint_arrays(listener.hmm).items()}
-    return arrays | {"joint_typical": np.array([listener.typical])}
+    arrays = joint_arrays(listener.hmm) | {"typical": np.array([listener.typical])}
+    return {f"{LISTENER}{name}": array for name, array in arrays.items()}
 
 
-def listener_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> Listener | None:
+def listener_from_arrays(arrays: Arrays) -> Listener | None:
     """Return it again, or None. Raises ModelFormatError, KeyError, ValueError: something is missing or damaged."""
-    own = {name.removeprefix("joint_"): array for name, array in arrays.items() if name.startswith("joint_")}
+    own = under(arrays, LISTENER)
     if not own:
         return None
-    typical = own.pop("typical")
-    if typical.shape != (1,) or not np.isfinite(typical).all():
-        raise ValueError(f"a typical fit of shape {typical.shape}, required one finite number")
-    return Listener(joint_from_arrays(own, CONFIG), float(typical[0]))
+    (typical,) = checked(own, TYPICAL)["typical"].tolist()
+    hmm = joint_from_arrays({name: array for name, array in own.items() if name not in TYPICAL}, CONFIG)
+    if set(hmm.inventory.names) != set(PHONES.units):
+        raise ValueError(f"the units {' '.join(hmm.inventory.names)}, required {' '.join(PHONES.units)}")
+    return Listener(hmm, typical)
 
 
 def _observed(speech: Speech) -> Observed:

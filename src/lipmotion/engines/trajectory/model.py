@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -11,11 +12,13 @@ from numpy.typing import NDArray
 
 from lipmotion.engines.trajectory.closure import Closure
 from lipmotion.engines.trajectory.contexts import Cut
-from lipmotion.engines.trajectory.emission import Emission, emission_arrays, emission_from_arrays
-from lipmotion.engines.trajectory.frame import frame_arrays, frame_from_arrays
-from lipmotion.engines.trajectory.listening import Listener, listener_arrays, listener_from_arrays
+from lipmotion.engines.trajectory.emission import EMISSION, Emission, emission_arrays, emission_from_arrays
+from lipmotion.engines.trajectory.frame import FRAME, frame_arrays, frame_from_arrays
+from lipmotion.engines.trajectory.listening import LISTENER, Listener, listener_arrays, listener_from_arrays
+from lipmotion.engines.trajectory.reach import Reach, check_poses, reach_of
 from lipmotion.engines.trajectory.space import MotionSpace
 from lipmotion.errors import ModelFormatError
+from lipmotion.stats.schema import POSITIVE, Arrays, Member, checked, only
 from lipmotion.units import UnitSet
 
 
@@ -38,6 +41,16 @@ class TrajectoryModel:
     closure: Closure | None
     listener: Listener | None = None
 
+    @cached_property
+    def reach(self) -> Reach:
+        """Between which values motion lies."""
+        return self.poses.widened(np.sqrt(self.emission.variances[:, 0].max(axis=0)))
+
+    @property
+    def poses(self) -> Reach:
+        """Between which values the means of all states lie."""
+        return reach_of(self.emission.means[:, 0])
+
 
 def model_arrays(model: TrajectoryModel) -> dict[str, NDArray[Any]]:
     """Return the model as arrays."""
@@ -46,21 +59,23 @@ def model_arrays(model: TrajectoryModel) -> dict[str, NDArray[Any]]:
     return arrays | emission_arrays(model.emission) | heard
 
 
-def model_from_arrays(arrays: Mapping[str, NDArray[Any]], cut: Callable[[UnitSet], Cut], units: str) -> TrajectoryModel:
+def model_from_arrays(arrays: Arrays, cut: Callable[[UnitSet], Cut], units: str) -> TrajectoryModel:
     """Return the model again.
 
     cut   : how the parts of some units are cut
     units : the name of its unit set; the set itself is in the arrays
-    Raises ModelFormatError: something is missing or has the wrong shape.
+    Raises ModelFormatError: something is missing, undeclared, out of place or out of range.
     """
     try:
+        only(arrays, FRAME, EMISSION, GAIN, (name for name in arrays if name.startswith(LISTENER)))
         of, space, closure = frame_from_arrays(arrays, units)
         emission = emission_from_arrays(arrays, cut(of), space.dimensions)
-        gain = arrays["gain"]
-        if gain.shape != (space.dimensions,) or not ((gain > 0) & np.isfinite(gain)).all():
-            raise ValueError(
-                f"a gain of shape {gain.shape}, required ({space.dimensions},), all finite and more than 0"
-            )
-        return TrajectoryModel(of, space, emission, gain, closure, listener_from_arrays(arrays))
+        gain = checked(arrays, GAIN, Q=space.dimensions)["gain"]
+        model = TrajectoryModel(of, space, emission, gain, closure, listener_from_arrays(arrays))
+        check_poses(model.poses, space, closure)
+        return model
     except (KeyError, ValueError, IndexError, TypeError) as error:
         raise ModelFormatError(f"the trajectory model is damaged ({error}); train or download it again") from error
+
+
+GAIN = {"gain": Member(np.float64, "Q", POSITIVE, 10)}

@@ -8,12 +8,21 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.stats.schema import STANDARD, Checked, Member
+
 OFFSETS = (-24, -18, -12, -8, -4, 0, 4, 8, 12, 18, 24)
 """Frames whose features are heard, relative to the one whose motion is wanted: dense near it, a quarter of a second
 to both sides."""
 SCALE = 12.0
 """Length of a typical row: what the ridge of the regression is relative to."""
 LEAST_DEVIATION = 1e-3
+FEATURES = 39
+INPUTS = FEATURES * len(OFFSETS)
+WINDOW = {
+    "window": Member(np.float32, f"2 {INPUTS}", -STANDARD, STANDARD),
+    "window_basis": Member(np.float32, f"{INPUTS} A", -STANDARD, STANDARD),
+}
+"""How a window is stored: means above scales, and the basis."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +64,16 @@ def fit_window(recordings: Iterable[NDArray[np.float32]], size: int) -> AudioWin
     basis = basis * np.where(basis[np.abs(basis).argmax(axis=0), np.arange(basis.shape[1])] < 0, -1.0, 1.0)
     factor = SCALE / np.sqrt(basis.shape[1])
     return AudioWindow(*(array.astype(np.float32) for array in (mean, scale, basis * factor)))
+
+
+def window_from(found: Checked) -> AudioWindow:
+    """Return a stored window, as ``WINDOW`` says. Raises ValueError: a scale that is not more than 0."""
+    mean, scale = found["window"]
+    if not (scale > 0).all():
+        raise ValueError("window of features of no spread")
+    if not found["window_basis"].any(axis=0).all():
+        raise ValueError("window_basis with an axis of zeros")
+    return AudioWindow(mean, scale, found["window_basis"])
 
 
 def _surroundings(features: NDArray[np.float32], frames: NDArray[np.intp] | slice) -> NDArray[np.float32]:

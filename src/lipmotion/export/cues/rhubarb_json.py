@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import json
-
 from lipmotion.export.cues.sheet import CueSheet
+from lipmotion.json_text import as_json
 
 
 def text(sheet: CueSheet, sound_file: str) -> str:
@@ -12,5 +11,5 @@ def text(sheet: CueSheet, sound_file: str) -> str:
     cues = ",\n".join(
         f'    {{ "start": {cue.start_s:.2f}, "end": {cue.end_s:.2f}, "value": "{cue.label}" }}' for cue in sheet.cues
     )
-    metadata = f'    "soundFile": {json.dumps(sound_file)},\n    "duration": {sheet.duration_s:.2f}\n'
+    metadata = f'    "soundFile": {as_json(sound_file)},\n    "duration": {sheet.duration_s:.2f}\n'
     return f'{{\n  "metadata": {{\n{metadata}  }},\n  "mouthCues": [\n{cues}\n  ]\n}}\n'

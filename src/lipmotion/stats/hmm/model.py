@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import ModelFormatError
-from lipmotion.stats.bigram import Bigram
+from lipmotion.stats.bigram import BIGRAM, Bigram, bigram_from
 from lipmotion.stats.hmm.states import StateTable, plain_states
-from lipmotion.stats.mixture import Mixtures
+from lipmotion.stats.mixture import MIXTURES, Mixtures, mixtures_from
+from lipmotion.stats.schema import NEGATIVE, Arrays, Member, checked, only
 
 
 @dataclass(frozen=True)
@@ -86,53 +86,41 @@ def hmm_arrays(hmm: UnitHmm, precision: type[np.floating[Any]] = np.float16) -> 
     }
 
 
-def hmm_from_arrays(arrays: Mapping[str, NDArray[Any]], config: HmmConfig) -> UnitHmm:
-    """Return the models again. Raises ModelFormatError: something is missing or has the wrong shape."""
+def hmm_from_arrays(arrays: Arrays, config: HmmConfig) -> UnitHmm:
+    """Return the models again. Raises ModelFormatError: something is missing, out of place or out of range."""
     try:
-        units, counts, names, free = (arrays[key].tolist() for key in ("units", "counts", "names", "free"))
-        _check_shapes(arrays)
+        only(arrays, NAMES, MODELS)
+        named = checked(arrays, NAMES)
+        units, counts, names, free = (tuple(named[key].tolist()) for key in ("units", "counts", "names", "free"))
         _check_names(units, counts, names, free)
-        _check_values(arrays)
-        table = StateTable(tuple(units), tuple(counts), tuple(names), tuple(free))
-        mixtures = Mixtures(*(arrays[key].astype(np.float32) for key in ("log_weights", "means", "variances")))
-        bigram = Bigram(table.units, arrays["bigram"].astype(np.float32))
-        return UnitHmm(
-            config, table, mixtures, arrays["log_stay"].astype(np.float32), bigram, float(arrays["typical_fit"][0])
-        )
+        found = checked(arrays, MODELS, **named.sizes, R=sum(counts))
+        table = StateTable(units, counts, names, free)
+        bigram = bigram_from(units, found["bigram"])
+        return UnitHmm(config, table, mixtures_from(found), found["log_stay"], bigram, float(found["typical_fit"][0]))
     except (KeyError, ValueError, TypeError, IndexError, OverflowError) as error:
         raise ModelFormatError(f"the phone models are damaged ({error}); train or download the model again") from error
 
 
-def _check_shapes(arrays: Mapping[str, NDArray[Any]]) -> None:
-    units, densities = len(arrays["units"]), len(arrays["names"])
-    each = (densities, *arrays["means"].shape[1:])
-    required = {
-        "counts": (units,),
-        "bigram": (units, units),
-        "typical_fit": (1,),
-        "log_stay": (int(arrays["counts"].sum()),),
-        "log_weights": each[:2],
-        "means": each,
-        "variances": each,
-    }
-    for name, shape in required.items():
-        if arrays[name].shape != shape:
-            raise ValueError(f"{name} of shape {arrays[name].shape}, required {shape}")
+NAMES = {
+    "units": Member(np.str_, "U"),
+    "counts": Member(np.int32, "U", 1, 1000),
+    "names": Member(np.str_, "G"),
+    "free": Member(np.str_, "F"),
+}
+MODELS = {
+    **MIXTURES,
+    **BIGRAM,
+    "log_stay": Member(np.float32, "R", -1e4, NEGATIVE),
+    "typical_fit": Member(np.float64, "1", -1e6, 1e6),
+}
+"""How unit models are stored; R states have no context."""
 
 
-def _check_names(units: list[str], counts: list[int], names: list[str], free: list[str]) -> None:
-    if not free or not set(free) <= set(units) or min(counts) < 1 or sum(counts) > len(names):
+def _check_names(
+    units: tuple[str, ...], counts: tuple[int, ...], names: tuple[str, ...], free: tuple[str, ...]
+) -> None:
+    if not set(free) <= set(units) or len(set(units)) < len(units) or sum(counts) > len(names):
         raise ValueError(f"{len(names)} states of {len(units)} units, {len(free)} of them silent")
-    wanted = plain_states(tuple(units), tuple(counts), tuple(free)).names
-    if tuple(names[: len(wanted)]) != wanted or len(set(names)) < len(names):
+    wanted = plain_states(units, counts, free).names
+    if names[: len(wanted)] != wanted or len(set(names)) < len(names):
         raise ValueError("the names of the states are not those of the units")
-
-
-def _check_values(arrays: Mapping[str, NDArray[Any]]) -> None:
-    for name in ("means", "variances", "log_stay", "bigram", "typical_fit"):
-        if not np.isfinite(arrays[name]).all():
-            raise ValueError(f"{name} holds values that are not finite")
-    if not (arrays["variances"] > 0).all() or not (arrays["log_stay"] < 0).all():
-        raise ValueError("variances not more than 0, or probabilities not less than 1")
-    if not np.isfinite(arrays["log_weights"].max(axis=1)).all():
-        raise ValueError("a state without a Gaussian of a finite weight")

@@ -114,7 +114,8 @@ def _restored(checkpoint: Checkpoint, config: HmmConfig) -> tuple[int, _State] |
     if arrays is None:
         return None
     said = tuple(tuple(units.split()) for units in arrays["said"].tolist())
-    return int(arrays["done"]), _State(hmm_from_arrays(arrays, config), said)
+    stored = {name: array for name, array in arrays.items() if name not in ("done", "said")}
+    return int(arrays["done"]), _State(hmm_from_arrays(stored, config), said)
 
 
 class _Training:

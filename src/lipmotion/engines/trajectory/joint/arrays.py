@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -14,11 +13,10 @@ from lipmotion.engines.trajectory.joint.inventory import Inventory
 from lipmotion.engines.trajectory.joint.model import JointConfig, JointHmm, Part
 from lipmotion.engines.trajectory.joint.streams import F0_STREAMS, MOTION, SPEECH, STREAMS
 from lipmotion.errors import ModelFormatError
-from lipmotion.stats.bigram import Bigram
-from lipmotion.stats.mixture import Mixtures
-from lipmotion.stats.trees import tree_arrays, trees_from_arrays
-
-Arrays = Mapping[str, NDArray[Any]]
+from lipmotion.stats.bigram import BIGRAM, bigram_from
+from lipmotion.stats.mixture import MIXTURES, mixtures_from
+from lipmotion.stats.schema import BELOW_ONE, NEGATIVE, POSITIVE, Arrays, Member, checked, only, under
+from lipmotion.stats.trees import TREES, tree_arrays, trees_from_arrays
 
 
 def joint_arrays(hmm: JointHmm, precision: type[np.floating[Any]] = np.float16) -> dict[str, NDArray[Any]]:
@@ -51,58 +49,58 @@ def joint_arrays(hmm: JointHmm, precision: type[np.floating[Any]] = np.float16) 
 
 
 def joint_from_arrays(arrays: Arrays, config: JointConfig) -> JointHmm:
-    """Return the model again. Raises ModelFormatError: something is missing, has the wrong shape or is no number."""
+    """Return the model again. Raises ModelFormatError: something is missing, out of place or out of range."""
     try:
-        units, free, streams = (tuple(map(str, arrays[key])) for key in ("units", "free", "streams"))
+        named = checked(arrays, NAMES)
+        units, free, streams = (tuple(named[key].tolist()) for key in ("units", "free", "streams"))
+        only(arrays, NAMES, TIMES, (name for name in arrays if name.partition("/")[0] in streams and "/" in name))
+        if config.states > arrays["log_stay"].size:
+            raise ValueError(f"{config.states} states a unit, of {arrays['log_stay'].size} in all")
         inventory = Inventory(units, free, config.states)
-        _check(arrays, {"spoken": (len(units),)})
-        spoken = tuple(unit for unit, heard in zip(units, arrays["spoken"], strict=True) if heard)
+        spoken = tuple(unit for unit, heard in zip(units, named["spoken"], strict=True) if heard)
         if inventory.silence not in spoken:
             raise ValueError("silence was not heard in training")
         if SPEECH not in streams or not set(streams) <= set(STREAMS) or len(set(streams)) < len(streams):
             raise ValueError(f"streams {streams}")
-        states, count = len(inventory.rows), len(units)
-        _check(arrays, {"log_stay": (states,), "durations": (states, 2), "bigram": (count, count)})
-        if not (arrays["log_stay"] < 0).all() or not (arrays["durations"] > 0).all():
-            raise ValueError("probabilities not less than 1, or durations not more than 0")
-        parts = {name: _part(arrays, name, inventory) for name in streams}
-        bigram = Bigram(units, arrays["bigram"].astype(np.float32))
-        times = arrays["log_stay"].astype(float), arrays["durations"].astype(float)
-        return JointHmm(config, inventory, parts, *times, spoken, bigram)
+        found = checked(arrays, TIMES, U=len(units), R=len(inventory.rows))
+        parts = {name: _part(name, under(arrays, f"{name}/"), inventory) for name in streams}
+        bigram = bigram_from(units, found["bigram"])
+        return JointHmm(config, inventory, parts, found["log_stay"], found["durations"], spoken, bigram)
     except (KeyError, ValueError, TypeError, IndexError, OverflowError) as error:
         raise ModelFormatError(f"the joint model is damaged ({error}); train or download it again") from error
 
 
-def _part(arrays: Arrays, name: str, inventory: Inventory) -> Part:
-    mine = {key.partition("/")[2]: array for key, array in arrays.items() if key.startswith(f"{name}/")}
-    forest = Forest(inventory, trees_from_arrays(mine))
-    if list(forest.trees) != list(inventory.trees):
-        raise ValueError(f"{name}: trees {' '.join(forest.trees)}, required {' '.join(inventory.trees)}")
-    dimensions, components = len(mine["mean"]), mine["means"].shape[1]
-    each = (forest.size, components, dimensions)
-    shapes = {"mean": each[2:], "deviation": each[2:], "means": each, "variances": each}
-    _check(mine, shapes | ({"voiced": each[:1]} if name in F0_STREAMS else {}))
-    _check_values(mine, name, each)
-    voiced = mine["voiced"].astype(float) if name in F0_STREAMS else None
-    mixtures = Mixtures(*(mine[key].astype(np.float32) for key in ("log_weights", "means", "variances")))
-    return Part(Scale(mine["mean"].astype(float), mine["deviation"].astype(float)), forest, Tied(mixtures, voiced))
+NAMES = {
+    "units": Member(np.str_, "U"),
+    "free": Member(np.str_, "F"),
+    "spoken": Member(np.int8, "U", 0, 1),
+    "streams": Member(np.str_, "S"),
+}
+TIMES = {
+    **BIGRAM,
+    "log_stay": Member(np.float64, "R", -1e4, NEGATIVE),
+    "durations": Member(np.float64, "R 2", POSITIVE, 1e9),
+}
+PART = {
+    **MIXTURES,
+    "mean": Member(np.float64, "D", -1e6, 1e6),
+    "deviation": Member(np.float64, "D", POSITIVE, 1e6),
+}
+VOICED = {"voiced": Member(np.float64, "G", POSITIVE, BELOW_ONE)}
+"""How a model is stored, and each of its streams; R states have no context."""
 
 
-def _check_values(arrays: Arrays, name: str, each: tuple[int, int, int]) -> None:
-    log_weights = arrays["log_weights"]
-    if log_weights.shape != each[:2] or not np.isfinite(log_weights.max(axis=1)).all() or (log_weights > 1).any():
-        raise ValueError(f"{name}: a leaf without a Gaussian of a finite weight")
-    if not (arrays["variances"] > 0).all() or not (arrays["deviation"] > 0).all():
-        raise ValueError(f"{name}: variances or deviations that are not more than 0")
-    if "voiced" in arrays and not ((arrays["voiced"] > 0) & (arrays["voiced"] < 1)).all():
-        raise ValueError(f"{name}: probabilities that are not between 0 and 1")
-    if each[2] < 1 or (name == MOTION and each[2] % 3):
-        raise ValueError(f"{name}: {each[2]} dimensions")
-
-
-def _check(arrays: Arrays, shapes: Mapping[str, tuple[int, ...]]) -> None:
-    for name, shape in shapes.items():
-        if arrays[name].shape != shape:
-            raise ValueError(f"{name} of shape {arrays[name].shape}, required {shape}")
-        if not np.isfinite(arrays[name]).all():
-            raise ValueError(f"{name} holds values that are not finite")
+def _part(name: str, arrays: Arrays, inventory: Inventory) -> Part:
+    try:
+        table = PART | VOICED if name in F0_STREAMS else PART
+        only(arrays, TREES, table)
+        forest = Forest(inventory, trees_from_arrays(arrays))
+        if list(forest.trees) != list(inventory.trees):
+            raise ValueError(f"trees {' '.join(forest.trees)}, required {' '.join(inventory.trees)}")
+        found = checked(arrays, table, G=forest.size)
+        if name == MOTION and found.sizes["D"] % 3:
+            raise ValueError(f"{found.sizes['D']} dimensions")
+        tied = Tied(mixtures_from(found), found.arrays.get("voiced"))
+        return Part(Scale(found["mean"], found["deviation"]), forest, tied)
+    except (KeyError, ValueError) as error:
+        raise ValueError(f"{name}: {error}") from error

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from typing import Any, ClassVar, final
 
 import numpy as np
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from lipmotion.engines.base import Arrays, Engine, Fit
 from lipmotion.engines.trajectory.closure import Closure, closing_spans, learned_closure
 from lipmotion.engines.trajectory.contexts import named
-from lipmotion.engines.trajectory.frame import frame_arrays, frame_from_arrays
+from lipmotion.engines.trajectory.frame import FRAME, frame_arrays, frame_from_arrays
 from lipmotion.engines.trajectory.generation import Statistics, generated_motion, resolved
 from lipmotion.engines.trajectory.joint.align import StatePath, align
 from lipmotion.engines.trajectory.joint.arrays import joint_arrays, joint_from_arrays
@@ -23,9 +24,11 @@ from lipmotion.engines.trajectory.joint.model import JointConfig, JointHmm
 from lipmotion.engines.trajectory.joint.recognise import joint_recogniser
 from lipmotion.engines.trajectory.joint.streams import MOTION, Observed, StreamWeights, observe
 from lipmotion.engines.trajectory.joint.train import Transcribed, train_joint
+from lipmotion.engines.trajectory.reach import Reach, check_poses, reach_of
 from lipmotion.engines.trajectory.space import MotionSpace, motion_in_space
 from lipmotion.errors import CorpusError, InputError, ModelFormatError
 from lipmotion.stats.checkpoint import NOTHING_KEPT, Checkpoint
+from lipmotion.stats.schema import only, under
 from lipmotion.types import (
     FRAME_RATE_HZ,
     Constraints,
@@ -39,6 +42,9 @@ from lipmotion.types import (
     Unit,
 )
 from lipmotion.units import LIP_CLOSING, UnitSet, unit_set
+
+PREFIX = "joint_"
+"""What the names of the joint model's own arrays begin with."""
 
 
 @dataclass(frozen=True)
@@ -107,6 +113,18 @@ class JointModel:
     hmm: JointHmm
     closure: Closure | None
 
+    @cached_property
+    def reach(self) -> Reach:
+        """Between which values motion lies."""
+        return self.poses.widened(self.hmm.parts[MOTION].scale.deviation[: self.space.dimensions])
+
+    @property
+    def poses(self) -> Reach:
+        """Between which values the means of all states lie."""
+        part, Q = self.hmm.parts[MOTION], self.space.dimensions
+        means = part.tied.mixtures.means[:, :, :Q].reshape(-1, Q)
+        return reach_of(means * part.scale.deviation[:Q] + part.scale.mean[:Q])
+
 
 @final
 @dataclass(frozen=True)
@@ -165,6 +183,7 @@ class JointEngine(Engine[JointModel]):
             statistics,
             frames,
             model.space,
+            model.reach,
             closure=model.closure,
             closing=closing_spans(spoken, frames, model.units.within(LIP_CLOSING)) if self.config.closures else [],
             pins=pins,
@@ -180,19 +199,23 @@ class JointEngine(Engine[JointModel]):
         return model.hmm.text()
 
     def to_arrays(self, model: JointModel) -> dict[str, NDArray[Any]]:  # noqa: D102
-        joint = {f"joint_{name}": array for name, array in joint_arrays(model.hmm).items()}
+        joint = {f"{PREFIX}{name}": array for name, array in joint_arrays(model.hmm).items()}
         return frame_arrays(model.units, model.space, model.closure) | joint
 
     def from_arrays(self, arrays: Arrays) -> JointModel:  # noqa: D102
         try:
+            only(arrays, FRAME, (name for name in arrays if name.startswith(PREFIX)))
             units, space, closure = frame_from_arrays(arrays, self.config.units)
-            own = {name.removeprefix("joint_"): a for name, a in arrays.items() if name.startswith("joint_")}
-            hmm = joint_from_arrays(own, self.config.joint)
+            hmm = joint_from_arrays(under(arrays, PREFIX), self.config.joint)
+            if set(hmm.inventory.names) != set(units.units):
+                raise ValueError(f"the units {' '.join(hmm.inventory.names)}, required {' '.join(units.units)}")
             if MOTION not in hmm.parts or len(hmm.parts[MOTION].scale.mean) != 3 * space.dimensions:
                 raise ValueError(f"motion that is not of {space.dimensions} dimensions")
+            model = JointModel(units, space, hmm, closure)
+            check_poses(model.poses, space, closure)
+            return model
         except (KeyError, ValueError, IndexError, TypeError) as error:
             raise ModelFormatError(f"the joint model is damaged ({error}); train or download it again") from error
-        return JointModel(units, space, hmm, closure)
 
     def _observed(
         self, speech: Speech, motion: NDArray[np.float64] | None = None, seen: NDArray[np.bool_] | None = None

@@ -1,0 +1,144 @@
+"""What stored arrays must be: a table of members, checked and turned into the types that are computed with."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Arrays = Mapping[str, NDArray[Any]]
+POSITIVE, NEGATIVE, BELOW_ONE = 5e-324, -5e-324, math.nextafter(1, 0)
+"""The least number over 0, the largest under 0, the largest under 1: ends of ranges that leave 0 or 1 out."""
+LARGEST = 1e30
+"""No number of a model is larger, whatever its unit."""
+STANDARD = 500.0
+"""No mean of standardised values is larger: of N numbers none is √N deviations away from the mean of all."""
+LARGEST_VARIANCE = 1e6
+"""Nor is any variance of them; a component that is switched off has 1."""
+_KINDS = {"f": "fractions", "i": "whole numbers", "U": "texts", "b": "truth values", "u": "whole numbers from 0"}
+_SPELLED = {POSITIVE: "more than 0", NEGATIVE: "less than 0", BELOW_ONE: "less than 1"}
+
+
+@dataclass(frozen=True)
+class Member:
+    """What one array must be.
+
+    dtype : what it becomes; it may be stored in another precision, but not as another kind of number
+    shape : sizes, as "L 3 Q": a letter is one size throughout a table, a small letter may also be 0; "" is one value
+    least, most : range, both ends in it; infinite only where it says so
+    optional : need not be there
+    whole : whole numbers will do for fractions
+    """
+
+    dtype: type[Any]
+    shape: str
+    least: float = -LARGEST
+    most: float = LARGEST
+    optional: bool = False
+    whole: bool = False
+
+    @property
+    def kinds(self) -> str:
+        """The kinds of NumPy's types that it may be stored in."""
+        kind = np.dtype(self.dtype).kind
+        return kind + "iu" if kind == "f" and self.whole else "iu" if kind == "i" else kind
+
+    @property
+    def range(self) -> str:
+        """Its range in words."""
+        low, high = (_SPELLED.get(end, f"{end:g}") for end in (self.least, self.most))
+        return f"{low} to {high}"
+
+
+@dataclass(frozen=True, eq=False)
+class Checked:
+    """Arrays that are as their table says, and the size of each letter in it."""
+
+    arrays: dict[str, NDArray[Any]]
+    sizes: dict[str, int]
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        """Return one array. Raises KeyError: an optional one that is not there."""
+        return self.arrays[name]
+
+
+def checked(arrays: Arrays, table: Mapping[str, Member], **sizes: int) -> Checked:
+    """Return the arrays of a table, in the types it says; other arrays are let be (``only`` refuses them).
+
+    sizes : of letters that are known
+    Raises ValueError: an array of another kind of number, of another shape or out of its range. KeyError: one is
+    missing.
+    """
+    sizes = check(arrays, table, **sizes)
+    with np.errstate(over="ignore"):
+        found = {name: arrays[name].astype(member.dtype) for name, member in table.items() if name in arrays}
+    return Checked(found, sizes)
+
+
+def check(arrays: Arrays, table: Mapping[str, Member], **sizes: int) -> dict[str, int]:
+    """Return the size of each letter of a table. Raises as ``checked``."""
+    for name, member in table.items():
+        if name in arrays:
+            _check_kind(name, arrays[name], member)
+            _check_shape(name, arrays[name], member, sizes)
+            _check_range(name, arrays[name], member)
+        elif not member.optional:
+            raise KeyError(f"{name} is missing")
+    return sizes
+
+
+def only(arrays: Iterable[str], *names: Iterable[str]) -> None:
+    """Raise ValueError where there is an array that none of some tables, or lists of names, has."""
+    unknown = sorted(set(arrays).difference(*names))
+    if unknown:
+        raise ValueError(f"undeclared {unknown[0]!r}")
+
+
+def check_index(name: str, numbers: NDArray[Any], count: int) -> None:
+    """Raise ValueError unless all numbers are of one of ``count`` things."""
+    if len(numbers) and not 0 <= numbers.min() <= numbers.max() < count:
+        raise ValueError(f"{name} is {numbers.min()} to {numbers.max()}, required 0 to {count - 1}")
+
+
+def under(arrays: Arrays, prefix: str) -> dict[str, NDArray[Any]]:
+    """Return the arrays of a part, whose names begin with its prefix, under their own names."""
+    return {name[len(prefix) :]: array for name, array in arrays.items() if name.startswith(prefix)}
+
+
+def _check_kind(name: str, array: NDArray[Any], member: Member) -> None:
+    if array.dtype.kind not in member.kinds or (array.dtype.kind != "U" and array.dtype.itemsize > 8):
+        required = _KINDS[np.dtype(member.dtype).kind]
+        raise ValueError(f"{name} holds {array.dtype}, required {required}")
+
+
+def _check_shape(name: str, array: NDArray[Any], member: Member, sizes: dict[str, int]) -> None:
+    letters = member.shape.split()
+    known = dict(zip(letters, array.shape, strict=False))
+    known |= {letter: size for letter, size in sizes.items() if letter in known}
+    known |= {letter: int(letter) for letter in letters if letter.isdigit()}
+    required = tuple(known.get(letter, 0) for letter in letters)
+    if array.shape != required:
+        raise ValueError(f"{name} of shape {array.shape}, required {_spelled(letters, sizes)}")
+    if any(not size and letter.isupper() for letter, size in known.items()):
+        raise ValueError(f"{name} of shape {array.shape}, required at least one of each")
+    sizes |= {letter: size for letter, size in known.items() if not letter.isdigit()}
+
+
+def _spelled(letters: list[str], sizes: Mapping[str, int]) -> str:
+    spelled = [str(sizes.get(letter, letter)) for letter in letters]
+    return f"({', '.join(spelled)}{',' if len(spelled) == 1 else ''})"
+
+
+def _check_range(name: str, array: NDArray[Any], member: Member) -> None:
+    if not array.size or array.dtype.kind in "Ub":
+        return
+    values = array.astype(np.float32) if array.dtype == np.float16 else array  # half precision is slow to compare
+    low, high = float(values.min()), float(values.max())
+    if not (member.least == -math.inf or math.isfinite(low)) or not math.isfinite(high):
+        raise ValueError(f"{name} holds values that are not finite")
+    if not member.least <= low <= high <= member.most:
+        raise ValueError(f"{name} holds {low:g} to {high:g}, required {member.range}")
