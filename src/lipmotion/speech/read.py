@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.files import check_source, open_media
+from lipmotion.files import check_source
+from lipmotion.media import open_media
 from lipmotion.speech.decode import Decoded, check_form, decode
 from lipmotion.types import Audio
 

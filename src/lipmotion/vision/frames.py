@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.files import MOST_PIXELS, check_source, moving_pictures, open_media, stated_duration_s
+from lipmotion.files import check_source
+from lipmotion.media import MOST_PIXELS, moving_pictures, open_media, stated_duration_s
 
 
 @dataclass(frozen=True, eq=False)
