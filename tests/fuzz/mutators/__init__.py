@@ -47,4 +47,7 @@ def _changed(chance: Random, name: str, content: bytes, other: bytes) -> bytes:
     if other and chance.random() < 0.05:
         return raw.spliced(chance, content, other)
     ways = (*FORMS.get(PurePosixPath(name).suffix, ()), raw.change)
-    return chance.choice(ways)(chance, content)[: raw.LARGEST]
+    try:
+        return chance.choice(ways)(chance, content)[: raw.LARGEST]
+    except (ArithmeticError, ValueError, TypeError, RecursionError, MemoryError):  # no such change of what is there
+        return raw.change(chance, content)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fuzz.mutators import raw
+from robustness.case import npy
 
 TYPES = "<f8 >f8 <f4 <f2 <i8 <i4 >i4 <i2 |i1 |u1 <u4 <c16 <M8[s] <m8[ns] |b1 <U3 |S4 |V8 |O <f16".split()
 VALUES = (np.nan, np.inf, -np.inf, 0.0, -1.0, 1e-320, 1e9, 1e30, 1e38, -1e38, 1e300, -1e300, 0.5, 255.0)
@@ -24,13 +25,6 @@ def change(chance: Random, content: bytes) -> bytes:
     except Exception:  # it was damaged before
         return _head(chance, content)
     return _head(chance, content) if header else npy(_array(chance, array))
-
-
-def npy(array: NDArray[Any]) -> bytes:
-    """Return an array as a file's content."""
-    stream = io.BytesIO()
-    np.save(stream, array, allow_pickle=True)
-    return stream.getvalue()
 
 
 def _head(chance: Random, content: bytes) -> bytes:

@@ -11,14 +11,14 @@ from pathlib import Path
 import numpy as np
 
 from fuzz.inputs import Files, Good
-from fuzz.mutators.arrays import npy
 from fuzz.readers.plausible import require, short_speech
-from fuzz.readers.units import SMALL
 from lipmotion.corpora.base import Curves
 from lipmotion.corpora.facegood import channels_in
 from lipmotion.corpora.store import Corpus
 from lipmotion.pipeline.given import given_track
 from lipmotion.types import WEIGHT
+from robustness.case import npy
+from robustness.motion_cases import GOOD
 
 NAMES, VALUES = "x_bs_name.npy", "bs_value_a.npy"
 FRAMES, RATE_HZ = 23, 30.0
@@ -29,7 +29,7 @@ def seeds(_: Good) -> list[Files]:
     """Return the same motion in every format."""
     values = np.linspace(0, 0.3, 2 * FRAMES).reshape(FRAMES, 2)
     channels = [{"name": name, "unit": WEIGHT} for name in ("opening", "width")]
-    document = SMALL | {"rate_hz": RATE_HZ, "channels": channels, "values": values.tolist()}
+    document = GOOD | {"rate_hz": RATE_HZ, "channels": channels, "values": values.tolist()}
     rows = [f"{n / RATE_HZ:.9f},{first},{second}" for n, (first, second) in enumerate(values)]
     archive = io.BytesIO()
     np.savez(archive, values=values, document=np.array(json.dumps(document | {"values": None})))

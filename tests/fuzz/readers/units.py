@@ -10,23 +10,12 @@ from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import check_generation, good_model, short_speech
 from lipmotion.export.base import read_motion
 from lipmotion.pipeline.animate import animate, write
-
-SMALL = {
-    "format": "lipmotion.motion",
-    "version": 1,
-    "rate_hz": 100.0,
-    "channels": [{"name": "opening", "unit": "eye_distance"}],
-    "values": [[0.1], [0.2]],
-    "units": [
-        {"start_s": 0.0, "end_s": 0.4, "phone": "sil", "unit": ""},
-        {"start_s": 0.4, "end_s": 0.6, "phone": "p", "unit": ""},
-    ],
-}
+from robustness.motion_cases import GOOD
 
 
 def seeds(good: Good) -> list[Files]:
     """Return what ``animate`` writes, and the least that can be written by hand."""
-    found: list[Files] = [{"a.json": json.dumps(SMALL).encode()}]
+    found: list[Files] = [{"a.json": json.dumps(GOOD).encode()}]
     result = animate(short_speech(good), model=good_model(good), recogniser="own")
     with tempfile.TemporaryDirectory() as folder:
         paths = [Path(folder) / "a.json", Path(folder) / "a.npz"]
