@@ -9,12 +9,12 @@ from dataclasses import dataclass, field
 from random import Random
 
 from fuzz.inputs import Files, Good, Reader, digest
-from fuzz.judge import CRASH, HANG, REFUSED, WRONG, Result
+from fuzz.judge import CRASH, HANG, READ, REFUSED, WRONG, Result
 from fuzz.mutators import mutated
 from fuzz.worker import Worker
 
-RECENT = 0.5
-"""So often, one of the last few is changed, which went where none went before."""
+ACCEPTED, RECENT = 0.7, 0.5
+"""So often, one that was read is changed, which gets further than one that was refused; one of the last few."""
 STOP_AFTER = 200
 """Inputs of one kind of hang or crash: each costs a new process, so a reader full of them is left."""
 
@@ -65,24 +65,30 @@ class Tally:
 def campaign(reader: Reader, worker: Worker, good: Good, seed: int, going_on: Callable[[Tally], bool]) -> Tally:
     """Read good input, then changed input while ``going_on`` says so. The same seed makes the same inputs."""
     chance, tally, seen = Random(f"{seed} {reader.name}"), Tally(reader.name), set[bytes]()
-    pool: list[Files] = []
+    accepted, refused = list[Files](), list[Files]()
     queue = reader.seeds(good)
     start_s = time.monotonic()
     while (queue or going_on(tally)) and tally.kinds[HANG] + tally.kinds[CRASH] < STOP_AFTER:
         first = bool(queue)
-        files = queue.pop(0) if first else mutated(chance, _chosen(chance, pool), chance.choice(pool))
+        files = (
+            queue.pop(0)
+            if first
+            else mutated(chance, _chosen(chance, accepted, refused), chance.choice(accepted + refused))
+        )
         tally.made += 1
         if digest(files) in seen:
             continue
         seen.add(digest(files))
         begun_s = time.monotonic()
-        new = tally.add(worker.tried(reader.name, files), files)
+        result = worker.tried(reader.name, files)
+        new = tally.add(result, files)
         tally.slowest_s = max(tally.slowest_s, time.monotonic() - begun_s)
         if new or first:
-            pool.append(files)
-    tally.kept, tally.seconds = len(pool), time.monotonic() - start_s
+            (accepted if result.kind == READ else refused).append(files)
+    tally.kept, tally.seconds = len(accepted + refused), time.monotonic() - start_s
     return tally
 
 
-def _chosen(chance: Random, pool: list[Files]) -> Files:
+def _chosen(chance: Random, accepted: list[Files], refused: list[Files]) -> Files:
+    pool = accepted if not refused or accepted and chance.random() < ACCEPTED else refused
     return chance.choice(pool[-10:] if chance.random() < RECENT else pool)

@@ -12,7 +12,7 @@ from fuzz.inputs import Files, Good, ImplausibleError, Reader
 from lipmotion.errors import InputError
 from lipmotion.units import words_of
 
-MEGABYTES = 200
+MEGABYTES = 80
 
 
 def seeds(_: Good) -> list[Files]:

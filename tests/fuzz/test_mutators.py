@@ -66,7 +66,7 @@ def test_archives_stay_archives() -> None:
 
 
 def test_arrays_of_other_types_and_values() -> None:
-    found = [array for seed in range(COUNT) if (array := _array(arrays.change(Random(seed), ARRAY))) is not None]
+    found = [array for seed in range(3 * COUNT) if (array := _array(arrays.change(Random(seed), ARRAY))) is not None]
     assert {array.dtype.kind for array in found} >= set("fciM")
     assert {bool(np.isfinite(array).all()) for array in found if array.dtype.kind == "f"} == {True, False}
 

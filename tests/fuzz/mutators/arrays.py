@@ -55,7 +55,7 @@ def _head(chance: Random, content: bytes) -> bytes:
 
 
 def _array(chance: Random, array: NDArray[Any]) -> NDArray[Any]:
-    kind = chance.choice(("type", "scale", "value", "value", "shape", "rows", "constant", "order"))
+    kind = chance.choice(("type", "type", "scale", "value", "value", "shape", "rows", "constant", "order"))
     if kind == "type" or array.dtype.kind not in "fiub" or not array.size:
         return _cast(array, chance.choice(TYPES))
     with np.errstate(all="ignore"):

@@ -33,6 +33,8 @@ WORDS = (
         "=1+1",
     ),
 )
+POWERS = (2,) * 4 + (3,) * 4 + (4, 4, 5, 6)
+"""How often something comes again, as powers of ten."""
 BREAKS = ("\r\n", "\r", "\n\n", "\x0b", "\u2028", "\t", ",", ";", " ", "")
 
 
@@ -76,7 +78,7 @@ def _flood(chance: Random, words: str) -> str:
     """Far more of something than anybody needs."""
     token = chance.choice(words[:100_000].split() or ["a"])
     one = chance.choice((token[:1000], "a", "9", "0.1", '"', "p")) + chance.choice(("", " ", "\n", ","))
-    many = one * min(10 ** chance.randint(2, 6), raw.LARGEST // 2 // len(one))
+    many = one * min(10 ** chance.choice(POWERS), raw.LARGEST // 2 // len(one))
     at = chance.choice((0, len(words), chance.randrange(len(words) + 1)))
     return words[:at] + many + words[at:]
 
