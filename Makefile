@@ -1,6 +1,7 @@
 # make demo   installs, then turns a spoken sentence into an animated face with the model in the package
 # make test   installs everything, then runs the tests
 # make check  lint, types, import contracts
+# make fuzz   changed input for every reader, MINUTES=10 in all; READER=name: that one only; SEED=1: other input
 # make bench  the speed figures of the README
 # make model  trains and measures the model that ships with the package (needs GRID speaker s1)
 # make requirements  renews the pinned requirements (needs uv)
@@ -9,10 +10,13 @@ PYTHON ?= python3
 VENV ?= .venv
 GRID ?= ../shared/corpora/grid-s1
 BUILD ?= build
+MINUTES ?= 10
+SEED ?= 0
+READER ?=
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
 SOURCES := $(shell find src -type f -not -name '*.pyc') pyproject.toml README.md
-.PHONY: demo test check bench model requirements clean
+.PHONY: demo test check fuzz bench model requirements clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/core
@@ -27,6 +31,11 @@ check: $(VENV)/dev
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+fuzz: $(VENV)/dev
+	mkdir -p $(BUILD)
+	PYTHONPATH=tests $(BIN)/python -m fuzz --minutes $(MINUTES) --seed $(SEED) $(addprefix --reader ,$(READER)) \
+	  --found $(BUILD)/fuzz --json $(BUILD)/fuzz.json
 
 bench: $(VENV)/dev
 	$(BIN)/python benchmarks/main_path.py --grid $(GRID) --full

@@ -90,5 +90,5 @@ def campaign(reader: Reader, worker: Worker, good: Good, seed: int, going_on: Ca
 
 
 def _chosen(chance: Random, accepted: list[Files], refused: list[Files]) -> Files:
-    pool = accepted if not refused or accepted and chance.random() < ACCEPTED else refused
+    pool = accepted if not refused or (accepted and chance.random() < ACCEPTED) else refused
     return chance.choice(pool[-10:] if chance.random() < RECENT else pool)

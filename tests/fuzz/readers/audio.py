@@ -30,7 +30,7 @@ TEXTS = {
 
 def seeds(_: Good) -> list[Files]:
     """Return a tone in many containers, with a video, with a hole; and texts that FFmpeg takes for recordings."""
-    found: list[Files] = [{name: text.encode()} for name, text in TEXTS.items()]
+    found: list[Files] = []
     with tempfile.TemporaryDirectory() as folder:
         for name, codec in CODECS.items():
             rate_hz = 48_000 if codec == "libopus" else 16_000
@@ -41,7 +41,7 @@ def seeds(_: Good) -> list[Files]:
             found.append({path.name: path.read_bytes()})
         path = write_sound(Path(folder) / "hole.mka", tone(16_000, 2.0), 16_000, "flac", hole_s=(0.5, 1.0))
         found.append({path.name: path.read_bytes()})
-    return found
+    return found + [{name: text.encode()} for name, text in TEXTS.items()]
 
 
 def read(folder: Path, _: Good) -> None:
