@@ -212,8 +212,9 @@ def unwanted(here: Path, before: set[str], goal: Goal, job: Job, number: int) ->
     """Return files that a killed run should not have left: unfinished ones, locks, outputs neither old nor new."""
     old, found = hashlib.sha256(OLD).hexdigest(), content(here)
     torn = [name for name in job.replaces if found.get(name) not in (old, goal.content[name])]
-    temporary = [name for name in found if ".part-" in name and name not in before]
-    others = [name for name in found if job.replaces and name not in goal.content and name not in temporary]
+    new = [name for name in found if name not in before]
+    temporary = [name for name in new if ".part-" in name]
+    others = [name for name in new if job.replaces and name not in goal.content and name not in temporary]
     return torn + others + ([] if number == signal.SIGKILL else temporary)
 
 

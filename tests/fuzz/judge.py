@@ -18,6 +18,8 @@ ERROR, IMPLAUSIBLE, LEFT, MEMORY, HANG, CRASH = "error", "implausible", "left be
 WRONG = (ERROR, IMPLAUSIBLE, LEFT, MEMORY, HANG, CRASH)
 LONGEST_LINE = 2000
 """Letters of a message."""
+OBEYED = re.compile("[\x00-\x1f\x7f-\x9f]")
+"""What a terminal obeys instead of showing it."""
 
 
 @dataclass(frozen=True)
@@ -65,8 +67,10 @@ def _read(reader: Reader, folder: Path, good: Good) -> Result:
         if known is None:
             return Result(ERROR, f"{type(error).__name__} {place_of(error)}", _trace(error))
         code, line = known
-        if len(line) > LONGEST_LINE or "\n" in line:
+        if len(line) > LONGEST_LINE:
             return Result(ERROR, f"a long message {place_of(error)}", f"{len(line)} letters: {line[:400]!r}")
+        if OBEYED.search(line):
+            return Result(ERROR, f"a raw message {place_of(error)}", repr(line))
         return Result(REFUSED, f"{code} {_shape(line)}", line)
     return Result(READ)
 
