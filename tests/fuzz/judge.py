@@ -63,16 +63,21 @@ def _read(reader: Reader, folder: Path, good: Good) -> Result:
     except MemoryError as error:
         return Result(MEMORY, place_of(error), _trace(error))
     except Exception as error:
-        known = outcome(error)
-        if known is None:
-            return Result(ERROR, f"{type(error).__name__} {place_of(error)}", _trace(error))
-        code, line = known
-        if len(line) > LONGEST_LINE:
-            return Result(ERROR, f"a long message {place_of(error)}", f"{len(line)} letters: {line[:400]!r}")
-        if OBEYED.search(line):
-            return Result(ERROR, f"a raw message {place_of(error)}", repr(line))
-        return Result(REFUSED, f"{code} {_shape(line)}", line)
+        return _told(error)
     return Result(READ)
+
+
+def _told(error: Exception) -> Result:
+    """Return what the command line makes of an error."""
+    known = outcome(error)
+    if known is None:
+        return Result(ERROR, f"{type(error).__name__} {place_of(error)}", _trace(error))
+    code, line = known
+    if len(line) > LONGEST_LINE:
+        return Result(ERROR, f"a long message {place_of(error)}", f"{len(line)} letters: {line[:400]!r}")
+    if OBEYED.search(line):
+        return Result(ERROR, f"a raw message {place_of(error)}", repr(line))
+    return Result(REFUSED, f"{code} {_shape(line)}", line)
 
 
 def place_of(error: BaseException) -> str:

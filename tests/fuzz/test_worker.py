@@ -16,16 +16,8 @@ from fuzz.planted import MEGABYTES, readers
 from fuzz.worker import Worker
 
 ORDERS = {
-    **{
-        "raise": ERROR,
-        "talk": ERROR,
-        "beep": ERROR,
-        "lie": IMPLAUSIBLE,
-        "drop": LEFT,
-        "spoil": LEFT,
-        "refuse": REFUSED,
-    },
-    "now": READ,
+    **{"raise": ERROR, "talk": ERROR, "beep": ERROR, "lie": IMPLAUSIBLE, "drop": LEFT, "spoil": LEFT},
+    **{"refuse": REFUSED, "now": READ},
 }
 
 
