@@ -7,6 +7,7 @@ from random import Random
 
 import pytest
 
+from fuzz.floods import FLOODS
 from fuzz.inputs import Files, Good, picked_up
 from fuzz.judge import READ, REFUSED
 from fuzz.mutators import mutated
@@ -39,6 +40,11 @@ def test_changed_input_is_read_or_refused(name: str, worker: Worker, good: Good)
 @pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: f"{folder.parent.name}: {folder.name}")
 def test_what_was_found_once(folder: Path, worker: Worker) -> None:
     _check(worker, folder.parent.name, picked_up(folder))
+
+
+@pytest.mark.parametrize(("name", "flood"), FLOODS, ids=lambda part: part)
+def test_a_flood_that_was_found_once(name: str, flood: str, worker: Worker) -> None:
+    _check(worker, name, FLOODS[name, flood]())
 
 
 def test_all_that_was_found_is_of_a_reader() -> None:
