@@ -13,8 +13,9 @@ import argparse
 import os
 import sys
 import tempfile
+import threading
 import time
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # of the processes that read
@@ -45,28 +46,34 @@ def main() -> int:
     parser.add_argument("--good", type=Path, metavar="FOLDER", help="keep the good input here, for further runs")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        good = (
-            good_in(options.good) if options.good and options.good.is_dir() else make_good(options.good or Path(folder))
-        )
+        place = options.good or Path(folder) / "good"
+        good = good_in(place) if place.is_dir() else make_good(place)
         return replay(options, good) if options.replay else fuzz(options, good)
 
 
 def fuzz(options: argparse.Namespace, good: Good) -> int:
-    """Fuzz the readers, several at a time."""
+    """Fuzz the readers, several at a time; Ctrl-C ends it early, with the table."""
     names = options.reader or list(READERS)
     workers = max(1, min(options.workers, len(names)))
+    stopped = threading.Event()
     budget_s = 60 * options.minutes * workers / len(names)
 
     def one(name: str) -> Tally:
         with Worker(good) as worker:
-            end_s = time.monotonic() + budget_s
-            tally = campaign(READERS[name], worker, good, options.seed, lambda _: time.monotonic() < end_s)
+            end_s = time.monotonic() + (0 if stopped.is_set() else budget_s)
+            begin = (READERS[name], worker, good, options.seed)
+            tally = campaign(*begin, lambda _: time.monotonic() < end_s and not stopped.is_set())
             for place in keep(tally, worker, options.found):
                 print(f"{name}: {place}; again: python -m fuzz --reader {name} --replay {place}", file=sys.stderr)
             return tally
 
     with ThreadPoolExecutor(workers) as pool:
-        tallies = list(pool.map(one, names))
+        runs = [pool.submit(one, name) for name in names]
+        try:
+            wait(runs)
+        except KeyboardInterrupt:
+            stopped.set()
+        tallies = [run.result() for run in runs]
     print(table(tallies))
     if options.json:
         write_json(options.json, tallies, options.seed, options.minutes)

@@ -8,6 +8,8 @@ from collections.abc import Callable
 from fuzz.inputs import Files
 from robustness.motion_cases import GOOD
 
+TIER = b'"ooTextFile"\n"TextGrid"\n0\n2\n<exists>\n1\n"%s"\n"a"\n0\n2\n1\n0\n2\n"x"\n'
+
 
 def _units(count: int) -> Files:
     """Return a document of so many phones, a millisecond each."""
@@ -27,10 +29,6 @@ FLOODS: dict[tuple[str, str], Callable[[], Files]] = {
     ("lexicon", "a phone of many letters"): lambda: {"words.dict": b"baby " + b"p," * 10_000},
     ("units", "units"): lambda: _units(300_000),
     ("labels", "a word time of many letters"): lambda: {"grid.align": b"0 1 sil\n" + b"9," * 100_000},
-    ("labels", "a tier's kind of many letters"): lambda: {
-        "a.TextGrid": b'"ooTextFile"\n"TextGrid"\n0\n2\n<exists>\n1\n"'
-        + b"9" * 100_000
-        + b'"\n"a"\n0\n2\n1\n0\n2\n"x"\n'
-    },
+    ("labels", "a tier's kind of many letters"): lambda: {"a.TextGrid": TIER % (b"9" * 100_000)},
 }
 """By reader and name."""
