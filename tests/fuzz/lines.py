@@ -10,6 +10,8 @@ from typing import Any
 import lipmotion
 
 ROOT = str(Path(lipmotion.__file__).parent)
+OFTEN, SELDOM = 500, 50
+"""A function that has been called so often without a new line is watched once in so many calls."""
 
 
 class Lines:
@@ -45,6 +47,7 @@ class Lines:
         def watch(self) -> None:
             """Begin."""
             self._missing: dict[CodeType, set[int]] = {}
+            self._calls: dict[CodeType, int] = {}
             sys.settrace(self._called)
 
         def _called(self, frame: FrameType, *_: object) -> Any:
@@ -53,11 +56,15 @@ class Lines:
             if missing is None:
                 own = code.co_filename.startswith(ROOT)
                 missing = self._missing[code] = {line for *_, line in code.co_lines() if line} if own else set()
-            return self._run if missing else None
+            if not missing:
+                return None
+            calls = self._calls[code] = self._calls.get(code, 0) + 1
+            return self._run if calls < OFTEN or calls % SELDOM == 0 else None
 
         def _run(self, frame: FrameType, *_: object) -> Any:
             missing = self._missing[frame.f_code]
             if frame.f_lineno in missing:
                 missing.remove(frame.f_lineno)
+                self._calls[frame.f_code] = 0
                 self._note(frame.f_code, frame.f_lineno)
             return self._run if missing else None

@@ -1,7 +1,9 @@
-"""How much memory one input takes."""
+"""How much memory, and how much of a processor, one input takes."""
 
 from __future__ import annotations
 
+import math
+import os
 import sys
 from contextlib import suppress
 from pathlib import Path
@@ -58,3 +60,12 @@ def _now_mb(name: str) -> float:
     except OSError:
         return 0.0
     return next((int(line.split()[1]) / 1024 for line in lines if line.startswith(f"{name}:")), 0.0)
+
+
+def busy_s(process: int) -> float:
+    """Return the processor time of a process, infinite where the system does not tell."""
+    try:
+        fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        return math.inf
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")

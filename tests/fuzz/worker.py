@@ -17,9 +17,11 @@ from typing import Any
 from fuzz.inputs import Files, Good, Reader
 from fuzz.judge import CRASH, HANG, LEFT, MEMORY, READ, REFUSED, Result, judged, quiet
 from fuzz.lines import Lines
-from fuzz.memory import Memory
+from fuzz.memory import Memory, busy_s
 
 HANG_S = 20.0
+PATIENCE = 3
+"""So many times as long it may take where others keep the processor busy."""
 START_S = 300.0
 """The first import compiles."""
 Readers = dict[str, Reader]
@@ -29,7 +31,7 @@ class Worker:
     """Reads inputs, one after the other; a process that died or hung is replaced by another.
 
     readers : a function of a module, which gives them by name
-    hang_s  : after this long, it hangs
+    hang_s  : after this long, in processor time, it hangs; ``PATIENCE`` times as long by the clock
     """
 
     def __init__(
@@ -54,7 +56,7 @@ class Worker:
             self._start()
         try:
             self._pipe.send((reader, files))
-            if self._pipe.poll(self._hang_s):
+            if self._answered():
                 result, weary = self._pipe.recv()
                 if weary:
                     self._end()
@@ -62,6 +64,16 @@ class Worker:
         except (EOFError, OSError):
             return self._died()
         return self._hung()
+
+    def _answered(self) -> bool:
+        """Wait for an answer, as long as it may take."""
+        before_s = busy_s(self._process.pid)
+        for _ in range(4 * PATIENCE):
+            if self._pipe.poll(self._hang_s / 4):
+                return True
+            if busy_s(self._process.pid) - before_s > self._hang_s:
+                break
+        return False
 
     def _start(self) -> None:
         spawn = multiprocessing.get_context("spawn")

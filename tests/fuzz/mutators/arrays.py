@@ -60,7 +60,7 @@ def _array(chance: Random, array: NDArray[Any]) -> NDArray[Any]:
         return _cast(array, chance.choice(TYPES))
     with np.errstate(all="ignore"):
         if kind == "scale":
-            return (array * chance.choice((1e3, -1.0, 1e30, 1e-30, 0.0))).astype(array.dtype)
+            return (array * chance.choice((0.5, 2.0, 10.0, 1e3, -1.0, 1e30, 1e-30, 0.0))).astype(array.dtype)
         if kind == "value":
             array.reshape(-1)[chance.randrange(array.size) :: chance.choice((array.size, 7, 1))] = _fitting(
                 chance, array
