@@ -23,10 +23,10 @@ KEYS = frozenset(
 """What every description holds. ``speaker`` and ``phones`` came with version 2 of the corpus; without them: unknown."""
 KINDS = {"audio": "i", "features": "f", "motion": "f", "seen": "b", "crops": "u"}
 """The kinds of number in each array."""
-MOST = 1e9
-"""No utterance has more seconds or frames, nor more frames a second."""
 FULL_SCALE = 32_768
 """16-bit samples per unit of amplitude: recordings of 16 bits come back exactly."""
+MOST = 1e9
+"""No utterance has more seconds or frames, nor more frames a second."""
 
 
 def quantised(audio: Audio) -> Audio:
