@@ -16,7 +16,7 @@ from fuzz.planted import MEGABYTES, readers
 from fuzz.worker import Worker
 
 ORDERS = {
-    **{"raise": ERROR, "talk": ERROR, "beep": ERROR, "lie": IMPLAUSIBLE, "drop": LEFT, "spoil": LEFT},
+    **{"raise": ERROR, "lie": IMPLAUSIBLE, "drop": LEFT, "spoil": LEFT},
     **{"refuse": REFUSED, "now": READ},
 }
 
