@@ -2,6 +2,7 @@
 # make test   installs everything, then runs the tests
 # make test-portable   the numeric tests as other processors would run them
 # make check  lint, types, import contracts
+# make fuzz   changed input for every reader, MINUTES=10 in all; READER=name: that one only; SEED=1: other input
 # make bench  the speed figures of the README
 # make model  trains and measures the model that ships with the package (needs GRID speaker s1)
 # make requirements  renews the pinned requirements (needs uv)
@@ -10,10 +11,13 @@ PYTHON ?= python3
 VENV ?= .venv
 GRID ?= ../shared/corpora/grid-s1
 BUILD ?= build
+MINUTES ?= 10
+SEED ?= 0
+READER ?=
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
 SOURCES := $(shell find src -type f -not -name '*.pyc') pyproject.toml README.md
-.PHONY: demo test test-portable check bench model requirements clean
+.PHONY: demo test test-portable check fuzz bench model requirements clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/core
@@ -31,6 +35,11 @@ check: $(VENV)/dev
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+fuzz: $(VENV)/dev
+	mkdir -p $(BUILD)
+	PYTHONPATH=tests $(BIN)/python -m fuzz --minutes $(MINUTES) --seed $(SEED) $(addprefix --reader ,$(READER)) \
+	  --found $(BUILD)/fuzz --json $(BUILD)/fuzz.json
 
 bench: $(VENV)/dev
 	$(BIN)/python benchmarks/main_path.py --grid $(GRID) --full

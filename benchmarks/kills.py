@@ -1,10 +1,11 @@
-"""Kill ``corpus prepare`` and ``train`` at random moments, go on, and compare every byte with an uninterrupted run.
+"""Kill every long or writing verb at random moments, run it again, and compare every byte with an undisturbed run.
 
-    python benchmarks/kills.py [--kills 100] [--seed 0] [--job prepare|train|share]
+    python benchmarks/kills.py [--kills 500] [--seed 0] [--job NAME ...] [--at-once 2] [-o docs/results/kills.txt]
 
 Ctrl-C (SIGINT), ``kill`` (SIGTERM) and ``kill -9`` (SIGKILL) are sent to the first process alone or to all of them, at
-moments spread over the whole duration of an uninterrupted run; every other run is killed a second time. The recordings
-are the package's own toy recordings. POSIX only.
+moments spread over the whole duration of an undisturbed run, some of them close to its end. Up to ``CHAIN`` kills hit
+the same folder before a run may finish there. A run that has ended before its signal came is compared, and no kill.
+The recordings are the package's own toy recordings. POSIX only.
 """
 
 from __future__ import annotations
@@ -12,177 +13,235 @@ from __future__ import annotations
 import argparse
 import hashlib
 import os
+import platform
 import random
 import shutil
 import signal
+import statistics
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections import Counter
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from kill_jobs import MAKERS, Job, make_inputs
+from kill_verdict import judged
+
 COMMAND = [sys.executable, "-m", "lipmotion.cli.main"]
-LINE = "lipmotion: stopped; run the same command again to go on"
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGKILL)
-LOCK = ".part-lock"
-"""May be left where the signal came between making and holding it: it never blocks, and the next run removes it."""
-CLIPS, MANY = 6, 96  # of so many utterances, enough are for training to be shared between two processes
+CHAIN = 4
+END_SHARE, END_S = 0.2, 0.3
+"""So many kills are aimed at the last moments of a run."""
+TRIES = 5
+"""Runs for each kill: of those that are aimed at the end, many have ended."""
 PATIENCE_S = 300
-
-
-@dataclass(frozen=True)
-class Job:
-    """A command, by name."""
-
-    name: str
-    arguments: tuple[str, ...]
+OLD = b"an earlier output"
 
 
 @dataclass
 class Tally:
-    """What was seen."""
+    """What was seen of one job."""
 
+    job: Job
+    duration_s: float = 0.0
+    kills: int = 0
     counts: Counter[str] = field(default_factory=Counter)
     problems: list[str] = field(default_factory=list)
+    lock: threading.Lock = field(default_factory=threading.Lock)
+
+    def see(self, what: str, problem: str = "", *, kill: bool = False) -> None:
+        """Count one thing, and note what is wrong with it."""
+        with self.lock:
+            self.kills += kill
+            self.counts[what] += 1
+            if problem:
+                self.problems.append(f"{what}: {problem}")
+
+
+@dataclass(frozen=True)
+class Goal:
+    """What an undisturbed run leaves, by name, and how long it takes."""
+
+    content: dict[str, str]
+    duration_s: float
 
 
 def main() -> int:
     """Print a table; return 1 if anything went wrong."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--kills", type=int, default=100, help="runs killed of each job (default: 100)")
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--kills", type=int, default=500, help="of all jobs together (default: 500)")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--job", choices=("prepare", "train", "share"))
+    parser.add_argument("--job", action="append", choices=sorted(MAKERS), help="this one only (repeatable)")
+    parser.add_argument("--at-once", type=int, default=os.cpu_count() or 1, help="runs at a time (default: one a core)")
+    parser.add_argument("-o", "--output", type=Path, help="write the table to this file, too")
     options = parser.parse_args()
-    failed = False
     with tempfile.TemporaryDirectory() as folder:
-        for job in jobs(Path(folder)):
-            if options.job in (None, job.name):
-                tally = kill_often(job, Path(folder), options.kills, random.Random(options.seed))  # noqa: S311
-                failed = show(job, options.kills, tally) or failed
-    return int(failed)
+        inputs = make_inputs(Path(folder) / "inputs", COMMAND)
+        before = content(inputs)
+        jobs = [MAKERS[name](inputs) for name in options.job or MAKERS]
+        tallies = []
+        with ThreadPoolExecutor(options.at_once) as pool:
+            for job, kills in shared(jobs, options.kills):
+                tallies.append(kill_often(job, Path(folder), kills, options.seed, pool))
+                print(f"{job.name}: {tallies[-1].kills} kills, {len(tallies[-1].problems)} problems", file=sys.stderr)
+        changed = sorted(name for name, found in content(inputs).items() if before.get(name) != found)
+    text = written(tallies, changed, options)
+    print(text)
+    if options.output:
+        options.output.write_text(text + "\n", encoding="utf-8")
+    return int(bool(changed) or any(tally.problems for tally in tallies))
 
 
-def jobs(folder: Path) -> Iterator[Job]:
-    """Give the jobs: preparing recordings, training on them, training on more in two processes."""
-    from lipmotion.corpora.store import Corpus
-    from lipmotion.pipeline.toy import toy_utterances, write_toy_recordings
-
-    write_toy_recordings(folder / "recordings", sentences=CLIPS)
-    prepare = ("corpus", "prepare", str(folder / "recordings"), "-o", "corpus", "--workers", "2")
-    yield Job("prepare", prepare)
-    run(prepare, folder)
-    yield Job("train", ("train", str(folder / "corpus"), "-o", "m.lipmotion"))
-    large = Corpus.create(folder / "large")
-    for utterance in toy_utterances(MANY):
-        large.add(utterance)
-    yield Job("share", ("train", str(large.path), "-o", "m.lipmotion", "--workers", "2"))
+def shared(jobs: list[Job], kills: int) -> Iterator[tuple[Job, int]]:
+    """Yield each job and its kills, as its weight tells; all kills together are those asked for."""
+    left, weight = kills, sum(job.weight for job in jobs)
+    for job in jobs:
+        share = round(left * job.weight / weight)
+        yield job, share
+        left, weight = left - share, weight - job.weight
 
 
-def kill_often(job: Job, folder: Path, kills: int, chance: random.Random) -> Tally:
-    """Kill ``kills`` runs and finish each."""
-    tally = Tally()
-    whole, duration_s = uninterrupted(job, folder / f"whole-{job.name}")
-    print(f"{job.name}: {duration_s:.1f} s uninterrupted", file=sys.stderr)
-    for number in range(kills):
-        here = folder / f"{job.name}-{number}"
-        here.mkdir()
-        kill_once(job, here, chance, duration_s, tally)
-        if number % 2:
-            kill_once(job, here, chance, duration_s / 2, tally)
-        finished = run(job.arguments, here)
-        if finished.returncode != 0:
-            tally.problems.append(f"{number}: could not go on: {finished.stderr}")
-        elif content(here) != whole:
-            tally.problems.append(f"{number}: other bytes, or other files: {sorted(set(content(here)) ^ set(whole))}")
-        else:
-            tally.counts["same bytes after going on"] += 1
+def kill_often(job: Job, folder: Path, kills: int, seed: int, pool: ThreadPoolExecutor) -> Tally:
+    """Kill ``kills`` runs, in rounds that each end with a whole one."""
+    goal = undisturbed(job, folder, pool)
+    tally = Tally(job, goal.duration_s)
+
+    def one_round(number: int) -> None:
+        here, chance = folder / f"{job.name}-{number}", random.Random(f"{seed} {job.name} {number}")  # noqa: S311
+        kill_and_finish(here, chance, min(CHAIN, kills - CHAIN * number), goal, tally)
         shutil.rmtree(here)
+
+    list(pool.map(one_round, range(-(-kills // CHAIN))))
     return tally
 
 
-def uninterrupted(job: Job, here: Path) -> tuple[dict[str, str], float]:
-    """Return what a run leaves that nobody disturbs, and how long it takes."""
-    durations_s = []
-    for _ in range(3):  # the first one fills the system's caches
-        shutil.rmtree(here, ignore_errors=True)
-        here.mkdir()
+def undisturbed(job: Job, folder: Path, pool: ThreadPoolExecutor) -> Goal:
+    """Return what a run leaves that nobody disturbs, and how long it takes where as many run at once as later."""
+
+    def whole(number: int) -> Goal:
+        here = fresh(folder / f"{job.name}-whole-{number}", job)
         start_s = time.monotonic()
-        done = run(job.arguments, here)
+        done = run(job, here)
         if done.returncode:
             raise SystemExit(done.stderr)
-        durations_s.append(time.monotonic() - start_s)
-    return content(here), min(durations_s)
+        found = Goal(content(here), time.monotonic() - start_s)
+        shutil.rmtree(here)
+        return found
+
+    whole(0)  # fills the system's caches
+    goals = list(pool.map(whole, range(1, 5)))
+    if any(goal.content != goals[0].content for goal in goals):
+        raise SystemExit(f"{job.name}: two undisturbed runs differ")
+    return Goal(goals[0].content, statistics.median(goal.duration_s for goal in goals))
 
 
-def run(arguments: tuple[str, ...], here: Path) -> subprocess.CompletedProcess[str]:
+def fresh(here: Path, job: Job) -> Path:
+    """Return a new folder with the outputs of an earlier run in it, where the verb replaces such."""
+    shutil.rmtree(here, ignore_errors=True)
+    here.mkdir()
+    for name in job.replaces:
+        (here / name).write_bytes(OLD)
+    return here
+
+
+def run(job: Job, here: Path) -> subprocess.CompletedProcess[str]:
     """Run a command to its end."""
-    return subprocess.run([*COMMAND, *arguments], cwd=here, capture_output=True, text=True, check=False)
+    return subprocess.run([*COMMAND, *job.arguments], cwd=here, capture_output=True, text=True, check=False)
 
 
-def kill_once(job: Job, here: Path, chance: random.Random, duration_s: float, tally: Tally) -> None:
-    """Start the job, kill it at some moment, and look at what it says and leaves."""
-    number, to_all = chance.choice(SIGNALS), chance.random() < 0.5
-    moment_s, before = chance.uniform(0, duration_s), leftovers(here)
-    pipe = subprocess.PIPE
-    with subprocess.Popen(
-        [*COMMAND, *job.arguments], cwd=here, stdout=pipe, stderr=pipe, text=True, start_new_session=True
-    ) as process:
-        time.sleep(moment_s)
-        if to_all:
-            os.killpg(process.pid, number)
+def kill_and_finish(here: Path, chance: random.Random, kills: int, goal: Goal, tally: Tally) -> None:
+    """Kill so many runs in one folder, then let one finish."""
+    fresh(here, tally.job)
+    hit = 0
+    for _ in range(TRIES * kills):
+        if hit < kills and kill_once(here, chance, goal, tally):
+            hit += 1
+        elif hit == kills:
+            break
         else:
-            process.send_signal(number)
-        _, said = process.communicate(timeout=PATIENCE_S)
-    name = f"{signal.Signals(number).name} to {'all' if to_all else 'the first'}"
-    tally.counts[name] += 1
-    left = [] if number == signal.SIGKILL else [path for path in leftovers(here) if path not in before]
-    problem = judged(number, process.returncode, said, left, tally)
-    if problem:
-        tally.problems.append(f"{name} after {moment_s:.3f} s: {problem}")
-
-
-def judged(number: int, code: int, said: str, left: list[str], tally: Tally) -> str:
-    """Return what is wrong with how a killed run ended, empty if nothing is."""
-    if "runpy" in said:
-        tally.counts["before Python had begun with the program"] += 1
-        return ""
-    if code == 0:
-        tally.counts["had ended already"] += 1
-    elif code == -number:
-        tally.counts["killed at once"] += 1
-    elif code != 128 + number:
-        return f"exit code {code}: {said}"
-    elif said.splitlines() != [LINE]:
-        return f"said {said!r}"
+            compare(here, goal, tally, "had ended already")
+            fresh(here, tally.job)
+    finished = run(tally.job, here)
+    if finished.returncode:
+        tally.see("could not go on", finished.stderr)
     else:
-        tally.counts["stopped with one line"] += 1
-    if number != signal.SIGKILL and "Traceback" in said:  # a process whose parent is gone may well complain
-        return f"said {said!r}"
-    return f"left {left}" if left else ""
+        compare(here, goal, tally, "same bytes after going on")
 
 
-def leftovers(here: Path) -> list[str]:
-    """Return unfinished files."""
-    return [str(path.relative_to(here)) for path in here.rglob(".part-*") if path.name != LOCK]
+def compare(here: Path, goal: Goal, tally: Tally, what: str) -> None:
+    """Note whether a whole run left what it should, and nothing else."""
+    found = content(here)
+    names = sorted(name for name in found.keys() | goal.content.keys() if found.get(name) != goal.content.get(name))
+    tally.see("other bytes, or other files" if names else what, ", ".join(names))
+
+
+def moment_s(chance: random.Random, duration_s: float) -> float:
+    """Return when a signal is to come."""
+    if chance.random() < END_SHARE:
+        return max(chance.uniform(duration_s - END_S, duration_s + END_S / 3), 0.0)
+    return chance.uniform(0, duration_s)
+
+
+def kill_once(here: Path, chance: random.Random, goal: Goal, tally: Tally) -> bool:
+    """Start the job, kill it at some moment, and look at what it says and leaves; False: it had ended."""
+    number, to_all, after_s = chance.choice(SIGNALS), chance.random() < 0.5, moment_s(chance, goal.duration_s)
+    before, pipe = set(content(here)), subprocess.PIPE
+    with subprocess.Popen(
+        [*COMMAND, *tally.job.arguments], cwd=here, stdout=pipe, stderr=pipe, text=True, start_new_session=True
+    ) as process:
+        time.sleep(after_s)
+        if process.poll() is None:
+            (os.killpg if to_all else os.kill)(process.pid, number)
+        said = process.communicate(timeout=PATIENCE_S)
+    if process.returncode == 0:
+        return False
+    what, problem = judged(number, process.returncode, *said, after_s / goal.duration_s, tally.job)
+    left = unwanted(here, before, goal, tally.job, number)
+    problem = problem or (f"left {', '.join(left)}" if left else "")
+    name = f"{signal.Signals(number).name} to {'all' if to_all else 'the first'}"
+    tally.see(f"{name}, {what}", f"{problem} (after {after_s:.3f} s)" if problem else "", kill=True)
+    return True
+
+
+def unwanted(here: Path, before: set[str], goal: Goal, job: Job, number: int) -> list[str]:
+    """Return files that a killed run should not have left: unfinished ones, locks, outputs neither old nor new."""
+    old, found = hashlib.sha256(OLD).hexdigest(), content(here)
+    torn = [name for name in job.replaces if found.get(name) not in (old, goal.content[name])]
+    new = [name for name in found if name not in before]
+    temporary = [name for name in new if ".part-" in name]
+    others = [name for name in new if job.replaces and name not in goal.content and name not in temporary]
+    return torn + others + ([] if number == signal.SIGKILL else temporary)
 
 
 def content(here: Path) -> dict[str, str]:
-    """Return a digest of every file, by name."""
-    files = (path for path in sorted(here.rglob("*")) if path.is_file())
-    return {str(path.relative_to(here)): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
+    """Return a digest of every file, by name; of folders, that they are there."""
+    paths = sorted(here.rglob("*"))
+    found = {str(path.relative_to(here)): path for path in paths}
+    return {
+        name: hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else "" for name, path in found.items()
+    }
 
 
-def show(job: Job, kills: int, tally: Tally) -> bool:
-    """Print the table of one job; return whether something went wrong."""
-    print(f"{job.name}: {kills} runs killed")
-    for name, count in sorted(tally.counts.items()):
-        print(f"  {count:5} {name}")
-    for problem in tally.problems:
-        print(f"  WRONG {problem}")
-    return bool(tally.problems)
+def written(tallies: list[Tally], changed: list[str], options: argparse.Namespace) -> str:
+    """Return the table."""
+    machine = f"{platform.system()}, Python {platform.python_version()}, {os.cpu_count()} cores"
+    kills, problems = sum(tally.kills for tally in tallies), sum(len(tally.problems) for tally in tallies)
+    found = f"{kills} kills, {problems} problems, {len(changed)} inputs changed"
+    lines = [f"{found}; seed {options.seed}; {machine}, {options.at_once} at once"]
+    for tally in tallies:
+        lines += [
+            "",
+            f"{tally.job.name}: {tally.kills} kills, undisturbed {tally.duration_s:.1f} s",
+            f"  {tally.job.shown}",
+        ]
+        lines += [f"  {count:5} {what}" for what, count in sorted(tally.counts.items())]
+        lines += [f"  WRONG {problem}" for problem in tally.problems]
+    return "\n".join(lines)
 
 
 if __name__ == "__main__":

@@ -266,3 +266,21 @@ def test_damaged_phones(corpus, rows):
     path.write_text(json.dumps(read_entry(corpus.folder("one")) | {"phones": rows}))
     with pytest.raises(CorpusError, match="not a whole utterance"):
         corpus.utterance("one")
+
+
+@pytest.mark.parametrize("seconds", [10**400, 1e10, -1, float("nan")])
+def test_a_listed_duration_that_cannot_be(corpus: Corpus, seconds: float) -> None:
+    path = corpus.path / "corpus.json"
+    content = json.loads(path.read_text())
+    content["utterances"]["one"]["duration_s"] = seconds
+    path.write_text(json.dumps(content))
+    with pytest.raises(CorpusError, match="prepare the corpus again"):
+        Corpus.open(corpus.path)
+
+
+@pytest.mark.parametrize("key", ["rate_hz", "duration_s", "frames"])
+def test_a_described_number_that_cannot_be(corpus: Corpus, key: str) -> None:
+    path = corpus.folder("one") / "entry.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | {key: 10**400}))
+    with pytest.raises(CorpusError, match="delete this folder and prepare again"):
+        corpus.summary()

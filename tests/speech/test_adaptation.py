@@ -70,7 +70,7 @@ def changed(values: np.ndarray, value: float) -> np.ndarray:
         ({"numbers": np.array([1.0, 1.5])}, "a warp of 1.0 and a trust of 1.5"),
         ({"numbers": np.array([0.0, 0.5])}, "a warp of 0.0"),
         ({"numbers": np.array([np.nan, 0.5])}, "not finite"),
-        ({"numbers": np.array(["a", "b"])}, "isfinite"),
+        ({"numbers": np.array(["a", "b"])}, "numbers holds <U1, required fractions"),
         ({"own": changed(np.eye(39, 40), np.nan)}, "own holds values that are not finite"),
         ({"general": changed(np.zeros((3, 13, 14)), np.inf)}, "general holds values that are not finite"),
     ],

@@ -51,6 +51,8 @@ ARRAYS = {
 """How an utterance is stored: N samples, T frames of sound, F of motion."""
 FULL_SCALE = 32_768
 """16-bit samples per unit of amplitude: recordings of 16 bits come back exactly."""
+MOST = 1e9
+"""No utterance has more seconds or frames, nor more frames a second."""
 
 
 def quantised(audio: Audio) -> Audio:
@@ -203,7 +205,7 @@ def _is_channel(value: Any) -> bool:
 
 
 def _is_count(value: Any) -> bool:
-    return isinstance(value, int | float) and 0 <= value < float("inf")
+    return isinstance(value, int | float) and 0 <= value <= MOST
 
 
 def _timeline(rows: Any) -> Timeline[Unit] | None:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from lipmotion.corpora.entry import is_name, read_entry, read_utterance, write_utterance
+from lipmotion.corpora.entry import MOST, is_name, read_entry, read_utterance, write_utterance
 from lipmotion.corpora.splits import SPLITS
 from lipmotion.errors import CorpusError, ExportError
 from lipmotion.files import TEMPORARY, remove_unfinished, text_in, whole_file
@@ -199,7 +198,7 @@ def _read_manifest(path: Path) -> dict[str, dict[str, Any]]:
     try:
         index: dict[str, dict[str, Any]] = content["utterances"]
         damaged = next((name for name, entry in index.items() if not is_name(name) or not _is_listed(entry)), None)
-    except (KeyError, TypeError, AttributeError, ValueError) as error:
+    except (KeyError, TypeError, AttributeError, ValueError, OverflowError) as error:
         raise CorpusError(f"{path}: the list of utterances is damaged ({error!r}); prepare the corpus again") from error
     if damaged is not None:
         raise CorpusError(f"{path}: the utterance {damaged!r} is not listed as one; prepare the corpus again")
@@ -208,4 +207,5 @@ def _read_manifest(path: Path) -> dict[str, dict[str, Any]]:
 
 def _is_listed(entry: dict[str, Any]) -> bool:
     numbers = [float(entry[key]) for key in ("duration_s", "frames", "unseen_frames")]
-    return entry["split"] in SPLITS and isinstance(entry.get("speaker", ""), str) and all(map(math.isfinite, numbers))
+    possible = all(0 <= number <= MOST for number in numbers)
+    return entry["split"] in SPLITS and isinstance(entry.get("speaker", ""), str) and possible

@@ -209,8 +209,9 @@ class _Track:
         for frame in frames:
             # packed, not planar: PyAV reads beyond the planes of eight channels
             channels = frame.to_ndarray().reshape(frame.samples, -1)
-            mean = channels.mean(axis=1)
-            self._energies = self._energies + np.square(channels, dtype=np.float64).sum(axis=0)
-            self._mean_energy += float(np.square(mean, dtype=np.float64).sum())
+            with np.errstate(all="ignore"):  # what is not finite, or beyond all bounds, is refused when all is decoded
+                mean = channels.mean(axis=1)
+                self._energies = self._energies + np.square(channels, dtype=np.float64).sum(axis=0)
+                self._mean_energy += float(np.square(mean, dtype=np.float64).sum())
             chosen = mean if self._channel is None else channels[:, self._channel]
             self._bytes += np.ascontiguousarray(chosen).data

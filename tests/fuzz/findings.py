@@ -1,0 +1,55 @@
+"""What was found: made small, and kept."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from fuzz.campaign import Finding, Tally
+from fuzz.inputs import Files, lay_out
+from fuzz.judge import HANG
+from fuzz.worker import Worker
+
+PATIENCE_S = 30.0
+"""How long the inputs of one reader are made smaller."""
+
+
+def keep(tally: Tally, worker: Worker, folder: Path) -> list[Path]:
+    """Write every finding of a reader, as small as is easily had, into a folder each; return these."""
+    patience_s = PATIENCE_S / max(len(tally.findings), 1)
+    return [_kept(tally.reader, finding, worker, folder, patience_s) for finding in tally.findings.values()]
+
+
+def _kept(reader: str, finding: Finding, worker: Worker, folder: Path, patience_s: float) -> Path:
+    result = finding.result
+
+    def same(files: Files) -> bool:
+        found = worker.tried(reader, files)
+        return (found.kind, found.where) == (result.kind, result.where)
+
+    files = finding.files if result.kind == HANG else smallest(finding.files, same, patience_s)
+    name = re.sub(r"[^a-z0-9.]+", "-", f"{result.kind} {result.where}".lower()).strip("-")[:60]
+    place = folder / reader / name
+    place.mkdir(parents=True, exist_ok=True)
+    lay_out(files, place)
+    place.with_name(f"{name}.trace").write_text(f"{finding.count} inputs\n{result.detail}", encoding="utf-8")
+    return place
+
+
+def smallest(files: Files, same: Callable[[Files], bool], patience_s: float) -> Files:
+    """Return less of each file, as long as the same comes of it: parts are left out, ever smaller ones."""
+    end_s = time.monotonic() + patience_s
+    for name in sorted(files):
+        size = max(len(files[name]) // 2, 1)
+        while size and time.monotonic() < end_s:
+            at = 0
+            while at < len(files[name]) and time.monotonic() < end_s:
+                shorter = files | {name: files[name][:at] + files[name][at + size :]}
+                if same(shorter):
+                    files = shorter
+                else:
+                    at += size
+            size //= 2
+    return files

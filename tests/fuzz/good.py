@@ -1,0 +1,37 @@
+"""The good things that everything begins with, made from the toy corpus."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from fuzz.inputs import Good
+from lipmotion.corpora.store import Corpus
+from lipmotion.engines import engine_named
+from lipmotion.pipeline.model import save_model
+from lipmotion.pipeline.toy import toy_utterances
+from lipmotion.pipeline.train import train
+from lipmotion.stats.hmm.model import HmmConfig
+
+SENTENCES = 6
+ENGINES: dict[str, dict[str, object]] = {
+    "trajectory": {},
+    "coupled": {"chains": "sVis 2vis", "mixtures": 1, "states": 2},
+    "joint": {},
+}
+
+
+def make_good(folder: Path) -> Good:
+    """Prepare a corpus, and train a model of every engine on it."""
+    corpus = Corpus.create(folder / "corpus")
+    for utterance in toy_utterances(SENTENCES):
+        corpus.add(utterance)
+    for name, options in ENGINES.items():
+        engine = engine_named(name, options)
+        model, _ = train(corpus, recogniser=HmmConfig(mixtures=1, iterations=2), engine=engine)
+        save_model(model, folder / f"{name}.lipmotion")
+    return good_in(folder)
+
+
+def good_in(folder: Path) -> Good:
+    """Return what ``make_good`` made there."""
+    return Good(folder / "corpus", tuple(folder / f"{name}.lipmotion" for name in ENGINES))

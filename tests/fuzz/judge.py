@@ -1,0 +1,107 @@
+"""What became of one input."""
+
+from __future__ import annotations
+
+import logging
+import re
+import shutil
+import traceback
+import warnings
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from fuzz.inputs import Files, Good, ImplausibleError, Reader, lay_out, picked_up
+from lipmotion.cli.outcome import outcome
+
+READ, REFUSED = "read", "refused"
+ERROR, IMPLAUSIBLE, LEFT, MEMORY, HANG, CRASH = "error", "implausible", "left behind", "memory", "hang", "crash"
+WRONG = (ERROR, IMPLAUSIBLE, LEFT, MEMORY, HANG, CRASH)
+LONGEST_LINE = 2000
+"""Letters of a message."""
+OBEYED = re.compile("[\x00-\x1f\x7f-\x9f]")
+"""What a terminal obeys instead of showing it."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """What became of an input.
+
+    kind   : read or refused, or what is wrong
+    where  : tells one defect from another
+    detail : for people
+    lines  : of the package that were run for the first time
+    """
+
+    kind: str
+    where: str = ""
+    detail: str = ""
+    lines: frozenset[str] = field(default_factory=frozenset)
+
+
+def judged(reader: Reader, files: Files, folder: Path, good: Good) -> Result:
+    """Read an input in a folder of its own, which is emptied afterwards."""
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir()
+    try:
+        lay_out(files, folder)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            warnings.filterwarnings("ignore", ".*(NumPy|numpy).*")
+            result = _read(reader, folder, good)
+        if result.kind in (READ, REFUSED) and picked_up(folder) != files:
+            return Result(LEFT, reader.name, f"there are now: {', '.join(picked_up(folder))}")
+        return result
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _read(reader: Reader, folder: Path, good: Good) -> Result:
+    try:
+        reader.read(folder, good)
+    except ImplausibleError as error:
+        return Result(IMPLAUSIBLE, str(error), _trace(error))
+    except MemoryError as error:
+        return Result(MEMORY, place_of(error), _trace(error))
+    except Exception as error:
+        return _told(error)
+    return Result(READ)
+
+
+def _told(error: Exception) -> Result:
+    """Return what the command line makes of an error."""
+    known = outcome(error)
+    if known is None:
+        return Result(ERROR, f"{type(error).__name__} {place_of(error)}", _trace(error))
+    code, line = known
+    if len(line) > LONGEST_LINE:
+        return Result(ERROR, f"a long message {place_of(error)}", f"{len(line)} letters: {line[:400]!r}")
+    if OBEYED.search(line):
+        return Result(ERROR, f"a raw message {place_of(error)}", repr(line))
+    return Result(REFUSED, f"{code} {_shape(line)}", line)
+
+
+def place_of(error: BaseException) -> str:
+    """Return the innermost function of the package on the way to an error."""
+    steps = [step for step in traceback.extract_tb(error.__traceback__) if "lipmotion" in Path(step.filename).parts]
+    return f"{Path(steps[-1].filename).name}:{steps[-1].name}" if steps else "outside"
+
+
+def _trace(error: BaseException) -> str:
+    return "".join(traceback.format_exception(error))[-4000:]
+
+
+def _shape(line: str) -> str:
+    """Return a message without what comes from the input."""
+    return re.sub(r"\d+|'[^']*'|\"[^\"]*\"|/\S+|\(.*\)", "", line)[:80]
+
+
+def quiet() -> None:
+    """Let warnings of the package be made, and go nowhere."""
+    logger = logging.getLogger("lipmotion")
+    logger.addHandler(_Unheard())
+    logger.propagate = False
+
+
+class _Unheard(logging.Handler):
+    def emit(self, record: logging.LogRecord) -> None:
+        record.getMessage()

@@ -1,0 +1,47 @@
+"""Readers with defects, to see that the fuzzer finds them."""
+
+from __future__ import annotations
+
+import os
+import time
+from pathlib import Path
+
+import numpy as np
+
+from fuzz.inputs import Files, Good, ImplausibleError, Reader
+from lipmotion.errors import InputError
+from lipmotion.units import words_of
+
+MEGABYTES = 80
+
+
+def seeds(_: Good) -> list[Files]:
+    """Return a good input."""
+    return [{"a.txt": b"baby now"}]
+
+
+def read(folder: Path, _: Good) -> None:
+    """Do what the first letters say."""
+    order = (folder / "a.txt").read_bytes()
+    if b"raise" in order:
+        raise RuntimeError("planted")
+    if b"refuse" in order:
+        raise InputError("planted; give something else")
+    if b"abort" in order:
+        os.abort()
+    if b"sleep" in order:
+        time.sleep(60)
+    if b"eat" in order:
+        np.ones(MEGABYTES << 17)
+    if b"drop" in order:
+        Path("left").touch()
+    if b"spoil" in order:
+        (folder / "a.txt").write_bytes(b"")
+    if b"lie" in order:
+        raise ImplausibleError("planted")
+    words_of("baby")
+
+
+def readers() -> dict[str, Reader]:
+    """Return the one reader."""
+    return {"planted": Reader("planted", seeds, read)}

@@ -1,0 +1,83 @@
+"""What lies beside recordings: TextGrids, HTK's and Audacity's labels, word times, the lists of the splits."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from fuzz.inputs import Files, Good
+from fuzz.readers.plausible import require
+from lipmotion.corpora.base import Recording, Recordings
+from lipmotion.corpora.grid import aligned_words
+from lipmotion.corpora.labels import read_labels
+from lipmotion.corpora.splits import LISTS, with_splits
+from lipmotion.pipeline.given import given_phones
+
+LONG = """File type = "ooTextFile"
+Object class = "TextGrid"
+
+xmin = 0
+xmax = 2
+tiers? <exists>
+size = 2
+item []:
+  item [1]:
+    class = "IntervalTier"
+    name = "phones"
+    xmin = 0
+    xmax = 2
+    intervals: size = 2
+    intervals [1]:
+      xmin = 0
+      xmax = 1.5
+      text = "P"
+    intervals [2]:
+      xmin = 1.5
+      xmax = 2
+      text = "AA1"
+  item [2]:
+    class = "TextTier"
+    name = "clicks"
+    xmin = 0
+    xmax = 2
+    points: size = 1
+    points [1]:
+      number = 1
+      mark = "x"
+"""
+TEXTS = {
+    "long.TextGrid": LONG,
+    "short.TextGrid": '"ooTextFile"\n"TextGrid"\n0\n2\n<exists>\n1\n"IntervalTier"\n"words"\n0\n2\n1\n0\n2\n"hi you"\n',
+    "htk.lab": "0 1000000 sil\n1000000 2000000 p\n2000000 3500000 aa\n",
+    "states.lab": "0 1000000 x^sil-p+aa=t[2]\n1000000 2000000 x^sil-p+aa=t[3]\n2000000 3500000 p-aa+t[2] -61.2 baby\n",
+    "starts.lab": "0 sil\n1000000 p\n2000000 aa\n",
+    "audacity.txt": "0.0\t0.5\tp\n0.5\t1.25\taa\n\\\t100\t200\n",
+    "words.txt": "Hello, you 42 people.\n",
+    "grid.align": "0 23750 sil\n23750 29500 bin\n29500 34000 blue\n",
+}
+SPLITS = {"train.txt": b"a\nb\n", "val.txt": b"c\n", "test.txt": b"d\n"}
+LENGTH_S = 4.0
+
+
+def seeds(_: Good) -> list[Files]:
+    """Return labels of every kind, and lists."""
+    return [SPLITS, *({name: text.encode()} for name, text in TEXTS.items())]
+
+
+def read(folder: Path, _: Good) -> None:
+    """Read each file by its name."""
+    if any((folder / name).exists() for name in LISTS):
+        recordings = tuple(Recording(name, Path(f"{name}.mp4"), None) for name in "abcd")
+        with_splits(Recordings("folder", recordings), folder)
+        return
+    for path in folder.iterdir():
+        if path.suffix == ".align":
+            require(bool(aligned_words(path)), "no word")
+        else:
+            _read_labels(path)
+
+
+def _read_labels(path: Path) -> None:
+    labels = read_labels(path)
+    phones = given_phones(Recording("a", path, labels.words, phones=labels.phones), LENGTH_S)
+    for span in phones or ():
+        require(0 <= span.start_s <= span.end_s <= LENGTH_S, "a phone outside of the sound")

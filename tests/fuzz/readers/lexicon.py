@@ -1,0 +1,32 @@
+"""Pronunciations, and alignment with them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from fuzz.inputs import Files, Good
+from fuzz.readers.plausible import check_generation, good_model, require, short_speech
+from lipmotion.pipeline.animate import animate
+from lipmotion.units import PHONES, Lexicon
+
+TEXTS = (
+    "# mine\nlipmotion L IH1 P M OW1 SH AH0 N\nnäh N EH\nlive(2) l ay v\n",
+    "baby B EY1 B IY0\nbaby(2) b ey b ix\n'bout b aw t # short\n\n",
+    "two T UW1\n2 t uw\n",
+)
+
+
+def seeds(_: Good) -> list[Files]:
+    """Return small lexicons."""
+    return [{"words.dict": text.encode()} for text in TEXTS]
+
+
+def read(folder: Path, good: Good) -> None:
+    """Read a lexicon; say its first word."""
+    lexicon = Lexicon.from_file(folder / "words.dict")
+    for word, pronunciations in lexicon.user.items():
+        require(lexicon.known(word), "a word that is not known")
+        require(all(set(phones) <= set(PHONES) for phones in pronunciations), "a phone that is none")
+    words = " ".join(list(lexicon.user)[:1])
+    told = {"model": good_model(good), "lexicon": lexicon, "recogniser": "own"}
+    check_generation(animate(short_speech(good), transcript=words or "baby", **told))

@@ -1,0 +1,22 @@
+"""Model files, and the motion made with them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from fuzz.inputs import Files, Good
+from fuzz.readers.plausible import check_generation, short_speech
+from lipmotion.pipeline.animate import animate
+from lipmotion.pipeline.model import load_model
+
+
+def seeds(good: Good) -> list[Files]:
+    """Return a model of every engine."""
+    return [{"a.lipmotion": path.read_bytes()} for path in good.models]
+
+
+def read(folder: Path, good: Good) -> None:
+    """Load a model; animate a short sound, recognised and told."""
+    model = load_model(folder / "a.lipmotion")
+    for said in (None, "baby"):
+        check_generation(animate(short_speech(good), transcript=said, model=model, recogniser="own"))

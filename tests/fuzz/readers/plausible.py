@@ -1,0 +1,67 @@
+"""What may come of any input, and short speech to try it with."""
+
+from __future__ import annotations
+
+import json
+import math
+import tempfile
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fuzz.inputs import Good, ImplausibleError
+from lipmotion.corpora.store import Corpus
+from lipmotion.pipeline.animate import write
+from lipmotion.pipeline.model import Model, load_model
+from lipmotion.types import Audio, Generation, Motion
+
+LARGEST = {"eye_distance": 10.0, "weight": 100.0, "grey": 1e6}
+"""By unit: a whole head is two eye distances high."""
+LONGEST_S = 3600.0
+SHORT = slice(6000, 18_000)
+"""Samples of the toy sentence: its first word."""
+
+
+def require(holds: bool, text: str) -> None:
+    """Raise ImplausibleError unless something holds."""
+    if not holds:
+        raise ImplausibleError(text)
+
+
+@cache
+def short_speech(good: Good) -> Audio:
+    """Return most of a second of speech."""
+    corpus = Corpus.open(good.corpus)
+    audio = corpus.utterance(corpus.names()[0]).audio
+    return Audio(audio.samples[SHORT].copy(), audio.rate_hz)
+
+
+@cache
+def good_model(good: Good) -> Model:
+    """Return the model of the default engine."""
+    return load_model(good.models[0])
+
+
+def check_motion(motion: Motion) -> None:
+    """Raise ImplausibleError unless the motion is one that can be, as far as its units tell."""
+    require(bool(np.isfinite(motion.values).all()), "values that are not finite")
+    for channel, curve in zip(motion.channels, motion.values.T, strict=True):
+        largest = float(np.abs(curve).max(initial=0.0))
+        require(largest <= LARGEST.get(channel.unit, math.inf), f"motion in {channel.unit} that is absurd")
+
+
+def check_generation(result: Generation) -> None:
+    """Raise ImplausibleError unless motion, its variance and the files written of it can be."""
+    check_motion(result.motion)
+    require(len(result.motion.values) <= LONGEST_S * result.motion.rate_hz, "hours of motion")
+    require(bool((result.variance >= 0).all()), "a variance that is negative or none")
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "a.json"
+        write(result, [path])
+        json.loads(path.read_text(encoding="utf-8"), parse_constant=_refuse)
+
+
+def _refuse(name: str) -> Any:
+    raise ImplausibleError(f"{name} in a file that was written")

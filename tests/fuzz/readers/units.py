@@ -1,0 +1,30 @@
+"""Phones in time, from a motion file, and the motion made of them."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from pathlib import Path
+
+from fuzz.inputs import Files, Good
+from fuzz.readers.plausible import check_generation, good_model, short_speech
+from lipmotion.export.base import read_motion
+from lipmotion.pipeline.animate import animate, write
+from robustness.motion_cases import GOOD
+
+
+def seeds(good: Good) -> list[Files]:
+    """Return what ``animate`` writes, and the least that can be written by hand."""
+    found: list[Files] = [{"a.json": json.dumps(GOOD).encode()}]
+    result = animate(short_speech(good), model=good_model(good), recogniser="own")
+    with tempfile.TemporaryDirectory() as folder:
+        paths = [Path(folder) / "a.json", Path(folder) / "a.npz"]
+        write(result, paths, channels=["opening"])
+        return found + [{path.name: path.read_bytes()} for path in paths]
+
+
+def read(folder: Path, good: Good) -> None:
+    """Animate a short sound with these phones."""
+    (path,) = folder.iterdir()
+    units = read_motion(path)[1]
+    check_generation(animate(short_speech(good), units=units, model=good_model(good), recogniser="own"))

@@ -1,0 +1,49 @@
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+
+import pytest
+
+from fuzz import judge
+from fuzz.inputs import Files, Good, Reader
+from fuzz.judge import ERROR, MEMORY, REFUSED, Result, judged
+from fuzz.planted import seeds
+from lipmotion.errors import InputError
+
+NOWHERE = Good(Path("nowhere"), ())
+FILES: Files = {"a.txt": b"x"}
+
+
+def read_with(error: Exception, folder: Path) -> Result:
+    def read(*_: object) -> None:
+        raise error
+
+    return judged(Reader("planted", seeds, read), FILES, folder / "bad", NOWHERE)
+
+
+@pytest.mark.parametrize("line", ["x" * 5000, "a\nb", "\x1b[2J", "\x9b2J"])
+def test_a_message_that_is_no_short_printable_line(line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    error = InputError("anything")
+    assert read_with(error, tmp_path).kind == REFUSED
+    monkeypatch.setattr(judge, "outcome", lambda _: (3, line))
+    assert read_with(error, tmp_path).kind == ERROR
+
+
+def test_messages_are_alike_whatever_they_quote(tmp_path: Path) -> None:
+    found = {read_with(InputError(f"{path}: line {n} is {path!r}"), tmp_path).where for n, path in enumerate("ab")}
+    assert len(found) == 2  # a name without a folder is a word
+    assert len({read_with(InputError(f"/x/{n}: line {n} is 'x{n}'"), tmp_path).where for n in range(3)}) == 1
+
+
+def test_memory_and_warnings_are_defects(tmp_path: Path) -> None:
+    def warn(*_: object) -> None:
+        warnings.warn("overflow", RuntimeWarning, stacklevel=1)
+
+    assert read_with(MemoryError("no room"), tmp_path).kind == MEMORY
+    assert judged(Reader("planted", seeds, warn), FILES, tmp_path / "bad", NOWHERE).kind == ERROR
+
+
+def test_nothing_stays(tmp_path: Path) -> None:
+    read_with(InputError("anything"), tmp_path)
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,94 @@
+"""Changes that keep the form."""
+
+from __future__ import annotations
+
+import io
+import json
+import zipfile
+from random import Random
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from fuzz.inputs import digest
+from fuzz.mutators import arrays, boxes, json_text, mutated, raw, riff, text, zips
+from robustness.case import npy
+from robustness.motion_cases import GOOD
+
+COUNT, MANY = 200, 40
+DOCUMENT = json.dumps(GOOD).encode()
+ARRAY = npy(np.arange(12.0).reshape(4, 3))
+ZIP = zips.zipped([("header.json", DOCUMENT), ("a.npy", ARRAY)], zipfile.ZIP_DEFLATED)
+SOUND = b"RIFF" + bytes(4) + b"WAVEfmt \x10\0\0\0\1\0\1\0\x80\x3e\0\0\0\x7d\0\0\2\0\x10\0data\x08\0\0\0" + bytes(8)
+MOVIE = bytes.fromhex(
+    "00000010 66747970 69736f6d 00000001 0000001c 6d6f6f76 00000014 6d766864 00000000 00000001 000003e8"
+)
+SAMPLES = {
+    **{"a.json": DOCUMENT, "a.npy": ARRAY, "a.npz": ZIP, "a.wav": SOUND, "a.mp4": MOVIE, "a.csv": b"time_s,a\n0,1\n"},
+    **{"a.txt": b"Hello, 42 people.\n", "a.flac": b"fLaC" + bytes(40), "empty.json": b"", "empty.txt": b""},
+    **{"empty.wav": b"", "empty.npy": b"", "empty.npz": b"", "empty.mp4": b""},
+}
+
+
+@pytest.mark.parametrize("name", SAMPLES)
+def test_changes_are_many_and_the_same_again(name: str) -> None:
+    def made(seed: int) -> list[tuple[int, bytes]]:
+        chance, sample = Random(seed), {name: SAMPLES[name]}
+        changed = (mutated(chance, sample, sample) for _ in range(MANY))
+        return [(len(files[name]), digest(files)) for files in changed]
+
+    found = made(1)
+    assert len(set(found)) > MANY / 4
+    assert max(size for size, _ in found) <= raw.LARGEST
+    assert found == made(1) != made(2)
+
+
+def test_documents_stay_documents() -> None:
+    found = [json_text.change(Random(seed), DOCUMENT) for seed in range(COUNT)]
+    assert sum(map(_is_json, found)) > 0.8 * COUNT
+    assert any(content.count(b'"version"') > 1 and _is_json(content) for content in found)
+
+
+def _is_json(content: bytes) -> bool:
+    try:
+        json.loads(content)
+    except (ValueError, RecursionError):
+        return False
+    return True
+
+
+def test_archives_stay_archives() -> None:
+    for seed in range(COUNT):
+        with zipfile.ZipFile(io.BytesIO(zips.change(Random(seed), ZIP))) as file:
+            assert file.testzip() is None
+
+
+def test_arrays_of_other_types_and_values() -> None:
+    found = [array for seed in range(3 * COUNT) if (array := _array(arrays.change(Random(seed), ARRAY))) is not None]
+    assert {array.dtype.kind for array in found} >= set("fciM")
+    assert {bool(np.isfinite(array).all()) for array in found if array.dtype.kind == "f"} == {True, False}
+
+
+def _array(content: bytes) -> NDArray[Any] | None:
+    """Return an array, None where its header was changed."""
+    try:
+        return np.load(io.BytesIO(content), allow_pickle=False)
+    except Exception:
+        return None
+
+
+def test_chunks_and_boxes_are_found() -> None:
+    assert boxes.change(Random(0), b"no boxes") != b"no boxes"
+    rates = {riff.change(Random(seed), SOUND)[24:28] for seed in range(COUNT)}
+    assert len(rates) > 10
+    sizes = {boxes.change(Random(seed), MOVIE)[16:24] for seed in range(COUNT)}
+    assert {b"\0\0\0\x1cmoov", b"\0\0\0\x08moov"} <= sizes  # the size around a box that was left out is right
+
+
+def test_texts_with_control_characters_numbers_and_floods() -> None:
+    found = [text.change(Random(seed), b"0.5 1.5 p\n") for seed in range(2 * COUNT)]
+    assert any(b"\x1b" in content for content in found)
+    assert any(b"1e308" in content for content in found)
+    assert max(map(len, found)) > 100_000

@@ -1,0 +1,57 @@
+"""Every reader with its good input, a few changes of that, and all that was ever found."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from random import Random
+
+import pytest
+
+from fuzz.floods import FLOODS
+from fuzz.inputs import Files, Good, picked_up
+from fuzz.judge import READ, REFUSED
+from fuzz.mutators import mutated
+from fuzz.readers import READERS
+from fuzz.worker import Worker
+
+FOUND = Path(__file__).parent / "found"
+FOLDERS = sorted(path for path in FOUND.glob("*/*") if path.is_dir())
+INPUTS = {"model": 8, "video": 20, "transcript": 20, "lexicon": 20}
+"""Changed inputs of readers that take longer."""
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_good_input_is_read(name: str, worker: Worker, good: Good) -> None:
+    results = [worker.tried(name, files) for files in READERS[name].seeds(good)]
+    assert {result.kind for result in results} <= {READ, REFUSED}, results
+    assert results[0].kind == READ, results[0]
+    assert sum(result.kind == READ for result in results) > len(results) / 2
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_changed_input_is_read_or_refused(name: str, worker: Worker, good: Good) -> None:
+    """The same changes every time; ``python -m fuzz`` goes further."""
+    chance, seeds = Random(f"1 {name}"), READERS[name].seeds(good)
+    for _ in range(INPUTS.get(name, 40)):
+        files = mutated(chance, chance.choice(seeds), chance.choice(seeds))
+        _check(worker, name, files)
+
+
+@pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: f"{folder.parent.name}: {folder.name}")
+def test_what_was_found_once(folder: Path, worker: Worker) -> None:
+    _check(worker, folder.parent.name, picked_up(folder))
+
+
+@pytest.mark.parametrize(("name", "flood"), FLOODS, ids=lambda part: part)
+def test_a_flood_that_was_found_once(name: str, flood: str, worker: Worker) -> None:
+    _check(worker, name, FLOODS[name, flood]())
+
+
+def test_all_that_was_found_is_of_a_reader() -> None:
+    assert FOLDERS
+    assert {folder.parent.name for folder in FOLDERS} <= READERS.keys()
+
+
+def _check(worker: Worker, name: str, files: Files) -> None:
+    result = worker.tried(name, files)
+    assert result.kind in (READ, REFUSED), f"{result.kind} {result.where}\n{result.detail}"

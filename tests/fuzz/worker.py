@@ -1,0 +1,175 @@
+"""A process that reads bad input, and what is left of it."""
+
+from __future__ import annotations
+
+import faulthandler
+import multiprocessing
+import os
+import re
+import signal
+import tempfile
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from fuzz.inputs import Files, Good, Reader
+from fuzz.judge import CRASH, HANG, LEFT, MEMORY, READ, REFUSED, Result, judged, quiet
+from fuzz.lines import Lines
+from fuzz.memory import Memory, busy_s
+
+HANG_S = 20.0
+PATIENCE = 3
+"""So many times as long it may take where others keep the processor busy."""
+START_S = 300.0
+"""The first import compiles."""
+Readers = dict[str, Reader]
+
+
+class Worker:
+    """Reads inputs, one after the other; a process that died or hung is replaced by another.
+
+    readers : a function of a module, which gives them by name
+    hang_s  : after this long, in processor time, it hangs; ``PATIENCE`` times as long by the clock
+    """
+
+    def __init__(
+        self, good: Good, *, hang_s: float = HANG_S, memory_mb: int = Memory.MOST_MB, readers: Any = None
+    ) -> None:
+        self._told = (good, memory_mb, readers)
+        self._hang_s = hang_s
+        self._process: Any = None
+        self._folder = tempfile.TemporaryDirectory(prefix="lipmotion-fuzz-")
+        self._log = Path(self._folder.name) / "log"
+
+    def __enter__(self) -> Worker:
+        return self
+
+    def __exit__(self, kind: type | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self._end()
+        self._folder.cleanup()
+
+    def tried(self, reader: str, files: Files) -> Result:
+        """Return what became of an input."""
+        if self._process is None:
+            self._start()
+        try:
+            self._pipe.send((reader, files))
+            if self._answered():
+                result, weary = self._pipe.recv()
+                if weary:
+                    self._end()
+                return result
+        except (EOFError, OSError):
+            return self._died()
+        return self._hung()
+
+    def _answered(self) -> bool:
+        """Wait for an answer, as long as it may take."""
+        before_s = busy_s(self._process.pid)
+        for _ in range(4 * PATIENCE):
+            if self._pipe.poll(self._hang_s / 4):
+                return True
+            if busy_s(self._process.pid) - before_s > self._hang_s:
+                break
+        return False
+
+    def _start(self) -> None:
+        spawn = multiprocessing.get_context("spawn")
+        self._pipe, theirs = spawn.Pipe()
+        self._log.write_bytes(b"")
+        self._process = spawn.Process(target=serve, args=(theirs, self._folder.name, *self._told), daemon=True)
+        self._process.start()
+        theirs.close()
+        if not self._pipe.poll(START_S):
+            raise RuntimeError(f"the process that reads does not start: {self._said()}")
+        try:
+            self._pipe.recv()
+        except EOFError as error:
+            raise RuntimeError(f"the process that reads ended: {self._said()}") from error
+
+    def _died(self) -> Result:
+        self._process.join()
+        code = self._process.exitcode
+        name = signal.Signals(-code).name if code < 0 else f"exit {code}"
+        said = self._said()
+        self._end()
+        return Result(CRASH, f"{name} {_place(said)}", said)
+
+    def _hung(self) -> Result:
+        if hasattr(signal, "SIGUSR1"):
+            os.kill(self._process.pid, signal.SIGUSR1)
+            self._process.join(1.0)
+        said = self._said()
+        self._end()
+        return Result(HANG, _place(said), said)
+
+    def _said(self) -> str:
+        return self._log.read_text(encoding="utf-8", errors="replace")[-4000:]
+
+    def _end(self) -> None:
+        if self._process is not None:
+            self._process.kill()
+            self._process.join()
+            self._pipe.close()
+        self._process = None
+
+
+def serve(pipe: Any, folder: str, good: Good, memory_mb: int, readers: Any) -> None:
+    """Read what comes through the pipe, in a folder that must stay empty."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the one who asks
+    here, log = Path(folder) / "here", (Path(folder) / "log").open("a")
+    here.mkdir(exist_ok=True)
+    for number in (1, 2):
+        os.dup2(log.fileno(), number)
+    faulthandler.enable(log)
+    if hasattr(faulthandler, "register"):
+        faulthandler.register(signal.SIGUSR1, log)
+    os.chdir(here)
+    tempfile.tempdir = str(here)
+    quiet()
+    known, lines, memory = _known(readers), Lines(), Memory(memory_mb)
+    lines.watch()
+    pipe.send("ready")
+    with suppress(EOFError, OSError):
+        while True:
+            reader, files = pipe.recv()
+            memory.begin()
+            result = judged(known[reader], files, Path(folder) / "bad", good)
+            pipe.send((replace(_checked(result, memory, here), lines=frozenset(lines.taken())), memory.weary()))
+
+
+def _known(readers: Any) -> Readers:
+    if readers is None:
+        from fuzz.readers import READERS
+
+        return READERS
+    return readers()
+
+
+def _checked(result: Result, memory: Memory, here: Path) -> Result:
+    """Return the result, or what the reading used up or left."""
+    left = sorted(path.name for path in here.iterdir())
+    for name in left:
+        _removed(here / name)
+    if result.kind in (READ, REFUSED) and memory.too_much():
+        return Result(MEMORY, result.where or result.kind, f"{memory.grown_mb():.0f} MB; {result.detail}")
+    if result.kind in (READ, REFUSED) and left:
+        return Result(LEFT, "beside it", ", ".join(left))
+    return result
+
+
+def _removed(path: Path) -> None:
+    if path.is_dir():
+        import shutil
+
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        path.unlink()
+
+
+def _place(said: str) -> str:
+    """Return the innermost function of the package in what faulthandler wrote."""
+    found = re.search(r'File ".*?lipmotion/([^"]*\.py)", line \d+ in (\S+)', said)
+    return f"{Path(found[1]).name}:{found[2]}" if found else "outside"
