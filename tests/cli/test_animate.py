@@ -89,7 +89,7 @@ def test_speech_that_cannot_be_used(
         (["--transcript", "missing.txt"], 3, "missing.txt: no such transcript file"),
         (["--transcript", ""], 3, "holds no word"),
         (["--transcript", "α" * 200], 3, "cannot guess how"),
-        (["--transcript", "9" * 5000], 5, "too short for what should be said"),
+        (["--transcript", "9" * 5000], 5, "nobody says so much"),
         (["--transcript", "five " * 100], 5, "too short for what should be said"),
         (["--lexicon", "missing.txt"], 3, "missing.txt: no such lexicon file"),
         (["--model", "missing.lipmotion"], 3, "missing.lipmotion: no such model"),

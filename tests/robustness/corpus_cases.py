@@ -238,11 +238,11 @@ def _prepared(name: str, code: int, *says: str) -> Callable[[Callable[[Bench], o
     return keep
 
 
-def _spoken(bench: Bench) -> None:
+def _spoken(bench: Bench, name: str = "a") -> None:
     """Lay out the good sentence with motion beside it."""
-    (bench.folder / "a.wav").write_bytes(bench.speech.read_bytes())
+    (bench.folder / f"{name}.wav").write_bytes(bench.speech.read_bytes())
     frames = len(bench.samples()) // 160 + 1
-    bench.file("a.json", json.dumps(GOOD | {"values": [[0.1]] * frames}))
+    bench.file(f"{name}.json", json.dumps(GOOD | {"values": [[0.1]] * frames}))
 
 
 NONE = "none of 1 recordings is usable; the first, a:"
@@ -345,6 +345,13 @@ def _(bench: Bench) -> None:
 
 
 @case(RECORDINGS, "a corpus where a file is", 7, "is a file; give the name of a new or an empty folder")
+def _(bench: Bench) -> list[object]:
+    (bench.folder / "recordings").mkdir()
+    _spoken(bench, "recordings/a")
+    return ["corpus", "prepare", bench.folder / "recordings", "-o", bench.file("taken", "")]
+
+
+@case(RECORDINGS, "a corpus in the place of a recording", 7, "lies in the folder of recordings")
 def _(bench: Bench) -> list[object]:
     _spoken(bench)
     return ["corpus", "prepare", bench.folder, "-o", bench.folder / "a.wav"]

@@ -1,4 +1,4 @@
-"""The table of docs/robustness.md, written by ``python -m robustness.document``."""
+"""The table of bad input, written by ``PYTHONPATH=tests python -m robustness.document``."""
 
 from __future__ import annotations
 
@@ -9,27 +9,30 @@ from robustness import corpus_cases, model_cases, motion_cases, option_cases, sp
 from robustness.case import CASES
 
 MODULES = (speech_cases, text_cases, motion_cases, model_cases, corpus_cases, option_cases, video_cases)
-DOCUMENT = Path(__file__).parents[2] / "docs" / "robustness.md"
-BEGIN, END = "<!-- begin: written by tests/robustness/document.py -->\n", "<!-- end -->\n"
+DOCUMENT = Path(__file__).parent / "table.md"
+HEAD = """# Bad input, row by row
+
+Every row is a test: one command line in an empty folder. Written by `PYTHONPATH=tests python -m robustness.document`.
+Codes: 0 done, 3 unusable input, 4 corpus, 5 alignment, 6 model file, 7 output. What they have in common stands in
+[docs/robustness.md](../../docs/robustness.md).
+"""
 
 
 def rendered() -> str:
-    """Return the table, by class."""
-    lines = []
+    """Return the document: a table for each class."""
+    lines = [HEAD]
     for group, cases in groupby(sorted(CASES, key=lambda case: case.group), key=lambda case: case.group):
         lines += [f"### {group.capitalize()}", "", "| input | exit code | words of the message |", "|---|---|---|"]
         for case in cases:
             said = " … ".join(case.says).replace("|", "\\|") or "(accepted)"
             lines.append(f"| {case.name.replace('|', chr(92) + '|')} | {case.code} | {said} |")
         lines.append("")
-    return BEGIN + "\n" + "\n".join(lines) + END
+    return "\n".join(lines)
 
 
 def main() -> None:
-    """Write the table into the document."""
-    text = DOCUMENT.read_text(encoding="utf-8")
-    before, after = text.partition(BEGIN)[0], text.partition(END)[2]
-    DOCUMENT.write_text(before + rendered() + after, encoding="utf-8")
+    """Write the document."""
+    DOCUMENT.write_text(rendered(), encoding="utf-8")
 
 
 if __name__ == "__main__":

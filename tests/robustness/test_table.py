@@ -68,4 +68,4 @@ def test_there_are_many_and_none_twice() -> None:
 
 def test_the_document_has_all_of_them() -> None:
     """Renew it: python -m robustness.document, in the folder of the tests."""
-    assert rendered() in DOCUMENT.read_text(encoding="utf-8")
+    assert rendered() == DOCUMENT.read_text(encoding="utf-8")
