@@ -274,7 +274,7 @@ def test_a_listed_duration_that_cannot_be(corpus: Corpus, seconds: float) -> Non
     content = json.loads(path.read_text())
     content["utterances"]["one"]["duration_s"] = seconds
     path.write_text(json.dumps(content))
-    with pytest.raises(CorpusError, match="prepare the corpus again|no readable corpus.json"):
+    with pytest.raises(CorpusError, match=r"prepare the corpus again|no readable corpus\.json"):
         Corpus.open(corpus.path)
 
 

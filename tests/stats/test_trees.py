@@ -170,3 +170,19 @@ def test_frames_that_are_all_alike_gain_no_more_than_the_least_variance_allows()
     assert gaussian_likelihood(statistics_of([x]), 0.5)[0] == pytest.approx(-2.5 * np.log(2 * np.pi * 0.5))
     spread = np.array([[0.0], [2.0]])  # a variance of 1 under a Gaussian of 4
     assert gaussian_likelihood(statistics_of([spread]), 4.0)[0] == pytest.approx(-(np.log(2 * np.pi * 4) + 0.25))
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_of_questions_that_split_alike_the_first_is_asked_however_sums_are_rounded(seed):
+    """Their gains differ by rounding when their answers stand in other rows of a matrix product."""
+    values = sample(lambda context: 5.0 if context[0] in "ab" else 0.0, seed=seed)
+    alike = [Question(0, str(number), frozenset("ab")) for number in range(40)]
+    others = [Question(0, f"not {number}", frozenset("cdefgh")) for number in range(40)]
+    rounding = np.random.default_rng(seed)
+
+    def likelihood(statistics):
+        found = gaussian_likelihood(statistics)
+        return found * (1 + 1e-14 * rounding.normal(size=found.shape))
+
+    tree = grow(CONTEXTS, statistics_of(values), [*alike, *others], likelihood, parameters=4, factor=1.0, least=10.0)
+    assert tree.questions[tree.asked[0]].name == "0"

@@ -58,13 +58,17 @@ def rmse(generated: Clips, original: Clips) -> Array:
 
 
 def normalised_rmse(generated: Clips, original: Clips) -> Array:
-    """Return the RMSE of every channel in units of its standard deviation over all frames [shape=(P,)]."""
-    return rmse(generated, original) / np.concatenate(original).std(axis=0)
+    """Return the RMSE of every channel in units of its standard deviation over all frames [shape=(P,)].
+
+    NaN where the original is constant but for rounding, as in ``global_variance_ratio`` and ``jerk_ratio``.
+    """
+    return rmse(generated, original) / _where_moving(original, np.concatenate(original).std(axis=0))
 
 
 def global_variance_ratio(generated: Clips, original: Clips) -> Array:
     """Return mean over clips of std(generated) / mean over clips of std(original) [shape=(P,)]."""
-    return np.mean([g.std(axis=0) for g in generated], axis=0) / np.mean([o.std(axis=0) for o in original], axis=0)
+    spread = np.mean([o.std(axis=0) for o in original], axis=0)
+    return np.mean([g.std(axis=0) for g in generated], axis=0) / _where_moving(original, spread)
 
 
 def jerk_ratio(generated: Clips, original: Clips) -> Array:
@@ -73,7 +77,12 @@ def jerk_ratio(generated: Clips, original: Clips) -> Array:
     def jerk(clips: Clips) -> Array:
         return np.abs(np.concatenate([np.diff(clip, 3, axis=0) for clip in clips if len(clip) > 3])).mean(axis=0)
 
-    return jerk(generated) / jerk(original)
+    return jerk(generated) / _where_moving(original, jerk(original))
+
+
+def _where_moving(original: Clips, divisor: Array) -> Array:
+    """Return what is divided by [shape=(P,)]: NaN for channels that do not move, and where it is 0."""
+    return np.where(varies(np.concatenate(original)) & (divisor > 0), divisor, np.nan)
 
 
 def lag_ms(generated: Clips, original: Clips, rate_hz: float, reach_s: float = 0.4) -> float:

@@ -97,3 +97,9 @@ def test_quiet_frames_are_silence_whatever_they_sound_like():
     plain = heard(hmm, features).log_density(2, 6, None)
     assert np.array_equal(values[2:], plain[2:])
     assert np.array_equal(values[:, free], plain[:, free])
+
+
+@pytest.mark.parametrize("level", [-69.0, -3.0, 20.0])
+def test_a_steady_sound_is_nowhere_loud_whatever_its_rounding(level):
+    steady = (level * (1 + 1e-7 * np.random.default_rng(0).uniform(-1, 1, 300))).astype(np.float32)
+    assert not loud_frames(steady, 11).any()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from io import StringIO
+from itertools import islice
 
 from lipmotion.corpora.labels.lines import timed_lines
 from lipmotion.corpora.labels.textgrid import is_textgrid
@@ -16,6 +17,8 @@ MARKUP = re.compile(r'\{\\rtf|<[!?a-zA-Z]|\{\s*"|\[\s*[\[{]')
 """How word processors' files, HTML, XML and JSON begin."""
 CUE = re.compile(r"^.{0,40}\d\s*-->\s*\d", re.MULTILINE)
 """The times of a subtitle."""
+LINES_JUDGED = 1000
+"""Lines of a text that tell whether it holds times."""
 NUMBERED = re.compile(r"[-+.]?\d|nan\b|[-+]?inf\b")
 TIME = re.compile(r"(?<![\w.])(?:\d*\.\d+|\d{5,})(?![\w.])")
 """Seconds with decimals, or a number that counts parts of a second."""
@@ -50,9 +53,9 @@ def check_other_labels(text: str, where: str) -> None:
 
 
 def _seems_timed(text: str) -> bool:
-    """Whether most lines begin with a number, some with a time, or every other line holds two times."""
+    """Whether most of the first lines begin with a number, some with a time, or every other one holds two times."""
     lines = numbered = timed = twice = 0
-    for line in _body(text):
+    for line in islice(_body(text), LINES_JUDGED):
         lines += 1
         numbered += NUMBERED.match(line) is not None
         times = sum(1 for _, _ in zip(TIME.finditer(line), "12", strict=False))

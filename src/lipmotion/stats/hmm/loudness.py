@@ -6,10 +6,11 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from lipmotion.stats.rounding import varies
-
 LOUD_SHARE = 0.5
 """A frame is loud where the smoothed log energy has risen this far from its 10th to its 95th percentile."""
+
+LEAST_RISE = 1e-3
+"""Energy that rises by less, in natural logarithms or in standard deviations, is constant but for rounding."""
 
 
 def loud_frames(log_energy: NDArray[np.float32], smoothing: int) -> NDArray[np.bool_]:
@@ -21,7 +22,8 @@ def loud_frames(log_energy: NDArray[np.float32], smoothing: int) -> NDArray[np.b
     padded = np.pad(log_energy, smoothing // 2, "edge")
     smooth = np.convolve(padded, np.full(smoothing, 1 / smoothing), "valid")
     quiet, loud = np.quantile(smooth, [0.1, 0.95])
-    return varies(smooth[:, None]) & (smooth > quiet + LOUD_SHARE * (loud - quiet))
+    rise = loud - quiet
+    return (rise > LEAST_RISE) & (smooth > quiet + LOUD_SHARE * rise)
 
 
 QUIET = 35 * np.log(10) / 10
