@@ -40,3 +40,10 @@ def test_a_figure_that_nothing_defines_is_null() -> None:
 def test_what_is_refused(text: str, says: str) -> None:
     with pytest.raises(ValueError, match=says):
         from_json(text)
+
+
+@pytest.mark.parametrize("content", ["\ud800", {"a": ["é\udfff"]}, "é", "😀"])
+def test_every_text_is_written_as_utf8_and_comes_back(content):
+    text = as_json(content, ensure_ascii=False)
+    assert from_json(text.encode()) == content
+    assert ("é" in text) == (content == "é")

@@ -4,18 +4,24 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from typing import Any, NoReturn
 
 from lipmotion.errors import ExportError
 
+HALF_CHARACTER = re.compile("[\ud800-\udfff]")
+
 
 def as_json(content: Any, **how: Any) -> str:
-    """Return content as JSON. ``how``: as ``json.dumps`` takes it.
+    """Return content as JSON that is UTF-8. ``how``: as ``json.dumps`` takes it; half a character is escaped anyway.
 
     Raises ExportError: a number that is not finite; JSON has none (``defined`` takes them out of reports).
     """
     try:
-        return json.dumps(content, allow_nan=False, **how)
+        text = json.dumps(content, allow_nan=False, **how)
+        if HALF_CHARACTER.search(text):  # JSON that was read may hold one, escaped; UTF-8 has none
+            text = json.dumps(content, allow_nan=False, **how | {"ensure_ascii": True})
+        return text
     except ValueError as error:
         raise ExportError(f"cannot be written as JSON ({error}): every number must be finite") from error
 

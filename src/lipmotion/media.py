@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import ctypes
 import re
+from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +19,8 @@ MEDIA_FORMATS = (
 ).split()
 """FFmpeg's names of the containers that hold what they play. All other formats are refused before they open anything:
 playlists (hls, concat, dash, imf), indexes (vobsub), numbered pictures (image2), addresses (sdp, rtsp), devices."""
+LARGEST_BLOCK = 1 << 28
+"""Bytes that FFmpeg may allocate at a time: three times a picture of ``MOST_PIXELS`` in 16 bits and four channels."""
 DURATION = re.compile(r"(\d{1,6}):(\d\d):(\d\d(?:\.\d{1,9})?)")
 MOST_PIXELS = 4096 * 2304
 """Pixels of one picture: a little more than 4K has. A decoder may keep sixteen of them."""
@@ -30,6 +35,7 @@ def open_media(path: Path) -> Any:
     """
     import av
 
+    _bound_allocations()
     options = {
         "protocol_whitelist": "file",
         "format_whitelist": ",".join(MEDIA_FORMATS),
@@ -42,6 +48,15 @@ def open_media(path: Path) -> Any:
         raise ValueError(
             "damaged, or of a format that is not read; playlists and indexes of other files are not followed"
         ) from error
+
+
+@cache
+def _bound_allocations() -> None:
+    """Let FFmpeg refuse blocks over ``LARGEST_BLOCK``, for the whole process: it trusts sizes that headers state."""
+    import av._core
+
+    with suppress(OSError, AttributeError):  # where a module does not show what the libraries behind it export
+        ctypes.CDLL(av._core.__file__).av_max_alloc(ctypes.c_size_t(LARGEST_BLOCK))
 
 
 def moving_pictures(container: Any) -> list[Any]:

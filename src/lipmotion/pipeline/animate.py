@@ -8,6 +8,7 @@ from pathlib import Path
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export.base import MOTION_SUFFIXES, check_motion, write_motion
 from lipmotion.files import as_text, check_distinct, check_target
+from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.hear import heard
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.speech.read import read_audio
@@ -21,6 +22,7 @@ SLOWEST_HZ, FASTEST_HZ = 1.0, 1000.0
 """Frame rates that files are written at; a mistyped one must not fill the memory."""
 
 
+@one_thread()
 def animate(
     speech: str | Path | Audio,
     *,

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from lipmotion.errors import ExportError
 from lipmotion.files import check_target, whole_file
+from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.hear import heard
 from lipmotion.pipeline.model import Model
 from lipmotion.speech.read import read_audio
@@ -15,6 +16,7 @@ from lipmotion.units import Lexicon
 SUFFIX = ".png"
 
 
+@one_thread()
 def animate_with_beliefs(
     speech: str | Path,
     *,

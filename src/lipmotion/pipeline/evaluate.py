@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import Animator
 from lipmotion.errors import AlignmentError, CorpusError
+from lipmotion.kernels.threads import one_thread
 from lipmotion.measures import curves
 from lipmotion.measures.bootstrap import interval
 from lipmotion.measures.closures import closed_threshold, closure_figures, phone_closures
@@ -76,6 +77,7 @@ class Clip:
     spoken: tuple[tuple[float, float, str], ...]
 
 
+@one_thread()
 def evaluate(
     model: Model,
     corpus: Corpus,

@@ -10,6 +10,7 @@ from typing import Any
 
 from lipmotion.engines.base import frame_of
 from lipmotion.errors import InputError
+from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.hear import heard
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.printable import printable
@@ -35,6 +36,7 @@ SHOWN = 6
 """Channels in a line of text; points are left out where there is anything else."""
 
 
+@one_thread()
 def explain(
     model: Model | str | Path | None,
     speech: str | Path | Audio,

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from lipmotion.corpora.entry import read_entry
 from lipmotion.corpora.store import Corpus
 from lipmotion.files import locked
+from lipmotion.kernels.threads import one_thread
 from lipmotion.measures.offset import Offset, offset, pooled_offset, shift_scores
 from lipmotion.speech.lips import opening_speed, speed
 from lipmotion.speech.mfcc import WINDOW, mfcc
@@ -96,6 +97,7 @@ def offsets(corpus: Corpus) -> CorpusOffsets:
     )
 
 
+@one_thread()
 def sync(corpus: Corpus) -> dict[str, float]:
     """Move the sound of each collection by its offset, where that is known; return the seconds, by collection.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import tempfile
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -16,9 +17,10 @@ from lipmotion.corpora.store import Corpus
 from lipmotion.pipeline.animate import write
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.types import Audio, Generation, Motion
+from lipmotion.types.motion import LARGEST
 
-LARGEST = {"eye_distance": 10.0, "weight": 100.0, "grey": 1e6}
-"""By unit: a whole head is two eye distances high."""
+GENERATED = {"eye_distance": 10.0, "weight": 100.0, "grey": 1e6}
+"""By unit, of what a model makes: a whole head is two eye distances high."""
 LONGEST_S = 3600.0
 SHORT = slice(6000, 18_000)
 """Samples of the toy sentence: its first word."""
@@ -44,17 +46,17 @@ def good_model(good: Good) -> Model:
     return load_model(good.models[0])
 
 
-def check_motion(motion: Motion) -> None:
+def check_motion(motion: Motion, largest_of: Mapping[str, float] = LARGEST) -> None:
     """Raise ImplausibleError unless the motion is one that can be, as far as its units tell."""
     require(bool(np.isfinite(motion.values).all()), "values that are not finite")
     for channel, curve in zip(motion.channels, motion.values.T, strict=True):
         largest = float(np.abs(curve).max(initial=0.0))
-        require(largest <= LARGEST.get(channel.unit, math.inf), f"motion in {channel.unit} that is absurd")
+        require(largest <= largest_of.get(channel.unit, math.inf), f"motion in {channel.unit} that is absurd")
 
 
 def check_generation(result: Generation) -> None:
     """Raise ImplausibleError unless motion, its variance and the files written of it can be."""
-    check_motion(result.motion)
+    check_motion(result.motion, GENERATED)
     require(len(result.motion.values) <= LONGEST_S * result.motion.rate_hz, "hours of motion")
     require(bool((result.variance >= 0).all()), "a variance that is negative or none")
     with tempfile.TemporaryDirectory() as folder:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.trajectory.joint.densities import Scale, Tied
+from lipmotion.engines.trajectory.joint.densities import LEAST_SCALE, Scale, Tied
 from lipmotion.engines.trajectory.joint.forest import Forest
 from lipmotion.engines.trajectory.joint.inventory import Inventory
 from lipmotion.engines.trajectory.joint.model import JointConfig, JointHmm, Part
@@ -81,10 +81,12 @@ TIMES = {
     "log_stay": Member(np.float64, "R", -1e4, NEGATIVE),
     "durations": Member(np.float64, "R 2", POSITIVE, 1e9),
 }
+LEAST_STORED_SCALE = LEAST_SCALE / 10
+"""As half precision may keep ``LEAST_SCALE``; squares of what is divided by less are not finite in single precision."""
 PART = {
     **MIXTURES,
     "mean": Member(np.float64, "D", -1e6, 1e6),
-    "deviation": Member(np.float64, "D", POSITIVE, 1e6),
+    "deviation": Member(np.float64, "D", LEAST_STORED_SCALE, 1e6),
 }
 VOICED = {"voiced": Member(np.float64, "G", POSITIVE, BELOW_ONE)}
 """How a model is stored, and each of its streams; R states have no context."""
