@@ -6,9 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_limits
 
 from lipmotion.errors import AlignmentError, InputError
-from lipmotion.pipeline.animate import animate
+from lipmotion.pipeline.animate import animate, write
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.toy import ToySentence, toy_motion
 from lipmotion.speech.read import read_audio
@@ -211,3 +212,11 @@ def test_units_beyond_the_recording_are_refused(toy_model: Model, toy_sentence: 
     units = Timeline(tuple(Span(i / 1e4, (i + 1) / 1e4, Unit("p")) for i in range(2000)))
     with pytest.raises(InputError, match=r"2000 units in time, required at most 1276 for 2.76 s of sound"):
         animate(toy_sentence.audio, units=units, model=toy_model)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_the_same_bytes_again_whatever_the_number_of_threads(toy_model, toy_speech, tmp_path, threads):
+    write(animate(toy_speech, model=toy_model), tmp_path / "first.npz")
+    with threadpool_limits(threads, user_api="blas"):
+        write(animate(toy_speech, model=toy_model), tmp_path / "second.npz")
+    assert (tmp_path / "first.npz").read_bytes() == (tmp_path / "second.npz").read_bytes()

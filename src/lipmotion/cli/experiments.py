@@ -25,9 +25,7 @@ def run_experiment(
 ) -> None:
     """Call ``experiment(corpus, lexicon=..., workers=..., monitor=...)`` and print its table."""
     from lipmotion.corpora.store import Corpus
-    from lipmotion.kernels.threads import one_thread
 
-    @one_thread()
     def compute(**given: Any) -> dict[str, Any]:
         return experiment(Corpus.open(options.corpus), workers=options.workers or os.cpu_count() or 1, **given)
 

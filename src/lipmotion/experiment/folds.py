@@ -9,6 +9,7 @@ from typing import Any
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import InputError
 from lipmotion.experiment.trial import Trial, channels_with_opening, opening_row, shuffled, trial
+from lipmotion.kernels.threads import one_thread
 from lipmotion.measures.report import number, without_nan
 from lipmotion.pipeline.evaluate import OPENING, figures_of
 from lipmotion.stats.hmm.model import HmmConfig
@@ -18,6 +19,7 @@ from lipmotion.units import Lexicon
 FOLDS = 5
 
 
+@one_thread()
 def folds(
     corpus: Corpus,
     *,

@@ -12,6 +12,7 @@ import numpy as np
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.experiment.trial import Trial, channels_with_opening, opening_row, shuffled, trial
+from lipmotion.kernels.threads import one_thread
 from lipmotion.measures.report import number, without_nan
 from lipmotion.pipeline.evaluate import figures_of
 from lipmotion.stats.hmm.model import HmmConfig
@@ -24,6 +25,7 @@ OTHERS = ("width", "outer")
 """Channels that are compared beside the opening."""
 
 
+@one_thread()
 def learning_curve(
     corpus: Corpus,
     *,

@@ -21,6 +21,7 @@ from lipmotion.experiment.noise import AUDIO_ONLY, in_noise
 from lipmotion.experiment.plots import check_plots, draw_plots
 from lipmotion.experiment.rivals import BEST, Contender, chosen_rivals, trained_rivals
 from lipmotion.experiment.trial import channels_with_opening, opening_row, shuffled
+from lipmotion.kernels.threads import one_thread
 from lipmotion.measures import curves
 from lipmotion.measures.report import without_nan
 from lipmotion.pipeline.evaluate import OPENING, Clip, Recorded, clips, figures_of, recorded
@@ -63,6 +64,7 @@ class Noises:
             raise InputError(f"a babble of {len(self.talkers)} talkers; required at least {FEWEST_TALKERS}: --talkers")
 
 
+@one_thread()
 def table3(
     corpus: Corpus,
     *,

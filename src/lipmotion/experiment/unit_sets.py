@@ -9,6 +9,7 @@ from lipmotion.corpora.store import Corpus
 from lipmotion.engines import engine_named
 from lipmotion.experiment.comparison import correlation_tally, mark, openings_of, score_tally
 from lipmotion.experiment.trial import channels_with_opening, opening_row
+from lipmotion.kernels.threads import one_thread
 from lipmotion.measures import curves
 from lipmotion.measures.report import number, without_nan
 from lipmotion.pipeline.evaluate import Clip, Recorded, clips, figures_of, recorded
@@ -32,6 +33,7 @@ SYSTEMS: dict[str, dict[str, Any]] = {
 units are recognised by their own models and their states begin where these say."""
 
 
+@one_thread()
 def unit_sets(
     corpus: Corpus,
     *,

@@ -1,0 +1,63 @@
+from concurrent.futures import ThreadPoolExecutor
+from threading import Barrier
+
+import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
+
+from lipmotion.kernels.threads import blas_kernels, one_thread
+
+
+def threads() -> set[int]:
+    return {each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"}
+
+
+@pytest.fixture(autouse=True)
+def two_outside():
+    with threadpool_limits(2, user_api="blas"):
+        yield
+
+
+def test_one_inside_and_as_before_afterwards():
+    with one_thread():
+        assert threads() == {1}
+        with one_thread():
+            assert threads() == {1}
+        assert threads() == {1}
+    assert threads() == {2}
+
+
+def test_as_before_after_an_error():
+    with pytest.raises(KeyError), one_thread():
+        raise KeyError
+    assert threads() == {2}
+
+
+def test_blocks_that_overlap_in_threads_of_python_leave_nothing_behind():
+    """The second begins inside the first and ends after it."""
+    both_in, first_out = Barrier(2), Barrier(2)
+
+    def first():
+        with one_thread():
+            both_in.wait(20)
+        first_out.wait(20)
+
+    def second():
+        with one_thread():
+            both_in.wait(20)
+            first_out.wait(20)
+
+    with ThreadPoolExecutor(2) as pool:
+        for job in [pool.submit(first), pool.submit(second)]:
+            job.result()
+    assert threads() == {2}
+
+
+def test_a_decorated_function_may_be_called_again():
+    counted = one_thread()(threads)
+    assert counted() == {1}
+    assert counted() == {1}
+
+
+def test_kernels_are_named():
+    assert blas_kernels() == blas_kernels() == sorted(blas_kernels())
+    assert all(len(name.split()) >= 3 for name in blas_kernels())
