@@ -23,7 +23,8 @@ def test_numbers_that_json_does_not_have(content: object) -> None:
 
 
 def test_a_figure_that_nothing_defines_is_null() -> None:
-    assert defined({"a": [1.5, NAN, (INFINITE, "b")], "c": 2}) == {"a": [1.5, None, [None, "b"]], "c": 2}
+    nested = {"a": [1.5, NAN, (INFINITE, "b", -INFINITE)], "c": 2, "d": "nan", "e": None, "f": True}
+    assert defined(nested) == {"a": [1.5, None, (None, "b", None)], "c": 2, "d": "nan", "e": None, "f": True}
 
 
 @pytest.mark.parametrize(

@@ -31,7 +31,7 @@ def defined(content: Any) -> Any:
     if isinstance(content, dict):
         return {key: defined(value) for key, value in content.items()}
     if isinstance(content, list | tuple):
-        return [defined(value) for value in content]
+        return type(content)(map(defined, content))
     return None if isinstance(content, float) and not math.isfinite(content) else content
 
 

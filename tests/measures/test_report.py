@@ -2,7 +2,7 @@ from itertools import count
 
 import pytest
 
-from lipmotion.measures.report import table, without_nan
+from lipmotion.measures.report import table
 
 
 def figures():
@@ -125,8 +125,3 @@ def test_motion_without_an_opening_has_a_shorter_table():
     assert len(lines[4]) == len(lines[5])
     assert len(lines) == 7
     assert "lag of a_rather_long_name" in lines[6]
-
-
-def test_what_json_does_not_know_becomes_none():
-    nested = {"a": float("nan"), "b": [1.5, float("inf"), (-float("inf"), 2)], "c": "nan", "d": None, "e": True}
-    assert without_nan(nested) == {"a": None, "b": [1.5, None, (None, 2)], "c": "nan", "d": None, "e": True}

@@ -9,8 +9,9 @@ from typing import Any
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import InputError
 from lipmotion.experiment.trial import Trial, channels_with_opening, opening_row, shuffled, trial
+from lipmotion.json_text import defined
 from lipmotion.kernels.threads import one_thread
-from lipmotion.measures.report import number, without_nan
+from lipmotion.measures.report import number
 from lipmotion.pipeline.evaluate import OPENING, figures_of
 from lipmotion.stats.hmm.model import HmmConfig
 from lipmotion.types import Monitor, part_of, silent_monitor
@@ -57,7 +58,7 @@ def folds(
     about = {"folds": count, "seed": seed, "clips": len(names), "trained_on": [len(each.used) for each in trials]}
     about |= {"closed_under": trials[0].found.closed_under}
     told = [name for name in trials[0].made if all(name in each.made for each in trials)]
-    figures: dict[str, Any] = without_nan(about | {"conditions": {name: _row(trials, name, seed) for name in told}})
+    figures: dict[str, Any] = defined(about | {"conditions": {name: _row(trials, name, seed) for name in told}})
     return figures
 
 

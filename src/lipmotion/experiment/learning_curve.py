@@ -12,8 +12,9 @@ import numpy as np
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.experiment.trial import Trial, channels_with_opening, opening_row, shuffled, trial
+from lipmotion.json_text import defined
 from lipmotion.kernels.threads import one_thread
-from lipmotion.measures.report import number, without_nan
+from lipmotion.measures.report import number
 from lipmotion.pipeline.evaluate import figures_of
 from lipmotion.stats.hmm.model import HmmConfig
 from lipmotion.types import Monitor, part_of, silent_monitor
@@ -64,7 +65,7 @@ def learning_curve(
         rows.append({"names": count} | _row(corpus, result, seed))
     about = {"split": split or "all", "clips": len(held_out), "seed": seed, "workers": workers}
     about |= {"order": "given" if order is not None else "shuffled", "closed_under": result.found.closed_under}
-    figures: dict[str, Any] = without_nan(about | {"rows": rows})
+    figures: dict[str, Any] = defined(about | {"rows": rows})
     return figures
 
 

@@ -21,9 +21,9 @@ from lipmotion.experiment.noise import AUDIO_ONLY, in_noise
 from lipmotion.experiment.plots import check_plots, draw_plots
 from lipmotion.experiment.rivals import BEST, Contender, chosen_rivals, trained_rivals
 from lipmotion.experiment.trial import channels_with_opening, opening_row, shuffled
+from lipmotion.json_text import defined
 from lipmotion.kernels.threads import one_thread
 from lipmotion.measures import curves
-from lipmotion.measures.report import without_nan
 from lipmotion.pipeline.evaluate import OPENING, Clip, Recorded, clips, figures_of, recorded
 from lipmotion.pipeline.train import FEWEST, phones_and_examples
 from lipmotion.pipeline.visual import EIGENLIPS, GEOMETRY, as_learned, check_visual, learned_eigenlips
@@ -127,7 +127,7 @@ def table3(
     about = {"split": split or "all", "clips": len(held_out), "seed": seed, "states": states, "workers": workers}
     about |= {"order": "given" if order is not None else "shuffled", "mixtures": list(mixtures)}
     about |= {"visual": visual, "channels": list(tried.found.channels), "closed_under": tried.found.closed_under}
-    figures: dict[str, Any] = without_nan(about | {"rows": rows, "noise": loud})
+    figures: dict[str, Any] = defined(about | {"rows": rows, "noise": loud})
     return figures
 
 

@@ -9,9 +9,10 @@ from lipmotion.corpora.store import Corpus
 from lipmotion.engines import engine_named
 from lipmotion.experiment.comparison import correlation_tally, mark, openings_of, score_tally
 from lipmotion.experiment.trial import channels_with_opening, opening_row
+from lipmotion.json_text import defined
 from lipmotion.kernels.threads import one_thread
 from lipmotion.measures import curves
-from lipmotion.measures.report import number, without_nan
+from lipmotion.measures.report import number
 from lipmotion.pipeline.evaluate import Clip, Recorded, clips, figures_of, recorded
 from lipmotion.pipeline.train import FEWEST, phones_and_examples
 from lipmotion.pipeline.workers import working
@@ -70,7 +71,7 @@ def unit_sets(
     }
     about = {"split": split or "all", "clips": len(found.utterances), "trained_on": len(examples)}
     about |= {"closed_under": found.closed_under, "closures": closures}
-    figures: dict[str, Any] = without_nan(about | {"systems": systems})
+    figures: dict[str, Any] = defined(about | {"systems": systems})
     return figures
 
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
 from lipmotion.printable import printable
 
 PINNED = (
@@ -85,15 +83,6 @@ def _unpinned(condition: Mapping[str, Any]) -> list[str]:
     acc = number(free["channels"]["opening"]["acc"], ".3f")
     head = f"  without pins: ACC of opening {acc} ({low:.3f} to {high:.3f}), mean ACC {free['acc']:.3f}"
     return [head, *(f"  {line}" for line in _closing(free))]
-
-
-def without_nan(figures: Any) -> Any:
-    """Return nested figures with None in the place of every number that is not finite: JSON knows no other."""
-    if isinstance(figures, dict):
-        return {key: without_nan(value) for key, value in figures.items()}
-    if isinstance(figures, list | tuple):
-        return type(figures)(map(without_nan, figures))
-    return None if isinstance(figures, float) and not np.isfinite(figures) else figures
 
 
 def number(value: float | None, form: str) -> str:

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import Animator
 from lipmotion.errors import AlignmentError, CorpusError
+from lipmotion.json_text import defined
 from lipmotion.kernels.threads import one_thread
 from lipmotion.measures import curves
 from lipmotion.measures.bootstrap import interval
 from lipmotion.measures.closures import closed_threshold, closure_figures, phone_closures
-from lipmotion.measures.report import without_nan
 from lipmotion.pipeline.hear import hear, hear_unsaid
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.train import labels_of
@@ -126,7 +126,7 @@ def evaluate(
             name: _figures_and_unpinned(found, name, model.engine, model.learned, seed) for name in found.conditions
         },
     }
-    plain: dict[str, Any] = without_nan(figures)
+    plain: dict[str, Any] = defined(figures)
     return plain
 
 

@@ -77,9 +77,9 @@ def check_poses(reach: Reach, space: MotionSpace, closure: Closure | None) -> No
     for column, channel in enumerate(space.direct):
         check_magnitude(space.channels[channel], float(reach.low[column]), float(reach.high[column]))
     if space.points is not None:
-        largest = float(np.abs(space.points.mean).max())
-        if largest > max(WIDE_OPEN, LARGEST_OFFSET * float(reach.span[count:].max())):
-            raise ValueError(f"points_mean as large as {largest:g} of points that move by {reach.span[count:].max():g}")
+        largest, moves = float(np.abs(space.points.mean).max()), float(reach.span[count:].max(initial=0.0))
+        if largest > max(WIDE_OPEN, LARGEST_OFFSET * moves):
+            raise ValueError(f"points_mean as large as {largest:g} of points that move by {moves:g}")
     if closure is not None:
         _check_opening(float(reach.low[closure.column]), float(reach.high[closure.column]), closure.closed)
 
