@@ -5,11 +5,13 @@ import os
 import signal
 import sys
 import threading
+import time
 from collections.abc import Iterator
 
 import pytest
 
 from lipmotion.errors import CorpusError, InputError
+from lipmotion.pipeline import workers as module
 from lipmotion.pipeline.workers import working
 
 
@@ -108,3 +110,23 @@ def test_workers_leave_signals_to_the_process_that_started_them() -> None:
     with working(2) as team:
         assert all(team.each(held, range(4)))
     assert not signal.pthread_sigmask(signal.SIG_BLOCK, ()) & {signal.SIGINT, signal.SIGTERM}
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals are held back on POSIX")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_that_another_thread_takes_waits_until_a_process_has_started(number):
+    """A BLAS has threads that do not mask signals; Python answers what they take in the main thread."""
+    over, seen = threading.Event(), []
+    other = threading.Thread(target=over.wait, args=(60,))
+    before = signal.signal(number, lambda *_: seen.append("answered"))
+    other.start()
+    try:
+        with module._signals_held():
+            os.kill(os.getpid(), number)
+            time.sleep(0.2)  # long enough to be answered, were it not held back
+            seen.append("started")
+    finally:
+        over.set()
+        other.join()
+        signal.signal(number, before)
+    assert seen == ["started", "answered"]

@@ -135,7 +135,9 @@ def _died() -> CorpusError:
 def _signals_held() -> Iterator[None]:
     """Hold Ctrl-C and ``kill`` back for a moment, and from processes that are started meanwhile for ever.
 
-    The terminal sends Ctrl-C to all of them, but only the first one, which ends the others, should act on it.
+    The terminal sends Ctrl-C to all of them, but only the first one, which ends the others, should act on it. A mask
+    alone does not hold them back here: any other thread, such as those of a BLAS, takes them, and Python answers in
+    this one.
     """
     if sys.platform == "win32":
         yield
@@ -144,10 +146,30 @@ def _signals_held() -> Iterator[None]:
 
     resource_tracker.ensure_running()  # else it starts with the first process, and lets go of the signals
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
+    came: list[int] = []
+    answers = _answered_by(lambda number, _: came.append(number))
     try:
         yield
     finally:
+        for number, answer in answers.items():
+            signal.signal(number, answer)
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        for number in came[:1]:
+            signal.raise_signal(number)
+
+
+def _answered_by(handler: Callable[[int, Any], None]) -> dict[int, Any]:
+    """Answer signals that are not ignored by ``handler``; return what answered them before.
+
+    Only the main thread may; in others, nothing changes.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        return {}
+    old: dict[int, Any] = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    old = {number: answer for number, answer in old.items() if answer not in (None, signal.SIG_IGN)}
+    for number in old:
+        signal.signal(number, handler)
+    return old
 
 
 def _work(end: Any) -> None:
