@@ -52,7 +52,8 @@ def fit_pca(values: NDArray[Any], components: int) -> Pca:
     with ``ROWS`` rows of memory, in single precision and up to ``TOLERANCE`` of the variance.
     """
     mean = values.mean(axis=0, dtype=np.float64)
-    least = values.size * (float(np.abs(values).max()) * CONSTANT) ** 2
+    largest = max(float(values.max()), -float(values.min()))  # no copy of a large table
+    least = values.size * (largest * CONSTANT) ** 2
     if min(values.shape) > EXACT:
         basis = _leading(values, mean, components)
     elif values.shape[0] < values.shape[1]:
