@@ -1,0 +1,157 @@
+"""``python benchmarks/golden.py WORK -o FILE.json [--against FILE.json]``: hashes of trained models and of what they make.
+
+Takes the command line only, so that the same driver runs on any version of the package: every engine is trained on the
+tiny corpus, and on twenty clips of GRID where they are present; models are hashed array by array, without the header;
+motion, cues, explanations and figures as they are written. Computed floats differ between processors: compare
+two versions on one machine.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import zipfile
+from collections.abc import Iterable, Iterator
+from hashlib import sha256
+from pathlib import Path
+
+HERE = Path(__file__).parents[1]
+GRID = HERE / ".." / "shared" / "corpora" / "grid-s1"
+WELCOME, SAID = HERE / "examples" / "welcome.flac", HERE / "examples" / "welcome.txt"
+SYSTEMS = ("ph-HMM", "ph-MSHMM", "ph-FHMM", "ph-vi-FHMM", "ph-CHMM", "ph-vi-CHMM")
+ENGINES: dict[str, tuple[str, ...]] = {
+    "trajectory": (),
+    "trajectory both": ("--visual", "both"),
+    "joint": ("--engine", "joint"),
+    **{name: ("--engine", "coupled", "--system", name, "--set", "mixtures=2") for name in SYSTEMS},
+}
+ON_GRID = ("trajectory", "trajectory both", "joint", "ph-MSHMM", "ph-vi-FHMM", "ph-vi-CHMM")
+TINY = """
+import sys
+from pathlib import Path
+try:
+    from lipmotion.testing import write_toy_recordings
+except ImportError:
+    from lipmotion.pipeline.toy import write_toy_recordings
+write_toy_recordings(Path(sys.argv[1]))
+"""
+VERB = "import sys; from lipmotion.cli.main import main; sys.exit(main())"
+Hashes = dict[str, str]
+
+
+def main() -> int:
+    """Write the hashes; with ``--against``, name what differs and return 1."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("work", type=Path)
+    parser.add_argument("-o", "--output", type=Path, required=True)
+    parser.add_argument("--against", type=Path)
+    parser.add_argument("--quick", action="store_true", help="the tiny corpus only, and the shipped model")
+    options = parser.parse_args()
+    options.work.mkdir(parents=True, exist_ok=True)
+    hashes = dict(_all(options.work, quick=options.quick))
+    options.output.write_text(json.dumps(hashes, indent=1) + "\n", encoding="utf-8")
+    if options.against is None:
+        return 0
+    before = json.loads(options.against.read_text(encoding="utf-8"))
+    different = [name for name in hashes if hashes[name] != before.get(name)]
+    print(f"{len(hashes) - len(different)} of {len(hashes)} equal", *different, sep="\n  ")
+    return bool(different)
+
+
+def _all(work: Path, *, quick: bool) -> Iterator[tuple[str, str]]:
+    yield from _outputs("shipped", None, work)
+    run(work, "adapt", WELCOME, "-o", work / "adapted.lipmotion")
+    yield "shipped: adapted", of_archive(work / "adapted.lipmotion")
+    python(TINY, work / "tiny")
+    yield from _of_corpus("tiny", work / "tiny", ENGINES, work)
+    if GRID.is_dir() and not quick:
+        yield from _of_corpus("grid", twenty_clips(work / "grid"), ON_GRID, work)
+
+
+def _of_corpus(name: str, recordings: Path, engines: Iterable[str], work: Path) -> Iterator[tuple[str, str]]:
+    corpus = work / f"{name}-corpus"
+    run(work, "corpus", "prepare", recordings, "-o", corpus)
+    files = sorted(file for file in corpus.rglob("*") if file.is_file())
+    yield f"{name}: corpus", of_bytes(b"".join(contents(file) for file in files))
+    for engine in engines:
+        model = work / f"{name}-{engine}.lipmotion"
+        model.unlink(missing_ok=True)
+        run(work, "train", corpus, "-o", model, *ENGINES[engine])
+        yield f"{name}: {engine}: model", of_archive(model)
+        yield from _outputs(f"{name}: {engine}", model, work)
+        figures = work / "figures.json"
+        figures.unlink(missing_ok=True)
+        run(work, "evaluate", model, corpus, "-o", figures)
+        yield f"{name}: {engine}: figures", of_archive(figures)
+
+
+def _outputs(name: str, model: Path | None, work: Path) -> Iterator[tuple[str, str]]:
+    chosen = ("--model", model) if model else ()
+    kinds = ("npz", "json", "csv", "mp4") if model is None else ("npz",)
+    for way, told in (("audio only", ()), ("transcript", ("--transcript", SAID))):
+        made = [work / f"motion.{kind}" for kind in kinds]
+        for file in made:
+            file.unlink(missing_ok=True)
+        said = run(work, "animate", WELCOME, *chosen, *told, "-o", *made)
+        for file in made:
+            yield f"{name}: {way}: {file.suffix[1:]}", of_archive(file) if file.exists() else said.decode()
+        if model is None:
+            for kind in ("tsv", "xml", "json", "dat"):
+                yield f"{name}: {way}: cues {kind}", of_bytes(run(work, "cues", WELCOME, *told, "-f", kind))
+    shipped = HERE / "src" / "lipmotion" / "models" / "grid-s1.lipmotion"
+    told = ("--transcript", SAID, "--at", "0.5", "--at", "1.0", "--json")
+    yield f"{name}: explanation", of_bytes(run(work, "explain", model or shipped, WELCOME, *told))
+    yield f"{name}: trees", of_bytes(run(work, "info", *(() if model is None else (model,)), "--trees"))
+
+
+def twenty_clips(folder: Path) -> Path:
+    """Return a folder of the first twenty clips of GRID's order, fourteen, three and three by the corpus's own lists."""
+    folder.mkdir(exist_ok=True)
+    for split, count in (("train", 14), ("val", 3), ("test", 3)):
+        names = (GRID / f"{split}.txt").read_text().split()[:count]
+        (folder / f"{split}.txt").write_text("".join(f"{name}\n" for name in names))
+        for name in names:
+            for file in (*(GRID / "clips").glob(f"{name}.*"), *(GRID / "align").glob(f"{name}.*")):
+                link = folder / file.relative_to(GRID)
+                link.parent.mkdir(exist_ok=True)
+                if not link.exists():
+                    link.symlink_to(file.resolve())
+    return folder
+
+
+def python(code: str, *arguments: object) -> bytes:
+    """Return what a program writes to standard output; its exit code, where it fails."""
+    command = [sys.executable, "-c", code, *map(str, arguments)]
+    done = subprocess.run(command, check=False, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=os.environ)
+    return done.stdout if done.returncode == 0 else f"exit {done.returncode}".encode()
+
+
+def run(work: Path, *arguments: object) -> bytes:
+    """Return what a verb writes to standard output, the folder of the work left out."""
+    return python(VERB, *arguments).replace(str(work).encode(), b"WORK")
+
+
+def of_archive(path: Path) -> str:
+    """Return the hash of a file; of a model or of motion that of all arrays by name, without the header."""
+    return of_bytes(contents(path))
+
+
+def contents(path: Path) -> bytes:
+    """Return the bytes of a file, of a zip those of its arrays by name."""
+    if not zipfile.is_zipfile(path):
+        return path.name.encode() + path.read_bytes()
+    with zipfile.ZipFile(path) as archive:
+        names = sorted(name for name in archive.namelist() if "header" not in name)
+        return b"".join(name.encode() + archive.read(name) for name in names)
+
+
+def of_bytes(found: bytes) -> str:
+    """Return the first half of the SHA-256."""
+    return sha256(found).hexdigest()[:32]
+
+
+if __name__ == "__main__":
+    sys.exit(main())
