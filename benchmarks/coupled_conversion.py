@@ -16,7 +16,7 @@ from time import process_time
 import numpy as np
 
 import lipmotion
-from lipmotion.pipeline.hear import hear_unsaid
+from lipmotion.pipeline.understand import hear_unsaid
 from lipmotion.speech.recogniser import recogniser
 
 

@@ -20,7 +20,7 @@ from lipmotion.export.cues.choose import choose_cues, usual_hold
 from lipmotion.export.cues.evidence import frame_costs
 from lipmotion.export.cues.shapes import SHAPES
 from lipmotion.export.cues.sheet import CueSheet, frames_in, sheet_of
-from lipmotion.pipeline.train import labels_of
+from lipmotion.pipeline.training.train import labels_of
 from lipmotion.speech.phones import recognise
 from lipmotion.types import Generation, Motion, Speech, Timeline, Trace
 from lipmotion.units import LIP_CLOSING, VISEMES, Lexicon, is_silent

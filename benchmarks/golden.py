@@ -1,4 +1,4 @@
-"""``python benchmarks/golden.py WORK -o FILE.json [--against FILE.json]``: hashes of trained models and of what they make.
+"""``python benchmarks/golden.py WORK -o FILE.json [--against FILE.json]``: hashes of trained models and their output.
 
 Takes the command line only, so that the same driver runs on any version of the package: every engine is trained on the
 tiny corpus, and on twenty clips of GRID where they are present; models are hashed array by array, without the header;
@@ -35,7 +35,7 @@ from pathlib import Path
 try:
     from lipmotion.testing import write_toy_recordings
 except ImportError:
-    from lipmotion.pipeline.toy import write_toy_recordings
+    from lipmotion.testing.toy import write_toy_recordings
 write_toy_recordings(Path(sys.argv[1]))
 """
 VERB = "import sys; from lipmotion.cli.main import main; sys.exit(main())"
@@ -84,8 +84,8 @@ def _of_corpus(name: str, recordings: Path, engines: Iterable[str], work: Path) 
         yield from _outputs(f"{name}: {engine}", model, work)
         figures = work / "figures.json"
         figures.unlink(missing_ok=True)
-        run(work, "evaluate", model, corpus, "-o", figures)
-        yield f"{name}: {engine}: figures", of_archive(figures)
+        said = run(work, "evaluate", model, corpus, "-o", figures)
+        yield f"{name}: {engine}: figures", of_archive(figures) if figures.exists() else said.decode()
 
 
 def _outputs(name: str, model: Path | None, work: Path) -> Iterator[tuple[str, str]]:
@@ -108,7 +108,7 @@ def _outputs(name: str, model: Path | None, work: Path) -> Iterator[tuple[str, s
 
 
 def twenty_clips(folder: Path) -> Path:
-    """Return a folder of the first twenty clips of GRID's order, fourteen, three and three by the corpus's own lists."""
+    """Return a folder of GRID's first 14 clips of train, 3 of val and 3 of test."""
     folder.mkdir(exist_ok=True)
     for split, count in (("train", 14), ("val", 3), ("test", 3)):
         names = (GRID / f"{split}.txt").read_text().split()[:count]

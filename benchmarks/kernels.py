@@ -59,7 +59,7 @@ def mlpg(options: Any) -> Work:
 
 def em(options: Any) -> Work:
     """One step of expectation and maximisation of all recordings."""
-    from lipmotion.stats.hmm.loop_em import em_step
+    from lipmotion.hmm.loop_em import em_step
 
     mixtures, network, data = _loop(options)
     floor = np.full(options.D, 1e-3, np.float32)
@@ -103,7 +103,7 @@ def _harness(name: str) -> Any:
 
 def _loop(options: Any) -> tuple[Any, Any, list[np.ndarray]]:
     """Return the harness's model as mixtures and network, and its recordings."""
-    from lipmotion.stats.hmm.network import NetworkBuilder
+    from lipmotion.hmm.network import NetworkBuilder
     from lipmotion.stats.mixture import Mixtures
 
     model, data = _harness("get")(options)

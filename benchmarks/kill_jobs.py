@@ -39,7 +39,7 @@ class Job:
 def make_inputs(folder: Path, command: Sequence[str]) -> Path:
     """Write recordings, sounds with motion, corpora and a model; return the folder."""
     from lipmotion.corpora.store import Corpus
-    from lipmotion.pipeline.toy import toy_utterances, write_toy_recordings
+    from lipmotion.testing.toy import toy_utterances, write_toy_recordings
 
     write_toy_recordings(folder / "recordings", sentences=CLIPS)
     utterances = toy_utterances(MANY)

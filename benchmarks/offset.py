@@ -16,7 +16,7 @@ import numpy as np
 
 import lipmotion
 from lipmotion.measures.offset import Offset, offset, pooled_offset
-from lipmotion.pipeline.offset import clip_scores
+from lipmotion.pipeline.corpus.sync import clip_scores
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.types import FRAME_RATE_HZ, Audio, Utterance
 

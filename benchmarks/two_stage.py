@@ -25,12 +25,12 @@ import lipmotion
 from lipmotion.corpora.grid import sentence
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import engine_named
-from lipmotion.engines.coupled.learned import CoupledModel
-from lipmotion.pipeline.evaluate import evaluate
+from lipmotion.engines.coupled.model import CoupledModel
+from lipmotion.pipeline.corpus.prompts import prompts
+from lipmotion.pipeline.evaluation.evaluate import evaluate
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.prompts import prompts
-from lipmotion.pipeline.train import examples_of_others, model_motion
-from lipmotion.pipeline.voices import Heard, heard, is_for_judging, many_voices, recorded_voices
+from lipmotion.pipeline.training.train import examples_of_others, model_motion
+from lipmotion.pipeline.training.voices import Heard, heard, is_for_judging, many_voices, recorded_voices
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.recogniser import Recogniser
 from lipmotion.speech.voices.installed import installed_voices

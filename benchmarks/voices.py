@@ -19,8 +19,8 @@ import numpy as np
 
 import lipmotion
 from lipmotion.errors import AlignmentError
-from lipmotion.pipeline.prompts import prompts
-from lipmotion.pipeline.voices import SpokenSentence, heard, is_for_judging, many_voices
+from lipmotion.pipeline.corpus.prompts import prompts
+from lipmotion.pipeline.training.voices import SpokenSentence, heard, is_for_judging, many_voices
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.recogniser import Recogniser
 from lipmotion.speech.voices.installed import installed_voices

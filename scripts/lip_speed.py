@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 
 import lipmotion
-from lipmotion.speech.lips import AROUND, STATIC, WEIGHTS, fit_opening_speed, speed
-from lipmotion.stats.resample import to_model_frames
+from lipmotion.motion.resample import to_model_frames
+from lipmotion.speech.lip_speed import AROUND, STATIC, WEIGHTS, fit_opening_speed, speed
 from lipmotion.types import FRAME_RATE_HZ, Features
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib import pyplot as plt
 
 import lipmotion
-from lipmotion.faces.character import render
+from lipmotion.faces.portrait import render
 
 ROOT = Path(__file__).parent.parent
 FPS = 25.0

@@ -10,10 +10,10 @@ import pytest
 
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import engine_named
+from lipmotion.hmm.model import HmmConfig
 from lipmotion.pipeline.model import Model, save_model
-from lipmotion.pipeline.toy import ToySentence, toy_sentences, toy_utterances
-from lipmotion.pipeline.train import train
-from lipmotion.stats.hmm.model import HmmConfig
+from lipmotion.pipeline.training.train import train
+from lipmotion.testing.toy import ToySentence, toy_sentences, toy_utterances
 
 SENTENCES = 12
 

@@ -65,7 +65,7 @@ def test_python_example(checkout: Path) -> None:
 @pytest.mark.video
 def test_training_on_own_recordings(checkout: Path) -> None:
     pytest.importorskip("mediapipe")
-    from lipmotion.pipeline.toy import write_toy_recordings
+    from lipmotion.testing.toy import write_toy_recordings
 
     (checkout / "my-recordings").mkdir()
     write_toy_recordings(checkout / "my-recordings")

@@ -18,12 +18,12 @@ if TYPE_CHECKING:
     from lipmotion.export.cues.sheet import CueSheet
     from lipmotion.pipeline.adapt import adapt
     from lipmotion.pipeline.animate import animate, write
+    from lipmotion.pipeline.corpus.prepare import prepare
     from lipmotion.pipeline.cues import cues, write_cues
-    from lipmotion.pipeline.evaluate import evaluate
+    from lipmotion.pipeline.evaluation.evaluate import evaluate
     from lipmotion.pipeline.explain import explain
     from lipmotion.pipeline.model import Model, load_model, save_model
-    from lipmotion.pipeline.prepare import prepare
-    from lipmotion.pipeline.train import train
+    from lipmotion.pipeline.training.train import train
     from lipmotion.types import Audio, Constraints, Explanation, Generation, Motion, Pin, Span, Timeline, Unit
     from lipmotion.units import Lexicon
 
@@ -65,13 +65,13 @@ _HOMES = {
     "animate": "lipmotion.pipeline.animate",
     "cues": "lipmotion.pipeline.cues",
     "engine_named": "lipmotion.engines",
-    "evaluate": "lipmotion.pipeline.evaluate",
+    "evaluate": "lipmotion.pipeline.evaluation.evaluate",
     "explain": "lipmotion.pipeline.explain",
     "load_model": "lipmotion.pipeline.model",
-    "prepare": "lipmotion.pipeline.prepare",
+    "prepare": "lipmotion.pipeline.corpus.prepare",
     "read_motion": "lipmotion.export.base",
     "save_model": "lipmotion.pipeline.model",
-    "train": "lipmotion.pipeline.train",
+    "train": "lipmotion.pipeline.training.train",
     "write": "lipmotion.pipeline.animate",
     "write_cues": "lipmotion.pipeline.cues",
 }

@@ -14,7 +14,7 @@ import pytest
 
 from lipmotion.cli.main import main
 from lipmotion.pipeline.model import VERSION
-from lipmotion.stats.archive import HEADER
+from lipmotion.storage.archive import HEADER
 
 
 class Done(NamedTuple):

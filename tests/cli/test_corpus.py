@@ -9,9 +9,10 @@ import pytest
 from cli.conftest import Run, is_one_error
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import MissingDependencyError
-from lipmotion.export.mp4 import write_mp4
-from lipmotion.pipeline import offset, prepare
-from lipmotion.pipeline.prepare import PrepareReport
+from lipmotion.export.video import write_mp4
+from lipmotion.pipeline.corpus import prepare
+from lipmotion.pipeline.corpus import sync as offset
+from lipmotion.pipeline.corpus.prepare import PrepareReport
 from lipmotion.types import Audio, Item, Progress
 
 

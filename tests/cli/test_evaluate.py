@@ -8,7 +8,7 @@ import pytest
 from cli.conftest import Run, is_one_error
 from lipmotion.corpora.store import Corpus
 from lipmotion.measures.report import table
-from lipmotion.pipeline.evaluate import evaluate
+from lipmotion.pipeline.evaluation.evaluate import evaluate
 from lipmotion.pipeline.model import VERSION, load_model
 
 

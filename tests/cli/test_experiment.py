@@ -8,9 +8,11 @@ import pytest
 
 from cli.conftest import Run, is_one_error
 from lipmotion.corpora.store import Corpus
-from lipmotion.experiment import comparison, folds, learning_curve, table3_text, unit_sets
+from lipmotion.experiments import comparison, folds, learning_curve
+from lipmotion.experiments.hofer2008 import unit_sets
+from lipmotion.experiments.xie_liu2007 import table3_text
 from lipmotion.measures.bootstrap import interval
-from lipmotion.pipeline import evaluate
+from lipmotion.pipeline.evaluation import evaluate
 
 
 @pytest.fixture(autouse=True)

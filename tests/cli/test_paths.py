@@ -15,10 +15,10 @@ from lipmotion.cli.command_line import parser
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import ExportError
 from lipmotion.pipeline.animate import animate, write
+from lipmotion.pipeline.corpus.prepare import prepare
 from lipmotion.pipeline.cues import cues, write_cues
 from lipmotion.pipeline.model import load_model, shipped_path
-from lipmotion.pipeline.prepare import prepare
-from lipmotion.pipeline.train import train
+from lipmotion.pipeline.training.train import train
 
 TALKING = "a.wav --transcript t.txt --lexicon l.txt --units u.json --model m.lipmotion"
 FIGURES = "c --lexicon l.txt"

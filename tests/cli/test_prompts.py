@@ -6,7 +6,7 @@ import pytest
 
 from cli.conftest import Run, is_one_error
 from lipmotion.corpora.store import Corpus
-from lipmotion.pipeline.prompts import prompts
+from lipmotion.pipeline.corpus.prompts import prompts
 
 
 def test_sentences_with_what_they_cover(run: Run) -> None:

@@ -12,10 +12,10 @@ from cli.conftest import Run, is_one_error
 from lipmotion.corpora.store import Corpus
 from lipmotion.export.base import read_motion
 from lipmotion.pipeline.model import Model, load_model, save_model
-from lipmotion.pipeline.toy import toy_sentences
-from lipmotion.pipeline.train import TrainReport, train
-from lipmotion.pipeline.voices import Heard, SpokenSentence
+from lipmotion.pipeline.training.train import TrainReport, train
+from lipmotion.pipeline.training.voices import Heard, SpokenSentence
 from lipmotion.speech.voices.base import SyntheticVoice
+from lipmotion.testing.toy import toy_sentences
 from lipmotion.units import unit_set
 
 
@@ -123,9 +123,9 @@ def test_other_voices_are_learned_from_but_those_for_judging(
         return toy_model, TrainReport((), {}, {})
 
     both = tuple(SyntheticVoice(name, "flite", name) for name in ("slt", "rms"))
-    monkeypatch.setattr("lipmotion.pipeline.voices.installed_voices", lambda: both)
-    monkeypatch.setattr("lipmotion.pipeline.voices.many_voices", say)
-    monkeypatch.setattr("lipmotion.pipeline.train.train", learn)
+    monkeypatch.setattr("lipmotion.pipeline.training.voices.installed_voices", lambda: both)
+    monkeypatch.setattr("lipmotion.pipeline.training.voices.many_voices", say)
+    monkeypatch.setattr("lipmotion.pipeline.training.train.train", learn)
     (here / "open" / "friend").mkdir(parents=True)
     shutil.copy(toy_speech, here / "open" / "friend" / "one.wav")
     (here / "open" / "friend" / "one.txt").write_text(" ".join(toy_corpus.utterance("toy00").words or ()))
@@ -139,7 +139,7 @@ def test_an_engine_without_a_use_for_voices(
 ) -> None:
     sentence = toy_sentences(3)[0]
     one = SpokenSentence("one", "rms", sentence.audio, sentence.units)
-    monkeypatch.setattr("lipmotion.pipeline.voices.many_voices", lambda **_: iter([one]))
+    monkeypatch.setattr("lipmotion.pipeline.training.voices.many_voices", lambda **_: iter([one]))
     refused = run("train", toy_corpus.path, "-o", "other", "--voices")
     assert is_one_error(refused, 3)
     assert "the trajectory engine cannot learn from other voices" in refused.err[0]

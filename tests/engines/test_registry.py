@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from lipmotion.engines import ENGINES, engine_as_told, engine_named
-from lipmotion.engines.coupled.systems import SYSTEMS
+from lipmotion.engines.coupled.chains.structures import SYSTEMS
 from lipmotion.errors import InputError
 
 

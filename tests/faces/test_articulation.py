@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from lipmotion.faces.character.articulation import BLEND_S, TIP_RAISES, TUCKS, weight
+from lipmotion.faces.portrait.articulation import BLEND_S, TIP_RAISES, TUCKS, weight
 from lipmotion.types import Span, Timeline, Unit
 
 

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from lipmotion.faces.character.bands import COLUMNS, Bands
-from lipmotion.faces.character.view import View
+from lipmotion.faces.portrait.bands import COLUMNS, Bands
+from lipmotion.faces.portrait.view import View
 
 
 def canvas(size: int = 64) -> tuple[Bands, np.ndarray, np.ndarray]:

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from lipmotion.faces.character.eyes import closure
+from lipmotion.faces.portrait.eyes import closure
 
 
 def test_eyes_blink_a_few_times_a_minute_and_are_open_otherwise():

@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lipmotion.faces.character.geometry import HALF_WIDTH, LINE_Y, TEETH_EDGE, inside, lips, roundness
-from lipmotion.faces.character.pose import TUCKED_GAP, WIDEST, MouthPose, jaw_drop
+from lipmotion.faces.portrait.geometry import HALF_WIDTH, LINE_Y, TEETH_EDGE, inside, lips, roundness
+from lipmotion.faces.portrait.pose import TUCKED_GAP, WIDEST, MouthPose, jaw_drop
 
 X = np.linspace(-0.5, 0.5, 1001)
 MIDDLE = 500

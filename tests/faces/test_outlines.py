@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from lipmotion.faces.character.outlines import STEPS, closed, corners, ellipse, lowered, opened, stroke, symmetric
+from lipmotion.faces.portrait.outlines import STEPS, closed, corners, ellipse, lowered, opened, stroke, symmetric
 
 PATH = "0 0, 1 0.5, 2 -0.5, 3 0"
 

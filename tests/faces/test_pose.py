@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.faces.character.pose import CLOSED_BELOW, WIDEST, drawn_gap, jaw_drop, mouth_poses, upper_share
+from lipmotion.faces.portrait.pose import CLOSED_BELOW, WIDEST, drawn_gap, jaw_drop, mouth_poses, upper_share
 from lipmotion.types import Channel, Motion, Span, Timeline, Unit
 
 NOTHING_SAID: Timeline[Unit] = Timeline(())

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.faces.character import render
-from lipmotion.faces.character.geometry import LINE_Y
-from lipmotion.faces.character.view import View
+from lipmotion.faces.portrait import render
+from lipmotion.faces.portrait.geometry import LINE_Y
+from lipmotion.faces.portrait.view import View
 from lipmotion.types import Channel, Motion, Span, Timeline, Unit
 
 NOTHING_SAID: Timeline[Unit] = Timeline(())

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lipmotion.faces.character import render
+from lipmotion.faces.portrait import render
 from lipmotion.types import Channel, Motion, Span, Timeline, Unit
 
 pytestmark = pytest.mark.video

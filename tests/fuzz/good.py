@@ -7,10 +7,10 @@ from pathlib import Path
 from fuzz.inputs import Good
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import engine_named
+from lipmotion.hmm.model import HmmConfig
 from lipmotion.pipeline.model import save_model
-from lipmotion.pipeline.toy import toy_utterances
-from lipmotion.pipeline.train import train
-from lipmotion.stats.hmm.model import HmmConfig
+from lipmotion.pipeline.training.train import train
+from lipmotion.testing.toy import toy_utterances
 
 SENTENCES = 6
 ENGINES: dict[str, dict[str, object]] = {

@@ -8,13 +8,13 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from lipmotion.appearance.eigenlips import eigenlips_arrays
 from lipmotion.errors import ModelFormatError
-from lipmotion.pipeline.hear import heard
+from lipmotion.hmm.model import hmm_arrays
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.toy import ToySentence
+from lipmotion.pipeline.understand import heard
 from lipmotion.speech.adaptation import adaptation_arrays, unadapted
-from lipmotion.stats.eigenlips import eigenlips_arrays
-from lipmotion.stats.hmm.model import hmm_arrays
+from lipmotion.testing.toy import ToySentence
 from pipeline.damage import DAMAGES, FAR, QUICK, UNREADABLE, animated, damaged, distance, refused
 
 ENGINES = ("toy_model", "joint_model", "coupled_model", "pictured_model")

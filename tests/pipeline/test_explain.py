@@ -12,7 +12,7 @@ import lipmotion
 from lipmotion.errors import InputError
 from lipmotion.pipeline.explain import explanation_document, explanation_text
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.toy import ToySentence
+from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Explanation, Span, Unit, Value
 
 WORDS = "See Bob, papa & mama!"

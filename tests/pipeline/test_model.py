@@ -17,7 +17,7 @@ from lipmotion.errors import ExportError, InputError, ModelFormatError
 from lipmotion.pipeline import model as module
 from lipmotion.pipeline.animate import animate
 from lipmotion.pipeline.model import VERSION, Model, load_model, read_header, save_model
-from lipmotion.stats.archive import HEADER
+from lipmotion.storage.archive import HEADER
 from lipmotion.types import Audio
 
 

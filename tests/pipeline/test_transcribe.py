@@ -6,10 +6,10 @@ import pytest
 
 from lipmotion.errors import AlignmentError, InputError
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.toy import ToySentence
 from lipmotion.pipeline.transcribe import MOST_GUESSES, report_guesses, transcribe
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.recogniser import Recogniser
+from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Audio, Features
 from lipmotion.units import Lexicon
 

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 import lipmotion
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import engine_named
+from lipmotion.hmm.model import HmmConfig
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.toy import toy_sentences, toy_utterances
-from lipmotion.pipeline.train import train
+from lipmotion.pipeline.training.train import train
 from lipmotion.speech.f0 import log_f0
 from lipmotion.speech.mfcc import mfcc
-from lipmotion.stats.hmm.model import HmmConfig
+from lipmotion.testing.toy import toy_sentences, toy_utterances
 from lipmotion.types import Audio, Generation
 
 RATE_HZ = 16_000

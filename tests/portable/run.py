@@ -16,10 +16,13 @@ from portable.settings import BEFORE_AVX, CORES, different_cores, environment, k
 
 TESTS = Path(__file__).parents[1]
 NUMERIC = (
-    *("stats", "measures", "kernels/test_threads.py", "engines/trajectory/test_engine.py"),
-    *(f"speech/{name}" for name in ("general", "test_adaptation.py", "test_f0.py", "test_joint.py", "test_mfcc.py")),
-    *(f"speech/{name}" for name in ("test_recogniser.py", "test_voice.py")),
-    *("pipeline/test_animate.py", "pipeline/test_resume.py"),
+    *("stats", "hmm", "motion", "measures", "kernels/test_threads.py", "engines/trajectory/test_engine.py"),
+    *(
+        f"speech/{name}"
+        for name in ("general", "test_adaptation.py", "test_f0.py", "test_combined_phones.py", "test_mfcc.py")
+    ),
+    *(f"speech/{name}" for name in ("test_recogniser.py", "test_speaker_similarity.py")),
+    *("pipeline/test_animate.py", "pipeline/training/test_resume.py"),
 )
 """Less than a minute of tests that compare what was computed; name others on the command line for more."""
 LEFT_OUT = ["-m", "not recordings and not slow and not video", "-k", "not memory"]

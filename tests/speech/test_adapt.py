@@ -6,11 +6,11 @@ from scipy.signal import butter, lfilter
 
 from lipmotion.errors import InputError
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.toy import toy_sentences
 from lipmotion.speech.adapt import Adapted, adapted
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.recogniser import Recogniser
 from lipmotion.stats.affine import log_determinant
+from lipmotion.testing.toy import toy_sentences
 from lipmotion.types import Audio
 
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import ModelFormatError
-from lipmotion.pipeline.toy import toy_sentences
 from lipmotion.speech.adaptation import Adaptation, adaptation_arrays, adaptation_from_arrays, unadapted
 from lipmotion.speech.general.front_end import general_features
 from lipmotion.speech.mfcc import mfcc
+from lipmotion.testing.toy import toy_sentences
 from lipmotion.types import Audio
 
 

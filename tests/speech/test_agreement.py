@@ -7,13 +7,13 @@ import pytest
 
 from lipmotion.corpora.grid import sentence
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.pipeline.toy import ToySentence, toy_sentences
 from lipmotion.speech.agreement import DOUBTFUL, JUDGED, agreement
 from lipmotion.speech.general.acoustic import PHONES, general_model
 from lipmotion.speech.general.front_end import general_features
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.read import read_audio
 from lipmotion.speech.recogniser import Recogniser
+from lipmotion.testing.toy import ToySentence, toy_sentences
 from lipmotion.types import Span, Timeline, Unit
 from lipmotion.units import Lexicon
 

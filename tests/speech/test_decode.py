@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from lipmotion.errors import InputError
-from lipmotion.media import open_media
 from lipmotion.speech.read import read_audio
+from lipmotion.storage.media import open_media
 from speech.opened import opened_in
 from speech.sound import babble, write_constant_flac, write_pictures, write_sound, write_stamped
 

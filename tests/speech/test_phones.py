@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import CorpusError
-from lipmotion.pipeline.toy import WORDS, ToySentence, toy_sentences
+from lipmotion.hmm.model import HmmConfig
 from lipmotion.speech.phones import train_phones
-from lipmotion.stats.hmm.model import HmmConfig
+from lipmotion.testing.toy import WORDS, ToySentence, toy_sentences
 from lipmotion.types.progress import silent_monitor
 from lipmotion.units import PAUSE, SILENCE, Lexicon
 

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import AlignmentError, InputError
+from lipmotion.hmm.model import UnitHmm
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.pipeline.toy import WORDS, ToySentence, toy_sentences
 from lipmotion.speech import recogniser as module
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.read import read_audio
 from lipmotion.speech.recogniser import FAMILIAR, FOREIGN, KINDS, SHORT_PAUSE_S, Recogniser, recogniser
+from lipmotion.speech.speaker_similarity import Voice
 from lipmotion.speech.synthesise import synthesise
-from lipmotion.speech.voice import Voice
-from lipmotion.stats.hmm.model import UnitHmm
+from lipmotion.testing.toy import WORDS, ToySentence, toy_sentences
 from lipmotion.types import Audio, Timeline, Unit
 from lipmotion.units import PAUSE, PHONES, SILENCE, Lexicon, words_of
 

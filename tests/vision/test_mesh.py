@@ -45,7 +45,7 @@ def test_native_messages_are_dropped_only_inside(capfd):
 def test_importing_needs_no_video_packages():
     code = (
         "import sys; sys.modules['cv2'] = sys.modules['mediapipe'] = None; "
-        "import lipmotion.vision.track, lipmotion.corpora.store, lipmotion.pipeline.prepare"
+        "import lipmotion.vision.track, lipmotion.corpora.store, lipmotion.pipeline.corpus.prepare"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
 

@@ -22,9 +22,9 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Call ``lipmotion.adapt`` and ``lipmotion.save_model``."""
-    from lipmotion.files import check_target
     from lipmotion.pipeline.adapt import adapt
     from lipmotion.pipeline.model import save_model
+    from lipmotion.storage.files import check_target
 
     check_target(options.output)
     model = adapt(options.model, options.recordings)

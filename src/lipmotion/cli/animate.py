@@ -27,7 +27,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 def run(options: argparse.Namespace) -> None:
     """Call ``lipmotion.animate`` and ``lipmotion.write``."""
     from lipmotion.pipeline.animate import animate, check_outputs, write
-    from lipmotion.pipeline.beliefs import animate_with_beliefs, check_picture, write_beliefs
+    from lipmotion.pipeline.posteriors import animate_with_beliefs, check_picture, write_beliefs
 
     check_outputs(options.output, options.speech, rate_hz=options.rate, fps=options.fps)
     if options.posteriors:

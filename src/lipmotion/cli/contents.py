@@ -18,7 +18,7 @@ def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 def run(options: argparse.Namespace) -> None:
     """Print what ``lipmotion.Corpus`` says of itself, and how late its sound is."""
     from lipmotion.corpora.store import Corpus
-    from lipmotion.pipeline.offset import offsets
+    from lipmotion.pipeline.corpus.sync import offsets
 
     corpus = Corpus.open(options.corpus)
     for name, value in (*corpus.summary().items(), *(("offset", line) for line in offsets(corpus).lines())):

@@ -29,7 +29,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 def run_prepare(options: argparse.Namespace) -> None:
     """Call ``lipmotion.prepare``."""
     from lipmotion.cli.progress import reporting
-    from lipmotion.pipeline.prepare import prepare
+    from lipmotion.pipeline.corpus.prepare import prepare
 
     given = {"workers": options.workers, "crops": options.crops}
     with reporting(options) as report:

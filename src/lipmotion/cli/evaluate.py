@@ -27,7 +27,7 @@ def run(options: argparse.Namespace) -> None:
     """Call ``lipmotion.evaluate`` and print its figures."""
     from lipmotion.corpora.store import Corpus
     from lipmotion.measures.report import table
-    from lipmotion.pipeline.evaluate import evaluate
+    from lipmotion.pipeline.evaluation.evaluate import evaluate
     from lipmotion.pipeline.model import load_model
 
     chosen = {"split": list_or_all(options.split), "speakers": options.speaker, "recogniser": options.recogniser}

@@ -75,7 +75,7 @@ class Status(Events):
         self._over = False
 
     def start(self, options: Namespace) -> None:  # noqa: D102
-        from lipmotion.files import as_text
+        from lipmotion.storage.files import as_text
 
         name = as_text(options.speech)
         self.say("start", "Info", f'Application startup. Input file: "{name}".', file=name)

@@ -27,8 +27,8 @@ def report_figures(
 ) -> None:
     """Call ``compute(lexicon=..., monitor=...)``, write its figures, and print their table."""
     from lipmotion.cli.progress import reporting
-    from lipmotion.files import check_target, whole_file
-    from lipmotion.json_text import as_json, defined
+    from lipmotion.storage.files import check_target, whole_file
+    from lipmotion.storage.json_text import as_json, defined
     from lipmotion.units import Lexicon
 
     with reporting(options) as report:

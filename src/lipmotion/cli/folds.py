@@ -18,6 +18,6 @@ def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Call ``experiment.folds`` and print its table."""
-    from lipmotion.experiment.folds import folds, table
+    from lipmotion.experiments.folds import folds, table
 
     run_experiment(options, partial(folds, count=options.folds), table)

@@ -26,7 +26,7 @@ def run(options: argparse.Namespace) -> None:
     """Call ``experiment.learning_curve`` and print its table."""
     from lipmotion.corpora.splits import names_in
     from lipmotion.corpora.store import Corpus
-    from lipmotion.experiment.learning_curve import learning_curve, table
+    from lipmotion.experiments.learning_curve import learning_curve, table
 
     def experiment(corpus: Corpus, **given: Any) -> dict[str, Any]:
         order = names_in(options.order) if options.order else None

@@ -11,8 +11,8 @@ from contextlib import suppress
 from typing import Any
 
 from lipmotion.errors import ExportError
-from lipmotion.json_text import as_json, defined
 from lipmotion.printable import printable
+from lipmotion.storage.json_text import as_json, defined
 
 LINE_START = "\r\x1b[K"
 """Over what is left of a progress bar, on a terminal."""

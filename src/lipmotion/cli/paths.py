@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from lipmotion.files import work_folder
-from lipmotion.sources import Source, check_apart, is_folder
+from lipmotion.storage.files import work_folder
+from lipmotion.storage.sources import Source, check_apart, is_folder
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 def run(options: argparse.Namespace) -> None:
     """Call ``prompts`` and print the sentences, each with what is covered after it."""
     from lipmotion.corpora.store import Corpus
-    from lipmotion.pipeline.prompts import prompts
+    from lipmotion.pipeline.corpus.prompts import prompts
     from lipmotion.units import Lexicon
 
     have = Corpus.open(options.have) if options.have else None

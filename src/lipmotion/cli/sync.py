@@ -16,9 +16,9 @@ def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Call ``lipmotion.pipeline.offset.sync``."""
+    """Call ``lipmotion.pipeline.corpus.sync.sync``."""
     from lipmotion.corpora.store import Corpus
-    from lipmotion.pipeline.offset import sync
+    from lipmotion.pipeline.corpus.sync import sync
 
     corpus = Corpus.open(options.corpus)
     moved = sync(corpus)

@@ -40,9 +40,9 @@ def run(options: argparse.Namespace) -> None:
     """Call ``experiment.table3`` and print its table."""
     from lipmotion.corpora.splits import names_in
     from lipmotion.corpora.store import Corpus
-    from lipmotion.experiment.noise import talkers_in
-    from lipmotion.experiment.table3 import Noises, table3
-    from lipmotion.experiment.table3_text import table
+    from lipmotion.experiments.noise import talkers_in
+    from lipmotion.experiments.xie_liu2007.table3 import Noises, table3
+    from lipmotion.experiments.xie_liu2007.table3_text import table
 
     def experiment(corpus: Corpus, **given: Any) -> dict[str, Any]:
         kinds = tuple(kind for kind in options.noise.split(",") if kind)

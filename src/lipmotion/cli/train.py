@@ -41,10 +41,10 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.cli.progress import reporting
     from lipmotion.corpora.store import Corpus
     from lipmotion.engines import engine_as_told
-    from lipmotion.files import unfinished_work
     from lipmotion.pipeline.model import save_model
-    from lipmotion.pipeline.train import train
-    from lipmotion.pipeline.voices import other_voices
+    from lipmotion.pipeline.training.train import train
+    from lipmotion.pipeline.training.voices import other_voices
+    from lipmotion.storage.files import unfinished_work
     from lipmotion.units import Lexicon
 
     split, workers = list_or_all(options.split), options.workers or os.cpu_count() or 1

@@ -20,7 +20,7 @@ def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Call ``experiment.unit_sets`` and print its table."""
-    from lipmotion.experiment.unit_sets import table, unit_sets
+    from lipmotion.experiments.hofer2008.unit_sets import table, unit_sets
 
     chosen = {"split": list_or_all(options.split), "closures": options.closures}
     run_experiment(options, partial(unit_sets, **chosen), table)

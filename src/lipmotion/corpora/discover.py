@@ -9,7 +9,7 @@ from lipmotion.corpora.facegood import read_facegood
 from lipmotion.corpora.folder import MOTION_SUFFIXES, read_folder
 from lipmotion.corpora.grid import read_grid
 from lipmotion.errors import CorpusError, InputError
-from lipmotion.files import check_listable
+from lipmotion.storage.files import check_listable
 
 
 def discover(directory: Path) -> Recordings:

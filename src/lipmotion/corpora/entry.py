@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from lipmotion.corpora.splits import SPLITS
 from lipmotion.errors import CorpusError, InputError
-from lipmotion.files import check_regular, text_in, whole_folder
-from lipmotion.json_text import as_json, from_json
-from lipmotion.stats.schema import Member, check
+from lipmotion.storage.files import check_regular, text_in, whole_folder
+from lipmotion.storage.json_text import as_json, from_json
+from lipmotion.storage.schema import Member, check
 from lipmotion.types import (
     FRAME_RATE_HZ,
     Audio,

@@ -17,8 +17,8 @@ from lipmotion.corpora.base import AUDIO_SUFFIXES, Curves, Recording, Recordings
 from lipmotion.corpora.labels import labels_beside
 from lipmotion.corpora.splits import LISTS, with_splits
 from lipmotion.errors import InputError
-from lipmotion.files import check_regular
-from lipmotion.stats.archive import array_in
+from lipmotion.storage.archive import array_in
+from lipmotion.storage.files import check_regular
 from lipmotion.types import WEIGHT, Channel, Motion
 
 KIND = "FACEGOOD blendshape weights"

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from lipmotion.corpora.base import Recordings
 from lipmotion.errors import CorpusError, InputError
-from lipmotion.files import text_in
+from lipmotion.storage.files import text_in
 
 SPLITS = ("train", "val", "test")
 LISTS = tuple(f"{split}.txt" for split in SPLITS)

@@ -9,8 +9,8 @@ from typing import Any
 from lipmotion.corpora.entry import MOST, is_name, read_entry, read_utterance, write_utterance
 from lipmotion.corpora.splits import SPLITS
 from lipmotion.errors import CorpusError, ExportError
-from lipmotion.files import TEMPORARY, remove_unfinished, text_in, whole_file
-from lipmotion.json_text import as_json, from_json
+from lipmotion.storage.files import TEMPORARY, remove_unfinished, text_in, whole_file
+from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.types import Utterance
 
 FORMAT = "lipmotion.corpus"

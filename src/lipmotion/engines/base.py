@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.stats.checkpoint import NOTHING_KEPT, Checkpoint
+from lipmotion.storage.checkpoint import NOTHING_KEPT, Checkpoint
 from lipmotion.types import (
     ChainBelief,
     Constraints,
@@ -133,9 +133,3 @@ def traced(result: Generation, frame: int) -> Explanation:
         trace.states[trace.frames[frame]],
         {name: Value(value, deviation) for name, value, deviation in values},
     )
-
-
-def frame_of(time_s: float, frames: int, rate_hz: float) -> int | None:
-    """Return the frame nearest to a time, or None where the recording has none."""
-    frame = np.floor(time_s * rate_hz + 0.5)
-    return int(frame) if 0 <= frame < frames else None

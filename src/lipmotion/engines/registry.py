@@ -7,11 +7,11 @@ from dataclasses import Field, fields
 from typing import Any
 
 from lipmotion.engines.base import Engine
+from lipmotion.engines.coupled.chains.structures import SYSTEMS, structure_of
 from lipmotion.engines.coupled.config import CoupledConfig
 from lipmotion.engines.coupled.engine import CoupledEngine
-from lipmotion.engines.coupled.systems import SYSTEMS, structure_of
+from lipmotion.engines.joint.engine import JointEngine, JointEngineConfig
 from lipmotion.engines.trajectory.engine import TrajectoryConfig, TrajectoryEngine
-from lipmotion.engines.trajectory.joint.engine import JointEngine, JointEngineConfig
 from lipmotion.errors import InputError
 from lipmotion.units import unit_set
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.export import motion_csv, motion_json, motion_npz
-from lipmotion.files import check_regular, whole_file
+from lipmotion.export.motion import motion_csv, motion_json, motion_npz
+from lipmotion.storage.files import check_regular, whole_file
 from lipmotion.types import Generation, Motion, Timeline, Unit
 
 About = Mapping[str, str]

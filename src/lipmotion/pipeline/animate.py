@@ -7,11 +7,11 @@ from pathlib import Path
 
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export.base import MOTION_SUFFIXES, check_motion, write_motion
-from lipmotion.files import as_text, check_distinct, check_target
 from lipmotion.kernels.threads import one_thread
-from lipmotion.pipeline.hear import heard
 from lipmotion.pipeline.model import Model, load_model
+from lipmotion.pipeline.understand import heard
 from lipmotion.speech.read import read_audio
+from lipmotion.storage.files import as_text, check_distinct, check_target
 from lipmotion.types import Audio, Constraints, Generation, Timeline, Unit
 from lipmotion.units import Lexicon
 
@@ -126,8 +126,8 @@ def _text(value: object) -> str:
 
 
 def _write_video(generation: Generation, path: Path, speech: Path, fps: float) -> None:
-    from lipmotion.export.mp4 import write_mp4
-    from lipmotion.faces.character import render
+    from lipmotion.export.video import write_mp4
+    from lipmotion.faces.portrait import render
 
     frames = render(generation.motion, generation.units, fps=fps)
     write_mp4(path, frames, fps=fps, audio=read_audio(speech, SOUND_RATE_HZ))

@@ -9,7 +9,7 @@ import numpy as np
 
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export.cues import CUE_FORMATS, OPTIONAL, CueSheet, choose_cues, format_of, write_cue_file
-from lipmotion.files import as_text, check_distinct, check_target
+from lipmotion.storage.files import as_text, check_distinct, check_target
 from lipmotion.types import Generation
 
 FASTEST_FPS = 60.0

@@ -8,11 +8,10 @@ from pathlib import Path
 from textwrap import wrap
 from typing import Any
 
-from lipmotion.engines.base import frame_of
 from lipmotion.errors import InputError
 from lipmotion.kernels.threads import one_thread
-from lipmotion.pipeline.hear import heard
 from lipmotion.pipeline.model import Model, load_model
+from lipmotion.pipeline.understand import heard
 from lipmotion.printable import printable
 from lipmotion.speech.mfcc import frame_count
 from lipmotion.speech.read import read_audio
@@ -27,6 +26,7 @@ from lipmotion.types import (
     Timeline,
     Unit,
     Value,
+    frame_of,
 )
 from lipmotion.units import Lexicon
 

@@ -11,15 +11,15 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from lipmotion.appearance.eigenlips import Eigenlips, eigenlips_arrays, eigenlips_from_arrays
 from lipmotion.engines import Engine, engine_named
 from lipmotion.errors import InputError, ModelFormatError
-from lipmotion.pipeline.visual import EIGENLIPS, GEOMETRY
+from lipmotion.hmm.model import HmmConfig, UnitHmm, hmm_arrays, hmm_from_arrays
+from lipmotion.pipeline.training.channels import EIGENLIPS, GEOMETRY
 from lipmotion.speech.adaptation import Adaptation, adaptation_arrays, adaptation_from_arrays
 from lipmotion.speech.mfcc import FEATURES
-from lipmotion.stats.archive import UNREADABLE, read_archive, read_archive_header, write_archive
-from lipmotion.stats.eigenlips import Eigenlips, eigenlips_arrays, eigenlips_from_arrays
-from lipmotion.stats.hmm.model import HmmConfig, UnitHmm, hmm_arrays, hmm_from_arrays
-from lipmotion.stats.schema import only, under
+from lipmotion.storage.archive import UNREADABLE, read_archive, read_archive_header, write_archive
+from lipmotion.storage.schema import only, under
 
 FORMAT = "lipmotion.model"
 VERSION = 3

@@ -8,9 +8,9 @@ from pathlib import Path
 
 from lipmotion.corpora.labels import check_plain
 from lipmotion.errors import shortened
-from lipmotion.files import text_in
 from lipmotion.speech.agreement import DOUBTFUL, agreement
 from lipmotion.speech.recogniser import Recogniser
+from lipmotion.storage.files import text_in
 from lipmotion.types import Audio, Features, Timeline, Unit
 from lipmotion.units import Lexicon, check_words
 from lipmotion.units.speaking_rate import LARGEST_TRANSCRIPT

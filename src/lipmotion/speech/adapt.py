@@ -10,15 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
+from lipmotion.hmm.model import UnitHmm
 from lipmotion.speech.adaptation import Adaptation, unadapted
+from lipmotion.speech.combined_phones import NOISES
 from lipmotion.speech.general.acoustic import STREAMS, general_model
 from lipmotion.speech.general.front_end import general_features
-from lipmotion.speech.joint import NOISES
 from lipmotion.speech.mfcc import FEATURES, mfcc
 from lipmotion.speech.recogniser import Recogniser, trusted
-from lipmotion.speech.voice import WARPS
+from lipmotion.speech.speaker_similarity import WARPS
 from lipmotion.stats.affine import AffineStatistics, Array, heard_statistics, improved, own_statistics
-from lipmotion.stats.hmm.model import UnitHmm
 from lipmotion.stats.mixture import Mixtures
 from lipmotion.types import FRAME_RATE_HZ, Audio
 from lipmotion.units import is_silent

@@ -13,7 +13,7 @@ from lipmotion.speech.general.acoustic import STREAMS
 from lipmotion.speech.general.front_end import general_features
 from lipmotion.speech.mfcc import FEATURES, mfcc
 from lipmotion.stats.affine import identity, transformed
-from lipmotion.stats.schema import STANDARD, Arrays, Member, checked, only
+from lipmotion.storage.schema import STANDARD, Arrays, Member, checked, only
 from lipmotion.types import Audio, Features
 
 WIDEST_WARP = 2.0

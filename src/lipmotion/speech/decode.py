@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.media import moving_pictures, stated_duration_s
+from lipmotion.storage.media import moving_pictures, stated_duration_s
 
 HOLE_S = 0.04
 """A frame this much later than the end of the one before leaves a hole; time stamps are rounded to 1 ms or better."""

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
+from lipmotion.hmm.loudness import loud_frames
 from lipmotion.speech.mfcc import HOP, checked_samples, log_energy
-from lipmotion.stats.hmm.loudness import loud_frames
 from lipmotion.types import Audio
 
 KINDS = ("white", "babble")

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import cycle
 
+from lipmotion.hmm.model import HmmConfig, UnitHmm
+from lipmotion.hmm.train import Transcribed, UnitInventory, train_hmm
 from lipmotion.speech.mfcc import LOG_ENERGY, mfcc
-from lipmotion.stats.checkpoint import NOTHING_KEPT, Checkpoint
-from lipmotion.stats.hmm.model import HmmConfig, UnitHmm
-from lipmotion.stats.hmm.train import Transcribed, UnitInventory, train_hmm
+from lipmotion.storage.checkpoint import NOTHING_KEPT, Checkpoint
 from lipmotion.types import Audio, Each, Monitor
 from lipmotion.units import PAUSE, SILENCE, Lexicon
 

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.files import check_source
-from lipmotion.media import open_media
 from lipmotion.speech.decode import Decoded, check_form, decode
+from lipmotion.storage.files import check_source
+from lipmotion.storage.media import open_media
 from lipmotion.types import Audio
 
 LOG = logging.getLogger("lipmotion")

@@ -11,16 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError, InputError
+from lipmotion.hmm.align import align_units, choose_pronunciations
+from lipmotion.hmm.decode import UnitLoop, decode_units, unit_loop
+from lipmotion.hmm.log_likelihoods import Evidence, always_silent, heard, never_silent
+from lipmotion.hmm.loudness import loud_frames, quiet_frames
+from lipmotion.hmm.model import UnitHmm
 from lipmotion.speech.adaptation import Adaptation
+from lipmotion.speech.combined_phones import NOISES, Joint, joined, joint_evidence
 from lipmotion.speech.general.front_end import general_features
-from lipmotion.speech.joint import NOISES, Joint, joined, joint_evidence
 from lipmotion.speech.mfcc import LOG_ENERGY, log_energy
-from lipmotion.speech.voice import fitted
-from lipmotion.stats.hmm.align import align_units, choose_pronunciations
-from lipmotion.stats.hmm.decode import UnitLoop, decode_units, unit_loop
-from lipmotion.stats.hmm.evidence import Evidence, always_silent, heard, never_silent
-from lipmotion.stats.hmm.loudness import loud_frames, quiet_frames
-from lipmotion.stats.hmm.model import UnitHmm
+from lipmotion.speech.speaker_similarity import fitted
 from lipmotion.types import FRAME_RATE_HZ, Audio, Features, Span, Timeline, Unit
 from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent, stand_in
 

@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.stats.schema import Member
+from lipmotion.storage.schema import Member
 
 DISCOUNT = 0.5
 BIGRAM = {"bigram": Member(np.float32, "U U", -1e4, 0.1)}

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.stats.schema import LARGEST_VARIANCE, POSITIVE, STANDARD, Checked, Member
+from lipmotion.storage.schema import LARGEST_VARIANCE, POSITIVE, STANDARD, Checked, Member
 
 SPLIT_STEP = 0.2
 """Halves of a split component move apart by this many standard deviations."""

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.printable import printable
-from lipmotion.stats.schema import Arrays, Member, checked
+from lipmotion.storage.schema import Arrays, Member, checked
 
 Context = tuple[str, ...]
 """What a state depends on, one name a place (left neighbour, unit, right neighbour)."""

@@ -11,7 +11,7 @@ from lipmotion.types.explanation import (
     Regression,
     Value,
 )
-from lipmotion.types.features import FRAME_RATE_HZ, Features
+from lipmotion.types.features import FRAME_RATE_HZ, Features, frame_of
 from lipmotion.types.generation import Constraints, Example, Generation, Pin, Speech, Spread, Trace
 from lipmotion.types.motion import EYE_DISTANCE, GREY, WEIGHT, Channel, Motion, check_curves, check_magnitude
 from lipmotion.types.progress import Item, Monitor, Progress, counted, part_of, silent_monitor
@@ -53,6 +53,7 @@ __all__ = [
     "check_curves",
     "check_magnitude",
     "counted",
+    "frame_of",
     "part_of",
     "silent_monitor",
 ]

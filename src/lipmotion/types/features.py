@@ -21,3 +21,9 @@ class Features:
 
     values: NDArray[np.float32]
     duration_s: float
+
+
+def frame_of(time_s: float, frames: int, rate_hz: float) -> int | None:
+    """Return the frame nearest to a time, or None where the recording has none."""
+    frame = np.floor(time_s * rate_hz + 0.5)
+    return int(frame) if 0 <= frame < frames else None

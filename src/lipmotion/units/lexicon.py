@@ -10,7 +10,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from lipmotion.errors import InputError, MissingDependencyError, shortened
-from lipmotion.files import text_in
+from lipmotion.storage.files import text_in
 from lipmotion.units.phones import PHONES, is_silent
 from lipmotion.units.spelling import guess
 from lipmotion.units.transcript import plain

@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 
 from lipmotion.errors import InputError, shortened
-from lipmotion.files import text_in
+from lipmotion.storage.files import text_in
 from lipmotion.types import Unit
 from lipmotion.units.classes import phone_classes
 from lipmotion.units.phones import PHONES, SILENCE, is_silent, unknown_phone

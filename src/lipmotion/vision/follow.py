@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.vision.landmarks import EYE_CORNERS, TRACKED_POINTS
-from lipmotion.vision.looks import face_of, likeness, scene_of
 from lipmotion.vision.mesh import FaceMesh
+from lipmotion.vision.similarity import face_of, likeness, scene_of
 
 Image = NDArray[np.uint8]
 Array = NDArray[np.float64]

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.files import check_source
-from lipmotion.media import MOST_PIXELS, moving_pictures, open_media, stated_duration_s
+from lipmotion.storage.files import check_source
+from lipmotion.storage.media import MOST_PIXELS, moving_pictures, open_media, stated_duration_s
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,9 +13,9 @@ from lipmotion.types import Channel, Motion, Track
 from lipmotion.vision.follow import Follower
 from lipmotion.vision.frames import Video, open_video
 from lipmotion.vision.landmarks import DISTANCES, EYE_CORNERS, JAW_POINTS, LIP_POINTS, TRACKED_POINTS
-from lipmotion.vision.looks import mouth_of, strange_mouths
 from lipmotion.vision.mouth import eyes_to_image, face_to_image, mouth_crop
 from lipmotion.vision.pose import head_frame
+from lipmotion.vision.similarity import mouth_of, strange_mouths
 from lipmotion.vision.timing import (
     HIGHEST_HZ,
     LOWEST_HZ,

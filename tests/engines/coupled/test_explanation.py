@@ -8,6 +8,7 @@ import pytest
 from engines.coupled.tiny import THREE, TWO, chains, observed, structure
 from engines.synthetic import CHANNELS, examples, speech, timeline
 from lipmotion.engines import engine_named
+from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, MULTISTREAM, SYSTEMS
 from lipmotion.engines.coupled.explanation import (
     _regression_name,
     chain_states,
@@ -17,8 +18,7 @@ from lipmotion.engines.coupled.explanation import (
     leads,
     units_believed,
 )
-from lipmotion.engines.coupled.systems import COUPLED, FACTORIAL, HMM, MULTISTREAM, SYSTEMS
-from lipmotion.engines.trajectory import generation
+from lipmotion.motion import generation
 from lipmotion.types import Explanation, Likely
 from lipmotion.types.progress import silent_monitor
 from lipmotion.units import VISEME_OF

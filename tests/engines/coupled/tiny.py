@@ -4,11 +4,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from lipmotion.engines.coupled.densities import Group, Observed
-from lipmotion.engines.coupled.model import Chains
-from lipmotion.engines.coupled.product import Grammar, reachable
-from lipmotion.engines.coupled.systems import COUPLED, HMM, Structure
-from lipmotion.engines.coupled.transitions import first_transitions
+from lipmotion.engines.coupled.chains.densities import Group, Observed
+from lipmotion.engines.coupled.chains.model import Chains
+from lipmotion.engines.coupled.chains.product import Grammar, reachable
+from lipmotion.engines.coupled.chains.structures import COUPLED, HMM, Structure
+from lipmotion.engines.coupled.chains.transitions import first_transitions
 from lipmotion.stats.mixture import Mixtures
 from lipmotion.units import PHONES, UnitSet
 from lipmotion.units.unit_set import CLOSED

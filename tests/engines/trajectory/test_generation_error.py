@@ -9,8 +9,8 @@ import pytest
 from engines.synthetic import examples
 from lipmotion.engines.trajectory import generation_error as module
 from lipmotion.engines.trajectory.engine import TrajectoryConfig
-from lipmotion.engines.trajectory.learning import rows_of
 from lipmotion.engines.trajectory.train import fit_trajectory, observed_of
+from lipmotion.engines.trajectory.training_data import rows_of
 from lipmotion.kernels.banded import generate
 from lipmotion.types.progress import silent_monitor
 

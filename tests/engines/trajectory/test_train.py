@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from engines.synthetic import examples
-from lipmotion.engines.trajectory.contexts import Cut, Place, places
 from lipmotion.engines.trajectory.engine import TrajectoryConfig
 from lipmotion.engines.trajectory.train import LEAST_VARIANCE, fit_trajectory
+from lipmotion.motion.frame_labels import Cut, Place, places
 from lipmotion.types.progress import silent_monitor
 
 HOW = replace(TrajectoryConfig(parts=3, silent_parts=7, components=2, listens=False).learning)

@@ -8,9 +8,9 @@ import pytest
 
 from engines.synthetic import OPENINGS, examples, speech, timeline
 from lipmotion.engines import Engine, engine_named
-from lipmotion.engines.trajectory.closure import closing_spans
-from lipmotion.engines.trajectory.contexts import Cut, places
 from lipmotion.errors import InputError, ModelFormatError
+from lipmotion.motion.closure import closing_spans
+from lipmotion.motion.frame_labels import Cut, places
 from lipmotion.types import Generation
 from lipmotion.types.progress import silent_monitor
 from lipmotion.units import LIP_CLOSING, PHONES, UNIT_SETS, unit_set

@@ -5,7 +5,7 @@ from itertools import accumulate
 
 import numpy as np
 
-from lipmotion.pipeline.toy import toy_motion
+from lipmotion.testing.toy import toy_motion
 from lipmotion.types import Generation, Motion, Span, Timeline, Trace, Unit
 
 

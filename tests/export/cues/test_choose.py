@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from export.cues.conftest import result, spoken, timeline
 from lipmotion.export.cues.choose import choose_cues, usual_hold
 from lipmotion.export.cues.sheet import CueSheet
-from lipmotion.pipeline.toy import ToySentence, toy_sentences
+from lipmotion.testing.toy import ToySentence, toy_sentences
 from lipmotion.types import Channel, Generation, Motion, Timeline, Unit
 from lipmotion.units import LIP_CLOSING, PHONES, VISEMES, is_silent
 

@@ -18,7 +18,7 @@ from lipmotion.export.cues.base import CUE_FORMATS, format_of, write_cue_file
 from lipmotion.export.cues.choose import choose_cues
 from lipmotion.export.cues.shapes import SHAPES
 from lipmotion.export.cues.sheet import CueSheet
-from lipmotion.pipeline.toy import ToySentence
+from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Channel, Motion, Timeline
 
 NAMES = ["hi.wav", "C:\\av\\hi.wav", 'Größe & <"tea\'s"> 茶 😀.wav', "line\nbreak\ttab.wav", "bell\x07\x00.wav", ""]

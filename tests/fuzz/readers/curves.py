@@ -15,7 +15,7 @@ from fuzz.readers.plausible import require, short_speech
 from lipmotion.corpora.base import Curves
 from lipmotion.corpora.facegood import channels_in
 from lipmotion.corpora.store import Corpus
-from lipmotion.pipeline.given import given_track
+from lipmotion.pipeline.corpus.supplied_motion import given_track
 from lipmotion.types import WEIGHT
 from robustness.case import npy
 from robustness.motion_cases import GOOD

@@ -10,7 +10,7 @@ from lipmotion.corpora.base import Recording, Recordings
 from lipmotion.corpora.grid import aligned_words
 from lipmotion.corpora.labels import read_labels
 from lipmotion.corpora.splits import LISTS, with_splits
-from lipmotion.pipeline.given import given_phones
+from lipmotion.pipeline.corpus.supplied_motion import given_phones
 
 LONG = """File type = "ooTextFile"
 Object class = "TextGrid"

@@ -8,23 +8,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.engines.coupled.chains.densities import Group
+from lipmotion.engines.coupled.chains.model import Chains
+from lipmotion.engines.coupled.chains.product import Grammar, reachable
+from lipmotion.engines.coupled.chains.structures import FACTORIAL, Structure
+from lipmotion.engines.coupled.chains.transitions import Transitions
+from lipmotion.engines.coupled.chains.unlimited import FreeProduct, FreeTransitions
+from lipmotion.engines.coupled.chains.visual_streams import VisualStream
 from lipmotion.engines.coupled.config import CoupledConfig
-from lipmotion.engines.coupled.densities import Group
-from lipmotion.engines.coupled.following import OFFSETS, Following, Surroundings
-from lipmotion.engines.coupled.free import FreeProduct, FreeTransitions
-from lipmotion.engines.coupled.learned import CoupledModel
-from lipmotion.engines.coupled.model import Chains
-from lipmotion.engines.coupled.product import Grammar, reachable
-from lipmotion.engines.coupled.systems import FACTORIAL, Structure
-from lipmotion.engines.coupled.transitions import Transitions
-from lipmotion.engines.coupled.visual import VisualStream
-from lipmotion.engines.trajectory.frame import FRAME, SINGLE, frame_arrays, frame_from_arrays
-from lipmotion.engines.trajectory.reach import check_poses, check_rest
-from lipmotion.engines.trajectory.window import FEATURES, WINDOW, window_from
+from lipmotion.engines.coupled.conversion.regression import OFFSETS, Following, Surroundings
+from lipmotion.engines.coupled.model import CoupledModel
 from lipmotion.errors import InputError, ModelFormatError
+from lipmotion.motion.arrays import FRAME, SINGLE, frame_arrays, frame_from_arrays
+from lipmotion.motion.context_window import FEATURES, WINDOW, window_from
+from lipmotion.motion.limits import check_poses, check_rest
 from lipmotion.stats.bigram import check_sums
 from lipmotion.stats.mixture import MIXTURES, mixtures_from
-from lipmotion.stats.schema import (
+from lipmotion.storage.schema import (
     BELOW_ONE,
     LARGEST_VARIANCE,
     POSITIVE,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 
-from lipmotion.engines.coupled.conversion import EXACT, SOFT, STARTS, UPDATES, Conversion
-from lipmotion.engines.coupled.systems import STRUCTURES
+from lipmotion.engines.coupled.chains.structures import STRUCTURES
+from lipmotion.engines.coupled.conversion.em import EXACT, SOFT, STARTS, UPDATES, Conversion
 from lipmotion.errors import InputError
 
 TRAJECTORY, FRAMES, PATH = "trajectory", "em", "viterbi"

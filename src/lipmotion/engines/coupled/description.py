@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from textwrap import wrap
 
-from lipmotion.engines.coupled.conversion import group_of
-from lipmotion.engines.coupled.learned import CoupledModel
-from lipmotion.engines.coupled.product import Product
-from lipmotion.engines.coupled.systems import COUPLED, FACTORIAL, HMM, MULTISTREAM
+from lipmotion.engines.coupled.chains.product import Product
+from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, MULTISTREAM
+from lipmotion.engines.coupled.conversion.em import group_of
+from lipmotion.engines.coupled.model import CoupledModel
 from lipmotion.printable import printable
 
 KINDS = {

@@ -11,21 +11,21 @@ from numpy.typing import NDArray
 
 from lipmotion.engines.base import Arrays, Engine, Fit, traced
 from lipmotion.engines.coupled.arrays import coupled_arrays, coupled_from_arrays
+from lipmotion.engines.coupled.chains.densities import Single
+from lipmotion.engines.coupled.chains.lattice import Lattice
+from lipmotion.engines.coupled.chains.model import Inferred
 from lipmotion.engines.coupled.config import PATH, TRAJECTORY, CoupledConfig
-from lipmotion.engines.coupled.conversion import converted, path_means
-from lipmotion.engines.coupled.densities import Single
+from lipmotion.engines.coupled.conversion.em import converted, path_means
 from lipmotion.engines.coupled.description import described
 from lipmotion.engines.coupled.explanation import explained, joined, units_believed
-from lipmotion.engines.coupled.fit import fit_coupled
-from lipmotion.engines.coupled.lattice import Lattice
-from lipmotion.engines.coupled.learned import CoupledModel
-from lipmotion.engines.coupled.model import Inferred
-from lipmotion.engines.coupled.train import allowed_units
-from lipmotion.engines.trajectory.closure import closing_spans
-from lipmotion.engines.trajectory.dynamic_range import widened
-from lipmotion.engines.trajectory.generation import Statistics, generated_motion, resolved, stretches
+from lipmotion.engines.coupled.model import CoupledModel
+from lipmotion.engines.coupled.training.fit import fit_coupled
+from lipmotion.engines.coupled.training.train import allowed_units
 from lipmotion.kernels.banded import generate
-from lipmotion.stats.checkpoint import NOTHING_KEPT, Checkpoint
+from lipmotion.motion.closure import closing_spans
+from lipmotion.motion.generation import Statistics, generated_motion, resolved, stretches
+from lipmotion.motion.variance_scaling import scaled
+from lipmotion.storage.checkpoint import NOTHING_KEPT, Checkpoint
 from lipmotion.types import (
     FRAME_RATE_HZ,
     ChainBelief,
@@ -82,7 +82,7 @@ class CoupledEngine(Engine[CoupledModel]):
         def statistics(wanted: slice) -> Statistics:
             lattice = self.lattice(model, speech, wanted)
             found, path[wanted] = self._statistics(model, features[wanted], lattice)
-            return widened(*found, model.gain, model.rest) if self.config.full_range else found
+            return scaled(*found, model.gain, model.rest) if self.config.full_range else found
 
         motion, spread = generated_motion(
             statistics,

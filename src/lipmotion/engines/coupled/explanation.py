@@ -8,15 +8,15 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.coupled.conversion import group_of
-from lipmotion.engines.coupled.densities import Single, component_posteriors
-from lipmotion.engines.coupled.following import gates
-from lipmotion.engines.coupled.lattice import Posteriors
-from lipmotion.engines.coupled.learned import CoupledModel
-from lipmotion.engines.coupled.model import Chains, Inferred
-from lipmotion.engines.coupled.product import Product
-from lipmotion.engines.coupled.systems import Structure
-from lipmotion.engines.coupled.visual import VisualStream
+from lipmotion.engines.coupled.chains.densities import Single, component_posteriors
+from lipmotion.engines.coupled.chains.lattice import Posteriors
+from lipmotion.engines.coupled.chains.model import Chains, Inferred
+from lipmotion.engines.coupled.chains.product import Product
+from lipmotion.engines.coupled.chains.structures import Structure
+from lipmotion.engines.coupled.chains.visual_streams import VisualStream
+from lipmotion.engines.coupled.conversion.em import group_of
+from lipmotion.engines.coupled.conversion.regression import gates
+from lipmotion.engines.coupled.model import CoupledModel
 from lipmotion.types import ChainBelief, ChainStates, Explanation, Gaussian, Likely, Regression, Value
 from lipmotion.units import VISEME_OF
 

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.trajectory.contexts import Cut, Place
-from lipmotion.engines.trajectory.reach import check_spread
-from lipmotion.engines.trajectory.window import WINDOW, AudioWindow, window_from
-from lipmotion.stats.schema import POSITIVE, Arrays, Member, checked
+from lipmotion.motion.context_window import WINDOW, AudioWindow, window_from
+from lipmotion.motion.frame_labels import Cut, Place
+from lipmotion.motion.limits import check_spread
 from lipmotion.stats.trees import TREES, Tree, tree_arrays, trees_from_arrays
+from lipmotion.storage.schema import POSITIVE, Arrays, Member, checked
 
 Array = NDArray[np.float64]
 

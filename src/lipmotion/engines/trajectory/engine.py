@@ -10,16 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.base import Arrays, Engine, Fit
-from lipmotion.engines.trajectory.closure import closing_spans
-from lipmotion.engines.trajectory.contexts import Cut, named, places
-from lipmotion.engines.trajectory.dynamic_range import widened
-from lipmotion.engines.trajectory.generation import Statistics, generated_motion, resolved
-from lipmotion.engines.trajectory.learning import Learning
 from lipmotion.engines.trajectory.model import TrajectoryModel, model_arrays, model_from_arrays
 from lipmotion.engines.trajectory.train import fit_trajectory
+from lipmotion.engines.trajectory.training_data import Learning
 from lipmotion.errors import InputError
+from lipmotion.motion.closure import closing_spans
+from lipmotion.motion.frame_labels import Cut, named, places
+from lipmotion.motion.generation import Statistics, generated_motion, resolved
+from lipmotion.motion.variance_scaling import scaled
 from lipmotion.printable import printable
-from lipmotion.stats.checkpoint import NOTHING_KEPT, Checkpoint
+from lipmotion.storage.checkpoint import NOTHING_KEPT, Checkpoint
 from lipmotion.types import (
     FRAME_RATE_HZ,
     Constraints,
@@ -147,7 +147,7 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
             found = model.emission.statistics(rows[path[wanted]], features, wanted)
             if not self.config.full_range:
                 return found
-            return widened(*found, model.gain, model.emission.means[-1, 0])
+            return scaled(*found, model.gain, model.emission.means[-1, 0])
 
         motion, spread = generated_motion(
             statistics,

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.trajectory.emission import Emission
-from lipmotion.engines.trajectory.learning import Learning, Observed, rows_of
+from lipmotion.engines.trajectory.training_data import Learning, Observed, rows_of
 from lipmotion.kernels.banded import generate, normal_equations, solve
-from lipmotion.stats.windows import with_dynamics
+from lipmotion.stats.delta_windows import with_dynamics
 
 Array = NDArray[np.float64]
 

@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.trajectory.closure import Closure
-from lipmotion.engines.trajectory.contexts import Cut
 from lipmotion.engines.trajectory.emission import EMISSION, Emission, emission_arrays, emission_from_arrays
-from lipmotion.engines.trajectory.frame import FRAME, frame_arrays, frame_from_arrays
-from lipmotion.engines.trajectory.listening import LISTENER, Listener, listener_arrays, listener_from_arrays
-from lipmotion.engines.trajectory.reach import Reach, check_poses, reach_of
-from lipmotion.engines.trajectory.space import MotionSpace
+from lipmotion.engines.trajectory.phone_recogniser import LISTENER, Listener, listener_arrays, listener_from_arrays
 from lipmotion.errors import ModelFormatError
-from lipmotion.stats.schema import POSITIVE, Arrays, Member, checked, only
+from lipmotion.motion.arrays import FRAME, frame_arrays, frame_from_arrays
+from lipmotion.motion.closure import Closure
+from lipmotion.motion.frame_labels import Cut
+from lipmotion.motion.limits import Reach, check_poses, reach_of
+from lipmotion.motion.space import MotionSpace
+from lipmotion.storage.schema import POSITIVE, Arrays, Member, checked, only
 from lipmotion.units import UnitSet
 
 

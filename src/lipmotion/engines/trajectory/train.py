@@ -7,20 +7,21 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.trajectory.closure import learned_closure
-from lipmotion.engines.trajectory.contexts import Cut, Place, places
-from lipmotion.engines.trajectory.dynamic_range import fit_gain
+from lipmotion.engines.trajectory.acoustic_regression import fit_hearing
 from lipmotion.engines.trajectory.emission import Emission
 from lipmotion.engines.trajectory.generation_error import minimise_generation_error
-from lipmotion.engines.trajectory.hearing import fit_hearing
-from lipmotion.engines.trajectory.learning import Learning, Observed
-from lipmotion.engines.trajectory.listening import fit_listener
 from lipmotion.engines.trajectory.model import TrajectoryModel
-from lipmotion.engines.trajectory.space import motion_in_space
+from lipmotion.engines.trajectory.phone_recogniser import fit_listener
+from lipmotion.engines.trajectory.training_data import Learning, Observed, rows_of
 from lipmotion.errors import CorpusError
-from lipmotion.stats.checkpoint import NOTHING_KEPT, Checkpoint
+from lipmotion.kernels.banded import generate
+from lipmotion.motion.closure import learned_closure
+from lipmotion.motion.frame_labels import Cut, Place, places
+from lipmotion.motion.space import motion_in_space
+from lipmotion.motion.variance_scaling import scaling_factors
+from lipmotion.stats.delta_windows import with_dynamics, within
 from lipmotion.stats.trees import Question, Tree, gaussian_likelihood, grow
-from lipmotion.stats.windows import with_dynamics, within
+from lipmotion.storage.checkpoint import NOTHING_KEPT, Checkpoint
 from lipmotion.types import Example, Monitor, Progress, part_of
 
 Array = NDArray[np.float64]
@@ -54,13 +55,25 @@ def fit_trajectory(
         emission = fit_hearing(emission, observed, how)
     if how.trajectory_steps:
         emission = minimise_generation_error(emission, observed, how)
-    gain = fit_gain(emission, observed, how)
+    gain = _scaling(emission, observed, how)
     monitor(Progress(_STAGE, 3, 3, 1.0))
     closure = learned_closure(space.direct_names, values, examples)
     return TrajectoryModel(how.cut.units, space, emission, gain, closure, listener)
 
 
 _STAGE = "trees"
+
+
+def _scaling(emission: Emission, observed: Sequence[Observed], how: Learning) -> Array:
+    """Return the factors of variance scaling [shape=(Q,)]; 1 where no example is long enough to vary."""
+    recorded, generated = [], []
+    for one in observed:
+        if len(one.frames) < 2:
+            continue
+        means, precisions = emission.statistics(rows_of(emission, one.places, how.cut), one.features, slice(None))
+        recorded.append(one.rows[:, 0].std(axis=0))
+        generated.append(generate(means, precisions)[0][one.frames].std(axis=0))
+    return scaling_factors(recorded, generated) if recorded else np.ones(emission.means.shape[2])
 
 
 def observed_of(example: Example, values: Array, cut: Cut) -> Observed:

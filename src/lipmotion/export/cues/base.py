@@ -8,7 +8,7 @@ from pathlib import Path
 from lipmotion.errors import ExportError
 from lipmotion.export.cues import moho_dat, rhubarb_json, rhubarb_tsv, rhubarb_xml
 from lipmotion.export.cues.sheet import CueSheet
-from lipmotion.files import whole_file
+from lipmotion.storage.files import whole_file
 
 CUE_FORMATS: dict[str, Callable[[CueSheet, str], str]] = {
     "tsv": rhubarb_tsv.text,

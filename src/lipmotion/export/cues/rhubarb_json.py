@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from lipmotion.export.cues.sheet import CueSheet
-from lipmotion.json_text import as_json
+from lipmotion.storage.json_text import as_json
 
 
 def text(sheet: CueSheet, sound_file: str) -> str:

@@ -1,0 +1,148 @@
+"""Eigenlips: pictures of a mouth as a few numbers a colour."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import InputError, ModelFormatError
+from lipmotion.stats.pca import check_orthonormal, fit_pca
+from lipmotion.storage.schema import Arrays, Member, checked, only
+from lipmotion.types import GREY, Channel
+
+COLOURS = "rgb"
+COMPONENTS = 30
+"""Of each colour, as in the paper."""
+Images = NDArray[np.uint8]
+
+
+@dataclass(frozen=True, eq=False)
+class Eigenlips:
+    """The space of mouth pictures: of each colour a mean picture and its principal components.
+
+    mean      : float32 array [shape=(3, D)], grey levels, D = height · width, row by row
+    basis     : float32 array [shape=(3, K, D)], orthonormal in each colour, most variance first
+    explained : share of each colour's variance that the components hold, in the pictures they come from [shape=(3,)]
+    size      : height and width of a picture, px
+    Source: Xie & Liu 2007, §5, Eqs. 12–13 (there r > d; read r < d). Deviation: the covariance is diagonalised, not the
+    correlation matrix, so that Eq. 13 is the least-squares solution of Eq. 12.
+    """
+
+    mean: NDArray[np.float32]
+    basis: NDArray[np.float32]
+    explained: NDArray[np.float64]
+    size: tuple[int, int]
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """The coefficients as motion channels: ``lips_r_01``, …, ``lips_b_30``."""
+        numbers = range(1, self.basis.shape[1] + 1)
+        return tuple(Channel(f"lips_{colour}_{number:02d}", GREY) for colour in COLOURS for number in numbers)
+
+    @property
+    def summary(self) -> str:
+        """In words: how many coefficients, of which pictures, and what they hold."""
+        height, width = self.size
+        share = 100 * float(self.explained.mean())
+        return f"{len(self.channels)} of {width} × {height} px, {share:.1f} % of the variance of the pictures"
+
+    def project(self, images: Images) -> NDArray[np.float32]:
+        """Return the coefficients [shape=(T, 3·K)] of pictures [shape=(T, H, W, 3)]: g = Aᵀ(I − Ī), Eq. 13.
+
+        Raises InputError: pictures of another size.
+        """
+        _check(images, self.size)
+        flat = _by_colour(images)
+        return np.concatenate(
+            [(flat[c] - self.mean[c]) @ self.basis[c].T for c in range(len(COLOURS))], axis=1, dtype=np.float32
+        )
+
+    def restore(self, coefficients: NDArray[np.floating[Any]]) -> Images:
+        """Return the pictures [shape=(T, H, W, 3)] at some coefficients [shape=(T, 3·K)]: I = Ī + Ag, Eq. 12.
+
+        Raises InputError: another number of coefficients.
+        """
+        wanted = self.basis.shape[0] * self.basis.shape[1]
+        if coefficients.ndim != 2 or coefficients.shape[1] != wanted:
+            raise InputError(
+                f"coefficients of shape {coefficients.shape}, required (T, {wanted}), as project gives them"
+            )
+        parts = np.split(coefficients.astype(np.float32), len(COLOURS), axis=1)
+        flat = np.stack([part @ self.basis[c] + self.mean[c] for c, part in enumerate(parts)], axis=-1)
+        return np.clip(np.rint(flat), 0, 255).astype(np.uint8).reshape(-1, *self.size, len(COLOURS))
+
+
+def fit_eigenlips(images: Images, components: int = COMPONENTS) -> Eigenlips:
+    """Return the principal components of some mouth pictures, colour by colour.
+
+    images     : uint8 array [shape=(N, H, W, 3)]
+    components : of each colour; fewer where the pictures do not span as many
+    Raises InputError: not pictures, fewer than two, or all the same.
+    """
+    if components < 1:
+        raise InputError(f"{components} components asked for, required at least 1")
+    _check(images)
+    flat = _by_colour(images)
+    spaces = [fit_pca(colour, components) for colour in flat]
+    kept = min(len(space.basis) for space in spaces)
+    if len(images) < 2 or not kept:
+        raise InputError(f"{len(images)} mouth pictures, all the same; required at least two that differ")
+    basis = np.stack([space.basis[:kept] for space in spaces]).astype(np.float32)
+    mean = np.stack([space.mean for space in spaces]).astype(np.float32)
+    explained = np.array([_share(colour - m, b) for colour, m, b in zip(flat, mean, basis, strict=True)])
+    height, width = images.shape[1:3]
+    return Eigenlips(mean, basis, explained, (height, width))
+
+
+def eigenlips_arrays(eigenlips: Eigenlips) -> dict[str, NDArray[Any]]:
+    """Return eigenlips as arrays."""
+    return {
+        "mean": eigenlips.mean,
+        "basis": eigenlips.basis,
+        "explained": eigenlips.explained,
+        "size": np.array(eigenlips.size),
+    }
+
+
+def eigenlips_from_arrays(arrays: Arrays) -> Eigenlips:
+    """Return eigenlips again. Raises ModelFormatError: something is missing, or does not belong together."""
+    try:
+        only(arrays, SIZE, SPACES)
+        height, width = checked(arrays, SIZE)["size"].tolist()
+        found = checked(arrays, SPACES, D=height * width)
+        for basis in found["basis"]:
+            check_orthonormal("basis", basis)
+        return Eigenlips(found["mean"], found["basis"], found["explained"], (height, width))
+    except (KeyError, ValueError, TypeError, IndexError) as error:
+        raise ModelFormatError(f"the eigenlips are damaged ({error}); train the model again") from error
+
+
+SIZE = {"size": Member(np.intp, "2", 1, 10_000)}
+SPACES = {
+    "mean": Member(np.float32, f"{len(COLOURS)} D", 0, 255),
+    "basis": Member(np.float32, f"{len(COLOURS)} K D", -1.01, 1.01),
+    "explained": Member(np.float64, f"{len(COLOURS)}", 0, 1.01),
+}
+"""How eigenlips are stored."""
+
+
+def _by_colour(images: Images) -> NDArray[np.uint8]:
+    """Return pictures as rows of each colour [shape=(3, T, H·W)]."""
+    return np.moveaxis(images, -1, 0).reshape(len(COLOURS), len(images), -1)
+
+
+def _share(centred: NDArray[np.float32], basis: NDArray[np.float32]) -> float:
+    return float(np.square(centred @ basis.T).sum(dtype=float) / np.square(centred).sum(dtype=float))
+
+
+def _check(images: Images, size: tuple[int, int] | None = None) -> None:
+    required = f"(T, {size[0]}, {size[1]}, 3)" if size else "(N, H, W, 3)"
+    is_one = images.ndim == 4 and images.shape[3] == len(COLOURS) and (size is None or images.shape[1:3] == size)
+    if not is_one or images.dtype != np.uint8 or not images.size:
+        raise InputError(
+            f"mouth pictures of shape {images.shape} and type {images.dtype}, required {required}, uint8; "
+            "prepare the recordings again with mouth images"
+        )

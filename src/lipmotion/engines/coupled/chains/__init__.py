@@ -1,0 +1,1 @@
+"""Coupled chains of hidden states: structures, transitions, emission densities, inference."""

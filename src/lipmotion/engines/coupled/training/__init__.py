@@ -1,0 +1,1 @@
+"""Training of coupled chains from speech with motion, and from speech alone."""

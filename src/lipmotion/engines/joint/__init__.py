@@ -1,0 +1,1 @@
+"""One model of speech, F0 and motion (Hofer 2008)."""

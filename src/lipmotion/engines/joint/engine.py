@@ -1,0 +1,258 @@
+"""The joint engine: one model of five streams, after Hofer 2008."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from typing import Any, ClassVar, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.engines.base import Arrays, Engine, Fit
+from lipmotion.errors import CorpusError, InputError, ModelFormatError
+from lipmotion.hmm.multistream.align import StatePath, align
+from lipmotion.hmm.multistream.arrays import joint_arrays, joint_from_arrays
+from lipmotion.hmm.multistream.generate import densities_along, densities_of, settled
+from lipmotion.hmm.multistream.inventory import Inventory
+from lipmotion.hmm.multistream.labels import in_frames, in_time
+from lipmotion.hmm.multistream.model import JointConfig, JointHmm
+from lipmotion.hmm.multistream.recognise import joint_recogniser
+from lipmotion.hmm.multistream.streams import MOTION, Observed, StreamWeights, observe
+from lipmotion.hmm.multistream.train import Transcribed, train_joint
+from lipmotion.motion.arrays import FRAME, frame_arrays, frame_from_arrays
+from lipmotion.motion.closure import Closure, closing_spans, learned_closure
+from lipmotion.motion.frame_labels import named
+from lipmotion.motion.generation import Statistics, generated_motion, resolved
+from lipmotion.motion.limits import Reach, check_poses, reach_of
+from lipmotion.motion.space import MotionSpace, motion_in_space
+from lipmotion.storage.checkpoint import NOTHING_KEPT, Checkpoint
+from lipmotion.storage.schema import only, under
+from lipmotion.types import (
+    FRAME_RATE_HZ,
+    Constraints,
+    Example,
+    Generation,
+    Monitor,
+    Motion,
+    Speech,
+    Timeline,
+    Trace,
+    Unit,
+)
+from lipmotion.units import LIP_CLOSING, UnitSet, unit_set
+
+PREFIX = "joint_"
+"""What the names of the joint model's own arrays begin with."""
+
+
+@dataclass(frozen=True)
+class JointEngineConfig:
+    """How the joint engine models speech, F0 and motion.
+
+    units      : what is modelled: a unit set's name, or a table's (docs/unit-sets.md)
+    states     : states per unit, left to right, no skips
+    mixtures, motion_mixtures : Gaussians per state of speech, and of motion (powers of two)
+    components : dimensions that all point channels are reduced to
+    f0         : hear the three streams of F0 (False: they are switched off everywhere)
+    sees       : let motion have a say, in training, in when states begin
+    recognises : find the model's own units by its own bigram where neither words nor units are given (False: take the
+                 phones in time that the shared recogniser finds). What is given always wins
+    paths      : generate from so many sequences of states, drawn from all that may have been said, instead of the
+                 best one, wherever units are recognised; needs ``recognises``
+    seed       : of the drawing
+    closures   : make the lips meet in every p, b and m, and in every recognised unit of these alone
+    """
+
+    units: str = "phone"
+    states: int = 3
+    mixtures: int = 4
+    motion_mixtures: int = 1
+    components: int = 16
+    f0: bool = True
+    sees: bool = True
+    recognises: bool = False
+    paths: int = 1
+    seed: int = 0
+    closures: bool = True
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value, least = getattr(self, field.name), 0 if field.name == "seed" else 1
+            if field.type == "int" and (type(value) is not int or value < least):
+                raise InputError(f"{field.name} is {value!r}, required a whole number from {least}")
+        if not isinstance(self.units, str):
+            raise InputError(f"units is {self.units!r}, required the name of a unit set or a table")
+        if self.paths > 1 and not self.recognises:
+            raise InputError(f"paths is {self.paths}: several are drawn only where units are recognised (recognises)")
+
+    @property
+    def joint(self) -> JointConfig:
+        """How the model is built, trained and used."""
+        f0 = float(self.f0)
+        heard = StreamWeights(f0=f0, f0_slope=f0, f0_curvature=f0, motion=0.0)
+        return JointConfig(
+            states=self.states,
+            mixtures=self.mixtures,
+            motion_mixtures=self.motion_mixtures,
+            training=StreamWeights(f0=f0, f0_slope=f0, f0_curvature=f0, motion=float(self.sees)),
+            recognition=heard,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class JointModel:
+    """A joint model with the space of its motion.
+
+    closure : how the lips close (None: the motion has no opening)
+    """
+
+    units: UnitSet
+    space: MotionSpace
+    hmm: JointHmm
+    closure: Closure | None
+
+    @cached_property
+    def reach(self) -> Reach:
+        """Between which values motion lies."""
+        return self.poses.widened(self.hmm.parts[MOTION].scale.deviation[: self.space.dimensions])
+
+    @property
+    def poses(self) -> Reach:
+        """Between which values the means of all states lie."""
+        part, Q = self.hmm.parts[MOTION], self.space.dimensions
+        means = part.tied.mixtures.means[:, :, :Q].reshape(-1, Q)
+        return reach_of(means * part.scale.deviation[:Q] + part.scale.mean[:Q])
+
+
+@final
+@dataclass(frozen=True)
+class JointEngine(Engine[JointModel]):
+    """One model of speech, F0 and motion: recognition or alignment by the heard streams, generation by motion.
+
+    Source: Hofer 2008, §4 and §5.  Deviations: training starts from phones in time (aligned or labelled), not from
+    nothing; the trees of what is heard ask for one neighbour, those of motion for both; unless it ``recognises``, the
+    phones of sound alone are those of the shared recogniser.
+    """
+
+    config: JointEngineConfig
+    name: ClassVar[str] = "joint"
+
+    @property
+    def hears_f0(self) -> bool:
+        """Whether it wants ``Speech.log_f0``."""
+        return self.config.f0
+
+    def fit(  # noqa: D102
+        self,
+        examples: Sequence[Example],
+        monitor: Monitor,
+        checkpoint: Checkpoint = NOTHING_KEPT,  # noqa: ARG002 - a matter of two minutes
+    ) -> Fit[JointModel]:
+        units = unit_set(self.config.units)
+        space, values = motion_in_space(examples, self.config.components)
+        utterances = [self._transcribed(one, x, units) for one, x in zip(examples, values, strict=True)]
+        if all(set(utterance.units) <= set(units.silence) for utterance in utterances):
+            raise CorpusError(f"nothing is said in {len(examples)} examples; learn from speech")
+        inventory = Inventory(units.units, units.silence[:1] + _also_silent(units), self.config.states)
+        hmm = train_joint(utterances, inventory, units.classes(), self.config.joint, monitor)
+        closure = learned_closure(space.direct_names, values, examples)
+        figures = {f"leaves_{name}": float(part.forest.size) for name, part in hmm.parts.items()}
+        frames = sum(int(example.valid.sum()) for example in examples)
+        return Fit(JointModel(units, space, hmm, closure), {"frames": frames, **figures})
+
+    def unpinned(self) -> JointEngine:  # noqa: D102
+        return replace(self, config=replace(self.config, closures=False))
+
+    def generate(self, model: JointModel, speech: Speech, constraints: Constraints | None = None) -> Generation:  # noqa: D102
+        frames = len(speech.features.values)
+        pins = resolved(constraints, model.space, frames)
+        observed = self._observed(speech)
+        if self.config.recognises and not speech.said:
+            spoken, paths = self._recognised(model, observed, speech.features.duration_s)
+        else:
+            spoken, paths = speech.units, [_aligned(model, observed, speech.units)]
+        densities = densities_along(model.hmm, paths[0]) if len(paths) == 1 else densities_of(model.hmm, paths)
+        means, precisions = settled(densities)
+
+        def statistics(wanted: slice) -> Statistics:
+            return means[wanted], precisions[wanted]
+
+        motion, spread = generated_motion(
+            statistics,
+            frames,
+            model.space,
+            model.reach,
+            closure=model.closure,
+            closing=closing_spans(spoken, frames, model.units.within(LIP_CLOSING)) if self.config.closures else [],
+            pins=pins,
+        )
+        return Generation(
+            Motion(motion, FRAME_RATE_HZ, model.space.channels),
+            spread,
+            named(spoken, model.units),
+            Trace(_sources(model.hmm, paths[0]), paths[0].frames),
+        )
+
+    def trees(self, model: JointModel) -> str:  # noqa: D102
+        return model.hmm.text()
+
+    def to_arrays(self, model: JointModel) -> dict[str, NDArray[Any]]:  # noqa: D102
+        joint = {f"{PREFIX}{name}": array for name, array in joint_arrays(model.hmm).items()}
+        return frame_arrays(model.units, model.space, model.closure) | joint
+
+    def from_arrays(self, arrays: Arrays) -> JointModel:  # noqa: D102
+        try:
+            only(arrays, FRAME, (name for name in arrays if name.startswith(PREFIX)))
+            units, space, closure = frame_from_arrays(arrays, self.config.units)
+            hmm = joint_from_arrays(under(arrays, PREFIX), self.config.joint)
+            if set(hmm.inventory.names) != set(units.units):
+                raise ValueError(f"the units {' '.join(hmm.inventory.names)}, required {' '.join(units.units)}")
+            if MOTION not in hmm.parts or len(hmm.parts[MOTION].scale.mean) != 3 * space.dimensions:
+                raise ValueError(f"motion that is not of {space.dimensions} dimensions")
+            model = JointModel(units, space, hmm, closure)
+            check_poses(model.poses, space, closure)
+            return model
+        except (KeyError, ValueError, IndexError, TypeError) as error:
+            raise ModelFormatError(f"the joint model is damaged ({error}); train or download it again") from error
+
+    def _observed(
+        self, speech: Speech, motion: NDArray[np.float64] | None = None, seen: NDArray[np.bool_] | None = None
+    ) -> Observed:
+        f0 = speech.log_f0 if self.config.f0 else None
+        return observe(np.asarray(speech.features.values), f0, motion, seen)
+
+    def _transcribed(self, example: Example, values: NDArray[np.float64], units: UnitSet) -> Transcribed:
+        observed = self._observed(example.speech, values, example.valid)
+        said, bounds = in_frames(example.speech.units, observed.frames, units.silence[0], units.unit_of)
+        return Transcribed(observed, said, bounds)
+
+    def _recognised(
+        self, model: JointModel, observed: Observed, duration_s: float
+    ) -> tuple[Timeline[Unit], list[StatePath]]:
+        recogniser = joint_recogniser(model.hmm)
+        said = recogniser.recognise(observed)
+        spoken = in_time(said, duration_s, model.units.label)
+        if self.config.paths > 1:
+            return spoken, recogniser.sampled_paths(observed, self.config.paths, self.config.seed)
+        bounds = np.array([*(one.first for one in said), observed.frames])
+        return spoken, [align(model.hmm, observed, [one.unit for one in said], bounds)]
+
+
+def _also_silent(units: UnitSet) -> tuple[str, ...]:
+    return tuple(unit for unit in units.silence[1:] if units.silent(unit))
+
+
+def _aligned(model: JointModel, observed: Observed, units: Timeline[Unit]) -> StatePath:
+    said, bounds = in_frames(units, observed.frames, model.units.silence[0], model.units.unit_of)
+    return align(model.hmm, observed, said, bounds)
+
+
+def _sources(hmm: JointHmm, path: StatePath) -> tuple[str, ...]:
+    """Return what stands behind every state of a path, in words."""
+    forest = hmm.parts[MOTION].forest
+    return tuple(
+        f"{left}-{unit}+{right}.{state}: {forest.name(forest.leaf(((left, unit, right), state)))}"
+        for (left, unit, right), state in path.states.places
+    )

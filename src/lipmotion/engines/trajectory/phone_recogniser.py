@@ -1,0 +1,129 @@
+"""The joint model finds the phones of voices that it knows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import AlignmentError
+from lipmotion.hmm.multistream.arrays import joint_arrays, joint_from_arrays
+from lipmotion.hmm.multistream.inventory import Inventory
+from lipmotion.hmm.multistream.labels import in_frames, in_time
+from lipmotion.hmm.multistream.model import JointConfig, JointHmm
+from lipmotion.hmm.multistream.recognise import joint_recogniser
+from lipmotion.hmm.multistream.streams import SPEECH, Observed, observe
+from lipmotion.hmm.multistream.train import Transcribed, train_joint
+from lipmotion.storage.checkpoint import Checkpoint
+from lipmotion.storage.schema import Arrays, Member, checked, under
+from lipmotion.types import FRAME_RATE_HZ, Example, Monitor, Speech, Timeline, Unit
+from lipmotion.units import UNIT_SETS, is_silent
+
+PHONES = UNIT_SETS["phone"]
+CONFIG = JointConfig(mixtures=16)
+LEAST_MINUTES = 8.0
+"""With less speech to learn from, the phones are found better with the help of the models of many voices."""
+LONGEST_S = 120.0
+"""Longer recordings are left to the other recogniser, which works block by block."""
+FAMILIAR = -6.0
+"""A voice is known whose sound the model explains at most this much worse than its training data (mean log density of a
+frame under what fits it best). GRID's s1 in other recordings: -6 to 2; five others of the same studio: -9 to -7."""
+HEARD_FRAMES = 400
+"""So many frames, spread evenly, tell whether a voice is known."""
+_STAGE = "joint"
+LISTENER = "joint_"
+"""What the names of its arrays begin with."""
+TYPICAL = {"typical": Member(np.float64, "1", -1e6, 1e6)}
+
+
+@dataclass(frozen=True, eq=False)
+class Listener:
+    """The joint model as a recogniser of phones.
+
+    typical : how well it explains its training data
+    """
+
+    hmm: JointHmm
+    typical: float
+
+    def phones(self, speech: Speech) -> Timeline[Unit] | None:
+        """Return the phones that were most probably said; None where the voice is not known, or the recording too long.
+
+        They are placed as this model hears them, which is not how the recogniser places those of a transcript.
+        """
+        observed = _observed(speech)
+        long = observed.frames > LONGEST_S * FRAME_RATE_HZ
+        if long or not speech.features.values.any() or _fit(self.hmm, observed) < self.typical + FAMILIAR:
+            return None
+        try:
+            found = joint_recogniser(self.hmm).recognise(observed)
+        except AlignmentError:  # shorter than any phone
+            return None
+        return in_time(found, speech.features.duration_s)
+
+
+def fit_listener(
+    examples: Sequence[Example], values: Sequence[NDArray[np.float64]], monitor: Monitor, checkpoint: Checkpoint
+) -> Listener | None:
+    """Return a listener trained on sound and motion; None where there is too little, or nothing is said.
+
+    values : every example's motion in the model's space [each shape=(T, Q)]
+    Source: Hofer 2008, §4 to §6: all streams are trained together; only the heard ones recognise.
+    """
+    spoken_s = sum(s.duration_s for e in examples for s in e.speech.units if not is_silent(s.label.phone))
+    if spoken_s < 60 * LEAST_MINUTES:
+        return None
+    kept = checkpoint.load(_STAGE)
+    if kept is None:
+        hmm = train_joint(
+            [_transcribed(example, x) for example, x in zip(examples, values, strict=True)],
+            Inventory(PHONES.units, PHONES.silence, CONFIG.states),
+            PHONES.classes(),
+            CONFIG,
+            monitor,
+        )
+        kept = joint_arrays(hmm, np.float32)
+        checkpoint.save(_STAGE, kept)
+    hmm = joint_from_arrays(kept, CONFIG)
+    return Listener(hmm, float(np.mean([_fit(hmm, _observed(example.speech)) for example in examples])))
+
+
+def listener_arrays(listener: Listener) -> dict[str, NDArray[Any]]:
+    """Return a listener as arrays, at half precision."""
+    arrays = joint_arrays(listener.hmm) | {"typical": np.array([listener.typical])}
+    return {f"{LISTENER}{name}": array for name, array in arrays.items()}
+
+
+def listener_from_arrays(arrays: Arrays) -> Listener | None:
+    """Return it again, or None. Raises ModelFormatError, KeyError, ValueError: something is missing or damaged."""
+    own = under(arrays, LISTENER)
+    if not own:
+        return None
+    (typical,) = checked(own, TYPICAL)["typical"].tolist()
+    hmm = joint_from_arrays({name: array for name, array in own.items() if name not in TYPICAL}, CONFIG)
+    if set(hmm.inventory.names) != set(PHONES.units):
+        raise ValueError(f"the units {' '.join(hmm.inventory.names)}, required {' '.join(PHONES.units)}")
+    return Listener(hmm, typical)
+
+
+def _observed(speech: Speech) -> Observed:
+    return observe(np.asarray(speech.features.values), speech.log_f0)
+
+
+def _transcribed(example: Example, values: NDArray[np.float64]) -> Transcribed:
+    speech = example.speech
+    observed = observe(np.asarray(speech.features.values), speech.log_f0, values, example.valid)
+    units, bounds = in_frames(speech.units, observed.frames, PHONES.silence[0], PHONES.unit_of)
+    return Transcribed(observed, units, bounds)
+
+
+def _fit(hmm: JointHmm, observed: Observed) -> float:
+    """Return the mean log density of some frames' features, each under the leaf that fits it best."""
+    part = hmm.parts[SPEECH]
+    rows = hmm.inside(observed, hmm.config.recognition)[SPEECH]
+    chosen = rows[np.linspace(0, len(rows) - 1, min(len(rows), HEARD_FRAMES)).astype(int)]
+    leaves = np.arange(part.forest.size)
+    return float(part.tied.log_density(chosen, leaves, part.scale.log_volume).max(axis=1).mean())

@@ -1,0 +1,71 @@
+"""What training works with."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.engines.trajectory.emission import Emission
+from lipmotion.motion.frame_labels import Cut, Place
+
+
+@dataclass(frozen=True)
+class Learning:
+    """How motion is learned.
+
+    cut        : how phones are cut into parts
+    components : dimensions that all point channels (``x_17``, ...) are reduced to
+    tree_factor: what a split of a tree must gain, in units of its description length
+    least_frames : frames that a leaf must have
+    shrinkage, variance_shrinkage : frames that the mean, and the variance, of the node above count for
+    listens    : let the means follow the sound around the frame
+    axes       : numbers that the sound around a frame is reduced to
+    ridge, shared_ridge : how strongly a regression is drawn towards the one above it, and the shared one towards none
+    ridge_frames : frames that a node must have for a regression of its own
+    trajectory_steps : steps of training for the least error of the generated trajectory (0: none)
+    joint : train the joint model as well
+    """
+
+    cut: Cut
+    components: int
+    tree_factor: float
+    least_frames: float
+    shrinkage: float
+    variance_shrinkage: float
+    listens: bool
+    axes: int
+    ridge: float
+    shared_ridge: float
+    ridge_frames: float
+    trajectory_steps: int
+    joint: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Observed:
+    """One example.
+
+    features : [shape=(T, D)]
+    places   : what is said in each frame [length T]
+    frames   : int array [shape=(N,)], those that were seen with both neighbours
+    rows     : float32 array [shape=(N, 3, Q)], static value, Δ and Δ² there
+    """
+
+    features: NDArray[np.float32]
+    places: list[Place]
+    frames: NDArray[np.intp]
+    rows: NDArray[np.float32]
+
+    @property
+    def seen_places(self) -> list[Place]:
+        """What is said in the frames that were seen [length N]."""
+        return [self.places[frame] for frame in self.frames]
+
+
+def rows_of(emission: Emission, where: Sequence[Place], cut: Cut) -> NDArray[np.intp]:
+    """Return the density of each place [shape=(len(where),)]."""
+    distinct = {place: emission.row(place, cut) for place in dict.fromkeys(where)}
+    return np.array([distinct[place] for place in where], np.intp)

@@ -1,0 +1,1 @@
+"""Baselines: methods that need no model of phones."""

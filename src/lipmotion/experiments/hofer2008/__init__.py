@@ -1,0 +1,1 @@
+"""The experiments of Hofer, Yamagishi and Shimodaira 2008, on any corpus."""

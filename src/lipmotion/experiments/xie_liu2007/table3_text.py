@@ -1,0 +1,100 @@
+"""The figures of ``table3`` as text."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from lipmotion.experiments.comparison import mark
+from lipmotion.experiments.xie_liu2007.systems import BEST, PRINTED
+from lipmotion.measures.report import number
+from lipmotion.printable import printable
+
+WIDTH = 27
+FEW = 8
+"""Channels that are named one by one."""
+HEAD = (
+    f"  {'system':{WIDTH}}{'paper':>13}  {'AMSE (95 %)':25}  {'ACC (95 %)':22}  {'opening (95 %)':22}  "
+    "nRMSE    RMSE    lag  score  p b m  false  variance  K  seconds"
+)
+
+
+def table(figures: Mapping[str, Any]) -> str:
+    """Return the figures of ``table3`` as text."""
+    order = {"given": "the list given", "shuffled": f"the training list shuffled with seed {figures['seed']}"}
+    chosen = " or ".join(map(str, figures["mixtures"])) + (", the best on val" if len(figures["mixtures"]) > 1 else "")
+    closed = f"; closed under {figures['closed_under']:.4f}" if figures["closed_under"] is not None else ""
+    lines = [
+        f"the first N clips of {order[figures['order']]}; split {figures['split']}: {figures['clips']} clips",
+        f"paper's systems: {figures['states']} states a unit, Gaussians a state (K): {chosen}; "
+        f"AMSE, ACC of {_compared(figures['channels'])}{closed}",
+    ]
+    for size in figures["rows"]:
+        for condition, rows in size["conditions"].items():
+            lines += ["", f"{condition}, {size['used']} of the first {size['names']} clips", HEAD]
+            lines += [_line(name, row, size["training"][name]) for name, row in rows.items()]
+            lines += _eigenlips(rows)
+    for kind in dict.fromkeys(row["kind"] for row in figures["noise"]):
+        lines += ["", *_noise(kind, figures)]
+    lines += ["", f"* differs from {BEST}: the 95 % interval of the difference on the same clips leaves out 0"]
+    return "\n".join(map(printable, lines))
+
+
+def _compared(channels: Sequence[str]) -> str:
+    """Return the names of channels, or how many there are."""
+    return ", ".join(channels) if len(channels) <= FEW else f"{len(channels)} channels"
+
+
+def _line(name: str, row: Mapping[str, Any], training: Mapping[str, Any]) -> str:
+    printed = "{:.3f} {:.3f}".format(*PRINTED[name]) if name in PRINTED else ""
+    amse, acc = _with_interval(row, "amse", ".4f"), _with_interval(row, "acc", ".3f")
+    return (
+        f"  {name:{WIDTH}}{printed:>13}  {amse:25}  {acc:22}  {_opening(row)}"
+        f"{number(training['mixtures'], '3.0f')}{training['seconds']:9.1f}"
+    )
+
+
+def _opening(row: Mapping[str, Any]) -> str:
+    lips = row["opening"] or dict.fromkeys(
+        ("nrmse", "rmse", "score", "recall_p_b_m", "false_per_minute", "global_variance")
+    )
+    return (
+        f"{_with_interval(row, 'opening_acc', '.3f'):22}{number(lips['nrmse'], '7.3f')}{number(lips['rmse'], '8.4f')}"
+        f"{number(row['lag_ms'], '+7.0f')}{number(lips['score'], '7.1f')}{number(lips['recall_p_b_m'], '7.1f')}"
+        f"{number(lips['false_per_minute'], '7.1f')}{number(lips['global_variance'], '10.2f')}"
+    )
+
+
+def _eigenlips(rows: Mapping[str, Any]) -> list[str]:
+    """Return AMSE and ACC of eigenlips, where they are compared beside geometry."""
+    if "eigenlips_acc" not in next(iter(rows.values())):
+        return []
+    lines = [f"  {'eigenlips':{WIDTH}}{'AMSE (95 %)':27}{'ACC (95 %)'}"]
+    for name, row in rows.items():
+        amse, acc = _with_interval(row, "eigenlips_amse", ".2f"), _with_interval(row, "eigenlips_acc", ".3f")
+        lines.append(f"  {name:{WIDTH}}{amse:27}{acc}")
+    return lines
+
+
+def _with_interval(row: Mapping[str, Any], name: str, form: str) -> str:
+    if name not in row:
+        return "–"
+    low, high = (format(end, form) for end in row[f"{name}_95"])
+    return f"{row[name]:{form}}{mark(row[f'{name}_gain_95'])} ({low}–{high})"
+
+
+def _noise(kind: str, figures: Mapping[str, Any]) -> list[str]:
+    """Return ACC and AMSE of every system, from clean to loudest."""
+    loud = [row for row in figures["noise"] if row["kind"] == kind]
+    size = figures["rows"][-1]
+    clean = next(iter(size["conditions"].values()))
+    heads = ["clean", *(f"{row['snr_db']:g} dB" for row in loud)]
+    lines = [f"{kind} noise, audio only, trained on {size['used']} clips without noise: ACC / AMSE"]
+    lines.append(f"  {'system':{WIDTH}}" + "".join(f"{head:>17}" for head in heads))
+    for name in clean:
+        cells = [
+            f"{row['acc']:.3f}{mark(row['acc_gain_95'])} / {row['amse']:.4f}{mark(row['amse_gain_95'])}"
+            for row in (clean[name], *(each["systems"][name] for each in loud))
+        ]
+        lines.append(f"  {name:{WIDTH}}" + "".join(f"{cell:>17}" for cell in cells))
+    return lines

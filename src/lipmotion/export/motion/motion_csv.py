@@ -1,0 +1,74 @@
+"""``.csv``: a table for spreadsheets and scripts, ``time_s`` and one column a channel. It has no units."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+from typing import TextIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import ExportError, InputError, shortened
+from lipmotion.export.motion.rounded import rows
+from lipmotion.types import Channel, Generation, Motion, Timeline, Unit
+
+LONGEST_HEAD = 1 << 20
+"""Characters of a line."""
+LONGEST_S = 1e6
+"""More than eleven days of motion are a mistake."""
+
+
+def check(motion: Motion) -> None:
+    """Raise ExportError if a channel's name would break the header."""
+    for name in motion.names:
+        if set(name) & set(',;"') or not name.isprintable():
+            raise ExportError(f"the channel name {shortened(name)!r} does not fit in a table; write .json or .npz")
+
+
+def write(path: Path, generation: Generation, _source: Mapping[str, str], _model: Mapping[str, str]) -> None:
+    """Write a header and one line a frame."""
+    motion = generation.motion
+    with path.open("w", encoding="utf-8") as file:
+        file.write(",".join(["time_s", *motion.names]) + "\n")
+        for time_s, row in zip(motion.time_s.tolist(), rows(motion.values), strict=True):
+            shortest = f"{time_s:.9f}".rstrip("0").rstrip(".")
+            file.write(f"{shortest},{row}\n")
+
+
+def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
+    """Read it back; all channels count as eye distances. Raises InputError: not such a table, or uneven times."""
+    try:
+        with path.open(encoding="utf-8-sig") as file:
+            head = file.readline(LONGEST_HEAD).rstrip("\n")
+            first, *names = head.split(",")
+            if first != "time_s" or not names:
+                raise ValueError(f"the first line is {head[:60]!r}, required 'time_s,opening,...'")
+            table = _numbers(file, len(names) + 1)
+    except ValueError as error:
+        raise InputError(f"not a table of numbers under a header ({error}); export it again") from error
+    return Motion(table[:, 1:], _rate(table[:, 0]), tuple(Channel(name) for name in names)), Timeline(())
+
+
+def _numbers(file: TextIO, columns: int) -> NDArray[np.float64]:
+    """Return the rows of a table [shape=(T, columns)]. Raises ValueError: a field that is no number, or uneven rows."""
+    numbers = array("d")
+    for number, line in enumerate(iter(partial(file.readline, LONGEST_HEAD), ""), 2):
+        row = line.rstrip("\n")
+        if row and row.count(",") + 1 != columns:
+            raise ValueError(f"line {number} has {row.count(',') + 1} fields, required {columns} numbers in each")
+        numbers.extend(map(float, row.split(",") if row else ()))
+    return np.frombuffer(numbers, np.float64).reshape(-1, columns) if numbers else np.empty((0, columns))
+
+
+def _rate(time_s: NDArray[np.float64]) -> float:
+    if len(time_s) < 2:
+        raise InputError("the table has fewer than two rows, so its frame rate is unknown; use .json or .npz")
+    if not np.abs(time_s).max() < LONGEST_S:
+        raise InputError(f"the column time_s holds times that are none, required seconds up to {LONGEST_S:.0f}")
+    step_s = (time_s[-1] - time_s[0]) / (len(time_s) - 1)
+    if time_s[0] != 0 or not step_s > 0 or np.abs(np.diff(time_s) - step_s).max() > 1e-6:
+        raise InputError("the column time_s must begin at 0 and rise in even steps")
+    return round(float(1 / step_s), 6)

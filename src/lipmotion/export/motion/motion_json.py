@@ -1,0 +1,41 @@
+"""``.json``: the whole document; one row of values a line."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+from lipmotion.errors import InputError
+from lipmotion.export.motion.document import FORMAT, header, labels, parse
+from lipmotion.export.motion.json_stream import members
+from lipmotion.export.motion.rounded import rows
+from lipmotion.storage.json_text import as_json
+from lipmotion.types import Generation, Motion, Timeline, Unit
+
+
+def write(path: Path, generation: Generation, source: Mapping[str, str], model: Mapping[str, str]) -> None:
+    """Write one JSON object: format, version, rate_hz, channels, values, units, source, model."""
+    before = as_json(header(generation), ensure_ascii=False)
+    after = as_json(labels(generation, source, model), ensure_ascii=False)
+    with path.open("w", encoding="utf-8") as file:
+        file.write(f'{before[:-1]}, "values": [\n')
+        for number, row in enumerate(rows(generation.motion.values)):
+            file.write(f",\n[{row}]" if number else f"[{row}]")
+        file.write(f"\n], {after[1:]}\n")
+
+
+def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
+    """Read it back. Raises InputError: not JSON, or not a motion document."""
+    try:
+        text = path.read_text(encoding="utf-8")
+        if text.lstrip().startswith("["):
+            raise InputError(f"not a motion document: its 'format' must be {FORMAT!r}")
+        document = members(text, "values")
+    except InputError:
+        raise
+    except (json.JSONDecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise InputError(f"not JSON ({error}); export it again") from error
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"the motion document is damaged ({error}); export it again") from error
+    return parse(document, document.get("values"))

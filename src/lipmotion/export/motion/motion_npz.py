@@ -1,0 +1,36 @@
+"""``.npz``: the values unrounded, and all else as JSON in a string array. Never pickled."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from lipmotion.errors import InputError
+from lipmotion.export.motion.document import header, labels, parse
+from lipmotion.storage.archive import UNREADABLE, array_in, check_archive
+from lipmotion.storage.json_text import as_json
+from lipmotion.types import Generation, Motion, Timeline, Unit
+
+
+def write(path: Path, generation: Generation, source: Mapping[str, str], model: Mapping[str, str]) -> None:
+    """Write the arrays ``values`` [shape=(T, P)] and ``document``, the JSON format's text without its values."""
+    document = as_json({**header(generation), **labels(generation, source, model)}, ensure_ascii=False)
+    np.savez(path, values=generation.motion.values, document=np.array(document))
+
+
+def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
+    """Read it back. Raises InputError: not an .npz file, or not a motion document."""
+    try:
+        with zipfile.ZipFile(path) as file:
+            check_archive(file)
+            values = array_in(file.read("values.npy"))
+            document = json.loads(str(array_in(file.read("document.npy"))))
+    except OSError:
+        raise
+    except UNREADABLE as error:
+        raise InputError(f"not a motion file ({error}); export it again") from error
+    return parse(document, values)

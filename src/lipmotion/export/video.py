@@ -1,0 +1,116 @@
+"""``.mp4``: frames and sound as a video that plays everywhere: H.264 and AAC, index first."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from fractions import Fraction
+from heapq import merge
+from itertools import chain
+from operator import itemgetter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import ExportError
+from lipmotion.storage.files import whole_file
+from lipmotion.types import Audio
+
+Frame = NDArray[np.uint8]
+
+SOUND_HZ = 48_000
+"""AAC begins with 1,024 samples of silence: for players that do not skip them, 21 ms at this rate, 64 at 16 kHz."""
+_BT601, _BT709, _LIMITED = 6, 1, 1
+
+
+def write_mp4(path: Path, frames: Iterable[Frame], *, fps: float, audio: Audio) -> None:
+    """Write a video with sound, whole or not at all; frame n is shown at ``n / fps`` seconds, sound starts at 0.
+
+    frames : RGB [shape=(H, W, 3)], even sizes, at least one; taken one at a time
+    fps    : 23.976, 29.97 and 59.94 mean thousands over 1,001
+    Neither stream is cut to the other's length.
+    Raises ExportError: no frames, frames of odd or different sizes, no sound, fps not positive, or the file cannot be
+    written.
+    """
+    if not 0 < fps < np.inf:
+        raise ExportError(f"{path}: the frame rate is {fps}, required more than 0")
+    if not len(audio.samples):
+        raise ExportError(f"{path}: the sound has no samples")
+    with whole_file(path) as temporary:
+        _encode(temporary, path, _checked(frames, path), frame_rate(fps), audio)
+
+
+def frame_rate(fps: float) -> Fraction:
+    """Return the exact rate that is meant: 29.97 is 30000/1001."""
+    for whole in (24, 30, 48, 60, 120):
+        if abs(fps - whole / 1.001) < 0.005:
+            return Fraction(whole * 1000, 1001)
+    return Fraction(fps).limit_denominator(1001)
+
+
+def _checked(frames: Iterable[Frame], path: Path) -> Iterator[Frame]:
+    """Yield the frames. Raises ExportError: none, or one that does not fit."""
+    shape: tuple[int, ...] | None = None
+    for n, frame in enumerate(frames):
+        shape = shape or frame.shape
+        height, width, *colours = frame.shape
+        if frame.shape != shape or frame.dtype != np.uint8 or colours != [3] or height % 2 or width % 2:
+            raise ExportError(
+                f"{path}: frame {n} is {frame.dtype} {frame.shape}, required uint8 RGB of even sizes, all alike"
+            )
+        yield frame
+    if shape is None:
+        raise ExportError(f"{path}: there are no frames to write")
+
+
+def _encode(temporary: Path, path: Path, frames: Iterator[Frame], rate: Fraction, audio: Audio) -> None:
+    import av
+
+    first = next(frames)
+    try:
+        with av.open(str(temporary), "w", format="mp4", options={"movflags": "+faststart"}) as container:
+            video = _video_stream(container, first, rate)
+            sound = container.add_stream("aac", rate=SOUND_HZ, layout="mono", bit_rate=128_000)
+            pictures = ((n / rate, video, _picture(frame, n, rate)) for n, frame in enumerate(chain([first], frames)))
+            heard = ((part.pts * part.time_base, sound, part) for part in _sound_parts(audio))
+            for _, stream, part in merge(pictures, heard, key=itemgetter(0)):
+                container.mux(stream.encode(part))
+            for stream in (video, sound):
+                container.mux(stream.encode(None))
+    except av.FFmpegError as error:
+        if isinstance(error, OSError):  # a full disk
+            raise
+        raise ExportError(f"{path}: cannot be encoded: {error}") from error
+
+
+def _video_stream(container: Any, first: Frame, rate: Fraction) -> Any:
+    stream = container.add_stream("libx264", rate=rate, options={"crf": "18", "preset": "veryfast"})
+    stream.height, stream.width = first.shape[:2]
+    stream.pix_fmt = "yuv420p"
+    context = stream.codec_context
+    context.time_base = 1 / rate
+    context.colorspace, context.color_range = _BT601, _LIMITED
+    context.color_primaries = context.color_trc = _BT709
+    return stream
+
+
+def _picture(frame: Frame, n: int, rate: Fraction) -> Any:
+    from av import VideoFrame
+
+    picture = VideoFrame.from_ndarray(np.ascontiguousarray(frame), format="rgb24")
+    picture = picture.reformat(format="yuv420p", dst_colorspace="itu601")
+    picture.pts, picture.time_base = n, 1 / rate
+    return picture
+
+
+def _sound_parts(audio: Audio) -> Iterator[Any]:
+    """Yield the sound in tenths of a second, so that it lies in the file beside its frames."""
+    from av import AudioFrame
+
+    length = max(1, audio.rate_hz // 10)
+    for start in range(0, len(audio.samples), length):
+        samples = np.ascontiguousarray(audio.samples[None, start : start + length], dtype=np.float32)
+        part = AudioFrame.from_ndarray(samples, format="fltp", layout="mono")
+        part.rate, part.pts, part.time_base = audio.rate_hz, start, Fraction(1, audio.rate_hz)
+        yield part

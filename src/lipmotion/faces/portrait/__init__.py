@@ -1,0 +1,47 @@
+"""A drawn face that speaks: a flat portrait whose mouth follows the motion. Needs numpy and Pillow only.
+
+The way of a frame: ``pose`` (motion and phones → numbers) → ``geometry`` (numbers → outlines) → ``mouth``
+(outlines → pixels, with ``bands``) → ``rasteriser`` (pixels → picture). What stands still is painted once,
+by ``portrait``, ``head`` and ``eyes`` on a ``layer``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import InputError
+from lipmotion.faces.portrait.eyes import closure
+from lipmotion.faces.portrait.pose import MouthPose, mouth_poses
+from lipmotion.types import Motion, Timeline, Unit
+
+__all__ = ["render"]
+
+
+def render(
+    motion: Motion, units: Timeline[Unit], *, fps: float = 25.0, height: int = 640
+) -> Iterator[NDArray[np.uint8]]:
+    """Draw a motion as RGB frames [shape=(height, height, 3)], frame n at ``n / fps`` seconds, to the motion's end.
+
+    motion : needs ``opening``; ``width``, ``outer`` and the chin ``y_152`` are used where they exist.
+             ``width`` and ``outer`` count relative to their rest in silence, so any speaker will do.
+    units  : the phones, for the lip on the teeth (f v) and the tongue (th dh l t d n); may be empty
+    height : pixels, even
+    Raises InputError: no ``opening``, no frames, values that are not finite, a size that is odd or under 64,
+    or fps not positive.
+    The same input gives the same pixels, blinks included.
+    """
+    if height < 64 or height % 2:
+        raise InputError(f"the height is {height} pixels, required an even number of at least 64")
+    poses = mouth_poses(motion, units, fps)
+    return _frames(poses, closure(np.arange(len(poses)) / fps), height)
+
+
+def _frames(poses: list[MouthPose], shut: NDArray[np.float64], height: int) -> Iterator[NDArray[np.uint8]]:
+    from lipmotion.faces.portrait.rasteriser import Rasteriser
+
+    rasteriser = Rasteriser(height)
+    for pose, lids in zip(poses, shut.tolist(), strict=True):
+        yield rasteriser.picture(pose, lids)

@@ -1,0 +1,161 @@
+"""Motion and phones → one mouth pose a video frame. Pure numpy; lengths in eye distances."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import InputError
+from lipmotion.faces.portrait.articulation import CLOSURES, TIP_RAISES, TUCKS, weight
+from lipmotion.types import Motion, Timeline, Unit
+from lipmotion.units import is_silent
+
+Curve = NDArray[np.float64]
+
+CLOSED_BELOW = 0.012
+"""Tracked lips that touch still read up to this much; narrower than this is drawn shut."""
+FAITHFUL_ABOVE = 0.03
+"""From here on the drawn gap equals the opening; in between it catches up."""
+WIDEST = 0.4
+"""No mouth is drawn open further than this; speech stays below 0.35."""
+WIDTH_GAIN, WIDTH_REACH = 1.5, 0.3
+"""A drawing needs broader strokes: small departures from the rest width are drawn larger, none beyond the reach."""
+TUCKED_GAP = (0.03, 0.055)
+"""Between the upper lip and a lower lip on the teeth: enough to show them."""
+DRAWN = ("opening", "width", "outer", "y_152")
+"""The channels that are drawn."""
+
+
+class MouthPose(NamedTuple):
+    """The mouth in one frame.
+
+    gap      : between the inner lips, eye distances; 0 means that they touch
+    width    : corner to corner, 1 = the character at rest
+    fullness : thickness of the lips, 1 = at rest
+    jaw      : how far the chin has dropped, eye distances
+    tuck     : 0..1, the lower lip drawn in against the upper teeth (f v)
+    tip      : 0..1, the tip of the tongue raised to the upper teeth (th dh l; less for t d n)
+    """
+
+    gap: float
+    width: float
+    fullness: float
+    jaw: float
+    tuck: float
+    tip: float
+
+
+def mouth_poses(motion: Motion, units: Timeline[Unit], fps: float) -> list[MouthPose]:
+    """Return the pose of every video frame, frame n at ``n / fps`` seconds, to the end of the motion.
+
+    Lips that close between two video frames are shown closed in the nearer one.
+    Raises InputError: no channel ``opening``, no frames, a value that is not finite, or fps not positive.
+    """
+    _check(motion, fps)
+    time_s = np.arange(int(np.floor((len(motion.values) - 1) / motion.rate_hz * fps + 1e-9)) + 1) / fps
+    rest = _rest_frames(motion, units)
+    tuck = np.maximum(weight(units, TUCKS, time_s) - weight(units, CLOSURES, time_s), 0)
+    gap = _gap(motion, time_s, fps)
+    gap += tuck * (np.clip(gap, *TUCKED_GAP) - gap)
+    curves = (
+        gap,
+        _at(motion, _width(motion, rest), time_s),
+        _at(motion, _fullness(motion, rest), time_s),
+        _jaw(motion, rest, gap, time_s),
+        tuck,
+        weight(units, TIP_RAISES, time_s),
+    )
+    return [MouthPose(*row) for row in np.stack(curves, axis=1).tolist()]
+
+
+def drawn_gap(opening: Curve) -> Curve:
+    """Return the gap to draw for a measured opening [shape=(T,)]: truly 0 where the lips touch."""
+    catching_up = (opening - CLOSED_BELOW) * (FAITHFUL_ABOVE / (FAITHFUL_ABOVE - CLOSED_BELOW))
+    return np.clip(np.minimum(opening, catching_up), 0, WIDEST)
+
+
+def upper_share(gap: Curve | float) -> Curve:
+    """Return how far the upper lip rises for a gap; it stops at about 5 mm, the rest is the jaw's.
+
+    Near 0 the share is 0.3, as tracked on GRID speaker 1.
+    """
+    return np.asarray(0.06 * (1 - np.exp(-5 * np.asarray(gap))))
+
+
+def jaw_drop(gap: Curve | float) -> Curve:
+    """Return how far the chin drops for a gap: a little less than the lower lip, which also rolls out."""
+    return 0.85 * (np.asarray(gap) - upper_share(gap))
+
+
+def _check(motion: Motion, fps: float) -> None:
+    if not 0 < fps < np.inf:
+        raise InputError(f"the frame rate is {fps}, required more than 0")
+    if "opening" not in motion.names:
+        names = ", ".join(motion.names[:6]) + (", ..." if len(motion.names) > 6 else "") or "no channels"
+        raise InputError(f"no channel 'opening' to draw a face from; the motion has: {names}")
+    if not len(motion.values):
+        raise InputError("the motion has no frames; there is nothing to draw")
+    for name in {*DRAWN} & {*motion.names}:
+        if not np.isfinite(motion[name]).all():
+            raise InputError(
+                f"the channel {name!r} has values that are not finite; interpolate the missing frames first"
+            )
+
+
+def _at(motion: Motion, curve: Curve, time_s: Curve) -> Curve:
+    return np.interp(time_s, motion.time_s, curve)
+
+
+def _gap(motion: Motion, time_s: Curve, fps: float) -> Curve:
+    gap = drawn_gap(motion["opening"].astype(float))
+    then = _at(motion, gap, time_s)
+    nearest = np.rint(motion.time_s[gap == 0] * fps).astype(int)
+    then[nearest[nearest < len(then)]] = 0
+    return then
+
+
+def _rest_frames(motion: Motion, units: Timeline[Unit]) -> NDArray[np.bool_]:
+    """Return where the mouth rests: in silence, or else the tenth of the frames that is most closed."""
+    time_s = motion.time_s
+    rest = np.zeros(len(time_s), dtype=bool)
+    for span in units:
+        if is_silent(span.label.phone):
+            rest |= (span.start_s <= time_s) & (time_s < span.end_s)
+    if rest.any():
+        return rest
+    most_closed = np.argsort(motion["opening"], kind="stable")[: max(1, len(time_s) // 10)]
+    rest[most_closed] = True
+    return rest
+
+
+def _against_rest(name: str, curve: Curve, rest: NDArray[np.bool_]) -> Curve:
+    """Return the curve in units of its value at rest."""
+    value = float(np.median(curve[rest]))
+    if not value > 0:
+        raise InputError(f"the {name} is {value:g} at rest, required more than 0")
+    return curve / value
+
+
+def _width(motion: Motion, rest: NDArray[np.bool_]) -> Curve:
+    if "width" not in motion.names:
+        return 1 - 0.25 * np.clip(motion["opening"], 0, WIDEST)
+    change = _against_rest("width", motion["width"].astype(float), rest) - 1
+    return 1 + WIDTH_REACH * np.tanh(WIDTH_GAIN * change / WIDTH_REACH)
+
+
+def _fullness(motion: Motion, rest: NDArray[np.bool_]) -> Curve:
+    if "outer" not in motion.names:
+        return 1 - 0.4 * np.clip(motion["opening"], 0, WIDEST)
+    thickness = motion["outer"] - motion["opening"]
+    return np.clip(_against_rest("thickness of the lips (outer - opening)", thickness, rest), 0.75, 1.25)
+
+
+def _jaw(motion: Motion, rest: NDArray[np.bool_], gap: Curve, time_s: Curve) -> Curve:
+    """Return how far the chin drops: as tracked (point 152, y up), as far as that suits the gap."""
+    usual = jaw_drop(gap)
+    if "y_152" not in motion.names:
+        return usual
+    chin = motion["y_152"]
+    return np.clip(_at(motion, np.median(chin[rest]) - chin, time_s), 0.6 * usual, 1.15 * usual + 0.01)

@@ -1,0 +1,173 @@
+"""Forced alignment: where each unit of a known sequence begins and ends."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import AlignmentError
+from lipmotion.hmm.log_likelihoods import Evidence
+from lipmotion.hmm.model import UnitHmm
+from lipmotion.hmm.network import Network, NetworkBuilder
+
+FEW_ARCS, ARCS_A_FRAME = 1_000_000, 10
+"""Arcs of a network that may always be built, and how many more for each frame; sentences need about one a frame."""
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """The states of a sequence of units, one after another.
+
+    names     : the state's full name in its context, and its density without context
+    densities : [shape=(S,)], the density of each state
+    plain     : [shape=(S,)], its density without context, which carries its duration
+    positions : [shape=(S,)], which unit of the sequence it belongs to
+    """
+
+    names: tuple[tuple[str, int], ...]
+    densities: NDArray[np.intp]
+    plain: NDArray[np.intp]
+    positions: NDArray[np.intp]
+
+
+def chain_of(hmm: UnitHmm, units: Sequence[str]) -> Chain:
+    """Return the chain of context-dependent states of a unit sequence; beyond its ends lies silence."""
+    table, silence = hmm.table, hmm.table.free[0]
+    around = [silence, *(silence if unit in table.free else unit for unit in units), silence]
+    names: list[tuple[str, int]] = []
+    densities, positions = [], []
+    for i, unit in enumerate(units):
+        for state in range(table.count(unit)):
+            names.append((table.name(around[i], unit, around[i + 2], state), table.density(unit, state)))
+            densities.append(table.density(unit, state, table.neighbour(around[i], unit, around[i + 2], state)))
+            positions.append(i)
+    plain = np.array([plain for _, plain in names], np.intp)
+    return Chain(tuple(names), np.array(densities, np.intp), plain, np.array(positions, np.intp))
+
+
+def state_path(
+    hmm: UnitHmm, evidence: Evidence, units: Sequence[str]
+) -> tuple[tuple[tuple[str, int], ...], NDArray[np.intp]]:
+    """Return the states of a unit sequence (``Chain.names``) and which of them holds in each frame [shape=(T,)].
+
+    Raises AlignmentError: fewer frames than states.
+    """
+    chain = chain_of(hmm, units)
+    used, local = np.unique(chain.densities, return_inverse=True)
+    path = _chain_network(hmm, chain, local).best_path(evidence, used)
+    return chain.names, path
+
+
+def align_units(hmm: UnitHmm, evidence: Evidence, units: Sequence[str]) -> NDArray[np.intp]:
+    """Return the first frame of each unit, and the frame count at the end [shape=(len(units) + 1,)].
+
+    Raises AlignmentError: fewer frames than states.
+    """
+    _, path = state_path(hmm, evidence, units)
+    positions = chain_of(hmm, units).positions[path]
+    return np.append(np.searchsorted(positions, np.arange(len(units))), evidence.frames)
+
+
+def _chain_network(hmm: UnitHmm, chain: Chain, emission: NDArray[np.intp]) -> Network:
+    builder = NetworkBuilder()
+    stay = hmm.log_stay[chain.plain].astype(float)
+    move = np.log(-np.expm1(stay))
+    for number, density in enumerate(emission):
+        builder.state(int(density), stay[number])
+        if number:
+            builder.arc(number - 1, number, move[number - 1])
+    builder.initial(0)
+    builder.final(len(stay) - 1, move[-1])
+    return builder.build()
+
+
+class Said(NamedTuple):
+    """One part of what was said: the word's position (-1: no word), which of its pronunciations, its units."""
+
+    word: int
+    variant: int
+    units: tuple[str, ...]
+
+
+def choose_pronunciations(
+    hmm: UnitHmm, evidence: Evidence, words: Sequence[Sequence[Sequence[str]]], pause: str
+) -> list[Said]:
+    """Choose how each word was said, and where there was a pause.
+
+    words : for each word, its possible pronunciations
+    pause : the unit that may stand between words; silence (the first free unit) surrounds them all
+    The states without context decide, so that a pronunciation's ends need not know its neighbours.
+    Raises AlignmentError: the words do not fit into the frames.
+    """
+    _check_room(hmm, evidence, words)
+    silence = Said(-1, 0, (hmm.table.free[0],))
+    slots: list[list[Said]] = [[silence]]
+    for word, variants in enumerate(words):
+        if word:
+            slots.append([Said(-1, 0, (pause,)), Said(-1, 1, ())])
+        slots.append([Said(word, number, tuple(variant)) for number, variant in enumerate(variants)])
+    slots.append([silence])
+    builder = NetworkBuilder()
+    owners: list[tuple[int, Said]] = []
+    open_ends: list[tuple[int, float]] = []
+    for slot, choices in enumerate(slots):
+        ends: list[tuple[int, float]] = []
+        for said in choices:
+            begin = len(owners)
+            ends += _append(builder, hmm, said.units, open_ends)
+            owners += [(slot, said)] * sum(hmm.table.count(unit) for unit in said.units)
+            if slot == 0:
+                builder.initial(begin)
+        open_ends = ends
+    for state, move in open_ends:
+        builder.final(state, move)
+    plain = np.arange(len(hmm.log_stay), dtype=np.intp)
+    path = builder.build().best_path(evidence, plain)
+    return [said for _, said in sorted({owners[state] for state in path})]
+
+
+def _check_room(hmm: UnitHmm, evidence: Evidence, words: Sequence[Sequence[Sequence[str]]]) -> None:
+    """Raise AlignmentError before a network is built that no path fits through, or that may fill the memory."""
+    states = _states_of(hmm, words)
+    least = sum(min(states[id(variants)]) for variants in words)
+    if least > evidence.frames:
+        raise AlignmentError(
+            f"{len(words)} words take at least {least} frames of 10 ms, found {evidence.frames}: the recording is too "
+            "short for what should be said in it; give its own transcript"
+        )
+    ends = [1, *(len(variants) + 1 for variants in words)]  # of the word before, and of the pause
+    arcs = sum(2 * sum(states[id(v)]) + len(v) * before for v, before in zip(words, ends, strict=False))
+    most = FEW_ARCS + ARCS_A_FRAME * evidence.frames
+    if arcs > most:
+        raise AlignmentError(
+            f"{len(words)} words in all their pronunciations make {arcs} arcs, required at most {most} for "
+            f"{evidence.frames} frames of 10 ms; give fewer pronunciations"
+        )
+
+
+def _states_of(hmm: UnitHmm, words: Sequence[Sequence[Sequence[str]]]) -> dict[int, list[int]]:
+    """Return how many states each pronunciation of a word has, by the word's identity: few of many words differ."""
+    counts = dict(zip(hmm.table.units, hmm.table.counts, strict=True))
+    different = {id(variants): variants for variants in words}
+    return {
+        number: [sum(counts[unit] for unit in variant) for variant in variants]
+        for number, variants in different.items()
+    }
+
+
+def _append(
+    builder: NetworkBuilder, hmm: UnitHmm, units: Sequence[str], open_ends: list[tuple[int, float]]
+) -> list[tuple[int, float]]:
+    """Add the states of some units behind all open ends; return the new open ends (the old ones if no units)."""
+    ends = open_ends
+    for unit in units:
+        for state in range(hmm.table.count(unit)):
+            number = builder.state(hmm.table.density(unit, state), hmm.stay(unit, state))
+            for source, move in ends:
+                builder.arc(source, number, move)
+            ends = [(number, hmm.move(unit, state))]
+    return ends

@@ -1,0 +1,126 @@
+"""A trained set of unit models."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import ModelFormatError
+from lipmotion.hmm.states import StateTable, plain_states
+from lipmotion.stats.bigram import BIGRAM, Bigram, bigram_from
+from lipmotion.stats.mixture import MIXTURES, Mixtures, mixtures_from
+from lipmotion.storage.schema import NEGATIVE, Arrays, Member, checked, only
+
+
+@dataclass(frozen=True)
+class HmmConfig:
+    """How unit models are built and trained.
+
+    states       : states per unit, left to right, no skips
+    mixtures     : most Gaussians per state (a power of two); with little speech there are fewer
+    context_frames : least frames of data for a state in context to get a density of its own
+    relevance    : frames that the density without context counts for, per Gaussian, in one with context
+    iterations   : embedded Baum–Welch iterations per stage
+    variance_floor   : share of a feature's overall variance
+    bigram_weight, insertion : scale of the log bigram, and log price of every unit, when decoding
+    """
+
+    states: int = 3
+    mixtures: int = 8
+    context_frames: int = 30
+    relevance: float = 10.0
+    iterations: int = 4
+    variance_floor: float = 0.02
+    bigram_weight: float = 4.0
+    insertion: float = -4.0
+
+
+@dataclass(frozen=True, eq=False)
+class UnitHmm:
+    """Models of all units: tied states, their densities, how long each lasts, and which unit follows which.
+
+    log_stay    : float32 array [shape=(G,)], of the densities without context; log P(keep the state)
+    typical_fit : mean ``fit`` of the recordings that the models were trained on
+    """
+
+    config: HmmConfig
+    table: StateTable
+    mixtures: Mixtures
+    log_stay: NDArray[np.float32]
+    bigram: Bigram
+    typical_fit: float = 0.0
+
+    def stay(self, unit: str, state: int) -> float:
+        """Return log P(keep this state one frame longer)."""
+        return float(self.log_stay[self.table.density(unit, state)])
+
+    def move(self, unit: str, state: int) -> float:
+        """Return log P(leave this state)."""
+        return float(np.log(-np.expm1(self.stay(unit, state))))
+
+    def fit(self, features: NDArray[np.float32]) -> float:
+        """Return the mean log density of frames [shape=(T, D)], each under what fits it best, without context."""
+        plain = np.arange(len(self.log_stay), dtype=np.intp)
+        return float(self.mixtures.log_likelihood(features, plain).max(axis=1).mean())
+
+
+def hmm_arrays(hmm: UnitHmm, precision: type[np.floating[Any]] = np.float16) -> dict[str, NDArray[Any]]:
+    """Return the models as arrays; the configuration is not among them.
+
+    precision : of the Gaussians: half is enough to recognise with, float32 is all there is
+    """
+    return {
+        "units": np.array(hmm.table.units),
+        "counts": np.array(hmm.table.counts, np.int32),
+        "names": np.array(hmm.table.names),
+        "free": np.array(hmm.table.free),
+        "log_weights": hmm.mixtures.log_weights.astype(precision),
+        "means": hmm.mixtures.means.astype(precision),
+        "variances": hmm.mixtures.variances.astype(precision),
+        "log_stay": hmm.log_stay,
+        "bigram": hmm.bigram.log_probability,
+        "typical_fit": np.array([hmm.typical_fit]),
+    }
+
+
+def hmm_from_arrays(arrays: Arrays, config: HmmConfig) -> UnitHmm:
+    """Return the models again. Raises ModelFormatError: something is missing, out of place or out of range."""
+    try:
+        only(arrays, NAMES, MODELS)
+        named = checked(arrays, NAMES)
+        units, counts, names, free = (tuple(named[key].tolist()) for key in ("units", "counts", "names", "free"))
+        _check_names(units, counts, names, free)
+        found = checked(arrays, MODELS, **named.sizes, R=sum(counts))
+        table = StateTable(units, counts, names, free)
+        bigram = bigram_from(units, found["bigram"])
+        return UnitHmm(config, table, mixtures_from(found), found["log_stay"], bigram, float(found["typical_fit"][0]))
+    except (KeyError, ValueError, TypeError, IndexError, OverflowError) as error:
+        raise ModelFormatError(f"the phone models are damaged ({error}); train or download the model again") from error
+
+
+NAMES = {
+    "units": Member(np.str_, "U"),
+    "counts": Member(np.int32, "U", 1, 1000),
+    "names": Member(np.str_, "G"),
+    "free": Member(np.str_, "F"),
+}
+MODELS = {
+    **MIXTURES,
+    **BIGRAM,
+    "log_stay": Member(np.float32, "R", -1e4, NEGATIVE),
+    "typical_fit": Member(np.float64, "1", -1e6, 1e6),
+}
+"""How unit models are stored; R states have no context."""
+
+
+def _check_names(
+    units: tuple[str, ...], counts: tuple[int, ...], names: tuple[str, ...], free: tuple[str, ...]
+) -> None:
+    if not set(free) <= set(units) or len(set(units)) < len(units) or sum(counts) > len(names):
+        raise ValueError(f"{len(names)} states of {len(units)} units, {len(free)} of them silent")
+    wanted = plain_states(units, counts, free).names
+    if names[: len(wanted)] != wanted or len(set(names)) < len(names):
+        raise ValueError("the names of the states are not those of the units")

@@ -1,0 +1,55 @@
+"""Units in time as the joint model takes them, and back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from operator import attrgetter
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import InputError
+from lipmotion.hmm.multistream.recognise import Said
+from lipmotion.types import FRAME_RATE_HZ, Span, Timeline, Unit
+
+
+def in_frames(
+    units: Timeline[Unit], frames: int, silence: str, unit_of: Callable[[Unit], str] = attrgetter("phone")
+) -> tuple[tuple[str, ...], NDArray[np.intp]]:
+    """Return the units of a recording, and the first frame of each with the frame count at the end.
+
+    frames  : T > 0; frame n belongs to the unit that holds at n · 10 ms
+    silence : the unit in gaps
+    unit_of : gives the unit of what is spoken; by default the phone itself
+    A unit without a frame of its own is left out.
+    Raises InputError: no frames.
+    """
+    if frames < 1:
+        raise InputError(f"{frames} frames, required one or more")
+    names: list[str] = []
+    firsts: list[int] = []
+    end = 0
+    for span in units:
+        edges = np.ceil(np.array([span.start_s, span.end_s]) * FRAME_RATE_HZ - 1e-6)
+        first, stop = np.clip(edges, end, frames).astype(int).tolist()
+        if first > end:
+            names.append(silence)
+            firsts.append(end)
+        if stop > first:
+            names.append(unit_of(span.label))
+            firsts.append(first)
+        end = max(end, stop)
+    if end < frames:
+        names.append(silence)
+        firsts.append(end)
+    return tuple(names), np.array([*firsts, frames], np.intp)
+
+
+def in_time(said: Sequence[Said], duration_s: float, label_of: Callable[[str], Unit] = Unit) -> Timeline[Unit]:
+    """Return recognised units in time: frame n covers (n ± ½) · 10 ms, from 0 s to the end of the recording.
+
+    label_of : gives what is known to be spoken in a unit; by default the unit is the phone
+    """
+    edges = np.clip((np.array([unit.first for unit in said]) - 0.5) / FRAME_RATE_HZ, 0, duration_s).tolist()
+    spans = zip(edges, [*edges[1:], duration_s], said, strict=True)
+    return Timeline(tuple(Span(start_s, end_s, label_of(unit.unit)) for start_s, end_s, unit in spans))

@@ -1,0 +1,140 @@
+"""What is observed in an utterance: speech, F0 in three parts, and motion."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import InputError
+from lipmotion.stats.delta_windows import with_dynamics, within
+
+SPEECH, MOTION = "speech", "motion"
+F0_STREAMS = ("f0", "f0_slope", "f0_curvature")
+STREAMS = (SPEECH, *F0_STREAMS, MOTION)
+HEARD = (SPEECH, *F0_STREAMS)
+"""The streams that recognition has."""
+
+
+@dataclass(frozen=True)
+class StreamWeights:
+    """What the log density of each stream is multiplied by; 0 switches it off.
+
+    Raises InputError: a weight is negative or not finite.
+    """
+
+    speech: float = 1.0
+    f0: float = 1.0
+    f0_slope: float = 1.0
+    f0_curvature: float = 1.0
+    motion: float = 1.0
+
+    def __post_init__(self) -> None:
+        for name, weight in self:
+            if not 0 <= weight < float("inf"):
+                raise InputError(f"the weight of the stream {name} is {weight}, required 0 or more and finite")
+
+    def __iter__(self) -> Iterator[tuple[str, float]]:
+        return ((field.name, getattr(self, field.name)) for field in fields(self))
+
+    @property
+    def on(self) -> dict[str, float]:
+        """The streams that are switched on, and their weights."""
+        return {name: weight for name, weight in self if weight}
+
+
+@dataclass(frozen=True, eq=False)
+class Stream:
+    """One kind of data of an utterance.
+
+    values  : float array [shape=(T, D)], anything finite where it is not known
+    known   : bool array [shape=(T,)]; of F0, where there is voice
+    """
+
+    values: NDArray[np.floating[Any]]
+    known: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Observed:
+    """An utterance: its streams by name. Recordings without a face have no motion, or none of it known.
+
+    Raises InputError: no speech, an unknown stream, streams of different lengths, or known values that are not finite.
+    """
+
+    streams: Mapping[str, Stream]
+
+    def __post_init__(self) -> None:
+        if SPEECH not in self.streams or not set(self.streams) <= set(STREAMS):
+            raise InputError(f"streams {', '.join(self.streams)}; required speech, and others of {', '.join(STREAMS)}")
+        for name, stream in self.streams.items():
+            if stream.values.ndim != 2 or stream.known.shape != (self.frames,) or len(stream.values) != self.frames:
+                raise InputError(
+                    f"the stream {name} has values of shape {stream.values.shape} and a mask of {stream.known.shape}; "
+                    f"required ({self.frames}, D) and ({self.frames},), as many frames as speech"
+                )
+            if not np.isfinite(stream.values).all():
+                raise InputError(f"the stream {name} holds values that are not finite; mark them as not known")
+
+    @property
+    def frames(self) -> int:
+        """T."""
+        return len(self.streams[SPEECH].values)
+
+
+def observe(
+    speech: NDArray[np.floating[Any]],
+    log_f0: NDArray[np.floating[Any]] | None = None,
+    motion: NDArray[np.floating[Any]] | None = None,
+    seen: NDArray[np.bool_] | None = None,
+) -> Observed:
+    """Return an utterance.
+
+    speech : features [shape=(T, 39)]
+    log_f0 : natural logarithm of F0 in Hz, NaN where there is no voice [shape=(T,)]
+    motion : [shape=(T, Q)], static; its Δ and Δ² come from here
+    seen   : where motion was measured [shape=(T,)]; everywhere by default
+    Raises InputError: as ``Observed``.
+    """
+    speech = np.asarray(speech)
+    streams = {SPEECH: Stream(speech, np.ones(len(speech), bool))}
+    if log_f0 is not None:
+        streams |= f0_streams(np.asarray(log_f0, float))
+    if motion is not None:
+        values: NDArray[np.float64] = np.asarray(motion, np.float64)
+        streams[MOTION] = motion_stream(values, np.ones(len(values), bool) if seen is None else seen)
+    return Observed(streams)
+
+
+def f0_streams(log_f0: NDArray[np.float64]) -> dict[str, Stream]:
+    """Return static, Δ and Δ² of log F0 [shape=(T,)], a stream each; known where all frames of the window are voiced.
+
+    Source: Hofer 2008, §4; the windows as for motion.
+    Raises InputError: not one value a frame, or infinite ones.
+    """
+    if log_f0.ndim != 1 or np.isinf(log_f0).any():
+        raise InputError(f"log F0 has shape {log_f0.shape}, required (T,), NaN where there is no voice, never infinite")
+    voiced = ~np.isnan(log_f0)
+    dynamics = with_dynamics(np.where(voiced, log_f0, 0.0)[:, None])
+    known = (voiced, *[within(voiced)] * 2)
+    return {
+        name: Stream(np.where(mask[:, None], dynamics[:, window], 0.0), mask)
+        for window, (name, mask) in enumerate(zip(F0_STREAMS, known, strict=True))
+    }
+
+
+def motion_stream(motion: NDArray[np.float64], seen: NDArray[np.bool_]) -> Stream:
+    """Return static, Δ and Δ² of motion [shape=(T, Q)] side by side [shape=(T, 3·Q)], known where all three are.
+
+    Raises InputError: the mask is not that of the frames, or a seen value is not finite.
+    """
+    if motion.ndim != 2 or seen.shape != motion.shape[:1]:
+        raise InputError(f"motion has shape {motion.shape}, seen {seen.shape}; required (T, Q) and (T,)")
+    if not np.isfinite(motion[seen]).all():
+        raise InputError("motion holds values that are not finite where it was seen; mark these frames as not seen")
+    known = within(np.asarray(seen, bool))
+    dynamics = with_dynamics(np.where(seen[:, None], motion, 0.0)).reshape(len(motion), -1)
+    return Stream(np.where(known[:, None], dynamics, 0.0), known)

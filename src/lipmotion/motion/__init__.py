@@ -1,0 +1,1 @@
+"""What all engines share once motion is predicted: its space, rest pose, closures, parameter generation, scaling."""

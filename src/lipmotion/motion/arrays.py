@@ -1,0 +1,86 @@
+"""What every model of motion has beside its statistics: units, the space of the motion, and how lips close."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.motion.closure import OPENING, Closure
+from lipmotion.motion.space import MotionSpace
+from lipmotion.stats.pca import Pca, check_orthonormal
+from lipmotion.storage.schema import Arrays, Member, checked, only
+from lipmotion.types import Channel
+from lipmotion.units import UNIT_SETS, UnitSet
+
+SINGLE = UNIT_SETS["phone"]
+"""Each phone its own unit: needs no table."""
+
+
+def frame_arrays(units: UnitSet, space: MotionSpace, closure: Closure | None) -> dict[str, NDArray[Any]]:
+    """Return them as arrays."""
+    arrays: dict[str, NDArray[Any]] = {
+        "channels": np.array([(channel.name, channel.unit) for channel in space.channels]),
+        "direct": space.direct,
+    }
+    if units != SINGLE:
+        arrays["units"] = np.array(list(units.of.items()))
+    if space.points is not None:
+        arrays |= {"points_mean": space.points.mean, "points_basis": space.points.basis.astype(np.float32)}
+    if closure is not None:
+        arrays |= {"closure": np.array([closure.column, closure.closed]), "closure_follow": closure.follow}
+    return arrays
+
+
+def frame_from_arrays(arrays: Arrays, units: str) -> tuple[UnitSet, MotionSpace, Closure | None]:
+    """Return them again.
+
+    units : the name of the unit set; the set itself is in the arrays
+    Raises KeyError, ValueError, IndexError, TypeError: something is missing, out of place or out of range.
+    """
+    space = _space(arrays)
+    closure = None
+    if OPENING in space.direct_names:
+        found = checked(arrays, CLOSURE, Q=space.dimensions)
+        column, closed = found["closure"]
+        if column != space.direct_names.index(OPENING) or closed < 0:
+            raise ValueError(f"closure of column {column:g} at {closed:g}, required that of {OPENING}, 0 or more")
+        closure = Closure(int(column), float(closed), found["closure_follow"])
+    of = SINGLE if units == SINGLE.name else UnitSet(units, _mapping(checked(arrays, UNITS)["units"]))
+    return of, space, closure
+
+
+CHANNELS = {"channels": Member(np.str_, "P 2"), "direct": Member(np.intp, "d", 0, 1e6)}
+POINTS = {
+    "points_mean": Member(np.float64, "R", -1e6, 1e6),
+    "points_basis": Member(np.float64, "K R", -1.01, 1.01),
+}
+CLOSURE = {"closure": Member(np.float64, "2"), "closure_follow": Member(np.float64, "Q")}
+UNITS = {"units": Member(np.str_, "N 2")}
+FRAME = (*CHANNELS, *POINTS, *CLOSURE, *UNITS)
+"""How they are stored: P channels, of which R are reduced to K dimensions."""
+
+
+def _space(arrays: Arrays) -> MotionSpace:
+    named = checked(arrays, CHANNELS)
+    count, direct = named.sizes["P"], named["direct"]
+    channels = tuple(Channel(name, unit) for name, unit in named["channels"].tolist())
+    if len({channel.name for channel in channels}) < count:
+        raise ValueError("channels whose names repeat")
+    if len(set(direct.tolist()) & set(range(count))) < len(direct):
+        raise ValueError(f"direct channels {direct.tolist()}, required different ones under {count}")
+    if len(direct) == count:
+        only(arrays.keys() & POINTS.keys())
+        return MotionSpace(channels, direct, None)
+    found = checked(arrays, POINTS, R=count - len(direct))
+    check_orthonormal("points_basis", found["points_basis"])
+    return MotionSpace(channels, direct, Pca(found["points_mean"], found["points_basis"]))
+
+
+def _mapping(pairs: NDArray[Any]) -> dict[str, str]:
+    """Return the unit of every phone. Raises ValueError: something else."""
+    of = {str(phone): str(unit) for phone, unit in pairs}
+    if len(of) != len(pairs):
+        raise ValueError("a phone with two units")
+    return of

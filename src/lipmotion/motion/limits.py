@@ -1,0 +1,116 @@
+"""How far motion may go: what a model's own poses tell of it, and what no face does."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import ModelFormatError
+from lipmotion.motion.closure import OPENING, Closure
+from lipmotion.motion.space import MotionSpace
+from lipmotion.types import check_magnitude
+
+Array = NDArray[np.float64]
+WIDEST = 20.0
+"""Motion stays within so many times the span of a model's poses: with sound that was never heard, about three."""
+DEVIATIONS = 3.0
+"""Motion lies around its poses."""
+LARGEST_SPREAD = 1000.0
+"""The poses of half of the dimensions span fewer of their own deviations than this: about ten in our models."""
+LARGEST_OFFSET = 1000.0
+"""The mean of points lies fewer of the largest span of a dimension away from 0."""
+WIDE_OPEN = 5.0
+"""Eye distances: more than this, a mouth is not open, and other things must fit as well."""
+NEGATIVE_SHARE = 0.05
+FAR_REST = 3.0
+"""The pose at rest lies fewer spans of the poses away from these."""
+LEAST_SPAN = 1e-3
+
+
+class Reach(NamedTuple):
+    """Between which values poses, or motion, of a model lie.
+
+    low, high : [shape=(Q,)]
+    """
+
+    low: Array
+    high: Array
+
+    @property
+    def span(self) -> Array:
+        """How far apart they are."""
+        return self.high - self.low
+
+    def widened(self, deviation: NDArray[np.floating]) -> Reach:
+        """Return a reach of ``DEVIATIONS`` more to both sides."""
+        return Reach(self.low - DEVIATIONS * deviation, self.high + DEVIATIONS * deviation)
+
+    def check(self, values: Array, closure: Closure | None, pins: Mapping[tuple[int, int], float]) -> None:
+        """Raise ModelFormatError where motion [shape=(T, Q)] goes that the model, and pins, do not lead to."""
+        low, high = self.low.copy(), self.high.copy()
+        for (_, column), value in pins.items():
+            low[column], high[column] = min(low[column], value), max(high[column], value)
+        span = _span(low, high)
+        if closure is not None:
+            span = np.maximum(span, np.abs(closure.follow) * (high - low)[closure.column] if pins else 0)
+        worst = np.maximum(low - values.min(axis=0), values.max(axis=0) - high) / (WIDEST * span)
+        if not worst.max() <= 1:
+            column = int(worst.argmax())
+            raise ModelFormatError(
+                f"the motion would go from {values[:, column].min():g} to {values[:, column].max():g} in dimension "
+                f"{column}, its model reaches from {low[column]:g} to {high[column]:g}: the model is "
+                "damaged; train or download it again"
+            )
+
+
+def reach_of(poses: NDArray[np.floating]) -> Reach:
+    """Return between which values poses [shape=(N, Q)] lie."""
+    return Reach(poses.min(axis=0).astype(float), poses.max(axis=0).astype(float))
+
+
+def check_poses(reach: Reach, space: MotionSpace, closure: Closure | None) -> None:
+    """Raise ValueError where a model's poses are none of a face, or do not fit the other things it knows."""
+    count = len(space.direct)
+    for column, channel in enumerate(space.direct):
+        check_magnitude(space.channels[channel], float(reach.low[column]), float(reach.high[column]))
+    if space.points is not None:
+        largest, moves = float(np.abs(space.points.mean).max()), float(reach.span[count:].max(initial=0.0))
+        if largest > max(WIDE_OPEN, LARGEST_OFFSET * moves):
+            raise ValueError(f"points_mean as large as {largest:g} of points that move by {moves:g}")
+    if closure is not None:
+        _check_opening(float(reach.low[closure.column]), float(reach.high[closure.column]), closure.closed)
+
+
+def check_rest(rest: Array, reach: Reach) -> None:
+    """Raise ValueError where the pose at rest [shape=(Q,)] is far from all other poses."""
+    away = np.maximum(reach.low - rest, rest - reach.high) / _span(reach.low, reach.high)
+    column = int(away.argmax())
+    if away[column] > FAR_REST:
+        raise ValueError(
+            f"rest of {rest[column]:g} in dimension {column}, whose poses are {reach.low[column]:g} to "
+            f"{reach.high[column]:g}"
+        )
+
+
+def _span(low: Array, high: Array) -> Array:
+    """Return how far apart values are; those that hardly differ, a thousandth of what they are, or of 1."""
+    return np.maximum(high - low, LEAST_SPAN * np.maximum(np.maximum(np.abs(low), np.abs(high)), 1))
+
+
+def _check_opening(low: float, high: float, closed: float) -> None:
+    span = high - low
+    if max(-low, high) > WIDE_OPEN and (low < -NEGATIVE_SHARE * span or low > WIDEST * span):
+        raise ValueError(f"poses whose {OPENING} is {low:g} to {high:g}")
+    if closed > max(high + WIDEST * span, WIDE_OPEN):
+        raise ValueError(f"lips that are closed at {closed:g}, with poses whose {OPENING} is {low:g} to {high:g}")
+
+
+def check_spread(poses: NDArray[np.floating], variances: NDArray[np.floating]) -> None:
+    """Raise ValueError where poses [shape=(N, Q)] lie much farther apart than their own deviations let them."""
+    deviation = np.sqrt(variances.mean(axis=0, dtype=float))
+    spread = float(np.median(np.ptp(poses, axis=0) / deviation))
+    if spread > LARGEST_SPREAD:
+        raise ValueError(f"means that span {spread:.0f} of their deviations, required at most {LARGEST_SPREAD:.0f}")

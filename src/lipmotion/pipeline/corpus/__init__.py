@@ -1,0 +1,1 @@
+"""Recordings to a corpus: preparation, supplied motion, synchronisation, prompts."""

@@ -1,0 +1,264 @@
+"""Recordings to a corpus: ``prepare(recordings) → corpus``."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field, replace
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from lipmotion.corpora.base import Recording, Recordings
+from lipmotion.corpora.discover import discover
+from lipmotion.corpora.entry import quantised, read_entry, write_utterance
+from lipmotion.corpora.store import UTTERANCES, Corpus
+from lipmotion.errors import AlignmentError, CorpusError, ExportError, InputError, MissingDependencyError
+from lipmotion.pipeline.corpus.supplied_motion import DIGESTS, digest, given_phones, given_track
+from lipmotion.pipeline.workers import working
+from lipmotion.speech.mfcc import mfcc
+from lipmotion.speech.read import read_audio
+from lipmotion.storage.files import locked, remove_unfinished, sha256_of
+from lipmotion.storage.sources import Source, check_apart, is_folder
+from lipmotion.types import Item, Monitor, Progress, Track, Utterance, silent_monitor
+from lipmotion.units import check_words
+from lipmotion.vision.packages import versions
+from lipmotion.vision.track import track
+
+RECIPE = "4"
+"""Raised whenever the same video would give other numbers: older utterances are then made again."""
+STAGE = "preparing recordings"
+
+
+@dataclass(frozen=True)
+class PrepareReport:
+    """What became of the recordings.
+
+    corpus   : the corpus's folder
+    kind     : what the recordings were taken for
+    prepared : names of the utterances made now
+    kept     : names of those that were there already, from the same source with the same settings
+    failed   : recordings that could not be used, name to reason
+    unseen   : utterances with frames without a face, name to the number of those frames
+    seconds  : wall time
+    notes    : what is odd about a video (cuts, damage, a covered mouth), name to remarks
+    """
+
+    corpus: Path
+    kind: str
+    prepared: tuple[str, ...]
+    kept: tuple[str, ...]
+    failed: dict[str, str]
+    unseen: dict[str, int]
+    seconds: float
+    notes: dict[str, tuple[str, ...]] = field(default_factory=dict)
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """How many recordings were prepared, kept and skipped."""
+        return {"prepared": len(self.prepared), "kept": len(self.kept), "skipped": len(self.failed)}
+
+    def __str__(self) -> str:
+        counts = ", ".join(f"{count} {what}" for what, count in self.counts.items())
+        return f"{self.corpus}: {counts} ({self.kind})"
+
+
+@dataclass(frozen=True)
+class _Job:
+    """One recording, the folder it becomes, and what is known of it beforehand."""
+
+    recording: Recording
+    folder: Path
+    source: dict[str, str]
+    settings: dict[str, str]
+
+
+@dataclass(frozen=True)
+class _Outcome:
+    name: str
+    kept: bool = False
+    unseen: int = 0
+    problem: str = ""
+    notes: tuple[str, ...] = ()
+
+
+def prepare(
+    directory: str | Path,
+    output: str | Path,
+    *,
+    workers: int | None = None,
+    crops: bool = True,
+    monitor: Monitor = silent_monitor,
+) -> PrepareReport:
+    """Turn a folder of recordings into a corpus, or add them to one.
+
+    directory : GRID's or FACEGOOD's layout, or any folder of videos or of sounds with motion (docs/corpora.md)
+    output    : the corpus; utterances in it that are up to date are kept, so a stopped run goes on where it stopped
+    workers   : processes, by default one a core. With more than one, a script must call this under
+                ``if __name__ == "__main__":``, as for every process pool
+    crops     : keep the mouth images
+    monitor   : hears how far it is, and what becomes of every recording
+    A recording that cannot be used is reported and left out. The corpus does not depend on ``workers``, nor on how
+    often it was interrupted.
+    Raises InputError, CorpusError: no recordings, none of them usable, or ``output`` is something else.
+    Raises MissingDependencyError: there are videos, and MediaPipe or OpenCV is not installed.
+    Raises ExportError: the disk is full, or another process is preparing into the same corpus.
+    """
+    directory, output = Path(directory), Path(output)
+    start_s = time.monotonic()
+    if workers is not None and workers < 1:
+        raise InputError(f"{workers} processes, required at least 1; leave it out for one a core")
+    check_apart((), [Source(directory, "folder of recordings")], folders=[output])
+    found = discover(directory)
+    packages = versions() if any(item.curves is None for item in found.items) else {}
+    is_new = not is_folder(output)
+    with locked(output):
+        corpus = Corpus.create(output)
+        jobs = [_job(item, directory.resolve(), corpus, packages, crops) for item in found.items]
+        with _listed(corpus), working(min(workers or os.cpu_count() or 1, len(jobs))) as team:
+            outcomes = _heard(found, team.as_they_come(_process, jobs), len(jobs), monitor)
+    report = _report(corpus, found, outcomes, time.monotonic() - start_s)
+    if not report.prepared and not report.kept:
+        if is_new:
+            shutil.rmtree(output)
+        name, reason = next(iter(report.failed.items()))
+        raise CorpusError(
+            f"{directory}: none of {len(report.failed)} recordings is usable; the first, {name}: {reason}"
+        )
+    return report
+
+
+def _report(corpus: Corpus, found: Recordings, outcomes: list[_Outcome], seconds: float) -> PrepareReport:
+    outcomes = sorted(outcomes, key=lambda outcome: outcome.name)
+    good = [outcome for outcome in outcomes if not outcome.problem]
+    problems = found.problems | {outcome.name: outcome.problem for outcome in outcomes if outcome.problem}
+    return PrepareReport(
+        corpus=corpus.path,
+        kind=found.kind,
+        prepared=tuple(outcome.name for outcome in good if not outcome.kept),
+        kept=tuple(outcome.name for outcome in good if outcome.kept),
+        failed=dict(sorted(problems.items())),
+        unseen={outcome.name: outcome.unseen for outcome in good if outcome.unseen},
+        seconds=seconds,
+        notes={outcome.name: outcome.notes for outcome in good if outcome.notes},
+    )
+
+
+def _job(recording: Recording, directory: Path, corpus: Corpus, packages: dict[str, str], crops: bool) -> _Job:
+    collection = "/".join(directory.parts[-2:]).strip("/")
+    name = recording.name
+    if _is_taken(corpus.folder(name), recording.file, collection):
+        name = f"{collection.replace('/', '-')}-{name}"
+    if recording.curves is None:
+        settings = {"tracker": f"mediapipe {packages['mediapipe']}", "crops": "yes" if crops else "no"}
+    else:
+        settings, packages = {"tracker": "none: motion was given"}, {"av": metadata.version("av")}
+    settings["recipe"] = RECIPE
+    source = {
+        "collection": collection,
+        "file": recording.file.name,
+        "lipmotion": metadata.version("lipmotion"),
+        **packages,
+        **recording.rights,
+    }
+    return _Job(replace(recording, name=name), corpus.folder(name), source, settings)
+
+
+def _is_taken(folder: Path, video: Path, collection: str) -> bool:
+    """Is this name another recording's, from another folder? (GRID's speakers share their file names.)"""
+    try:
+        source = read_entry(folder).get("source", {})
+    except CorpusError:
+        return False
+    return source.get("collection") != collection and source.get("sha256") != sha256_of(video)
+
+
+def _process(job: _Job) -> _Outcome:
+    name = job.recording.name
+    try:
+        sound = job.recording.file
+        source = job.source | {"sha256": sha256_of(sound), "bytes": str(sound.stat().st_size)} | digest(job.recording)
+        entry = _kept(job, source)
+        if entry is not None:
+            return _Outcome(name, kept=True, unseen=int(entry["unseen_frames"]), notes=tuple(entry.get("notes", ())))
+        utterance = _utterance(job, source)
+        write_utterance(job.folder, utterance, job.settings)
+    except (MissingDependencyError, ExportError):
+        raise  # every other recording would fail in the same way
+    except (InputError, AlignmentError) as error:
+        return _Outcome(name, problem=str(error))
+    except Exception as error:  # one strange file must not stop the rest
+        return _Outcome(name, problem=f"{job.recording.file}: {type(error).__name__}: {error}")
+    return _Outcome(name, unseen=int((~utterance.track.seen).sum()), notes=utterance.track.notes)
+
+
+def _kept(job: _Job, source: dict[str, str]) -> dict[str, Any] | None:
+    """Return the description of an utterance that is up to date, None if there is none."""
+    try:
+        entry = read_entry(job.folder)
+    except CorpusError:
+        return None
+    words = None if job.recording.words is None else list(job.recording.words)
+    digests = [source.get(key) for key in DIGESTS]
+    wanted = (digests, words, job.recording.split, job.recording.speaker, job.settings)
+    made_of = [entry["source"].get(key) for key in DIGESTS]
+    found = (made_of, entry["words"], entry["split"], entry.get("speaker", ""), entry["settings"])
+    return entry if found == wanted else None
+
+
+def _utterance(job: _Job, source: dict[str, str]) -> Utterance:
+    audio = quantised(read_audio(job.recording.file))
+    check_words(job.recording.words or (), audio.duration_s)
+    return Utterance(
+        name=job.recording.name,
+        audio=audio,
+        features=mfcc(audio),
+        track=_track(job, audio.duration_s),
+        words=job.recording.words,
+        split=job.recording.split,
+        source=source,
+        speaker=job.recording.speaker,
+        phones=given_phones(job.recording, audio.duration_s),
+    )
+
+
+def _track(job: _Job, duration_s: float) -> Track:
+    if job.recording.curves is not None:
+        return given_track(job.recording.curves, duration_s)
+    return track(job.recording.file, crops=job.settings["crops"] == "yes")
+
+
+def _heard(found: Recordings, coming: Iterator[_Outcome], count: int, monitor: Monitor) -> list[_Outcome]:
+    """Return all outcomes; each is reported as soon as it is known."""
+    for name, problem in found.problems.items():
+        monitor(Item(name, "skipped", problem))
+    outcomes: list[_Outcome] = []
+    monitor(Progress(STAGE, 0, count, 0.0))
+    for outcome in coming:
+        outcomes.append(outcome)
+        kind = "skipped" if outcome.problem else "kept" if outcome.kept else "prepared"
+        unseen = (f"no face in {outcome.unseen} frames, interpolated",) if outcome.unseen else ()
+        monitor(Item(outcome.name, kind, outcome.problem or "; ".join((*outcome.notes, *unseen))))
+        monitor(Progress(STAGE, len(outcomes), count, len(outcomes) / count))
+    return outcomes
+
+
+@contextmanager
+def _listed(corpus: Corpus) -> Iterator[None]:
+    """Whatever happens inside, have the corpus list what is finished, and leave nothing that is not."""
+    try:
+        yield
+    except ExportError as error:
+        with suppress(ExportError):
+            corpus.refresh()
+        raise ExportError(f"{error}; {len(corpus)} utterances are finished and kept") from error
+    except BaseException:
+        corpus.refresh()
+        raise
+    else:
+        corpus.refresh()
+    finally:
+        remove_unfinished(corpus.path / UTTERANCES)

@@ -1,0 +1,104 @@
+"""What comes with a recording instead of being found in it: motion curves, phones in time."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from lipmotion.corpora.base import Curves, Recording
+from lipmotion.corpora.facegood import read_array
+from lipmotion.errors import InputError
+from lipmotion.export.base import read_motion
+from lipmotion.speech.recogniser import SHORT_PAUSE_S
+from lipmotion.storage.files import sha256_of
+from lipmotion.types import Span, Timeline, Track, Unit
+from lipmotion.units import PAUSE, SILENCE, check_phones, is_silent
+
+DIGESTS = ("sha256", "motion_sha256", "phones_sha256")
+"""What the source of an utterance says of its contents; another content is prepared again."""
+CURVES_MARGIN_S, CURVES_MARGIN_SHARE = 0.5, 0.02
+"""Curves may be this much shorter or longer than their sound; at another frame rate they are not."""
+PHONES_MARGIN_S = 0.1
+"""Labels may end this long after the sound: tools round."""
+
+
+def digest(recording: Recording) -> dict[str, str]:
+    """Return what identifies the motion and the phones that came with a recording, if any."""
+    found = {}
+    if recording.curves is not None:
+        found["motion_file"] = recording.curves.file.name
+        found["motion_sha256"] = sha256_of(recording.curves.file)
+    if recording.phones is not None:
+        text = "\n".join(f"{span.start_s!r} {span.end_s!r} {span.label.phone}" for span in recording.phones)
+        found["phones_sha256"] = hashlib.sha256(text.encode()).hexdigest()
+    return found
+
+
+def given_track(curves: Curves, duration_s: float) -> Track:
+    """Return the motion in a file as a track that was seen everywhere, without mouth images.
+
+    duration_s : of the sound that it belongs to
+    Raises InputError: not a motion file, or of another length than the sound.
+    """
+    motion = read_array(curves) if curves.channels else read_motion(curves.file)[0]
+    length_s = len(motion.values) / motion.rate_hz
+    if abs(length_s - duration_s) > max(CURVES_MARGIN_S, CURVES_MARGIN_SHARE * duration_s):
+        raise InputError(
+            f"{curves.file}: {len(motion.values)} frames at {motion.rate_hz:g} Hz last {length_s:.2f} s, the sound "
+            f"lasts {duration_s:.2f} s; required: the same time from the same start"
+        )
+    return Track(motion, np.ones(len(motion.values), bool))
+
+
+def given_phones(recording: Recording, duration_s: float) -> Timeline[Unit] | None:
+    """Return the labelled phones of a recording from 0 s to the end of its sound, or None if there are none.
+
+    Silence is named as recognition names it: a short one between phones is a pause.
+    Raises InputError: the labels go on after the sound, or are more than it can hold.
+    """
+    if recording.phones is None:
+        return None
+    try:
+        check_phones(len(recording.phones), duration_s)
+    except InputError as error:
+        raise InputError(f"{recording.file}: {error}") from error
+    last = recording.phones[-1]
+    end_s = max(last.start_s, 0.0) if last.end_s == float("inf") else last.end_s
+    if end_s > duration_s + PHONES_MARGIN_S:
+        raise InputError(
+            f"{recording.file}: its phones are labelled to {end_s:.2f} s, the sound lasts {duration_s:.2f} s; "
+            "are they those of another recording?"
+        )
+    clipped = [replace(s, start_s=min(s.start_s, duration_s), end_s=min(s.end_s, duration_s)) for s in recording.phones]
+    before = Span(0.0, clipped[0].start_s, Unit(SILENCE))
+    after = Span(clipped[-1].end_s, duration_s, Unit(SILENCE))
+    whole = _merged([span for span in (before, *clipped, after) if span.duration_s > 0])
+    if _spoken(recording.phones) and not _spoken(whole):
+        raise InputError(
+            f"{recording.file}: none of its {len(recording.phones)} labels is a phone that lasts longer than 0 s"
+        )
+    return Timeline(tuple(_named(span, inside=0 < i < len(whole) - 1) for i, span in enumerate(whole)))
+
+
+def _spoken(spans: Iterable[Span[Unit]]) -> bool:
+    return any(not is_silent(span.label.phone) for span in spans)
+
+
+def _merged(spans: list[Span[Unit]]) -> list[Span[Unit]]:
+    """Return the spans, neighbouring silences made one."""
+    merged: list[Span[Unit]] = []
+    for span in spans:
+        if merged and is_silent(span.label.phone) and is_silent(merged[-1].label.phone):
+            merged[-1] = replace(merged[-1], end_s=span.end_s)
+        else:
+            merged.append(span)
+    return merged
+
+
+def _named(span: Span[Unit], *, inside: bool) -> Span[Unit]:
+    if not is_silent(span.label.phone):
+        return span
+    return replace(span, label=Unit(PAUSE if inside and span.duration_s < SHORT_PAUSE_S else SILENCE))

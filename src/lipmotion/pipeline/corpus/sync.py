@@ -1,0 +1,147 @@
+"""Are sound and lips of a corpus in step: ``offsets(corpus) → how late``, ``sync(corpus)`` puts it right."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.corpora.entry import read_entry
+from lipmotion.corpora.store import Corpus
+from lipmotion.kernels.threads import one_thread
+from lipmotion.measures.offset import Offset, offset, pooled_offset, shift_scores
+from lipmotion.motion.resample import to_model_frames
+from lipmotion.speech.lip_speed import opening_speed, speed
+from lipmotion.speech.mfcc import WINDOW, mfcc
+from lipmotion.storage.files import locked
+from lipmotion.types import FRAME_RATE_HZ, Audio, Timeline, Unit, Utterance
+
+REACH_S = 0.4
+"""Offsets are looked for this far either way."""
+OPENING = "opening"
+"""The channel that is compared with the sound."""
+REMOVED_MS = "offset_removed_ms"
+"""The key of an utterance's source that tells by how much its sound was moved."""
+LEAST_MOVE_S = 0.005
+"""Sound is not moved by less."""
+
+
+@dataclass(frozen=True)
+class CorpusOffsets:
+    """How late the sound of a corpus is, now.
+
+    clips       : by utterance
+    collections : by collection and speaker (one camera set-up, as a rule), all the clips together
+    members     : the utterances of each collection
+    """
+
+    clips: Mapping[str, Offset]
+    collections: Mapping[str, Offset]
+    members: Mapping[str, tuple[str, ...]]
+
+    def lines(self) -> list[str]:
+        """Return what a user wants to know, one line a collection."""
+        return [f"{name or 'corpus'}: {self._told(name)}" for name in sorted(self.collections)]
+
+    def _told(self, collection: str) -> str:
+        pooled, clips = self.collections[collection], {name: self.clips[name] for name in self.members[collection]}
+        known = {name: clip for name, clip in clips.items() if clip.known}
+        if not pooled.known:
+            return f"unknown, for the lips do not follow the sound ({len(known)} of {len(clips)} clips known)"
+        worst = sorted(known, key=lambda name: -abs(known[name].late_s - pooled.late_s))[:3]
+        median_s = float(np.median([clip.late_s for clip in known.values()])) if known else float("nan")
+        interval = f"95 %: {1000 * pooled.low_s:+.0f} to {1000 * pooled.high_s:+.0f} ms"
+        furthest = ", ".join(f"{name} {1000 * known[name].late_s:+.0f}" for name in worst)
+        return (
+            f"sound {_late(pooled.late_s)} ({interval}), median of clips {1000 * median_s:+.0f} ms, "
+            f"known in {len(known)} of {len(clips)} clips; furthest off: {furthest or 'none known'}"
+        )
+
+
+def clip_scores(utterance: Utterance) -> NDArray[np.float64]:
+    """Return how well sound and lips agree at every shift of up to ``REACH_S`` [shape=(81,)]."""
+    motion = utterance.track.motion
+    predicted = opening_speed(utterance.features)
+    opening, valid = to_model_frames(
+        np.asarray(motion[OPENING], float)[:, None],
+        np.asarray(utterance.track.seen),
+        motion.rate_hz,
+        len(predicted),
+        FRAME_RATE_HZ,
+    )
+    return shift_scores(predicted, speed(opening[:, 0]), valid, round(REACH_S * FRAME_RATE_HZ))
+
+
+def offsets(corpus: Corpus) -> CorpusOffsets:
+    """Return how late the sound of each utterance and of each collection is; only those with an ``opening`` count.
+
+    The zero is that of the GRID corpus, whose lips the map behind it knows.
+    Raises CorpusError: an utterance is damaged.
+    """
+    scores: dict[str, NDArray[np.float64]] = {}
+    members: dict[str, list[str]] = {}
+    for name in corpus.names():
+        utterance = corpus.utterance(name)
+        if OPENING in utterance.track.motion.names:
+            scores[name] = clip_scores(utterance)
+            members.setdefault(_group(utterance), []).append(name)
+    return CorpusOffsets(
+        clips={name: offset(score, FRAME_RATE_HZ) for name, score in scores.items()},
+        collections={
+            collection: pooled_offset([scores[name] for name in names], FRAME_RATE_HZ)
+            for collection, names in members.items()
+        },
+        members={collection: tuple(names) for collection, names in members.items()},
+    )
+
+
+@one_thread()
+def sync(corpus: Corpus) -> dict[str, float]:
+    """Move the sound of each collection by its offset, where that is known; return the seconds, by collection.
+
+    The track stays; features are computed again. Sound that was late loses its beginning, sound that was early is
+    preceded by its own beginning mirrored. The moves are kept in each utterance's source (``offset_removed_ms``).
+    Raises CorpusError: an utterance is damaged. Raises ExportError: it cannot be written, or another process
+    is at work on the corpus.
+    """
+    with locked(corpus.path):
+        found = offsets(corpus)
+        moved = {name: pooled.late_s for name, pooled in found.collections.items() if _is_worth_moving(pooled)}
+        for collection, late_s in moved.items():
+            for name in found.members[collection]:
+                settings = read_entry(corpus.folder(name))["settings"]
+                corpus.add(_moved(corpus.utterance(name), late_s), settings)
+    return moved
+
+
+def _is_worth_moving(pooled: Offset) -> bool:
+    return pooled.known and abs(pooled.late_s) >= LEAST_MOVE_S and (pooled.low_s > 0 or pooled.high_s < 0)
+
+
+def _moved(utterance: Utterance, late_s: float) -> Utterance:
+    audio = utterance.audio
+    shift = min(round(late_s * audio.rate_hz), len(audio.samples) - WINDOW)
+    samples = audio.samples[shift:] if shift > 0 else np.pad(audio.samples, (-shift, 0), mode="reflect")
+    moved = Audio(np.ascontiguousarray(samples), audio.rate_hz)
+    total_ms = float(utterance.source.get(REMOVED_MS, 0)) + 1000 * shift / audio.rate_hz
+    source = utterance.source | {REMOVED_MS: f"{total_ms:.1f}"}
+    phones = utterance.phones and _phones_moved(utterance.phones, shift / audio.rate_hz)
+    return replace(utterance, audio=moved, features=mfcc(moved), source=source, phones=phones)
+
+
+def _phones_moved(phones: Timeline[Unit], late_s: float) -> Timeline[Unit]:
+    """Return labels in time that begin with the sound again."""
+    spans = [replace(span, start_s=max(span.start_s, 0.0)) for span in phones.shifted(-late_s) if span.end_s > 0]
+    return Timeline((replace(spans[0], start_s=0.0), *spans[1:]))
+
+
+def _group(utterance: Utterance) -> str:
+    """Return the collection; speakers of one are recorded apart, as a rule."""
+    collection = utterance.source.get("collection", "")
+    return f"{collection} {utterance.speaker}".strip()
+
+
+def _late(seconds: float) -> str:
+    return f"{1000 * abs(seconds):.0f} ms {'late' if seconds >= 0 else 'early'}"

@@ -1,0 +1,45 @@
+"""One short text for everything that training depends on: what an earlier run left is used only if it is the same."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+from collections.abc import Sequence
+from dataclasses import asdict
+from importlib import metadata
+from typing import Any
+
+from lipmotion.corpora.store import Corpus
+from lipmotion.engines import Engine
+from lipmotion.hmm.model import HmmConfig
+from lipmotion.kernels.threads import blas_kernels
+from lipmotion.pipeline.training.channels import GEOMETRY
+from lipmotion.storage.files import sha256_of
+from lipmotion.units import Lexicon
+
+PICTURES = "crops.npy"
+"""A large file of an utterance, which only eigenlips are learned from."""
+
+
+def fingerprint(
+    corpus: Corpus, names: Sequence[str], engine: Engine[Any], recogniser: HmmConfig, lexicon: Lexicon, visual: str
+) -> str:
+    """Return a digest of the utterances' content, the configuration, the user's words, and what computes."""
+    digest = hashlib.sha256()
+    job = {
+        "engine": [engine.name, asdict(engine.config)],
+        "recogniser": asdict(recogniser),
+        "words": lexicon.user,
+        "visual": visual,
+        "versions": {name: metadata.version(name) for name in ("lipmotion", "numpy", "scipy", "pocketsphinx")},
+        "machine": [platform.machine(), blas_kernels()],
+    }
+    digest.update(json.dumps(job, sort_keys=True).encode())
+    for name in names:
+        digest.update(f"\n{name}\n".encode())
+        for path in sorted(corpus.folder(name).iterdir()):
+            if path.name != PICTURES or visual != GEOMETRY:
+                digest.update(f"{path.name}\n".encode())
+                digest.update(bytes.fromhex(sha256_of(path)))
+    return digest.hexdigest()

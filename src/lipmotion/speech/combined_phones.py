@@ -1,0 +1,100 @@
+"""Our own phone models and the general ones as one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.hmm.log_likelihoods import Chosen, Evidence
+from lipmotion.hmm.model import UnitHmm
+from lipmotion.hmm.states import StateTable
+from lipmotion.speech.general.acoustic import column, general_model
+from lipmotion.speech.general.language import english_bigram
+from lipmotion.stats.bigram import Bigram
+from lipmotion.units import PHONES, SILENCE, is_silent, stand_in
+
+NOISES = ("+nsn+", "+spn+")
+"""Units of the general models alone: noise, and noise of the mouth (a breath, a cough)."""
+ENGLISH_SHARE = 0.5
+"""Of the bigram; the rest is that of the own corpus."""
+BIGRAM_WEIGHT, INSERTION = 3.0, -4.0
+KEPT_FRAMES = 400_000
+"""Of a recording up to about an hour, general log densities are kept, for they are asked for twice: 500 bytes a frame.
+Those of a longer one are computed twice."""
+
+
+class Joint(NamedTuple):
+    """Models of every phone of the inventory and of the noises.
+
+    hmm     : its own densities are those of the own models; a phone that these have never heard borrows the
+              density of the nearest one that they have (``units.RELATIVES``)
+    columns : the general density of each of them [shape=(G,)]
+    """
+
+    hmm: UnitHmm
+    columns: NDArray[np.intp]
+
+
+def joined(own: UnitHmm) -> Joint:
+    """Return the own models with all phones. Raises MissingDependencyError: pocketsphinx is not installed."""
+    old, known = own.table, [unit for unit in own.table.units if not is_silent(unit)]
+    new = tuple(unit for unit in (*PHONES, *NOISES) if unit not in old.units)
+    borrowed = [SILENCE if unit in NOISES or is_silent(unit) else stand_in(unit, known) for unit in new]
+    plain = len(own.log_stay)
+    added = [(unit, state, old.density(source, state)) for unit, source in zip(new, borrowed, strict=True)
+             for state in range(old.count(source))]  # fmt: skip
+    table = StateTable(
+        units=old.units + new,
+        counts=old.counts + tuple(old.count(source) for source in borrowed),
+        names=(*old.names[:plain], *(f"{unit}.{state}" for unit, state, _ in added), *old.names[plain:]),
+        free=(*old.free, *(unit for unit in new if unit in NOISES or is_silent(unit))),
+    )
+    sources = np.array([*range(plain), *(source for *_, source in added), *range(plain, len(old.names))], np.intp)
+    hmm = replace(
+        own,
+        config=replace(own.config, bigram_weight=BIGRAM_WEIGHT, insertion=INSERTION),
+        table=table,
+        mixtures=own.mixtures.picked(sources),
+        log_stay=own.log_stay[sources[: plain + len(added)]],
+        bigram=_bigram(own.bigram, table.units),
+    )
+    return Joint(hmm, np.array([_column(table, name) for name in table.names], np.intp))
+
+
+def _column(table: StateTable, name: str) -> int:
+    unit, _, rest = name.partition(".")
+    return column(unit, int(rest.partition("<")[0].partition(">")[0]), table.count(unit))
+
+
+def _bigram(own: Bigram, units: tuple[str, ...]) -> Bigram:
+    """Mix the own bigram with that of English; behind phones that the own corpus never says, English alone."""
+    english = english_bigram(units)
+    mixed, known = english.copy(), len(own.units)
+    mixed[:known] *= ENGLISH_SHARE
+    mixed[:known, :known] += (1 - ENGLISH_SHARE) * np.exp(own.log_probability.astype(float))
+    return Bigram(units, np.log(np.maximum(mixed, 1e-9)).astype(np.float32))
+
+
+def joint_evidence(
+    joint: Joint, own_features: NDArray[np.float32], trust: float, general: NDArray[np.float32]
+) -> Evidence:
+    """Return what both models say about a recording: the sum of their log densities.
+
+    own_features : for the own models [shape=(T, 39)]
+    trust        : what their log densities are multiplied by, 0 to 1
+    general      : from ``general_features`` [shape=(T, 39)]
+    """
+    model = general_model()
+    kept = model.log_density(general) if len(general) <= KEPT_FRAMES else None
+
+    def log_density(first: int, end: int, chosen: Chosen) -> NDArray[np.float32]:
+        heard = kept[first:end] if kept is not None else model.log_density(general[first:end])
+        values = heard[:, joint.columns if chosen is None else joint.columns[chosen]]
+        if trust > 0:
+            values += np.float32(trust) * joint.hmm.mixtures.log_likelihood(own_features[first:end], chosen)
+        return values
+
+    return Evidence(len(general), log_density)

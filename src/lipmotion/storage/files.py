@@ -1,0 +1,359 @@
+"""Files and folders that appear whole or not at all.
+
+Everything is written under a temporary name beside its target and renamed at the end.
+"""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import os
+import platform
+import shutil
+import sys
+import uuid
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import IO
+
+from lipmotion.errors import ExportError, InputError
+from lipmotion.storage.sources import Source, check_apart, is_same
+
+if sys.platform == "win32":
+    import msvcrt
+else:
+    import fcntl
+
+TEMPORARY = ".part-"
+"""Names of unfinished files start with this; a killed run may leave one, the next removes it."""
+LOCK = f"{TEMPORARY}lock"
+"""The file that a process holds while it works on a folder."""
+UNFINISHED = ".unfinished"
+"""What a folder of unfinished work adds to the name of the file that the work is for."""
+
+
+LARGEST_TEXT = 1 << 26
+"""Bytes of a text that is read whole: more than all the words that anyone says in a year."""
+
+
+def check_source(path: Path, kind: str) -> None:
+    """Raise InputError unless ``path`` is a file with something in it; ``kind`` says what it should be."""
+    check_regular(path, kind)
+    if not path.is_file():
+        raise InputError(f"{path}: no such file")
+    if path.stat().st_size == 0:
+        raise InputError(f"{path}: the file is empty; give a {kind}")
+
+
+def sha256_of(path: Path) -> str:
+    """Return the digest of a file's content."""
+    digest = hashlib.sha256()
+    with path.open("rb") as file:
+        while block := file.read(1 << 20):
+            digest.update(block)
+    return digest.hexdigest()
+
+
+def check_regular(path: Path, kind: str) -> None:
+    """Raise InputError for a folder, and for a pipe or a device, which may never end. What is missing passes."""
+    if path.is_dir():
+        raise InputError(f"{path}: is a folder; give one {kind}")
+    if path.exists() and not path.is_file():
+        raise InputError(f"{path}: is a pipe or a device, required a file; save the {kind} first")
+
+
+def check_listable(folder: Path) -> None:
+    """Raise InputError if a folder may not be looked into: what looks for files in it would just find none."""
+    try:
+        os.scandir(folder).close()
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be read: {error.strerror or error}; ask its owner, or copy it") from error
+
+
+def text_in(path: Path, kind: str, largest: int = LARGEST_TEXT) -> str:
+    """Return the text of a file, without a byte order mark.
+
+    Raises InputError: no such file, not a file, larger than ``largest`` bytes, or not UTF-8.
+    """
+    check_regular(path, f"{kind} file")
+    try:
+        size = path.stat().st_size
+        if size > largest:
+            raise InputError(f"{path}: {size} bytes, required at most {largest}: is it a {kind}?")
+        return path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError as error:
+        raise InputError(f"{path}: no such {kind} file") from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: not a readable UTF-8 {kind} ({error}); save it as UTF-8 text") from error
+
+
+def check_target(target: Path, source: str | Path | None = None) -> None:
+    """Raise ExportError unless a file can be put there: before work begins, not after it.
+
+    source : a recording that must not be overwritten
+    """
+    try:
+        is_folder = target.is_dir()
+        _check_parent(_place(target))
+    except OSError as error:  # a name too long, a folder that may not be looked into
+        raise ExportError(f"{target}: cannot be written: {error.strerror or error}") from error
+    if is_folder:
+        raise ExportError(f"{target}: is a folder; give the name of a file in it")
+    if source is not None:
+        check_apart([target], [Source(Path(source), "recording")])
+
+
+def check_distinct(targets: Sequence[Path]) -> None:
+    """Raise ExportError if two outputs are one file."""
+    places = [os.path.realpath(target) for target in targets]
+    for number, place in enumerate(places):
+        if any(place == other or is_same(place, other) for other in places[:number]):
+            raise ExportError(f"{targets[number]}: is given twice; give every output another name")
+
+
+def as_text(path: str | Path) -> str:
+    """Return what can be written as UTF-8: a file's name may be of any bytes."""
+    return str(path).encode("utf-8", "backslashreplace").decode("utf-8")
+
+
+def _check_parent(target: Path) -> None:
+    if not target.parent.is_dir():
+        raise ExportError(f"{target}: the folder {target.parent} does not exist; create it first")
+
+
+def _temporary(target: Path, suffix: str) -> Path:
+    _check_parent(target)
+    return target.with_name(f"{_prefix(target)}{os.getpid()}-{uuid.uuid4().hex[:8]}{suffix.lower()}")
+
+
+def _prefix(target: Path) -> str:
+    """Return how temporary names for this target begin on this machine."""
+    name = f"{platform.node()}/{target.name}".encode(errors="surrogatepass")
+    return f"{TEMPORARY}{hashlib.sha256(name).hexdigest()[:8]}-"
+
+
+def _sweep(target: Path) -> None:
+    """Remove what killed runs of this machine left of a file."""
+    prefix = _prefix(target)
+    with suppress(OSError):  # a folder that may be written to, but not listed
+        for left in target.parent.glob(f"{prefix}*"):
+            if not _is_alive(left.name[len(prefix) :].split("-")[0]):
+                _remove(left)
+
+
+def _is_alive(process: str) -> bool:
+    """Whether a process may still be at work. Windows deletes no file that is open, so there nobody need be asked."""
+    if sys.platform == "win32" or not process.isdigit():
+        return sys.platform != "win32"
+    try:
+        os.kill(int(process), 0)
+    except ProcessLookupError:
+        return False
+    except OSError:
+        return True  # somebody else's
+    return True
+
+
+def _place(target: Path) -> Path:
+    """Return where an output goes: to what a link points to, so that the link stays one."""
+    try:
+        place = Path(os.path.realpath(target)) if target.is_symlink() else target
+        endless = place.is_symlink()
+    except OSError as error:
+        raise _refused(target, error) from error
+    if endless:
+        raise ExportError(f"{target}: is a link that leads back to itself; give the name of a file")
+    return place
+
+
+@contextmanager
+def whole_file(target: Path, *, follow: bool = True) -> Iterator[Path]:
+    """Give a temporary path to write to, with the target's suffix (lower case); rename it to ``target`` on success.
+
+    follow : where ``target`` is a link, write what it points to; else the file takes the place of the link
+    Raises ExportError: the folder does not exist, or the file cannot be written (disk full, no permission).
+    """
+    place = _place(target) if follow else target
+    temporary = _temporary(place, target.suffix)
+    try:
+        _sweep(place)
+        yield temporary
+        temporary.replace(place)
+    except OSError as error:
+        raise _refused(target, error) from error
+    finally:
+        with suppress(OSError):
+            temporary.unlink()
+
+
+@contextmanager
+def whole_folder(target: Path) -> Iterator[Path]:
+    """Give a temporary folder to fill; rename it to ``target``, which must not exist, on success.
+
+    Raises ExportError: the parent does not exist, or something cannot be written.
+    """
+    temporary = _temporary(target, target.suffix)
+    try:
+        temporary.mkdir()
+        yield temporary
+        temporary.replace(target)
+    except OSError as error:
+        raise _refused(target, error) from error
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def _refused(target: Path, error: OSError) -> ExportError:
+    full = (
+        error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG) or error.errno is None
+    )  # None: NumPy, on a short write
+    reason = error.strerror or ("No space left on device" if full else str(error))
+    return ExportError(f"{target}: cannot be written: {reason}{'; make room, then run it again' if full else ''}")
+
+
+@contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Hold a folder, made if needed, for this process alone.
+
+    The system itself lets go of it when the process ends, however it ends: a lock that was left never blocks.
+    Raises ExportError: another process holds it, or it cannot be made.
+    """
+    path = folder / LOCK
+    file = None
+    try:
+        try:
+            file = _lock_in(folder)
+            yield
+        finally:
+            _let_go(path, file)
+    except BaseException:  # an interrupt may have come while letting go; a second one does not follow at once
+        _let_go(path, file)
+        raise
+
+
+def _lock_in(folder: Path) -> IO[bytes]:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        return _held(folder / LOCK)
+    except FileExistsError as error:
+        raise ExportError(f"{folder}: is a file; give the name of a new or an empty folder") from error
+    except OSError as error:
+        raise _refused(folder, error) from error
+
+
+def _let_go(path: Path, file: IO[bytes] | None) -> None:
+    """Delete a lock: that of ``file`` or, where an interrupt came between making and keeping it, one nobody holds."""
+    with suppress(OSError):  # none there, or another's
+        is_held = file is not None and not file.closed
+        with file if file is not None and is_held else path.open("r+b", buffering=0) as lock:
+            if not is_held:
+                _lock(lock)
+            if sys.platform == "win32":
+                lock.close()
+            path.unlink()
+
+
+def _held(path: Path) -> IO[bytes]:
+    while True:
+        file = None
+        try:
+            file = path.open("a+b", buffering=0)
+            _lock(file)
+            if _is_there(path, file):
+                with suppress(OSError):  # a full disk
+                    file.truncate(0)
+                    file.write(str(os.getpid()).encode())
+                return file
+            file.close()  # whoever held it has just deleted it
+        except BlockingIOError as error:
+            raise _busy(path, file) from error
+        except BaseException:
+            if file is not None:
+                file.close()
+            raise
+
+
+def _is_there(path: Path, file: IO[bytes]) -> bool:
+    try:
+        return os.path.samestat(os.fstat(file.fileno()), path.stat())
+    except FileNotFoundError:
+        return False
+
+
+def _busy(path: Path, file: IO[bytes] | None) -> ExportError:
+    owner = b""
+    if file is not None:
+        with file:
+            file.seek(0)
+            owner = file.read()
+    who = owner.decode(errors="replace") or "unknown"
+    return ExportError(f"{path.parent}: another lipmotion (process {who}) is at work on it; wait for it, or stop it")
+
+
+if sys.platform == "win32":
+
+    def _lock(file: IO[bytes]) -> None:
+        file.seek(1 << 30)  # what is locked cannot be read, and the owner's number should be
+        try:
+            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+        except OSError as error:
+            raise BlockingIOError from error
+
+else:
+
+    def _lock(file: IO[bytes]) -> None:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise
+        except OSError:  # some network file systems know no locks
+            pass
+
+
+@contextmanager
+def unfinished_work(target: Path) -> Iterator[Path]:
+    """Give a folder beside ``target`` for what is finished of the work on it, held for this process alone.
+
+    It is deleted when the block ends well; after an error, or when the process is killed, a later run finds in it
+    what this one left.
+    Raises ExportError: the file could not be put there, or another process is at work on it.
+    """
+    check_target(target)
+    target = _place(target)
+    folder = work_folder(target)
+    try:
+        with locked(folder):
+            remove_unfinished(folder)
+            _sweep(target)
+            try:
+                yield folder
+            except ExportError as error:
+                raise ExportError(f"{error}; what is finished is kept in {folder}") from error
+            for path in folder.iterdir():
+                if path.name != LOCK:
+                    _remove(path)
+    finally:
+        with suppress(OSError):  # there is something in it to go on from
+            folder.rmdir()
+
+
+def work_folder(target: Path) -> Path:
+    """Return the folder that ``unfinished_work`` gives."""
+    target = _place(target)
+    return target.with_name(target.name + UNFINISHED)
+
+
+def remove_unfinished(folder: Path) -> None:
+    """Delete what a killed run left behind in ``folder``."""
+    for path in folder.glob(f"{TEMPORARY}*"):
+        if path.name != LOCK:
+            _remove(path)
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        with suppress(OSError):
+            path.unlink()

@@ -1,0 +1,1 @@
+"""For whoever tests or extends lipmotion: the toy corpus."""

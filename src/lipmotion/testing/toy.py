@@ -1,0 +1,244 @@
+"""A tiny corpus of our own making: spoken by the synthesiser, by a drawn face whose mouth follows known motion.
+
+It is small enough for every test, it is nobody's face or voice, and all that a model should find in it is known: the
+words, the time of every phone, and the motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import ExportError, InputError
+from lipmotion.export.video import write_mp4
+from lipmotion.faces.portrait import render
+from lipmotion.speech.mfcc import mfcc
+from lipmotion.speech.synthesise import synthesise
+from lipmotion.storage.files import whole_file
+from lipmotion.testing.toy_mouth import toy_mouths
+from lipmotion.types import Audio, Channel, Motion, Timeline, Track, Unit, Utterance
+
+WORDS: dict[str, tuple[str, ...]] = {
+    "baby": ("b", "ey", "b", "iy"),
+    "blue": ("b", "l", "uw"),
+    "bob": ("b", "aa", "b"),
+    "five": ("f", "ay", "v"),
+    "mama": ("m", "aa", "m", "ax"),
+    "map": ("m", "ae", "p"),
+    "now": ("n", "aw"),
+    "papa": ("p", "aa", "p", "ax"),
+    "pop": ("p", "aa", "p"),
+    "see": ("s", "iy"),
+    "tea": ("t", "iy"),
+    "two": ("t", "uw"),
+}
+"""All that is ever said, pronounced as in the CMU dictionary."""
+
+_SHAPES: tuple[tuple[str, tuple[tuple[float, float], ...]], ...] = (
+    # phones, then opening and width (eye distances) at their start and, where they differ, at their end
+    ("sil sp", ((0.00, 0.55),)),
+    ("p b m", ((0.00, 0.54),)),
+    ("f v", ((0.03, 0.55),)),
+    ("w", ((0.05, 0.42),)),
+    ("uw", ((0.07, 0.42),)),
+    ("uh", ((0.10, 0.46),)),
+    ("ow", ((0.16, 0.46), (0.08, 0.42))),
+    ("ao", ((0.20, 0.48),)),
+    ("oy", ((0.18, 0.46), (0.11, 0.59))),
+    ("aa", ((0.30, 0.55),)),
+    ("aw", ((0.28, 0.56), (0.08, 0.43))),
+    ("ay", ((0.28, 0.56), (0.11, 0.60))),
+    ("ae", ((0.26, 0.59),)),
+    ("ah", ((0.20, 0.55),)),
+    ("eh", ((0.20, 0.58),)),
+    ("ey", ((0.18, 0.58), (0.10, 0.61))),
+    ("ih ix", ((0.13, 0.58),)),
+    ("iy", ((0.09, 0.62),)),
+    ("ax axr er hh", ((0.13, 0.54),)),
+    ("l el", ((0.12, 0.55),)),
+    ("k g ng", ((0.10, 0.55),)),
+    ("y", ((0.08, 0.60),)),
+    ("r", ((0.08, 0.50),)),
+    ("sh zh ch jh", ((0.08, 0.47),)),
+    ("t d n en s z th dh", ((0.06, 0.57),)),
+    ("em", ((0.10, 0.54), (0.00, 0.54))),
+)
+SHAPES = {phone: shapes for phones, shapes in _SHAPES for phone in phones.split()}
+"""Opening and width that the lips aim for in each phone of the inventory."""
+LIPS_TOUCH = frozenset({"p", "b", "m"})
+
+CHANNELS = (Channel("opening"), Channel("width"), Channel("outer"))
+LIP_THICKNESS = 0.22
+"""``outer`` exceeds ``opening`` by this much."""
+LEAD_S = 0.03
+"""The lips are this far ahead of the sound."""
+BLEND_S = 0.12
+"""Neighbouring targets run into one another over this long."""
+PART_S = 0.08
+"""Touching lips come together, and part, in this time."""
+
+SPEECH_S = 1.27
+"""A sentence ends with the word that makes its speech at least this long."""
+SILENCE_S, PITCH_HZ = (0.4, 0.6), (105.0, 135.0)  # ranges
+
+CAMERA_HZ = 25.0
+FACE_HEIGHT = 256
+_GRID_HZ = 1000
+_MOTION_HZ = 100.0
+
+
+@dataclass(frozen=True, eq=False)
+class ToySentence:
+    """One spoken sentence.
+
+    units : the exact times of its phones, each with its word; silence has none
+    split : ``train``, ``val`` or ``test``
+    """
+
+    name: str
+    words: tuple[str, ...]
+    audio: Audio
+    units: Timeline[Unit]
+    split: str
+
+
+def toy_sentences(count: int, seed: int = 0) -> list[ToySentence]:
+    """Speak ``count`` sentences of two to three seconds, 0.4–0.6 s of silence at both ends of each.
+
+    Every word comes up before any comes again. The last sixth (at least one) is ``test``, the sixth before it ``val``;
+    from six sentences on, ``train`` says every word. The same seed gives the same sentences, and asking for more of
+    them gives the same ones first.
+    Raises InputError: fewer than three, so that a split would be empty.
+    """
+    if count < 3:
+        raise InputError(f"{count} toy sentences asked for, required at least 3: one each to train, choose and test")
+    held_out = max(1, count // 6)
+    splits = ["train"] * (count - 2 * held_out) + ["val"] * held_out + ["test"] * held_out
+    rng = np.random.default_rng(seed)
+    deck = _deck(rng)
+    return [_sentence(f"toy{number:02d}", split, deck, rng) for number, split in enumerate(splits)]
+
+
+def toy_motion(units: Timeline[Unit], rate_hz: float) -> Motion:
+    """Return how the toy face's lips move: ``opening``, ``width`` and ``outer``, frame n at ``n / rate_hz`` seconds.
+
+    units : phones of the inventory from 0 s on; gaps between them count as silence
+    Returns Motion with T = floor(end of the last unit · rate_hz) + 1 frames; the opening is exactly 0 in p, b and m
+    (``LEAD_S`` early) and in silence more than 0.1 s away from speech.
+    Raises InputError: no units, a phone that is not in the inventory, or a rate that is not positive.
+    """
+    _check(units, rate_hz)
+    end_s = units.spans[-1].end_s
+    margin_s = BLEND_S + LEAD_S
+    grid_s = np.arange(-margin_s, end_s + 2 * margin_s, 1 / _GRID_HZ)
+    kernel = np.hanning(round(BLEND_S * _GRID_HZ) + 1)
+    opening, width = (np.convolve(target, kernel / kernel.sum(), "same") for target in _targets(units, grid_s))
+    opening *= _parted(units, grid_s)
+    time_s = np.arange(int(end_s * rate_hz + 1e-9) + 1) / rate_hz + LEAD_S
+    opening, width = np.interp(time_s, grid_s, opening), np.interp(time_s, grid_s, width)
+    return Motion(np.stack([opening, width, LIP_THICKNESS + opening], axis=1), rate_hz, CHANNELS)
+
+
+def toy_utterances(count: int, seed: int = 0) -> list[Utterance]:
+    """Return the toy corpus as it would be if every video had been tracked without error, at 25 frames a second.
+
+    Raises InputError: fewer than three.
+    """
+    return [_utterance(sentence) for sentence in toy_sentences(count, seed)]
+
+
+def write_toy_recordings(directory: Path, *, sentences: int = 12, seed: int = 0, fps: float = CAMERA_HZ) -> list[Path]:
+    """Write the toy corpus as recordings: ``toy00.mp4``, ``toy00.txt``, ..., and the lists of the three splits.
+
+    directory : made where it does not exist; files of the same names are replaced
+    Returns the videos. About half a second of computing for each.
+    Raises InputError: fewer than three sentences, or fps not positive; ExportError: a file cannot be written.
+    """
+    spoken = toy_sentences(sentences, seed)
+    _make(directory)
+    videos = [directory / f"{sentence.name}.mp4" for sentence in spoken]
+    for sentence, video in zip(spoken, videos, strict=True):
+        motion = toy_motion(sentence.units, _MOTION_HZ)
+        write_mp4(video, render(motion, sentence.units, fps=fps, height=FACE_HEIGHT), fps=fps, audio=sentence.audio)
+        _write_lines(video.with_suffix(".txt"), [" ".join(sentence.words)])
+    for split in ("train", "val", "test"):
+        _write_lines(directory / f"{split}.txt", [sentence.name for sentence in spoken if sentence.split == split])
+    return videos
+
+
+def _deck(rng: np.random.Generator) -> Iterator[str]:
+    """Yield the words for ever, shuffled anew each time that all have been said."""
+    while True:
+        yield from rng.permutation(sorted(WORDS)).tolist()
+
+
+def _sentence(name: str, split: str, deck: Iterator[str], rng: np.random.Generator) -> ToySentence:
+    words: list[str] = []
+    labels, durations_s = [Unit("sil")], [rng.uniform(*SILENCE_S)]
+    while sum(durations_s[1:]) < SPEECH_S:
+        words.append(next(deck))
+        labels += [Unit(phone, word=words[-1]) for phone in WORDS[words[-1]]]
+        durations_s += [_usual_s(phone) * rng.uniform(0.85, 1.15) for phone in WORDS[words[-1]]]
+    labels, durations_s = [*labels, Unit("sil")], [*durations_s, rng.uniform(*SILENCE_S)]
+    phones = [(label.phone, duration_s) for label, duration_s in zip(labels, durations_s, strict=True)]
+    audio, units = synthesise(phones, pitch_hz=rng.uniform(*PITCH_HZ), seed=int(rng.integers(2**31)))
+    spans = tuple(replace(span, label=label) for span, label in zip(units, labels, strict=True))
+    return ToySentence(name, tuple(words), audio, Timeline(spans), split)
+
+
+def _usual_s(phone: str) -> float:
+    return 0.17 if phone[0] in "aeiou" else 0.105
+
+
+def _utterance(sentence: ToySentence) -> Utterance:
+    motion = toy_motion(sentence.units, CAMERA_HZ)
+    track = Track(motion, np.ones(len(motion.values), dtype=bool), toy_mouths(motion))
+    source = {"file": "", "licence": "synthesised by lipmotion"}
+    return Utterance(sentence.name, sentence.audio, mfcc(sentence.audio), track, sentence.words, sentence.split, source)
+
+
+def _check(units: Timeline[Unit], rate_hz: float) -> None:
+    if not len(units):
+        raise InputError("there are no phones to move the lips to; give at least one")
+    if not rate_hz > 0:
+        raise InputError(f"motion rate is {rate_hz} Hz, required more than 0")
+    for span in units:
+        if span.label.phone not in SHAPES:
+            raise InputError(f"phone {span.label.phone!r} is not in the inventory: {' '.join(sorted(SHAPES))}")
+
+
+def _targets(units: Timeline[Unit], grid_s: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return what opening and width aim for, in steps; at rest outside the units [shape=(2, len(grid_s))]."""
+    targets = np.repeat(np.array(SHAPES["sil"]).T, len(grid_s), axis=1)
+    for span in units:
+        shapes = SHAPES[span.label.phone]
+        edges_s = np.linspace(span.start_s, span.end_s, len(shapes) + 1)
+        for shape, start_s, end_s in zip(shapes, edges_s, edges_s[1:], strict=False):
+            targets[:, (grid_s >= start_s) & (grid_s < end_s)] = np.array(shape)[:, None]
+    return targets
+
+
+def _parted(units: Timeline[Unit], grid_s: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return 0 where the lips touch, 1 well away from it, a raised cosine between [shape=(len(grid_s),)]."""
+    parted = np.ones(len(grid_s))
+    for span in units:
+        if span.label.phone in LIPS_TOUCH:
+            away_s = np.maximum(0, np.maximum(span.start_s - grid_s, grid_s - span.end_s))
+            parted = np.minimum(parted, 0.5 - 0.5 * np.cos(np.pi * np.minimum(1, away_s / PART_S)))
+    return parted
+
+
+def _make(directory: Path) -> None:
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ExportError(f"{directory}: the folder cannot be made: {error.strerror or error}") from error
+
+
+def _write_lines(path: Path, lines: list[str]) -> None:
+    with whole_file(path) as temporary:
+        temporary.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")

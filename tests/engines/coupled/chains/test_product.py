@@ -1,0 +1,162 @@
+from itertools import product
+
+import numpy as np
+import pytest
+
+from engines.coupled.tiny import THREE, TWO, grammar, structure
+from lipmotion.engines.coupled.chains.product import Joint, reachable
+from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, MULTISTREAM, SYSTEMS, structure_of
+from lipmotion.engines.coupled.chains.transitions import first_transitions
+from lipmotion.errors import InputError
+
+
+def even(of):
+    return reachable(of, grammar(of))
+
+
+@pytest.mark.parametrize(
+    ("system", "crosses", "joints"),
+    [
+        ("ph-HMM", True, 235),
+        ("ph-MSHMM", True, 235),
+        ("ph-CHMM", True, 611 + 2 * 47 * 47),
+        ("ph-CHMM", False, 611),
+        ("ph-vi-CHMM", True, 611 + 2 * 47 * 13),
+        ("ph-vi-CHMM", False, 611),
+    ],
+)
+def test_joint_states_of_the_papers_systems(system, crosses, joints):
+    """47 × (5 + 4 + 4) when all leave a unit together; beyond that, one chain waits in the last state for the other."""
+    options = {"asynchrony": 1} | SYSTEMS[system]
+    of = structure_of(options["structure"], options["chains"], 5, options["asynchrony"], crosses)
+    assert len(even(of).joints) == joints
+
+
+@pytest.mark.parametrize("limit", [0, 1, 2])
+@pytest.mark.parametrize("crosses", [True, False])
+def test_chains_are_never_farther_apart_than_the_limit(limit, crosses):
+    of = structure(states=3, limit=limit, crosses=crosses)
+    found = even(of)
+    spread = found.lead.max(axis=0) - found.lead.min(axis=0)
+    assert spread.max() == limit
+    if not crosses:
+        assert not any(any(joint.ahead) for joint in found.joints)
+
+
+def test_arcs_are_those_of_the_definition():
+    """Each chain stays or moves one state on, no skips; whoever is behind must say what the other has begun."""
+    of = structure(states=2, limit=1)
+    found = even(of)
+    arcs = set(zip(found.arc_from.tolist(), found.arc_to.tolist(), strict=True))
+    for source, target in product(range(len(found.joints)), repeat=2):
+        assert ((source, target) in arcs) is possible(of, found.joints[source], found.joints[target])
+
+
+def possible(of, before: Joint, after: Joint) -> bool:
+    """Whether some sequence of units, and a place in it for each chain, lead from one joint state to the other."""
+    units, count = range(len(of.units[0])), of.states
+    for old, new, newer in product(units, repeat=3):
+        said = [old, new, newer]
+        for start in product(range(2 * count), repeat=2):
+            if not fits(of, before, said, start):
+                continue
+            for moved in product((0, 1), repeat=2):
+                end = [a + b for a, b in zip(start, moved, strict=True)]
+                if max(end) - min(end) <= of.limit and fits(of, after, said, end, relative=True):
+                    return True
+    return False
+
+
+def fits(of, joint: Joint, said, places, relative=False) -> bool:
+    units = [place // of.states for place in places]
+    first = min(units)
+    if not relative and first != 0:
+        return False
+    if max(units) - first > 1:
+        return False
+    return all(
+        joint.states[c] == places[c] % of.states
+        and joint.units[c] == of.follows[c][said[units[c]]]
+        and joint.ahead[c] == (units[c] > first)
+        for c in range(2)
+    )
+
+
+def test_what_is_said_next_has_the_bigrams_probability():
+    """Whoever enters first: the first chain's next unit, given its last, is as probable as the bigram says."""
+    of = structure(states=2, limit=1)
+    found = even(of)
+    bigram, last = found.grammar.bigrams[0], of.states - 1
+    for unit in range(len(of.units[0])):
+        together = found.joints.index(Joint((unit, of.follows[1][unit]), (last, last), (False, False)))
+        out = found.arc_from == together
+        both = out & found.moves.all(axis=0)
+        for entered in range(len(of.units[0])):
+            target = found.joints.index(Joint((entered, of.follows[1][entered]), (0, 0), (False, False)))
+            assert found.base[both & (found.arc_to == target)] == pytest.approx(bigram[unit, entered])
+        seen_first = out & ~found.moves[0] & found.moves[1]
+        assert found.base[seen_first].sum() == pytest.approx(1)
+        for arc in np.flatnonzero(seen_first):
+            waiting = found.joints[found.arc_to[arc]]
+            alike = [u for u in range(len(of.units[0])) if of.follows[1][u] == waiting.units[1]]
+            assert found.base[arc] == pytest.approx(bigram[unit, alike].sum())
+            follow = (found.arc_from == found.arc_to[arc]) & found.moves[0] & ~found.moves[1]
+            for after in np.flatnonzero(follow):
+                entered = found.joints[found.arc_to[after]].units[0]
+                expected = bigram[unit, entered] / bigram[unit, alike].sum()
+                assert found.base[after] == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("kind", [COUPLED, FACTORIAL])
+@pytest.mark.parametrize("limit", [1, None])
+def test_probabilities_out_of_every_state_sum_to_one(kind, limit):
+    transitions = first_transitions(even(structure(kind, limit=limit)))
+    left = np.bincount(transitions.product.arc_from, np.exp(transitions.arc_log))
+    np.testing.assert_allclose(left, 1, rtol=1e-12)
+
+
+def test_one_chain_is_the_hmm_of_its_units():
+    of = structure(HMM, (THREE,), states=3, limit=1)
+    found = even(of)
+    assert len(found.joints) == 9
+    assert len(found.arc_from) == 9 + 6 + 9  # stay, move within, enter
+
+
+def test_units_that_look_alike_stand_together():
+    of = structure(states=2)
+    looks = of.follows[1]
+    assert sorted(looks) == list(looks)
+
+
+@pytest.mark.parametrize(
+    ("kind", "chains", "limit", "message"),
+    [
+        ("ring", (THREE,), 1, "ring"),
+        (HMM, (THREE, TWO), 1, "2 chains"),
+        (MULTISTREAM, (THREE, TWO), 1, "2 chains"),
+        (COUPLED, (THREE,), 1, "1 chains"),
+        (COUPLED, (THREE, TWO), 2, "required 0 to 1"),
+    ],
+)
+def test_structures_that_do_not_fit_together(kind, chains, limit, message):
+    with pytest.raises(InputError, match=message):
+        structure(kind, chains, states=2, limit=limit)
+
+
+def test_no_chains_at_all():
+    with pytest.raises(InputError, match="no chains"):
+        structure_of(HMM, " ", 3, 1, True)
+
+
+def test_too_many_joint_states_to_list():
+    of = structure_of(FACTORIAL, "phone phone", 5, -1, True)
+    with pytest.raises(InputError, match="limit the asynchrony"):
+        even(of)
+
+
+def test_three_chains():
+    of = structure(COUPLED, (THREE, TWO, TWO), states=2, limit=1)
+    found = even(of)
+    assert found.moves.shape[0] == 3
+    assert np.abs(found.lead).max() == 1
+    assert len(set(found.joints)) == len(found.joints)

@@ -1,0 +1,106 @@
+"""The joint model as a recogniser of the voices that it knows."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from engines.synthetic import example, examples, speech, timeline
+from lipmotion.engines import engine_named
+from lipmotion.engines.trajectory import phone_recogniser as module
+from lipmotion.errors import ModelFormatError
+from lipmotion.storage.checkpoint import NOTHING_KEPT, Checkpoint
+from lipmotion.types import Features, Timeline
+from lipmotion.types.progress import silent_monitor
+
+SENTENCE = ("t", "aa", "p", "iy", "m", "uw", "s", "aa")
+
+
+def phones(units):
+    return [span.label.phone for span in units]
+
+
+def fitted(corpus, checkpoint=NOTHING_KEPT):
+    values = [one.motion.values[:, :2] for one in corpus]
+    return module.fit_listener(corpus, values, silent_monitor, checkpoint)
+
+
+@pytest.fixture(scope="module")
+def corpus():
+    return examples(12)
+
+
+@pytest.fixture(scope="module")
+def listener(corpus):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "LEAST_MINUTES", 0.1)
+        return fitted(corpus)
+
+
+def test_with_little_speech_there_is_none(corpus):
+    assert fitted(corpus) is None
+
+
+def test_phones_of_a_known_voice_are_found(listener):
+    spoken = speech(timeline(SENTENCE), seed=77)
+    found = listener.phones(replace(spoken, units=Timeline(())))
+    assert phones(found) == ["sil", *SENTENCE, "sil"]
+    for span, true in zip(found, spoken.units, strict=True):
+        assert abs(span.start_s - true.start_s) < 0.03
+    assert found[-1].end_s == spoken.features.duration_s
+
+
+def test_a_voice_that_is_not_known_is_left_to_others(listener):
+    spoken = speech(timeline(SENTENCE))
+    strange = np.random.default_rng(0).normal(0, 3, spoken.features.values.shape).astype(np.float32)
+    assert listener.phones(replace(spoken, features=Features(strange, spoken.features.duration_s))) is None
+
+
+def test_digital_silence_and_long_recordings_are_left_to_others(listener, monkeypatch):
+    spoken = speech(timeline(SENTENCE))
+    quiet = Features(np.zeros_like(spoken.features.values), spoken.features.duration_s)
+    assert listener.phones(replace(spoken, features=quiet)) is None
+    monkeypatch.setattr(module, "LONGEST_S", 1.0)
+    assert listener.phones(spoken) is None
+
+
+def test_a_recording_shorter_than_any_phone_is_left_to_others(listener):
+    spoken = speech(timeline(SENTENCE))
+    assert listener.phones(replace(spoken, features=Features(spoken.features.values[:2], 0.01))) is None
+
+
+def test_a_listener_comes_back_from_arrays(listener):
+    arrays = module.listener_arrays(listener)
+    again = module.listener_from_arrays(arrays)
+    assert again.typical == listener.typical
+    spoken = speech(timeline(SENTENCE), seed=3)
+    assert phones(again.phones(spoken)) == phones(listener.phones(spoken))
+    assert module.listener_from_arrays({"means": np.zeros(3)}) is None
+    for name in arrays:
+        with pytest.raises((ModelFormatError, KeyError, ValueError)):
+            module.listener_from_arrays({key: array for key, array in arrays.items() if key != name})
+
+
+def test_what_was_trained_is_kept(corpus, listener, tmp_path, monkeypatch):
+    monkeypatch.setattr(module, "LEAST_MINUTES", 0.1)
+    checkpoint = Checkpoint(tmp_path, "one")
+    first = fitted(corpus, checkpoint)
+    monkeypatch.setattr(module, "train_joint", lambda *_: pytest.fail("trained again"))
+    again = fitted(corpus, checkpoint)
+    for one, two in zip(module.listener_arrays(first).values(), module.listener_arrays(again).values(), strict=True):
+        assert one.tobytes() == two.tobytes()
+    assert module.listener_arrays(first)["joint_typical"] == listener.typical
+
+
+def test_the_engine_listens_if_there_is_speech_enough(monkeypatch):
+    monkeypatch.setattr(module, "LEAST_MINUTES", 0.1)
+    engine = engine_named("trajectory", {"components": 2, "axes": 20})
+    corpus = examples(10)
+    model = engine.fit(corpus, silent_monitor).model
+    spoken = example(SENTENCE, seed=50).speech
+    heard = engine.listen(model, spoken)
+    assert phones(heard) == ["sil", *SENTENCE, "sil"]
+    back = engine.from_arrays(engine.to_arrays(model))
+    assert phones(engine.listen(back, spoken)) == phones(heard)
+    deaf = engine_named("trajectory", {"components": 2, "axes": 20, "joint": False})
+    assert deaf.listen(deaf.fit(corpus, silent_monitor).model, spoken) is None

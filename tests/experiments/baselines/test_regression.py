@@ -1,0 +1,95 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from engines.synthetic import CHANNELS
+from engines.synthetic import examples as sentences
+from lipmotion.errors import CorpusError
+from lipmotion.experiments.baselines.regression import REACH, Loudness, MeanPose, SoundAround
+from lipmotion.speech.mfcc import LOG_ENERGY
+from lipmotion.types import Example, silent_monitor
+
+BASELINES = [MeanPose, Loudness, SoundAround]
+
+
+@pytest.fixture(scope="module")
+def examples() -> list[Example]:
+    """Six sentences, the last frames of each not seen, and wrong there."""
+    made = []
+    for one in sentences(6):
+        valid = one.valid.copy()
+        valid[-5:] = False
+        one.motion.values[-5:] = 9
+        made.append(replace(one, valid=valid))
+    return made
+
+
+def seen(examples: list[Example]) -> np.ndarray:
+    return np.concatenate([one.motion.values[one.valid] for one in examples])
+
+
+@pytest.mark.parametrize("baseline", BASELINES)
+def test_motion_has_a_row_for_every_feature_frame(baseline: type, examples: list[Example]) -> None:
+    engine = baseline()
+    fit = engine.fit(examples, silent_monitor)
+    result = engine.generate(fit.model, examples[0].speech)
+    frames = len(examples[0].speech.features.values)
+    assert fit.figures == {"frames": len(seen(examples))}
+    assert (result.motion.rate_hz, result.motion.channels) == (100, CHANNELS)
+    assert result.motion.values.shape == result.variance.shape == (frames, len(CHANNELS))
+    assert np.isfinite(result.motion.values).all()
+    assert (result.variance >= 0).all()
+    assert len(result.trace.frames) == frames
+    assert engine.listen(fit.model, examples[0].speech) is None
+
+
+def test_the_mean_pose(examples: list[Example]) -> None:
+    model = MeanPose().fit(examples, silent_monitor).model
+    made = MeanPose().generate(model, examples[0].speech)
+    assert made.motion.values == pytest.approx(np.broadcast_to(seen(examples).mean(axis=0), made.motion.values.shape))
+    direct = made.motion.column("opening")
+    assert made.variance[0, direct] == pytest.approx(seen(examples)[:, direct].var())
+
+
+def moved_by(examples: list[Example], curve: np.ndarray, late: int) -> list[Example]:
+    """The same features, and an opening that is twice a column of them, later."""
+    made = []
+    for one in examples:
+        values = one.motion.values.copy()
+        values[:, one.motion.column("opening")] = 3 + 2 * np.roll(one.speech.features.values @ curve, late)
+        made.append(replace(one, motion=replace(one.motion, values=values)))
+    return made
+
+
+def error(engine, examples: list[Example]) -> float:
+    model = engine.fit(examples, silent_monitor).model
+    made = engine.generate(model, examples[0].speech).motion["opening"]
+    inner = slice(2 * REACH, -2 * REACH)
+    return float(np.abs(made - examples[0].motion["opening"])[inner].max())
+
+
+def test_the_sound_around_explains_what_it_holds(examples: list[Example]) -> None:
+    column = np.eye(39)[3]
+    assert error(SoundAround(), moved_by(examples, column, REACH)) < 0.2
+    assert error(SoundAround(), moved_by(examples, column, REACH + 8)) > 1
+
+
+def test_loudness_is_smoothed(examples: list[Example]) -> None:
+    made = moved_by(examples, np.eye(39)[LOG_ENERGY], 0)
+    slow = []
+    for one in made:
+        opening = one.motion["opening"]
+        values = one.motion.values.copy()
+        values[:, one.motion.column("opening")] = [opening[max(t - 4, 0) : t + 5].mean() for t in range(len(opening))]
+        slow.append(replace(one, motion=replace(one.motion, values=values)))
+    assert error(Loudness(), slow) < 0.05 < error(Loudness(), made)
+
+
+@pytest.mark.parametrize("baseline", BASELINES)
+def test_nothing_to_learn_from(baseline: type, examples: list[Example]) -> None:
+    unseen = [replace(one, valid=np.zeros_like(one.valid)) for one in examples]
+    with pytest.raises(CorpusError, match="none of 6 examples has motion"):
+        baseline().fit(unseen, silent_monitor)

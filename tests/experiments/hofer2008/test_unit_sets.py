@@ -1,0 +1,190 @@
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from experiments.copies import copied, renamed
+from lipmotion.corpora.store import Corpus
+from lipmotion.engines import engine_named
+from lipmotion.errors import CorpusError
+from lipmotion.experiments.hofer2008.unit_sets import PAPER, SYSTEMS, table, unit_sets
+from lipmotion.hmm.model import HmmConfig
+from lipmotion.measures.closures import closings
+from lipmotion.pipeline.evaluation.evaluate import clips, evaluate, recorded
+from lipmotion.pipeline.training.train import train
+from lipmotion.speech.recogniser import recogniser
+from lipmotion.types import Progress
+from lipmotion.units import unit_set
+
+SMALL = HmmConfig(mixtures=1, iterations=2)
+PLAIN, SHIPPED = SYSTEMS
+CONDITIONS = ["audio only", "with transcript"]
+Rows = dict[str, dict[str, Any]]
+
+
+@pytest.fixture(scope="module")
+def stages() -> list[Progress]:
+    return []
+
+
+@pytest.fixture(scope="module")
+def figures(toy_corpus: Corpus, stages: list[Progress]) -> dict[str, Any]:
+    return unit_sets(toy_corpus, recogniser=SMALL, monitor=stages.append)
+
+
+def all_rows(figures: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
+    return [item for system in figures["systems"].values() for rows in system.values() for item in rows.items()]
+
+
+def test_the_rows_are_those_of_the_paper(figures: dict[str, Any]) -> None:
+    assert (figures["split"], figures["clips"], figures["trained_on"], figures["closures"]) == ("test", 2, 8, False)
+    assert list(figures["systems"]) == [PLAIN, SHIPPED]
+    for system in figures["systems"].values():
+        assert list(system) == CONDITIONS
+        for rows in system.values():
+            assert [(units, row["units"], row["paper"]) for units, row in rows.items()] == [
+                ("2vis", 2, 66.5),
+                ("pbVis", 9, 67.7),
+                ("sVis", 6, 67.4),
+                ("eVis", 19, 68.8),
+                ("phone", 46, 65.2),
+            ]
+    assert json.loads(json.dumps(figures, allow_nan=False))
+
+
+@pytest.mark.parametrize("system", SYSTEMS)
+def test_a_row_is_what_train_and_evaluate_say(system: str, figures: dict[str, Any], toy_corpus: Corpus) -> None:
+    engine = engine_named("trajectory", SYSTEMS[system] | {"units": "eVis", "closures": False})
+    wanted = evaluate(train(toy_corpus, recogniser=SMALL, engine=engine)[0], toy_corpus)
+    assert figures["closed_under"] == wanted["closed_under"]
+    for condition in CONDITIONS:
+        row, said = figures["systems"][system][condition]["eVis"], wanted["conditions"][condition]
+        opening = said["channels"]["opening"]
+        for key in ("acc", "nrmse", "global_variance"):
+            assert row[key] == pytest.approx(opening[key])
+        assert row["score"] == 100 * said["closures"]["score"]
+        assert row["precision"] == 100 * said["closures"]["precision"]
+        assert row["timing_ms"] == said["closures"]["timing_ms"]
+        assert row["recall_p_b_m"] == 100 * said["closures_p_b_m"]["recall"]
+
+
+def test_figures_by_hand(figures: dict[str, Any], toy_corpus: Corpus) -> None:
+    """RMSE and score of one row, from the curves and the paper's rule."""
+    engine = engine_named("trajectory", {"units": "2vis", "closures": False})
+    model = train(toy_corpus, recogniser=SMALL, engine=engine)[0]
+    found = recorded(toy_corpus, recogniser(model.phones))
+    pairs = [(c.generated[:, 0], c.original[:, 0]) for c in clips(found, "audio only", engine, model.learned)]
+    error = np.concatenate([g - o for g, o in pairs])
+    points = [
+        any(abs(int(g_frame) - int(o_frame)) <= 2 for g_frame in closings(g, found.closed_under))
+        for g, o in pairs
+        for o_frame in closings(o, found.closed_under)
+    ]
+    row = figures["systems"][SHIPPED]["audio only"]["2vis"]
+    assert row["rmse"] == pytest.approx(np.sqrt(np.mean(error**2)))
+    assert row["score"] == pytest.approx(100 * np.mean(points))
+    assert row["closings"] == len(points) > 4
+
+
+def test_phones_know_more_than_open_and_closed(figures: dict[str, Any]) -> None:
+    for system in figures["systems"].values():
+        for rows in system.values():
+            assert rows["2vis"]["acc"] < rows["phone"]["acc"]
+            assert rows["2vis"]["rmse"] > rows["phone"]["rmse"]
+            assert rows["2vis"]["acc_gain_95"][1] < 0
+
+
+def test_intervals_hold_their_figures_and_nothing_differs_from_itself(figures: dict[str, Any]) -> None:
+    for units, row in all_rows(figures):
+        for key in ("score", "acc"):
+            low, high = row[f"{key}_95"]
+            assert low <= row[key] + 1e-9
+            assert row[key] <= high + 1e-9
+            if units == "phone":
+                assert row[f"{key}_gain_95"] == (0, 0)
+
+
+def test_lips_that_are_made_to_meet_do(toy_corpus: Corpus) -> None:
+    pinned = unit_sets(toy_corpus, recogniser=SMALL, closures=True, split="val")
+    assert (pinned["split"], pinned["closures"]) == ("val", True)
+    rows = pinned["systems"][SHIPPED]["with transcript"]
+    assert [row["recall_p_b_m"] for row in rows.values()] == [100] * len(PAPER)
+    assert all(row["p_b_m"] > 3 for row in rows.values())
+    assert "lips made to meet on p b m" in table(pinned)
+
+
+def test_progress_goes_from_nothing_to_all(figures: dict[str, Any], stages: list[Progress]) -> None:
+    shares = [event.share for event in stages]
+    assert figures
+    assert shares == sorted(shares)
+    assert (shares[0] < 0.1, shares[-1]) == (True, 1.0)
+    assert stages[-1].stage == f"{SHIPPED}: unit sets"
+
+
+def test_without_transcripts_there_is_audio_only(toy_corpus: Corpus, tmp_path: Path) -> None:
+    corpus = copied(toy_corpus, tmp_path, lambda u: u if u.split == "train" else replace(u, words=None))
+    untold = unit_sets(corpus, recogniser=SMALL)
+    assert [list(system) for system in untold["systems"].values()] == [["audio only"]] * 2
+
+
+def test_motion_without_an_opening(toy_corpus: Corpus, tmp_path: Path) -> None:
+    with pytest.raises(CorpusError, match="compared by the channel 'opening', which is not in it"):
+        unit_sets(renamed(toy_corpus, tmp_path, "shape 0", "shape 1", "shape 2"))
+
+
+def test_nothing_to_train_on_or_to_compare_with(toy_corpus: Corpus, tmp_path: Path) -> None:
+    with pytest.raises(CorpusError, match="no utterances of split 'train'"):
+        unit_sets(copied(toy_corpus, tmp_path, partial(replace, split="test")))
+    with pytest.raises(CorpusError, match="no utterances of split 'tset'"):
+        unit_sets(toy_corpus, split="tset", recogniser=SMALL)
+
+
+def row(**changes: Any) -> dict[str, Any]:
+    plain = {"units": 6, "paper": 67.4, "score": 70.0, "score_95": (60.0, 80.0), "score_gain_95": (-1.0, 1.0)}
+    plain |= {"precision": 50.0, "recall_p_b_m": 90.0, "timing_ms": -20.0, "acc": 0.8, "acc_95": (0.7, 0.9)}
+    plain |= {"acc_gain_95": (-0.1, 0.0), "rmse": 0.0123, "nrmse": 0.5, "global_variance": 0.75}
+    return plain | changes
+
+
+def shown(**changes: Any) -> str:
+    figures = {"split": "test", "clips": 2, "trained_on": 8, "closed_under": 0.02, "closures": False}
+    lines = table(figures | {"systems": {"S": {"audio only": {"sVis": row(**changes)}}}}).splitlines()
+    assert lines[0] == "trained on 8 clips; split test: 2 clips, no lips made to meet; closed under 0.0200"
+    assert lines[2] == "S; audio only"
+    return lines[4]
+
+
+def test_a_line_of_the_table() -> None:
+    assert shown().split() == "sVis 6 67.4 70.0 (60.0–80.0) 50.0 90.0 -20 0.800 (0.700–0.900) 0.0123 0.500 0.75".split()
+
+
+@pytest.mark.parametrize("gain", [(0.1, 2.0), (-2.0, -0.1)])
+def test_what_differs_from_phones_has_a_star(gain: tuple[float, float]) -> None:
+    assert shown(score_gain_95=gain).split()[3] == "70.0*"
+    assert shown(acc_gain_95=gain).split()[8] == "0.800*"
+
+
+def test_figures_that_do_not_exist_are_dashes() -> None:
+    none = {"score": None, "score_95": (None, None), "score_gain_95": (None, None), "precision": None}
+    line = shown(**none, timing_ms=None, recall_p_b_m=None)
+    assert line.split()[3:8] == ["–", "(–––)", "–", "–", "–"]
+    assert len(line) == len(shown())
+
+
+def test_every_set_of_the_table_is_known() -> None:
+    assert all(unit_set(name).name == name for name in PAPER)
+
+
+def test_the_document_shows_the_figures_beside_it() -> None:
+    results = Path(__file__).parents[2] / "docs" / "results"
+    figures = json.loads((results / "unit-sets.json").read_text(encoding="utf-8"))
+    text = (results / "unit-sets.md").read_text(encoding="utf-8")
+    assert f"```text\n{table(figures)}\n```" in text
+    for name, row in all_rows(figures):
+        assert (row["units"], row["paper"]) == (unit_set(name).count, PAPER[name])

@@ -1,0 +1,154 @@
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from experiments.copies import copied, renamed
+from lipmotion.corpora.store import Corpus
+from lipmotion.errors import CorpusError, InputError
+from lipmotion.experiments.folds import folds, table
+from lipmotion.hmm.model import HmmConfig
+from lipmotion.measures.closures import closings
+from lipmotion.pipeline.evaluation.evaluate import BILABIAL, Clip, clips, recorded
+from lipmotion.pipeline.training.train import train
+from lipmotion.speech.recogniser import recogniser
+from lipmotion.types import Progress
+
+SMALL = HmmConfig(mixtures=1, iterations=2)
+CONDITIONS = ["audio only", "with transcript"]
+RATE_HZ = 25
+
+
+@pytest.fixture(scope="module")
+def stages() -> list[Progress]:
+    return []
+
+
+@pytest.fixture(scope="module")
+def figures(toy_corpus: Corpus, stages: list[Progress]) -> dict[str, Any]:
+    return folds(toy_corpus, count=3, recogniser=SMALL, monitor=stages.append)
+
+
+@pytest.fixture(scope="module")
+def by_hand(toy_corpus: Corpus) -> list[Clip]:
+    """Every clip of the training list, with transcript, by a model that was not trained on it."""
+    names = toy_corpus.names("train")
+    mixed = [names[i] for i in np.random.default_rng(0).permutation(len(names))]
+    made = []
+    for held_out in (mixed[0::3], mixed[1::3], mixed[2::3]):
+        model = train(toy_corpus, names=sorted(set(names) - set(held_out)), recogniser=SMALL)[0]
+        found = recorded(toy_corpus, recogniser(model.phones), names=sorted(held_out))
+        made += clips(found, "with transcript", model.engine, model.learned)
+    return made
+
+
+def test_what_was_done(figures: dict[str, Any]) -> None:
+    assert (figures["folds"], figures["seed"], figures["clips"]) == (3, 0, 8)
+    assert figures["trained_on"] == [5, 5, 6]
+    assert list(figures["conditions"]) == CONDITIONS
+    assert json.loads(json.dumps(figures, allow_nan=False))
+
+
+def test_figures_are_of_all_clips_as_one_split(figures: dict[str, Any], by_hand: list[Clip]) -> None:
+    generated = np.concatenate([clip.generated[:, 0] for clip in by_hand])
+    original = np.concatenate([clip.original[:, 0] for clip in by_hand])
+    row = figures["conditions"]["with transcript"]
+    assert row["acc"] == pytest.approx(np.corrcoef(generated, original)[0, 1])
+    assert row["nrmse"] == pytest.approx(np.sqrt(np.mean((generated - original) ** 2)) / original.std())
+    spread = [(clip.generated[:, 0].std(), clip.original[:, 0].std()) for clip in by_hand]
+    assert row["global_variance"] == pytest.approx(np.mean([g for g, _ in spread]) / np.mean([o for _, o in spread]))
+    low, high = row["acc_95"]
+    assert low <= row["acc"] <= high
+
+
+def test_closings_are_of_all_clips_as_one_split(figures: dict[str, Any], by_hand: list[Clip]) -> None:
+    under, row = figures["closed_under"], figures["conditions"]["with transcript"]
+    pairs = [(closings(c.generated[:, 0], under), closings(c.original[:, 0], under)) for c in by_hand]
+    hits = [any(abs(int(g) - int(o)) <= 2 for g in made) for made, recorded_ones in pairs for o in recorded_ones]
+    good = [any(abs(int(g) - int(o)) <= 2 for o in recorded_ones) for made, recorded_ones in pairs for g in made]
+    assert (row["closings"], row["generated_closings"]) == (len(hits), len(good))
+    assert (row["score"], row["precision"]) == pytest.approx((100 * np.mean(hits), 100 * np.mean(good)))
+
+
+def test_p_b_m_and_elsewhere_by_hand(figures: dict[str, Any], by_hand: list[Clip]) -> None:
+    under, row = figures["closed_under"], figures["conditions"]["with transcript"]
+    wanted, hit, elsewhere, speech_s = 0, 0, [0, 0], 0.0
+    for clip in by_hand:
+        inside = np.zeros(len(clip.original), bool)
+        for start_s, end_s, phone in clip.spoken:
+            if phone not in BILABIAL:
+                speech_s += end_s - start_s
+                continue
+            frames = np.arange(len(clip.original))
+            near = (frames >= np.ceil(start_s * RATE_HZ - 1e-6) - 1) & (frames <= np.floor(end_s * RATE_HZ + 1e-6) + 1)
+            inside |= near
+            wanted += bool((clip.original[near, 0] < under).any())
+            hit += bool((clip.original[near, 0] < under).any() and (clip.generated[near, 0] < under).any())
+        for side, curve in enumerate((clip.generated[:, 0], clip.original[:, 0])):
+            elsewhere[side] += int((~inside[closings(curve, under)]).sum())
+    assert wanted > 10
+    assert (row["p_b_m"], row["recall_p_b_m"]) == (wanted, pytest.approx(100 * hit / wanted))
+    assert row["false_per_minute"] == pytest.approx(elsewhere[0] / speech_s * 60)
+    assert row["original_per_minute"] == pytest.approx(elsewhere[1] / speech_s * 60)
+
+
+def test_the_seed_cuts_the_list(figures: dict[str, Any], toy_corpus: Corpus) -> None:
+    other = folds(toy_corpus, count=3, seed=1, recogniser=SMALL)
+    assert other["seed"] == 1
+    assert other["conditions"]["audio only"]["acc"] != figures["conditions"]["audio only"]["acc"]
+    assert other["conditions"]["audio only"]["closings"] == figures["conditions"]["audio only"]["closings"]
+
+
+def test_progress_goes_from_nothing_to_all(figures: dict[str, Any], stages: list[Progress]) -> None:
+    shares = [event.share for event in stages]
+    assert figures
+    assert shares == sorted(shares)
+    assert (shares[0] < 0.1, shares[-1]) == (True, 1.0)
+    assert {event.stage.partition(":")[0] for event in stages} == {"fold 1", "fold 2", "fold 3"}
+
+
+def test_what_is_not_transcribed_is_recognised(toy_corpus: Corpus, tmp_path: Path) -> None:
+    """A fold with such an utterance has no ``with transcript``, so that the whole has none."""
+    untold = copied(toy_corpus, tmp_path, lambda u: replace(u, words=None) if u.name == "toy00" else u)
+    assert list(folds(untold, count=2, recogniser=SMALL)["conditions"]) == ["audio only"]
+
+
+@pytest.mark.parametrize("count", [-1, 0, 1, 9])
+def test_counts_that_cannot_be(toy_corpus: Corpus, count: int) -> None:
+    with pytest.raises(InputError, match=f"{count} folds; required: from 2 to 8, which is how many"):
+        folds(toy_corpus, count=count)
+
+
+def test_corpora_that_cannot_be(toy_corpus: Corpus, tmp_path: Path) -> None:
+    with pytest.raises(CorpusError, match="no utterances of split 'train'"):
+        folds(copied(toy_corpus, tmp_path / "a", lambda utterance: replace(utterance, split="test")))
+    with pytest.raises(CorpusError, match="compared by the channel 'opening', which is not in it"):
+        folds(renamed(toy_corpus, tmp_path / "b", "smile", "frown"))
+
+
+def test_the_table() -> None:
+    row = {"score": 70.0, "precision": None, "timing_ms": None, "closings": 10, "generated_closings": 0}
+    row |= {"recall_p_b_m": 98.04, "p_b_m": 51, "acc": 0.8, "acc_95": (0.7, 0.9), "nrmse": 0.5}
+    row |= {"global_variance": 0.75, "false_per_minute": 12.34, "original_per_minute": None}
+    figures = {"folds": 2, "seed": 3, "clips": 5, "trained_on": [3, 2], "closed_under": 0.02}
+    assert table(figures | {"conditions": {"audio only": row}}).splitlines() == [
+        "5 clips of train in 2 folds, shuffled with seed 3; each generated by a model of the others (2 to 3 clips); "
+        "closed under 0.0200",
+        "",
+        "audio only",
+        "  p b m: 98.0 % of 51 closed; closings elsewhere 12.3 a minute of speech (original –)",
+        "  closings: score 70.0 % of 10, precision – % of 0, timing – ms",
+        "  opening: ACC 0.800 (0.700–0.900), nRMSE 0.500, variance 0.75",
+    ]
+
+
+def test_the_document_shows_the_figures_beside_it() -> None:
+    results = Path(__file__).parents[2] / "docs" / "results"
+    figures = json.loads((results / "folds.json").read_text(encoding="utf-8"))
+    assert f"```text\n{table(figures)}\n```" in (results / "folds.md").read_text(encoding="utf-8")
+    assert (figures["folds"], figures["clips"]) == (5, 452)

@@ -1,0 +1,246 @@
+from __future__ import annotations
+
+import json
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from experiments.copies import copied, renamed
+from lipmotion.corpora.store import Corpus
+from lipmotion.engines import engine_named
+from lipmotion.errors import CorpusError, ExportError, InputError, MissingDependencyError
+from lipmotion.experiments.xie_liu2007.plots import NAMES
+from lipmotion.experiments.xie_liu2007.systems import BEST, BEST_PATH, BLSTM, PRINTED, RIVALS, chosen_rivals
+from lipmotion.experiments.xie_liu2007.table3 import Noises, table3
+from lipmotion.experiments.xie_liu2007.table3_text import table
+from lipmotion.hmm.model import HmmConfig
+from lipmotion.measures import curves
+from lipmotion.pipeline.evaluation.evaluate import clips, evaluate, recorded
+from lipmotion.pipeline.training.train import train
+from lipmotion.speech.recogniser import recogniser
+from lipmotion.types import Progress
+
+SMALL = HmmConfig(mixtures=1, iterations=2)
+SYSTEMS = [BEST, BEST_PATH, "trajectory HMM", "loudness", "mean pose"]
+PICTURE = b"\x89PNG\r\n\x1a\n"
+
+
+@pytest.fixture(scope="module")
+def stages() -> list[Progress]:
+    return []
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("pictures") / "new"
+
+
+@pytest.fixture(scope="module")
+def figures(toy_corpus: Corpus, folder: Path, stages: list[Progress]) -> dict[str, Any]:
+    return table3(
+        toy_corpus,
+        systems=SYSTEMS,
+        sizes=[8, 3],
+        states=2,
+        mixtures=[1],
+        transcripts=True,
+        noises=Noises(("white",), (0.0,)),
+        plots=folder,
+        recogniser=SMALL,
+        monitor=stages.append,
+    )
+
+
+def test_every_size_condition_and_system(figures: dict[str, Any]) -> None:
+    assert [(row["names"], row["used"]) for row in figures["rows"]] == [(3, 3), (8, 8)]
+    for row in figures["rows"]:
+        assert list(row["conditions"]) == ["audio only", "with transcript"]
+        assert all(list(rows) == SYSTEMS for rows in row["conditions"].values())
+        assert list(row["training"]) == SYSTEMS
+    assert (figures["split"], figures["clips"], figures["states"]) == ("test", 2, 2)
+    assert [(row["kind"], row["snr_db"]) for row in figures["noise"]] == [("white", 0)]
+    assert json.loads(json.dumps(figures, allow_nan=False))
+
+
+def test_a_row_is_what_train_and_evaluate_say(figures: dict[str, Any], toy_corpus: Corpus) -> None:
+    wanted = evaluate(train(toy_corpus, recogniser=SMALL)[0], toy_corpus)
+    for condition, said in wanted["conditions"].items():
+        row = figures["rows"][-1]["conditions"][condition]["trajectory HMM"]
+        assert (row["acc"], row["amse"]) == pytest.approx((said["acc"], said["amse"]))
+        assert row["opening_acc_95"] == pytest.approx(tuple(said["opening_acc_95"]))
+        expected = (said["lag_ms"], said["channels"]["opening"]["acc"])
+        assert (row["lag_ms"], row["opening"]["acc"]) == pytest.approx(expected)
+        assert row["opening"]["false_per_minute"] == said["closures_p_b_m"]["false_per_minute"]
+
+
+def test_the_conversion_is_all_that_differs(figures: dict[str, Any], toy_corpus: Corpus) -> None:
+    """Both systems of the same chains, trained by hand."""
+    options = {"states": 2, "mixtures": 1, "full_range": False, "closures": False, "start": "viterbi", "steps": 10}
+    by_em = engine_named("coupled", options | {"conversion": "em"})
+    by_path = engine_named("coupled", options | {"conversion": "viterbi"})
+    model = train(toy_corpus, recogniser=SMALL, engine=by_em)[0]
+    found = recorded(toy_corpus, recogniser(model.phones))
+    for name, engine in ((BEST, by_em), (BEST_PATH, by_path)):
+        made = clips(found, "audio only", engine, model.learned)
+        row = figures["rows"][-1]["conditions"]["audio only"][name]
+        generated, original = [clip.generated for clip in made], [clip.original for clip in made]
+        assert row["acc"] == pytest.approx(curves.pooled_correlation(generated, original).mean())
+        assert row["opening"]["rmse"] == pytest.approx(curves.rmse(generated, original)[0])
+    training = figures["rows"][-1]["training"]
+    assert training[BEST] == training[BEST_PATH]
+    assert training[BEST]["mixtures"] == 1
+
+
+def test_intervals_hold_their_figures_and_nothing_differs_from_itself(figures: dict[str, Any]) -> None:
+    for name, row in figures["rows"][-1]["conditions"]["audio only"].items():
+        for key in ("amse", "acc"):
+            low, high = row[f"{key}_95"]
+            assert low - 1e-9 <= row[key] <= high + 1e-9
+        assert (row["acc_gain_95"] == (0, 0)) == (name == BEST)
+
+
+def test_a_pose_that_stands_still_has_no_lag(figures: dict[str, Any]) -> None:
+    row = figures["rows"][-1]["conditions"]["audio only"]["mean pose"]
+    assert (row["acc"], row["lag_ms"], row["opening"]["global_variance"]) == (0, None, pytest.approx(0))
+    assert row["opening"]["nrmse"] == pytest.approx(1, abs=0.05)
+
+
+def test_noise_makes_it_worse(figures: dict[str, Any]) -> None:
+    clean = figures["rows"][-1]["conditions"]["audio only"]
+    much = figures["noise"][0]["systems"]
+    for name in ("trajectory HMM", BEST):
+        assert clean[name]["amse"] < much[name]["amse"]
+    assert clean["mean pose"]["opening"] == much["mean pose"]["opening"]
+
+
+def test_pictures_are_written(figures: dict[str, Any], folder: Path) -> None:
+    assert figures
+    assert sorted(path.name for path in folder.iterdir()) == sorted(NAMES.values())
+    assert all(path.read_bytes().startswith(PICTURE) for path in folder.iterdir())
+
+
+def test_progress_goes_from_nothing_to_all(figures: dict[str, Any], stages: list[Progress]) -> None:
+    shares = [event.share for event in stages]
+    assert figures
+    assert shares == sorted(shares)
+    assert (shares[0] < 0.1, shares[-1]) == (True, pytest.approx(1.0))
+
+
+def test_the_text_names_every_system(figures: dict[str, Any]) -> None:
+    lines = table(figures).splitlines()
+    for name in SYSTEMS:
+        assert sum(line.startswith(f"  {name}  ") for line in lines) == 5
+    assert any(line.split()[:3] == [BEST, "6.911", "0.696"] for line in lines)
+    assert any(line.split()[-3:] == ["clean", "0", "dB"] for line in lines)
+
+
+@pytest.mark.parametrize("visual", ["eigenlips", "both"])
+def test_eigenlips(visual: str, toy_corpus: Corpus) -> None:
+    chosen = {"systems": ["trajectory HMM"], "states": 2, "mixtures": [1], "visual": visual}
+    made = table3(toy_corpus, **chosen, recogniser=SMALL)
+    said = evaluate(train(toy_corpus, recogniser=SMALL, visual=visual)[0], toy_corpus)["conditions"]["audio only"]
+    row = made["rows"][0]["conditions"]["audio only"]["trajectory HMM"]
+    assert (row["acc"], row["amse"]) == pytest.approx((said["acc"], said["amse"]))
+    part = "eigenlips_" if visual == "both" else ""
+    assert row[f"{part}acc"] == pytest.approx(said["eigenlips"]["acc"])
+    assert row[f"{part}amse"] == pytest.approx(said["eigenlips"]["amse"])
+    assert len(made["channels"]) == len(said["eigenlips"]["channels"]) + (3 if visual == "both" else 0)
+    assert (row["opening"] is None) == (visual == "eigenlips")
+    assert json.loads(json.dumps(made, allow_nan=False))
+    starts = [line.split()[:1] for line in table(made).splitlines()]
+    assert (["eigenlips"] in starts) == (visual == "both")
+
+
+def test_pictures_that_cannot_be_written(toy_corpus: Corpus, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(ExportError, match="file: is a file; give a folder for the pictures"):
+        table3(toy_corpus, plots=tmp_path / "file")
+
+
+def row(**changes: Any) -> dict[str, Any]:
+    opening = {"nrmse": 0.5, "rmse": 0.0123, "score": 70.0, "recall_p_b_m": 90.0, "false_per_minute": 3.21}
+    plain = {"opening": opening | {"global_variance": 0.75}, "lag_ms": -7.4, "opening_acc": 0.8}
+    plain["opening_acc_95"] = (0.7, 0.9)
+    plain |= {"amse": 0.03, "amse_95": (0.02, 0.04), "amse_gain_95": (-0.1, 0.1), "acc": 0.7, "acc_95": (0.6, 0.8)}
+    return plain | {"acc_gain_95": (0.01, 0.02), "opening_acc_gain_95": (-0.2, -0.1)} | changes
+
+
+def test_a_line_of_the_table() -> None:
+    size = {"names": 9, "used": 8, "training": {"ph-HMM": {"mixtures": 4, "seconds": 12.34}}}
+    size["conditions"] = {"audio only": {"ph-HMM": row()}}
+    about = {"split": "val", "clips": 2, "order": "given", "seed": 0, "states": 5, "mixtures": [1, 4], "noise": []}
+    about |= {"channels": ["opening", "width"], "closed_under": 0.02}
+    lines = table(about | {"rows": [size]}).splitlines()
+    assert lines[0] == "the first N clips of the list given; split val: 2 clips"
+    assert lines[3] == "audio only, 8 of the first 9 clips"
+    wanted = (
+        "ph-HMM 8.043 0.581 0.0300 (0.0200–0.0400) 0.700* (0.600–0.800) 0.800* (0.700–0.900) 0.500 0.0123 -7 70.0 90.0"
+    )
+    assert lines[5].split() == f"{wanted} 3.2 0.75 4 12.3".split()
+    assert len(lines[5]) == len(lines[4])
+
+
+def test_systems_in_the_order_of_the_table() -> None:
+    assert chosen_rivals(["loudness", "ph-HMM"]) == ["ph-HMM", BEST, "loudness"]
+    assert list(PRINTED) == list(RIVALS)[:6]
+    with pytest.raises(InputError, match="no system 'ph-RNN'; there are: ph-HMM, "):
+        chosen_rivals(["ph-RNN"])
+
+
+def test_without_torch_the_network_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "torch", None)
+    assert chosen_rivals(None) == [name for name in RIVALS if name != BLSTM]
+    with pytest.raises(MissingDependencyError, match=r'needs PyTorch.*; pip install "lipmotion\[network\]"'):
+        chosen_rivals([BLSTM])
+
+
+def test_without_matplotlib_there_are_no_pictures(
+    toy_corpus: Corpus, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    with pytest.raises(MissingDependencyError, match=r'need matplotlib.*; pip install "lipmotion\[plots\]"'):
+        table3(toy_corpus, plots=tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"systems": ["nothing"]}, "no system 'nothing'"),
+        ({"sizes": [9]}, "sizes 9; required: from 1 to 8"),
+        ({"mixtures": []}, "numbers of Gaussians none; required: powers of two"),
+        ({"mixtures": [3]}, "numbers of Gaussians 3; required: powers of two"),
+    ],
+)
+def test_what_cannot_be_chosen(toy_corpus: Corpus, options: dict[str, Any], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        table3(toy_corpus, **({"systems": [BEST], "recogniser": SMALL} | options))
+
+
+def test_noise_that_cannot_be_made() -> None:
+    with pytest.raises(InputError, match="unknown noise 'pink'; required some of: white, babble"):
+        Noises(("pink",))
+    with pytest.raises(InputError, match="a babble of 0 talkers; required at least 2"):
+        Noises(("babble",))
+
+
+def test_corpora_that_cannot_be_used(toy_corpus: Corpus, tmp_path: Path) -> None:
+    with pytest.raises(CorpusError, match="no utterances of split 'tset'"):
+        table3(toy_corpus, split="tset")
+    with pytest.raises(CorpusError, match="are in the split that is compared with"):
+        table3(toy_corpus, order=toy_corpus.names("val"))
+    with pytest.raises(CorpusError, match="compared by the channel 'opening', which is not in it"):
+        table3(renamed(toy_corpus, tmp_path, "smile", "frown"))
+    with pytest.raises(CorpusError, match="no utterances of split 'val'"):
+        table3(copied(toy_corpus, tmp_path / "b", lambda u: replace(u, split="test") if u.split == "val" else u))
+
+
+def test_the_document_shows_the_figures_beside_it() -> None:
+    results = Path(__file__).parents[2] / "docs" / "results"
+    text = (results / "table3.md").read_text(encoding="utf-8")
+    for name in ("table3", "table3-noise"):
+        figures = json.loads((results / f"{name}.json").read_text(encoding="utf-8"))
+        assert f"```text\n{table(figures)}\n```" in text
+        assert BEST in figures["rows"][0]["training"]

@@ -1,0 +1,176 @@
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+
+from lipmotion.errors import ExportError
+from lipmotion.export import write_mp4
+from lipmotion.export.video import frame_rate
+from lipmotion.types import Audio
+
+RATES = [24, 25, 29.97, 30, 60]
+
+
+def black(count: int, height: int = 64, width: int = 96) -> list[np.ndarray]:
+    return [np.zeros((height, width, 3), dtype=np.uint8) for _ in range(count)]
+
+
+def silence(duration_s: float, rate_hz: int = 16_000) -> Audio:
+    return Audio(np.zeros(round(duration_s * rate_hz), dtype=np.float32), rate_hz)
+
+
+def pictures(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Time and mean brightness of every frame, as a player shows them."""
+    with av.open(str(path)) as container:
+        shown = [(frame.time, frame.to_ndarray(format="gray").mean()) for frame in container.decode(video=0)]
+    return np.array([s[0] for s in shown]), np.array([s[1] for s in shown])
+
+
+def sound(path: Path) -> tuple[float, np.ndarray, int]:
+    """Time of the first sample that is heard, the samples and their rate."""
+    with av.open(str(path)) as container:
+        frames = list(container.decode(audio=0))
+    return float(frames[0].time), np.concatenate([f.to_ndarray()[0] for f in frames]), frames[0].sample_rate
+
+
+@pytest.mark.parametrize("fps", RATES)
+def test_a_click_and_a_flash_stay_together(tmp_path, fps):
+    count, flash, rate_hz = int(2 * fps), int(1.3 * fps), 16_000
+    frames = black(count)
+    frames[flash][:] = 255
+    audio = silence(2.0, rate_hz)
+    audio.samples[round(flash / fps * rate_hz)] = 1.0
+    write_mp4(tmp_path / "a.mp4", frames, fps=fps, audio=audio)
+
+    time_s, brightness = pictures(tmp_path / "a.mp4")
+    start_s, samples, heard_hz = sound(tmp_path / "a.mp4")
+    seen_s = time_s[brightness.argmax()]
+    heard_s = start_s + np.abs(samples).argmax() / heard_hz
+    assert seen_s == pytest.approx(flash / fps, abs=2e-4)
+    assert heard_s == pytest.approx(seen_s, abs=1e-3)
+
+
+@pytest.mark.parametrize("fps", RATES)
+@pytest.mark.parametrize("duration_s", [1.0, 1.617])
+def test_streams_start_at_zero_and_keep_their_lengths(tmp_path, fps, duration_s):
+    count = int(1.2 * fps)
+    write_mp4(tmp_path / "a.mp4", black(count), fps=fps, audio=silence(duration_s, 22_050))
+    with av.open(str(tmp_path / "a.mp4")) as container:
+        video, heard = container.streams.video[0], container.streams.audio[0]
+        assert video.start_time == heard.start_time == 0
+        assert video.frames == count
+        assert video.average_rate == frame_rate(fps)
+        assert float(video.duration * video.time_base) == pytest.approx(count / fps, abs=1e-3)
+        assert float(heard.duration * heard.time_base) == pytest.approx(duration_s, abs=1e-3)
+    time_s, _ = pictures(tmp_path / "a.mp4")
+    assert len(time_s) == count
+    assert np.diff(time_s) == pytest.approx(np.full(count - 1, 1 / fps), abs=2e-4)
+
+
+def test_the_end_of_the_sound_is_heard(tmp_path):
+    audio = silence(1.0)
+    audio.samples[-80:] = 0.5
+    write_mp4(tmp_path / "a.mp4", black(5), fps=25, audio=audio)
+    start_s, samples, rate_hz = sound(tmp_path / "a.mp4")
+    loud = np.flatnonzero(np.abs(samples) > 0.2)
+    assert start_s + loud[-1] / rate_hz == pytest.approx(1.0, abs=0.005)
+
+
+def test_players_find_it_playable(tmp_path):
+    write_mp4(tmp_path / "a.mp4", black(50), fps=25, audio=silence(2.0))
+    content = (tmp_path / "a.mp4").read_bytes()
+    assert content.index(b"moov") < content.index(b"mdat")
+    with av.open(str(tmp_path / "a.mp4")) as container:
+        video, heard = container.streams.video[0], container.streams.audio[0]
+        assert (video.codec_context.name, heard.codec_context.name) == ("h264", "aac")
+        assert video.codec_context.pix_fmt == "yuv420p"
+        assert (video.width, video.height) == (96, 64)
+
+
+def test_sound_lies_beside_its_frames(tmp_path):
+    """A player that streams must not wait for the end of the file to hear the beginning."""
+    write_mp4(tmp_path / "a.mp4", black(300), fps=10, audio=silence(30.0))
+    with av.open(str(tmp_path / "a.mp4")) as container:
+        packets = [(p.pos, p.stream.type, float(p.dts * p.time_base)) for p in container.demux() if p.dts is not None]
+    latest = {"video": 0.0, "audio": 0.0}
+    for _, kind, time_s in sorted(packets):
+        latest[kind] = time_s
+        assert abs(latest["video"] - latest["audio"]) < 1.5
+
+
+def test_colours_come_back(tmp_path):
+    colours = np.zeros((64, 96, 3), dtype=np.uint8)
+    colours[:, :32], colours[:, 32:64], colours[:, 64:] = (242, 190, 156), (44, 92, 104), (188, 84, 80)
+    write_mp4(tmp_path / "a.mp4", [colours] * 3, fps=25, audio=silence(0.1))
+    with av.open(str(tmp_path / "a.mp4")) as container:
+        back = next(container.decode(video=0)).to_ndarray(format="rgb24")
+    for x in (16, 48, 80):
+        assert np.abs(back[32, x].astype(int) - colours[32, x]).max() <= 4
+
+
+def test_frames_are_taken_one_at_a_time(tmp_path):
+    alive = []
+
+    def frames():
+        for n in range(10):
+            alive.append(n)
+            yield np.full((32, 32, 3), n, dtype=np.uint8)
+
+    write_mp4(tmp_path / "a.mp4", frames(), fps=25, audio=silence(0.4))
+    assert alive == list(range(10))
+    assert len(pictures(tmp_path / "a.mp4")[0]) == 10
+
+
+@pytest.mark.parametrize(
+    ("fps", "rate"),
+    [
+        (24, Fraction(24)),
+        (25.0, Fraction(25)),
+        (12.5, Fraction(25, 2)),
+        (23.976, Fraction(24000, 1001)),
+        (29.97, Fraction(30000, 1001)),
+        (30000 / 1001, Fraction(30000, 1001)),
+        (59.94, Fraction(60000, 1001)),
+    ],
+)
+def test_the_frame_rate_is_exact(fps, rate):
+    assert frame_rate(fps) == rate
+
+
+@pytest.mark.parametrize(
+    ("frames", "message"),
+    [
+        ([], "no frames"),
+        (black(1, 63, 64), "even sizes"),
+        (black(1, 64, 63), "even sizes"),
+        ([*black(1), *black(1, 32, 32)], "frame 1 .* all alike"),
+        ([np.zeros((64, 64), dtype=np.uint8)], "uint8 RGB"),
+        ([np.zeros((64, 64, 3))], "float64"),
+    ],
+)
+def test_unusable_frames_are_refused_and_leave_no_file(tmp_path, frames, message):
+    with pytest.raises(ExportError, match=message):
+        write_mp4(tmp_path / "a.mp4", frames, fps=25, audio=silence(0.1))
+    assert not list(tmp_path.iterdir())
+
+
+def test_other_unusable_input_is_refused(tmp_path):
+    with pytest.raises(ExportError, match="sound has no samples"):
+        write_mp4(tmp_path / "a.mp4", black(1), fps=25, audio=silence(0))
+    for fps in (0, -1, float("nan"), float("inf")):
+        with pytest.raises(ExportError, match="frame rate"):
+            write_mp4(tmp_path / "a.mp4", black(1), fps=fps, audio=silence(0.1))
+    with pytest.raises(ExportError, match="does not exist"):
+        write_mp4(tmp_path / "no" / "a.mp4", black(1), fps=25, audio=silence(0.1))
+
+
+def test_an_error_while_drawing_passes_through_and_leaves_no_file(tmp_path):
+    def frames():
+        yield from black(3)
+        raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        write_mp4(tmp_path / "a.mp4", frames(), fps=25, audio=silence(0.1))
+    assert not list(tmp_path.iterdir())

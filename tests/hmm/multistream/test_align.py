@@ -1,0 +1,98 @@
+import numpy as np
+import pytest
+
+from hmm.multistream.synthetic import CLASSES, config, inventory, observed, random_joint, utterances
+from lipmotion.errors import AlignmentError, InputError
+from lipmotion.hmm.multistream.align import align, align_by_durations, measured_durations
+from lipmotion.hmm.multistream.inventory import states_of
+from lipmotion.hmm.multistream.streams import Observed, StreamWeights
+from lipmotion.hmm.multistream.train import train_joint
+from oracles import joint as slow
+from oracles.sequences import segmentations
+
+WEIGHTS = StreamWeights(1, 0.5, 0.2, 1, 0.7)
+
+
+def slow_scores(hmm, data, units, weights):
+    """Give the score of every segmentation: emissions and transitions."""
+    states = states_of(hmm.inventory, units)
+    density = np.array(
+        [[slow.log_density(hmm, data, place, t, weights) for place in states.places] for t in range(data.frames)]
+    )
+    stay = hmm.log_stay[states.rows]
+    for lengths in segmentations(data.frames, len(states.rows)):
+        path = np.repeat(np.arange(len(lengths)), lengths)
+        kept = ((np.array(lengths) - 1) * stay + np.log(1 - np.exp(stay))).sum()
+        yield float(density[np.arange(data.frames), path].sum() + kept), lengths
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_no_other_path_is_more_probable(seed):
+    hmm = random_joint(seed, states=2)
+    data, units = observed(np.random.default_rng([seed, 1]), 9), ("sil", "a", "b")
+    _, lengths = max(slow_scores(hmm, data, units, WEIGHTS))
+    path = align(hmm, data, units, weights=WEIGHTS)
+    assert path.frames.tolist() == np.repeat(np.arange(6), lengths).tolist()
+    edges = np.cumsum([0, *lengths])[::2]
+    assert path.bounds(3).tolist() == edges.tolist()
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_with_bounds_only_the_states_inside_units_are_sought(seed):
+    hmm = random_joint(seed, states=2)
+    data, units, bounds = observed(np.random.default_rng([seed, 2]), 9), ("sil", "a", "b"), np.array([0, 4, 6, 9])
+    allowed = [
+        found
+        for found in slow_scores(hmm, data, units, WEIGHTS)
+        if np.cumsum([0, *found[1]])[::2].tolist() == bounds.tolist()
+    ]
+    path = align(hmm, data, units, bounds, WEIGHTS)
+    assert path.frames.tolist() == np.repeat(np.arange(6), max(allowed)[1]).tolist()
+
+
+def test_short_units_have_some_of_their_states():
+    hmm, data = random_joint(0), observed(np.random.default_rng(1), 10)
+    path = align(hmm, data, ("sil", "a", "b", "a", "sil"), np.array([0, 3, 5, 6, 6, 10]))
+    assert path.frames.tolist()[:6] == [0, 1, 2, 3, 5, 7]
+    assert path.bounds(5).tolist() == [0, 3, 5, 6, 6, 10]
+
+
+def test_lengths_that_are_known_decide_where_nothing_else_does():
+    hmm = random_joint(2, states=1)
+    mean = np.array([2.0, 1.0, 5.0, 3.0])  # of sil, sp, a, b
+    hmm = type(hmm)(**{**hmm.__dict__, "durations": np.stack([mean, np.full(4, 0.5)], axis=1)})
+    nothing = Observed({name: type(s)(s.values[:1].repeat(8, axis=0), s.known[:1].repeat(8)) for name, s in
+                        observed(np.random.default_rng(3), 1).streams.items()})  # fmt: skip
+    even = align_by_durations(hmm, nothing, ("a", "b"), weight=1e6)
+    assert even.bounds(2).tolist() == [0, 5, 8]
+    with pytest.raises(AlignmentError):
+        align_by_durations(hmm, nothing, ("a",) * 9)
+
+
+def test_silence_may_last_as_long_as_it_likes():
+    hmm = random_joint(4, states=1)
+    data = observed(np.random.default_rng(5), 300)
+    assert len(align_by_durations(hmm, data, ("sil", "a", "sil")).frames) == 300
+
+
+def test_durations_are_those_of_the_alignment():
+    data = utterances(12)
+    hmm = train_joint(data, inventory(), CLASSES, config(mixtures=1))
+    durations = measured_durations(hmm, [(u.observed, u.units) for u in data])
+    assert np.array_equal(durations, hmm.durations)
+    rows = [hmm.inventory.rows["a", state] for state in range(3)]
+    assert 6 <= durations[rows, 0].sum() <= 12
+    assert (durations[:, 1] >= 1).all()
+    near = align_by_durations(hmm, data[0].observed, data[0].units).bounds(len(data[0].units))
+    assert np.abs(near - data[0].bounds).max() <= 4
+
+
+def test_what_does_not_fit_is_refused():
+    hmm, data = random_joint(6), observed(np.random.default_rng(7), 8)
+    with pytest.raises(AlignmentError, match="at least 9 frames"):
+        align(hmm, data, ("a", "b", "a"))
+    for bounds in ([0, 8], [0, 9, 8], [1, 4, 8], [0, 4, 9]):
+        with pytest.raises(InputError, match="bounds"):
+            align(hmm, data, ("a", "b"), np.array(bounds))
+    with pytest.raises(InputError, match="unknown unit"):
+        align(hmm, data, ("q",))

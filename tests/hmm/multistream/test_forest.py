@@ -1,0 +1,100 @@
+from itertools import product
+
+import numpy as np
+import pytest
+
+from hmm.multistream.synthetic import CLASSES, NAMES, inventory, random_joint
+from lipmotion.errors import InputError
+from lipmotion.hmm.multistream.densities import Sums
+from lipmotion.hmm.multistream.forest import grown, places_asked, questions_about, unit_forest
+from lipmotion.hmm.multistream.inventory import Inventory, states_of
+from lipmotion.hmm.multistream.streams import HEARD, STREAMS
+
+KNOWN = inventory()
+SIDES = [name for name in NAMES if name != "sp"]
+
+
+def test_every_unit_that_is_spoken_has_a_leaf_of_its_own():
+    forest = unit_forest(KNOWN, ("sil", "a", "c"))
+    leaves = {unit: forest.leaf((("sil", unit, "a"), 1)) for unit in NAMES if unit != "sp"}
+    assert leaves["b"] == leaves["x"] == leaves["d"]
+    assert len({leaves["a"], leaves["c"], leaves["x"], leaves["sil"]}) == 4
+    assert forest.leaf((("a", "sp", "a"), 0)) not in leaves.values()
+    assert forest.leaf((("b", "a", "b"), 1)) == leaves["a"]
+
+
+def places(unit_names=NAMES):
+    return [((a, b, c), s) for a, b, c in product(SIDES, unit_names, SIDES) for s in range(KNOWN.count(b))]
+
+
+def tied(stream, mean_of, seen, classes=CLASSES, has_spaces=False):
+    means = np.array([mean_of(*place) for place in seen])[:, None]
+    sums = Sums.none(len(seen), 1, 1)
+    sums.add(np.arange(len(seen)), 20.0 * np.concatenate([np.ones((len(seen), 2)), means, means**2 + 0.1], axis=1))
+    return grown(
+        stream, KNOWN, questions_about(KNOWN, classes), seen, sums,
+        has_spaces=has_spaces, factor=1.0, least_frames=10.0, least_variance=0.02,
+    )  # fmt: skip
+
+
+def test_units_and_contexts_that_were_never_seen_resolve_by_class():
+    seen = [place for place in places() if place[0][1] != "x" and place[0][0] != "c"]
+    forest = tied("motion", lambda context, _: float(context[1] in "cdx") + 5.0 * (context[0] in "cdx"), seen)
+    assert forest.leaf((("a", "x", "a"), 1)) == forest.leaf((("a", "d", "a"), 1)) != forest.leaf((("a", "b", "a"), 1))
+    assert forest.leaf((("x", "a", "a"), 1)) == forest.leaf((("d", "a", "a"), 1)) != forest.leaf((("b", "a", "a"), 1))
+    leaf = forest.leaf((("x", "x", "x"), 0))
+    assert forest.name(leaf) == "state 0: left is late, unit is not early"
+    assert "left is late?" in forest.text()
+
+
+@pytest.mark.parametrize("stream", STREAMS)
+def test_what_is_heard_depends_on_one_neighbour_at_most(stream):
+    hmm = random_joint(0, ("a", "b", "c"))
+    forest, units = hmm.parts[stream].forest, hmm.inventory.names
+    sides = [name for name in units if name != "sp"]
+
+    def differs(unit, state, place):
+        found = set()
+        for other in sides:
+            context = ["sil", unit, "sil"]
+            context[place] = other
+            found.add(forest.leaf((tuple(context), state)))
+        return len(found) > 1
+
+    left = {state for unit, state in hmm.inventory.rows if unit not in ("sil", "sp") and differs(unit, state, 0)}
+    right = {state for unit, state in hmm.inventory.rows if unit not in ("sil", "sp") and differs(unit, state, 2)}
+    silent = any(differs("sil", state, place) for state in range(3) for place in (0, 2))
+    expected = ({0}, {2}, False) if stream in HEARD else ({0, 1, 2}, {0, 1, 2}, True)
+    assert (left, right, silent) == expected
+
+
+def test_an_even_count_has_no_middle():
+    known = inventory(4)
+    assert [places_asked("f0", known, "a", state) for state in range(4)] == [(0, 1), (0, 1), (1, 2), (1, 2)]
+
+
+def test_silence_stands_for_pauses_beside_other_units():
+    contexts = KNOWN.contexts(("sil", "a", "sp", "b"))
+    assert contexts == [("sil", "sil", "a"), ("sil", "a", "sil"), ("a", "sp", "b"), ("sil", "b", "sil")]
+    states = states_of(KNOWN, ("a", "sp"))
+    assert states.positions.tolist() == [0, 0, 0, 1]
+    assert [KNOWN.rows[context[1], state] for context, state in states.places] == states.rows.tolist()
+
+
+@pytest.mark.parametrize(
+    "given",
+    [(("a",), (), 3), (("a",), ("b",), 3), (("a", "a"), ("a",), 3), (("a b",), ("a b",), 3), (("a",), ("a",), 0)],
+)
+def test_an_inventory_that_is_none_is_refused(given):
+    with pytest.raises(InputError):
+        Inventory(*given)
+
+
+def test_an_unknown_unit_is_refused():
+    with pytest.raises(InputError, match="unknown unit 'q'"):
+        states_of(KNOWN, ("a", "q"))
+
+
+def test_classes_of_other_units_are_left_out():
+    names = {question.name for question in questions_about(KNOWN, {"other": frozenset({"q"}), **CLASSES})}
+    assert names == {*CLASSES, *NAMES}

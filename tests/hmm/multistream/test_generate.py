@@ -1,0 +1,175 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hmm.multistream.synthetic import CLASSES, config, inventory, observed, random_joint, utterances
+from lipmotion.errors import InputError
+from lipmotion.hmm.multistream.align import align
+from lipmotion.hmm.multistream.generate import (
+    FrameDensities,
+    densities_along,
+    densities_of,
+    densities_over,
+    generate,
+)
+from lipmotion.hmm.multistream.model import HEARD_ONLY
+from lipmotion.hmm.multistream.streams import MOTION, SPEECH
+from lipmotion.hmm.multistream.train import train_joint
+from lipmotion.stats.delta_windows import with_dynamics
+from oracles import trajectories
+
+
+def random_densities(seed, frames, components, dimensions=2):
+    draw = np.random.default_rng(seed)
+    precisions = draw.uniform(0.2, 9, (frames, components, 3, dimensions))
+    precisions[[0, -1], :, 1:] = 0
+    return FrameDensities(
+        np.log(draw.dirichlet(np.full(components, 2.0), frames)),
+        draw.normal(0, 2, (frames, components, 3, dimensions)),
+        precisions,
+    )
+
+
+def test_static_values_alone_are_the_means():
+    densities = random_densities(0, 12, 1)
+    densities.precisions[:, :, 1:] = 0
+    found = generate(densities)
+    assert found.values == pytest.approx(densities.means[:, 0, 0], abs=1e-12)
+    assert found.variance == pytest.approx(1 / densities.precisions[:, 0, 0])
+
+
+@settings(deadline=None)
+@given(frames=st.integers(1, 12), seed=st.integers(0, 50), pinned=st.booleans())
+def test_one_gaussian_has_the_closed_form(frames, seed, pinned):
+    densities = random_densities(seed, frames, 1)
+    pins = {(frames // 2, 0): 1.5, (frames // 2, 1): -0.5, (0, 1): 0.25} if pinned else {}
+    found = generate(densities, pins)
+    for channel in range(2):
+        mine = [(frame, value) for (frame, c), value in pins.items() if c == channel]
+        mean, precision = densities.means[:, 0, :, channel], densities.precisions[:, 0, :, channel]
+        values, variance = trajectories.generate(mean, precision, mine)
+        assert found.values[:, channel] == pytest.approx(values, abs=1e-8)
+        assert found.variance[:, channel] == pytest.approx(variance, abs=1e-8)
+    assert len(found.log_likelihoods) == 1
+
+
+def test_many_steps_over_one_gaussian_change_nothing():
+    densities = random_densities(1, 15, 1)
+    twins = FrameDensities(
+        np.full((15, 2), np.log(0.5)), densities.means.repeat(2, axis=1), densities.precisions.repeat(2, axis=1)
+    )
+    assert generate(twins).values == pytest.approx(generate(densities).values, abs=1e-9)
+    assert generate(twins).log_likelihoods[-1] == pytest.approx(generate(densities).log_likelihoods[0], abs=1e-9)
+
+
+@settings(deadline=None)
+@given(frames=st.integers(1, 25), components=st.integers(2, 4), seed=st.integers(0, 50), pinned=st.booleans())
+def test_the_likelihood_of_the_trajectory_never_falls(frames, components, seed, pinned):
+    densities = random_densities(seed, frames, components)
+    pins = {(frames - 1, 0): 0.3} if pinned else {}
+    found = generate(densities, pins, iterations=50)
+    assert (np.diff(found.log_likelihoods) > -1e-9 * frames).all()
+    assert found.log_likelihoods[-1] == pytest.approx(slow_log_likelihood(densities, found.values), abs=1e-8)
+    for (frame, channel), value in pins.items():
+        assert found.values[frame, channel] == value
+
+
+def slow_log_likelihood(densities, values):
+    dynamics, total = with_dynamics(values), 0.0
+    for t, weights in enumerate(densities.log_weights):
+        rows = slice(0, 3 if 0 < t < len(values) - 1 else 1)
+        each = []
+        for m, weight in enumerate(weights):
+            p, off = densities.precisions[t, m, rows], dynamics[t, rows] - densities.means[t, m, rows]
+            each.append(weight + 0.5 * (np.log(p / (2 * np.pi)) - p * off * off).sum())
+        total += np.logaddexp.reduce(each)
+    return total
+
+
+def test_mixtures_take_sides():
+    means = np.zeros((30, 2, 3, 1))
+    means[:, 0, 0], means[:, 1, 0] = 1.0, -1.0
+    precisions = np.full((30, 2, 3, 1), 50.0)
+    weights = np.log(np.tile([0.6, 0.4], (30, 1)))
+    found = generate(FrameDensities(weights, means, precisions))
+    assert found.values == pytest.approx(np.ones((30, 1)), abs=0.05)
+    assert generate(FrameDensities(weights, means, precisions), iterations=1).values == pytest.approx(0.2, abs=0.05)
+
+
+@pytest.mark.parametrize("components", [1, 3])
+def test_the_densities_are_those_of_the_leaves_in_units_of_the_motion(components):
+    hmm = random_joint(1, components=components, states=2)
+    path = align(hmm, observed(np.random.default_rng(2), 9), ("sil", "a", "b"))
+    found, part = densities_along(hmm, path), hmm.parts[MOTION]
+    leaves = part.forest.leaves(path.states.places)[path.frames]
+    middle = 4
+    wanted = part.tied.mixtures.means[leaves[middle]] * part.scale.deviation + part.scale.mean
+    assert found.means[middle] == pytest.approx(wanted.reshape(components, 3, 2))
+    variance = part.tied.mixtures.variances[leaves[middle]] * part.scale.deviation**2
+    assert found.precisions[middle] == pytest.approx(1 / variance.reshape(components, 3, 2), rel=1e-6)
+    assert (found.precisions[[0, -1], :, 1:] == 0).all()
+
+
+def test_a_path_that_is_certain_is_that_path():
+    hmm = random_joint(3, components=1)
+    path = align(hmm, observed(np.random.default_rng(4), 20), ("sil", "a", "b", "sil"))
+    leaves = hmm.parts[MOTION].forest.leaves(path.states.places)
+    one = np.eye(len(leaves))[path.frames]
+    assert generate(densities_over(hmm, leaves, one)).values == pytest.approx(
+        generate(densities_along(hmm, path)).values, abs=1e-9
+    )
+
+
+def test_all_paths_together_maximise_the_expected_density():
+    hmm = random_joint(5, components=1)
+    draw = np.random.default_rng(6)
+    leaves = np.array([0, 1, 1, 2])
+    posterior = draw.dirichlet(np.ones(4), 10)
+    found = generate(densities_over(hmm, leaves, posterior)).values
+    mixtures, scale = hmm.parts[MOTION].tied.mixtures, hmm.parts[MOTION].scale
+    for channel in range(2):
+        means = (mixtures.means[leaves, 0] * scale.deviation + scale.mean).reshape(4, 3, 2)[:, :, channel]
+        precisions = 1 / (mixtures.variances[leaves, 0] * scale.deviation**2).reshape(4, 3, 2)[:, :, channel]
+        P = np.einsum("ts,sw->tw", posterior, precisions)
+        m = np.einsum("ts,sw->tw", posterior, precisions * means) / P
+        assert found[:, channel] == pytest.approx(trajectories.generate(m, P)[0], abs=1e-6)
+
+
+def test_several_paths_count_as_often_as_they_are_given():
+    hmm = random_joint(3, components=1)
+    data = observed(np.random.default_rng(4), 20)
+    one, other = (align(hmm, data, units) for units in (("sil", "a", "b", "sil"), ("sil", "b", "sil")))
+    leaves = [hmm.parts[MOTION].forest.leaves(path.states.places) for path in (one, other)]
+    posterior = np.concatenate(
+        [0.75 * np.eye(len(leaves[0]))[one.frames], 0.25 * np.eye(len(leaves[1]))[other.frames]], axis=1
+    )
+    wanted = generate(densities_over(hmm, np.concatenate(leaves), posterior)).values
+    assert generate(densities_of(hmm, [one, other, one, one])).values == pytest.approx(wanted, abs=1e-9)
+    with pytest.raises(InputError, match="of the same length"):
+        densities_of(hmm, [])
+
+
+def test_what_was_learned_comes_back():
+    data = utterances(30)
+    hmm = train_joint(data, inventory(), CLASSES, config())
+    for utterance in utterances(4, seed=9):
+        motion = utterance.observed.streams[MOTION]
+        found = generate(densities_along(hmm, align(hmm, utterance.observed, utterance.units, utterance.bounds)))
+        off = found.values - motion.values[:, :2]
+        assert np.sqrt((off[motion.known] ** 2).mean(axis=0)) == pytest.approx([0.06, 0.03], abs=0.05)
+
+
+def test_what_cannot_be_generated():
+    deaf, hmm = random_joint(7, streams=(SPEECH,)), random_joint(8, synthesis=HEARD_ONLY)
+    data = observed(np.random.default_rng(9), 9)
+    for model in (deaf, hmm):
+        with pytest.raises(InputError, match="no motion, or it is switched off"):
+            densities_along(model, align(model, data, ("a",)))
+    hmm = replace(hmm, config=config())
+    with pytest.raises(InputError, match="one of each state"):
+        densities_over(hmm, np.array([0, 1]), np.ones((9, 3)))
+    with pytest.raises(InputError, match="a pin at"):
+        generate(random_densities(0, 5, 1), {(5, 0): 1.0})

@@ -1,0 +1,158 @@
+from functools import cache
+
+import numpy as np
+import pytest
+
+from hmm.multistream.synthetic import observed, random_joint, utterances
+from lipmotion.errors import AlignmentError, InputError
+from lipmotion.hmm.decode import decode_units, unit_loop
+from lipmotion.hmm.log_likelihoods import heard
+from lipmotion.hmm.model import HmmConfig, UnitHmm
+from lipmotion.hmm.multistream.inventory import states_of
+from lipmotion.hmm.multistream.model import HEARD_ONLY
+from lipmotion.hmm.multistream.recognise import JointRecogniser
+from lipmotion.hmm.multistream.streams import SPEECH, Observed, StreamWeights
+from lipmotion.hmm.states import StateTable
+from oracles import joint as slow
+from oracles.sequences import sequences
+
+WEIGHTS = StreamWeights(0.8, 0.5, 1.0, 0.3, 0.0)
+SOFT = StreamWeights(0.1, 0.1, 0.05, 0, 0)
+"""Nothing is certain."""
+
+
+def slow_densities(hmm, data, weights):
+    @cache
+    def density(place, frame):
+        return slow.log_density(hmm, data, place, frame, weights)
+
+    return density
+
+
+def candidates(hmm, frames):
+    counts = {unit: hmm.inventory.count(unit) for unit in hmm.inventory.names}
+    return sequences([unit for unit in hmm.inventory.names if unit != "sp"], counts, frames)
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize(("states", "frames"), [(2, 7), (3, 8)])
+def test_nothing_else_is_more_probable(seed, states, frames):
+    hmm = random_joint(seed, states=states, components=1 + seed % 2)
+    data = observed(np.random.default_rng([seed, 1]), frames)
+    density = slow_densities(hmm, data, WEIGHTS)
+    best, units, lengths = max(slow.everything(hmm, density, frames, candidates(hmm, frames)))
+    said = JointRecogniser(hmm, WEIGHTS).recognise(data)
+    edges = [s.first for s in said] + [frames]
+    assert tuple(s.unit for s in said) == units
+    inside = iter(lengths)
+    assert np.diff(edges).tolist() == [sum(next(inside) for _ in range(hmm.inventory.count(u))) for u in units]
+    assert np.isfinite(best)
+
+
+def test_sequences_are_drawn_as_often_as_they_are_probable():
+    hmm = random_joint(3, states=2, bigram_weight=0.3, insertion=1.5)
+    data, frames, count = observed(np.random.default_rng(4), 7), 7, 4000
+    density = slow_densities(hmm, data, SOFT)
+    ways = list(slow.everything(hmm, density, frames, candidates(hmm, frames)))
+    shares = np.exp([score for score, _, _ in ways] - np.logaddexp.reduce([score for score, _, _ in ways]))
+    expected: dict[tuple, float] = {}
+    for share, (_, units, lengths) in zip(shares, ways, strict=True):
+        key = tuple(zip(units, np.cumsum([0, *lengths])[:-1:2].tolist(), strict=True))
+        expected[key] = expected.get(key, 0) + share
+    drawn = [tuple(map(tuple, said)) for said in JointRecogniser(hmm, SOFT).sampled(data, count, seed=5)]
+    assert set(drawn) <= set(expected)
+    likely = {key: share for key, share in expected.items() if share > 0.02}
+    assert len(likely) > 2
+    for key, share in likely.items():
+        assert drawn.count(key) / count == pytest.approx(share, abs=5 * np.sqrt(share / count))
+
+
+def test_posteriors_are_the_shares_of_all_sequences():
+    hmm = random_joint(3, states=2, bigram_weight=0.3, insertion=1.5)
+    data, frames = observed(np.random.default_rng(4), 7), 7
+    ways = list(slow.everything(hmm, slow_densities(hmm, data, SOFT), frames, candidates(hmm, frames)))
+    shares = np.exp([score for score, _, _ in ways] - np.logaddexp.reduce([score for score, _, _ in ways]))
+    expected = np.zeros((frames, len(hmm.inventory.rows)))
+    for share, (_, units, lengths) in zip(shares, ways, strict=True):
+        expected[np.arange(frames), np.repeat(states_of(hmm.inventory, units).rows, lengths)] += share
+    found = JointRecogniser(hmm, SOFT).posterior(data)
+    assert found == pytest.approx(expected, abs=1e-4)
+    assert found.sum(axis=1) == pytest.approx(np.ones(frames), abs=1e-5)
+
+
+def test_paths_that_are_drawn_go_through_the_states_of_their_units():
+    hmm, data = random_joint(3, bigram_weight=0.3, insertion=2.0), observed(np.random.default_rng(5), 40)
+    recogniser = JointRecogniser(hmm, SOFT)
+    paths = recogniser.sampled_paths(data, 400, 6)
+    for path, said in zip(paths, recogniser.sampled(data, 400, 6), strict=True):
+        assert set(np.diff(path.frames).tolist()) <= {0, 1}
+        assert (path.frames[0], path.frames[-1]) == (0, len(path.states.rows) - 1)
+        assert [context[1] for context, state in path.states.places if state == 0] == [s.unit for s in said]
+        assert path.bounds(len(said))[:-1].tolist() == [s.first for s in said]
+    drawn = np.mean([np.eye(len(hmm.inventory.rows))[path.states.rows[path.frames]] for path in paths], axis=0)
+    assert drawn == pytest.approx(recogniser.posterior(data), abs=0.13)
+
+
+def test_a_wide_beam_changes_nothing():
+    hmm, data = random_joint(3), observed(np.random.default_rng(5), 40)
+    recogniser = JointRecogniser(hmm)
+    assert recogniser.recognise(data, beam=1e4) == recogniser.recognise(data)
+
+
+def test_the_same_seed_draws_the_same():
+    hmm = random_joint(6, bigram_weight=0.3, insertion=2.0)
+    data = observed(np.random.default_rng(7), 20)
+    recogniser = JointRecogniser(hmm, SOFT)
+    assert recogniser.sampled(data, 5, 1) == recogniser.sampled(data, 5, 1) != recogniser.sampled(data, 5, 2)
+
+
+def test_speech_alone_is_the_plain_model():
+    """The densities of all contexts, written out by name, in the models that the project had before."""
+    hmm = random_joint(8, streams=(SPEECH,))
+    known, part = hmm.inventory, hmm.parts[SPEECH]
+    names, leaves = [], []
+    for unit, state in known.rows:
+        names.append(f"{unit}.{state}")
+        leaves.append(part.forest.leaf((("sil", unit, "sil"), state)))
+    for unit, state in known.rows:
+        side = known.side(unit, state)
+        for neighbour in ("sil", "a", "b") if side else ():
+            context = (neighbour, unit, "sil") if side < 0 else ("sil", unit, neighbour)
+            names.append(f"{unit}.{state}{'<' if side < 0 else '>'}{neighbour}")
+            leaves.append(part.forest.leaf((context, state)))
+    table = StateTable(known.names, tuple(map(known.count, known.names)), tuple(names), known.free)
+    config = HmmConfig(bigram_weight=hmm.config.bigram_weight, insertion=hmm.config.insertion)
+    plain = UnitHmm(config, table, part.tied.mixtures.picked(np.array(leaves)), hmm.log_stay, hmm.bigram)
+    data = observed(np.random.default_rng(9), 60, (SPEECH,))
+    rows = part.scale.inside(data.streams[SPEECH])
+    units, bounds = decode_units(unit_loop(plain, ["sil", "a", "b"]), heard(plain, part.tied.values(rows)))
+    said = JointRecogniser(hmm).recognise(data)
+    assert tuple(s.unit for s in said) == units
+    assert [s.first for s in said] == bounds[:-1].tolist()
+
+
+def test_streams_that_are_missing_say_nothing():
+    hmm, data = random_joint(10), observed(np.random.default_rng(11), 20)
+    only = Observed({SPEECH: data.streams[SPEECH]})
+    found = JointRecogniser(hmm, HEARD_ONLY).recognise(only)
+    assert found == JointRecogniser(hmm, StreamWeights(1, 0, 0, 0, 0)).recognise(data)
+
+
+def test_what_cannot_be_recognised():
+    hmm = random_joint(12)
+    data = utterances(1)[0].observed
+    with pytest.raises(InputError, match="motion the weight 0"):
+        JointRecogniser(hmm, StreamWeights())
+    with pytest.raises(InputError, match="switched on are"):
+        JointRecogniser(hmm, StreamWeights(0, 0, 0, 0, 0)).recognise(data)
+    with pytest.raises(InputError, match="required one or more"):
+        JointRecogniser(hmm).sampled(data, 0, 0)
+    with pytest.raises(AlignmentError):
+        JointRecogniser(hmm).recognise(observed(np.random.default_rng(0), 2))
+    with pytest.raises(AlignmentError):
+        JointRecogniser(hmm).sampled(observed(np.random.default_rng(0), 2), 1, 0)
+    with pytest.raises(AlignmentError):
+        JointRecogniser(hmm).posterior(observed(np.random.default_rng(0), 2))
+    wide = Observed({SPEECH: type(data.streams[SPEECH])(np.zeros((9, 4)), np.ones(9, bool))})
+    with pytest.raises(InputError, match="has 4 dimensions"):
+        JointRecogniser(hmm).recognise(wide)

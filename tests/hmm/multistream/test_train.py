@@ -1,0 +1,199 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hmm.multistream.synthetic import CLASSES, config, inventory, random_joint, say, utterances
+from hmm.multistream.synthetic import observed as noise
+from lipmotion.errors import CorpusError, InputError
+from lipmotion.hmm.multistream import densities
+from lipmotion.hmm.multistream.align import align
+from lipmotion.hmm.multistream.em import expect, maximised, posteriors, sentences_of
+from lipmotion.hmm.multistream.inventory import Inventory
+from lipmotion.hmm.multistream.model import MOTION_ONLY
+from lipmotion.hmm.multistream.recognise import JointRecogniser
+from lipmotion.hmm.multistream.streams import STREAMS, Observed, StreamWeights
+from lipmotion.hmm.multistream.train import Transcribed, mean_log_likelihood, train_joint
+from lipmotion.types import Progress
+from oracles import chains
+from oracles import joint as slow
+
+TRAIN, HELD_OUT = utterances(30), utterances(8, seed=1)
+
+
+def trained(data=TRAIN, validation=(), classes=CLASSES, known=None, **changes):
+    events: list[Progress] = []
+    hmm = train_joint(data, known or inventory(), classes, config(**changes), events.append, validation)
+    return hmm, events
+
+
+@pytest.fixture(scope="module")
+def usual():
+    return trained()
+
+
+def stages(events):
+    found: dict[str, list[float]] = {}
+    for event in events:
+        if event.stage not in ("trees", "lengths of states"):
+            found.setdefault(event.stage, []).append(event.figure)
+    return found
+
+
+@pytest.mark.parametrize(
+    "weights",
+    [StreamWeights(), StreamWeights(motion=0), StreamWeights(0.3, 0.5, 0, 0.1, 2), MOTION_ONLY],
+)
+@pytest.mark.parametrize("started", [True, False])
+def test_the_likelihood_never_falls_within_a_stage(weights, started):
+    data = TRAIN[:12] if started else [replace(utterance, bounds=None) for utterance in TRAIN[:12]]
+    _, events = trained(data, training=weights, mixtures=4, motion_mixtures=2, plain_iterations=8, iterations=6)
+    found = stages(events)
+    assert len(found) >= 4
+    for figures in found.values():
+        assert (np.diff(figures) > -2e-4).all(), figures
+
+
+@pytest.mark.parametrize("components", [1, 2])
+def test_posteriors_are_those_of_all_paths(components):
+    hmm = random_joint(1, states=2, components=components, training=StreamWeights(0.7, 1.2, 0.4, 1, 0.9))
+    draw = np.random.default_rng(0)
+    observed = Observed({name: s for name, s in noise(draw, 7).streams.items() if name != "f0_slope"})
+    units = ("a", "sp", "b")
+    sentences = sentences_of(hmm, [(observed, units)])
+    (found,) = posteriors(hmm, sentences)
+    places = [sentences.places[i] for i in sentences.items[0].places]
+    density = [[slow.log_density(hmm, observed, place, t, hmm.config.training) for place in places] for t in range(7)]
+    rows = sentences.items[0].states
+    expected, stay, log_likelihood = chains.chain_posteriors(np.array(density), hmm.log_stay[rows], hmm.log_move[rows])
+    assert found.states == pytest.approx(expected, abs=1e-4)
+    assert found.states.sum(axis=1) == pytest.approx(np.ones(7), abs=1e-9)
+    assert found.stay == pytest.approx(stay, abs=1e-4)
+    assert found.log_likelihood == pytest.approx(log_likelihood, abs=1e-3)
+
+
+def test_a_stream_without_weight_is_as_good_as_absent():
+    off = StreamWeights(motion=0, f0=0)
+    hmm, events = trained(TRAIN[:12], training=off)
+    without = [
+        replace(u, observed=Observed({n: s for n, s in u.observed.streams.items() if n not in ("motion", "f0")}))
+        for u in TRAIN[:12]
+    ]
+    alone, same = trained(without, training=off)
+    assert [e.figure for e in events if e.stage in stages(same)] == pytest.approx(
+        [e.figure for e in same if e.stage in stages(same)], abs=1e-9
+    )
+    assert np.array_equal(hmm.parts["speech"].tied.mixtures.means, alone.parts["speech"].tied.mixtures.means)
+    assert "motion" in hmm.parts
+    assert "motion" not in alone.parts
+
+
+def test_a_step_improves_on_what_was_found():
+    hmm = random_joint(2, units=("a", "b", "c", "d"), components=1)
+    data = [(noise(np.random.default_rng(i), 40), ("sil", "a", "c", "sil")) for i in range(4)]
+    sentences, figures = sentences_of(hmm, data), []
+    for _ in range(4):
+        expected = expect(hmm, sentences)
+        figures.append(expected.mean_log_likelihood)
+        hmm = maximised(hmm, expected)
+    assert (np.diff(figures) > 0).all()
+
+
+def test_what_was_learned_is_recognised(usual):
+    hmm, _ = usual
+    recogniser = JointRecogniser(hmm)
+    right = [tuple(s.unit for s in recogniser.recognise(u.observed)) == u.units for u in HELD_OUT]
+    assert np.mean(right) >= 0.75
+
+
+def test_a_flat_start_finds_the_units():
+    hmm, _ = trained([replace(utterance, bounds=None) for utterance in TRAIN])
+    for utterance in HELD_OUT:
+        found = align(hmm, utterance.observed, utterance.units).bounds(len(utterance.units))
+        assert np.abs(found - utterance.bounds).max() <= 4
+
+
+def test_splitting_stops_where_held_out_utterances_are_no_better(monkeypatch):
+    monkeypatch.setattr(densities, "SPLIT_FRAMES", 3.0)
+    hmm, events = trained(validation=HELD_OUT, mixtures=64)
+    free, _ = trained(mixtures=64)
+    assert hmm.parts["speech"].tied.mixtures.size[1] < free.parts["speech"].tied.mixtures.size[1]
+    best = mean_log_likelihood(hmm, of_model(hmm, HELD_OUT))
+    assert best > mean_log_likelihood(free, of_model(free, HELD_OUT))
+    plain, _ = trained(mixtures=1)
+    assert best >= mean_log_likelihood(plain, of_model(plain, HELD_OUT))
+    assert any("Gaussians for speech" in stage for stage in stages(events))
+
+
+def of_model(hmm, data):
+    return sentences_of(hmm, [(utterance.observed, utterance.units) for utterance in data])
+
+
+def test_gaussians_without_enough_data_are_not_split():
+    hmm, events = trained(mixtures=64)
+    assert hmm.parts["speech"].tied.mixtures.size[1] < 64
+    assert len(stages(events)) < 5 + np.log2(64)
+
+
+def test_streams_and_units_that_are_missing_here_and_there():
+    draw = np.random.default_rng(7)
+    deaf = replace(TRAIN[0], observed=Observed({"speech": TRAIN[0].observed.streams["speech"]}))
+    pause = say(draw, ["a", "b"])
+    hmm, _ = trained([deaf, pause, *TRAIN[1:8]])
+    assert set(hmm.parts) == set(STREAMS)
+    assert hmm.spoken == ("sil", "a", "b", "c", "d")
+    path = align(hmm, HELD_OUT[0].observed, ("sil", "x", "sil"))  # never heard
+    assert len(path.frames) == HELD_OUT[0].observed.frames
+    assert np.isfinite(hmm.durations).all()
+
+
+def test_progress_ends_with_everything_done(usual):
+    shares = [event.share for event in usual[1]]
+    assert shares == sorted(shares)
+    assert shares[-1] == 1
+    assert sum(event.stage == "trees" for event in usual[1]) == len(STREAMS)
+
+
+def test_nothing_that_is_switched_on_was_observed():
+    deaf = [replace(u, observed=Observed({"speech": u.observed.streams["speech"]})) for u in TRAIN[:3]]
+    with pytest.raises(InputError, match="switched on are motion"):
+        trained(deaf, training=MOTION_ONLY)
+    hmm, _ = trained([*TRAIN[:6], deaf[0]], training=MOTION_ONLY)  # where some have it, the others do no harm
+    assert np.isfinite(hmm.durations).all()
+
+
+def test_training_is_repeatable(usual):
+    again, _ = trained()
+    assert np.array_equal(again.parts["speech"].tied.mixtures.means, usual[0].parts["speech"].tied.mixtures.means)
+    assert np.array_equal(again.log_stay, usual[0].log_stay)
+
+
+def test_any_other_units_can_be_modelled():
+    shapes = {"sil": "closed", "a": "open", "b": "closed", "c": "open", "d": "open"}
+    data = [replace(u, units=tuple(shapes[unit] for unit in u.units)) for u in TRAIN[:12]]
+    known = Inventory(("closed", "open"), ("closed",), 3)
+    hmm, _ = trained(data, classes={}, known=known)
+    assert {s.unit for s in JointRecogniser(hmm).recognise(HELD_OUT[0].observed)} == {"closed", "open"}
+
+
+def test_too_short_for_its_units():
+    observed = noise(np.random.default_rng(0), 5)
+    with pytest.raises(CorpusError, match="room for the states"):
+        trained([Transcribed(observed, ("sil", "a", "sil"))])
+    with pytest.raises(CorpusError, match="no utterances"):
+        trained([])
+
+
+@pytest.mark.parametrize("bounds", [[0, 3], [0, 3, 4], [1, 3, 5], [0, 4, 3, 5]])
+def test_bounds_are_those_of_the_units(bounds):
+    with pytest.raises(InputError, match="bounds"):
+        Transcribed(noise(np.random.default_rng(0), 5), ("a", "b"), np.array(bounds))
+
+
+@pytest.mark.parametrize(
+    "changes", [{"states": 0}, {"mixtures": 0}, {"tree_factor": 0.0}, {"insertion": float("nan")},
+                {"training": StreamWeights(0, 0, 0, 0, 0)}],
+)  # fmt: skip
+def test_a_configuration_out_of_range(changes):
+    with pytest.raises(InputError):
+        config(**changes)

@@ -1,0 +1,113 @@
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from hmm.synthetic import SILENCE, UNITS, known_hmm, random_hmm, sentences, speaker
+from lipmotion.hmm.decode import decode_units, unit_loop
+from lipmotion.hmm.log_likelihoods import heard
+from lipmotion.hmm.model import HmmConfig
+from oracles import sequences
+
+INVENTORY = (SILENCE, "a", "b")
+
+
+def decoded(hmm, features, inventory=INVENTORY):
+    units, bounds = decode_units(unit_loop(hmm, inventory), heard(hmm, features))
+    return units, bounds.tolist()
+
+
+def own_score(hmm, features, units, bounds) -> float:
+    """The best score of units that begin where they were found."""
+    cuts = (
+        durations
+        for durations in sequences.segmentations(len(features), sum(hmm.table.count(unit) for unit in units))
+        if sequences.boundaries(hmm, units, durations) == bounds
+    )
+    return max(sequences.score(hmm, features, units, durations) for durations in cuts)
+
+
+@pytest.mark.parametrize(("states", "frames"), [(2, 6), (2, 7), (3, 7), (3, 9), (4, 8), (5, 10)])
+@pytest.mark.parametrize("contexts", [0, 6])
+@pytest.mark.parametrize("seed", range(3))
+def test_no_sequence_of_units_is_better(seed, contexts, states, frames):
+    """Every unit pays the bigram exactly once, whatever its context."""
+    hmm = random_hmm(seed, states=states, contexts=contexts)
+    features = np.random.default_rng([seed, frames]).normal(0, 1.5, (frames, 2)).astype(np.float32)
+    counts = dict.fromkeys(INVENTORY, states)
+    _, _, best = sequences.best(hmm, features, sequences.sequences(INVENTORY, counts, frames))
+    units, bounds = decoded(hmm, features)
+    assert own_score(hmm, features, units, bounds) == pytest.approx(best, abs=1e-3)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_units_of_one_state(seed):
+    hmm = random_hmm(seed, states=1)
+    features = np.random.default_rng(seed).normal(0, 1.5, (5, 2)).astype(np.float32)
+    candidates = [  # a unit right behind itself is the same path as one that lasts longer
+        units
+        for units in sequences.sequences(INVENTORY, dict.fromkeys(INVENTORY, 1), 5)
+        if all(unit != following for unit, following in pairwise(units))
+    ]
+    _, _, best = sequences.best(hmm, features, candidates)
+    units, bounds = decoded(hmm, features)
+    assert own_score(hmm, features, units, bounds) == pytest.approx(best, abs=1e-3)
+
+
+@pytest.mark.parametrize("contexts", [0, 6])
+def test_order_of_the_inventory_changes_nothing(contexts):
+    hmm = random_hmm(8, states=3, contexts=contexts)
+    features = np.random.default_rng(8).normal(0, 1.5, (40, 2)).astype(np.float32)
+    assert decoded(hmm, features) == decoded(hmm, features, ("b", SILENCE, "a"))
+
+
+def test_a_known_sequence_is_recovered():
+    who = speaker()
+    hmm = known_hmm(who)
+    for number, words in enumerate(sentences(1, 10)):
+        units = (SILENCE, *(unit for word in words for unit in word), SILENCE)
+        features, edges = who.say(np.random.default_rng(number), units)
+        found, bounds = decoded(hmm, features, (SILENCE, *UNITS))
+        assert found == units
+        assert bounds == pytest.approx(edges, abs=1)
+
+
+def test_speech_may_begin_and_end_without_silence():
+    who = speaker()
+    features, edges = who.say(np.random.default_rng(1), ("b", "c", "a"))
+    assert decoded(known_hmm(who), features, (SILENCE, *UNITS)) == (("b", "c", "a"), edges)
+
+
+def test_silence_alone_is_silence_however_unlikely_it_is_to_follow_itself():
+    who = speaker()
+    said = [(SILENCE, *(unit for word in words for unit in word), SILENCE) for words in sentences(1, 40)]
+    hmm = known_hmm(who, said, HmmConfig(mixtures=1, bigram_weight=20.0))
+    features, edges = who.say(np.random.default_rng(1), (SILENCE,))
+    assert decoded(hmm, features, (SILENCE, *UNITS)) == ((SILENCE,), edges)
+
+
+@pytest.mark.parametrize("silent", [3, 4])
+def test_short_silence_at_the_start_is_not_priced_out(silent):
+    """Nobody says silence after silence; a recording that begins in silence does not say so either."""
+    who = speaker(spread=2.0)
+    said = [(SILENCE, *(unit for word in words for unit in word), SILENCE) for words in sentences(1, 400)]
+    hmm = known_hmm(who, said, HmmConfig(mixtures=1, bigram_weight=8.0))
+    with_silence = np.repeat(who.means[SILENCE][:1], silent, axis=0)
+    rest = np.concatenate([np.repeat(who.means[unit], 3, axis=0) for unit in ("b", "c", SILENCE)])
+    features = np.concatenate([with_silence, rest]).astype(np.float32)
+    assert decoded(hmm, features, (SILENCE, *UNITS))[0] == (SILENCE, "b", "c", SILENCE)
+
+
+def test_the_bigram_decides_between_units_that_sound_alike():
+    who = speaker()
+    who.means["e"] = who.means["d"]
+    hmm = known_hmm(who, [(SILENCE, "a", "e", SILENCE)] * 9 + [(SILENCE, "b", "d", SILENCE)] * 9)
+    for first, second in (("a", "e"), ("b", "d")):
+        features, _ = who.say(np.random.default_rng(2), (SILENCE, first, second, SILENCE))
+        assert decoded(hmm, features, (SILENCE, *UNITS))[0] == (SILENCE, first, second, SILENCE)
+
+
+def test_a_price_on_units_leaves_fewer():
+    features = np.random.default_rng(4).normal(0, 1.5, (60, 2)).astype(np.float32)
+    cheap, dear = (random_hmm(4, config=HmmConfig(3, bigram_weight=1.0, insertion=price)) for price in (8.0, -8.0))
+    assert len(decoded(dear, features)[0]) < len(decoded(cheap, features)[0])

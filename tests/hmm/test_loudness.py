@@ -1,0 +1,105 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hmm.synthetic import PAUSE, SILENCE, known_hmm, speaker
+from lipmotion.hmm.align import align_units, choose_pronunciations
+from lipmotion.hmm.log_likelihoods import always_silent, heard, never_silent
+from lipmotion.hmm.loudness import QUIET, QUIET_REACH, loud_frames, quiet_frames
+
+
+def energy(seed: int = 0) -> np.ndarray:
+    """Forty quiet frames, sixty loud ones, forty quiet ones."""
+    return np.repeat([0.0, 10.0, 0.0], [40, 60, 40]) + np.random.default_rng(seed).normal(0, 0.5, 140)
+
+
+@given(gain=st.floats(0.01, 100), offset=st.floats(-50, 50))
+def test_loud_is_relative_to_the_recording(gain, offset):
+    loud = np.nonzero(loud_frames(gain * energy() + offset, 5))[0]
+    assert (loud[0], loud[-1]) == pytest.approx((40, 99), abs=1)
+    assert len(loud) == loud[-1] - loud[0] + 1
+
+
+def test_clicks_shorter_than_the_smoothing_are_not_loud():
+    clicks = energy()
+    clicks[[10, 120]] = 12.0
+    assert loud_frames(clicks, 1)[[10, 120]].all()
+    assert not loud_frames(clicks, 5)[[10, 120]].any()
+
+
+@pytest.mark.parametrize("frames", [1, 2, 3])
+def test_the_shortest_recordings_and_those_that_never_change(frames):
+    assert not loud_frames(np.full(frames, -3.0), 21).any()
+
+
+def stranger():
+    """A voice that sounds more like the models' silence than like any of their units, and is as loud as theirs."""
+    who = speaker(spread=2.0)
+    features, edges = who.say(np.random.default_rng(3), (SILENCE, "a", "b", SILENCE))
+    spoken = slice(edges[1], edges[3])
+    features[spoken] = features[spoken] * 0.1 + who.means[SILENCE][0]
+    loud = np.zeros(len(features), bool)
+    loud[spoken] = True
+    return known_hmm(who), features, edges, loud
+
+
+def test_loud_frames_are_not_aligned_with_silence():
+    hmm, features, edges, loud = stranger()
+    units = (SILENCE, "a", "b", SILENCE)
+    evidence = heard(hmm, features)
+    without, bounds = (align_units(hmm, given, units) for given in (evidence, never_silent(hmm, evidence, loud)))
+    assert without[3] - without[1] < 8
+    assert (bounds[1], bounds[3]) == (edges[1], edges[3])
+
+
+def test_loud_frames_are_not_chosen_as_pauses():
+    hmm, features, _, loud = stranger()
+    words = ((("a",),), (("b",),))
+    evidence = heard(hmm, features)
+    free, bound = (
+        choose_pronunciations(hmm, given, words, PAUSE) for given in (evidence, never_silent(hmm, evidence, loud))
+    )
+    assert PAUSE in [unit for part in free for unit in part.units]
+    assert PAUSE not in [unit for part in bound for unit in part.units]
+
+
+def test_no_loud_frames_change_nothing():
+    hmm, features, _, loud = stranger()
+    units = (SILENCE, "a", "b", SILENCE)
+    evidence = heard(hmm, features)
+    unchanged = never_silent(hmm, evidence, loud & False)
+    assert np.array_equal(align_units(hmm, unchanged, units), align_units(hmm, evidence, units))
+
+
+def test_quiet_frames_are_far_under_the_loud_ones_and_away_from_them():
+    level = np.full(200, -QUIET - 1)
+    level[50:120] = 0
+    level[70:76] = -QUIET - 9  # the closure of a stop
+    quiet = quiet_frames(level.astype(np.float32))
+    assert quiet[: 50 - QUIET_REACH].all()
+    assert quiet[120 + QUIET_REACH :].all()
+    assert not quiet[50 - QUIET_REACH : 120 + QUIET_REACH].any()
+
+
+@pytest.mark.parametrize("frames", [1, 5, 40])
+def test_nothing_is_quiet_where_nothing_is_loud(frames):
+    assert not quiet_frames(np.full(frames, -9.0, np.float32)).any()
+
+
+def test_quiet_frames_are_silence_whatever_they_sound_like():
+    hmm, features, _, _loud = stranger()
+    quiet = np.zeros(len(features), bool)
+    quiet[:4] = True
+    values = always_silent(hmm, heard(hmm, features), quiet).log_density(2, 6, None)
+    free = [hmm.table.density(SILENCE, 0), hmm.table.density(PAUSE, 0)]
+    assert set(values[:2].argmax(axis=1)) <= {hmm.table.density(SILENCE, k) for k in range(3)} | set(free)
+    plain = heard(hmm, features).log_density(2, 6, None)
+    assert np.array_equal(values[2:], plain[2:])
+    assert np.array_equal(values[:, free], plain[:, free])
+
+
+@pytest.mark.parametrize("level", [-69.0, -3.0, 20.0])
+def test_a_steady_sound_is_nowhere_loud_whatever_its_rounding(level):
+    steady = (level * (1 + 1e-7 * np.random.default_rng(0).uniform(-1, 1, 300))).astype(np.float32)
+    assert not loud_frames(steady, 11).any()

@@ -1,0 +1,57 @@
+import numpy as np
+import pytest
+
+from hmm.synthetic import random_hmm
+from lipmotion.errors import ModelFormatError
+from lipmotion.hmm.align import align_units
+from lipmotion.hmm.log_likelihoods import heard
+from lipmotion.hmm.model import hmm_arrays, hmm_from_arrays
+
+
+def test_models_come_back_from_arrays():
+    hmm = random_hmm(1, contexts=5)
+    back = hmm_from_arrays(hmm_arrays(hmm), hmm.config)
+    assert back.table == hmm.table
+    assert back.bigram.units == hmm.bigram.units
+    assert np.array_equal(back.log_stay, hmm.log_stay)
+    assert np.array_equal(back.bigram.log_probability, hmm.bigram.log_probability)
+    features = np.random.default_rng(1).normal(0, 1.5, (30, 2)).astype(np.float32)
+    assert back.mixtures.log_likelihood(features) == pytest.approx(hmm.mixtures.log_likelihood(features), abs=0.1)
+    units = ("sil", "a", "b", "sil")
+    assert np.array_equal(
+        align_units(back, heard(back, features), units), align_units(hmm, heard(hmm, features), units)
+    )
+
+
+def test_arrays_hold_no_objects():
+    assert all(array.dtype != object for array in hmm_arrays(random_hmm(2, contexts=3)).values())
+
+
+def test_switched_off_components_stay_off():
+    hmm = random_hmm(3)
+    hmm.mixtures.log_weights[0] = [0, -np.inf]
+    back = hmm_from_arrays(hmm_arrays(hmm), hmm.config)
+    assert back.mixtures.log_weights[0].tolist() == [0, -np.inf]
+
+
+@pytest.mark.parametrize("name", sorted(hmm_arrays(random_hmm(4))))
+def test_a_missing_array_is_a_damaged_model(name):
+    arrays = hmm_arrays(random_hmm(4))
+    del arrays[name]
+    with pytest.raises(ModelFormatError, match=name):
+        hmm_from_arrays(arrays, random_hmm(4).config)
+
+
+@pytest.mark.parametrize("name", ["means", "variances", "names", "log_weights", "log_stay", "bigram", "counts"])
+def test_an_array_of_the_wrong_shape_is_a_damaged_model(name):
+    arrays = hmm_arrays(random_hmm(5, contexts=2))
+    arrays[name] = arrays[name][:-1]
+    with pytest.raises(ModelFormatError, match="damaged"):
+        hmm_from_arrays(arrays, random_hmm(5).config)
+
+
+def test_staying_and_moving_sum_to_one():
+    hmm = random_hmm(6, contexts=4)
+    for unit in ("sil", "a", "b"):
+        for state in range(3):
+            assert np.exp(hmm.stay(unit, state)) + np.exp(hmm.move(unit, state)) == pytest.approx(1)

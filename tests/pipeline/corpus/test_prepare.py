@@ -1,0 +1,347 @@
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+import wave
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lipmotion.corpora.entry import read_entry
+from lipmotion.corpora.store import Corpus
+from lipmotion.errors import CorpusError, ExportError, InputError, MissingDependencyError
+from lipmotion.pipeline.corpus import prepare as module
+from lipmotion.pipeline.corpus.prepare import prepare
+from lipmotion.storage.files import locked
+from lipmotion.types import Channel, Item, Motion, Progress, Track
+
+
+def speak(path: Path, seed: int) -> None:
+    """Write a second of noise; its suffix says video, its content is sound."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with wave.open(str(path), "wb") as file:
+        file.setnchannels(1)
+        file.setsampwidth(2)
+        file.setframerate(16_000)
+        file.writeframes(np.random.default_rng(seed).integers(-9000, 9000, 16_000).astype("<i2").tobytes())
+
+
+@pytest.fixture
+def studio(tmp_path: Path) -> Path:
+    folder = tmp_path / "studio"
+    for seed, name in enumerate(("a", "b", "c")):
+        speak(folder / f"{name}.mp4", seed)
+    (folder / "a.txt").write_text("Hello, you.")
+    return folder
+
+
+@pytest.fixture
+def tracked(monkeypatch) -> list[str]:
+    """Replaces face tracking; lists the names of the videos it was asked for."""
+    asked: list[str] = []
+
+    def track(path: Path, *, crops: bool = True) -> Track:
+        asked.append(path.stem)
+        if "broken" in path.stem:
+            raise InputError(f"{path}: no face in 25 of 25 frames")
+        if "strange" in path.stem:
+            raise ZeroDivisionError("what is this")
+        images = np.zeros((25, 56, 72, 3), np.uint8) if crops else None
+        notes = ("cut at 0.50 s",) if "cut" in path.stem else ()
+        return Track(Motion(np.ones((25, 1)), 25.0, (Channel("opening"),)), np.arange(25) > 1, images, notes)
+
+    monkeypatch.setattr(module, "track", track)
+    monkeypatch.setattr(module, "versions", lambda: {"mediapipe": "0", "opencv": "4", "av": "1"})
+    return asked
+
+
+def content(corpus: Path) -> dict[str, bytes]:
+    files = (path for path in sorted(corpus.rglob("*")) if path.is_file())
+    return {str(path.relative_to(corpus)): path.read_bytes() for path in files}
+
+
+@pytest.mark.usefixtures("tracked")
+def test_recordings_become_a_corpus(studio, tmp_path):
+    report = prepare(studio, tmp_path / "corpus", workers=1)
+    assert report.kind == "folder of videos"
+    assert report.prepared == ("a", "b", "c")
+    assert (report.kept, report.failed) == ((), {})
+    assert report.unseen == {"a": 2, "b": 2, "c": 2}
+    assert report.seconds > 0
+    found = Corpus.open(report.corpus).utterance("a")
+    assert found.words == ("hello", "you")
+    assert found.features.values.shape == (101, 39)
+    assert found.track.motion.rate_hz == 25
+    assert found.source["file"] == "a.mp4"
+    assert found.source["bytes"] == "32044"
+    assert len(found.source["sha256"]) == 64
+    assert found.source["mediapipe"] == "0"
+
+
+@pytest.mark.usefixtures("tracked")
+def test_what_is_odd_about_a_video_is_told_and_kept(studio, tmp_path):
+    speak(studio / "cut.mp4", 9)
+    for _ in range(2):  # prepared, then kept
+        report = prepare(studio, tmp_path / "corpus", workers=1)
+        assert report.notes == {"cut": ("cut at 0.50 s",)}
+    assert Corpus.open(report.corpus).utterance("cut").track.notes == ("cut at 0.50 s",)
+
+
+@pytest.mark.usefixtures("tracked")
+def test_features_are_those_of_the_sound_that_is_kept(studio, tmp_path):
+    from lipmotion.speech.mfcc import mfcc
+
+    prepare(studio, tmp_path / "corpus", workers=1)
+    found = Corpus.open(tmp_path / "corpus").utterance("b")
+    np.testing.assert_allclose(mfcc(found.audio).values, found.features.values, rtol=0, atol=1e-4)
+
+
+def test_what_is_up_to_date_is_kept(studio, tmp_path, tracked):
+    prepare(studio, tmp_path / "corpus", workers=1)
+    before = content(tmp_path / "corpus")
+    report = prepare(studio, tmp_path / "corpus", workers=1)
+    assert (report.prepared, report.kept) == ((), ("a", "b", "c"))
+    assert report.unseen == {"a": 2, "b": 2, "c": 2}
+    assert tracked == ["a", "b", "c"]
+    assert content(tmp_path / "corpus") == before
+
+
+@pytest.mark.usefixtures("tracked")
+def test_changed_recordings_transcripts_and_lists_are_prepared_again(studio, tmp_path):
+    prepare(studio, tmp_path / "corpus", workers=1)
+    speak(studio / "b.mp4", 77)
+    assert prepare(studio, tmp_path / "corpus", workers=1).prepared == ("b",)
+    (studio / "a.txt").write_text("Goodbye.")
+    assert prepare(studio, tmp_path / "corpus", workers=1).prepared == ("a",)
+    (studio / "val.txt").write_text("c\n")
+    assert prepare(studio, tmp_path / "corpus", workers=1).prepared == ("c",)
+    corpus = Corpus.open(tmp_path / "corpus")
+    assert corpus.utterance("a").words == ("goodbye",)
+    assert corpus.names("val") == ("c",)
+
+
+@pytest.mark.usefixtures("tracked")
+def test_other_settings_prepare_again(studio, tmp_path):
+    prepare(studio, tmp_path / "corpus", workers=1)
+    assert len(prepare(studio, tmp_path / "corpus", workers=1, crops=False).prepared) == 3
+    assert Corpus.open(tmp_path / "corpus").utterance("a").track.crops is None
+
+
+@pytest.mark.usefixtures("tracked")
+def test_a_damaged_utterance_is_prepared_again(studio, tmp_path):
+    prepare(studio, tmp_path / "corpus", workers=1)
+    before = content(tmp_path / "corpus")
+    (tmp_path / "corpus" / "utterances" / "b" / "entry.json").write_text("{")
+    assert prepare(studio, tmp_path / "corpus", workers=1).prepared == ("b",)
+    assert content(tmp_path / "corpus") == before
+
+
+@pytest.mark.usefixtures("tracked")
+def test_bad_recordings_are_listed_and_the_rest_is_prepared(studio, tmp_path):
+    speak(studio / "broken.mp4", 5)
+    speak(studio / "strange.mp4", 6)
+    (studio / "empty.mp4").touch()
+    (studio / "words.mp4").write_text("not a video")
+    (studio / "c.txt").write_bytes(b"\xff")
+    report = prepare(studio, tmp_path / "corpus", workers=1)
+    assert report.prepared == ("a", "b")
+    assert list(report.failed) == ["broken", "c", "empty", "strange", "words"]
+    assert "no face in 25 of 25 frames" in report.failed["broken"]
+    assert "ZeroDivisionError: what is this" in report.failed["strange"]
+    assert "empty" in report.failed["empty"]
+    assert Corpus.open(report.corpus).names() == ("a", "b")
+
+
+@pytest.mark.usefixtures("tracked")
+def test_nothing_usable(tmp_path):
+    speak(tmp_path / "studio" / "broken.mp4", 5)
+    with pytest.raises(CorpusError, match=r"none of 1 recordings is usable; the first, broken: .*no face in 25"):
+        prepare(tmp_path / "studio", tmp_path / "corpus", workers=1)
+
+
+def test_missing_packages_are_said_at_once(studio, tmp_path, monkeypatch):
+    def missing() -> dict[str, str]:
+        raise MissingDependencyError("pip install")
+
+    monkeypatch.setattr(module, "versions", missing)
+    with pytest.raises(MissingDependencyError):
+        prepare(studio, tmp_path / "corpus")
+    assert not (tmp_path / "corpus").exists()
+
+
+@pytest.mark.usefixtures("tracked")
+def test_a_full_disk_stops_it(studio, tmp_path, monkeypatch):
+    def full(*_: object) -> None:
+        raise ExportError("no space left on device")
+
+    monkeypatch.setattr(module, "write_utterance", full)
+    with pytest.raises(ExportError):
+        prepare(studio, tmp_path / "corpus", workers=1)
+
+
+@pytest.mark.usefixtures("tracked")
+def test_an_interrupted_run_goes_on_where_it_stopped(studio, tmp_path, monkeypatch):
+    prepare(studio, tmp_path / "whole", workers=1)
+    good = module.track
+
+    def interrupted(path: Path, *, crops: bool = True) -> Track:
+        if path.stem == "b":
+            raise KeyboardInterrupt
+        return good(path, crops=crops)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(module, "track", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            prepare(studio, tmp_path / "corpus", workers=1)
+    assert Corpus.open(tmp_path / "corpus").names() == ("a",)
+    report = prepare(studio, tmp_path / "corpus", workers=1)
+    assert (report.kept, report.prepared) == (("a",), ("b", "c"))
+    assert content(tmp_path / "corpus") == content(tmp_path / "whole")
+
+
+@pytest.mark.usefixtures("tracked")
+def test_a_second_folder_is_added(studio, tmp_path):
+    prepare(studio, tmp_path / "corpus", workers=1)
+    speak(tmp_path / "home" / "d.mp4", 9)
+    assert prepare(tmp_path / "home", tmp_path / "corpus", workers=1).prepared == ("d",)
+    assert Corpus.open(tmp_path / "corpus").names() == ("a", "b", "c", "d")
+
+
+@pytest.mark.usefixtures("tracked")
+def test_another_speaker_may_use_the_same_names(studio, tmp_path):
+    prepare(studio, tmp_path / "corpus", workers=1)
+    other = tmp_path / "home"
+    speak(other / "a.mp4", 50)
+    shutil.copy(studio / "b.mp4", other / "b.mp4")  # the same recording: it is there already
+    report = prepare(other, tmp_path / "corpus", workers=1)
+    qualified = f"{tmp_path.name}-home-a"
+    assert (report.prepared, report.kept) == ((qualified,), ("b",))
+    assert prepare(other, tmp_path / "corpus", workers=1).kept == ("b", qualified)
+    assert len(Corpus.open(tmp_path / "corpus")) == 4
+
+
+@pytest.mark.usefixtures("tracked")
+def test_what_becomes_of_every_recording_is_told_at_once(studio, tmp_path, capsys):
+    speak(studio / "broken.mp4", 5)
+    (studio / "empty.mp4").touch()
+    prepare(studio, tmp_path / "corpus", workers=1, crops=False)
+    (studio / "b.txt").write_text("Goodbye.")
+    events: list[Progress | Item] = []
+    prepare(studio, tmp_path / "corpus", workers=1, crops=False, monitor=events.append)
+    found = {event.name: event.outcome for event in events if isinstance(event, Item)}
+    assert found == {"a": "kept", "b": "prepared", "broken": "skipped", "c": "kept", "empty": "skipped"}
+    reasons = {event.name: event.reason for event in events if isinstance(event, Item)}
+    assert reasons["b"] == "no face in 2 frames, interpolated"
+    assert "no face in 25 of 25 frames" in reasons["broken"]
+    progress = [event for event in events if isinstance(event, Progress)]
+    assert [event.step for event in progress] == list(range(progress[0].steps + 1))
+    assert progress[-1].share == 1
+    assert capsys.readouterr() == ("", "")
+
+
+@pytest.mark.usefixtures("tracked")
+def test_two_at_a_time_are_refused(studio, tmp_path):
+    with locked(tmp_path / "corpus"):
+        (tmp_path / "corpus" / ".part-of-the-other").touch()
+        with pytest.raises(ExportError, match=rf"corpus: another lipmotion \(process {os.getpid()}\) is at work on it"):
+            prepare(studio, tmp_path / "corpus", workers=1)
+        assert (tmp_path / "corpus" / ".part-of-the-other").exists()
+    assert len(prepare(studio, tmp_path / "corpus", workers=1).prepared) == 3
+    assert [path.name for path in sorted((tmp_path / "corpus").iterdir())] == ["corpus.json", "utterances"]
+
+
+@pytest.fixture
+def clips(tmp_path: Path) -> Path:
+    """A dozen GRID clips."""
+    pytest.importorskip("mediapipe")
+    source = Path(__file__).parents[2].parent / "shared" / "corpora" / "grid-s1" / "clips"
+    if not source.is_dir():
+        pytest.skip("the real recordings are not here")
+    folder = tmp_path / "clips"
+    folder.mkdir()
+    for path in sorted(source.glob("*.mkv"))[:12]:
+        (folder / path.name).symlink_to(path)
+    return folder
+
+
+SCRIPT = """
+import sys
+import time
+from pathlib import Path
+from lipmotion.pipeline.corpus.prepare import prepare
+from lipmotion.types import Item
+
+heard = []
+
+def hold(event):
+    heard.append(isinstance(event, Item))
+    if sum(heard) == 2:
+        print("two are done", flush=True)
+        time.sleep(600)
+
+if __name__ == "__main__":
+    prepare(Path(sys.argv[1]), Path(sys.argv[2]), workers=2, monitor=hold)
+"""
+
+
+def started(script: Path, folder: Path, corpus: Path) -> subprocess.Popen[str]:
+    """Start preparing in another process, which goes no further than the first utterances; return when they are there.
+
+    Each worker may finish one more meanwhile.
+    """
+    script.write_text(SCRIPT)
+    process = subprocess.Popen(
+        [sys.executable, str(script), str(folder), str(corpus)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+        text=True,
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline() == "two are done\n"
+    process.stdout.close()
+    return process
+
+
+@pytest.mark.video
+@pytest.mark.recordings
+@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGKILL])
+def test_real_clips_in_two_processes_stopped_and_gone_on(clips, tmp_path, stop):
+    process = started(tmp_path / "script.py", clips, tmp_path / "corpus")
+    if stop == signal.SIGINT:
+        os.killpg(process.pid, stop)  # as Ctrl-C does: the workers get it, too
+    else:
+        process.send_signal(stop)
+    assert process.wait(30) != 0
+    time.sleep(1)  # workers of a killed run end by themselves
+    done = len(list((tmp_path / "corpus").glob("utterances/[a-z]*")))
+    assert 2 <= done <= 4
+    if stop == signal.SIGINT:
+        assert len(Corpus.open(tmp_path / "corpus")) == done
+    report = prepare(clips, tmp_path / "corpus", workers=2)
+    assert len(report.kept) == done
+    assert len(report.prepared) == 12 - done
+    assert not list((tmp_path / "corpus").rglob(".part-*"))
+
+    prepare(clips, tmp_path / "whole", workers=1)
+    assert content(tmp_path / "corpus") == content(tmp_path / "whole")
+
+
+@pytest.mark.video
+@pytest.mark.recordings
+def test_real_clips_with_their_words(clips, tmp_path, capfd):
+    for path in sorted(clips.iterdir())[2:]:
+        path.unlink()
+    report = prepare(clips, tmp_path / "corpus", workers=1)
+    found = Corpus.open(report.corpus).utterance("bbaf2n")
+    assert found.words == ("bin", "blue", "at", "f", "two", "now")
+    assert found.source["licence"] == "CC BY 4.0"
+    assert found.track.motion.values.shape == (75, 159)
+    assert found.audio.duration_s == pytest.approx(2.978)
+    assert read_entry(Corpus.open(report.corpus).folder("bbaf2n"))["settings"]["tracker"].startswith("mediapipe 0.10.")
+    assert capfd.readouterr() == ("", "")

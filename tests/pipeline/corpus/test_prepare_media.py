@@ -1,0 +1,87 @@
+"""Videos as people have them, through ``prepare``: the motion is that of the plain clip, in time with the sound."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+
+from lipmotion.corpora.store import Corpus
+from lipmotion.errors import CorpusError
+from lipmotion.pipeline.corpus.prepare import prepare
+from lipmotion.types import Item
+
+CLIP = "brwa3s"
+COUNT = 75
+
+
+def rewritten(source: Path, target: Path, kept: Sequence[int]) -> None:
+    """Write some of a clip's pictures at their times, its sound as it is, subtitles that go on, and a cover."""
+    with av.open(str(source)) as clip, av.open(str(target), "w") as container:
+        copied = container.add_stream_from_template(clip.streams.audio[0], opaque=True)
+        pictures = container.add_stream("libx264", rate=30, options={"crf": "8"})
+        words = container.add_mux_stream("subrip")
+        container.add_attachment("cover.jpg", "image/jpeg", b"\xff\xd8\xff\xe0 no picture")
+        pictures.width, pictures.height, pictures.pix_fmt = 360, 288, "yuv420p"
+        pictures.codec_context.time_base = Fraction(1, 25)
+        for packet in clip.demux():
+            for frame in packet.decode() if packet.stream.type == "video" else ():
+                number = round(frame.time * 25)
+                if number in kept:
+                    picture = av.VideoFrame.from_ndarray(frame.to_ndarray(format="rgb24"), format="rgb24")
+                    picture.pts, picture.time_base = number, Fraction(1, 25)
+                    container.mux(pictures.encode(picture))
+            if packet.stream.type == "audio" and packet.size:
+                packet.stream = copied
+                container.mux(packet)
+        container.mux(pictures.encode())
+        line = av.Packet(b"words that stay")
+        line.stream, line.time_base, line.pts, line.dts, line.duration = words, Fraction(1, 1000), 2000, 2000, 9000
+        container.mux(line)
+
+
+@pytest.mark.video
+@pytest.mark.recordings
+def test_variable_frame_rate_with_subtitles_and_a_cover(recordings: Path, tmp_path: Path) -> None:
+    pytest.importorskip("mediapipe")
+    source = recordings / "grid-s1" / "clips" / f"{CLIP}.mkv"
+    draw = np.random.default_rng(0)
+    kept = [n for n in range(COUNT) if draw.random() > 0.3 or n in (0, COUNT - 1)]
+    (tmp_path / "clips").mkdir()
+    rewritten(source, tmp_path / "clips" / "varied.mkv", kept)
+    (tmp_path / "clips" / "plain.mkv").write_bytes(source.read_bytes())
+    prepare(tmp_path / "clips", tmp_path / "corpus", workers=1, crops=False)
+    corpus = Corpus.open(tmp_path / "corpus")
+    varied, plain = corpus.utterance("varied"), corpus.utterance("plain")
+    assert varied.track.motion.rate_hz == pytest.approx(25)
+    assert np.flatnonzero(~varied.track.seen).tolist() == sorted(set(range(COUNT)) - set(kept))
+    seen = varied.track.seen
+    opening, usual = (one.track.motion["opening"] for one in (varied, plain))
+    assert np.corrcoef(opening[seen], usual[seen])[0, 1] > 0.99
+    assert np.corrcoef(opening[:-1], usual[1:])[0, 1] < np.corrcoef(opening, usual)[0, 1]
+    assert np.array_equal(varied.audio.samples, plain.audio.samples)
+
+
+def test_many_useless_files_are_each_told_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("lipmotion.pipeline.corpus.prepare.versions", lambda: {"mediapipe": "1"})
+    names = [f"clip{number:03d}" for number in range(300)]
+    (tmp_path / "clips").mkdir()
+    for name in names:
+        (tmp_path / "clips" / f"{name}.mp4").write_bytes(b"not a video")
+    told: list[Item] = []
+    with pytest.raises(
+        CorpusError, match=r"none of 300 recordings is usable; the first, clip000: .*not a readable"
+    ) as e:
+        prepare(
+            tmp_path / "clips",
+            tmp_path / "corpus",
+            workers=1,
+            monitor=lambda event: told.append(event) if isinstance(event, Item) else None,
+        )
+    assert len(str(e.value)) < 500
+    assert [item.name for item in told] == names
+    assert not (tmp_path / "corpus").exists()

@@ -1,0 +1,209 @@
+from __future__ import annotations
+
+import wave
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lipmotion.corpora.base import Curves, Recording
+from lipmotion.corpora.store import Corpus
+from lipmotion.errors import InputError, MissingDependencyError
+from lipmotion.export.base import write_motion
+from lipmotion.pipeline.corpus import prepare as module
+from lipmotion.pipeline.corpus.prepare import prepare
+from lipmotion.pipeline.corpus.supplied_motion import digest, given_phones, given_track
+from lipmotion.types import Channel, Generation, Motion, Span, Timeline, Trace, Unit
+from lipmotion.units import is_silent
+
+CHANNELS = (Channel("jaw", "weight"), Channel("brow", "weight"))
+
+
+def write_sound(path: Path, seconds: float = 2.0, seed: int = 0) -> None:
+    samples = np.random.default_rng(seed).integers(-9000, 9000, int(seconds * 16_000)).astype("<i2")
+    with wave.open(str(path), "wb") as file:
+        file.setnchannels(1)
+        file.setsampwidth(2)
+        file.setframerate(16_000)
+        file.writeframes(samples.tobytes())
+
+
+def write_curves(path: Path, seconds: float = 2.0, rate_hz: float = 60.0, seed: int = 0) -> Motion:
+    count = int(seconds * rate_hz)
+    motion = Motion(np.random.default_rng(seed).uniform(size=(count, 2)), rate_hz, CHANNELS)
+    trace = Trace(("x",), np.zeros(count, int))
+    write_motion(path, Generation(motion, motion.values, Timeline(()), trace), source={}, model={})
+    return motion
+
+
+@pytest.fixture
+def studio(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Three sounds with motion, and no packages for video."""
+
+    def missing() -> dict[str, str]:
+        raise MissingDependencyError("pip install")
+
+    monkeypatch.setattr(module, "versions", missing)
+    folder = tmp_path / "studio"
+    (folder / "anna").mkdir(parents=True)
+    for seed, (name, suffix) in enumerate((("a", ".npz"), ("b", ".json"), ("anna/c", ".csv"))):
+        write_sound(folder / f"{name}.wav", seed=seed)
+        write_curves(folder / f"{name}{suffix}", seed=seed)
+    return folder
+
+
+def test_curves_become_a_corpus_without_the_packages_for_video(studio, tmp_path):
+    (studio / "a.lab").write_text("0 10000000 AH0\n10000000 18000000 M\n")
+    report = prepare(studio, tmp_path / "corpus", workers=1)
+    assert (report.prepared, report.failed, report.unseen) == (("a", "anna-c", "b"), {}, {})
+    corpus = Corpus.open(tmp_path / "corpus")
+    for name, path, seed in (("a", "a.npz", 0), ("b", "b.json", 1), ("anna-c", "anna/c.csv", 2)):
+        found, original = corpus.utterance(name), write_curves(tmp_path / Path(path).name, seed=seed)
+        assert found.track.motion.rate_hz == pytest.approx(60)
+        assert found.track.motion.names == ("jaw", "brow")
+        np.testing.assert_allclose(found.track.motion.values, original.values, atol=1e-5)
+        assert found.track.seen.all()
+        assert found.track.crops is None
+        assert found.features.values.shape == (201, 39)
+        assert found.source["motion_file"] == Path(path).name
+        assert "mediapipe" not in found.source
+    assert corpus.utterance("anna-c").speaker == "anna"
+    phones = corpus.utterance("a").phones
+    assert phones is not None
+    assert [(s.start_s, s.end_s, s.label.phone) for s in phones] == [(0, 1, "ax"), (1, 1.8, "m"), (1.8, 2, "sil")]
+    assert corpus.summary()["labelled"] == "1 with phones in time"
+
+
+def test_another_content_is_prepared_again(studio, tmp_path):
+    prepare(studio, tmp_path / "corpus", workers=1)
+    assert prepare(studio, tmp_path / "corpus", workers=1).prepared == ()
+    write_curves(studio / "b.json", seed=9)
+    assert prepare(studio, tmp_path / "corpus", workers=1).prepared == ("b",)
+    (studio / "a.lab").write_text("0 10000000 AH0\n10000000 18000000 M\n")
+    assert prepare(studio, tmp_path / "corpus", workers=1).prepared == ("a",)
+    (studio / "a.lab").write_text("0 11000000 AH0\n11000000 18000000 M\n")
+    assert prepare(studio, tmp_path / "corpus", workers=1).prepared == ("a",)
+    assert prepare(studio, tmp_path / "corpus", workers=1).prepared == ()
+
+
+def test_what_does_not_fit_is_listed_and_the_rest_goes_on(studio, tmp_path):
+    write_curves(studio / "b.json", rate_hz=60, seconds=1.2)
+    (studio / "anna" / "c.csv").write_text("Timecode,BlendShapeCount\n1,2\n")
+    write_sound(studio / "d.wav")
+    write_curves(studio / "d.npz")
+    (studio / "d.lab").write_text("0 10000000 t\n10000000 90000000 uw\n")
+    report = prepare(studio, tmp_path / "corpus", workers=1)
+    assert report.prepared == ("a",)
+    assert "72 frames at 60 Hz last 1.20 s, the sound lasts 2.00 s" in report.failed["b"]
+    assert "required 'time_s,opening,...'" in report.failed["anna-c"]
+    assert "its phones are labelled to 9.00 s, the sound lasts 2.00 s" in report.failed["d"]
+
+
+def test_a_bare_array_at_another_rate_is_noticed(tmp_path):
+    np.save(tmp_path / "a.npy", np.zeros((50, 2)))
+    curves = Curves(tmp_path / "a.npy", 30.0, CHANNELS)
+    assert given_track(curves, 1.7).motion.rate_hz == 30
+    with pytest.raises(InputError, match=r"50 frames at 30 Hz last 1\.67 s, the sound lasts 5\.00 s"):
+        given_track(curves, 5.0)
+
+
+def recording(phones: Timeline[Unit] | None) -> Recording:
+    return Recording("a", Path("a.wav"), None, phones=phones)
+
+
+def spans(*rows: tuple[float, float, str]) -> Timeline[Unit]:
+    return Timeline(tuple(Span(start_s, end_s, Unit(phone)) for start_s, end_s, phone in rows))
+
+
+def test_silence_is_named_as_recognition_names_it():
+    labelled = spans(
+        *[(0.1, 0.2, "sp"), (0.2, 0.4, "aa"), (0.4, 0.5, "sil"), (0.5, 0.7, "m"), (0.7, 0.8, "sp")],
+        *[(0.8, 1.0, "sil"), (1.0, 1.2, "b"), (1.2, float("inf"), "sil")],
+    )
+    found = given_phones(recording(labelled), 1.3)
+    assert found == spans(
+        *[(0.0, 0.2, "sil"), (0.2, 0.4, "aa"), (0.4, 0.5, "sp"), (0.5, 0.7, "m"), (0.7, 1.0, "sil")],
+        *[(1.0, 1.2, "b"), (1.2, 1.3, "sil")],
+    )
+    assert given_phones(recording(None), 1.3) is None
+    assert "phones_sha256" not in digest(recording(None))
+
+
+@given(
+    st.lists(st.tuples(st.sampled_from(["aa", "m", "sil", "sp"]), st.floats(0.01, 0.5)), min_size=1, max_size=20),
+    st.floats(0, 0.5),
+    st.floats(-0.09, 1),
+)
+def test_phones_tile_the_sound(phones, begin_s, longer_s):
+    edges = begin_s + np.cumsum([0, *(length for _, length in phones)])
+    labelled = spans(*((a, b, p) for a, b, (p, _) in zip(edges, edges[1:], phones, strict=False)))
+    duration_s = max(float(edges[-1]) + longer_s, 0.1)
+    found = given_phones(recording(labelled), duration_s)
+    assert found is not None
+    assert found[0].start_s == 0
+    assert found[-1].end_s == pytest.approx(duration_s)
+    assert all(a.end_s == b.start_s for a, b in zip(found, found.spans[1:], strict=False))
+    assert not any(
+        is_silent(a.label.phone) and is_silent(b.label.phone) for a, b in zip(found, found.spans[1:], strict=False)
+    )
+    spoken = [s.label.phone for s in labelled if not is_silent(s.label.phone) and s.start_s < duration_s]
+    assert [s.label.phone for s in found if not is_silent(s.label.phone)] == spoken
+
+
+def test_labels_that_go_on_after_the_sound():
+    with pytest.raises(InputError, match="are they those of another recording"):
+        given_phones(recording(spans((0, 2, "aa"))), 1.8)
+    assert given_phones(recording(spans((0, 2, "aa"))), 1.95) == spans((0, 1.95, "aa"))
+
+
+@pytest.mark.recordings
+def test_facegood_from_recordings_to_figures(recordings: Path, tmp_path: Path) -> None:
+    """Two recordings to train on, the third to test: Mandarin, 30 Hz, 116 blendshapes, no transcript."""
+    from lipmotion.pipeline.animate import animate
+    from lipmotion.pipeline.evaluation.evaluate import evaluate
+    from lipmotion.pipeline.model import load_model, save_model
+    from lipmotion.pipeline.training.train import train
+
+    folder = recordings / "facegood"
+    if not folder.is_dir():
+        pytest.skip("no FACEGOOD recordings")
+    (tmp_path / "faces").mkdir()
+    for path in folder.iterdir():
+        (tmp_path / "faces" / path.name).symlink_to(path.resolve())
+    (tmp_path / "faces" / "test.txt").write_text("1114_2_02\n")
+    report = prepare(tmp_path / "faces", tmp_path / "corpus", workers=1)
+    assert (len(report.prepared), report.failed) == (3, {})
+    corpus = Corpus.open(report.corpus)
+    save_model(train(corpus)[0], tmp_path / "faces.lipmotion")
+    model = load_model(tmp_path / "faces.lipmotion")
+    figures = evaluate(model, corpus)
+    rows = figures["conditions"]["audio only"]["channels"]
+    assert len(rows) + len(figures["still_channels"]) == 116
+    assert rows["mouth_stretch_c"]["acc"] > 0.7  # 0.79 was measured
+    result = animate(folder / "1114_2_02.wav", model=model).resampled(30.0)
+    assert result.motion.values.shape == (3361, 116)
+    assert result.motion.values.min() >= 0
+    assert "FACEGOOD" in " ".join(model.about["attribution"])
+
+
+def test_a_source_is_not_touched(studio):
+    item = replace(recording(spans((0, 1, "aa"))), curves=Curves(studio / "a.npz"))
+    assert set(digest(item)) == {"motion_file", "motion_sha256", "phones_sha256"}
+    assert digest(item) == digest(item)
+    assert digest(item) != digest(replace(item, phones=spans((0, 1.001, "aa"))))
+
+
+def test_labels_beyond_what_a_recording_holds(tmp_path):
+    spans = tuple(Span(i / 1e5, (i + 1) / 1e5, Unit("p")) for i in range(2000))
+    recording = Recording("a", tmp_path / "a.wav", None, phones=Timeline(spans))
+    with pytest.raises(InputError, match=r"a\.wav: 2000 units in time, required at most 1200 for 2.00 s of sound"):
+        given_phones(recording, 2.0)
+
+
+def test_labels_that_last_no_time(tmp_path):
+    recording = Recording("a", tmp_path / "a.wav", None, phones=Timeline((Span(1.0, 1.0, Unit("p")),) * 3))
+    with pytest.raises(InputError, match="none of its 3 labels is a phone that lasts longer than 0 s"):
+        given_phones(recording, 2.0)

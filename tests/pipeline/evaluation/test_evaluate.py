@@ -1,0 +1,317 @@
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+
+from lipmotion.corpora.store import Corpus
+from lipmotion.engines import Engine
+from lipmotion.errors import AlignmentError, CorpusError
+from lipmotion.measures.report import table
+from lipmotion.pipeline.evaluation.evaluate import evaluate
+from lipmotion.pipeline.model import Model
+from lipmotion.testing.toy import toy_motion, toy_sentences
+from lipmotion.types import Channel, Generation, Motion, Speech, Timeline, Trace, Unit, Utterance
+from lipmotion.units import Lexicon
+
+CONDITIONS = ["audio only", "with transcript"]
+FIGURES = "channels acc amse leading lag_ms opening_acc_95 closures closures_p_b_m silence".split()
+
+
+@dataclass(frozen=True, eq=False)
+class Medium(Engine[Mapping[float, Motion]]):
+    """Knows the motion of every recording by the recording's length."""
+
+    config: Any
+    name: ClassVar[str] = "medium"
+
+    def generate(self, model: Mapping[float, Motion], speech: Speech, _constraints: object = None) -> Generation:
+        motion = model[speech.features.duration_s]
+        frames = np.zeros(len(motion.values), np.intp)
+        return Generation(motion, np.zeros_like(motion.values), speech.units, Trace(("known",), frames))
+
+    def fit(self, examples: object, monitor: object) -> Any: ...
+    def trees(self, model: object) -> Any: ...
+    def to_arrays(self, model: object) -> Any: ...
+    def from_arrays(self, arrays: object) -> Any: ...
+
+
+class Shut(Medium):
+    """Never opens the mouth but where it is not pinned."""
+
+    def generate(self, model: Mapping[float, Motion], speech: Speech, _constraints: object = None) -> Generation:
+        result = super().generate(model, speech)
+        return replace(result, motion=replace(result.motion, values=result.motion.values * (0.0, 1.0, 1.0)))
+
+    def unpinned(self) -> Medium:
+        return Medium(self.config)
+
+
+@pytest.fixture(scope="module")
+def known() -> dict[float, Motion]:
+    """The true motion of the toy sentences at 100 Hz."""
+    return {sentence.audio.duration_s: toy_motion(sentence.units, 100.0) for sentence in toy_sentences(12)}
+
+
+@pytest.fixture(scope="module")
+def figures(toy_model: Model, toy_corpus: Corpus) -> dict[str, Any]:
+    return evaluate(toy_model, toy_corpus)
+
+
+def corpus_of(utterances: Iterable[Utterance], folder: Path) -> Corpus:
+    corpus = Corpus.create(folder / "corpus")
+    for utterance in utterances:
+        corpus.add(utterance)
+    return corpus
+
+
+def held_out(corpus: Corpus) -> list[Utterance]:
+    return [corpus.utterance(name) for name in corpus.names("test")]
+
+
+def test_all_figures_are_there(figures: dict[str, Any]) -> None:
+    assert (figures["split"], figures["clips"]) == ("test", 2)
+    assert list(figures["conditions"]) == CONDITIONS
+    for condition in figures["conditions"].values():
+        assert list(condition) == [*FIGURES, "unpinned"]
+        for some in (condition, condition["unpinned"]):
+            assert list(some)[: len(FIGURES)] == FIGURES
+            assert list(some["channels"]) == ["opening", "width", "outer"]
+            for row in some["channels"].values():
+                assert list(row) == ["acc", "acc_per_clip", "nrmse", "global_variance", "jerk"]
+    assert json.loads(json.dumps(figures)) is not None
+    for name in CONDITIONS:
+        assert name in table(figures)
+
+
+def test_the_toy_model_is_good_on_sentences_it_has_not_seen(figures: dict[str, Any]) -> None:
+    for condition in figures["conditions"].values():
+        assert condition["acc"] > 0.9
+        for row in condition["channels"].values():
+            assert 0.9 < row["acc"] <= 1
+            assert row["nrmse"] < 0.5
+            assert 0.6 < row["global_variance"] < 1.2
+        low, high = condition["opening_acc_95"]
+        assert low <= condition["channels"]["opening"]["acc"] <= high
+        assert abs(condition["lag_ms"]) < 20
+        assert condition["closures_p_b_m"]["recall"] == 1
+        assert condition["silence"]["generated"]["mean"] < 0.01
+
+
+def test_a_perfect_model_has_perfect_figures(toy_model: Model, toy_corpus: Corpus, known: dict[float, Motion]) -> None:
+    figures = evaluate(replace(toy_model, engine=Medium(None), learned=known), toy_corpus)
+    for condition in figures["conditions"].values():
+        for row in condition["channels"].values():
+            assert row == pytest.approx(
+                {"acc": 1, "acc_per_clip": 1, "nrmse": 0, "global_variance": 1, "jerk": 1}, abs=1e-4
+            )
+        assert condition["opening_acc_95"] == pytest.approx((1, 1), abs=1e-6)
+        assert condition["acc"] == pytest.approx(1, abs=1e-6)
+        assert condition["amse"] == pytest.approx(0, abs=1e-6)
+        assert condition["lag_ms"] == pytest.approx(0, abs=0.5)
+        closures = condition["closures"]
+        assert (closures["score"], closures["precision"], closures["timing_ms"]) == (1, 1, 0)
+        assert closures["original"] == closures["generated"] > 4
+        lips = condition["closures_p_b_m"]
+        assert (lips["recall"], lips["false_per_minute"]) == (1, lips["original_per_minute"])
+        assert condition["silence"]["generated"] == pytest.approx(condition["silence"]["original"], abs=1e-6)
+
+
+def test_figures_without_pins_are_those_of_the_engine_without_them(
+    toy_model: Model, toy_corpus: Corpus, known: dict[float, Motion]
+) -> None:
+    figures = evaluate(replace(toy_model, engine=Shut(None), learned=known), toy_corpus)
+    perfect = evaluate(replace(toy_model, engine=Medium(None), learned=known), toy_corpus)
+    for name, condition in figures["conditions"].items():
+        assert condition["unpinned"] == perfect["conditions"][name]
+        assert condition["closures"]["generated"] == 0
+        assert condition["unpinned"]["closures"]["generated"] > 4
+    assert "without pins" in table(figures)
+    assert "pin" not in table(perfect)
+
+
+def test_figures_of_a_trained_engine_without_pins(
+    toy_model: Model, toy_corpus: Corpus, figures: dict[str, Any]
+) -> None:
+    free = evaluate(replace(toy_model, engine=toy_model.engine.unpinned()), toy_corpus)
+    assert {name: one["unpinned"] for name, one in figures["conditions"].items()} == free["conditions"]
+
+
+def test_an_engine_without_pins_has_no_other_figures(
+    toy_model: Model, toy_corpus: Corpus, known: dict[float, Motion]
+) -> None:
+    figures = evaluate(replace(toy_model, engine=Medium(None), learned=known), toy_corpus)
+    assert [list(condition) for condition in figures["conditions"].values()] == [FIGURES, FIGURES]
+
+
+@pytest.mark.parametrize("late", [-8, -4, 4, 8])
+def test_a_late_model_is_late(late: int, toy_model: Model, toy_corpus: Corpus, known: dict[float, Motion]) -> None:
+    shifted = {length: replace(m, values=np.roll(m.values, late, axis=0)) for length, m in known.items()}
+    figures = evaluate(replace(toy_model, engine=Medium(None), learned=shifted), toy_corpus)
+    assert figures["conditions"]["audio only"]["lag_ms"] == pytest.approx(10 * late, abs=8)
+    assert figures["conditions"]["audio only"]["closures"]["timing_ms"] == pytest.approx(10 * late, abs=20)
+
+
+def test_frames_without_a_face_are_left_out(
+    toy_model: Model, toy_corpus: Corpus, known: dict[float, Motion], tmp_path: Path
+) -> None:
+    """What the tracker filled in where it saw nothing has no say."""
+    damaged = []
+    for utterance in held_out(toy_corpus):
+        seen = np.arange(len(utterance.track.seen)) % 25 != 7
+        values = np.where(seen[:, None], utterance.track.motion.values, 9.0)
+        motion = replace(utterance.track.motion, values=values)
+        damaged.append(replace(utterance, track=replace(utterance.track, motion=motion, seen=seen)))
+    perfect = replace(toy_model, engine=Medium(None), learned=known)
+    figures = evaluate(perfect, corpus_of(damaged, tmp_path))
+    assert figures["conditions"]["audio only"]["acc"] == pytest.approx(1, abs=1e-6)
+    assert figures["conditions"]["audio only"]["amse"] == pytest.approx(0, abs=1e-6)
+
+
+def test_closed_is_closed_by_the_training_list(toy_model: Model, toy_corpus: Corpus) -> None:
+    openings = [toy_corpus.utterance(name).track.motion["opening"] for name in toy_corpus.names("train")]
+    expected = 0.1 * np.percentile(np.concatenate(openings), 95)
+    for split in ("val", "test", None):
+        assert evaluate(toy_model, toy_corpus, split=split)["closed_under"] == pytest.approx(expected, rel=1e-5)
+
+
+def test_other_lists_and_all(toy_model: Model, toy_corpus: Corpus) -> None:
+    assert evaluate(toy_model, toy_corpus, split="val")["clips"] == 2
+    everything = evaluate(toy_model, toy_corpus, split=None)
+    assert (everything["split"], everything["clips"]) == ("all", 12)
+
+
+def test_the_seed_decides(toy_model: Model, toy_corpus: Corpus) -> None:
+    one, two, other = (
+        evaluate(toy_model, toy_corpus, split=None, seed=seed)["conditions"]["audio only"] for seed in (1, 1, 2)
+    )
+    assert one == two
+    assert one["opening_acc_95"] != other["opening_acc_95"]
+    assert one["channels"] == other["channels"]
+
+
+def test_without_transcripts_there_is_audio_only(toy_model: Model, toy_corpus: Corpus, tmp_path: Path) -> None:
+    first, second = held_out(toy_corpus)
+    untold = corpus_of([replace(first, words=None), second], tmp_path)
+    assert list(evaluate(toy_model, untold)["conditions"]) == ["audio only"]
+
+
+def test_a_lexicon_says_how_words_are_said(toy_model: Model, toy_corpus: Corpus, tmp_path: Path) -> None:
+    renamed = [
+        replace(u, words=tuple({"papa": "日本"}.get(word, word) for word in u.words or ()))
+        for u in held_out(toy_corpus)
+    ]
+    corpus = corpus_of(renamed, tmp_path)
+    told = evaluate(toy_model, corpus, lexicon=Lexicon({"日本": (("p", "aa", "p", "ax"),)}))
+    assert told["conditions"]["with transcript"]["acc"] > 0.9
+
+
+def test_guessed_words_are_reported(
+    toy_model: Model, toy_corpus: Corpus, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    changed = [
+        replace(u, words=tuple({"papa": "pahpa"}.get(word, word) for word in u.words or ()))
+        for u in held_out(toy_corpus)
+    ]
+    evaluate(toy_model, corpus_of(changed, tmp_path))
+    assert [record.getMessage().split()[0] for record in caplog.records] == ["'pahpa'"]
+
+
+def test_an_empty_split_names_the_others(toy_model: Model, toy_corpus: Corpus) -> None:
+    with pytest.raises(CorpusError, match=r"no utterances of split 'tset' \(there are train: 8, val: 2, test: 2\)"):
+        evaluate(toy_model, toy_corpus, split="tset")
+
+
+def test_a_transcript_that_does_not_fit_is_named(toy_model: Model, toy_corpus: Corpus, tmp_path: Path) -> None:
+    first, second = held_out(toy_corpus)
+    wrong = corpus_of([first, replace(second, words=("five",) * 100)], tmp_path)
+    with pytest.raises(AlignmentError, match=rf"{second.name}: .*too short.*correct its transcript, or leave it out"):
+        evaluate(toy_model, wrong)
+
+
+def renamed(motion: Motion) -> Motion:
+    """The same curves under other names, beside one that stands still and one that hardly moves."""
+    time_s = motion.time_s[:, None]
+    values = np.concatenate([motion.values, 0 * time_s + 0.3, 1e-6 * np.sin(time_s)], axis=1)
+    return replace(motion, values=values, channels=tuple(map(Channel, ("jaw", "width", "pout", "brow", "noise"))))
+
+
+def renamed_utterance(utterance: Utterance) -> Utterance:
+    return replace(utterance, track=replace(utterance.track, motion=renamed(utterance.track.motion)))
+
+
+def labelled(utterance: Utterance, names: dict[str, str]) -> Timeline[Unit]:
+    """The true phones of a toy utterance, some of them under other names."""
+    (units,) = (s.units for s in toy_sentences(12) if s.name == utterance.name)
+    return Timeline(tuple(replace(s, label=Unit(names.get(s.label.phone, s.label.phone))) for s in units))
+
+
+def test_other_channels_than_lip_distances(
+    toy_model: Model, toy_corpus: Corpus, known: dict[float, Motion], tmp_path: Path
+) -> None:
+    """Every channel that moves is compared, and what only an opening can tell is left out."""
+    faces = corpus_of([renamed_utterance(u) for u in held_out(toy_corpus)], tmp_path)
+    other = replace(toy_model, engine=Medium(None), learned={key: renamed(m) for key, m in known.items()})
+    figures = evaluate(other, faces)
+    assert figures["closed_under"] is None
+    assert figures["still_channels"] == ["brow", "noise"]
+    for condition in figures["conditions"].values():
+        assert list(condition) == FIGURES[:5]
+        assert list(condition["channels"]) == ["jaw", "width", "pout"]
+        assert condition["acc"] == pytest.approx(1, abs=1e-6)
+        assert condition["leading"] in ("jaw", "pout")
+        assert condition["lag_ms"] == pytest.approx(0, abs=0.5)
+    json.dumps(figures, allow_nan=False)
+    assert "left out, for they do not move: brow, noise" in table(figures)
+
+
+def test_a_model_of_other_motion_is_refused(
+    toy_model: Model, toy_corpus: Corpus, known: dict[float, Motion], tmp_path: Path
+) -> None:
+    faces = corpus_of([renamed_utterance(u) for u in held_out(toy_corpus)], tmp_path)
+    with pytest.raises(CorpusError, match="the model has no channels jaw, pout, which the corpus has"):
+        evaluate(toy_model, faces)
+    other = replace(toy_model, engine=Medium(None), learned={key: renamed(m) for key, m in known.items()})
+    with pytest.raises(CorpusError, match="the model has no channels opening, outer"):
+        evaluate(other, toy_corpus)
+
+
+def test_two_kinds_of_motion_at_once_are_refused(toy_model: Model, toy_corpus: Corpus, tmp_path: Path) -> None:
+    first, second = held_out(toy_corpus)
+    with pytest.raises(CorpusError, match="different motion channels"):
+        evaluate(toy_model, corpus_of([first, renamed_utterance(second)], tmp_path))
+
+
+def test_motion_that_never_moves_is_refused(toy_model: Model, toy_corpus: Corpus, tmp_path: Path) -> None:
+    frozen = [renamed_utterance(u) for u in held_out(toy_corpus)]
+    motions = [replace(u.track.motion, values=np.ones_like(u.track.motion.values)) for u in frozen]
+    frozen = [replace(u, track=replace(u.track, motion=m)) for u, m in zip(frozen, motions, strict=True)]
+    with pytest.raises(CorpusError, match="none of 5 motion channels moves in these 2 utterances"):
+        evaluate(toy_model, corpus_of(frozen, tmp_path))
+
+
+def test_one_speaker(toy_model: Model, toy_corpus: Corpus, tmp_path: Path) -> None:
+    first, second = held_out(toy_corpus)
+    both = corpus_of([replace(first, speaker="anna"), replace(second, speaker="ben")], tmp_path)
+    alone = corpus_of([first], tmp_path / "alone")
+    one = evaluate(toy_model, both, speakers=["anna"])
+    assert one["clips"] == 1
+    assert one == evaluate(toy_model, alone)
+    assert evaluate(toy_model, both, speakers=["anna", "ben"]) == evaluate(toy_model, both)
+
+
+def test_labelled_phones_are_the_reference(toy_model: Model, toy_corpus: Corpus, tmp_path: Path) -> None:
+    """Labels that call the p, b and m something else: then there is nothing to close in."""
+    untold = [replace(u, words=None, phones=labelled(u, {"p": "t", "b": "d", "m": "n"})) for u in held_out(toy_corpus)]
+    figures = evaluate(toy_model, corpus_of(untold, tmp_path))
+    assert list(figures["conditions"]) == CONDITIONS
+    for condition in figures["conditions"].values():
+        assert condition["closures_p_b_m"]["intervals"] == 0
+        assert condition["closures_p_b_m"]["recall"] is None
+    json.dumps(figures, allow_nan=False)
+    assert "recall – of 0" in table(figures)

@@ -1,0 +1,217 @@
+"""Eigenlips from mouth pictures to figures: learned, trained on, kept in the model, generated, compared."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lipmotion.appearance.eigenlips import Eigenlips, fit_eigenlips
+from lipmotion.corpora.store import Corpus
+from lipmotion.engines import engine_named
+from lipmotion.errors import CorpusError, ExportError, InputError, ModelFormatError
+from lipmotion.export.base import read_motion
+from lipmotion.hmm.model import HmmConfig
+from lipmotion.measures.report import table
+from lipmotion.pipeline.animate import animate, write
+from lipmotion.pipeline.evaluation.evaluate import clips, evaluate, recorded
+from lipmotion.pipeline.model import Model, load_model, save_model
+from lipmotion.pipeline.training.channels import BOTH, EIGENLIPS, GEOMETRY, as_learned, learned_eigenlips
+from lipmotion.pipeline.training.train import train
+from lipmotion.speech.recogniser import recogniser
+from lipmotion.testing.toy import toy_utterances
+from lipmotion.types import Utterance
+
+SMALL = HmmConfig(mixtures=1, iterations=2)
+
+
+@pytest.fixture(scope="module")
+def utterances() -> list[Utterance]:
+    return toy_utterances(12)[:4]
+
+
+@pytest.fixture(scope="module")
+def space(utterances: list[Utterance]) -> Eigenlips:
+    return learned_eigenlips(utterances, 4)
+
+
+@pytest.fixture(scope="module")
+def models(toy_corpus: Corpus, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """A model of the pictures, and one of pictures and points, as they are saved."""
+    folder = tmp_path_factory.mktemp("visual")
+    for visual in (EIGENLIPS, BOTH):
+        save_model(train(toy_corpus, recogniser=SMALL, visual=visual)[0], folder / visual)
+    return {visual: folder / visual for visual in (EIGENLIPS, BOTH)}
+
+
+def crops(given: Sequence[Utterance]) -> list[np.ndarray]:
+    return [np.asarray(utterance.track.crops) for utterance in given]
+
+
+def test_few_pictures_are_all_learned_from(utterances: list[Utterance], space: Eigenlips) -> None:
+    wanted = fit_eigenlips(np.concatenate(crops(utterances)), 4)
+    assert np.array_equal(space.basis, wanted.basis)
+    assert np.array_equal(space.mean, wanted.mean)
+
+
+def test_pictures_are_taken_evenly_from_the_frames_that_are_seen(utterances: list[Utterance]) -> None:
+    """Those that are not seen are white here: not one of them is taken."""
+    given, kept = [], []
+    for number, utterance in enumerate(utterances):
+        seen = np.arange(len(utterance.track.seen)) % 3 != number % 3
+        pictures = np.where(seen[:, None, None, None], utterance.track.crops, 255).astype(np.uint8)
+        given.append(replace(utterance, track=replace(utterance.track, crops=pictures, seen=seen)))
+        kept.append(pictures[seen])
+    everything = np.concatenate(kept)
+    places = ((np.arange(50) + 0.5) * len(everything) / 50).astype(int)
+    assert np.array_equal(learned_eigenlips(given, 4, 50).basis, fit_eigenlips(everything[places], 4).basis)
+
+
+def test_an_utterance_that_was_never_seen_gives_no_picture(utterances: list[Utterance]) -> None:
+    hidden = replace(
+        utterances[1], track=replace(utterances[1].track, seen=np.zeros(len(utterances[1].track.seen), bool))
+    )
+    some = learned_eigenlips([utterances[0], hidden, utterances[2]], 3)
+    assert np.array_equal(some.basis, learned_eigenlips([utterances[0], utterances[2]], 3).basis)
+    with pytest.raises(CorpusError, match="no face is seen in 1 utterances; prepare a corpus of videos with faces"):
+        learned_eigenlips([hidden])
+
+
+def test_motion_has_the_channels_that_are_learned(utterances: list[Utterance], space: Eigenlips) -> None:
+    one = utterances[0]
+    assert as_learned(one, GEOMETRY, None) is one
+    pictured, both = (as_learned(one, visual, space).track.motion for visual in (EIGENLIPS, BOTH))
+    assert pictured.channels == space.channels
+    assert np.array_equal(pictured.values, space.project(crops([one])[0]))
+    assert both.channels == (*one.track.motion.channels, *space.channels)
+    assert np.array_equal(both.values, np.concatenate([one.track.motion.values, pictured.values], axis=1))
+    assert pictured.rate_hz == both.rate_hz == one.track.motion.rate_hz
+
+
+def test_what_is_missing_is_said(utterances: list[Utterance], space: Eigenlips, tmp_path: Path) -> None:
+    blind = replace(utterances[0], track=replace(utterances[0].track, crops=None))
+    words = f"{blind.name}: no mouth pictures, which eigenlips need; prepare its video again without --no-crops"
+    with pytest.raises(CorpusError, match=words):
+        learned_eigenlips([utterances[1], blind])
+    with pytest.raises(CorpusError, match=words):
+        as_learned(blind, BOTH, space)
+    with pytest.raises(InputError, match="visual 'both' without eigenlips"):
+        as_learned(utterances[0], BOTH, None)
+    with pytest.raises(InputError, match="visual is 'pixels', required one of: geometry, eigenlips, both"):
+        as_learned(utterances[0], "pixels", None)
+    corpus = Corpus.create(tmp_path / "corpus")
+    corpus.add(blind)
+    with pytest.raises(CorpusError, match=words):
+        train(corpus, visual=EIGENLIPS)
+    with pytest.raises(InputError, match="visual is 'lips'"):
+        train(corpus, visual="lips")
+
+
+def test_pictures_of_two_sizes_are_refused(utterances: list[Utterance]) -> None:
+    track = utterances[1].track
+    small = replace(utterances[1], track=replace(track, crops=np.asarray(track.crops)[:, ::2]))
+    with pytest.raises(CorpusError, match="mouth pictures of 2 sizes"):
+        learned_eigenlips([utterances[0], small])
+
+
+def test_a_model_of_pictures_draws_mouths_it_has_not_seen(models: dict[str, Path], toy_corpus: Corpus) -> None:
+    """Saved, loaded, and asked for the mouth of a sentence of the test list."""
+    model = load_model(models[EIGENLIPS])
+    held_out = toy_corpus.utterance(toy_corpus.names("test")[0])
+    motion = animate(held_out.audio, transcript=" ".join(held_out.words or ()), model=model).motion
+    assert model.eigenlips is not None
+    assert motion.channels == model.eigenlips.channels
+    times_s = np.arange(len(held_out.track.seen)) / held_out.track.motion.rate_hz
+    drawn = model.eigenlips.restore(motion.at(times_s)).astype(float)
+    real = crops([held_out])[0].astype(float)
+    still = np.abs(real - model.eigenlips.mean.T.reshape(56, 72, 3)).mean()
+    assert np.abs(drawn - real).mean() < 0.5 * still
+
+
+def test_figures_of_pictures(models: dict[str, Path], toy_corpus: Corpus) -> None:
+    figures = evaluate(load_model(models[EIGENLIPS]), toy_corpus)
+    assert figures["closed_under"] is None
+    for condition in figures["conditions"].values():
+        lips = condition["eigenlips"]
+        assert list(condition) == ["channels", "acc", "amse", "leading", "lag_ms", "eigenlips"]
+        assert condition["channels"] == {}
+        assert len(lips["channels"]) == 90
+        assert lips["acc"] == pytest.approx(np.mean([row["acc"] for row in lips["channels"].values()]))
+        assert (condition["acc"], condition["amse"]) == (lips["acc"], lips["amse"])
+        assert lips["channels"]["lips_r_01"]["acc"] > 0.9
+        assert condition["leading"] in lips["channels"]
+    assert "90 eigenlips" in table(figures)
+    assert "lips_r_01 " not in table(figures).replace("lag of lips_r_01 ", "")
+
+
+def test_figures_of_both(models: dict[str, Path], toy_model: Model, toy_corpus: Corpus) -> None:
+    """The eigenlips stand apart: figures of the lip distances are of these alone."""
+    figures = evaluate(load_model(models[BOTH]), toy_corpus)
+    plain = evaluate(toy_model, toy_corpus)
+    assert figures["closed_under"] == plain["closed_under"]
+    for name, condition in figures["conditions"].items():
+        assert set(condition) == set(plain["conditions"][name]) | {"eigenlips"}
+        assert list(condition["channels"]) == ["opening", "width", "outer"]
+        assert condition["acc"] == pytest.approx(np.mean([row["acc"] for row in condition["channels"].values()]))
+        assert condition["acc"] > 0.9
+        assert condition["amse"] < 0.1  # eye distances
+        assert condition["eigenlips"]["amse"] > 10  # grey levels
+        assert condition["leading"] == "opening"
+    assert "AMSE of the eigenlips" in table(figures)
+
+
+def test_originals_are_the_projected_pictures(models: dict[str, Path], toy_corpus: Corpus) -> None:
+    model = load_model(models[BOTH])
+    assert model.eigenlips is not None
+    found = recorded(toy_corpus, recogniser(model.phones), visual=model.visual, eigenlips=model.eigenlips)
+    assert found.channels == ("opening", "width", "outer", *(channel.name for channel in model.eigenlips.channels))
+    made = clips(found, "with transcript", model.engine, model.learned)
+    for clip, name in zip(made, toy_corpus.names("test"), strict=True):
+        images = crops([toy_corpus.utterance(name)])[0]
+        assert np.array_equal(clip.original[:, 3:], model.eigenlips.project(images))
+
+
+def test_the_joint_engine_learns_pictures_too(toy_corpus: Corpus) -> None:
+    engine = engine_named("joint", {})
+    model, _ = train(toy_corpus, names=toy_corpus.names("train")[:4], recogniser=SMALL, engine=engine, visual=EIGENLIPS)
+    assert (
+        evaluate(model, toy_corpus)["conditions"]["with transcript"]["eigenlips"]["channels"]["lips_r_01"]["acc"] > 0.5
+    )
+
+
+def test_it_is_the_same_file_again(models: dict[str, Path], toy_corpus: Corpus, tmp_path: Path) -> None:
+    save_model(load_model(models[BOTH]), tmp_path / "again")
+    assert (tmp_path / "again").read_bytes() == models[BOTH].read_bytes()
+    save_model(train(toy_corpus, recogniser=SMALL, visual=BOTH, work=tmp_path)[0], tmp_path / "anew")
+    assert (tmp_path / "anew").read_bytes() == models[BOTH].read_bytes()
+
+
+def test_what_was_kept_for_other_channels_is_not_used(
+    toy_corpus: Corpus, models: dict[str, Path], tmp_path: Path
+) -> None:
+    for visual in (GEOMETRY, BOTH):
+        model, _ = train(toy_corpus, recogniser=SMALL, visual=visual, work=tmp_path)
+    save_model(model, tmp_path / "both")
+    assert (tmp_path / "both").read_bytes() == models[BOTH].read_bytes()
+
+
+def test_a_model_without_the_eigenlips_it_names_is_damaged(models: dict[str, Path], tmp_path: Path) -> None:
+    model = load_model(models[BOTH])
+    assert model.visual == BOTH
+    save_model(replace(model, eigenlips=None), tmp_path / "without")
+    with pytest.raises(ModelFormatError, match="the model says visual 'both', which its eigenlips do not fit"):
+        load_model(tmp_path / "without")
+
+
+def test_motion_files_hold_the_coefficients_and_videos_need_an_opening(
+    models: dict[str, Path], toy_speech: Path, tmp_path: Path
+) -> None:
+    result = animate(toy_speech, model=models[EIGENLIPS])
+    write(result, [tmp_path / "a.npz", tmp_path / "a.json"])
+    for name in ("a.npz", "a.json"):
+        assert read_motion(tmp_path / name)[0].channels == result.motion.channels
+    with pytest.raises(ExportError, match="no channel 'opening' to draw a face from"):
+        write(result, tmp_path / "a.mp4", speech=toy_speech)

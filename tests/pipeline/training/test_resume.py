@@ -1,0 +1,170 @@
+"""A training that is stopped, wherever it is, goes on from there to the same bytes."""
+
+from __future__ import annotations
+
+import multiprocessing
+import shutil
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
+
+from lipmotion.corpora.store import Corpus
+from lipmotion.hmm.model import HmmConfig
+from lipmotion.pipeline.model import Model, save_model
+from lipmotion.pipeline.training import labels
+from lipmotion.pipeline.training import train as module
+from lipmotion.pipeline.training.train import train
+from lipmotion.types import Item, Monitor, Progress, silent_monitor
+from lipmotion.units import Lexicon
+
+CONFIG = HmmConfig(mixtures=2, iterations=1, context_frames=20)
+Train = Callable[..., Model]
+
+
+class Stopped(Exception):  # noqa: N818
+    pass
+
+
+def stopping_after(events: int) -> Monitor:
+    heard: list[object] = []
+
+    def hear(event: Progress | Item) -> None:
+        heard.append(event)
+        if len(heard) == events:
+            raise Stopped
+
+    return hear
+
+
+@pytest.fixture
+def work(tmp_path: Path) -> Path:
+    folder = tmp_path / "work"
+    folder.mkdir()
+    return folder
+
+
+@pytest.fixture(scope="module")
+def corpus(toy_corpus: Corpus, tmp_path_factory: pytest.TempPathFactory) -> Corpus:
+    """Five good utterances, and one whose words do not fit."""
+    small = Corpus.create(tmp_path_factory.mktemp("resume") / "corpus")
+    for name in toy_corpus.names("train")[:6]:
+        utterance = toy_corpus.utterance(name)
+        small.add(utterance if name != "toy02" else replace(utterance, words=("five",) * 100))
+    return small
+
+
+def run(corpus: Corpus, work: Path | None = None, monitor: Monitor = silent_monitor) -> Model:
+    return train(corpus, recogniser=CONFIG, work=work, monitor=monitor)[0]
+
+
+def content(model: Model, folder: Path) -> bytes:
+    save_model(model, folder / "model.lipmotion")
+    return (folder / "model.lipmotion").read_bytes()
+
+
+def events_of(corpus: Corpus, work: Path | None = None) -> list[Progress | Item]:
+    events: list[Progress | Item] = []
+    run(corpus, work, events.append)
+    return events
+
+
+def test_stopped_after_any_event(corpus: Corpus, work: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(labels, "AT_A_TIME", 2)
+    whole = content(run(corpus), tmp_path)
+    count = len(events_of(corpus))
+    assert count > 15
+    for number in range(1, count + 1):
+        with pytest.raises(Stopped):
+            run(corpus, work, stopping_after(number))
+        assert content(run(corpus, work), tmp_path) == whole, number
+        for path in work.iterdir():
+            path.unlink()
+
+
+def test_stopped_again_and_again(corpus: Corpus, work: Path, tmp_path: Path) -> None:
+    """Every run gets some steps further than the one before."""
+    stops = 0
+    while True:
+        try:
+            model = run(corpus, work, stopping_after(6))
+            break
+        except Stopped:
+            stops += 1
+            assert stops < 50
+    assert stops > 1
+    assert content(model, tmp_path) == content(run(corpus), tmp_path)
+
+
+def test_what_is_done_is_not_done_again(corpus: Corpus, work: Path) -> None:
+    assert not [event for event in events_of(corpus, work) if isinstance(event, Progress) and event.share > 1]
+    again = [event for event in events_of(corpus, work) if isinstance(event, Progress)]
+    assert [event.share for event in again] == sorted(event.share for event in again)
+    assert again[0].share >= 0.8
+
+
+def test_left_out_utterances_are_told_again(corpus: Corpus, work: Path) -> None:
+    first, second = ([e for e in events_of(corpus, work) if isinstance(e, Item)] for _ in range(2))
+    assert first == second
+    assert [(item.name, item.outcome) for item in first] == [("toy02", "skipped")]
+    assert "too short" in first[0].reason
+
+
+@pytest.mark.parametrize("what", ["corpus", "recogniser", "lexicon", "names"])
+def test_another_job_starts_over(corpus: Corpus, work: Path, tmp_path: Path, what: str) -> None:
+    run(corpus, work)
+    options: dict[str, object] = {"recogniser": CONFIG}
+    if what == "corpus":
+        shutil.copytree(corpus.path, tmp_path / "other")
+        corpus = Corpus.open(tmp_path / "other")
+        utterance = corpus.utterance("toy01")
+        values = utterance.features.values.copy()
+        values[5, 5] += 0.1
+        corpus.add(replace(utterance, features=replace(utterance.features, values=values)))
+    elif what == "recogniser":
+        options["recogniser"] = replace(CONFIG, relevance=3.0)
+    elif what == "lexicon":
+        options["lexicon"] = Lexicon({"papa": (("p", "ae", "p", "ax"),)})
+    else:
+        options["names"] = corpus.names("train")[:4]
+    expected = content(train(corpus, **options)[0], tmp_path)  # type: ignore[arg-type]
+    assert content(train(corpus, **options, work=work)[0], tmp_path) == expected  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("name", ["phones", "labels-0"])
+def test_a_damaged_checkpoint_is_not_used(corpus: Corpus, work: Path, tmp_path: Path, name: str) -> None:
+    whole = content(run(corpus, work), tmp_path)
+    path = work / f"{name}.checkpoint"
+    path.write_bytes(path.read_bytes()[:-500])
+    assert content(run(corpus, work), tmp_path) == whole
+
+
+@pytest.mark.parametrize(("here", "there"), [(1, 2), (2, 1)])
+def test_threads_of_matrix_products_change_nothing(
+    corpus: Corpus, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, here: int, there: int
+) -> None:
+    """Neither this process's own nor those that the processes it starts would use."""
+    whole = content(run(corpus), tmp_path)
+    monkeypatch.setattr(module, "FEWEST", 1)
+    monkeypatch.setenv("OMP_NUM_THREADS", str(there))
+    with threadpool_limits(here, user_api="blas"):
+        assert content(train(corpus, recogniser=CONFIG, workers=2)[0], tmp_path) == whole
+        assert {each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"} == {here}
+
+
+@pytest.mark.parametrize("stop", [0, 6, 12])
+def test_in_two_processes(
+    corpus: Corpus, work: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stop: int
+) -> None:
+    """The model is the same to the bit, stopped or not."""
+    whole = content(run(corpus), tmp_path)
+    monkeypatch.setattr(module, "FEWEST", 1)
+    monkeypatch.setattr(labels, "AT_A_TIME", 2)
+    before = set(multiprocessing.active_children())
+    if stop:
+        with pytest.raises(Stopped):
+            train(corpus, recogniser=CONFIG, work=work, monitor=stopping_after(stop), workers=2)
+        assert set(multiprocessing.active_children()) == before
+    assert content(train(corpus, recogniser=CONFIG, work=work, workers=2)[0], tmp_path) == whole

@@ -1,0 +1,250 @@
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lipmotion.corpora.store import Corpus
+from lipmotion.engines import engine_named
+from lipmotion.errors import CorpusError, InputError
+from lipmotion.hmm.model import HmmConfig
+from lipmotion.pipeline.model import Model, save_model
+from lipmotion.pipeline.training import train as module
+from lipmotion.pipeline.training.train import labels_of, model_motion, train
+from lipmotion.pipeline.training.voices import Heard
+from lipmotion.speech.mfcc import mfcc
+from lipmotion.speech.recogniser import Recogniser
+from lipmotion.testing.toy import toy_sentences
+from lipmotion.types import Channel, Motion, Timeline, Track, Unit, Utterance
+from lipmotion.units import Lexicon
+
+SMALL = HmmConfig(mixtures=1, iterations=2)
+TRAINED = tuple(f"toy0{number}" for number in range(8))
+
+
+def some(corpus: Corpus, count: int = 5) -> list[Utterance]:
+    return [corpus.utterance(name) for name in corpus.names("train")[:count]]
+
+
+def corpus_of(utterances: Iterable[Utterance], folder: Path) -> Corpus:
+    corpus = Corpus.create(folder / "corpus")
+    for utterance in utterances:
+        corpus.add(utterance)
+    return corpus
+
+
+def test_the_training_list_is_used(toy_corpus: Corpus) -> None:
+    model, report = train(toy_corpus, recogniser=SMALL)
+    assert report.used == TRAINED
+    assert report.skipped == {}
+    assert report.figures["frames"] > 1500
+    assert model.about["split"] == "train"
+    assert model.about["utterances"] == 8
+
+
+def test_the_same_corpus_gives_the_same_model(toy_corpus: Corpus, toy_model_file: Path, tmp_path: Path) -> None:
+    save_model(train(toy_corpus, recogniser=SMALL)[0], tmp_path / "again.lipmotion")
+    assert (tmp_path / "again.lipmotion").read_bytes() == toy_model_file.read_bytes()
+
+
+def test_every_stage_is_reported(toy_corpus: Corpus) -> None:
+    steps: list[str] = []
+    train(toy_corpus, names=TRAINED[:3], recogniser=SMALL, monitor=lambda event: steps.append(event.stage))
+    assert list(dict.fromkeys(steps))[:2] == ["learning phones: flat start", "learning phones: pronunciations"]
+    assert "learning motion: trees" in steps
+
+
+def test_other_lists_all_and_given_names(toy_corpus: Corpus) -> None:
+    assert train(toy_corpus, split="val", recogniser=SMALL)[1].used == ("toy08", "toy09")
+    model, report = train(toy_corpus, split=None, recogniser=SMALL)
+    assert (len(report.used), model.about["split"]) == (12, "all")
+    model, report = train(toy_corpus, names=("toy10", "toy02", "toy03"), recogniser=SMALL)
+    assert (report.used, model.about["split"]) == (("toy10", "toy02", "toy03"), "given names")
+
+
+def test_configurations_are_used(toy_corpus: Corpus) -> None:
+    engine = engine_named("trajectory", {"parts": 3})
+    model, _ = train(toy_corpus, names=TRAINED[:4], engine=engine, recogniser=replace(SMALL, states=2))
+    assert model.engine is engine
+    assert model.phones.table.count("aa") == 2
+
+
+def test_untranscribed_utterances_are_recognised_and_used(toy_corpus: Corpus, tmp_path: Path) -> None:
+    utterances = some(toy_corpus, 8)
+    utterances[5] = replace(utterances[5], words=None)
+    mixed = corpus_of(utterances, tmp_path)
+    model, report = train(mixed, recogniser=SMALL)
+    assert report.used == TRAINED
+    found = [
+        span.label.phone for span in labels_of(mixed.utterance("toy05"), Recogniser(model.phones, "own"), Lexicon())
+    ]
+    known = [
+        span.label.phone
+        for span in labels_of(toy_corpus.utterance("toy05"), Recogniser(model.phones, "own"), Lexicon())
+    ]
+    assert np.mean([phone in found for phone in known]) > 0.8
+
+
+def labelled(utterance: Utterance) -> Utterance:
+    """The true phones in the place of the words."""
+    (units,) = (s.units for s in toy_sentences(12) if s.name == utterance.name)
+    phones = Timeline(tuple(replace(s, label=Unit(s.label.phone)) for s in units))
+    return replace(utterance, words=None, phones=phones)
+
+
+def test_labelled_phones_are_used_as_they_are(
+    toy_corpus: Corpus, toy_model: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nothing is aligned, no transcript is needed, and phone models are trained on what is labelled."""
+    monkeypatch.setattr(module, "phones_in_time", None)
+    given = [labelled(utterance) for utterance in some(toy_corpus, 8)]
+    given[0] = replace(given[0], words=("not", "what", "is", "said"))
+    model, report = train(corpus_of(given, tmp_path), recogniser=SMALL)
+    assert report.used == TRAINED
+    assert report.skipped == {}
+    assert set(model.phones.table.units) == set(toy_model.phones.table.units)
+    assert labels_of(given[0], Recogniser(model.phones, "own"), Lexicon()) == given[0].phones
+
+
+def test_labelled_and_transcribed_utterances_together(toy_corpus: Corpus, tmp_path: Path) -> None:
+    both = [u if number % 2 else labelled(u) for number, u in enumerate(some(toy_corpus, 8))]
+    model, report = train(corpus_of(both, tmp_path), recogniser=SMALL)
+    assert (report.used, report.skipped) == (TRAINED, {})
+    truth = labelled(toy_corpus.utterance("toy11"))
+    assert truth.phones is not None
+    heard = [s.label.phone for s in labels_of(replace(truth, phones=None), Recogniser(model.phones, "own"), Lexicon())]
+    assert np.mean([span.label.phone in heard for span in truth.phones]) > 0.8
+
+
+def test_one_speaker(toy_corpus: Corpus, tmp_path: Path) -> None:
+    names = ("anna", "ben", "ben", "anna", "anna")
+    corpus = corpus_of([replace(u, speaker=n) for u, n in zip(some(toy_corpus), names, strict=True)], tmp_path)
+    model, report = train(corpus, speakers=["anna"], recogniser=SMALL)
+    assert report.used == ("toy00", "toy03", "toy04")
+    assert model.about["speakers"] == ["anna"]
+    model, report = train(corpus, speakers=["ben", "anna"], recogniser=SMALL)
+    assert len(report.used) == 5
+    assert "speakers" not in train(corpus, recogniser=SMALL)[0].about
+    with pytest.raises(CorpusError, match="no speaker 'carl'"):
+        train(corpus, speakers=["carl"])
+
+
+def test_a_transcript_that_does_not_fit_is_skipped_and_reported(toy_corpus: Corpus, tmp_path: Path) -> None:
+    utterances = some(toy_corpus)
+    utterances[1] = replace(utterances[1], words=("five",) * 100)
+    utterances[2] = replace(utterances[2], words=("mama", "日本"))
+    model, report = train(corpus_of(utterances, tmp_path), recogniser=SMALL)
+    assert report.used == ("toy00", "toy03", "toy04")
+    assert set(report.skipped) == {"toy01", "toy02"}
+    assert "too short" in report.skipped["toy01"]
+    assert "how '日本' is said" in report.skipped["toy02"]
+    assert model.about["utterances"] == 3
+
+
+def test_without_any_transcript_the_shipped_phones_are_used(
+    toy_corpus: Corpus,
+    toy_model: Model,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    monkeypatch.setattr(module, "load_model", lambda: toy_model)
+    silent = corpus_of([replace(utterance, words=None) for utterance in some(toy_corpus)], tmp_path)
+    model, report = train(silent, recogniser=SMALL)
+    assert model.phones is toy_model.phones
+    assert len(report.used) == 5
+    assert "no transcripts in the corpus: its phones are recognised by the shipped model" in caplog.text
+
+
+def test_guessed_words_are_reported(toy_corpus: Corpus, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    utterances = some(toy_corpus)
+    renamed = {"papa": "pahpa"}
+    utterances = [replace(u, words=tuple(renamed.get(w, w) for w in u.words or ())) for u in utterances]
+    corpus = corpus_of(utterances, tmp_path)
+    train(corpus, recogniser=SMALL)
+    assert [record.getMessage().split()[0] for record in caplog.records] == ["'pahpa'"]
+    caplog.clear()
+    train(corpus, recogniser=SMALL, lexicon=Lexicon({"pahpa": (("p", "aa", "p", "ax"),)}))
+    assert not caplog.records
+
+
+def test_licence_and_attribution_go_with_the_model(toy_corpus: Corpus, tmp_path: Path) -> None:
+    rights = [{"licence": "CC0"}, {"licence": "CC BY 4.0", "attribution": "Anna"}, {"attribution": "Anna"}, {}]
+    given = [replace(u, source=source) for u, source in zip(some(toy_corpus, 4), rights, strict=True)]
+    model, _ = train(corpus_of(given, tmp_path), recogniser=SMALL)
+    assert model.about["licence"] == ["CC BY 4.0", "CC0"]
+    assert model.about["attribution"] == ["Anna"]
+    assert model.about["corpus"] == ["corpus"]
+    assert set(model.about["versions"]) == {"lipmotion", "numpy", "scipy"}
+    assert model.about["minutes"] == pytest.approx(0.2, abs=0.05)
+
+
+def test_an_empty_split_names_the_others(toy_corpus: Corpus) -> None:
+    with pytest.raises(CorpusError, match=r"no utterances of split 'tset' \(there are train: 8, val: 2, test: 2\)"):
+        train(toy_corpus, split="tset")
+
+
+def test_names_that_are_not_there(toy_corpus: Corpus) -> None:
+    with pytest.raises(CorpusError, match="no utterance 'toy99' among 12"):
+        train(toy_corpus, names=("toy00", "toy99"))
+
+
+def test_nothing_usable(toy_corpus: Corpus, tmp_path: Path) -> None:
+    wrong = corpus_of([replace(u, words=("five",) * 100) for u in some(toy_corpus, 2)], tmp_path)
+    with pytest.raises(CorpusError, match="none of 2 utterances has a transcript that fits"):
+        train(wrong, recogniser=SMALL)
+
+
+def test_frames_without_a_face_are_not_learned_from(toy_corpus: Corpus, tmp_path: Path) -> None:
+    utterances = some(toy_corpus, 4)
+    track = utterances[0].track
+    seen = np.arange(len(track.seen)) % 10 > 1
+    hidden = [replace(utterances[0], track=replace(track, seen=seen)), *utterances[1:]]
+    few, many = (
+        train(corpus_of(given, tmp_path / name), recogniser=SMALL)[1].figures["frames"]
+        for name, given in (("few", hidden), ("many", utterances))
+    )
+    assert many - few == pytest.approx(4 * (~seen).sum(), abs=4)
+    _, valid = model_motion(replace(track, seen=seen), 250)
+    nearest = np.minimum(np.floor(np.arange(250) / 4 + 0.5).astype(int), len(seen) - 1)
+    assert np.array_equal(valid, seen[nearest])
+
+
+def test_camera_frames_become_model_frames() -> None:
+    curve = np.sin(np.arange(26) / 25 * 2 * np.pi)[:, None]
+    motion, valid = model_motion(Track(Motion(curve, 25.0, (Channel("opening"),)), np.ones(26, bool)), 111)
+    assert motion.values[:101, 0] == pytest.approx(np.sin(np.arange(101) / 100 * 2 * np.pi), abs=0.01)
+    assert valid[:101].all()
+    assert not valid[103:].any()  # half a camera frame after the last one
+
+
+def others() -> Iterator[Heard]:
+    """Two speakers of whom nothing was seen."""
+    for number, sentence in enumerate(toy_sentences(4)):
+        yield Heard(mfcc(sentence.audio), sentence.units, ("bert", "anna")[number % 2])
+
+
+def test_voices_of_others_teach_engines_that_have_a_use_for_them(toy_corpus: Corpus) -> None:
+    stages: list[str] = []
+    plain = {"states": 1, "asynchrony": 0, "mixtures": 1, "follows": False, "full_range": False}
+    engine = engine_named("coupled", plain | {"more_mixtures": 1})
+    chosen = {"names": TRAINED[:4], "recogniser": SMALL, "engine": engine}
+    model, report = train(toy_corpus, **chosen, voices=others(), monitor=lambda event: stages.append(event.stage))
+    alone, _ = train(toy_corpus, **chosen)
+    assert model.about["voices"] == ["anna", "bert"]
+    assert model.about["utterances"] == 4
+    assert report.used == TRAINED[:4]
+    assert "voices" not in alone.about
+    assert {"hearing other voices", "learning motion: more speech"} <= set(stages)
+    speech, lips = ([one.learned.chains.groups[group].mixtures.means for one in (model, alone)] for group in (0, 1))
+    assert np.abs(speech[0] - speech[1]).max() > 0.1
+    assert lips[0].tobytes() == lips[1].tobytes()
+
+
+@pytest.mark.parametrize("name", ["trajectory", "joint"])
+def test_other_engines_have_no_use_for_voices(toy_corpus: Corpus, name: str) -> None:
+    with pytest.raises(InputError, match=f"the {name} engine cannot learn from other voices"):
+        train(toy_corpus, engine=engine_named(name, {}), voices=others())

@@ -1,0 +1,48 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from lipmotion.pipeline.model import Model
+from lipmotion.speech import combined_phones as module
+from lipmotion.speech.combined_phones import NOISES, joined, joint_evidence
+from lipmotion.speech.general.acoustic import general_model
+from lipmotion.units import PHONES, SILENCE
+
+
+def test_all_phones_are_there_and_the_own_ones_are_as_they_were(toy_model: Model) -> None:
+    own = toy_model.phones
+    joint = joined(own)
+    table = joint.hmm.table
+    assert set(table.units) == {*PHONES, *NOISES}
+    assert table.free[0] == SILENCE
+    assert len(joint.columns) == len(table.names) == len(joint.hmm.mixtures.means)
+    for index, name in enumerate(own.table.names):
+        there = table.names.index(name)
+        assert np.array_equal(joint.hmm.mixtures.means[there], own.mixtures.means[index])
+    assert joint.hmm.stay("b", 0) == own.stay("b", 0)
+    assert np.exp(joint.hmm.bigram.log_probability).sum(axis=1) == pytest.approx(1, abs=1e-4)
+
+
+def test_phones_never_heard_borrow(toy_model: Model) -> None:
+    assert "z" not in toy_model.phones.table.units
+    hmm = joined(toy_model.phones).hmm
+    z, s = (hmm.mixtures.means[hmm.table.density(unit, 1)] for unit in ("z", "s"))
+    assert np.array_equal(z, s)
+
+
+@pytest.mark.parametrize("kept", [0, 9])
+@pytest.mark.parametrize("trust", [0.0, 0.4, 1.0])
+def test_evidence_is_the_sum_of_both(
+    toy_model: Model, trust: float, kept: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "KEPT_FRAMES", kept)
+    draw = np.random.default_rng(0)
+    own, general = draw.normal(size=(2, 9, 39)).astype(np.float32)
+    joint = joined(toy_model.phones)
+    evidence = joint_evidence(joint, own, trust, general)
+    wanted = general_model().log_density(general)[:, joint.columns] + trust * joint.hmm.mixtures.log_likelihood(own)
+    assert evidence.frames == 9
+    assert evidence.log_density(0, 9, None) == pytest.approx(wanted, abs=2e-3)
+    some = np.array([5, 2, 40])
+    assert evidence.log_density(3, 7, some) == pytest.approx(wanted[3:7, some], abs=2e-3)

@@ -1,0 +1,43 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from lipmotion.speech.lip_speed import AROUND, STATIC, fit_opening_speed, opening_speed, speed
+from lipmotion.types import Features
+
+
+def features(seed: int, frames: int = 200) -> Features:
+    return Features(np.random.default_rng(seed).normal(size=(frames, 39)).astype(np.float32), frames / 100)
+
+
+def around(values: np.ndarray, frame: int) -> np.ndarray:
+    """Return what the map sees of a frame, slowly."""
+    rows = [values[min(max(frame + step, 0), len(values) - 1), :STATIC] for step in AROUND]
+    return np.concatenate(rows)
+
+
+def test_the_fit_finds_the_map_behind_the_data() -> None:
+    weights = np.random.default_rng(9).normal(size=STATIC * len(AROUND))
+    examples = []
+    for seed in range(12):
+        given = features(seed)
+        examples.append((given, np.array([around(given.values, n) @ weights for n in range(200)])))
+    found = fit_opening_speed(examples)
+    assert np.corrcoef(found, weights)[0, 1] > 0.995
+
+
+def test_the_map_that_ships_is_linear_and_local() -> None:
+    given = features(1)
+    whole = opening_speed(given)
+    assert whole.shape == (200,)
+    twice = Features(2 * given.values, given.duration_s)
+    assert opening_speed(twice) == pytest.approx(2 * whole)
+    changed = given.values.copy()
+    changed[100, :STATIC] += 1
+    moved = np.flatnonzero(np.abs(opening_speed(Features(changed, 2.0)) - whole) > 1e-6)
+    assert moved.tolist() == [100 - step for step in reversed(AROUND)]
+
+
+def test_speed_is_the_slope() -> None:
+    assert speed(0.03 * np.arange(20.0))[3:-3] == pytest.approx(0.03, abs=1e-6)

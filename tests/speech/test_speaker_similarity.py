@@ -1,0 +1,56 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from lipmotion.pipeline.model import Model
+from lipmotion.speech import speaker_similarity as module
+from lipmotion.speech.mfcc import mfcc
+from lipmotion.speech.speaker_similarity import WARPS, fitted
+from lipmotion.testing.toy import toy_sentences
+from lipmotion.types import Audio
+
+
+def test_the_voice_of_the_training_is_not_warped_and_fits(toy_model: Model) -> None:
+    audio = toy_sentences(3)[0].audio
+    voice = fitted(toy_model.phones, audio, mfcc(audio))
+    assert voice.warp == 1
+    assert abs(voice.fit) < 3
+
+
+def test_a_warped_voice_is_warped_back(toy_model: Model) -> None:
+    """Its spectra are those of the known voice, stretched."""
+    audio = toy_sentences(3)[0].audio
+    before = fitted(toy_model.phones, audio, mfcc(audio)).fit
+    for factor, expected in ((1.12, 0.88), (0.89, 1.12)):
+        positions = np.arange(0, len(audio.samples) - 1, factor)
+        other = Audio(np.interp(positions, np.arange(len(audio.samples)), audio.samples).astype(np.float32), 16_000)
+        voice = fitted(toy_model.phones, other, mfcc(other))
+        assert abs(voice.warp - expected) < 0.07
+        assert voice.fit < before
+
+
+def test_the_warp_chosen_fits_best(toy_model: Model) -> None:
+    draw = np.random.default_rng(3)
+    audio = Audio(draw.normal(0, 0.1, 16_000).astype(np.float32), 16_000)
+    voice = fitted(toy_model.phones, audio, mfcc(audio))
+    fits = {warp: toy_model.phones.fit(mfcc(audio, warp).values) for warp in WARPS}
+    assert voice.warp == max(fits, key=lambda warp: fits[warp])
+    assert voice.fit == pytest.approx(max(fits.values()) - toy_model.phones.typical_fit)
+    assert np.array_equal(voice.features.values, mfcc(audio, voice.warp).values)
+
+
+def test_a_long_recording_is_judged_by_its_loudest_stretch(toy_model: Model, monkeypatch: pytest.MonkeyPatch) -> None:
+    spoken = toy_sentences(3)[0].audio.samples
+    quiet = np.zeros(5 * 16_000, np.float32)
+    long = Audio(np.concatenate([quiet, spoken, quiet]), 16_000)
+    monkeypatch.setattr(module, "JUDGED_FRAMES", len(spoken) // 160)
+    judged = []
+    phones = toy_model.phones
+    monkeypatch.setattr(type(phones), "fit", lambda _, values: judged.append(len(values)) or 0.0)
+    assert len(fitted(replace(phones), long, mfcc(long)).features.values) == len(long.samples) // 160 + 1
+    assert set(judged) == {len(spoken) // 160 + 1}
+    stretch = module._loudest(long, mfcc(long))
+    assert np.abs(stretch.samples).sum() > 0.95 * np.abs(spoken).sum()

@@ -1,0 +1,73 @@
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lipmotion.errors import ExportError
+from lipmotion.storage.checkpoint import NOTHING_KEPT, Checkpoint
+
+ARRAYS = {
+    "single": np.float32([[1 / 3, np.nan], [-0.0, np.inf]]),
+    "double": np.array([np.pi, np.nextafter(1, 2)]),
+    "names": np.array(["b.0<ih", "ä"]),
+    "count": np.array(7),
+    "empty": np.zeros((0, 3)),
+}
+
+
+def test_every_bit_comes_back(tmp_path: Path) -> None:
+    Checkpoint(tmp_path, "a").save("stage", ARRAYS)
+    found = Checkpoint(tmp_path, "a").load("stage")
+    assert found is not None
+    assert found.keys() == ARRAYS.keys()
+    for name, array in ARRAYS.items():
+        assert (found[name].dtype, found[name].shape) == (array.dtype, array.shape)
+        assert found[name].tobytes() == array.tobytes()
+
+
+def test_the_last_state_counts(tmp_path: Path) -> None:
+    checkpoint = Checkpoint(tmp_path, "a")
+    for number in range(3):
+        checkpoint.save("stage", {"n": np.array(number)})
+    found = checkpoint.load("stage")
+    assert found is not None
+    assert found["n"] == 2
+    assert checkpoint.load("other") is None
+    assert [path.name for path in tmp_path.iterdir()] == ["stage.checkpoint"]
+
+
+def test_without_a_folder_nothing_is_kept() -> None:
+    NOTHING_KEPT.save("stage", ARRAYS)
+    assert NOTHING_KEPT.load("stage") is None
+
+
+def test_another_job_is_not_gone_on_with(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level(logging.INFO)
+    Checkpoint(tmp_path, "a").save("stage", ARRAYS)
+    assert Checkpoint(tmp_path, "b").load("stage") is None
+    assert "of another corpus, configuration or version; not used" in caplog.text
+
+
+def test_any_damaged_byte_of_an_array_is_noticed(tmp_path: Path) -> None:
+    checkpoint = Checkpoint(tmp_path, "a")
+    values = np.random.default_rng(0).normal(size=100)
+    checkpoint.save("stage", {"values": values})
+    (path,) = tmp_path.iterdir()
+    whole = path.read_bytes()
+    start = whole.index(values.tobytes())
+    for position in (start, start + 400, start + 799):
+        path.write_bytes(whole[:position] + bytes([whole[position] ^ 1]) + whole[position + 1 :])
+        assert checkpoint.load("stage") is None
+    for length in (0, 10, len(whole) // 2, len(whole) - 1):
+        path.write_bytes(whole[:length])
+        assert checkpoint.load("stage") is None
+    path.write_bytes(whole)
+    assert checkpoint.load("stage") is not None
+
+
+def test_a_folder_that_is_gone_is_an_export_error(tmp_path: Path) -> None:
+    with pytest.raises(ExportError, match="does not exist"):
+        Checkpoint(tmp_path / "gone", "a").save("stage", ARRAYS)

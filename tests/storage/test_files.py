@@ -1,0 +1,315 @@
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from pathlib import Path
+from types import FrameType
+
+import pytest
+
+from lipmotion.errors import ExportError
+from lipmotion.storage import files
+from lipmotion.storage.files import (
+    LOCK,
+    TEMPORARY,
+    check_distinct,
+    check_target,
+    locked,
+    remove_unfinished,
+    unfinished_work,
+    whole_file,
+    whole_folder,
+)
+
+Context = Callable[[Path], AbstractContextManager[Path]]
+LONGEST = "x" * 250 + ".json"
+TOO_LONG = "x" * 300 + ".json"
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_a_file_appears_when_it_is_whole(tmp_path: Path) -> None:
+    target = tmp_path / "motion.json"
+    with whole_file(target) as unfinished:
+        unfinished.write_text("half")
+        assert not target.exists()
+        assert unfinished.suffix == target.suffix
+        assert unfinished.parent == target.parent
+    assert target.read_text() == "half"
+    assert names(tmp_path) == ["motion.json"]
+
+
+def fail(context: AbstractContextManager[Path], error: BaseException) -> None:
+    """Write half of something, then fail."""
+    with context as unfinished:
+        (unfinished / "entry.json" if unfinished.is_dir() else unfinished).write_text("half")
+        raise error
+
+
+def test_an_old_file_stays_until_the_new_one_is_whole(tmp_path: Path) -> None:
+    target = tmp_path / "motion.json"
+    target.write_text("old")
+    with pytest.raises(RuntimeError):
+        fail(whole_file(target), RuntimeError())
+    assert target.read_text() == "old"
+    assert names(tmp_path) == ["motion.json"]
+    with whole_file(target) as unfinished:
+        unfinished.write_text("new")
+    assert target.read_text() == "new"
+
+
+@pytest.mark.parametrize("context", [whole_file, whole_folder])
+@pytest.mark.parametrize("error", [RuntimeError(), KeyboardInterrupt()])
+def test_a_failure_leaves_nothing(tmp_path: Path, context: Context, error: BaseException) -> None:
+    with pytest.raises(type(error)):
+        fail(context(tmp_path / "one"), error)
+    assert names(tmp_path) == []
+
+
+@pytest.mark.parametrize("context", [whole_file, whole_folder])
+def test_what_the_system_refuses_is_an_export_error(tmp_path: Path, context: Context) -> None:
+    with pytest.raises(ExportError, match=r"one: cannot be written: No space left"):
+        fail(context(tmp_path / "one"), OSError(28, "No space left on device"))
+    assert names(tmp_path) == []
+
+
+def test_writers_do_not_share_a_temporary_name(tmp_path: Path) -> None:
+    with whole_file(tmp_path / "a.json") as one, whole_file(tmp_path / "a.json") as two:
+        assert one != two
+        one.touch()
+        two.touch()
+
+
+def test_the_longest_name_can_be_written(tmp_path: Path) -> None:
+    check_target(tmp_path / LONGEST)
+    with whole_file(tmp_path / LONGEST) as unfinished:
+        unfinished.touch()
+    assert names(tmp_path) == [LONGEST]
+
+
+def test_a_longer_name_is_refused_in_words(tmp_path: Path) -> None:
+    with (
+        pytest.raises(ExportError, match="cannot be written: File name too long"),
+        whole_file(tmp_path / TOO_LONG) as new,
+    ):
+        new.touch()
+    assert names(tmp_path) == []
+
+
+def test_a_folder_appears_when_it_is_whole(tmp_path: Path) -> None:
+    with whole_folder(tmp_path / "one") as unfinished:
+        (unfinished / "entry.json").touch()
+        assert not (tmp_path / "one").exists()
+    assert names(tmp_path / "one") == ["entry.json"]
+    assert names(tmp_path) == ["one"]
+
+
+def test_a_folder_does_not_replace_one_that_holds_something(tmp_path: Path) -> None:
+    (tmp_path / "one").mkdir()
+    (tmp_path / "one" / "precious").touch()
+    with pytest.raises(ExportError, match="one: cannot be written"), whole_folder(tmp_path / "one"):
+        pass
+    assert names(tmp_path) == ["one"]
+    assert names(tmp_path / "one") == ["precious"]
+
+
+@pytest.mark.parametrize("context", [whole_file, whole_folder])
+def test_the_parent_must_exist(tmp_path: Path, context: Context) -> None:
+    with (
+        pytest.raises(ExportError, match=r"missing does not exist; create it first"),
+        context(tmp_path / "missing" / "a.json"),
+    ):
+        raise AssertionError
+
+
+def test_targets_are_checked_before_work_begins(tmp_path: Path) -> None:
+    check_target(tmp_path / "new.json")
+    with pytest.raises(ExportError, match=r"is a folder; give the name of a file"):
+        check_target(tmp_path)
+    with pytest.raises(ExportError, match=r"the folder .*missing does not exist; create it first"):
+        check_target(tmp_path / "missing" / "new.json")
+    (tmp_path / "file").touch()
+    with pytest.raises(ExportError, match=r"does not exist"):
+        check_target(tmp_path / "file" / "new.json")
+    assert names(tmp_path) == ["file"]
+
+
+def test_what_a_killed_run_left_is_removed(tmp_path: Path) -> None:
+    (tmp_path / f"{TEMPORARY}1.json").touch()
+    (tmp_path / f"{TEMPORARY}2").mkdir()
+    (tmp_path / f"{TEMPORARY}2" / "entry.json").touch()
+    (tmp_path / "kept.json").touch()
+    remove_unfinished(tmp_path)
+    assert names(tmp_path) == ["kept.json"]
+
+
+def test_what_a_killed_process_left_of_a_target_is_removed_with_the_next(tmp_path: Path) -> None:
+    target = tmp_path / "motion.json"
+    program = (
+        "import os, pathlib, sys\n"
+        "from lipmotion.storage.files import whole_file\n"
+        "with whole_file(pathlib.Path(sys.argv[1])) as unfinished:\n"
+        "    unfinished.write_text('half')\n"
+        "    os._exit(1)\n"
+    )
+    subprocess.run([sys.executable, "-c", program, str(target)], check=False)
+    assert len(names(tmp_path)) == 1
+    with whole_file(tmp_path / "other.json") as other, whole_file(target) as mine:
+        assert len(names(tmp_path)) == 0
+        other.touch()
+        mine.touch()
+        with whole_file(target) as same:  # a process that lives is left alone
+            same.touch()
+        assert mine.exists()
+    assert names(tmp_path) == ["motion.json", "other.json"]
+
+
+HOLD = (
+    "import pathlib, sys\n"
+    "from lipmotion.storage.files import locked\n"
+    "with locked(pathlib.Path(sys.argv[1])):\n"
+    "    print('held', flush=True)\n"
+    "    sys.stdin.read()\n"
+)
+
+
+def test_a_folder_is_held_by_one_process_and_let_go_of_when_it_is_killed(tmp_path: Path) -> None:
+    folder = tmp_path / "new" / "work"
+    pipe = subprocess.PIPE
+    with subprocess.Popen([sys.executable, "-c", HOLD, str(folder)], stdin=pipe, stdout=pipe) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == b"held\n"
+        with pytest.raises(ExportError, match=rf"work: another lipmotion \(process {process.pid}\) is at work on it"):
+            locked(folder).__enter__()
+        process.kill()
+    assert names(folder) == [LOCK]  # it stays, and does not block
+    with locked(folder):
+        assert (folder / LOCK).read_text() == str(os.getpid())
+    assert names(folder) == []
+
+
+def test_a_folder_that_cannot_be_made_is_an_export_error(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(ExportError, match="file: is a file; give the name of a new"), locked(tmp_path / "file"):
+        raise AssertionError
+
+
+def test_finished_work_leaves_no_folder(tmp_path: Path) -> None:
+    with unfinished_work(tmp_path / "model") as folder:
+        (folder / "stage").touch()
+        assert names(tmp_path) == ["model.unfinished"]
+    assert names(tmp_path) == []
+
+
+def test_unfinished_work_is_found_again(tmp_path: Path) -> None:
+    def interrupted() -> None:
+        with unfinished_work(tmp_path / "model") as folder:
+            (folder / "stage").touch()
+            (folder / f"{TEMPORARY}half").touch()
+            raise KeyboardInterrupt
+
+    for _ in range(2):
+        with pytest.raises(KeyboardInterrupt):
+            interrupted()
+    with unfinished_work(tmp_path / "model") as folder:
+        assert names(folder) == [LOCK, "stage"]
+
+
+def test_work_without_a_result_leaves_nothing(tmp_path: Path) -> None:
+    with pytest.raises(RuntimeError), unfinished_work(tmp_path / "model"):
+        raise RuntimeError
+    assert names(tmp_path) == []
+    with pytest.raises(ExportError, match="does not exist"), unfinished_work(tmp_path / "missing" / "model"):
+        raise AssertionError
+
+
+def test_a_link_is_written_through(tmp_path: Path) -> None:
+    (tmp_path / "there").mkdir()
+    for name, target in (("a.json", "there/b.json"), ("c.json", "a.json")):
+        (tmp_path / name).symlink_to(target)
+    for name in ("c.json", "a.json"):
+        with whole_file(tmp_path / name) as unfinished:
+            assert unfinished.parent == (tmp_path / "there").resolve()
+            unfinished.write_text(name)
+        assert (tmp_path / "there" / "b.json").read_text() == name
+    assert names(tmp_path) == ["a.json", "c.json", "there"]
+    assert names(tmp_path / "there") == ["b.json"]
+    assert all((tmp_path / name).is_symlink() for name in ("a.json", "c.json"))
+
+
+def test_a_link_is_replaced_where_it_must_not_lead_away(tmp_path: Path) -> None:
+    (tmp_path / "precious").write_text("old")
+    (tmp_path / "corpus.json").symlink_to("precious")
+    with whole_file(tmp_path / "corpus.json", follow=False) as unfinished:
+        unfinished.write_text("new")
+    assert not (tmp_path / "corpus.json").is_symlink()
+    assert (tmp_path / "precious").read_text() == "old"
+
+
+def test_a_link_that_leads_nowhere(tmp_path: Path) -> None:
+    (tmp_path / "loop").symlink_to("loop")
+    (tmp_path / "away").symlink_to("missing/b.json")
+    for name, words in (("loop", "leads back to itself"), ("away", "the folder .*missing does not exist")):
+        with pytest.raises(ExportError, match=words):
+            check_target(tmp_path / name)
+        with pytest.raises(ExportError, match=words), whole_file(tmp_path / name):
+            raise AssertionError
+    assert names(tmp_path) == ["away", "loop"]
+
+
+def test_unfinished_work_lies_beside_what_a_link_points_to(tmp_path: Path) -> None:
+    (tmp_path / "there").mkdir()
+    (tmp_path / "m").symlink_to("there/model")
+    with unfinished_work(tmp_path / "m") as folder:
+        assert folder == (tmp_path / "there").resolve() / "model.unfinished"
+    assert names(tmp_path / "there") == []
+
+
+def test_two_outputs_that_are_one(tmp_path: Path) -> None:
+    (tmp_path / "a").touch()
+    (tmp_path / "soft").symlink_to("a")
+    (tmp_path / "new").symlink_to("b")
+    os.link(tmp_path / "a", tmp_path / "hard")
+    for one, other in (("a", "soft"), ("hard", "a"), ("new", "b"), ("c", "../" + tmp_path.name + "/c")):
+        with pytest.raises(ExportError, match="is given twice"):
+            check_distinct([tmp_path / one, tmp_path / other])
+    check_distinct([tmp_path / "a", tmp_path / "b", tmp_path / "c"])
+
+
+def interrupted(folder: Path, step: int) -> bool:
+    """Hold a folder for a moment, with an interrupt at a step of doing so; whether there were as many steps."""
+    seen = 0
+
+    def trace(frame: FrameType, event: str, _: object) -> Callable[..., object] | None:
+        nonlocal seen
+        if frame.f_code.co_filename != files.__file__:
+            return None
+        seen += event == "line"
+        if seen == step:
+            seen += 1
+            raise KeyboardInterrupt
+        return trace
+
+    before = sys.gettrace()
+    sys.settrace(trace)
+    try:
+        with locked(folder):
+            pass
+    except KeyboardInterrupt:
+        return True
+    finally:
+        sys.settrace(before)
+    return False
+
+
+def test_an_interrupt_at_any_step_leaves_no_lock(tmp_path: Path) -> None:
+    step = 1
+    while interrupted(tmp_path, step):
+        assert names(tmp_path) == [], step
+        step += 1
+    assert step > 20

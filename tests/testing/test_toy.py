@@ -1,0 +1,254 @@
+"""The toy corpus: known words, known times, known motion; and videos that can be tracked."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from lipmotion.errors import ExportError, InputError
+from lipmotion.speech.read import read_audio
+from lipmotion.testing.toy import (
+    LEAD_S,
+    LIPS_TOUCH,
+    SHAPES,
+    WORDS,
+    ToySentence,
+    toy_motion,
+    toy_sentences,
+    toy_utterances,
+    write_toy_recordings,
+)
+from lipmotion.types import Span, Timeline, Unit
+from lipmotion.units.lexicon import Lexicon
+from lipmotion.units.phones import PHONES, SILENCE
+
+FPS = 25.0
+
+
+@pytest.fixture(scope="module")
+def sentences() -> list[ToySentence]:
+    return toy_sentences(12)
+
+
+def spelled(*phones: tuple[str, float]) -> Timeline[Unit]:
+    edges_s = np.cumsum([0.0, *(duration_s for _, duration_s in phones)])
+    return Timeline(
+        tuple(Span(start, end, Unit(phone)) for (phone, _), (start, end) in zip(phones, pairwise(edges_s), strict=True))
+    )
+
+
+@pytest.mark.parametrize("word", WORDS)
+def test_words_are_pronounced_as_in_the_dictionary(word: str) -> None:
+    assert Lexicon().known(word)
+    assert WORDS[word] in Lexicon().pronunciations(word)
+
+
+def test_the_lips_know_the_inventory() -> None:
+    assert sorted(SHAPES) == sorted(PHONES)
+
+
+def test_sentences_say_their_words(sentences: list[ToySentence]) -> None:
+    for sentence in sentences:
+        phones = [span.label.phone for span in sentence.units]
+        assert phones == [SILENCE, *(phone for word in sentence.words for phone in WORDS[word]), SILENCE]
+        words = [span.label.word for span in sentence.units][1:-1]
+        assert words == [word for word in sentence.words for _ in WORDS[word]]
+        assert len(sentence.words) >= 3
+
+
+def test_sentences_have_the_promised_lengths(sentences: list[ToySentence]) -> None:
+    for sentence in sentences:
+        assert 2 <= sentence.audio.duration_s <= 3.1
+        assert sentence.units.spans[-1].end_s == pytest.approx(sentence.audio.duration_s, abs=1e-4)
+        for silence in (sentence.units.spans[0], sentence.units.spans[-1]):
+            assert 0.4 <= silence.duration_s <= 0.6
+            assert silence.label.word == ""
+
+
+def test_the_splits(sentences: list[ToySentence]) -> None:
+    assert [sentence.split for sentence in sentences] == ["train"] * 8 + ["val"] * 2 + ["test"] * 2
+    assert [sentence.split for sentence in toy_sentences(3)] == ["train", "val", "test"]
+    for seed in range(3):
+        said = {word for s in toy_sentences(6, seed) if s.split == "train" for word in s.words}
+        assert said == set(WORDS)
+
+
+def test_the_seed_decides_and_more_begins_with_the_same(sentences: list[ToySentence]) -> None:
+    for few, many in zip(toy_sentences(4), sentences, strict=False):
+        assert (few.name, few.words, few.units) == (many.name, many.words, many.units)
+        assert np.array_equal(few.audio.samples, many.audio.samples)
+    assert [s.words for s in toy_sentences(4, seed=1)] != [s.words for s in sentences[:4]]
+
+
+@pytest.mark.parametrize("make", [toy_sentences, toy_utterances])
+def test_a_corpus_needs_three_sentences(make: Any) -> None:
+    with pytest.raises(InputError, match="2 toy sentences asked for"):
+        make(2)
+
+
+@pytest.mark.parametrize("rate_hz", [25.0, 30.0, 100.0])
+def test_the_mouth_is_shut_in_silence_and_touches_in_p_b_m(sentences: list[ToySentence], rate_hz: float) -> None:
+    for sentence in sentences:
+        motion = toy_motion(sentence.units, rate_hz)
+        first, last = sentence.units.spans[0].end_s, sentence.units.spans[-1].start_s
+        quiet = (motion.time_s < first - 0.1) | (motion.time_s > last + 0.1)
+        assert quiet.sum() > 0.5 * rate_hz
+        assert (motion["opening"][quiet] == 0).all()
+        for span in sentence.units:
+            inside = (motion.time_s >= span.start_s) & (motion.time_s < span.end_s)
+            if span.label.phone in LIPS_TOUCH:
+                assert motion["opening"][inside].min() == 0
+            elif span.label.phone == "aa":
+                assert motion["opening"][inside].max() > 0.2
+
+
+def test_channels_stay_in_their_ranges(sentences: list[ToySentence]) -> None:
+    for sentence in sentences:
+        motion = toy_motion(sentence.units, 100.0)
+        assert motion.names == ("opening", "width", "outer")
+        assert len(motion.values) == int(sentence.units.spans[-1].end_s * 100) + 1
+        assert motion["opening"].min() == 0
+        assert motion["opening"].max() <= 0.3 + 1e-9
+        assert motion["width"][0] == pytest.approx(0.55)
+        assert motion["width"].min() >= 0.42 - 1e-9
+        assert motion["width"].max() <= 0.62 + 1e-9
+        assert motion["outer"] - motion["opening"] == pytest.approx(0.22)
+
+
+def test_lips_are_rounded_in_uw_and_spread_in_iy() -> None:
+    motion = toy_motion(spelled(("sil", 0.3), ("uw", 0.3), ("iy", 0.3), ("sil", 0.3)), 100.0)
+    assert motion["width"][[10, 45, 75, 110]] == pytest.approx([0.55, 0.42, 0.62, 0.55])
+
+
+def test_the_lips_lead_the_sound() -> None:
+    motion = toy_motion(spelled(("sil", 0.5), ("aa", 0.2), ("sil", 0.5)), 100.0)
+    middle_s = np.average(motion.time_s, weights=motion["opening"])
+    assert middle_s == pytest.approx(0.6 - LEAD_S, abs=0.002)
+    assert 0 < LEAD_S < 1 / FPS
+
+
+def test_motion_is_smooth_and_the_same_at_every_rate(sentences: list[ToySentence]) -> None:
+    for sentence in sentences:
+        fast, slow = toy_motion(sentence.units, 100.0), toy_motion(sentence.units, 25.0)
+        assert fast.values[::4][: len(slow.values)] == pytest.approx(slow.values, abs=1e-9)
+        assert np.abs(np.diff(fast.values, axis=0)).max() < 0.07
+
+
+def test_a_gap_is_silence() -> None:
+    whole = spelled(("sil", 0.3), ("aa", 0.2), ("sil", 0.2), ("iy", 0.2))
+    gaps = Timeline(tuple(span for span in whole if span.label.phone != "sil"))
+    assert np.array_equal(toy_motion(whole, 100.0).values, toy_motion(gaps, 100.0).values)
+
+
+@pytest.mark.parametrize(
+    ("units", "rate_hz", "message"),
+    [
+        (Timeline(()), 25.0, "at least one"),
+        (spelled(("aa", 0.1)), 0.0, "rate is 0.0 Hz"),
+        (spelled(("aa", 0.1), ("AA", 0.1)), 25.0, "'AA'"),
+    ],
+)
+def test_motion_says_what_is_wrong(units: Timeline[Unit], rate_hz: float, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        toy_motion(units, rate_hz)
+
+
+def test_utterances_are_the_sentences_perfectly_tracked(sentences: list[ToySentence]) -> None:
+    for utterance, sentence in zip(toy_utterances(12), sentences, strict=True):
+        assert (utterance.name, utterance.words, utterance.split) == (sentence.name, sentence.words, sentence.split)
+        assert np.array_equal(utterance.audio.samples, sentence.audio.samples)
+        assert utterance.features.values.shape == (int(sentence.audio.duration_s * 100 + 1e-9) + 1, 39)
+        assert utterance.track.motion.rate_hz == FPS
+        assert np.array_equal(utterance.track.motion.values, toy_motion(sentence.units, FPS).values)
+        assert utterance.track.seen.shape == (len(utterance.track.motion.values),)
+        assert utterance.track.seen.all()
+
+
+def test_every_phone_can_be_heard_in_the_features(sentences: list[ToySentence]) -> None:
+    """A frame's nearest phone mean is mostly its own phone's: there is something to learn."""
+    labels, rows = [], []
+    for utterance, sentence in zip(toy_utterances(12), sentences, strict=True):
+        for span in sentence.units:
+            frame = round((span.start_s + span.end_s) * 50)
+            labels.append(span.label.phone)
+            rows.append(utterance.features.values[frame, :13])
+    names, features = np.array(labels), np.array(rows)
+    means = {name: features[names == name].mean(axis=0) for name in set(labels)}
+    order = sorted(means)
+    distance = np.square(features[:, None] - np.array([means[name] for name in order])).sum(axis=-1)
+    assert np.mean(np.array(order)[distance.argmin(axis=1)] == names) > 0.8
+
+
+@pytest.fixture(scope="module")
+def recordings(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    return write_toy_recordings(tmp_path_factory.mktemp("toy") / "new", sentences=3)
+
+
+def pictures(video: Path) -> list[NDArray[np.uint8]]:
+    with av.open(str(video)) as container:
+        return [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
+
+
+def test_recordings_come_with_transcripts_and_lists(recordings: list[Path]) -> None:
+    folder = recordings[0].parent
+    sentences = toy_sentences(3)
+    assert [path.name for path in recordings] == ["toy00.mp4", "toy01.mp4", "toy02.mp4"]
+    assert sorted(path.name for path in folder.iterdir() if path.suffix == ".txt") == [
+        *("test.txt", "toy00.txt", "toy01.txt", "toy02.txt", "train.txt", "val.txt")
+    ]
+    for path, sentence in zip(recordings, sentences, strict=True):
+        assert path.with_suffix(".txt").read_text().split() == list(sentence.words)
+        assert (folder / f"{sentence.split}.txt").read_text() == f"{sentence.name}\n"
+
+
+def test_recordings_hold_the_sentences(recordings: list[Path]) -> None:
+    for path, sentence in zip(recordings, toy_sentences(3), strict=True):
+        assert len(pictures(path)) == len(toy_motion(sentence.units, FPS).values)
+        sound = read_audio(path).samples
+        count = min(len(sound), len(sentence.audio.samples))
+        assert abs(len(sound) - len(sentence.audio.samples)) < 0.1 * 16000
+        assert np.corrcoef(sound[:count], sentence.audio.samples[:count])[0, 1] > 0.95
+
+
+def test_recordings_say_what_is_wrong(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="2 toy sentences"):
+        write_toy_recordings(tmp_path / "new", sentences=2)
+    assert not (tmp_path / "new").exists()
+    with pytest.raises(InputError, match="0"):
+        write_toy_recordings(tmp_path, sentences=3, fps=0)
+    assert not list(tmp_path.iterdir())
+    (tmp_path / "file").touch()
+    with pytest.raises(ExportError, match="file"):
+        write_toy_recordings(tmp_path / "file", sentences=3)
+
+
+def tracked_opening(video: Path) -> NDArray[np.float64]:
+    """Return |13 − 14| / |33 − 263| per frame, in pixels; NaN where no face is found."""
+    mediapipe = pytest.importorskip("mediapipe")
+    openings = []
+    with mediapipe.solutions.face_mesh.FaceMesh(max_num_faces=1, refine_landmarks=True) as mesh:
+        for picture in pictures(video):
+            found = mesh.process(picture).multi_face_landmarks
+            height, width, _ = picture.shape
+            points = (
+                {i: np.array([p.x * width, p.y * height]) for i, p in enumerate(found[0].landmark)} if found else {}
+            )
+            openings.append(
+                np.linalg.norm(points[13] - points[14]) / np.linalg.norm(points[33] - points[263]) if found else np.nan
+            )
+    return np.array(openings)
+
+
+@pytest.mark.video
+def test_toy_faces_can_be_tracked(recordings: list[Path]) -> None:
+    for path, sentence in zip(recordings, toy_sentences(3), strict=True):
+        opening, known = tracked_opening(path), toy_motion(sentence.units, FPS)["opening"]
+        assert np.isfinite(opening).all()
+        assert np.corrcoef(opening, known)[0, 1] > 0.9
+        assert np.median(opening[known == 0]) < 0.3 * np.percentile(opening, 95)
