@@ -29,7 +29,7 @@ from lipmotion.corpora.store import Corpus
 from lipmotion.engines.trajectory.engine import TrajectoryEngine
 from lipmotion.measures.report import table
 from lipmotion.pipeline.explain import explanation_text
-from lipmotion.types import Explanation, Item, Progress, Span, Unit, Value
+from lipmotion.types import ChannelValue, Explanation, Item, Progress, Span, Unit
 
 EVIL = "q\x1b]52;c;aGk=\x07\x9b31m\r\nlipmotion: error: forged\n\x85\u202e\u2028\x7f"
 SHOWN = r"q\x1b]52;c;aGk=\x07\x9b31m\r\nlipmotion: error: forged\n\x85\u202e\u2028\x7f"
@@ -205,7 +205,7 @@ def test_tables_have_a_line_a_row() -> None:
     assert table(figures).count(SHOWN) == 5
     assert OBEYED.search(table(figures)) is None
     span = Span(0.0, 1.0, Unit(EVIL, EVIL, EVIL))
-    explained = Explanation(0.0, 0, span, EVIL, {EVIL: Value(0.0, 1.0)})
+    explained = Explanation(0.0, 0, span, EVIL, {EVIL: ChannelValue(0.0, 1.0)})
     assert OBEYED.search(explanation_text(explained)) is None
 
 

@@ -9,16 +9,16 @@ import pytest
 from PIL import Image
 
 from lipmotion.export.plots import COLOURS, LEFT, NARROWEST, RIGHT, ROW, TITLE, WIDEST, draw
-from lipmotion.types import ChainBelief, Channel, Generation, Motion, Span, Timeline, Trace, Unit
+from lipmotion.types import ChainPosteriors, Channel, Generation, Motion, Span, Timeline, Trace, Unit
 
 FRAMES = 400
 
 
-def belief(name: str, believed: np.ndarray, lead: np.ndarray | None = None) -> ChainBelief:
+def belief(name: str, believed: np.ndarray, lead: np.ndarray | None = None) -> ChainPosteriors:
     units = tuple(f"u{number}" for number in range(believed.shape[1]))
     leads = () if lead is None else (-1, 0, 1)
     given = np.zeros((len(believed), 0)) if lead is None else lead
-    return ChainBelief(name, units, believed.astype(np.float32), leads, given.astype(np.float32))
+    return ChainPosteriors(name, units, believed.astype(np.float32), leads, given.astype(np.float32))
 
 
 def generated(frames: int = FRAMES, name: str = "opening") -> Generation:

@@ -4,7 +4,7 @@ import pytest
 from hmm.synthetic import PAUSE, SILENCE, known_hmm, random_hmm, recordings, speaker
 from lipmotion.errors import AlignmentError
 from lipmotion.hmm.align import align_units, chain_of, choose_pronunciations, state_path
-from lipmotion.hmm.log_likelihoods import heard
+from lipmotion.hmm.log_likelihoods import log_likelihoods_of
 from oracles import sequences
 
 
@@ -28,22 +28,22 @@ def test_no_segmentation_is_better(seed):
     features = np.random.default_rng(seed).normal(0, 1.5, (10, 2)).astype(np.float32)
     units = ("sil", "b") if seed % 2 else ("a", "b")
     _, wanted, _ = sequences.best(hmm, features, [units])
-    assert align_units(hmm, heard(hmm, features), units).tolist() == wanted
+    assert align_units(hmm, log_likelihoods_of(hmm, features), units).tolist() == wanted
 
 
 def test_known_boundaries_are_found():
     who = speaker()
     transcribed, said, edges = recordings(3, 8, who)
     for utterance, units, where in zip(transcribed, said, edges, strict=True):
-        assert align_units(known_hmm(who), heard(known_hmm(who), utterance.features), units) == pytest.approx(
-            where, abs=1
-        )
+        assert align_units(
+            known_hmm(who), log_likelihoods_of(known_hmm(who), utterance.features), units
+        ) == pytest.approx(where, abs=1)
 
 
 def test_the_path_moves_one_state_at_a_time():
     hmm = random_hmm(6)
     features = np.random.default_rng(6).normal(0, 1.5, (40, 2)).astype(np.float32)
-    names, path = state_path(hmm, heard(hmm, features), ("sil", "a", "b", "sil"))
+    names, path = state_path(hmm, log_likelihoods_of(hmm, features), ("sil", "a", "b", "sil"))
     assert (path[0], path[-1]) == (0, len(names) - 1)
     assert set(np.diff(path)) <= {0, 1}
 
@@ -51,8 +51,10 @@ def test_the_path_moves_one_state_at_a_time():
 def test_too_short_a_recording_says_so():
     hmm = random_hmm(7)
     with pytest.raises(AlignmentError, match="12 states in 11 frames"):
-        align_units(hmm, heard(hmm, np.zeros((11, 2), np.float32)), ("sil", "a", "b", "sil"))
-    assert align_units(hmm, heard(hmm, np.zeros((12, 2), np.float32)), ("sil", "a", "b", "sil")).tolist() == [
+        align_units(hmm, log_likelihoods_of(hmm, np.zeros((11, 2), np.float32)), ("sil", "a", "b", "sil"))
+    assert align_units(
+        hmm, log_likelihoods_of(hmm, np.zeros((12, 2), np.float32)), ("sil", "a", "b", "sil")
+    ).tolist() == [
         0,
         3,
         6,
@@ -75,28 +77,33 @@ def test_the_pronunciation_and_the_pauses_that_were_said_are_chosen(first, last,
         wanted.append((word, variant, WORDS[word][variant]))
     wanted.append((-1, 0, (SILENCE,)))
     features, _ = who.say(np.random.default_rng(first + 2 * last), [unit for part in wanted for unit in part[2]])
-    assert choose_pronunciations(known_hmm(who), heard(known_hmm(who), features), WORDS, PAUSE) == wanted
+    assert choose_pronunciations(known_hmm(who), log_likelihoods_of(known_hmm(who), features), WORDS, PAUSE) == wanted
 
 
 def test_order_of_the_variants_changes_nothing():
     who = speaker()
     features, _ = who.say(np.random.default_rng(5), (SILENCE, "b", "c", "d", "e", "e", SILENCE))
-    straight = choose_pronunciations(known_hmm(who), heard(known_hmm(who), features), WORDS, PAUSE)
-    back = choose_pronunciations(known_hmm(who), heard(known_hmm(who), features), [word[::-1] for word in WORDS], PAUSE)
+    straight = choose_pronunciations(known_hmm(who), log_likelihoods_of(known_hmm(who), features), WORDS, PAUSE)
+    back = choose_pronunciations(
+        known_hmm(who), log_likelihoods_of(known_hmm(who), features), [word[::-1] for word in WORDS], PAUSE
+    )
     assert [part.units for part in back] == [part.units for part in straight]
 
 
 def test_words_that_do_not_fit_say_so():
     who = speaker()
     with pytest.raises(AlignmentError, match="too short"):
-        choose_pronunciations(known_hmm(who), heard(known_hmm(who), np.zeros((14, 4), np.float32)), WORDS, PAUSE)
+        choose_pronunciations(
+            known_hmm(who), log_likelihoods_of(known_hmm(who), np.zeros((14, 4), np.float32)), WORDS, PAUSE
+        )
 
 
 def test_no_words_are_silence():
     who = speaker()
     features, _ = who.say(np.random.default_rng(5), (SILENCE,))
     assert [
-        part.units for part in choose_pronunciations(known_hmm(who), heard(known_hmm(who), features), (), PAUSE)
+        part.units
+        for part in choose_pronunciations(known_hmm(who), log_likelihoods_of(known_hmm(who), features), (), PAUSE)
     ] == [(SILENCE,)] * 2
 
 
@@ -106,4 +113,4 @@ def test_pronunciations_without_number_are_refused_before_a_network_is_built():
     with pytest.raises(
         AlignmentError, match=r"4 words in all their pronunciations make \d+ arcs, required at most 1000600"
     ):
-        choose_pronunciations(hmm, heard(hmm, features), [[("a",)] * 800] * 4, PAUSE)
+        choose_pronunciations(hmm, log_likelihoods_of(hmm, features), [[("a",)] * 800] * 4, PAUSE)

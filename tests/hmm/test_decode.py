@@ -5,7 +5,7 @@ import pytest
 
 from hmm.synthetic import SILENCE, UNITS, known_hmm, random_hmm, sentences, speaker
 from lipmotion.hmm.decode import decode_units, unit_loop
-from lipmotion.hmm.log_likelihoods import heard
+from lipmotion.hmm.log_likelihoods import log_likelihoods_of
 from lipmotion.hmm.model import HmmConfig
 from oracles import sequences
 
@@ -13,7 +13,7 @@ INVENTORY = (SILENCE, "a", "b")
 
 
 def decoded(hmm, features, inventory=INVENTORY):
-    units, bounds = decode_units(unit_loop(hmm, inventory), heard(hmm, features))
+    units, bounds = decode_units(unit_loop(hmm, inventory), log_likelihoods_of(hmm, features))
     return units, bounds.tolist()
 
 

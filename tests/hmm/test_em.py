@@ -13,7 +13,7 @@ from lipmotion.hmm import em as module
 from lipmotion.hmm import train
 from lipmotion.hmm.align import chain_of
 from lipmotion.hmm.em import adapt_contexts, baum_welch, expect
-from lipmotion.hmm.log_likelihoods import heard
+from lipmotion.hmm.log_likelihoods import log_likelihoods_of
 from lipmotion.hmm.model import HmmConfig
 from oracles import chains
 
@@ -152,7 +152,7 @@ def coarticulated(count: int):
         x = utterance.features.copy()
         path = chain_of(known_hmm(who), units)
         first = {position for position, unit in enumerate(units) if unit == "a" and units[position - 1] == "d"}
-        nearest = train.state_path(known_hmm(who), heard(known_hmm(who), x), units)[1]
+        nearest = train.state_path(known_hmm(who), log_likelihoods_of(known_hmm(who), x), units)[1]
         for position in first:
             x[(path.positions[nearest] == position) & (nearest % 3 == 0)] += [0, 0, 1.5, 0]
         data.append(x)

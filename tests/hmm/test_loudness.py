@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from hmm.synthetic import PAUSE, SILENCE, known_hmm, speaker
 from lipmotion.hmm.align import align_units, choose_pronunciations
-from lipmotion.hmm.log_likelihoods import always_silent, heard, never_silent
+from lipmotion.hmm.log_likelihoods import log_likelihoods_of, penalise_silence, penalise_speech
 from lipmotion.hmm.loudness import QUIET, QUIET_REACH, loud_frames, quiet_frames
 
 
@@ -47,8 +47,8 @@ def stranger():
 def test_loud_frames_are_not_aligned_with_silence():
     hmm, features, edges, loud = stranger()
     units = (SILENCE, "a", "b", SILENCE)
-    evidence = heard(hmm, features)
-    without, bounds = (align_units(hmm, given, units) for given in (evidence, never_silent(hmm, evidence, loud)))
+    evidence = log_likelihoods_of(hmm, features)
+    without, bounds = (align_units(hmm, given, units) for given in (evidence, penalise_silence(hmm, evidence, loud)))
     assert without[3] - without[1] < 8
     assert (bounds[1], bounds[3]) == (edges[1], edges[3])
 
@@ -56,9 +56,9 @@ def test_loud_frames_are_not_aligned_with_silence():
 def test_loud_frames_are_not_chosen_as_pauses():
     hmm, features, _, loud = stranger()
     words = ((("a",),), (("b",),))
-    evidence = heard(hmm, features)
+    evidence = log_likelihoods_of(hmm, features)
     free, bound = (
-        choose_pronunciations(hmm, given, words, PAUSE) for given in (evidence, never_silent(hmm, evidence, loud))
+        choose_pronunciations(hmm, given, words, PAUSE) for given in (evidence, penalise_silence(hmm, evidence, loud))
     )
     assert PAUSE in [unit for part in free for unit in part.units]
     assert PAUSE not in [unit for part in bound for unit in part.units]
@@ -67,8 +67,8 @@ def test_loud_frames_are_not_chosen_as_pauses():
 def test_no_loud_frames_change_nothing():
     hmm, features, _, loud = stranger()
     units = (SILENCE, "a", "b", SILENCE)
-    evidence = heard(hmm, features)
-    unchanged = never_silent(hmm, evidence, loud & False)
+    evidence = log_likelihoods_of(hmm, features)
+    unchanged = penalise_silence(hmm, evidence, loud & False)
     assert np.array_equal(align_units(hmm, unchanged, units), align_units(hmm, evidence, units))
 
 
@@ -91,10 +91,10 @@ def test_quiet_frames_are_silence_whatever_they_sound_like():
     hmm, features, _, _loud = stranger()
     quiet = np.zeros(len(features), bool)
     quiet[:4] = True
-    values = always_silent(hmm, heard(hmm, features), quiet).log_density(2, 6, None)
+    values = penalise_speech(hmm, log_likelihoods_of(hmm, features), quiet).log_density(2, 6, None)
     free = [hmm.table.density(SILENCE, 0), hmm.table.density(PAUSE, 0)]
     assert set(values[:2].argmax(axis=1)) <= {hmm.table.density(SILENCE, k) for k in range(3)} | set(free)
-    plain = heard(hmm, features).log_density(2, 6, None)
+    plain = log_likelihoods_of(hmm, features).log_density(2, 6, None)
     assert np.array_equal(values[2:], plain[2:])
     assert np.array_equal(values[:, free], plain[:, free])
 

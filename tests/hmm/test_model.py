@@ -4,7 +4,7 @@ import pytest
 from hmm.synthetic import random_hmm
 from lipmotion.errors import ModelFormatError
 from lipmotion.hmm.align import align_units
-from lipmotion.hmm.log_likelihoods import heard
+from lipmotion.hmm.log_likelihoods import log_likelihoods_of
 from lipmotion.hmm.model import hmm_arrays, hmm_from_arrays
 
 
@@ -19,7 +19,8 @@ def test_models_come_back_from_arrays():
     assert back.mixtures.log_likelihood(features) == pytest.approx(hmm.mixtures.log_likelihood(features), abs=0.1)
     units = ("sil", "a", "b", "sil")
     assert np.array_equal(
-        align_units(back, heard(back, features), units), align_units(hmm, heard(hmm, features), units)
+        align_units(back, log_likelihoods_of(back, features), units),
+        align_units(hmm, log_likelihoods_of(hmm, features), units),
     )
 
 

@@ -11,7 +11,7 @@ from lipmotion.hmm import train
 from lipmotion.hmm.align import align_units, choose_pronunciations
 from lipmotion.hmm.decode import decode_units, unit_loop
 from lipmotion.hmm.em import LONGEST_SILENCE, LONGEST_STATE
-from lipmotion.hmm.log_likelihoods import heard
+from lipmotion.hmm.log_likelihoods import log_likelihoods_of
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.hmm.train import Transcribed, train_hmm
 from lipmotion.stats.bigram import estimate_bigram
@@ -43,7 +43,7 @@ def test_no_iteration_of_any_stage_lowers_the_likelihood(trained):
 def test_boundaries_are_found_within_two_frames(trained):
     hmm, _, transcribed, said, edges, _ = trained
     errors = [
-        align_units(hmm, heard(hmm, utterance.features), units) - where
+        align_units(hmm, log_likelihoods_of(hmm, utterance.features), units) - where
         for utterance, units, where in zip(transcribed, said, edges, strict=True)
     ]
     assert np.abs(np.concatenate(errors)).max() <= 2
@@ -53,7 +53,7 @@ def test_boundaries_are_found_within_two_frames(trained):
 def test_pauses_are_found_where_they_were_made(trained):
     hmm, _, transcribed, said, _, _ = trained
     for utterance, units in zip(transcribed, said, strict=True):
-        chosen = choose_pronunciations(hmm, heard(hmm, utterance.features), utterance.words, PAUSE)
+        chosen = choose_pronunciations(hmm, log_likelihoods_of(hmm, utterance.features), utterance.words, PAUSE)
         assert tuple(unit for part in chosen for unit in part.units) == units
 
 
@@ -77,7 +77,7 @@ def test_new_sentences_are_recognised(trained):
     for number, words in enumerate(sentences(99, 15)):
         units = (SILENCE, *(unit for word in words for unit in word), SILENCE)
         features, edges = who.say(np.random.default_rng([99, number]), units)
-        found, bounds = decode_units(unit_loop(hmm, (SILENCE, *UNITS)), heard(hmm, features))
+        found, bounds = decode_units(unit_loop(hmm, (SILENCE, *UNITS)), log_likelihoods_of(hmm, features))
         assert found == units, f"{set(pairwise(units)) - seen} were never seen in training"
         assert bounds == pytest.approx(edges, abs=2)
 
@@ -88,8 +88,8 @@ def test_the_order_of_utterances_changes_nothing_that_matters():
     back = train_hmm(transcribed[::-1], INVENTORY, CONFIG, silent_monitor)
     assert back.table == straight.table
     for utterance, units in zip(transcribed, said, strict=True):
-        bounds = align_units(straight, heard(straight, utterance.features), units)
-        assert np.array_equal(align_units(back, heard(back, utterance.features), units), bounds)
+        bounds = align_units(straight, log_likelihoods_of(straight, utterance.features), units)
+        assert np.array_equal(align_units(back, log_likelihoods_of(back, utterance.features), units), bounds)
 
 
 def test_the_same_data_give_the_same_models():
@@ -110,11 +110,13 @@ def test_names_of_units_change_nothing():
     for utterance, units in zip(transcribed, said, strict=True):
         new = tuple(other.get(unit, unit) for unit in units)
         assert np.array_equal(
-            align_units(again, heard(again, utterance.features), new),
-            align_units(hmm, heard(hmm, utterance.features), units),
+            align_units(again, log_likelihoods_of(again, utterance.features), new),
+            align_units(hmm, log_likelihoods_of(hmm, utterance.features), units),
         )
-        found, bounds = decode_units(unit_loop(hmm, (SILENCE, *UNITS)), heard(hmm, utterance.features))
-        same, where = decode_units(unit_loop(again, (SILENCE, *other.values())), heard(again, utterance.features))
+        found, bounds = decode_units(unit_loop(hmm, (SILENCE, *UNITS)), log_likelihoods_of(hmm, utterance.features))
+        same, where = decode_units(
+            unit_loop(again, (SILENCE, *other.values())), log_likelihoods_of(again, utterance.features)
+        )
         assert same == tuple(other.get(unit, unit) for unit in found)
         assert np.array_equal(where, bounds)
 
@@ -131,7 +133,7 @@ def test_the_pronunciation_said_is_learned():
         said.append(tuple(units))
     hmm = train_hmm(transcribed, INVENTORY, CONFIG, silent_monitor)
     for utterance, units in zip(transcribed, said, strict=True):
-        chosen = choose_pronunciations(hmm, heard(hmm, utterance.features), utterance.words, PAUSE)
+        chosen = choose_pronunciations(hmm, log_likelihoods_of(hmm, utterance.features), utterance.words, PAUSE)
         assert tuple(unit for part in chosen for unit in part.units) == units
 
 
@@ -152,7 +154,7 @@ def test_clicks_in_the_silence_behind_the_last_word_do_not_become_part_of_it():
         edges.append([*where[:-1], where[-1] + 60])
     hmm = train_hmm(transcribed, INVENTORY, CONFIG, silent_monitor)
     errors = [
-        np.abs(align_units(hmm, heard(hmm, utterance.features), units) - where).max()
+        np.abs(align_units(hmm, log_likelihoods_of(hmm, utterance.features), units) - where).max()
         for utterance, units, where in zip(transcribed, said, edges, strict=True)
     ]
     assert max(errors) <= 3

@@ -5,10 +5,10 @@ from hypothesis import strategies as st
 
 from engines.synthetic import timeline
 from lipmotion.errors import InputError
-from lipmotion.motion.frame_labels import Cut, Place, places, with_neighbours
+from lipmotion.motion.frame_labels import FullContextState, StateLayout, full_context_states, with_neighbours
 from lipmotion.types import Span, Timeline, Unit
 
-CUT = Cut(5, 7, 0.1)
+CUT = StateLayout(5, 7, 0.1)
 REST = CUT.rest
 
 
@@ -17,12 +17,14 @@ def spans(*labels: tuple[float, float, str]) -> Timeline[Unit]:
 
 
 def parts_of(units: Timeline[Unit], phone: str, parts: int = 5, edge_s: float = 0.08) -> list[int]:
-    return [place.part for place in places(units, 200, Cut(parts, 1, edge_s)) if place.unit == phone]
+    return [
+        place.part for place in full_context_states(units, 200, StateLayout(parts, 1, edge_s)) if place.unit == phone
+    ]
 
 
 def test_parts_have_names():
     assert CUT.names[:2] + CUT.names[-2:] == ["speech.0", "speech.1", "silence.5", "silence.6"]
-    assert [CUT.name(Place("t", phone, "t", 3)) for phone in ("aa", "sil", "sp")] == [
+    assert [CUT.name(FullContextState("t", phone, "t", 3)) for phone in ("aa", "sil", "sp")] == [
         "speech.3",
         "silence.3",
         "silence.3",
@@ -72,7 +74,7 @@ def test_parts_mirror_in_time(start, length, edge):
 
 
 def test_silence_rests_away_from_speech_only():
-    where = places(spans((0, 0.595, "sil"), (0.595, 0.695, "aa"), (0.695, 1.5, "sil")), 151, CUT)
+    where = full_context_states(spans((0, 0.595, "sil"), (0.595, 0.695, "aa"), (0.695, 1.5, "sil")), 151, CUT)
     rests = np.array([place == REST for place in where])
     margin = round(CUT.rest_s * 100)
     assert margin == 30
@@ -84,19 +86,19 @@ def test_silence_rests_away_from_speech_only():
 
 def test_short_silence_between_words_never_rests():
     units = spans((0, 0.1, "aa"), (0.1, 0.6, "sil"), (0.6, 0.7, "aa"))
-    assert REST not in places(units, 70, CUT)
+    assert REST not in full_context_states(units, 70, CUT)
 
 
 def test_frames_outside_all_units_rest():
-    where = places(spans((0.1, 0.2, "aa"), (0.3, 0.4, "t")), 60, CUT)
+    where = full_context_states(spans((0.1, 0.2, "aa"), (0.3, 0.4, "t")), 60, CUT)
     assert [frame for frame in range(60) if where[frame] != REST] == [*range(10, 20), *range(30, 40)]
 
 
 def test_frames_belong_to_the_unit_that_has_begun():
-    where = places(spans((0.0, 0.105, "aa"), (0.105, 0.2, "t")), 20, CUT)
+    where = full_context_states(spans((0.0, 0.105, "aa"), (0.105, 0.2, "t")), 20, CUT)
     assert [place.unit for place in where] == ["aa"] * 11 + ["t"] * 9
 
 
 def test_unknown_phones_are_named():
     with pytest.raises(InputError, match=r"'xx' at 0\.6 s"):
-        places(timeline(("xx",)), 10, CUT)
+        full_context_states(timeline(("xx",)), 10, CUT)

@@ -5,13 +5,13 @@ import pytest
 
 from lipmotion.errors import ModelFormatError
 from lipmotion.motion.closure import Closure
-from lipmotion.motion.limits import Reach, check_poses, check_rest, check_spread, reach_of
+from lipmotion.motion.limits import MotionLimits, check_poses, check_rest, check_spread, limits_of
 from lipmotion.motion.space import MotionSpace
 from lipmotion.stats.pca import Pca
 from lipmotion.types import GREY, WEIGHT, Channel
 
 POSES = np.array([[0.0, 0.5], [0.3, 0.6], [0.1, 0.55]])
-REACH = reach_of(POSES)
+REACH = limits_of(POSES)
 CLOSURE = Closure(0, 0.02, np.array([1.0, 0.2]))
 
 
@@ -51,14 +51,14 @@ def test_pins_lead_farther_and_what_follows_the_opening_with_them() -> None:
 
 
 def test_dimensions_that_do_not_move() -> None:
-    still = reach_of(np.full((3, 2), 0.5))
+    still = limits_of(np.full((3, 2), 0.5))
     still.check(np.full((4, 2), 0.501), None, {})
     check_rest(np.full(2, 0.5), still)
 
 
 def test_plausible_poses() -> None:
     check_poses(REACH, FACE, CLOSURE)
-    check_poses(Reach(REACH.low * 100, REACH.high * 100), FACE, None)  # millimetres of a table without units
+    check_poses(MotionLimits(REACH.low * 100, REACH.high * 100), FACE, None)  # millimetres of a table without units
 
 
 @pytest.mark.parametrize(
@@ -73,15 +73,15 @@ def test_plausible_poses() -> None:
 )
 def test_poses_of_no_face(low: list[float], high: list[float], closed: float) -> None:
     with pytest.raises(ValueError, match=r"opening|width"):
-        check_poses(Reach(np.array(low), np.array(high)), FACE, Closure(0, closed, np.zeros(2)))
+        check_poses(MotionLimits(np.array(low), np.array(high)), FACE, Closure(0, closed, np.zeros(2)))
 
 
 @pytest.mark.parametrize(("unit", "largest"), [(WEIGHT, 255), (GREY, 1e5), ("mm", 1e6)])
 def test_each_unit_has_its_largest_value(unit: str, largest: float) -> None:
     high = np.array([largest, 0.6])
-    check_poses(Reach(REACH.low, high), space(unit, unit), None)
+    check_poses(MotionLimits(REACH.low, high), space(unit, unit), None)
     with pytest.raises(ValueError, match="'opening' goes from 0 to"):
-        check_poses(Reach(REACH.low, high * 1.01), space(unit, unit), None)
+        check_poses(MotionLimits(REACH.low, high * 1.01), space(unit, unit), None)
 
 
 def test_points_far_from_the_face() -> None:

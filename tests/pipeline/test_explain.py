@@ -13,7 +13,7 @@ from lipmotion.errors import InputError
 from lipmotion.pipeline.explain import explanation_document, explanation_text
 from lipmotion.pipeline.model import Model
 from lipmotion.testing.toy import ToySentence
-from lipmotion.types import Explanation, Span, Unit, Value
+from lipmotion.types import ChannelValue, Explanation, Span, Unit
 
 WORDS = "See Bob, papa & mama!"
 
@@ -52,7 +52,7 @@ def test_the_last_frame_is_inside(coupled_model: Model, toy_sentence: ToySentenc
 
 def test_a_unit_whose_phone_is_not_known_has_no_phone_in_the_text() -> None:
     unit = Span(0.7, 0.9, Unit("", "bilabial"))
-    lines = explanation_text(Explanation(0.8, 80, unit, "bilabial.1", {"opening": Value(0.0, 0.1)})).splitlines()
+    lines = explanation_text(Explanation(0.8, 80, unit, "bilabial.1", {"opening": ChannelValue(0.0, 0.1)})).splitlines()
     assert lines[1] == "  phone      not known, 0.70 to 0.90 s, modelled by bilabial"
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.types import Audio, Channel, Generation, Motion, Span, Spread, Timeline, Trace, Unit
+from lipmotion.types import Audio, Channel, Generation, Motion, ReducedVariance, Span, Timeline, Trace, Unit
 
 
 def generation(frames: int = 101) -> Generation:
@@ -68,9 +68,9 @@ def test_variance_that_follows_from_few_dimensions_is_kept_as_such() -> None:
     channels = tuple(map(Channel, ("opening", "width", "outer")))
     plain = generation()
     motion = Motion(np.zeros((101, 3)), 100.0, channels)
-    small = Generation(motion, Spread(reduced, mixing), plain.units, plain.trace)
+    small = Generation(motion, ReducedVariance(reduced, mixing), plain.units, plain.trace)
     large = Generation(motion, reduced @ mixing, plain.units, plain.trace)
     for change in (lambda g: g, lambda g: g.selected(["outer", "width"]), lambda g: g.resampled(29.97)):
-        assert isinstance(change(small).spread, Spread)
+        assert isinstance(change(small).spread, ReducedVariance)
         assert change(small).variance == pytest.approx(change(large).variance)
     assert small.variance_of(slice(3, 5)) == pytest.approx(large.variance[3:5])

@@ -27,7 +27,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 def run(options: argparse.Namespace) -> None:
     """Call ``lipmotion.animate`` and ``lipmotion.write``."""
     from lipmotion.pipeline.animate import animate, check_outputs, write
-    from lipmotion.pipeline.posteriors import animate_with_beliefs, check_picture, write_beliefs
+    from lipmotion.pipeline.posteriors import animate_with_posteriors, check_picture, write_posteriors
 
     check_outputs(options.output, options.speech, rate_hz=options.rate, fps=options.fps)
     if options.posteriors:
@@ -35,8 +35,8 @@ def run(options: argparse.Namespace) -> None:
     told = speech_arguments(options)
     channels = options.channels.split(",") if options.channels is not None else None
     if options.posteriors:
-        result, beliefs = animate_with_beliefs(options.speech, **told)
-        write_beliefs(options.posteriors, result, beliefs)
+        result, beliefs = animate_with_posteriors(options.speech, **told)
+        write_posteriors(options.posteriors, result, beliefs)
     else:
         result = animate(options.speech, **told)
     about = {"speech": options.speech, "model": told["model"], "channels": channels}

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError
 from lipmotion.storage.checkpoint import NOTHING_KEPT, Checkpoint
 from lipmotion.types import (
-    ChainBelief,
+    ChainPosteriors,
+    ChannelValue,
     Constraints,
     Example,
     Explanation,
@@ -22,7 +23,6 @@ from lipmotion.types import (
     Speech,
     Timeline,
     Unit,
-    Value,
 )
 
 ModelT = TypeVar("ModelT")
@@ -102,7 +102,7 @@ class Engine(Animator[ModelT]):
                 "was trained with --engine coupled"
             )
 
-    def beliefs(self, model: ModelT, speech: Speech) -> tuple[ChainBelief, ...]:  # noqa: ARG002
+    def beliefs(self, model: ModelT, speech: Speech) -> tuple[ChainPosteriors, ...]:  # noqa: ARG002
         """Return what is believed of every chain of states over time. Raises InputError: the engine has no chains."""
         self.check_chains()
         return ()
@@ -131,5 +131,5 @@ def traced(result: Generation, frame: int) -> Explanation:
         frame,
         next((span for span in result.units if span.start_s <= time_s < span.end_s), None),
         trace.states[trace.frames[frame]],
-        {name: Value(value, deviation) for name, value, deviation in values},
+        {name: ChannelValue(value, deviation) for name, value, deviation in values},
     )

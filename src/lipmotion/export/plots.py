@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageChops, ImageDraw, ImageFont
 
-from lipmotion.types import ChainBelief, Generation
+from lipmotion.types import ChainPosteriors, Generation
 from lipmotion.units import is_silent
 
 WIDEST = 2000
@@ -57,7 +57,7 @@ class Axis:
         return values[first].astype(float)
 
 
-def draw(generation: Generation, beliefs: Sequence[ChainBelief]) -> Image.Image:
+def draw(generation: Generation, beliefs: Sequence[ChainPosteriors]) -> Image.Image:
     """Return the picture. Its rows, from above: phones, units of each chain, asynchrony, opening, time."""
     frames, rate_hz = len(generation.motion.values), generation.motion.rate_hz
     axis = Axis(frames, rate_hz, int(np.clip(2 * frames, NARROWEST, WIDEST)))
@@ -83,7 +83,7 @@ def draw(generation: Generation, beliefs: Sequence[ChainBelief]) -> Image.Image:
 
 
 def _panels(
-    axis: Axis, belief: ChainBelief, leader: str, number: int
+    axis: Axis, belief: ChainPosteriors, leader: str, number: int
 ) -> list[tuple[str, list[str], NDArray[np.uint8]]]:
     """Return title, names of rows and colours [shape=(columns, rows, 3)] of what is shown of a chain."""
     colour = COLOURS[number % len(COLOURS)]

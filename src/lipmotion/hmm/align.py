@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError
-from lipmotion.hmm.log_likelihoods import Evidence
+from lipmotion.hmm.log_likelihoods import LogLikelihoods
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.hmm.network import Network, NetworkBuilder
 
@@ -50,7 +50,7 @@ def chain_of(hmm: UnitHmm, units: Sequence[str]) -> Chain:
 
 
 def state_path(
-    hmm: UnitHmm, evidence: Evidence, units: Sequence[str]
+    hmm: UnitHmm, evidence: LogLikelihoods, units: Sequence[str]
 ) -> tuple[tuple[tuple[str, int], ...], NDArray[np.intp]]:
     """Return the states of a unit sequence (``Chain.names``) and which of them holds in each frame [shape=(T,)].
 
@@ -62,7 +62,7 @@ def state_path(
     return chain.names, path
 
 
-def align_units(hmm: UnitHmm, evidence: Evidence, units: Sequence[str]) -> NDArray[np.intp]:
+def align_units(hmm: UnitHmm, evidence: LogLikelihoods, units: Sequence[str]) -> NDArray[np.intp]:
     """Return the first frame of each unit, and the frame count at the end [shape=(len(units) + 1,)].
 
     Raises AlignmentError: fewer frames than states.
@@ -94,7 +94,7 @@ class Said(NamedTuple):
 
 
 def choose_pronunciations(
-    hmm: UnitHmm, evidence: Evidence, words: Sequence[Sequence[Sequence[str]]], pause: str
+    hmm: UnitHmm, evidence: LogLikelihoods, words: Sequence[Sequence[Sequence[str]]], pause: str
 ) -> list[Said]:
     """Choose how each word was said, and where there was a pause.
 
@@ -130,7 +130,7 @@ def choose_pronunciations(
     return [said for _, said in sorted({owners[state] for state in path})]
 
 
-def _check_room(hmm: UnitHmm, evidence: Evidence, words: Sequence[Sequence[Sequence[str]]]) -> None:
+def _check_room(hmm: UnitHmm, evidence: LogLikelihoods, words: Sequence[Sequence[Sequence[str]]]) -> None:
     """Raise AlignmentError before a network is built that no path fits through, or that may fill the memory."""
     states = _states_of(hmm, words)
     least = sum(min(states[id(variants)]) for variants in words)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.hmm.log_likelihoods import Evidence
+from lipmotion.hmm.log_likelihoods import LogLikelihoods
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.hmm.network import Network, NetworkBuilder
 from lipmotion.hmm.states import Context
@@ -52,7 +52,7 @@ def unit_loop(hmm: UnitHmm, inventory: Sequence[str]) -> UnitLoop:
 
 
 def decode_units(
-    loop: UnitLoop, evidence: Evidence, beam: float | None = None
+    loop: UnitLoop, evidence: LogLikelihoods, beam: float | None = None
 ) -> tuple[tuple[str, ...], NDArray[np.intp]]:
     """Return the units said, and the first frame of each with the frame count at the end.
 

@@ -13,7 +13,7 @@ from lipmotion.hmm.model import UnitHmm
 from lipmotion.hmm.states import StateTable
 from lipmotion.kernels.forward_backward import IMPOSSIBLE, chain_posteriors
 from lipmotion.stats.mixture import Mixtures
-from lipmotion.types import Each
+from lipmotion.types import ParallelMap
 
 CELLS = 1_000_000
 """Frames × utterances × states whose posteriors are computed together: 8 MB an array, some fifty in all."""
@@ -25,7 +25,7 @@ closure of a stop that begins every other sentence takes the silence before it f
 
 
 def baum_welch(
-    hmm: UnitHmm, data: Sequence[NDArray[np.float32]], sequences: Sequence[tuple[str, ...]], each: Each = map
+    hmm: UnitHmm, data: Sequence[NDArray[np.float32]], sequences: Sequence[tuple[str, ...]], each: ParallelMap = map
 ) -> tuple[UnitHmm, float]:
     """Take one embedded Baum–Welch step.
 
@@ -41,7 +41,7 @@ def baum_welch(
 
 
 def adapt_contexts(
-    hmm: UnitHmm, data: Sequence[NDArray[np.float32]], sequences: Sequence[tuple[str, ...]], each: Each = map
+    hmm: UnitHmm, data: Sequence[NDArray[np.float32]], sequences: Sequence[tuple[str, ...]], each: ParallelMap = map
 ) -> tuple[UnitHmm, float | None]:
     """Take one step of adapting the states in context to their data, those without context as their prior.
 
@@ -69,7 +69,7 @@ def maximised(hmm: UnitHmm, statistics: Statistics, data: Sequence[NDArray[np.fl
 
 
 def expect(
-    hmm: UnitHmm, data: Sequence[NDArray[np.float32]], sequences: Sequence[tuple[str, ...]], each: Each = map
+    hmm: UnitHmm, data: Sequence[NDArray[np.float32]], sequences: Sequence[tuple[str, ...]], each: ParallelMap = map
 ) -> Statistics:
     """Return what the utterances say about every state (the E-step)."""
     statistics = Statistics(hmm)
@@ -77,8 +77,8 @@ def expect(
     groups = list(batches([len(x) for x in data], states))
     jobs = (_Batch(hmm, [data[i] for i in batch], [sequences[i] for i in batch]) for batch in groups)
     for batch, (found, log_likelihood, frames) in zip(groups, each(_heard, jobs), strict=True):
-        for i, heard in zip(batch, found, strict=True):
-            statistics.add(data[i], heard)
+        for i, utterance_statistics in zip(batch, found, strict=True):
+            statistics.add(data[i], utterance_statistics)
         statistics.count(log_likelihood, frames)
     return statistics
 
@@ -93,7 +93,7 @@ class _Batch:
 
 
 @dataclass(frozen=True, eq=False)
-class Heard:
+class UtteranceStatistics:
     """What one utterance says about the states of its chain.
 
     plain    : [shape=(S,)], the states' numbers without context
@@ -109,14 +109,16 @@ class Heard:
     shares: NDArray[np.float32]
 
 
-def heard(chain: Chain, posterior: NDArray[np.float64], stay: NDArray[np.float64]) -> Heard:
+def utterance_statistics(
+    chain: Chain, posterior: NDArray[np.float64], stay: NDArray[np.float64]
+) -> UtteranceStatistics:
     """Return what an utterance says whose state posteriors are known."""
     frame, state = np.nonzero(posterior > LEAST_POSTERIOR)
     shares = posterior[frame, state].astype(np.float32)
-    return Heard(chain.plain, stay, posterior.sum(axis=0), frame, chain.densities[state], shares)
+    return UtteranceStatistics(chain.plain, stay, posterior.sum(axis=0), frame, chain.densities[state], shares)
 
 
-def _heard(batch: _Batch) -> tuple[list[Heard], float, int]:
+def _heard(batch: _Batch) -> tuple[list[UtteranceStatistics], float, int]:
     """Return what each utterance says, their log likelihood, and the frames of those that are possible."""
     hmm, chains = batch.hmm, [chain_of(batch.hmm, sequence) for sequence in batch.sequences]
     frames = np.array([len(x) for x in batch.data], np.intp)
@@ -130,7 +132,8 @@ def _heard(batch: _Batch) -> tuple[list[Heard], float, int]:
     log_move = np.log(-np.expm1(log_stay))
     posterior, stay, log_likelihood = chain_posteriors(log_emission, log_stay, log_move, frames, states)
     found = [
-        heard(chain, posterior[: frames[u], u, : states[u]], stay[u, : states[u]]) for u, chain in enumerate(chains)
+        utterance_statistics(chain, posterior[: frames[u], u, : states[u]], stay[u, : states[u]])
+        for u, chain in enumerate(chains)
     ]
     possible = log_likelihood > IMPOSSIBLE / 2
     return found, float(log_likelihood[possible].sum()), int(frames[possible].sum())
@@ -169,13 +172,13 @@ class Statistics:
         """Per frame."""
         return self._log_likelihood / max(self._frames, 1)
 
-    def add(self, x: NDArray[np.float32], heard: Heard) -> None:
+    def add(self, x: NDArray[np.float32], utterance_statistics: UtteranceStatistics) -> None:
         """Add one utterance with features ``x``."""
-        np.add.at(self._stay, heard.plain, heard.stay)
-        np.add.at(self._occupied, heard.plain, heard.occupied)
-        self._densities.append(heard.densities)
-        self._shares.append(heard.shares)
-        self._rows.append(heard.frames + self._seen)
+        np.add.at(self._stay, utterance_statistics.plain, utterance_statistics.stay)
+        np.add.at(self._occupied, utterance_statistics.plain, utterance_statistics.occupied)
+        self._densities.append(utterance_statistics.densities)
+        self._shares.append(utterance_statistics.shares)
+        self._rows.append(utterance_statistics.frames + self._seen)
         self._features.append(x)
         self._seen += len(x)
 

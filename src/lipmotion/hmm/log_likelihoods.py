@@ -20,7 +20,7 @@ Chosen = NDArray[np.intp] | None
 
 
 @dataclass(frozen=True, eq=False)
-class Evidence:
+class LogLikelihoods:
     """Log densities, computed when they are asked for: those of an hour do not fit into the memory.
 
     frames      : T
@@ -31,12 +31,14 @@ class Evidence:
     log_density: Callable[[int, int, Chosen], NDArray[np.float32]]
 
 
-def heard(hmm: UnitHmm, features: NDArray[np.float32]) -> Evidence:
+def log_likelihoods_of(hmm: UnitHmm, features: NDArray[np.float32]) -> LogLikelihoods:
     """Return what features [shape=(T, D)] say to the models they were made for."""
-    return Evidence(len(features), lambda first, end, chosen: hmm.mixtures.log_likelihood(features[first:end], chosen))
+    return LogLikelihoods(
+        len(features), lambda first, end, chosen: hmm.mixtures.log_likelihood(features[first:end], chosen)
+    )
 
 
-def never_silent(hmm: UnitHmm, evidence: Evidence, loud: NDArray[np.bool_]) -> Evidence:
+def penalise_silence(hmm: UnitHmm, evidence: LogLikelihoods, loud: NDArray[np.bool_]) -> LogLikelihoods:
     """Return evidence that makes silence improbable in loud frames [shape=(T,)], for forced alignment.
 
     A voice that the models do not know is, to them, hardly more like speech than like silence; its energy says which.
@@ -44,7 +46,7 @@ def never_silent(hmm: UnitHmm, evidence: Evidence, loud: NDArray[np.bool_]) -> E
     return _without(evidence, loud, _silent_densities(hmm), LOUD_SILENCE)
 
 
-def always_silent(hmm: UnitHmm, evidence: Evidence, quiet: NDArray[np.bool_]) -> Evidence:
+def penalise_speech(hmm: UnitHmm, evidence: LogLikelihoods, quiet: NDArray[np.bool_]) -> LogLikelihoods:
     """Return evidence that makes all but silence improbable in quiet frames [shape=(T,)]."""
     return _without(evidence, quiet, ~_silent_densities(hmm), QUIET_SPEECH)
 
@@ -54,7 +56,9 @@ def _silent_densities(hmm: UnitHmm) -> NDArray[np.bool_]:
     return np.isin(np.arange(len(hmm.table.names)), free)
 
 
-def _without(evidence: Evidence, frames: NDArray[np.bool_], densities: NDArray[np.bool_], loss: float) -> Evidence:
+def _without(
+    evidence: LogLikelihoods, frames: NDArray[np.bool_], densities: NDArray[np.bool_], loss: float
+) -> LogLikelihoods:
     """Return evidence in which some densities lose something in some frames."""
 
     def log_density(first: int, end: int, chosen: Chosen) -> NDArray[np.float32]:
@@ -63,4 +67,4 @@ def _without(evidence: Evidence, frames: NDArray[np.bool_], densities: NDArray[n
         values[np.ix_(frames[first:end], lost)] -= loss
         return values
 
-    return Evidence(evidence.frames, log_density)
+    return LogLikelihoods(evidence.frames, log_density)

@@ -12,7 +12,7 @@ from lipmotion.errors import InputError
 from lipmotion.hmm.network import Network
 from lipmotion.kernels.network import Expectation
 from lipmotion.stats.mixture import Mixtures, Quadratic, with_squares
-from lipmotion.types import Each
+from lipmotion.types import ParallelMap
 
 CELLS = 1_000_000
 """Frames × components whose posteriors are computed together: 4 MB an array, a few of them."""
@@ -25,7 +25,7 @@ def em_step(
     network: Network,
     data: Sequence[NDArray[np.float32]],
     floor: NDArray[np.float32],
-    each: Each = map,
+    each: ParallelMap = map,
 ) -> tuple[Mixtures, Network, float]:
     """Take one step of expectation and maximisation.
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError
-from lipmotion.hmm.log_likelihoods import Evidence
+from lipmotion.hmm.log_likelihoods import LogLikelihoods
 from lipmotion.kernels.arcs import Layout, laid_out
 from lipmotion.kernels.network import Expectation
 from lipmotion.kernels.viterbi import best_path
@@ -39,7 +39,7 @@ class Network:
         return Expectation.of(self.arc_from, self.arc_log, self.arc_start, self.log_initial, self.log_final)
 
     def best_path(
-        self, evidence: Evidence, chosen: NDArray[np.intp] | None = None, beam: float | None = None
+        self, evidence: LogLikelihoods, chosen: NDArray[np.intp] | None = None, beam: float | None = None
     ) -> NDArray[np.intp]:
         """Return the best path's states [shape=(T,)].
 

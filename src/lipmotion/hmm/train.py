@@ -12,15 +12,15 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError, CorpusError
 from lipmotion.hmm.align import Chain, chain_of, choose_pronunciations, state_path
-from lipmotion.hmm.em import Statistics, adapt_contexts, baum_welch, heard, longest, maximised
-from lipmotion.hmm.log_likelihoods import heard as evidence_of
+from lipmotion.hmm.em import Statistics, adapt_contexts, baum_welch, longest, maximised, utterance_statistics
+from lipmotion.hmm.log_likelihoods import log_likelihoods_of
 from lipmotion.hmm.loudness import loud_frames
 from lipmotion.hmm.model import HmmConfig, UnitHmm, hmm_arrays, hmm_from_arrays
 from lipmotion.hmm.states import plain_states
 from lipmotion.stats.bigram import estimate_bigram
 from lipmotion.stats.mixture import single_gaussian
 from lipmotion.storage.checkpoint import NOTHING_KEPT, Checkpoint
-from lipmotion.types import Each, Monitor, Progress
+from lipmotion.types import Monitor, ParallelMap, Progress
 
 AT_A_TIME = 32
 """Utterances whose pronunciations are chosen together, by one worker."""
@@ -71,7 +71,7 @@ def train_hmm(
     config: HmmConfig,
     monitor: Monitor,
     checkpoint: Checkpoint = NOTHING_KEPT,
-    each: Each = map,
+    each: ParallelMap = map,
 ) -> UnitHmm:
     """Train models of every unit that the utterances say.
 
@@ -122,7 +122,7 @@ class _Training:
     """The steps of training, each from one state to the next, over the same utterances."""
 
     def __init__(
-        self, utterances: Sequence[Transcribed], inventory: UnitInventory, config: HmmConfig, each: Each
+        self, utterances: Sequence[Transcribed], inventory: UnitInventory, config: HmmConfig, each: ParallelMap
     ) -> None:
         self._utterances, self._inventory, self._config, self._each = utterances, inventory, config, each
         self._data = [utterance.features for utterance in utterances]
@@ -214,9 +214,9 @@ class _Heard:
     before: Sequence[tuple[str, ...]]
 
 
-def _pronounced_all(heard: _Heard, inventory: UnitInventory) -> list[tuple[str, ...]]:
-    pairs = zip(heard.utterances, heard.before, strict=True)
-    return [_pronounced(heard.hmm, utterance, before, inventory) for utterance, before in pairs]
+def _pronounced_all(job: _Heard, inventory: UnitInventory) -> list[tuple[str, ...]]:
+    pairs = zip(job.utterances, job.before, strict=True)
+    return [_pronounced(job.hmm, utterance, before, inventory) for utterance, before in pairs]
 
 
 def _pronounced(
@@ -226,7 +226,7 @@ def _pronounced(
     known = set(hmm.table.units)
     words = [[v for v in variants if set(v) <= known] or variants[:1] for variants in utterance.words]
     try:
-        chosen = choose_pronunciations(hmm, evidence_of(hmm, utterance.features), words, inventory.pause)
+        chosen = choose_pronunciations(hmm, log_likelihoods_of(hmm, utterance.features), words, inventory.pause)
     except AlignmentError:
         return before
     sequence = tuple(unit for said in chosen for unit in said.units)
@@ -252,7 +252,7 @@ def _flat_start(
         chain = chain_of(hmm, sequence)
         posterior = np.zeros((len(x), len(chain.plain)))
         posterior[np.arange(len(x)), _even_path(x[:, inventory.energy], chain, len(sequence))] = 1
-        statistics.add(x, heard(chain, posterior, np.zeros(len(chain.plain))))
+        statistics.add(x, utterance_statistics(chain, posterior, np.zeros(len(chain.plain))))
     return replace(hmm, mixtures=maximised(hmm, statistics, data))
 
 
@@ -285,7 +285,7 @@ def _frequent_contexts(
     frames: Counter[str] = Counter()
     for x, sequence in zip(data, sequences, strict=True):
         if len(x) >= sum(hmm.table.count(unit) for unit in sequence):
-            names, path = state_path(hmm, evidence_of(hmm, x), sequence)
+            names, path = state_path(hmm, log_likelihoods_of(hmm, x), sequence)
             frames.update(names[position][0] for position in path)
     frequent = {name for name, count in frames.items() if count >= hmm.config.context_frames}
     return tuple(sorted(frequent - set(hmm.table.names)))

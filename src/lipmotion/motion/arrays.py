@@ -18,7 +18,7 @@ SINGLE = UNIT_SETS["phone"]
 """Each phone its own unit: needs no table."""
 
 
-def frame_arrays(units: UnitSet, space: MotionSpace, closure: Closure | None) -> dict[str, NDArray[Any]]:
+def motion_arrays(units: UnitSet, space: MotionSpace, closure: Closure | None) -> dict[str, NDArray[Any]]:
     """Return them as arrays."""
     arrays: dict[str, NDArray[Any]] = {
         "channels": np.array([(channel.name, channel.unit) for channel in space.channels]),
@@ -33,7 +33,7 @@ def frame_arrays(units: UnitSet, space: MotionSpace, closure: Closure | None) ->
     return arrays
 
 
-def frame_from_arrays(arrays: Arrays, units: str) -> tuple[UnitSet, MotionSpace, Closure | None]:
+def motion_from_arrays(arrays: Arrays, units: str) -> tuple[UnitSet, MotionSpace, Closure | None]:
     """Return them again.
 
     units : the name of the unit set; the set itself is in the arrays
@@ -58,7 +58,7 @@ POINTS = {
 }
 CLOSURE = {"closure": Member(np.float64, "2"), "closure_follow": Member(np.float64, "Q")}
 UNITS = {"units": Member(np.str_, "N 2")}
-FRAME = (*CHANNELS, *POINTS, *CLOSURE, *UNITS)
+MOTION_ARRAYS = (*CHANNELS, *POINTS, *CLOSURE, *UNITS)
 """How they are stored: P channels, of which R are reduced to K dimensions."""
 
 

@@ -87,7 +87,7 @@ def closing_frames(
     return frames
 
 
-def learned_closure(
+def fit_closure_of(
     names: Sequence[str], values: Sequence[NDArray[np.float64]], examples: Sequence[Example]
 ) -> Closure | None:
     """Return how the lips of some examples close; None where nothing is called ``opening``.

@@ -26,7 +26,7 @@ WINDOW = {
 
 
 @dataclass(frozen=True, eq=False)
-class AudioWindow:
+class AcousticContext:
     """Standardised features at ``OFFSETS`` around a frame, projected on their F main axes.
 
     mean, scale : float32 arrays [shape=(D·len(OFFSETS),)]
@@ -46,7 +46,7 @@ class AudioWindow:
         return np.asarray(inputs @ self.basis, np.float32)
 
 
-def fit_window(recordings: Iterable[NDArray[np.float32]], size: int) -> AudioWindow:
+def fit_acoustic_context(recordings: Iterable[NDArray[np.float32]], size: int) -> AcousticContext:
     """Return the window of some recordings' features [each shape=(T, D)] with ``size`` axes at most."""
     count, total, products = 0, np.zeros(0), np.zeros(0)
     for features in recordings:
@@ -63,17 +63,17 @@ def fit_window(recordings: Iterable[NDArray[np.float32]], size: int) -> AudioWin
     basis = axes[:, ::-1][:, :size]
     basis = basis * np.where(basis[np.abs(basis).argmax(axis=0), np.arange(basis.shape[1])] < 0, -1.0, 1.0)
     factor = SCALE / np.sqrt(basis.shape[1])
-    return AudioWindow(*(array.astype(np.float32) for array in (mean, scale, basis * factor)))
+    return AcousticContext(*(array.astype(np.float32) for array in (mean, scale, basis * factor)))
 
 
-def window_from(found: Checked) -> AudioWindow:
+def acoustic_context_from(found: Checked) -> AcousticContext:
     """Return a stored window, as ``WINDOW`` says. Raises ValueError: a scale that is not more than 0."""
     mean, scale = found["window"]
     if not (scale > 0).all():
         raise ValueError("window of features of no spread")
     if not found["window_basis"].any(axis=0).all():
         raise ValueError("window_basis with an axis of zeros")
-    return AudioWindow(mean, scale, found["window_basis"])
+    return AcousticContext(mean, scale, found["window_basis"])
 
 
 def _surroundings(features: NDArray[np.float32], frames: NDArray[np.intp] | slice) -> NDArray[np.float32]:

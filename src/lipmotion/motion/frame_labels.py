@@ -17,7 +17,7 @@ RESTING = -1
 """The part of silence that is no part of it."""
 
 
-class Place(NamedTuple):
+class FullContextState(NamedTuple):
     """A part of a unit between its neighbours."""
 
     left: str
@@ -32,7 +32,7 @@ class Place(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Cut:
+class StateLayout:
     """How units are cut into parts.
 
     speech, silence : parts of a unit, and of one that is silence only; odd numbers
@@ -50,7 +50,7 @@ class Cut:
         """Return how many parts a unit has."""
         return self.silence if self.units.silent(unit) else self.speech
 
-    def name(self, place: Place) -> str:
+    def name(self, place: FullContextState) -> str:
         """Return the part alone, as ``speech.2`` or ``silence.6``."""
         return f"{'silence' if self.units.silent(place.unit) else 'speech'}.{place.part}"
 
@@ -61,10 +61,10 @@ class Cut:
         return [f"{kind}.{part}" for kind, count in kinds for part in range(count)]
 
     @property
-    def rest(self) -> Place:
+    def rest(self) -> FullContextState:
         """The place of frames in silence away from speech."""
         quiet = self.units.unit(SILENCE)
-        return Place(quiet, quiet, quiet, RESTING)
+        return FullContextState(quiet, quiet, quiet, RESTING)
 
     @property
     def rest_s(self) -> float:
@@ -78,7 +78,7 @@ def with_neighbours(units: Timeline[Unit]) -> Iterator[tuple[str, Span[Unit], st
     return zip(phones, units, phones[2:], strict=False)
 
 
-def named(spans: Timeline[Unit], units: UnitSet) -> Timeline[Unit]:
+def with_unit_names(spans: Timeline[Unit], units: UnitSet) -> Timeline[Unit]:
     """Return the timeline with the unit of each phone named, between its neighbours; units without phones stay."""
     quiet = units.unit(SILENCE)
     said = [quiet, *(units.unit_of(span.label) for span in spans), quiet]
@@ -89,7 +89,7 @@ def named(spans: Timeline[Unit], units: UnitSet) -> Timeline[Unit]:
     return Timeline(tuple(found))
 
 
-def places(units: Timeline[Unit], frames: int, cut: Cut) -> list[Place]:
+def full_context_states(units: Timeline[Unit], frames: int, cut: StateLayout) -> list[FullContextState]:
     """Return the place of every frame [length ``frames``].
 
     Silence (the phone, whatever its unit) further than ``cut.rest_s`` from speech, and frames outside all units, are
@@ -108,7 +108,7 @@ def places(units: Timeline[Unit], frames: int, cut: Cut) -> list[Place]:
         rests = _rests(time_s, left, span, right, cut.rest_s)
         part = _parts(time_s, span.start_s, span.end_s, cut.parts(unit), cut.edge_s)
         for i in np.nonzero(~rests)[0]:
-            result[first + i] = Place(before, unit, after, int(part[i]))
+            result[first + i] = FullContextState(before, unit, after, int(part[i]))
     return result
 
 

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError
 from lipmotion.kernels.banded import generate
 from lipmotion.motion.closure import OPENING, Closure, closing_frames
-from lipmotion.motion.limits import Reach
+from lipmotion.motion.limits import MotionLimits
 from lipmotion.motion.space import MotionSpace
-from lipmotion.types import FRAME_RATE_HZ, WEIGHT, Constraints, Spread, check_magnitude, frame_of
+from lipmotion.types import FRAME_RATE_HZ, WEIGHT, Constraints, ReducedVariance, check_magnitude, frame_of
 
 STRETCH, MARGIN = 6000, 500
 """Frames generated at a time, and those around them that are generated again and thrown away: what lies seconds off
@@ -31,25 +31,25 @@ def generated_motion(
     statistics: Callable[[slice], Statistics],
     frames: int,
     space: MotionSpace,
-    reach: Reach,
+    reach: MotionLimits,
     *,
     closure: Closure | None,
     closing: Sequence[slice],
     pins: Pins,
-) -> tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]] | Spread]:
+) -> tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]] | ReducedVariance]:
     """Return the motion of all channels [shape=(T, P)] and its variance, by parameter generation.
 
     statistics : gives means and precisions of some frames
     reach      : between which values the model's poses lie
     closure    : how the lips close (None: the motion has no opening);  closing : the frames in which they must
-    pins       : from ``resolved``
+    pins       : from ``resolved_pins``
     Raises ModelFormatError: the motion leaves all that the model's poses, and the pins, span.
     """
     is_long = frames > DOUBLE_FRAMES
     precise = np.float32 if is_long else np.float64
     motion = np.empty((frames, len(space.channels)), precise)
     spread = np.empty((frames, space.dimensions if is_long else len(space.channels)), precise)
-    for inner, outer in stretches(frames):
+    for inner, outer in generation_blocks(frames):
         inside = {(frame - outer.start, c): v for (frame, c), v in pins.items() if outer.start <= frame < outer.stop}
         spans = [
             slice(span.start - outer.start, span.stop - outer.start)
@@ -64,10 +64,10 @@ def generated_motion(
         spread[inner] = variance if is_long else restored
     weights = [channel.unit == WEIGHT for channel in space.channels]
     motion[:, weights] = np.maximum(motion[:, weights], 0)
-    return motion, Spread(spread, space.mixing.astype(precise)) if is_long else spread
+    return motion, ReducedVariance(spread, space.mixing.astype(precise)) if is_long else spread
 
 
-def resolved(constraints: Constraints | None, space: MotionSpace, frames: int) -> Pins:
+def resolved_pins(constraints: Constraints | None, space: MotionSpace, frames: int) -> Pins:
     """Return what is pinned, by frame and dimension. Raises InputError: it cannot be."""
     names = space.direct_names
     pins: Pins = {}
@@ -89,7 +89,7 @@ def resolved(constraints: Constraints | None, space: MotionSpace, frames: int) -
     return pins
 
 
-def stretches(frames: int) -> Iterator[tuple[slice, slice]]:
+def generation_blocks(frames: int) -> Iterator[tuple[slice, slice]]:
     """Give the frames of each stretch, and those with what lies around it; a shorter recording is one stretch."""
     for start in range(0, frames, STRETCH):
         stop = min(start + STRETCH, frames)

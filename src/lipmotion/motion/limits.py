@@ -30,7 +30,7 @@ FAR_REST = 3.0
 LEAST_SPAN = 1e-3
 
 
-class Reach(NamedTuple):
+class MotionLimits(NamedTuple):
     """Between which values poses, or motion, of a model lie.
 
     low, high : [shape=(Q,)]
@@ -44,9 +44,9 @@ class Reach(NamedTuple):
         """How far apart they are."""
         return self.high - self.low
 
-    def widened(self, deviation: NDArray[np.floating]) -> Reach:
+    def widened(self, deviation: NDArray[np.floating]) -> MotionLimits:
         """Return a reach of ``DEVIATIONS`` more to both sides."""
-        return Reach(self.low - DEVIATIONS * deviation, self.high + DEVIATIONS * deviation)
+        return MotionLimits(self.low - DEVIATIONS * deviation, self.high + DEVIATIONS * deviation)
 
     def check(self, values: Array, closure: Closure | None, pins: Mapping[tuple[int, int], float]) -> None:
         """Raise ModelFormatError where motion [shape=(T, Q)] goes that the model, and pins, do not lead to."""
@@ -66,12 +66,12 @@ class Reach(NamedTuple):
             )
 
 
-def reach_of(poses: NDArray[np.floating]) -> Reach:
+def limits_of(poses: NDArray[np.floating]) -> MotionLimits:
     """Return between which values poses [shape=(N, Q)] lie."""
-    return Reach(poses.min(axis=0).astype(float), poses.max(axis=0).astype(float))
+    return MotionLimits(poses.min(axis=0).astype(float), poses.max(axis=0).astype(float))
 
 
-def check_poses(reach: Reach, space: MotionSpace, closure: Closure | None) -> None:
+def check_poses(reach: MotionLimits, space: MotionSpace, closure: Closure | None) -> None:
     """Raise ValueError where a model's poses are none of a face, or do not fit the other things it knows."""
     count = len(space.direct)
     for column, channel in enumerate(space.direct):
@@ -84,7 +84,7 @@ def check_poses(reach: Reach, space: MotionSpace, closure: Closure | None) -> No
         _check_opening(float(reach.low[closure.column]), float(reach.high[closure.column]), closure.closed)
 
 
-def check_rest(rest: Array, reach: Reach) -> None:
+def check_rest(rest: Array, reach: MotionLimits) -> None:
     """Raise ValueError where the pose at rest [shape=(Q,)] is far from all other poses."""
     away = np.maximum(reach.low - rest, rest - reach.high) / _span(reach.low, reach.high)
     column = int(away.argmax())

@@ -77,7 +77,7 @@ def fit_space(channels: tuple[Channel, ...], seen: NDArray[np.float64], componen
     return MotionSpace(channels, np.nonzero(~is_point)[0].astype(np.intp), points)
 
 
-def motion_in_space(examples: Sequence[Example], components: int) -> tuple[MotionSpace, list[NDArray[np.float64]]]:
+def fit_reduced_motion(examples: Sequence[Example], components: int) -> tuple[MotionSpace, list[NDArray[np.float64]]]:
     """Return the space of some examples' motion, and the motion of each in it [each shape=(T, Q)].
 
     Raises CorpusError: no motion was seen, or the examples have different channels.

@@ -9,7 +9,7 @@ from lipmotion.errors import ExportError, InputError
 from lipmotion.export.base import MOTION_SUFFIXES, check_motion, write_motion
 from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.pipeline.understand import heard
+from lipmotion.pipeline.understand import understand
 from lipmotion.speech.read import read_audio
 from lipmotion.storage.files import as_text, check_distinct, check_target
 from lipmotion.types import Audio, Constraints, Generation, Timeline, Unit
@@ -48,7 +48,7 @@ def animate(
     """
     chosen = model if isinstance(model, Model) else load_model(model)
     audio = speech if isinstance(speech, Audio) else read_audio(Path(speech))
-    known = heard(chosen, audio, transcript=transcript, units=units, lexicon=lexicon, recogniser=recogniser)
+    known = understand(chosen, audio, transcript=transcript, units=units, lexicon=lexicon, recogniser=recogniser)
     del audio  # of a long recording it is much
     return chosen.engine.generate(chosen.learned, known, constraints)
 

@@ -11,7 +11,7 @@ from typing import Any
 from lipmotion.errors import InputError
 from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.pipeline.understand import heard
+from lipmotion.pipeline.understand import understand
 from lipmotion.printable import printable
 from lipmotion.speech.mfcc import frame_count
 from lipmotion.speech.read import read_audio
@@ -19,13 +19,13 @@ from lipmotion.types import (
     FRAME_RATE_HZ,
     Audio,
     ChainStates,
+    ChannelValue,
+    DominantGaussian,
     Explanation,
-    Gaussian,
-    Likely,
-    Regression,
+    NamedProbability,
+    RegressedMean,
     Timeline,
     Unit,
-    Value,
     frame_of,
 )
 from lipmotion.units import Lexicon
@@ -59,7 +59,7 @@ def explain(
     times = [at_s] if isinstance(at_s, int | float) else at_s
     count = frame_count(audio.samples)
     frames = [_frame(time_s, count) for time_s in times]
-    known = heard(chosen, audio, transcript=transcript, units=units, lexicon=lexicon, recogniser=recogniser)
+    known = understand(chosen, audio, transcript=transcript, units=units, lexicon=lexicon, recogniser=recogniser)
     return chosen.engine.explain(chosen.learned, known, frames)
 
 
@@ -120,7 +120,7 @@ def _phone(explanation: Explanation) -> str:
     return f"{phone}{word}, {span.start_s:.2f} to {span.end_s:.2f} s, modelled by {span.label.unit}"
 
 
-def _listed(found: Sequence[Likely]) -> str:
+def _listed(found: Sequence[NamedProbability]) -> str:
     return "   ".join(f"{one.name} {one.probability:.2f}" for one in found)
 
 
@@ -132,19 +132,19 @@ def _lead(chain: ChainStates, first: str) -> str:
     return f"{chain.name} {abs(chain.expected_lead):.2f} states {side} {first}   ({shares})"
 
 
-def _gaussian(gaussian: Gaussian) -> str:
+def _gaussian(gaussian: DominantGaussian) -> str:
     number = f" number {gaussian.component} of {gaussian.components}" if gaussian.components > 1 else ""
     distance = f", {gaussian.distance:.2f} deviations away" if gaussian.distance is not None else ""
     return f"{gaussian.density}{number}, responsible for {gaussian.responsibility:.2f}{distance}"
 
 
-def _followed(regression: Regression) -> str:
+def _followed(regression: RegressedMean) -> str:
     if regression.shares[0].name == "rest":
         return "the pose at rest: silence away from speech"
     return f"follows what is heard and believed around the frame: {_listed(regression.shares)}"
 
 
-def _values(channels: Mapping[str, Value]) -> Iterator[tuple[str, str]]:
+def _values(channels: Mapping[str, ChannelValue]) -> Iterator[tuple[str, str]]:
     names = [name for name in channels if name[:2] not in ("x_", "y_", "z_")] or list(channels)
     for start in range(0, min(len(names), SHOWN), 3):
         shown = names[start : min(start + 3, SHOWN)]

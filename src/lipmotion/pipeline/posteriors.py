@@ -7,17 +7,17 @@ from pathlib import Path
 from lipmotion.errors import ExportError
 from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.understand import heard
+from lipmotion.pipeline.understand import understand
 from lipmotion.speech.read import read_audio
 from lipmotion.storage.files import check_target, whole_file
-from lipmotion.types import ChainBelief, Generation, Timeline, Unit
+from lipmotion.types import ChainPosteriors, Generation, Timeline, Unit
 from lipmotion.units import Lexicon
 
 SUFFIX = ".png"
 
 
 @one_thread()
-def animate_with_beliefs(
+def animate_with_posteriors(
     speech: str | Path,
     *,
     model: Model,
@@ -25,14 +25,14 @@ def animate_with_beliefs(
     units: Timeline[Unit] | None = None,
     lexicon: Lexicon | None = None,
     recogniser: str = "auto",
-) -> tuple[Generation, tuple[ChainBelief, ...]]:
+) -> tuple[Generation, tuple[ChainPosteriors, ...]]:
     """Return what ``animate`` does, and what every chain of the model believes over time.
 
     Raises InputError: as ``animate``, or the model's engine has no chains of states.
     """
     engine, learned = model.engine, model.learned
     engine.check_chains()
-    told = heard(
+    told = understand(
         model, read_audio(Path(speech)), transcript=transcript, units=units, lexicon=lexicon, recogniser=recogniser
     )
     return engine.generate(learned, told), engine.beliefs(learned, told)
@@ -45,7 +45,7 @@ def check_picture(path: Path, speech: Path | None = None) -> None:
     check_target(path, speech)
 
 
-def write_beliefs(path: Path, generation: Generation, beliefs: tuple[ChainBelief, ...]) -> None:
+def write_posteriors(path: Path, generation: Generation, beliefs: tuple[ChainPosteriors, ...]) -> None:
     """Write a picture of what chains believe over time (docs/explain.md).
 
     Raises ExportError: another suffix, or the file cannot be written.

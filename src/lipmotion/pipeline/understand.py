@@ -25,7 +25,7 @@ LATE_S = 0.1
 LOG = logging.getLogger("lipmotion")
 
 
-def heard(
+def understand(
     model: Model,
     audio: Audio,
     *,

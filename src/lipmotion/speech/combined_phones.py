@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.hmm.log_likelihoods import Chosen, Evidence
+from lipmotion.hmm.log_likelihoods import Chosen, LogLikelihoods
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.hmm.states import StateTable
 from lipmotion.speech.general.acoustic import column, general_model
@@ -80,7 +80,7 @@ def _bigram(own: Bigram, units: tuple[str, ...]) -> Bigram:
 
 def joint_evidence(
     joint: Joint, own_features: NDArray[np.float32], trust: float, general: NDArray[np.float32]
-) -> Evidence:
+) -> LogLikelihoods:
     """Return what both models say about a recording: the sum of their log densities.
 
     own_features : for the own models [shape=(T, 39)]
@@ -97,4 +97,4 @@ def joint_evidence(
             values += np.float32(trust) * joint.hmm.mixtures.log_likelihood(own_features[first:end], chosen)
         return values
 
-    return Evidence(len(general), log_density)
+    return LogLikelihoods(len(general), log_density)

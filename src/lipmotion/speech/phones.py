@@ -9,7 +9,7 @@ from lipmotion.hmm.model import HmmConfig, UnitHmm
 from lipmotion.hmm.train import Transcribed, UnitInventory, train_hmm
 from lipmotion.speech.mfcc import LOG_ENERGY, mfcc
 from lipmotion.storage.checkpoint import NOTHING_KEPT, Checkpoint
-from lipmotion.types import Audio, Each, Monitor
+from lipmotion.types import Audio, Monitor, ParallelMap
 from lipmotion.units import PAUSE, SILENCE, Lexicon
 
 TURNS = (1.0, 0.88, 1.0, 0.94, 1.12, 1.06)
@@ -24,7 +24,7 @@ def train_phones(
     config: HmmConfig,
     monitor: Monitor,
     checkpoint: Checkpoint = NOTHING_KEPT,
-    each: Each = map,
+    each: ParallelMap = map,
 ) -> UnitHmm:
     """Train phone models from recordings and the words said in them.
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import AlignmentError, InputError
 from lipmotion.hmm.align import align_units, choose_pronunciations
 from lipmotion.hmm.decode import UnitLoop, decode_units, unit_loop
-from lipmotion.hmm.log_likelihoods import Evidence, always_silent, heard, never_silent
+from lipmotion.hmm.log_likelihoods import LogLikelihoods, log_likelihoods_of, penalise_silence, penalise_speech
 from lipmotion.hmm.loudness import loud_frames, quiet_frames
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.speech.adaptation import Adaptation
@@ -86,7 +86,7 @@ class Recogniser:
         Raises MissingDependencyError: as ``recognise``.
         """
         hmm, evidence = self._evidence(audio, features, aligning=True)
-        evidence = never_silent(hmm, evidence, loud_frames(features.values[:, LOG_ENERGY], LOUD_FRAMES))
+        evidence = penalise_silence(hmm, evidence, loud_frames(features.values[:, LOG_ENERGY], LOUD_FRAMES))
         known_words = {word: lexicon.pronunciations(word) for word in set(words)}
         variants = [known_words[word] for word in words]
         known = [unit for unit in hmm.table.units if not is_silent(unit)]
@@ -141,14 +141,14 @@ class Recogniser:
     def _knows_little(self) -> bool:
         return self.own.mixtures.size[1] <= FEW_GAUSSIANS
 
-    def _evidence(self, audio: Audio, features: Features, aligning: bool = False) -> tuple[UnitHmm, Evidence]:
+    def _evidence(self, audio: Audio, features: Features, aligning: bool = False) -> tuple[UnitHmm, LogLikelihoods]:
         alone = self.kind == "general" or (aligning and self.kind == "auto" and self._knows_little)
         hmm, evidence = self._said(audio, features, alone)
-        return hmm, always_silent(hmm, evidence, quiet_frames(log_energy(audio.samples)))
+        return hmm, penalise_speech(hmm, evidence, quiet_frames(log_energy(audio.samples)))
 
-    def _said(self, audio: Audio, features: Features, general_alone: bool) -> tuple[UnitHmm, Evidence]:
+    def _said(self, audio: Audio, features: Features, general_alone: bool) -> tuple[UnitHmm, LogLikelihoods]:
         if self.kind == "own":
-            return self.own, heard(self.own, self._own_features(audio, features)[0])
+            return self.own, log_likelihoods_of(self.own, self._own_features(audio, features)[0])
         own, trust = (features.values, 0.0) if general_alone else self._own_features(audio, features)
         if trust == 0:  # they are not heard, and those of a long recording are large
             own = features.values

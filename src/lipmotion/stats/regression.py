@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Moments:
+class RegressionStatistics:
     """Sums over frames of inputs z [shape=(F,)] and what they should explain, r [shape=(P,)]; they grow in place.
 
     products : Σ z zᵀ [shape=(F, F)]
@@ -30,16 +30,16 @@ class Moments:
         np.add(self.products, z.T @ z, out=self.products)
         np.add(self.targets, z.T @ r, out=self.targets)
 
-    def __add__(self, other: Moments) -> Moments:
-        return Moments(self.products + other.products, self.targets + other.targets)
+    def __add__(self, other: RegressionStatistics) -> RegressionStatistics:
+        return RegressionStatistics(self.products + other.products, self.targets + other.targets)
 
 
-def no_moments(inputs: int, outputs: int) -> Moments:
+def zero_statistics(inputs: int, outputs: int) -> RegressionStatistics:
     """Return the sums over no frames."""
-    return Moments(np.zeros((inputs, inputs)), np.zeros((inputs, outputs)))
+    return RegressionStatistics(np.zeros((inputs, inputs)), np.zeros((inputs, outputs)))
 
 
-def ridge(moments: Moments, prior: Array, strength: float) -> Array:
+def ridge(moments: RegressionStatistics, prior: Array, strength: float) -> Array:
     """Return the coefficients [shape=(F, P)] that explain the targets best, near those expected beforehand.
 
     prior    : [shape=(F, P)]
@@ -55,7 +55,9 @@ def owner(tree: Tree, path: list[int], least: float) -> int:
     return next((node for node in reversed(path) if tree.frames[node] >= least), 0)
 
 
-def fit_tree(tree: Tree, moments: Mapping[int, Moments], shared: Array, strength: float) -> dict[int, Array]:
+def fit_tree(
+    tree: Tree, moments: Mapping[int, RegressionStatistics], shared: Array, strength: float
+) -> dict[int, Array]:
     """Return the coefficients of every owner [shape=(F, P)]: each node's are drawn towards those of the one above.
 
     moments : of the frames of the leaves that each owner stands for

@@ -1,18 +1,18 @@
 """The data that flows. Plain frozen values; nothing here computes more than a look-up."""
 
 from lipmotion.types.audio import Audio
-from lipmotion.types.each import Each
+from lipmotion.types.each import ParallelMap
 from lipmotion.types.explanation import (
-    ChainBelief,
+    ChainPosteriors,
     ChainStates,
+    ChannelValue,
+    DominantGaussian,
     Explanation,
-    Gaussian,
-    Likely,
-    Regression,
-    Value,
+    NamedProbability,
+    RegressedMean,
 )
 from lipmotion.types.features import FRAME_RATE_HZ, Features, frame_of
-from lipmotion.types.generation import Constraints, Example, Generation, Pin, Speech, Spread, Trace
+from lipmotion.types.generation import Constraints, Example, Generation, Pin, ReducedVariance, Speech, Trace
 from lipmotion.types.motion import EYE_DISTANCE, GREY, WEIGHT, Channel, Motion, check_curves, check_magnitude
 from lipmotion.types.progress import Item, Monitor, Progress, counted, part_of, silent_monitor
 from lipmotion.types.timeline import Span, Timeline, Unit
@@ -24,32 +24,32 @@ __all__ = [
     "GREY",
     "WEIGHT",
     "Audio",
-    "ChainBelief",
+    "ChainPosteriors",
     "ChainStates",
     "Channel",
+    "ChannelValue",
     "Constraints",
-    "Each",
+    "DominantGaussian",
     "Example",
     "Explanation",
     "Features",
-    "Gaussian",
     "Generation",
     "Item",
-    "Likely",
     "Monitor",
     "Motion",
+    "NamedProbability",
+    "ParallelMap",
     "Pin",
     "Progress",
-    "Regression",
+    "ReducedVariance",
+    "RegressedMean",
     "Span",
     "Speech",
-    "Spread",
     "Timeline",
     "Trace",
     "Track",
     "Unit",
     "Utterance",
-    "Value",
     "check_curves",
     "check_magnitude",
     "counted",

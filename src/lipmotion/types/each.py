@@ -9,7 +9,7 @@ GivenT = TypeVar("GivenT")
 FoundT = TypeVar("FoundT")
 
 
-class Each(Protocol):
+class ParallelMap(Protocol):
     """As the built-in ``map``: results in the order of the items. In other processes, function and items are copied."""
 
     def __call__(self, function: Callable[[GivenT], FoundT], items: Iterable[GivenT], /) -> Iterator[FoundT]:

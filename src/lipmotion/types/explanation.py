@@ -12,7 +12,7 @@ from lipmotion.types.timeline import Span, Unit
 
 
 @dataclass(frozen=True)
-class Likely:
+class NamedProbability:
     """Something by name, and its probability."""
 
     name: str
@@ -20,7 +20,7 @@ class Likely:
 
 
 @dataclass(frozen=True)
-class Value:
+class ChannelValue:
     """A value of a channel and its standard deviation, in the channel's unit."""
 
     value: float
@@ -38,7 +38,7 @@ class ChainStates:
     """
 
     name: str
-    states: tuple[Likely, ...]
+    states: tuple[NamedProbability, ...]
     lead: Mapping[int, float] = field(default_factory=dict)
 
     @property
@@ -48,7 +48,7 @@ class ChainStates:
 
 
 @dataclass(frozen=True)
-class Gaussian:
+class DominantGaussian:
     """The mixture component that most of a frame comes from, in one stream.
 
     density, component, components : the mixture's name; which of its Gaussians this is, from 1; how many there are
@@ -64,11 +64,11 @@ class Gaussian:
     components: int
     responsibility: float
     distance: float | None
-    channels: Mapping[str, Value]
+    channels: Mapping[str, ChannelValue]
 
 
 @dataclass(frozen=True)
-class Regression:
+class RegressedMean:
     """The mean of a stream where it is not that of a density: it follows what is heard and believed around the frame.
 
     shares   : how much each regression says, largest first; ``rest`` in silence away from speech
@@ -76,8 +76,8 @@ class Regression:
     """
 
     stream: str
-    shares: tuple[Likely, ...]
-    channels: Mapping[str, Value]
+    shares: tuple[NamedProbability, ...]
+    channels: Mapping[str, ChannelValue]
 
 
 @dataclass(frozen=True)
@@ -96,15 +96,15 @@ class Explanation:
     frame: int
     span: Span[Unit] | None
     state: str
-    motion: Mapping[str, Value]
+    motion: Mapping[str, ChannelValue]
     chains: tuple[ChainStates, ...] = ()
-    joint: Likely | None = None
-    gaussians: tuple[Gaussian, ...] = ()
-    regressions: tuple[Regression, ...] = ()
+    joint: NamedProbability | None = None
+    gaussians: tuple[DominantGaussian, ...] = ()
+    regressions: tuple[RegressedMean, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
-class ChainBelief:
+class ChainPosteriors:
     """What is believed of one chain over time.
 
     name, units : its unit set

@@ -72,7 +72,7 @@ class Trace:
 
 
 @dataclass(frozen=True, eq=False)
-class Spread:
+class ReducedVariance:
     """Variances of P channels that follow from those of fewer dimensions: a long recording's are large.
 
     reduced : float array [shape=(T, Q)]
@@ -95,7 +95,7 @@ class Generation:
     """
 
     motion: Motion
-    spread: NDArray[np.floating[Any]] | Spread
+    spread: NDArray[np.floating[Any]] | ReducedVariance
     units: Timeline[Unit]
     trace: Trace
 
@@ -106,7 +106,7 @@ class Generation:
 
     def variance_of(self, frames: slice) -> NDArray[np.floating[Any]]:
         """Return the variance of every channel in some frames."""
-        if isinstance(self.spread, Spread):
+        if isinstance(self.spread, ReducedVariance):
             return self.spread.reduced[frames] @ self.spread.mixing
         return self.spread[frames]
 
@@ -115,7 +115,7 @@ class Generation:
         columns = [self.motion.column(name) for name in names]
         channels = tuple(self.motion.channels[column] for column in columns)
         motion = Motion(self.motion.values[:, columns], self.motion.rate_hz, channels)
-        if isinstance(self.spread, Spread):
+        if isinstance(self.spread, ReducedVariance):
             return replace(self, motion=motion, spread=replace(self.spread, mixing=self.spread.mixing[:, columns]))
         return replace(self, motion=motion, spread=self.spread[:, columns])
 
@@ -129,8 +129,8 @@ class Generation:
         nearest = np.minimum(np.round(motion.time_s * self.motion.rate_hz).astype(int), len(self.trace.frames) - 1)
         return replace(self, motion=motion, spread=spread, trace=Trace(self.trace.states, self.trace.frames[nearest]))
 
-    def _spread_at(self, time_s: NDArray[np.float64]) -> NDArray[np.floating[Any]] | Spread:
-        if isinstance(self.spread, Spread):
+    def _spread_at(self, time_s: NDArray[np.float64]) -> NDArray[np.floating[Any]] | ReducedVariance:
+        if isinstance(self.spread, ReducedVariance):
             reduced = between_frames(self.spread.reduced, self.motion.rate_hz, time_s)
             return replace(self.spread, reduced=reduced)
         return between_frames(self.spread, self.motion.rate_hz, time_s)

@@ -19,7 +19,7 @@ from lipmotion.engines.coupled.explanation import (
     units_believed,
 )
 from lipmotion.motion import generation
-from lipmotion.types import Explanation, Likely
+from lipmotion.types import Explanation, NamedProbability
 from lipmotion.types.progress import silent_monitor
 from lipmotion.units import VISEME_OF
 from oracles import coupled as oracle
@@ -173,7 +173,7 @@ def test_in_silence_away_from_speech_the_mean_is_the_pose_at_rest():
     model, inferred = fitted("ph-vi-CHMM")
     assert model.resting(inferred.posteriors.chains[0])[5]
     (found,) = explanation("ph-vi-CHMM", 5).regressions
-    assert found.shares == (Likely("rest", 1.0),)
+    assert found.shares == (NamedProbability("rest", 1.0),)
     assert found.channels["opening"].value == pytest.approx(model.rest[0])
 
 

@@ -8,9 +8,9 @@ import pytest
 from engines.synthetic import examples
 from lipmotion.engines.trajectory.engine import TrajectoryConfig
 from lipmotion.engines.trajectory.train import fit_trajectory
-from lipmotion.motion.context_window import OFFSETS, SCALE, fit_window
-from lipmotion.motion.frame_labels import places
-from lipmotion.stats.regression import fit_tree, no_moments, owner, ridge
+from lipmotion.motion.context_window import OFFSETS, SCALE, fit_acoustic_context
+from lipmotion.motion.frame_labels import full_context_states
+from lipmotion.stats.regression import fit_tree, owner, ridge, zero_statistics
 from lipmotion.stats.trees import Question, Tree
 from lipmotion.types.progress import silent_monitor
 
@@ -18,7 +18,7 @@ HOW = TrajectoryConfig(parts=3, silent_parts=7, components=2, axes=20, ridge=10.
 
 
 def moments_of(z, r):
-    moments = no_moments(z.shape[1], r.shape[1])
+    moments = zero_statistics(z.shape[1], r.shape[1])
     moments.add(z.astype(np.float32), r.astype(np.float32))
     return moments
 
@@ -78,7 +78,7 @@ def test_moments_add_up():
 def test_the_window_hears_features_around_a_frame_and_no_further():
     draw = np.random.default_rng(0)
     recordings = [draw.normal(size=(80, 3)).astype(np.float32) for _ in range(4)]
-    window = fit_window(recordings, 10)
+    window = fit_acoustic_context(recordings, 10)
     x = recordings[0]
     z = window(x, slice(None))
     assert z.shape == (80, 10)
@@ -90,11 +90,17 @@ def test_the_window_hears_features_around_a_frame_and_no_further():
     everything = np.concatenate([window(one, slice(None)) for one in recordings])
     assert everything.mean(axis=0) == pytest.approx(np.zeros(10), abs=0.05)
     assert np.cov(everything.T) == pytest.approx(np.diag(np.diag(np.cov(everything.T))), abs=0.15)
-    assert SCALE * 0.5 < np.sqrt(np.square(fit_window(recordings, 33)(x, slice(None))).sum(axis=1).mean()) < SCALE * 1.5
+    assert (
+        SCALE * 0.5
+        < np.sqrt(np.square(fit_acoustic_context(recordings, 33)(x, slice(None))).sum(axis=1).mean())
+        < SCALE * 1.5
+    )
 
 
 def test_a_window_has_no_more_axes_than_there_are():
-    assert fit_window([np.random.default_rng(0).normal(size=(50, 2)).astype(np.float32)], 300).basis.shape == (22, 22)
+    assert fit_acoustic_context(
+        [np.random.default_rng(0).normal(size=(50, 2)).astype(np.float32)], 300
+    ).basis.shape == (22, 22)
 
 
 def loud_and_soft(count):
@@ -112,7 +118,9 @@ def loud_and_soft(count):
 def error(model, corpus):
     squares = []
     for one in corpus:
-        rows = np.array([model.emission.row(p, HOW.cut) for p in places(one.speech.units, len(one.valid), HOW.cut)])
+        rows = np.array(
+            [model.emission.row(p, HOW.cut) for p in full_context_states(one.speech.units, len(one.valid), HOW.cut)]
+        )
         means, _ = model.emission.statistics(rows, one.speech.features.values, slice(None))
         squares.append((means[:, 0, 0] - one.motion["opening"])[60:-60] ** 2)
     return float(np.sqrt(np.concatenate(squares).mean()))

@@ -9,7 +9,7 @@ import pytest
 from engines.synthetic import examples
 from lipmotion.engines.trajectory import generation_error as module
 from lipmotion.engines.trajectory.engine import TrajectoryConfig
-from lipmotion.engines.trajectory.train import fit_trajectory, observed_of
+from lipmotion.engines.trajectory.train import fit_trajectory, training_clip
 from lipmotion.engines.trajectory.training_data import rows_of
 from lipmotion.kernels.banded import generate
 from lipmotion.types.progress import silent_monitor
@@ -22,7 +22,7 @@ def start():
     corpus = examples(6)
     model = fit_trajectory(corpus, HOW, silent_monitor)
     values = [model.space.reduce(one.motion.values) for one in corpus]
-    return model.emission, [observed_of(one, x, HOW.cut) for one, x in zip(corpus, values, strict=True)]
+    return model.emission, [training_clip(one, x, HOW.cut) for one, x in zip(corpus, values, strict=True)]
 
 
 def error(emission, observed):

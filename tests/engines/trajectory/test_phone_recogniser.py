@@ -22,7 +22,7 @@ def phones(units):
 
 def fitted(corpus, checkpoint=NOTHING_KEPT):
     values = [one.motion.values[:, :2] for one in corpus]
-    return module.fit_listener(corpus, values, silent_monitor, checkpoint)
+    return module.fit_phone_recogniser(corpus, values, silent_monitor, checkpoint)
 
 
 @pytest.fixture(scope="module")
@@ -70,15 +70,15 @@ def test_a_recording_shorter_than_any_phone_is_left_to_others(listener):
 
 
 def test_a_listener_comes_back_from_arrays(listener):
-    arrays = module.listener_arrays(listener)
-    again = module.listener_from_arrays(arrays)
+    arrays = module.recogniser_arrays(listener)
+    again = module.recogniser_from_arrays(arrays)
     assert again.typical == listener.typical
     spoken = speech(timeline(SENTENCE), seed=3)
     assert phones(again.phones(spoken)) == phones(listener.phones(spoken))
-    assert module.listener_from_arrays({"means": np.zeros(3)}) is None
+    assert module.recogniser_from_arrays({"means": np.zeros(3)}) is None
     for name in arrays:
         with pytest.raises((ModelFormatError, KeyError, ValueError)):
-            module.listener_from_arrays({key: array for key, array in arrays.items() if key != name})
+            module.recogniser_from_arrays({key: array for key, array in arrays.items() if key != name})
 
 
 def test_what_was_trained_is_kept(corpus, listener, tmp_path, monkeypatch):
@@ -87,9 +87,11 @@ def test_what_was_trained_is_kept(corpus, listener, tmp_path, monkeypatch):
     first = fitted(corpus, checkpoint)
     monkeypatch.setattr(module, "train_joint", lambda *_: pytest.fail("trained again"))
     again = fitted(corpus, checkpoint)
-    for one, two in zip(module.listener_arrays(first).values(), module.listener_arrays(again).values(), strict=True):
+    for one, two in zip(
+        module.recogniser_arrays(first).values(), module.recogniser_arrays(again).values(), strict=True
+    ):
         assert one.tobytes() == two.tobytes()
-    assert module.listener_arrays(first)["joint_typical"] == listener.typical
+    assert module.recogniser_arrays(first)["joint_typical"] == listener.typical
 
 
 def test_the_engine_listens_if_there_is_speech_enough(monkeypatch):

@@ -6,7 +6,7 @@ import pytest
 from engines.synthetic import examples
 from lipmotion.engines.trajectory.engine import TrajectoryConfig
 from lipmotion.engines.trajectory.train import LEAST_VARIANCE, fit_trajectory
-from lipmotion.motion.frame_labels import Cut, Place, places
+from lipmotion.motion.frame_labels import FullContextState, StateLayout, full_context_states
 from lipmotion.types.progress import silent_monitor
 
 HOW = replace(TrajectoryConfig(parts=3, silent_parts=7, components=2, listens=False).learning)
@@ -22,7 +22,7 @@ def frames_by_density(corpus, emission):
     found: dict[int, list[list[float]]] = {}
     for example in corpus:
         x = example.motion["opening"]
-        for t, place in list(enumerate(places(example.speech.units, len(x), CUT)))[1:-1]:
+        for t, place in list(enumerate(full_context_states(example.speech.units, len(x), CUT)))[1:-1]:
             row = [x[t], (x[t + 1] - x[t - 1]) / 2, x[t + 1] - 2 * x[t] + x[t - 1]]
             found.setdefault(emission.row(place, CUT), []).append(row)
     return {density: np.array(rows) for density, rows in found.items()}
@@ -53,7 +53,8 @@ def test_shrinkage_draws_leaves_together():
 def test_trees_tell_apart_what_moves_apart():
     emission = fit(examples(12)).emission
     middle = {
-        phone: emission.means[emission.row(Place("t", phone, "s", 1), CUT), 0, 0] for phone in ("aa", "iy", "uw", "p")
+        phone: emission.means[emission.row(FullContextState("t", phone, "s", 1), CUT), 0, 0]
+        for phone in ("aa", "iy", "uw", "p")
     }
     assert middle["aa"] > middle["iy"] + 0.1
     assert middle["iy"] > middle["p"] + 0.05
@@ -75,14 +76,14 @@ def test_a_channel_that_never_moves_keeps_a_variance():
         example.motion.values[:, 1] = 0.0
     emission = fit(corpus, listens=True, axes=20).emission
     assert (emission.variances >= LEAST_VARIANCE / 1e4).all()
-    rows = np.array([emission.row(place, CUT) for place in places(corpus[0].speech.units, 99, CUT)])
+    rows = np.array([emission.row(place, CUT) for place in full_context_states(corpus[0].speech.units, 99, CUT)])
     for statistic in emission.statistics(rows, corpus[0].speech.features.values, slice(0, 99)):
         assert np.isfinite(statistic).all()
 
 
 def test_the_source_of_a_place_says_what_its_density_rests_on():
     emission = fit(examples(6)).emission
-    said = emission.source(Place("t", "aa", "p", 1), CUT)
+    said = emission.source(FullContextState("t", "aa", "p", 1), CUT)
     assert said.startswith("t-aa+p speech.1: ")
     assert said.endswith(" frames)")
     assert emission.source(CUT.rest, CUT) == "rest"
@@ -91,10 +92,12 @@ def test_the_source_of_a_place_says_what_its_density_rests_on():
 def test_phones_never_heard_resolve_like_those_of_their_class():
     emission = fit(examples(8)).emission
     for phone in ("zh", "oy", "em"):
-        assert 0 <= emission.row(Place("zh", phone, "ng", 2), CUT) < len(emission.means) - 1
-    assert emission.row(Place("t", "sp", "t", 6), CUT) == emission.row(Place("t", "sil", "t", 6), CUT)
+        assert 0 <= emission.row(FullContextState("zh", phone, "ng", 2), CUT) < len(emission.means) - 1
+    assert emission.row(FullContextState("t", "sp", "t", 6), CUT) == emission.row(
+        FullContextState("t", "sil", "t", 6), CUT
+    )
 
 
 def test_silence_may_be_cut_finer_than_speech():
-    emission = fit(examples(4), cut=Cut(1, 3, 0.1)).emission
+    emission = fit(examples(4), cut=StateLayout(1, 3, 0.1)).emission
     assert list(emission.forest) == ["speech.0", "silence.0", "silence.1", "silence.2"]

@@ -10,7 +10,7 @@ from engines.synthetic import OPENINGS, examples, speech, timeline
 from lipmotion.engines import Engine, engine_named
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.motion.closure import closing_spans
-from lipmotion.motion.frame_labels import Cut, places
+from lipmotion.motion.frame_labels import StateLayout, full_context_states
 from lipmotion.types import Generation
 from lipmotion.types.progress import silent_monitor
 from lipmotion.units import LIP_CLOSING, PHONES, UNIT_SETS, unit_set
@@ -107,8 +107,8 @@ def test_the_mouth_rests_in_silence_whatever_its_unit(name):
 
 
 def test_silence_that_is_a_closed_mouth_is_cut_as_speech():
-    cut = Cut(3, 7, 0.1, unit_set("2vis"))
-    where = places(timeline(("p", "aa")), 141, cut)
+    cut = StateLayout(3, 7, 0.1, unit_set("2vis"))
+    where = full_context_states(timeline(("p", "aa")), 141, cut)
     assert {place.unit for place in where} == {"open", "closed"}
     assert {cut.name(place) for place in where if place != cut.rest} == {"speech.0", "speech.1", "speech.2"}
     assert where[0] == where[-1] == cut.rest
@@ -117,8 +117,8 @@ def test_silence_that_is_a_closed_mouth_is_cut_as_speech():
 
 def test_lips_that_meet_between_others_do_not_rest():
     """All three are units of silence, too, and the part may have the number of silence's middle one."""
-    cut = Cut(5, 5, 0.1, unit_set("2vis"))
-    assert cut.rest not in places(timeline(("p", "b", "m")), 150, cut)[60:90]
+    cut = StateLayout(5, 5, 0.1, unit_set("2vis"))
+    assert cut.rest not in full_context_states(timeline(("p", "b", "m")), 150, cut)[60:90]
 
 
 def table_model(folder: Path) -> tuple[Engine, dict]:

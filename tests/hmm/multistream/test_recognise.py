@@ -6,7 +6,7 @@ import pytest
 from hmm.multistream.synthetic import observed, random_joint, utterances
 from lipmotion.errors import AlignmentError, InputError
 from lipmotion.hmm.decode import decode_units, unit_loop
-from lipmotion.hmm.log_likelihoods import heard
+from lipmotion.hmm.log_likelihoods import log_likelihoods_of
 from lipmotion.hmm.model import HmmConfig, UnitHmm
 from lipmotion.hmm.multistream.inventory import states_of
 from lipmotion.hmm.multistream.model import HEARD_ONLY
@@ -125,7 +125,7 @@ def test_speech_alone_is_the_plain_model():
     plain = UnitHmm(config, table, part.tied.mixtures.picked(np.array(leaves)), hmm.log_stay, hmm.bigram)
     data = observed(np.random.default_rng(9), 60, (SPEECH,))
     rows = part.scale.inside(data.streams[SPEECH])
-    units, bounds = decode_units(unit_loop(plain, ["sil", "a", "b"]), heard(plain, part.tied.values(rows)))
+    units, bounds = decode_units(unit_loop(plain, ["sil", "a", "b"]), log_likelihoods_of(plain, part.tied.values(rows)))
     said = JointRecogniser(hmm).recognise(data)
     assert tuple(s.unit for s in said) == units
     assert [s.first for s in said] == bounds[:-1].tolist()

@@ -19,8 +19,8 @@ from lipmotion.engines.coupled.config import CoupledConfig
 from lipmotion.engines.coupled.conversion.regression import OFFSETS, Following, Surroundings
 from lipmotion.engines.coupled.model import CoupledModel
 from lipmotion.errors import InputError, ModelFormatError
-from lipmotion.motion.arrays import FRAME, SINGLE, frame_arrays, frame_from_arrays
-from lipmotion.motion.context_window import FEATURES, WINDOW, window_from
+from lipmotion.motion.arrays import MOTION_ARRAYS, SINGLE, motion_arrays, motion_from_arrays
+from lipmotion.motion.context_window import FEATURES, WINDOW, acoustic_context_from
 from lipmotion.motion.limits import check_poses, check_rest
 from lipmotion.stats.bigram import check_sums
 from lipmotion.stats.mixture import MIXTURES, mixtures_from
@@ -43,7 +43,7 @@ def coupled_arrays(model: CoupledModel) -> dict[str, NDArray[Any]]:
     """Return a model as arrays; its configuration is not among them."""
     chains = model.chains
     product = chains.transitions.product
-    arrays = frame_arrays(SINGLE, model.space, model.closure) | {
+    arrays = motion_arrays(SINGLE, model.space, model.closure) | {
         "gain": model.gain,
         "rest": model.rest,
         "streams": np.array(chains.streams),
@@ -101,7 +101,7 @@ def _follow_arrays(model: CoupledModel) -> dict[str, NDArray[Any]]:
 def coupled_from_arrays(arrays: Arrays, config: CoupledConfig) -> CoupledModel:
     """Return the model again. Raises ModelFormatError: something is missing, out of place or out of range."""
     try:
-        _, space, closure = frame_from_arrays(arrays, SINGLE.name)
+        _, space, closure = motion_from_arrays(arrays, SINGLE.name)
         structure = _structure(arrays, config)
         poses = checked(arrays, POSES, Q=space.dimensions)
         streams = tuple(poses["streams"].tolist())
@@ -167,7 +167,7 @@ def _check_names(arrays: Arrays, structure: Structure, streams: int) -> None:
         for key in table
     )
     group = (f"group_{number}/{key}" for number in range(streams) for key in GROUP)
-    only(arrays, FRAME, POSES, PAIRS, chain, seen, group, (f"around/{key}" for key in AROUND))
+    only(arrays, MOTION_ARRAYS, POSES, PAIRS, chain, seen, group, (f"around/{key}" for key in AROUND))
 
 
 def _structure(arrays: Arrays, config: CoupledConfig) -> Structure:
@@ -236,7 +236,7 @@ def _follow(
     checked(mine, AROUND, N=structure.counts[0])
     axes = mine["window_basis"].shape[1] + mine["belief"].shape[1] * len(OFFSETS)
     found = checked(mine, AROUND, N=structure.counts[0], I=axes)
-    around = Surroundings(window_from(found), found["belief"], found["mean"], found["basis"])
+    around = Surroundings(acoustic_context_from(found), found["belief"], found["mean"], found["basis"])
     following = []
     for number, stream in enumerate(visual):
         count = structure.counts[structure.chain_of(number + 1)]

@@ -23,12 +23,12 @@ from lipmotion.engines.coupled.training.fit import fit_coupled
 from lipmotion.engines.coupled.training.train import allowed_units
 from lipmotion.kernels.banded import generate
 from lipmotion.motion.closure import closing_spans
-from lipmotion.motion.generation import Statistics, generated_motion, resolved, stretches
+from lipmotion.motion.generation import Statistics, generated_motion, generation_blocks, resolved_pins
 from lipmotion.motion.variance_scaling import scaled
 from lipmotion.storage.checkpoint import NOTHING_KEPT, Checkpoint
 from lipmotion.types import (
     FRAME_RATE_HZ,
-    ChainBelief,
+    ChainPosteriors,
     Constraints,
     Example,
     Explanation,
@@ -91,7 +91,7 @@ class CoupledEngine(Engine[CoupledModel]):
             model.reach,
             closure=model.closure,
             closing=closing_spans(speech.units, frames) if self.config.closures else [],
-            pins=resolved(constraints, model.space, frames),
+            pins=resolved_pins(constraints, model.space, frames),
         )
         states, places = np.unique(path, return_inverse=True)
         return Generation(
@@ -136,7 +136,7 @@ class CoupledEngine(Engine[CoupledModel]):
     def explain(self, model: CoupledModel, speech: Speech, frames: Sequence[int]) -> tuple[Explanation, ...]:  # noqa: D102
         result = self.generate(model, speech)
         features, found = np.asarray(speech.features.values), dict[int, Explanation]()
-        for inner, outer in stretches(len(features)):
+        for inner, outer in generation_blocks(len(features)):
             inside = [frame for frame in frames if inner.start <= frame < inner.stop]
             if inside:
                 inferred = self.inferred(model, features[outer], self.lattice(model, speech, outer))
@@ -149,9 +149,9 @@ class CoupledEngine(Engine[CoupledModel]):
         """Whether it has chains of states that ``beliefs`` tells of."""
         return True
 
-    def beliefs(self, model: CoupledModel, speech: Speech) -> tuple[ChainBelief, ...]:  # noqa: D102
+    def beliefs(self, model: CoupledModel, speech: Speech) -> tuple[ChainPosteriors, ...]:  # noqa: D102
         features, found = np.asarray(speech.features.values), []
-        for inner, outer in stretches(len(features)):
+        for inner, outer in generation_blocks(len(features)):
             inferred = self.inferred(model, features[outer], self.lattice(model, speech, outer))
             kept = slice(inner.start - outer.start, inner.stop - outer.start)
             found.append(units_believed(model.chains, inferred.posteriors, kept))

@@ -17,7 +17,15 @@ from lipmotion.engines.coupled.chains.visual_streams import VisualStream
 from lipmotion.engines.coupled.conversion.em import group_of
 from lipmotion.engines.coupled.conversion.regression import gates
 from lipmotion.engines.coupled.model import CoupledModel
-from lipmotion.types import ChainBelief, ChainStates, Explanation, Gaussian, Likely, Regression, Value
+from lipmotion.types import (
+    ChainPosteriors,
+    ChainStates,
+    ChannelValue,
+    DominantGaussian,
+    Explanation,
+    NamedProbability,
+    RegressedMean,
+)
 from lipmotion.units import VISEME_OF
 
 Array = NDArray[np.float64]
@@ -67,13 +75,13 @@ def chain_states(chains: Chains, posteriors: Posteriors, row: int) -> tuple[Chai
     )
 
 
-def joint_state(chains: Chains, posteriors: Posteriors, row: int) -> Likely | None:
+def joint_state(chains: Chains, posteriors: Posteriors, row: int) -> NamedProbability | None:
     """Return the most probable state of all chains together in a frame; None where joint states are not listed."""
     if posteriors.joint is None:
         return None
     best = int(posteriors.joint.probability[row].argmax())
     name = chains.transitions.product.name(int(posteriors.joint.states[best]))
-    return Likely(name, float(posteriors.joint.probability[row, best]))
+    return NamedProbability(name, float(posteriors.joint.probability[row, best]))
 
 
 def leads(chains: Chains, chain: int) -> tuple[int, ...]:
@@ -95,11 +103,11 @@ def lead_posteriors(chains: Chains, posteriors: Posteriors) -> list[Single]:
     return found
 
 
-def units_believed(chains: Chains, posteriors: Posteriors, kept: slice) -> list[ChainBelief]:
+def units_believed(chains: Chains, posteriors: Posteriors, kept: slice) -> list[ChainPosteriors]:
     """Return what is believed of the units of each chain in some frames."""
     structure = chains.structure
     return [
-        ChainBelief(
+        ChainPosteriors(
             own.name,
             units,
             posteriors.chains[number][kept].reshape(-1, len(units), structure.states).sum(axis=2),
@@ -112,20 +120,20 @@ def units_believed(chains: Chains, posteriors: Posteriors, kept: slice) -> list[
     ]
 
 
-def joined(parts: Sequence[ChainBelief]) -> ChainBelief:
+def joined(parts: Sequence[ChainPosteriors]) -> ChainPosteriors:
     """Return successive beliefs of one chain as one."""
     together = (np.concatenate([getattr(part, name) for part in parts]) for name in ("probability", "lead"))
     probability, lead = together
     return replace(parts[0], probability=probability, lead=lead)
 
 
-def _likely(names: Sequence[str], probability: NDArray[np.floating]) -> tuple[Likely, ...]:
+def _likely(names: Sequence[str], probability: NDArray[np.floating]) -> tuple[NamedProbability, ...]:
     best = np.argsort(-probability, kind="stable")[:MOST_STATES]
-    named = [Likely(names[i], float(probability[i])) for i in best]
+    named = [NamedProbability(names[i], float(probability[i])) for i in best]
     return (named[0], *(one for one in named[1:] if one.probability >= LEAST))
 
 
-def _gaussian(model: CoupledModel, inferred: Inferred, row: int, stream: int) -> Gaussian:
+def _gaussian(model: CoupledModel, inferred: Inferred, row: int, stream: int) -> DominantGaussian:
     """Return the Gaussian of a stream that is most responsible for a frame."""
     chains = model.chains
     number = group_of(chains, stream)
@@ -141,12 +149,12 @@ def _gaussian(model: CoupledModel, inferred: Inferred, row: int, stream: int) ->
     if seen is None or seen[row]:
         error = inferred.observed.streams[stream][row] - mean
         distance = float(np.sqrt(np.mean(error * error / variance)))
-    channels: Mapping[str, Value] = {}
+    channels: Mapping[str, ChannelValue] = {}
     if stream:
         visual = model.visual[stream - 1]
         means, precisions = visual.restored(mean[None], 1 / variance[None])
         channels = _in_channels(model, visual, means[0, 0], 1 / precisions[0, 0])
-    return Gaussian(
+    return DominantGaussian(
         chains.streams[stream],
         _density_name(chains, group.tie, density),
         int(component) + 1,
@@ -165,17 +173,17 @@ def _density_name(chains: Chains, tie: NDArray[np.intp], density: int) -> str:
     )
 
 
-def _regressions(model: CoupledModel, inferred: Inferred, rows: Sequence[int]) -> list[tuple[Regression, ...]]:
+def _regressions(model: CoupledModel, inferred: Inferred, rows: Sequence[int]) -> list[tuple[RegressedMean, ...]]:
     """Return what the means of frames come from where they are not those of the densities, frame by frame."""
     if not all(stream.dynamic for stream in model.visual):
         return [() for _ in rows]
     means, precisions = model.statistics(inferred)
     resting, found = model.resting(inferred.posteriors.chains[0]), []
     for row in rows:
-        shares = [(Likely(REST, 1.0),)] * len(model.visual) if resting[row] else _shares(model, inferred, row)
+        shares = [(NamedProbability(REST, 1.0),)] * len(model.visual) if resting[row] else _shares(model, inferred, row)
         found.append(
             tuple(
-                Regression(
+                RegressedMean(
                     stream.name,
                     own,
                     _in_channels(model, stream, means[row, 0, columns], 1 / precisions[row, 0, columns]),
@@ -186,7 +194,7 @@ def _regressions(model: CoupledModel, inferred: Inferred, rows: Sequence[int]) -
     return found
 
 
-def _shares(model: CoupledModel, inferred: Inferred, row: int) -> list[tuple[Likely, ...]]:
+def _shares(model: CoupledModel, inferred: Inferred, row: int) -> list[tuple[NamedProbability, ...]]:
     """Return how much each regression of every visual stream says; none where means follow nothing."""
     structure, found = model.chains.structure, []
     for number, following in enumerate(model.follow[1] if model.follow is not None else ()):
@@ -205,11 +213,15 @@ def _regression_name(structure: Structure, chain: int, kind: NDArray[np.intp], n
     return f"{viseme}.{places[0] + 1}" if len(set(places.tolist())) == 1 else viseme
 
 
-def _in_channels(model: CoupledModel, stream: VisualStream, means: Array, variances: Array) -> Mapping[str, Value]:
+def _in_channels(
+    model: CoupledModel, stream: VisualStream, means: Array, variances: Array
+) -> Mapping[str, ChannelValue]:
     """Return the means and deviations of a visual stream's channels from those in its dimensions [shapes=(q,)]."""
     space = model.space
     values, variance = np.zeros((1, space.dimensions)), np.full((1, space.dimensions), np.nan)
     values[:, stream.columns], variance[:, stream.columns] = means, variances
     motion, spread = space.restore(values, variance)
     found = zip(space.channels, motion[0].tolist(), np.sqrt(spread[0]).tolist(), strict=True)
-    return {channel.name: Value(value, deviation) for channel, value, deviation in found if np.isfinite(deviation)}
+    return {
+        channel.name: ChannelValue(value, deviation) for channel, value, deviation in found if np.isfinite(deviation)
+    }

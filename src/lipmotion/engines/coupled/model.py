@@ -15,7 +15,7 @@ from lipmotion.engines.coupled.chains.visual_streams import VisualStream, unseen
 from lipmotion.engines.coupled.conversion.em import statistics
 from lipmotion.engines.coupled.conversion.regression import Following, Surroundings
 from lipmotion.motion.closure import Closure
-from lipmotion.motion.limits import Reach, reach_of
+from lipmotion.motion.limits import MotionLimits, limits_of
 from lipmotion.motion.space import MotionSpace
 from lipmotion.types import FRAME_RATE_HZ
 
@@ -49,23 +49,23 @@ class CoupledModel:
     closure: Closure | None
 
     @cached_property
-    def reach(self) -> Reach:
+    def reach(self) -> MotionLimits:
         """Between which values motion lies."""
         poses, deviation = self.poses, np.zeros(self.space.dimensions)
         for stream in self.visual:
             deviation[stream.columns] = stream.deviation[: len(stream.columns)]
-        return Reach(np.minimum(poses.low, self.rest), np.maximum(poses.high, self.rest)).widened(deviation)
+        return MotionLimits(np.minimum(poses.low, self.rest), np.maximum(poses.high, self.rest)).widened(deviation)
 
     @property
-    def poses(self) -> Reach:
+    def poses(self) -> MotionLimits:
         """Between which values the means of all densities lie."""
         low, high = np.zeros(self.space.dimensions), np.zeros(self.space.dimensions)
         for number, stream in enumerate(self.visual, start=1):
             group = next(group for group in self.chains.groups if number in group.streams)
             means = group.of_stream(number).means.astype(float)
             flat = means.reshape(-1, means.shape[2])
-            low[stream.columns], high[stream.columns] = reach_of(stream.restored(flat, np.ones_like(flat))[0][:, 0])
-        return Reach(low, high)
+            low[stream.columns], high[stream.columns] = limits_of(stream.restored(flat, np.ones_like(flat))[0][:, 0])
+        return MotionLimits(low, high)
 
     def unseen(self, features: Single) -> Observed:
         """Return speech [shape=(T, 39)] with nothing seen."""

@@ -21,12 +21,12 @@ from lipmotion.hmm.multistream.model import JointConfig, JointHmm
 from lipmotion.hmm.multistream.recognise import joint_recogniser
 from lipmotion.hmm.multistream.streams import MOTION, Observed, StreamWeights, observe
 from lipmotion.hmm.multistream.train import Transcribed, train_joint
-from lipmotion.motion.arrays import FRAME, frame_arrays, frame_from_arrays
-from lipmotion.motion.closure import Closure, closing_spans, learned_closure
-from lipmotion.motion.frame_labels import named
-from lipmotion.motion.generation import Statistics, generated_motion, resolved
-from lipmotion.motion.limits import Reach, check_poses, reach_of
-from lipmotion.motion.space import MotionSpace, motion_in_space
+from lipmotion.motion.arrays import MOTION_ARRAYS, motion_arrays, motion_from_arrays
+from lipmotion.motion.closure import Closure, closing_spans, fit_closure_of
+from lipmotion.motion.frame_labels import with_unit_names
+from lipmotion.motion.generation import Statistics, generated_motion, resolved_pins
+from lipmotion.motion.limits import MotionLimits, check_poses, limits_of
+from lipmotion.motion.space import MotionSpace, fit_reduced_motion
 from lipmotion.storage.checkpoint import NOTHING_KEPT, Checkpoint
 from lipmotion.storage.schema import only, under
 from lipmotion.types import (
@@ -114,16 +114,16 @@ class JointModel:
     closure: Closure | None
 
     @cached_property
-    def reach(self) -> Reach:
+    def reach(self) -> MotionLimits:
         """Between which values motion lies."""
         return self.poses.widened(self.hmm.parts[MOTION].scale.deviation[: self.space.dimensions])
 
     @property
-    def poses(self) -> Reach:
+    def poses(self) -> MotionLimits:
         """Between which values the means of all states lie."""
         part, Q = self.hmm.parts[MOTION], self.space.dimensions
         means = part.tied.mixtures.means[:, :, :Q].reshape(-1, Q)
-        return reach_of(means * part.scale.deviation[:Q] + part.scale.mean[:Q])
+        return limits_of(means * part.scale.deviation[:Q] + part.scale.mean[:Q])
 
 
 @final
@@ -151,13 +151,13 @@ class JointEngine(Engine[JointModel]):
         checkpoint: Checkpoint = NOTHING_KEPT,  # noqa: ARG002 - a matter of two minutes
     ) -> Fit[JointModel]:
         units = unit_set(self.config.units)
-        space, values = motion_in_space(examples, self.config.components)
+        space, values = fit_reduced_motion(examples, self.config.components)
         utterances = [self._transcribed(one, x, units) for one, x in zip(examples, values, strict=True)]
         if all(set(utterance.units) <= set(units.silence) for utterance in utterances):
             raise CorpusError(f"nothing is said in {len(examples)} examples; learn from speech")
         inventory = Inventory(units.units, units.silence[:1] + _also_silent(units), self.config.states)
         hmm = train_joint(utterances, inventory, units.classes(), self.config.joint, monitor)
-        closure = learned_closure(space.direct_names, values, examples)
+        closure = fit_closure_of(space.direct_names, values, examples)
         figures = {f"leaves_{name}": float(part.forest.size) for name, part in hmm.parts.items()}
         frames = sum(int(example.valid.sum()) for example in examples)
         return Fit(JointModel(units, space, hmm, closure), {"frames": frames, **figures})
@@ -167,7 +167,7 @@ class JointEngine(Engine[JointModel]):
 
     def generate(self, model: JointModel, speech: Speech, constraints: Constraints | None = None) -> Generation:  # noqa: D102
         frames = len(speech.features.values)
-        pins = resolved(constraints, model.space, frames)
+        pins = resolved_pins(constraints, model.space, frames)
         observed = self._observed(speech)
         if self.config.recognises and not speech.said:
             spoken, paths = self._recognised(model, observed, speech.features.duration_s)
@@ -191,7 +191,7 @@ class JointEngine(Engine[JointModel]):
         return Generation(
             Motion(motion, FRAME_RATE_HZ, model.space.channels),
             spread,
-            named(spoken, model.units),
+            with_unit_names(spoken, model.units),
             Trace(_sources(model.hmm, paths[0]), paths[0].frames),
         )
 
@@ -200,12 +200,12 @@ class JointEngine(Engine[JointModel]):
 
     def to_arrays(self, model: JointModel) -> dict[str, NDArray[Any]]:  # noqa: D102
         joint = {f"{PREFIX}{name}": array for name, array in joint_arrays(model.hmm).items()}
-        return frame_arrays(model.units, model.space, model.closure) | joint
+        return motion_arrays(model.units, model.space, model.closure) | joint
 
     def from_arrays(self, arrays: Arrays) -> JointModel:  # noqa: D102
         try:
-            only(arrays, FRAME, (name for name in arrays if name.startswith(PREFIX)))
-            units, space, closure = frame_from_arrays(arrays, self.config.units)
+            only(arrays, MOTION_ARRAYS, (name for name in arrays if name.startswith(PREFIX)))
+            units, space, closure = motion_from_arrays(arrays, self.config.units)
             hmm = joint_from_arrays(under(arrays, PREFIX), self.config.joint)
             if set(hmm.inventory.names) != set(units.units):
                 raise ValueError(f"the units {' '.join(hmm.inventory.names)}, required {' '.join(units.units)}")

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.trajectory.emission import Emission, Hearing, add_heard
-from lipmotion.engines.trajectory.training_data import Learning, Observed, rows_of
-from lipmotion.motion.context_window import AudioWindow, fit_window
-from lipmotion.stats.regression import Moments, fit_tree, no_moments, owner, ridge
+from lipmotion.engines.trajectory.emission import AcousticRegression, Emission, add_acoustic_regression
+from lipmotion.engines.trajectory.training_data import TrainingClip, TrainingOptions, rows_of
+from lipmotion.motion.context_window import AcousticContext, fit_acoustic_context
+from lipmotion.stats.regression import RegressionStatistics, fit_tree, owner, ridge, zero_statistics
 
 Array = NDArray[np.float64]
 MOST = 170
@@ -21,21 +21,21 @@ AT_A_TIME = 64
 """Examples whose frames are sorted by what they belong to before they are added up."""
 
 
-def fit_hearing(emission: Emission, observed: Sequence[Observed], how: Learning) -> Emission:
+def fit_acoustic_regression(emission: Emission, observed: Sequence[TrainingClip], how: TrainingOptions) -> Emission:
     """Return the same densities with means that follow the sound, and variances around these.
 
     A linear regression on the sound around the frame is learned from all frames, one for each node of the trees with
     enough of them, drawn towards that of the node above it: so a state with little data listens as its relatives do.
     """
-    window = fit_window((one.features for one in observed), how.axes)
+    window = fit_acoustic_context((one.features for one in observed), how.axes)
     owners = _owners(emission, how)
     axes, outputs = window.basis.shape[1], emission.means[0].size
-    moments = {key: no_moments(axes, outputs) for key in dict.fromkeys(owners) if key is not None}
+    moments = {key: zero_statistics(axes, outputs) for key in dict.fromkeys(owners) if key is not None}
     for key, z, error in _frames(emission, observed, how, window, owners):
         moments[key].add(z, error)
     coefficients, index = _coefficients(emission, moments, how)
     rows = np.array([-1 if key is None else index[key] for key in owners], np.int32)
-    hearing = Hearing(window, coefficients, rows)
+    hearing = AcousticRegression(window, coefficients, rows)
     return replace(emission, hearing=hearing, variances=_variances(emission, hearing, observed, how))
 
 
@@ -43,7 +43,7 @@ _Key = tuple[str, int]
 """A tree and a node of it."""
 
 
-def _owners(emission: Emission, how: Learning) -> list[_Key | None]:
+def _owners(emission: Emission, how: TrainingOptions) -> list[_Key | None]:
     """Return, density by density, the node whose regression it uses; rest uses none."""
     least = max(how.ridge_frames, sum(float(tree.frames[0]) for tree in emission.forest.values()) / MOST)
     found: list[_Key | None] = []
@@ -54,9 +54,9 @@ def _owners(emission: Emission, how: Learning) -> list[_Key | None]:
 
 def _frames(
     emission: Emission,
-    observed: Sequence[Observed],
-    how: Learning,
-    window: AudioWindow,
+    observed: Sequence[TrainingClip],
+    how: TrainingOptions,
+    window: AcousticContext,
     owners: Sequence[_Key | None],
 ) -> Iterator[tuple[_Key, NDArray[np.float32], NDArray[np.float32]]]:
     """Give, for each node with a regression, what is heard and how far the motion is from its density's mean."""
@@ -77,7 +77,7 @@ def _frames(
 
 
 def _coefficients(
-    emission: Emission, moments: dict[_Key, Moments], how: Learning
+    emission: Emission, moments: dict[_Key, RegressionStatistics], how: TrainingOptions
 ) -> tuple[NDArray[np.float32], dict[_Key, int]]:
     every = list(moments.values())
     shared = ridge(sum(every[1:], every[0]), np.zeros_like(every[0].targets), how.shared_ridge)
@@ -90,14 +90,14 @@ def _coefficients(
 
 
 def _variances(
-    emission: Emission, hearing: Hearing, observed: Sequence[Observed], how: Learning
+    emission: Emission, hearing: AcousticRegression, observed: Sequence[TrainingClip], how: TrainingOptions
 ) -> NDArray[np.float32]:
     """Return the variances around means that follow the sound, shrunk towards those of all frames together."""
     squares, counts = np.zeros(emission.means.shape), np.zeros(len(emission.means))
     for one in observed:
         rows = rows_of(emission, one.seen_places, how.cut)
         means = emission.means[rows].astype(float)
-        add_heard(means, hearing, rows, hearing.window(one.features, one.frames))
+        add_acoustic_regression(means, hearing, rows, hearing.window(one.features, one.frames))
         np.add.at(squares, rows, np.square(one.rows - means))
         np.add.at(counts, rows, 1)
     return _shrunk(emission, squares, counts, how.variance_shrinkage)

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.motion.context_window import WINDOW, AudioWindow, window_from
-from lipmotion.motion.frame_labels import Cut, Place
+from lipmotion.motion.context_window import WINDOW, AcousticContext, acoustic_context_from
+from lipmotion.motion.frame_labels import FullContextState, StateLayout
 from lipmotion.motion.limits import check_spread
 from lipmotion.stats.trees import TREES, Tree, tree_arrays, trees_from_arrays
 from lipmotion.storage.schema import POSITIVE, Arrays, Member, checked
@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Hearing:
+class AcousticRegression:
     """Linear regressions of motion on the sound around a frame.
 
     window       : what is heard [F numbers a frame]
@@ -28,7 +28,7 @@ class Hearing:
     rows         : int array [shape=(L,)], the coefficients of each density; -1 marks one that does not listen
     """
 
-    window: AudioWindow
+    window: AcousticContext
     coefficients: NDArray[np.float32]
     rows: NDArray[np.int32]
 
@@ -37,7 +37,7 @@ class Hearing:
 class Emission:
     """Densities of static value, Δ and Δ² (Q dimensions each) of all tied states.
 
-    forest    : a tree for every part of speech and of silence (``Cut.names``)
+    forest    : a tree for every part of speech and of silence (``StateLayout.names``)
     means, variances : float32 arrays [shape=(L, 3, Q)], leaf by leaf, tree by tree; the last is that of rest
     hearing   : how the means follow the sound (None: they do not)
     """
@@ -45,7 +45,7 @@ class Emission:
     forest: Mapping[str, Tree]
     means: NDArray[np.float32]
     variances: NDArray[np.float32]
-    hearing: Hearing | None
+    hearing: AcousticRegression | None
 
     @cached_property
     def _first(self) -> dict[str, int]:
@@ -56,7 +56,7 @@ class Emission:
     def _rank(self) -> dict[str, NDArray[np.intp]]:
         return {name: np.cumsum(tree.asked < 0) - 1 for name, tree in self.forest.items()}
 
-    def row(self, place: Place, cut: Cut) -> int:
+    def row(self, place: FullContextState, cut: StateLayout) -> int:
         """Return the density of a place."""
         if place == cut.rest:
             return len(self.means) - 1
@@ -64,7 +64,7 @@ class Emission:
         leaf = self.forest[name].path(place.context)[-1]
         return self._first[name] + int(self._rank[name][leaf])
 
-    def source(self, place: Place, cut: Cut) -> str:
+    def source(self, place: FullContextState, cut: StateLayout) -> str:
         """Return what the density of a place rests on, in words."""
         if place == cut.rest:
             return "rest"
@@ -82,11 +82,13 @@ class Emission:
         """
         means, precisions = self.means[rows].astype(float), 1 / self.variances[rows].astype(float)
         if self.hearing is not None:
-            add_heard(means, self.hearing, rows, self.hearing.window(features, heard))
+            add_acoustic_regression(means, self.hearing, rows, self.hearing.window(features, heard))
         return means, precisions
 
 
-def add_heard(means: Array, hearing: Hearing, rows: NDArray[np.intp], z: NDArray[np.float32]) -> None:
+def add_acoustic_regression(
+    means: Array, hearing: AcousticRegression, rows: NDArray[np.intp], z: NDArray[np.float32]
+) -> None:
     """Add to means [shape=(T, 3, Q)] what the sound around each frame [shape=(T, F)] says (in place)."""
     used = hearing.rows[rows]
     for row in np.unique(used[used >= 0]):
@@ -111,7 +113,7 @@ def emission_arrays(emission: Emission) -> dict[str, NDArray[Any]]:
     return arrays
 
 
-def emission_from_arrays(arrays: Arrays, cut: Cut, dimensions: int) -> Emission:
+def emission_from_arrays(arrays: Arrays, cut: StateLayout, dimensions: int) -> Emission:
     """Return the densities again. Raises KeyError, ValueError: something is missing, out of place or out of range."""
     forest = trees_from_arrays(arrays)
     if len(forest) != cut.speech + cut.silence or list(forest) != cut.names:
@@ -133,9 +135,9 @@ EMISSION = (*TREES, *DENSITIES, *HEARING)
 """How they are stored: L leaves and C regressions."""
 
 
-def _hearing(arrays: Arrays, leaves: int, dimensions: int) -> Hearing:
+def _hearing(arrays: Arrays, leaves: int, dimensions: int) -> AcousticRegression:
     found = checked(arrays, HEARING, L=leaves, V=3 * dimensions)
     rows = found["coefficient_rows"]
     if rows.max() >= found.sizes["C"]:
         raise ValueError(f"a density that follows regression {rows.max()} of {found.sizes['C']}")
-    return Hearing(window_from(found), found["coefficients"], rows)
+    return AcousticRegression(acoustic_context_from(found), found["coefficients"], rows)

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from lipmotion.engines.base import Arrays, Engine, Fit
 from lipmotion.engines.trajectory.model import TrajectoryModel, model_arrays, model_from_arrays
 from lipmotion.engines.trajectory.train import fit_trajectory
-from lipmotion.engines.trajectory.training_data import Learning
+from lipmotion.engines.trajectory.training_data import TrainingOptions
 from lipmotion.errors import InputError
 from lipmotion.motion.closure import closing_spans
-from lipmotion.motion.frame_labels import Cut, named, places
-from lipmotion.motion.generation import Statistics, generated_motion, resolved
+from lipmotion.motion.frame_labels import StateLayout, full_context_states, with_unit_names
+from lipmotion.motion.generation import Statistics, generated_motion, resolved_pins
 from lipmotion.motion.variance_scaling import scaled
 from lipmotion.printable import printable
 from lipmotion.storage.checkpoint import NOTHING_KEPT, Checkpoint
@@ -94,15 +94,15 @@ class TrajectoryConfig:
         if self.trajectory_steps < 0:
             raise InputError(f"trajectory_steps is {self.trajectory_steps}, required 0 or more")
 
-    def cut(self, units: UnitSet) -> Cut:
+    def cut(self, units: UnitSet) -> StateLayout:
         """Return how units are cut into parts."""
-        return Cut(self.parts, self.silent_parts, self.edge_s, units)
+        return StateLayout(self.parts, self.silent_parts, self.edge_s, units)
 
     @property
-    def learning(self) -> Learning:
+    def learning(self) -> TrainingOptions:
         """What training needs of it. Raises InputError: no such unit set, or a table that is wrong."""
-        names = {field.name for field in fields(Learning)} - {"cut"}
-        return Learning(self.cut(unit_set(self.units)), **{name: getattr(self, name) for name in names})
+        names = {field.name for field in fields(TrainingOptions)} - {"cut"}
+        return TrainingOptions(self.cut(unit_set(self.units)), **{name: getattr(self, name) for name in names})
 
 
 @final
@@ -138,7 +138,7 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
     def generate(self, model: TrajectoryModel, speech: Speech, constraints: Constraints | None = None) -> Generation:  # noqa: D102
         features = np.asarray(speech.features.values)
         frames, cut = len(features), self.config.cut(model.units)
-        where = places(speech.units, frames, cut)
+        where = full_context_states(speech.units, frames, cut)
         distinct = {place: number for number, place in enumerate(dict.fromkeys(where))}
         path = np.array([distinct[place] for place in where], np.intp)
         rows = np.array([model.emission.row(place, cut) for place in distinct], np.intp)
@@ -156,12 +156,12 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
             model.reach,
             closure=model.closure,
             closing=closing_spans(speech.units, frames) if self.config.closures else [],
-            pins=resolved(constraints, model.space, frames),
+            pins=resolved_pins(constraints, model.space, frames),
         )
         return Generation(
             Motion(motion, FRAME_RATE_HZ, model.space.channels),
             spread,
-            named(speech.units, model.units),
+            with_unit_names(speech.units, model.units),
             Trace(tuple(model.emission.source(place, cut) for place in distinct), path),
         )
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.trajectory.emission import Emission
-from lipmotion.engines.trajectory.training_data import Learning, Observed, rows_of
+from lipmotion.engines.trajectory.training_data import TrainingClip, TrainingOptions, rows_of
 from lipmotion.kernels.banded import generate, normal_equations, solve
 from lipmotion.stats.delta_windows import with_dynamics
 
@@ -26,7 +26,7 @@ class Clip:
     error: Array
 
 
-def minimise_generation_error(emission: Emission, observed: Sequence[Observed], how: Learning) -> Emission:
+def minimise_generation_error(emission: Emission, observed: Sequence[TrainingClip], how: TrainingOptions) -> Emission:
     """Return the same densities with means that minimise the squared error of the generated trajectories.
 
     Precisions stay as they are; then trajectories are linear in the means, and the error a quadratic, whose minimum is
@@ -55,7 +55,7 @@ def minimise_generation_error(emission: Emission, observed: Sequence[Observed], 
     return replace(emission, means=(emission.means + total).astype(np.float32))
 
 
-def _clip(emission: Emission, one: Observed, how: Learning) -> Clip:
+def _clip(emission: Emission, one: TrainingClip, how: TrainingOptions) -> Clip:
     rows = rows_of(emission, one.places, how.cut)
     means, precisions = emission.statistics(rows, one.features, slice(None))
     generated, _ = generate(means, precisions)

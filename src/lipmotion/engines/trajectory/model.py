@@ -11,12 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.trajectory.emission import EMISSION, Emission, emission_arrays, emission_from_arrays
-from lipmotion.engines.trajectory.phone_recogniser import LISTENER, Listener, listener_arrays, listener_from_arrays
+from lipmotion.engines.trajectory.phone_recogniser import (
+    LISTENER,
+    OwnPhoneRecogniser,
+    recogniser_arrays,
+    recogniser_from_arrays,
+)
 from lipmotion.errors import ModelFormatError
-from lipmotion.motion.arrays import FRAME, frame_arrays, frame_from_arrays
+from lipmotion.motion.arrays import MOTION_ARRAYS, motion_arrays, motion_from_arrays
 from lipmotion.motion.closure import Closure
-from lipmotion.motion.frame_labels import Cut
-from lipmotion.motion.limits import Reach, check_poses, reach_of
+from lipmotion.motion.frame_labels import StateLayout
+from lipmotion.motion.limits import MotionLimits, check_poses, limits_of
 from lipmotion.motion.space import MotionSpace
 from lipmotion.storage.schema import POSITIVE, Arrays, Member, checked, only
 from lipmotion.units import UnitSet
@@ -39,27 +44,27 @@ class TrajectoryModel:
     emission: Emission
     gain: NDArray[np.float64]
     closure: Closure | None
-    listener: Listener | None = None
+    listener: OwnPhoneRecogniser | None = None
 
     @cached_property
-    def reach(self) -> Reach:
+    def reach(self) -> MotionLimits:
         """Between which values motion lies."""
         return self.poses.widened(np.sqrt(self.emission.variances[:, 0].max(axis=0)))
 
     @property
-    def poses(self) -> Reach:
+    def poses(self) -> MotionLimits:
         """Between which values the means of all states lie."""
-        return reach_of(self.emission.means[:, 0])
+        return limits_of(self.emission.means[:, 0])
 
 
 def model_arrays(model: TrajectoryModel) -> dict[str, NDArray[Any]]:
     """Return the model as arrays."""
-    arrays = frame_arrays(model.units, model.space, model.closure) | {"gain": model.gain}
-    heard = listener_arrays(model.listener) if model.listener is not None else {}
+    arrays = motion_arrays(model.units, model.space, model.closure) | {"gain": model.gain}
+    heard = recogniser_arrays(model.listener) if model.listener is not None else {}
     return arrays | emission_arrays(model.emission) | heard
 
 
-def model_from_arrays(arrays: Arrays, cut: Callable[[UnitSet], Cut], units: str) -> TrajectoryModel:
+def model_from_arrays(arrays: Arrays, cut: Callable[[UnitSet], StateLayout], units: str) -> TrajectoryModel:
     """Return the model again.
 
     cut   : how the parts of some units are cut
@@ -67,11 +72,11 @@ def model_from_arrays(arrays: Arrays, cut: Callable[[UnitSet], Cut], units: str)
     Raises ModelFormatError: something is missing, undeclared, out of place or out of range.
     """
     try:
-        only(arrays, FRAME, EMISSION, GAIN, (name for name in arrays if name.startswith(LISTENER)))
-        of, space, closure = frame_from_arrays(arrays, units)
+        only(arrays, MOTION_ARRAYS, EMISSION, GAIN, (name for name in arrays if name.startswith(LISTENER)))
+        of, space, closure = motion_from_arrays(arrays, units)
         emission = emission_from_arrays(arrays, cut(of), space.dimensions)
         gain = checked(arrays, GAIN, Q=space.dimensions)["gain"]
-        model = TrajectoryModel(of, space, emission, gain, closure, listener_from_arrays(arrays))
+        model = TrajectoryModel(of, space, emission, gain, closure, recogniser_from_arrays(arrays))
         check_poses(model.poses, space, closure)
         return model
     except (KeyError, ValueError, IndexError, TypeError) as error:

@@ -40,7 +40,7 @@ TYPICAL = {"typical": Member(np.float64, "1", -1e6, 1e6)}
 
 
 @dataclass(frozen=True, eq=False)
-class Listener:
+class OwnPhoneRecogniser:
     """The joint model as a recogniser of phones.
 
     typical : how well it explains its training data
@@ -65,9 +65,9 @@ class Listener:
         return in_time(found, speech.features.duration_s)
 
 
-def fit_listener(
+def fit_phone_recogniser(
     examples: Sequence[Example], values: Sequence[NDArray[np.float64]], monitor: Monitor, checkpoint: Checkpoint
-) -> Listener | None:
+) -> OwnPhoneRecogniser | None:
     """Return a listener trained on sound and motion; None where there is too little, or nothing is said.
 
     values : every example's motion in the model's space [each shape=(T, Q)]
@@ -88,16 +88,16 @@ def fit_listener(
         kept = joint_arrays(hmm, np.float32)
         checkpoint.save(_STAGE, kept)
     hmm = joint_from_arrays(kept, CONFIG)
-    return Listener(hmm, float(np.mean([_fit(hmm, _observed(example.speech)) for example in examples])))
+    return OwnPhoneRecogniser(hmm, float(np.mean([_fit(hmm, _observed(example.speech)) for example in examples])))
 
 
-def listener_arrays(listener: Listener) -> dict[str, NDArray[Any]]:
+def recogniser_arrays(listener: OwnPhoneRecogniser) -> dict[str, NDArray[Any]]:
     """Return a listener as arrays, at half precision."""
     arrays = joint_arrays(listener.hmm) | {"typical": np.array([listener.typical])}
     return {f"{LISTENER}{name}": array for name, array in arrays.items()}
 
 
-def listener_from_arrays(arrays: Arrays) -> Listener | None:
+def recogniser_from_arrays(arrays: Arrays) -> OwnPhoneRecogniser | None:
     """Return it again, or None. Raises ModelFormatError, KeyError, ValueError: something is missing or damaged."""
     own = under(arrays, LISTENER)
     if not own:
@@ -106,7 +106,7 @@ def listener_from_arrays(arrays: Arrays) -> Listener | None:
     hmm = joint_from_arrays({name: array for name, array in own.items() if name not in TYPICAL}, CONFIG)
     if set(hmm.inventory.names) != set(PHONES.units):
         raise ValueError(f"the units {' '.join(hmm.inventory.names)}, required {' '.join(PHONES.units)}")
-    return Listener(hmm, typical)
+    return OwnPhoneRecogniser(hmm, typical)
 
 
 def _observed(speech: Speech) -> Observed:

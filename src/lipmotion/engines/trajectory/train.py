@@ -7,17 +7,17 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.trajectory.acoustic_regression import fit_hearing
+from lipmotion.engines.trajectory.acoustic_regression import fit_acoustic_regression
 from lipmotion.engines.trajectory.emission import Emission
 from lipmotion.engines.trajectory.generation_error import minimise_generation_error
 from lipmotion.engines.trajectory.model import TrajectoryModel
-from lipmotion.engines.trajectory.phone_recogniser import fit_listener
-from lipmotion.engines.trajectory.training_data import Learning, Observed, rows_of
+from lipmotion.engines.trajectory.phone_recogniser import fit_phone_recogniser
+from lipmotion.engines.trajectory.training_data import TrainingClip, TrainingOptions, rows_of
 from lipmotion.errors import CorpusError
 from lipmotion.kernels.banded import generate
-from lipmotion.motion.closure import learned_closure
-from lipmotion.motion.frame_labels import Cut, Place, places
-from lipmotion.motion.space import motion_in_space
+from lipmotion.motion.closure import fit_closure_of
+from lipmotion.motion.frame_labels import FullContextState, StateLayout, full_context_states
+from lipmotion.motion.space import fit_reduced_motion
 from lipmotion.motion.variance_scaling import scaling_factors
 from lipmotion.stats.delta_windows import with_dynamics, within
 from lipmotion.stats.trees import Question, Tree, gaussian_likelihood, grow
@@ -30,18 +30,18 @@ LEAST_VARIANCE_SHARE, LEAST_VARIANCE = 1e-3, 1e-12
 
 
 def fit_trajectory(
-    examples: Sequence[Example], how: Learning, monitor: Monitor, checkpoint: Checkpoint = NOTHING_KEPT
+    examples: Sequence[Example], how: TrainingOptions, monitor: Monitor, checkpoint: Checkpoint = NOTHING_KEPT
 ) -> TrajectoryModel:
     """Return densities of the motion for every part of a phone in context, tied by decision trees.
 
     Raises CorpusError: no example with motion that was seen in speech, or examples of different channels.
     """
-    space, values = motion_in_space(examples, how.components)
+    space, values = fit_reduced_motion(examples, how.components)
     listener = None
     if how.joint:
-        listener = fit_listener(examples, values, part_of(monitor, 0, 0.8), checkpoint)
+        listener = fit_phone_recogniser(examples, values, part_of(monitor, 0, 0.8), checkpoint)
     monitor = part_of(monitor, 0.8, 1)
-    observed = [observed_of(example, x, how.cut) for example, x in zip(examples, values, strict=True)]
+    observed = [training_clip(example, x, how.cut) for example, x in zip(examples, values, strict=True)]
     quiet = how.cut.units.silence
     covered = {how.cut.name(place) for one in observed for place in one.seen_places if place.unit not in quiet}
     if len(covered) < how.cut.speech:
@@ -52,19 +52,19 @@ def fit_trajectory(
     emission = _tied(observed, how)
     if how.listens:
         monitor(Progress(_STAGE, 2, 3, 0.3))
-        emission = fit_hearing(emission, observed, how)
+        emission = fit_acoustic_regression(emission, observed, how)
     if how.trajectory_steps:
         emission = minimise_generation_error(emission, observed, how)
     gain = _scaling(emission, observed, how)
     monitor(Progress(_STAGE, 3, 3, 1.0))
-    closure = learned_closure(space.direct_names, values, examples)
+    closure = fit_closure_of(space.direct_names, values, examples)
     return TrajectoryModel(how.cut.units, space, emission, gain, closure, listener)
 
 
 _STAGE = "trees"
 
 
-def _scaling(emission: Emission, observed: Sequence[Observed], how: Learning) -> Array:
+def _scaling(emission: Emission, observed: Sequence[TrainingClip], how: TrainingOptions) -> Array:
     """Return the factors of variance scaling [shape=(Q,)]; 1 where no example is long enough to vary."""
     recorded, generated = [], []
     for one in observed:
@@ -76,16 +76,16 @@ def _scaling(emission: Emission, observed: Sequence[Observed], how: Learning) ->
     return scaling_factors(recorded, generated) if recorded else np.ones(emission.means.shape[2])
 
 
-def observed_of(example: Example, values: Array, cut: Cut) -> Observed:
+def training_clip(example: Example, values: Array, cut: StateLayout) -> TrainingClip:
     """Return what training needs of an example, whose motion in the model's space is ``values`` [shape=(T, Q)]."""
     frames = np.nonzero(within(example.valid))[0]
-    where = places(example.speech.units, len(values), cut)
+    where = full_context_states(example.speech.units, len(values), cut)
     features = np.asarray(example.speech.features.values)
     dynamics = with_dynamics(values)[frames].astype(np.float32)
-    return Observed(features, where, frames, dynamics)
+    return TrainingClip(features, where, frames, dynamics)
 
 
-def _tied(observed: Sequence[Observed], how: Learning) -> Emission:
+def _tied(observed: Sequence[TrainingClip], how: TrainingOptions) -> Emission:
     """Return the Gaussians of all leaves: each mean and variance is drawn towards that of the node above it."""
     moving = np.concatenate(
         [one.rows[[place != how.cut.rest for place in one.seen_places]] for one in observed], dtype=np.float64
@@ -107,7 +107,7 @@ def _tied(observed: Sequence[Observed], how: Learning) -> Emission:
     return Emission(forest, means.astype(np.float32), np.maximum(variances, least).astype(np.float32), None)
 
 
-def _grown(contexts: _Contexts, parameters: int, how: Learning) -> Tree:
+def _grown(contexts: _Contexts, parameters: int, how: TrainingOptions) -> Tree:
     """Return the tree of one part; a single leaf where the part was never seen."""
     unseen = {how.cut.rest.context: np.zeros(1 + parameters)}
     return grow(
@@ -125,11 +125,11 @@ _Contexts = dict[tuple[str, str, str], Array]
 """Count, sums and sums of squares of the frames of every context."""
 
 
-def _grouped(observed: Sequence[Observed], cut: Cut, centre: Array, scale: Array) -> dict[str, _Contexts]:
+def _grouped(observed: Sequence[TrainingClip], cut: StateLayout, centre: Array, scale: Array) -> dict[str, _Contexts]:
     """Return the moments of the standardised frames of every context, part by part."""
     grouped: dict[str, _Contexts] = {name: {} for name in cut.names}
     for one in observed:
-        index: dict[Place, list[int]] = {}
+        index: dict[FullContextState, list[int]] = {}
         for number, place in enumerate(one.seen_places):
             index.setdefault(place, []).append(number)
         for place, numbers in index.items():
@@ -142,7 +142,7 @@ def _grouped(observed: Sequence[Observed], cut: Cut, centre: Array, scale: Array
     return grouped
 
 
-def _leaf_gaussians(tree: Tree, contexts: _Contexts, size: int, how: Learning) -> list[tuple[Array, Array]]:
+def _leaf_gaussians(tree: Tree, contexts: _Contexts, size: int, how: TrainingOptions) -> list[tuple[Array, Array]]:
     """Return mean and variance [each shape=(3·Q,)] of every leaf, in standardised units."""
     totals = np.zeros((len(tree.asked), 1 + 2 * size))
     above = np.full(len(tree.asked), -1)
@@ -160,7 +160,9 @@ def _leaf_gaussians(tree: Tree, contexts: _Contexts, size: int, how: Learning) -
     return [(means[leaf], variances[leaf]) for leaf in tree.leaves]
 
 
-def _rest(observed: Sequence[Observed], how: Learning, fallback: Array, overall: Array) -> tuple[Array, Array]:
+def _rest(
+    observed: Sequence[TrainingClip], how: TrainingOptions, fallback: Array, overall: Array
+) -> tuple[Array, Array]:
     """Return the median pose of silence away from speech, and a variance that holds it still.
 
     What the mouth did there (breath, a lick of the lips) is no speech.

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.trajectory.emission import Emission
-from lipmotion.motion.frame_labels import Cut, Place
+from lipmotion.motion.frame_labels import FullContextState, StateLayout
 
 
 @dataclass(frozen=True)
-class Learning:
+class TrainingOptions:
     """How motion is learned.
 
     cut        : how phones are cut into parts
@@ -29,7 +29,7 @@ class Learning:
     joint : train the joint model as well
     """
 
-    cut: Cut
+    cut: StateLayout
     components: int
     tree_factor: float
     least_frames: float
@@ -45,7 +45,7 @@ class Learning:
 
 
 @dataclass(frozen=True, eq=False)
-class Observed:
+class TrainingClip:
     """One example.
 
     features : [shape=(T, D)]
@@ -55,17 +55,17 @@ class Observed:
     """
 
     features: NDArray[np.float32]
-    places: list[Place]
+    places: list[FullContextState]
     frames: NDArray[np.intp]
     rows: NDArray[np.float32]
 
     @property
-    def seen_places(self) -> list[Place]:
+    def seen_places(self) -> list[FullContextState]:
         """What is said in the frames that were seen [length N]."""
         return [self.places[frame] for frame in self.frames]
 
 
-def rows_of(emission: Emission, where: Sequence[Place], cut: Cut) -> NDArray[np.intp]:
+def rows_of(emission: Emission, where: Sequence[FullContextState], cut: StateLayout) -> NDArray[np.intp]:
     """Return the density of each place [shape=(len(where),)]."""
     distinct = {place: emission.row(place, cut) for place in dict.fromkeys(where)}
     return np.array([distinct[place] for place in where], np.intp)

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines import Animator, Fit
-from lipmotion.motion.space import MotionSpace, motion_in_space
+from lipmotion.motion.space import MotionSpace, fit_reduced_motion
 from lipmotion.speech.mfcc import LOG_ENERGY
-from lipmotion.stats.regression import no_moments, ridge
+from lipmotion.stats.regression import ridge, zero_statistics
 from lipmotion.storage.checkpoint import NOTHING_KEPT, Checkpoint
 from lipmotion.types import (
     FRAME_RATE_HZ,
@@ -61,7 +61,7 @@ class Baseline(Animator[FrameModel]):
         monitor: Monitor,
         checkpoint: Checkpoint = NOTHING_KEPT,  # noqa: ARG002 - it takes seconds
     ) -> Fit[FrameModel]:
-        space, values = motion_in_space(examples, COMPONENTS)
+        space, values = fit_reduced_motion(examples, COMPONENTS)
         features = [np.asarray(example.speech.features.values) for example in examples]
         seen = [np.asarray(example.valid) for example in examples]
         learned = self.learned(features, values, seen, monitor)
@@ -113,7 +113,7 @@ class Linear(Baseline):
         moments, frames = None, 0
         for one, target, mask in zip(features, values, seen, strict=True):
             rows = self.heard(one)[mask]
-            moments = moments or no_moments(rows.shape[1], target.shape[1])
+            moments = moments or zero_statistics(rows.shape[1], target.shape[1])
             moments.add(rows, target[mask])
             frames += len(rows)
         if moments is None:

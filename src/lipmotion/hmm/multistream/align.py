@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError, InputError
-from lipmotion.hmm.log_likelihoods import Evidence
+from lipmotion.hmm.log_likelihoods import LogLikelihoods
 from lipmotion.hmm.multistream.inventory import States, states_of
 from lipmotion.hmm.multistream.model import JointHmm
 from lipmotion.hmm.multistream.streams import Observed, StreamWeights
@@ -101,7 +101,7 @@ def _best_path(hmm: JointHmm, log_density: NDArray[np.float64], rows: NDArray[np
             builder.final(number, float(move))
     builder.initial(0)
     values = log_density.astype(np.float32)
-    evidence = Evidence(len(values), lambda first, end, _: values[first:end])
+    evidence = LogLikelihoods(len(values), lambda first, end, _: values[first:end])
     return builder.build().best_path(evidence)
 
 

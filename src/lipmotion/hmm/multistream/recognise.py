@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError, InputError
 from lipmotion.hmm.decode import UnitLoop, decode_units, unit_loop
-from lipmotion.hmm.log_likelihoods import Evidence
+from lipmotion.hmm.log_likelihoods import LogLikelihoods
 from lipmotion.hmm.model import HmmConfig, UnitHmm
 from lipmotion.hmm.multistream.align import StatePath
 from lipmotion.hmm.multistream.inventory import Place, states_of
@@ -117,7 +117,7 @@ class JointRecogniser:
         heard = [unit for unit in self.hmm.spoken if unit not in inventory.free[1:]]
         return unit_loop(_as_plain(self.hmm, self._states), heard)
 
-    def _evidence(self, observed: Observed) -> Evidence:
+    def _evidence(self, observed: Observed) -> LogLikelihoods:
         inside = self.hmm.inside(observed, self._weights)
 
         def log_density(first: int, end: int, chosen: NDArray[np.intp] | None) -> NDArray[np.float32]:
@@ -125,7 +125,7 @@ class JointRecogniser:
             values = self.hmm.log_density(rows, self._states.leaves, self._weights).astype(np.float32)
             return values[:, self._states.column if chosen is None else self._states.column[chosen]]
 
-        return Evidence(observed.frames, log_density)
+        return LogLikelihoods(observed.frames, log_density)
 
     def _all_evidence(self, observed: Observed) -> NDArray[np.float32]:
         return self._evidence(observed).log_density(0, observed.frames, None)

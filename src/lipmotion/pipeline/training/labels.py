@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError, InputError
 from lipmotion.storage.checkpoint import Checkpoint
-from lipmotion.types import Each, Item, Monitor, Progress, Span, Timeline, Unit, Utterance
+from lipmotion.types import Item, Monitor, ParallelMap, Progress, Span, Timeline, Unit, Utterance
 
 AT_A_TIME = 32
 """Utterances that are labelled between one checkpoint and the next."""
@@ -22,7 +22,7 @@ Labelled = Timeline[Unit] | str
 
 
 def labelled(
-    utterances: Sequence[Utterance], label: Label, monitor: Monitor, checkpoint: Checkpoint, each: Each
+    utterances: Sequence[Utterance], label: Label, monitor: Monitor, checkpoint: Checkpoint, each: ParallelMap
 ) -> Iterator[tuple[Utterance, Labelled]]:
     """Give every utterance with its phones.
 

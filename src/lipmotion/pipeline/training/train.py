@@ -33,11 +33,11 @@ from lipmotion.storage.checkpoint import NOTHING_KEPT, Checkpoint
 from lipmotion.storage.sources import Source, check_apart
 from lipmotion.types import (
     FRAME_RATE_HZ,
-    Each,
     Example,
     Features,
     Monitor,
     Motion,
+    ParallelMap,
     Progress,
     Speech,
     Timeline,
@@ -145,7 +145,7 @@ def phones_and_examples(
     lexicon: Lexicon,
     monitor: Monitor,
     checkpoint: Checkpoint,
-    each: Each,
+    each: ParallelMap,
 ) -> tuple[UnitHmm, list[Example], dict[str, str]]:
     """Return phone models of what is transcribed, every utterance ready for an engine, and why others are left out.
 
@@ -200,7 +200,7 @@ def _phones(
     config: HmmConfig,
     monitor: Monitor,
     checkpoint: Checkpoint,
-    each: Each,
+    each: ParallelMap,
 ) -> UnitHmm:
     spoken = [(u.audio, u.words) for u in utterances if u.phones is None and u.words and _can_be_said(u.words, lexicon)]
     given = [(u.audio, _runs(u.phones)) for u in utterances if u.phones is not None]
@@ -234,7 +234,7 @@ def _examples(
     lexicon: Lexicon,
     monitor: Monitor,
     checkpoint: Checkpoint,
-    each: Each,
+    each: ParallelMap,
 ) -> tuple[list[Example], dict[str, str]]:
     examples: list[Example] = []
     skipped: dict[str, str] = {}

@@ -29,7 +29,7 @@ from lipmotion.speech.recogniser import Recogniser
 from lipmotion.speech.voices.base import SyntheticVoice
 from lipmotion.speech.voices.installed import SYNTHESISERS, installed_voices, speak_all
 from lipmotion.storage.files import check_listable
-from lipmotion.types import Audio, Each, Features, Item, Monitor, Span, Timeline, Unit, silent_monitor
+from lipmotion.types import Audio, Features, Item, Monitor, ParallelMap, Span, Timeline, Unit, silent_monitor
 from lipmotion.units import SILENCE, Lexicon, is_silent
 
 SENTENCES = 60
@@ -78,7 +78,7 @@ def many_voices(
     voices: Sequence[SyntheticVoice] | None = None,
     *,
     lexicon: Lexicon | None = None,
-    each: Each = map,
+    each: ParallelMap = map,
 ) -> Iterator[SpokenSentence]:
     """Give every text in every voice, voice by voice: flite, festival, espeak-ng, as far as they are installed.
 

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import CorpusError
-from lipmotion.motion.context_window import AudioWindow, fit_window
-from lipmotion.stats.regression import no_moments, ridge
+from lipmotion.motion.context_window import AcousticContext, fit_acoustic_context
+from lipmotion.stats.regression import ridge, zero_statistics
 
 Array = NDArray[np.float64]
 Single = NDArray[np.float32]
@@ -42,7 +42,7 @@ class Surroundings:
     mean, basis : of both together [shapes=(F',), (F', F)], float32
     """
 
-    sound: AudioWindow
+    sound: AcousticContext
     belief: Single
     mean: Single
     basis: Single
@@ -125,7 +125,7 @@ def belief_axes(posteriors: Iterable[Single]) -> Single:
 
 def fit_surroundings(belief: Single, heard: Sequence[Heard]) -> Surroundings:
     """Return the surroundings of some recordings in few numbers."""
-    sound = fit_window((one.features for one in heard), SOUND_AXES)
+    sound = fit_acoustic_context((one.features for one in heard), SOUND_AXES)
     count, total, products = 0, np.zeros(0), np.zeros(0)
     for one in heard:
         inputs = _inputs(sound, one.features, one.belief).astype(float)
@@ -148,7 +148,7 @@ def fit_following(
     family : of each regression [shape=(E,)]; each is drawn towards that of its family, and this towards that of all
     """
     outputs, inputs, count = heard[0].targets[stream].shape[1], around.basis.shape[1] + 1, len(family)
-    moments = [no_moments(inputs, outputs) for _ in range(count)]
+    moments = [zero_statistics(inputs, outputs) for _ in range(count)]
     for one in heard:
         z, weight = _frames(around, one), gates(one.gates[stream], kind, count)[one.seen]
         target = one.targets[stream][one.seen]
@@ -194,7 +194,7 @@ def _axes(covariance: Array, size: int) -> Single:
     return (basis * signs).astype(np.float32)
 
 
-def _inputs(sound: AudioWindow, features: Single, belief: Single) -> Single:
+def _inputs(sound: AcousticContext, features: Single, belief: Single) -> Single:
     """Return what is heard and believed around all frames [shape=(T, F')]."""
     scale = SOUND_WEIGHT / float(np.linalg.norm(sound.basis[:, 0]))
     frames = np.arange(len(belief))

@@ -33,8 +33,8 @@ from lipmotion.engines.coupled.training.speech_only import MoreSpeech, with_more
 from lipmotion.engines.coupled.training.train import Labelled, Schedule, Step, growing_chains
 from lipmotion.errors import CorpusError
 from lipmotion.kernels.banded import generate
-from lipmotion.motion.closure import learned_closure
-from lipmotion.motion.space import motion_in_space
+from lipmotion.motion.closure import fit_closure_of
+from lipmotion.motion.space import fit_reduced_motion
 from lipmotion.motion.variance_scaling import scaling_factors
 from lipmotion.stats.delta_windows import within
 from lipmotion.types import FRAME_RATE_HZ, Example, Monitor, Progress, Timeline, Unit, part_of
@@ -66,7 +66,7 @@ def growing_models(
     """
     structure = structure_of(config.structure, config.chains, config.states, config.asynchrony, config.crosses)
     moving = [example for example in examples if within(example.valid).any()]
-    space, values = motion_in_space(moving or examples, config.components)
+    space, values = fit_reduced_motion(moving or examples, config.components)
     if all(is_silent(span.label.phone) for example in moving for span in example.speech.units):
         raise CorpusError(f"nothing is said in {len(moving)} examples with motion; learn from speech")
     seen = [within(example.valid) for example in moving]
@@ -78,7 +78,7 @@ def growing_models(
         )
         for example, x, mask in zip(moving, values, seen, strict=True)
     ]
-    rest, closure = _rest(moving, values, seen), learned_closure(space.direct_names, values, moving)
+    rest, closure = _rest(moving, values, seen), fit_closure_of(space.direct_names, values, moving)
     others = [
         Labelled(unseen(_features(example), visual), example.speech.units)
         for example in examples
