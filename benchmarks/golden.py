@@ -40,6 +40,8 @@ write_toy_recordings(Path(sys.argv[1]))
 """
 VERB = "import sys; from lipmotion.cli.main import main; sys.exit(main())"
 Hashes = dict[str, str]
+TEXTS = ("header.json", "document.npy")
+"""What models and motion files say of where they came from: file names, versions."""
 
 
 def main() -> int:
@@ -74,7 +76,7 @@ def _all(work: Path, *, quick: bool) -> Iterator[tuple[str, str]]:
 def _of_corpus(name: str, recordings: Path, engines: Iterable[str], work: Path) -> Iterator[tuple[str, str]]:
     corpus = work / f"{name}-corpus"
     run(work, "corpus", "prepare", recordings, "-o", corpus)
-    files = sorted(file for file in corpus.rglob("*") if file.is_file())
+    files = sorted(corpus.rglob("*.npy"))
     yield f"{name}: corpus", of_bytes(b"".join(contents(file) for file in files))
     for engine in engines:
         model = work / f"{name}-{engine}.lipmotion"
@@ -130,12 +132,12 @@ def python(code: str, *arguments: object) -> bytes:
 
 
 def run(work: Path, *arguments: object) -> bytes:
-    """Return what a verb writes to standard output, the folder of the work left out."""
-    return python(VERB, *arguments).replace(str(work).encode(), b"WORK")
+    """Return what a verb writes to standard output, folders left out."""
+    return python(VERB, *arguments).replace(str(work).encode(), b"WORK").replace(str(HERE).encode(), b"HERE")
 
 
 def of_archive(path: Path) -> str:
-    """Return the hash of a file; of a model or of motion that of all arrays by name, without the header."""
+    """Return the hash of a file; of a model or of motion that of all arrays by name."""
     return of_bytes(contents(path))
 
 
@@ -144,7 +146,7 @@ def contents(path: Path) -> bytes:
     if not zipfile.is_zipfile(path):
         return path.name.encode() + path.read_bytes()
     with zipfile.ZipFile(path) as archive:
-        names = sorted(name for name in archive.namelist() if "header" not in name)
+        names = sorted(name for name in archive.namelist() if name not in TEXTS)
         return b"".join(name.encode() + archive.read(name) for name in names)
 
 
