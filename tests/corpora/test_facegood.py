@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion.corpora.base import Curves
 from lipmotion.corpora.discover import discover
-from lipmotion.corpora.facegood import channels_in, read_array
+from lipmotion.corpora.facegood import read_bare_motion, read_channels
+from lipmotion.corpora.source_recordings import MotionFile
 from lipmotion.errors import InputError
 from lipmotion.types import Channel
 
@@ -35,9 +35,9 @@ def test_sounds_with_arrays(folder):
         ("two", "test", None),
     ]
     assert found.items[0].file == folder / "one.wav"
-    assert found.items[0].curves == Curves(folder / "bs_value_one.npy", 30.0, CHANNELS)
+    assert found.items[0].curves == MotionFile(folder / "bs_value_one.npy", 30.0, CHANNELS)
     assert found.items[0].rights == {"licence": "The MIT License", "attribution": "Copyright (c) Anna"}
-    motion = read_array(found.items[0].curves)
+    motion = read_bare_motion(found.items[0].curves)
     assert (motion.rate_hz, motion.channels) == (30.0, CHANNELS)
     np.testing.assert_array_equal(motion.values, np.load(folder / "bs_value_one.npy"))
 
@@ -62,7 +62,7 @@ def test_a_header_written_by_python_2(folder, recwarn):
     old = plain.replace(b"(60, 3)", b"(60L, 3L)").replace(b"  \n", b"\n", 1)
     assert len(old) == len(plain)
     path.write_bytes(old)
-    assert read_array(Curves(path, 30.0, CHANNELS)).values.shape == (60, 3)
+    assert read_bare_motion(MotionFile(path, 30.0, CHANNELS)).values.shape == (60, 3)
     assert not recwarn.list
 
 
@@ -82,7 +82,7 @@ def test_nothing_is_unpickled(folder, name):
     victim.touch()
     np.save(folder / name, np.array([Harmful(victim)], object), allow_pickle=True)
     with pytest.raises(InputError, match=r"not an array of numbers or texts .*save it with numpy\.save"):
-        channels_in(folder / name) if "name" in name else read_array(Curves(folder / name, 30.0, CHANNELS))
+        read_channels(folder / name) if "name" in name else read_bare_motion(MotionFile(folder / name, 30.0, CHANNELS))
     assert victim.exists()
 
 
@@ -97,13 +97,13 @@ def test_names_that_are_none(folder, names):
 def test_arrays_that_do_not_fit(folder, values):
     np.save(folder / "bs_value_one.npy", values)
     with pytest.raises(InputError, match=r"required numbers of shape \(frames, 3\)"):
-        read_array(Curves(folder / "bs_value_one.npy", 30.0, CHANNELS))
+        read_bare_motion(MotionFile(folder / "bs_value_one.npy", 30.0, CHANNELS))
 
 
 def test_values_that_are_not_finite(folder):
     np.save(folder / "bs_value_one.npy", np.full((5, 3), np.nan))
     with pytest.raises(InputError, match="not finite"):
-        read_array(Curves(folder / "bs_value_one.npy", 30.0, CHANNELS))
+        read_bare_motion(MotionFile(folder / "bs_value_one.npy", 30.0, CHANNELS))
 
 
 def test_two_lists_of_names(folder):

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from lipmotion.corpora.discover import discover
-from lipmotion.corpora.grid import aligned_words, read_grid, sentence
+from lipmotion.corpora.grid import read_aligned_words, read_grid, words_of_name
 from lipmotion.errors import InputError
 
 
@@ -20,15 +20,15 @@ def grid(tmp_path: Path) -> Path:
 
 
 def test_file_names_spell_sentences():
-    assert sentence("brwa3s") == ("bin", "red", "with", "a", "three", "soon")
-    assert sentence("swiz9n") == ("set", "white", "in", "z", "nine", "now")
-    assert sentence("lgazzp") == ("lay", "green", "at", "z", "zero", "please")
-    assert sentence("pbbc1a") == ("place", "blue", "by", "c", "one", "again")
+    assert words_of_name("brwa3s") == ("bin", "red", "with", "a", "three", "soon")
+    assert words_of_name("swiz9n") == ("set", "white", "in", "z", "nine", "now")
+    assert words_of_name("lgazzp") == ("lay", "green", "at", "z", "zero", "please")
+    assert words_of_name("pbbc1a") == ("place", "blue", "by", "c", "one", "again")
 
 
 @pytest.mark.parametrize("name", ["brwa3", "brww3s", "brwa0s", "xrwa3s", "brwa3s2", "BRWA3S", ""])
 def test_other_names_do_not(name):
-    assert sentence(name) is None
+    assert words_of_name(name) is None
 
 
 def test_reads_the_layout(grid):
@@ -64,7 +64,7 @@ def test_bad_word_times_are_reported_and_the_rest_is_read(grid):
 def test_a_missing_word_time_file(tmp_path):
     (tmp_path / "x.align").write_text("")
     with pytest.raises(InputError, match="holds no word"):
-        aligned_words(tmp_path / "x.align")
+        read_aligned_words(tmp_path / "x.align")
 
 
 def test_other_videos_are_not_grid(tmp_path):
@@ -83,7 +83,7 @@ def test_the_real_thing():
     assert found.problems == {}
     splits = [item.split for item in found.items]
     assert {split: splits.count(split) for split in splits} == {"train": 452, "val": 22, "test": 50}
-    assert sum(item.words == sentence(item.name) for item in found.items) >= 520
+    assert sum(item.words == words_of_name(item.name) for item in found.items) >= 520
     assert all(item.words is not None and len(item.words) == 6 for item in found.items)
 
 
@@ -112,9 +112,9 @@ def test_speakers_by_their_folders(tmp_path, folder, speaker):
 def test_hostile_word_times_are_refused(tmp_path, text, message):
     (tmp_path / "a.align").write_text(text)
     with pytest.raises(InputError, match=message):
-        aligned_words(tmp_path / "a.align")
+        read_aligned_words(tmp_path / "a.align")
 
 
 def test_words_of_any_language_are_words(tmp_path):
     (tmp_path / "a.align").write_text("0 1 Näh\n1 2 o'clock\n2 3 well-known\n3 4 真\n", encoding="utf-8")
-    assert aligned_words(tmp_path / "a.align") == ("näh", "o'clock", "well-known", "真")
+    assert read_aligned_words(tmp_path / "a.align") == ("näh", "o'clock", "well-known", "真")

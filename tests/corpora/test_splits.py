@@ -4,25 +4,27 @@ from pathlib import Path
 
 import pytest
 
-from lipmotion.corpora.base import Recording, Recordings
-from lipmotion.corpora.splits import LARGEST_LIST, MOST_MISSING, names_in, with_splits
+from lipmotion.corpora.source_recordings import RecordingFolder, SourceRecording
+from lipmotion.corpora.splits import LARGEST_LIST, MOST_MISSING, assign_splits, read_names
 from lipmotion.errors import CorpusError
 
 
-def recordings(count: int) -> Recordings:
-    return Recordings("folder", tuple(Recording(f"name{i}", Path(f"name{i}.wav"), None) for i in range(count)))
+def recordings(count: int) -> RecordingFolder:
+    return RecordingFolder(
+        "folder", tuple(SourceRecording(f"name{i}", Path(f"name{i}.wav"), None) for i in range(count))
+    )
 
 
 def test_names_elsewhere_are_names_without_a_recording(tmp_path: Path) -> None:
     (tmp_path / "train.txt").write_text("name0\n/etc/passwd\n../name1\n..\nname0\n")
-    found = with_splits(recordings(2), tmp_path)
+    found = assign_splits(recordings(2), tmp_path)
     assert [(item.name, item.split) for item in found.items] == [("name0", "train")]
     assert sorted(found.problems) == ["-etc-passwd", "..", "..-name1", "name1"]
 
 
 def test_long_lists_of_many_recordings(tmp_path: Path) -> None:
     (tmp_path / "train.txt").write_text("".join(f"name{i}\n" for i in range(20_000)))
-    found = with_splits(recordings(5000), tmp_path)
+    found = assign_splits(recordings(5000), tmp_path)
     assert len(found.items) == 5000
     assert len(found.problems) == 15_000
 
@@ -32,10 +34,10 @@ def test_a_list_of_another_folder_is_refused_in_one_line(tmp_path: Path) -> None
     with pytest.raises(
         CorpusError, match=f"name {MOST_MISSING + 1} recordings that are not in it, at most {MOST_MISSING}"
     ):
-        with_splits(recordings(2), tmp_path)
+        assign_splits(recordings(2), tmp_path)
 
 
 def test_a_list_is_small(tmp_path: Path) -> None:
     (tmp_path / "train.txt").write_bytes(b"\n" * (LARGEST_LIST + 1))
     with pytest.raises(CorpusError, match="required at most 16777216: is it a list"):
-        names_in(tmp_path / "train.txt")
+        read_names(tmp_path / "train.txt")

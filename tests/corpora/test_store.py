@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion.corpora.entry import quantised, read_entry
+from lipmotion.corpora.entry import quantise, read_entry
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import CorpusError, ExportError, InputError
 from lipmotion.types import Audio, Channel, Features, Motion, Span, Timeline, Track, Unit, Utterance
@@ -17,7 +17,7 @@ from lipmotion.types import Audio, Channel, Features, Motion, Span, Timeline, Tr
 
 def utterance(name: str = "one", split: str = "train", crops: bool = True) -> Utterance:
     rng = np.random.default_rng(len(name))
-    audio = quantised(Audio(rng.uniform(-1, 1, 16_000).astype(np.float32), 16_000))
+    audio = quantise(Audio(rng.uniform(-1, 1, 16_000).astype(np.float32), 16_000))
     motion = Motion(rng.normal(size=(25, 2)), 25.0, (Channel("opening"), Channel("jaw", "degrees")))
     images = rng.integers(0, 256, (25, 56, 72, 3)).astype(np.uint8) if crops else None
     return Utterance(
@@ -67,8 +67,8 @@ def test_large_arrays_stay_on_disk(corpus):
 
 def test_sixteen_bit_sound_is_kept_exactly():
     samples = np.array([-32768, -1, 0, 1, 32767], np.float32) / 32768
-    np.testing.assert_array_equal(quantised(Audio(samples, 16_000)).samples, samples)
-    np.testing.assert_array_equal(quantised(Audio(np.float32([1.0, -1.5]), 16_000)).samples, [32767 / 32768, -1])
+    np.testing.assert_array_equal(quantise(Audio(samples, 16_000)).samples, samples)
+    np.testing.assert_array_equal(quantise(Audio(np.float32([1.0, -1.5]), 16_000)).samples, [32767 / 32768, -1])
 
 
 def test_names_and_splits(corpus):

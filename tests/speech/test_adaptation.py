@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import ModelFormatError
-from lipmotion.speech.adaptation import Adaptation, adaptation_arrays, adaptation_from_arrays, unadapted
+from lipmotion.speech.adaptation import Adaptation, adaptation_arrays, adaptation_from_arrays, identity_adaptation
 from lipmotion.speech.general.front_end import general_features
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.testing.toy import toy_sentences
@@ -24,7 +24,7 @@ def some() -> Adaptation:
 
 
 def test_no_adaptation_changes_nothing(audio: Audio) -> None:
-    nothing, features = unadapted(1.0, 0.5), mfcc(audio)
+    nothing, features = identity_adaptation(1.0, 0.5), mfcc(audio)
     assert np.array_equal(nothing.own_features(audio, features), features.values)
     assert np.array_equal(nothing.general_features(audio), general_features(audio))
 

@@ -5,14 +5,14 @@ import pytest
 
 from lipmotion.pipeline.model import Model
 from lipmotion.speech import combined_phones as module
-from lipmotion.speech.combined_phones import NOISES, joined, joint_evidence
+from lipmotion.speech.combined_phones import NOISES, combine_phones, combined_log_likelihoods
 from lipmotion.speech.general.acoustic import general_model
 from lipmotion.units import PHONES, SILENCE
 
 
 def test_all_phones_are_there_and_the_own_ones_are_as_they_were(toy_model: Model) -> None:
     own = toy_model.phones
-    joint = joined(own)
+    joint = combine_phones(own)
     table = joint.hmm.table
     assert set(table.units) == {*PHONES, *NOISES}
     assert table.free[0] == SILENCE
@@ -26,7 +26,7 @@ def test_all_phones_are_there_and_the_own_ones_are_as_they_were(toy_model: Model
 
 def test_phones_never_heard_borrow(toy_model: Model) -> None:
     assert "z" not in toy_model.phones.table.units
-    hmm = joined(toy_model.phones).hmm
+    hmm = combine_phones(toy_model.phones).hmm
     z, s = (hmm.mixtures.means[hmm.table.density(unit, 1)] for unit in ("z", "s"))
     assert np.array_equal(z, s)
 
@@ -39,8 +39,8 @@ def test_evidence_is_the_sum_of_both(
     monkeypatch.setattr(module, "KEPT_FRAMES", kept)
     draw = np.random.default_rng(0)
     own, general = draw.normal(size=(2, 9, 39)).astype(np.float32)
-    joint = joined(toy_model.phones)
-    evidence = joint_evidence(joint, own, trust, general)
+    joint = combine_phones(toy_model.phones)
+    evidence = combined_log_likelihoods(joint, own, trust, general)
     wanted = general_model().log_density(general)[:, joint.columns] + trust * joint.hmm.mixtures.log_likelihood(own)
     assert evidence.frames == 9
     assert evidence.log_density(0, 9, None) == pytest.approx(wanted, abs=2e-3)

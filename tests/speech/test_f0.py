@@ -14,8 +14,8 @@ from scipy.signal import butter, lfilter
 from lipmotion.errors import InputError
 from lipmotion.speech import f0 as module
 from lipmotion.speech.f0 import HIGHEST_HZ, LOWEST_HZ, candidates, correlations, lags, log_f0
+from lipmotion.speech.formant_synthesiser import PHONE_TARGETS, synthesise
 from lipmotion.speech.mfcc import mfcc
-from lipmotion.speech.synthesise import SOUNDS, synthesise
 from lipmotion.types import Audio
 from speech import f0_oracle
 
@@ -117,7 +117,7 @@ def test_glides_have_no_jumps(first_hz: float, last_hz: float, noise_db: float, 
 
 @pytest.mark.parametrize("pitch_hz", [70, 120, 220, 370])
 def test_speech_is_voiced_where_it_is(pitch_hz: float) -> None:
-    names = ["sil", *(name for name in SOUNDS if name not in ("sil", "sp")), "sil"]
+    names = ["sil", *(name for name in PHONE_TARGETS if name not in ("sil", "sp")), "sil"]
     audio, phones = synthesise([(name, 0.15) for name in names], pitch_hz=pitch_hz)
     result = np.exp(log_f0(audio).astype(float))
     known = pitch_hz * np.linspace(1.06, 0.94, len(result))
@@ -128,9 +128,9 @@ def test_speech_is_voiced_where_it_is(pitch_hz: float) -> None:
     time_s = np.arange(len(result)) / 100
     for span in phones:
         inner = ~np.isnan(result[(time_s > span.start_s + 0.03) & (time_s < span.end_s - 0.03)])
-        if all(part.voice >= 0.3 for part in SOUNDS[span.label.phone]):
+        if all(part.voice >= 0.3 for part in PHONE_TARGETS[span.label.phone]):
             assert inner.all(), span
-        if all(part.voice == 0 for part in SOUNDS[span.label.phone]):
+        if all(part.voice == 0 for part in PHONE_TARGETS[span.label.phone]):
             assert not inner.any(), span
 
 

@@ -3,7 +3,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lipmotion.speech.lip_speed import AROUND, STATIC, fit_opening_speed, opening_speed, speed
+from lipmotion.speech.lip_speed import (
+    FRAME_OFFSETS,
+    STATIC_FEATURES,
+    fit_opening_speed,
+    measured_opening_speed,
+    predicted_opening_speed,
+)
 from lipmotion.types import Features
 
 
@@ -13,12 +19,12 @@ def features(seed: int, frames: int = 200) -> Features:
 
 def around(values: np.ndarray, frame: int) -> np.ndarray:
     """Return what the map sees of a frame, slowly."""
-    rows = [values[min(max(frame + step, 0), len(values) - 1), :STATIC] for step in AROUND]
+    rows = [values[min(max(frame + step, 0), len(values) - 1), :STATIC_FEATURES] for step in FRAME_OFFSETS]
     return np.concatenate(rows)
 
 
 def test_the_fit_finds_the_map_behind_the_data() -> None:
-    weights = np.random.default_rng(9).normal(size=STATIC * len(AROUND))
+    weights = np.random.default_rng(9).normal(size=STATIC_FEATURES * len(FRAME_OFFSETS))
     examples = []
     for seed in range(12):
         given = features(seed)
@@ -29,15 +35,15 @@ def test_the_fit_finds_the_map_behind_the_data() -> None:
 
 def test_the_map_that_ships_is_linear_and_local() -> None:
     given = features(1)
-    whole = opening_speed(given)
+    whole = predicted_opening_speed(given)
     assert whole.shape == (200,)
     twice = Features(2 * given.values, given.duration_s)
-    assert opening_speed(twice) == pytest.approx(2 * whole)
+    assert predicted_opening_speed(twice) == pytest.approx(2 * whole)
     changed = given.values.copy()
-    changed[100, :STATIC] += 1
-    moved = np.flatnonzero(np.abs(opening_speed(Features(changed, 2.0)) - whole) > 1e-6)
-    assert moved.tolist() == [100 - step for step in reversed(AROUND)]
+    changed[100, :STATIC_FEATURES] += 1
+    moved = np.flatnonzero(np.abs(predicted_opening_speed(Features(changed, 2.0)) - whole) > 1e-6)
+    assert moved.tolist() == [100 - step for step in reversed(FRAME_OFFSETS)]
 
 
 def test_speed_is_the_slope() -> None:
-    assert speed(0.03 * np.arange(20.0))[3:-3] == pytest.approx(0.03, abs=1e-6)
+    assert measured_opening_speed(0.03 * np.arange(20.0))[3:-3] == pytest.approx(0.03, abs=1e-6)

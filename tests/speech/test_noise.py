@@ -7,8 +7,8 @@ import pytest
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.speech.noise import KINDS, babble, noisy, spoken_samples, white, with_noise
-from lipmotion.speech.synthesise import synthesise
+from lipmotion.speech.formant_synthesiser import synthesise
+from lipmotion.speech.noise import NOISE_KINDS, add_noise, babble_noise, noisy_audio, spoken_samples, white_noise
 from lipmotion.types import Audio
 from oracles.noise import ratio_db
 
@@ -27,24 +27,24 @@ def added(clean: Audio, dirty: Audio) -> NDArray[np.float64]:
     return dirty.samples.astype(float) - clean.samples
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", NOISE_KINDS)
 @pytest.mark.parametrize("snr_db", [-10.0, 0.0, 12.5, 40.0])
 def test_the_ratio_is_as_asked(kind: str, snr_db: float) -> None:
     clean = talker(0, 0.3)
-    dirty = noisy(clean, kind, snr_db, [talker(1), talker(2), talker(3)], seed=4)
+    dirty = noisy_audio(clean, kind, snr_db, [talker(1), talker(2), talker(3)], seed=4)
     assert ratio_db(clean.samples, added(clean, dirty)) == pytest.approx(snr_db, abs=0.02)
 
 
 @pytest.mark.parametrize("gain", [0.01, 1.0, 20.0])
 def test_the_level_of_the_noise_given_does_not_matter(gain: float) -> None:
-    clean, hiss = talker(0), white(len(talker(0).samples), 1)
-    same, other = with_noise(clean, hiss, 10), with_noise(clean, np.float32(gain) * hiss, 10)
+    clean, hiss = talker(0), white_noise(len(talker(0).samples), 1)
+    same, other = add_noise(clean, hiss, 10), add_noise(clean, np.float32(gain) * hiss, 10)
     np.testing.assert_allclose(other.samples, same.samples, atol=1e-6)
 
 
 def test_pauses_do_not_change_the_level() -> None:
     short, long = talker(0, pause_s=0.2), talker(0, pause_s=0.7)
-    levels = [added(clean, noisy(clean, "white", 10)).std() for clean in (short, long)]
+    levels = [added(clean, noisy_audio(clean, "white", 10)).std() for clean in (short, long)]
     assert levels[1] == pytest.approx(levels[0], rel=0.06)
 
 
@@ -55,34 +55,34 @@ def test_speech_is_found_between_the_pauses() -> None:
 
 
 def test_white_is_white() -> None:
-    power = np.square(np.abs(np.fft.rfft(white(1 << 16, 0)))).reshape(-1)[1:].reshape(8, -1).mean(axis=1)
+    power = np.square(np.abs(np.fft.rfft(white_noise(1 << 16, 0)))).reshape(-1)[1:].reshape(8, -1).mean(axis=1)
     assert power / power.mean() == pytest.approx(np.ones(8), abs=0.06)
 
 
 def test_all_talkers_are_as_loud() -> None:
-    alone = [babble([talker(1), Audio(talker(1).samples, RATE_HZ)], 16_000, seed=0)]
-    alone += [babble([talker(1, 0.02), talker(1, 3.0)], 16_000, seed=0)]
+    alone = [babble_noise([talker(1), Audio(talker(1).samples, RATE_HZ)], 16_000, seed=0)]
+    alone += [babble_noise([talker(1, 0.02), talker(1, 3.0)], 16_000, seed=0)]
     np.testing.assert_allclose(alone[0], alone[1], atol=1e-4)
 
 
 def test_a_short_talker_begins_again() -> None:
     one = talker(1)
     length = len(one.samples)
-    twice = babble([one, one], 3 * length, seed=2)
+    twice = babble_noise([one, one], 3 * length, seed=2)
     np.testing.assert_allclose(twice[:length], twice[length : 2 * length], atol=1e-6)
 
 
 def test_talkers_start_by_chance_of_the_seed() -> None:
     talkers = [talker(1), talker(2)]
-    first, again, other = (babble(talkers, 20_000, seed) for seed in (1, 1, 2))
+    first, again, other = (babble_noise(talkers, 20_000, seed) for seed in (1, 1, 2))
     assert np.array_equal(first, again)
     assert not np.array_equal(first, other)
-    assert not np.array_equal(white(100, 1), white(100, 2))
+    assert not np.array_equal(white_noise(100, 1), white_noise(100, 2))
 
 
 def test_a_steady_tone_is_all_speech() -> None:
     tone = Audio(np.sin(np.arange(16_000) * 0.3).astype(np.float32), RATE_HZ)
-    assert ratio_db(tone.samples, added(tone, noisy(tone, "white", 5))) == pytest.approx(5, abs=0.2)
+    assert ratio_db(tone.samples, added(tone, noisy_audio(tone, "white", 5))) == pytest.approx(5, abs=0.2)
 
 
 SILENT = Audio(np.zeros(16_000, np.float32), RATE_HZ)
@@ -107,7 +107,7 @@ SILENT = Audio(np.zeros(16_000, np.float32), RATE_HZ)
 )
 def test_it_says_what_is_wrong(kind: str, snr_db: float, audio: Audio, talkers: list[Audio], message: str) -> None:
     with pytest.raises(InputError, match=message):
-        noisy(audio, kind, snr_db, talkers)
+        noisy_audio(audio, kind, snr_db, talkers)
 
 
 @pytest.mark.parametrize(
@@ -116,10 +116,10 @@ def test_it_says_what_is_wrong(kind: str, snr_db: float, audio: Audio, talkers: 
 def test_noise_must_be_noise(noise: NDArray[np.float64], message: str) -> None:
     tone = Audio(np.sin(np.arange(16_000) * 0.3).astype(np.float32), RATE_HZ)
     with pytest.raises(InputError, match=message):
-        with_noise(tone, noise, 0)
+        add_noise(tone, noise, 0)
 
 
 def test_no_samples_are_no_noise() -> None:
-    for make in (lambda: white(0), lambda: babble([talker(0), talker(1)], 0)):
+    for make in (lambda: white_noise(0), lambda: babble_noise([talker(0), talker(1)], 0)):
         with pytest.raises(InputError, match="0 samples"):
             make()

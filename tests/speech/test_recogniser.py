@@ -11,12 +11,12 @@ import pytest
 from lipmotion.errors import AlignmentError, InputError
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.speech import recogniser as module
+from lipmotion.speech import cached_recogniser as module
+from lipmotion.speech.audio_files import read_audio
+from lipmotion.speech.formant_synthesiser import synthesise
 from lipmotion.speech.mfcc import mfcc
-from lipmotion.speech.read import read_audio
-from lipmotion.speech.recogniser import FAMILIAR, FOREIGN, KINDS, SHORT_PAUSE_S, Recogniser, recogniser
-from lipmotion.speech.speaker_similarity import Voice
-from lipmotion.speech.synthesise import synthesise
+from lipmotion.speech.recogniser import FAMILIAR, FOREIGN, RECOGNISER_KINDS, SHORT_PAUSE_S, Recogniser, recogniser
+from lipmotion.speech.speaker_similarity import SpeakerSimilarity
 from lipmotion.testing.toy import WORDS, ToySentence, toy_sentences
 from lipmotion.types import Audio, Timeline, Unit
 from lipmotion.units import PAUSE, PHONES, SILENCE, Lexicon, words_of
@@ -168,7 +168,7 @@ def test_words_of_real_recordings_are_found_where_others_found_them(recordings: 
     assert abs(np.median(errors_s)) < 0.03
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", RECOGNISER_KINDS)
 def test_every_kind_gives_phones_from_start_to_end(hmm: UnitHmm, sentences: list[ToySentence], kind: str) -> None:
     sentence = sentences[0]
     found = recognise(hmm, sentence.audio, kind)
@@ -193,7 +193,7 @@ def test_the_own_models_are_heard_as_far_as_they_know_the_voice(
     monkeypatch.setattr(module, "joint_evidence", lambda *given: trusted.append(given[2]) or real(*given))
     audio = sentences[0].audio
     for fit, wanted in ((0.0, 1.0), (FAMILIAR, 1.0), ((FAMILIAR + FOREIGN) / 2, 0.5), (FOREIGN, 0.0), (-99.0, 0.0)):
-        monkeypatch.setattr(module, "fitted", lambda *_, fit=fit: Voice(mfcc(audio), 1.0, fit))
+        monkeypatch.setattr(module, "fitted", lambda *_, fit=fit: SpeakerSimilarity(mfcc(audio), 1.0, fit))
         recognise(hmm, audio, "auto")
         assert trusted[-1] == pytest.approx(wanted)
 

@@ -8,14 +8,14 @@ import pytest
 from lipmotion.pipeline.model import Model
 from lipmotion.speech import speaker_similarity as module
 from lipmotion.speech.mfcc import mfcc
-from lipmotion.speech.speaker_similarity import WARPS, fitted
+from lipmotion.speech.speaker_similarity import WARPS, speaker_similarity
 from lipmotion.testing.toy import toy_sentences
 from lipmotion.types import Audio
 
 
 def test_the_voice_of_the_training_is_not_warped_and_fits(toy_model: Model) -> None:
     audio = toy_sentences(3)[0].audio
-    voice = fitted(toy_model.phones, audio, mfcc(audio))
+    voice = speaker_similarity(toy_model.phones, audio, mfcc(audio))
     assert voice.warp == 1
     assert abs(voice.fit) < 3
 
@@ -23,11 +23,11 @@ def test_the_voice_of_the_training_is_not_warped_and_fits(toy_model: Model) -> N
 def test_a_warped_voice_is_warped_back(toy_model: Model) -> None:
     """Its spectra are those of the known voice, stretched."""
     audio = toy_sentences(3)[0].audio
-    before = fitted(toy_model.phones, audio, mfcc(audio)).fit
+    before = speaker_similarity(toy_model.phones, audio, mfcc(audio)).fit
     for factor, expected in ((1.12, 0.88), (0.89, 1.12)):
         positions = np.arange(0, len(audio.samples) - 1, factor)
         other = Audio(np.interp(positions, np.arange(len(audio.samples)), audio.samples).astype(np.float32), 16_000)
-        voice = fitted(toy_model.phones, other, mfcc(other))
+        voice = speaker_similarity(toy_model.phones, other, mfcc(other))
         assert abs(voice.warp - expected) < 0.07
         assert voice.fit < before
 
@@ -35,7 +35,7 @@ def test_a_warped_voice_is_warped_back(toy_model: Model) -> None:
 def test_the_warp_chosen_fits_best(toy_model: Model) -> None:
     draw = np.random.default_rng(3)
     audio = Audio(draw.normal(0, 0.1, 16_000).astype(np.float32), 16_000)
-    voice = fitted(toy_model.phones, audio, mfcc(audio))
+    voice = speaker_similarity(toy_model.phones, audio, mfcc(audio))
     fits = {warp: toy_model.phones.fit(mfcc(audio, warp).values) for warp in WARPS}
     assert voice.warp == max(fits, key=lambda warp: fits[warp])
     assert voice.fit == pytest.approx(max(fits.values()) - toy_model.phones.typical_fit)
@@ -50,7 +50,7 @@ def test_a_long_recording_is_judged_by_its_loudest_stretch(toy_model: Model, mon
     judged = []
     phones = toy_model.phones
     monkeypatch.setattr(type(phones), "fit", lambda _, values: judged.append(len(values)) or 0.0)
-    assert len(fitted(replace(phones), long, mfcc(long)).features.values) == len(long.samples) // 160 + 1
+    assert len(speaker_similarity(replace(phones), long, mfcc(long)).features.values) == len(long.samples) // 160 + 1
     assert set(judged) == {len(spoken) // 160 + 1}
     stretch = module._loudest(long, mfcc(long))
     assert np.abs(stretch.samples).sum() > 0.95 * np.abs(spoken).sum()

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from lipmotion.errors import InputError
 from lipmotion.units import PHONES, Lexicon, is_silent
-from lipmotion.units.spelling import SPELLINGS, guess
+from lipmotion.units.spelling import SPELLINGS, guess_pronunciation
 
 LETTERS = "abcdefghijklmnopqrstuvwxyz"
 
@@ -31,7 +31,7 @@ LETTERS = "abcdefghijklmnopqrstuvwxyz"
     ],
 )
 def test_rules(word: str, phones: str) -> None:
-    assert " ".join(guess(word)) == phones
+    assert " ".join(guess_pronunciation(word)) == phones
 
 
 def test_every_rule_gives_phones_of_the_inventory() -> None:
@@ -43,7 +43,7 @@ def test_every_rule_gives_phones_of_the_inventory() -> None:
 @settings(deadline=None, max_examples=300)
 @given(st.text(LETTERS, min_size=1, max_size=20))
 def test_any_word_can_be_said(word: str) -> None:
-    phones = guess(word)
+    phones = guess_pronunciation(word)
     assert phones
     assert all(phone in PHONES and not is_silent(phone) for phone in phones)
 
@@ -69,11 +69,11 @@ def test_the_lexicon_knows_how_any_word_is_said(word: str) -> None:
 )
 def test_it_says_what_it_cannot_guess(word: str, message: str) -> None:
     with pytest.raises(InputError, match=message):
-        guess(word)
+        guess_pronunciation(word)
 
 
 @pytest.mark.parametrize("word", ["ä" * 1000, "".join(map(chr, range(0x3B1, 0x3C9))) * 100 + "日" * 90])
 def test_a_message_repeats_the_beginning_of_a_word(word: str) -> None:
     with pytest.raises(InputError, match=r"\.\.\.' is said") as caught:
-        guess(word)
+        guess_pronunciation(word)
     assert len(str(caught.value)) < 300

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.vision.frames import Frame, open_video
+from lipmotion.vision.frames import VideoFrame, open_video
 
 
-def all_frames(path: Path) -> list[Frame]:
+def all_frames(path: Path) -> list[VideoFrame]:
     with open_video(path) as video:
         return list(video.frames)
 

@@ -9,7 +9,7 @@ import pytest
 
 from lipmotion.errors import MissingDependencyError
 from lipmotion.vision.mesh import FaceMesh, quiet_stderr
-from lipmotion.vision.packages import import_face_mesh, import_opencv, versions
+from lipmotion.vision.packages import import_face_mesh, import_opencv, package_versions
 
 
 def test_missing_packages_are_named_with_the_way_to_install_them(monkeypatch):
@@ -32,7 +32,7 @@ def test_versions_need_the_packages(monkeypatch):
 
     monkeypatch.setattr(metadata, "version", missing)
     with pytest.raises(MissingDependencyError, match="mediapipe"):
-        versions()
+        package_versions()
 
 
 def test_native_messages_are_dropped_only_inside(capfd):
@@ -60,4 +60,4 @@ def test_a_picture_without_a_face_has_no_points():
 @pytest.mark.video
 def test_versions_are_known():
     pytest.importorskip("mediapipe")
-    assert versions().keys() == {"mediapipe", "opencv", "av"}
+    assert package_versions().keys() == {"mediapipe", "opencv", "av"}

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from lipmotion.vision.landmarks import EYE_CORNERS, JAW_POINTS, LIP_POINTS, NASION, RIGID_POINTS, TRACKED_POINTS
-from lipmotion.vision.pose import head_frame, similarity
+from lipmotion.vision.pose import head_frame, similarity_transforms
 
 COLUMN = {index: n for n, index in enumerate(TRACKED_POINTS)}
 FRAMES = 40
@@ -67,7 +67,7 @@ def test_similarity_agrees_with_scipy_where_only_rotation_is_asked():
     rng = np.random.default_rng(8)
     target = rng.normal(size=(12, 3))
     points = rng.normal(size=(5, 12, 3))
-    turn, scale, shift = similarity(points, target)
+    turn, scale, shift = similarity_transforms(points, target)
     for n in range(5):
         centred = points[n] - points[n].mean(axis=0)
         oracle, _ = Rotation.align_vectors(target - target.mean(axis=0), centred)
@@ -79,7 +79,7 @@ def test_similarity_agrees_with_scipy_where_only_rotation_is_asked():
 def test_similarity_is_the_least_squares_solution():
     rng = np.random.default_rng(9)
     target, points = rng.normal(size=(12, 3)), rng.normal(size=(1, 12, 3))
-    turn, scale, shift = similarity(points, target)
+    turn, scale, shift = similarity_transforms(points, target)
 
     def cost(turned: NDArray[np.float64], scaled: float, shifted: NDArray[np.float64]) -> float:
         return float(np.square(scaled * points[0] @ turned.T + shifted - target).sum())
@@ -92,7 +92,7 @@ def test_similarity_is_the_least_squares_solution():
 
 def test_a_mirrored_face_is_not_reflected():
     points = np.random.default_rng(10).normal(size=(1, 12, 3))
-    turn, _, _ = similarity(points * (-1, 1, 1), points[0])
+    turn, _, _ = similarity_transforms(points * (-1, 1, 1), points[0])
     assert np.linalg.det(turn[0]) == pytest.approx(1)
 
 

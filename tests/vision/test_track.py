@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.vision import follow
+from lipmotion.vision import face_follower as follow
 from lipmotion.vision.landmarks import JAW_POINTS, LIP_POINTS, TRACKED_POINTS
 from lipmotion.vision.track import CHANNELS, motion_values, track
 

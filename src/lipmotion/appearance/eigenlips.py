@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.stats.pca import check_orthonormal, fit_pca
-from lipmotion.storage.schema import Arrays, Member, checked, only
+from lipmotion.storage.schema import Arrays, ArraySpec, checked_arrays, refuse_undeclared
 from lipmotion.types import GREY, Channel
 
 COLOURS = "rgb"
@@ -110,9 +110,9 @@ def eigenlips_arrays(eigenlips: Eigenlips) -> dict[str, NDArray[Any]]:
 def eigenlips_from_arrays(arrays: Arrays) -> Eigenlips:
     """Return eigenlips again. Raises ModelFormatError: something is missing, or does not belong together."""
     try:
-        only(arrays, SIZE, SPACES)
-        height, width = checked(arrays, SIZE)["size"].tolist()
-        found = checked(arrays, SPACES, D=height * width)
+        refuse_undeclared(arrays, SIZE, SPACES)
+        height, width = checked_arrays(arrays, SIZE)["size"].tolist()
+        found = checked_arrays(arrays, SPACES, D=height * width)
         for basis in found["basis"]:
             check_orthonormal("basis", basis)
         return Eigenlips(found["mean"], found["basis"], found["explained"], (height, width))
@@ -120,11 +120,11 @@ def eigenlips_from_arrays(arrays: Arrays) -> Eigenlips:
         raise ModelFormatError(f"the eigenlips are damaged ({error}); train the model again") from error
 
 
-SIZE = {"size": Member(np.intp, "2", 1, 10_000)}
+SIZE = {"size": ArraySpec(np.intp, "2", 1, 10_000)}
 SPACES = {
-    "mean": Member(np.float32, f"{len(COLOURS)} D", 0, 255),
-    "basis": Member(np.float32, f"{len(COLOURS)} K D", -1.01, 1.01),
-    "explained": Member(np.float64, f"{len(COLOURS)}", 0, 1.01),
+    "mean": ArraySpec(np.float32, f"{len(COLOURS)} D", 0, 255),
+    "basis": ArraySpec(np.float32, f"{len(COLOURS)} K D", -1.01, 1.01),
+    "explained": ArraySpec(np.float64, f"{len(COLOURS)}", 0, 1.01),
 }
 """How eigenlips are stored."""
 

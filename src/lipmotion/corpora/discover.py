@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from lipmotion.corpora.base import VIDEO_SUFFIXES, Recordings
 from lipmotion.corpora.facegood import read_facegood
 from lipmotion.corpora.folder import MOTION_SUFFIXES, read_folder
 from lipmotion.corpora.grid import read_grid
+from lipmotion.corpora.source_recordings import VIDEO_SUFFIXES, RecordingFolder
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.storage.files import check_listable
 
 
-def discover(directory: Path) -> Recordings:
+def discover(directory: Path) -> RecordingFolder:
     """Return what a folder holds, read by the first reader that fits: GRID, FACEGOOD, then any other folder.
 
     Raises InputError: no such folder. Raises CorpusError: no recordings in it, or its lists contradict each other.

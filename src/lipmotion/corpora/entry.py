@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from lipmotion.corpora.splits import SPLITS
 from lipmotion.errors import CorpusError, InputError
-from lipmotion.storage.files import check_regular, text_in, whole_folder
+from lipmotion.storage.files import check_regular, read_text_file, whole_folder
 from lipmotion.storage.json_text import as_json, from_json
-from lipmotion.storage.schema import Member, check
+from lipmotion.storage.schema import ArraySpec, checked_sizes
 from lipmotion.types import (
     FRAME_RATE_HZ,
     Audio,
@@ -37,30 +37,30 @@ KEYS = frozenset(
 )
 """What every description holds. ``speaker`` and ``phones`` came with version 2 of the corpus; without them: unknown.
 ``checksums`` came later; without them, only arrays that cannot be are noticed."""
-LAZY = "crops"
+UNCHECKED = "crops"
 """The array that is not read before it is needed, and has no checksum."""
 LARGEST_FEATURE = 1e3
 """Features are standardised."""
-ARRAYS = {
-    "audio": Member(np.int16, "N"),
-    "features": Member(np.float32, "T D", -LARGEST_FEATURE, LARGEST_FEATURE),
-    "motion": Member(np.float32, "F P"),
-    "seen": Member(np.bool_, "F"),
-    "crops": Member(np.uint8, "F H W 3", optional=True),
+UTTERANCE_MEMBERS = {
+    "audio": ArraySpec(np.int16, "N"),
+    "features": ArraySpec(np.float32, "T D", -LARGEST_FEATURE, LARGEST_FEATURE),
+    "motion": ArraySpec(np.float32, "F P"),
+    "seen": ArraySpec(np.bool_, "F"),
+    "crops": ArraySpec(np.uint8, "F H W 3", optional=True),
 }
 """How an utterance is stored: N samples, T frames of sound, F of motion."""
 FULL_SCALE = 32_768
 """16-bit samples per unit of amplitude: recordings of 16 bits come back exactly."""
-MOST = 1e9
+LARGEST_NUMBER = 1e9
 """No utterance has more seconds or frames, nor more frames a second."""
 
 
-def quantised(audio: Audio) -> Audio:
+def quantise(audio: Audio) -> Audio:
     """Return the sound as a corpus keeps it, in 16 bits, so that its features can be computed again from there."""
     return Audio(_as_float(_as_int16(audio.samples)), audio.rate_hz)
 
 
-def is_name(name: str) -> bool:
+def is_utterance_name(name: str) -> bool:
     """Whether an utterance can be named so: as a visible folder, and nowhere else."""
     return bool(name) and name == Path(name).name and not name.startswith(".") and "\0" not in name
 
@@ -72,7 +72,7 @@ def write_utterance(folder: Path, utterance: Utterance, settings: dict[str, str]
     Raises InputError: the name cannot be a folder's, or the motion is none of a face.
     Raises ExportError: it cannot be written.
     """
-    if not is_name(utterance.name):
+    if not is_utterance_name(utterance.name):
         raise InputError(f"an utterance cannot be named {utterance.name!r}: required: the name of a visible folder")
     check_curves(utterance.track.motion)
     with whole_folder(folder) as unfinished:
@@ -87,7 +87,7 @@ def write_utterance(folder: Path, utterance: Utterance, settings: dict[str, str]
 def read_entry(folder: Path) -> dict[str, Any]:
     """Return the description of an utterance. Raises CorpusError: missing or damaged."""
     try:
-        entry = from_json(text_in(folder / ENTRY, "description"))
+        entry = from_json(read_text_file(folder / ENTRY, "description"))
     except (OSError, ValueError, RecursionError) as error:
         raise _damaged(folder, error) from error
     if not isinstance(entry, dict) or not entry.keys() >= KEYS:
@@ -107,8 +107,8 @@ def read_utterance(folder: Path) -> Utterance:
     entry = read_entry(folder)
     try:
         channels = tuple(Channel(**channel) for channel in entry["channels"])
-        arrays = {name: _load(folder, name) for name in ARRAYS if name != "crops" or entry["crops"]}
-        sizes = check(arrays, ARRAYS, P=len(channels), F=entry["frames"])
+        arrays = {name: _load(folder, name) for name in UTTERANCE_MEMBERS if name != "crops" or entry["crops"]}
+        sizes = checked_sizes(arrays, UTTERANCE_MEMBERS, P=len(channels), F=entry["frames"])
         audio = Audio(_as_float(arrays["audio"]), entry["audio_rate_hz"])
         expected = int(audio.duration_s * FRAME_RATE_HZ + 1e-9) + 1
         if sizes["T"] != expected:
@@ -161,7 +161,7 @@ def _description(utterance: Utterance, settings: dict[str, str]) -> dict[str, An
         "notes": utterance.track.notes,
         "source": utterance.source,
         "settings": settings,
-        "checksums": {name: _checksum(array) for name, array in _arrays(utterance).items() if name != LAZY},
+        "checksums": {name: _checksum(array) for name, array in _arrays(utterance).items() if name != UNCHECKED},
     }
 
 
@@ -205,7 +205,7 @@ def _is_channel(value: Any) -> bool:
 
 
 def _is_count(value: Any) -> bool:
-    return isinstance(value, int | float) and 0 <= value <= MOST
+    return isinstance(value, int | float) and 0 <= value <= LARGEST_NUMBER
 
 
 def _timeline(rows: Any) -> Timeline[Unit] | None:

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.corpora.base import AUDIO_SUFFIXES, Curves, Recording, Recordings
 from lipmotion.corpora.labels import labels_beside
-from lipmotion.corpora.splits import LISTS, with_splits
+from lipmotion.corpora.source_recordings import AUDIO_SUFFIXES, MotionFile, RecordingFolder, SourceRecording
+from lipmotion.corpora.splits import LISTS, assign_splits
 from lipmotion.errors import InputError
 from lipmotion.storage.archive import array_in
 from lipmotion.storage.files import check_regular
@@ -28,7 +28,7 @@ LICENCE_START = 10_000
 """Characters of a licence that say which it is, and whose."""
 
 
-def read_facegood(directory: Path) -> Recordings | None:
+def read_facegood(directory: Path) -> RecordingFolder | None:
     """Return the recordings of such a folder, or None if it holds no list of names or no arrays.
 
     Raises InputError: the list of names is damaged, or there are several.
@@ -38,7 +38,7 @@ def read_facegood(directory: Path) -> Recordings | None:
         return None
     if len(lists) > 1:
         raise InputError(f"{directory}: {len(lists)} lists of channel names ({NAMES}); keep the one that belongs here")
-    channels = channels_in(lists[0])
+    channels = read_channels(lists[0])
     sounds: dict[str, list[Path]] = {}
     for path in directory.iterdir():
         if path.suffix.lower() in AUDIO_SUFFIXES:
@@ -52,14 +52,16 @@ def read_facegood(directory: Path) -> Recordings | None:
             if len(found) != 1:
                 raise InputError(f"{path}: {len(found)} sounds named {name}, required one: {name}.wav")
             labels = labels_beside(found[0], ignored=ignored)
-            curves = Curves(path, RATE_HZ, channels)
-            items.append(Recording(name, found[0], labels.words, rights=rights, phones=labels.phones, curves=curves))
+            curves = MotionFile(path, RATE_HZ, channels)
+            items.append(
+                SourceRecording(name, found[0], labels.words, rights=rights, phones=labels.phones, curves=curves)
+            )
         except InputError as error:
             problems[name] = str(error)
-    return with_splits(Recordings(KIND, tuple(items), problems), directory)
+    return assign_splits(RecordingFolder(KIND, tuple(items), problems), directory)
 
 
-def channels_in(path: Path) -> tuple[Channel, ...]:
+def read_channels(path: Path) -> tuple[Channel, ...]:
     """Return the channels that a list of names gives. Raises InputError: not a row of different texts."""
     names = _load(path)
     if names.dtype.kind != "U" or names.ndim != 1 or len(set(names.tolist())) != len(names):
@@ -69,7 +71,7 @@ def channels_in(path: Path) -> tuple[Channel, ...]:
     return tuple(Channel(str(name), WEIGHT) for name in names)
 
 
-def read_array(curves: Curves) -> Motion:
+def read_bare_motion(curves: MotionFile) -> Motion:
     """Return the motion of a bare array.
 
     Raises InputError: not an array of numbers, a row of which has one for each channel.

@@ -4,9 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from lipmotion.corpora.base import AUDIO_SUFFIXES, Curves, Recording, Recordings, videos
-from lipmotion.corpora.labels import Labels, labels_beside
-from lipmotion.corpora.splits import LISTS, with_splits
+from lipmotion.corpora.labels import RecordingLabels, labels_beside
+from lipmotion.corpora.source_recordings import (
+    AUDIO_SUFFIXES,
+    MotionFile,
+    RecordingFolder,
+    SourceRecording,
+    video_files,
+)
+from lipmotion.corpora.splits import LISTS, assign_splits
 from lipmotion.errors import InputError
 
 VIDEOS, SOUNDS, BOTH = "folder of videos", "folder of sounds with motion", "folder of videos, and of sounds with motion"
@@ -14,7 +20,7 @@ MOTION_SUFFIXES = (".csv", ".json", ".npz")
 """Motion files that ``animate`` writes and ``read_motion`` reads."""
 
 
-def read_folder(directory: Path) -> Recordings:
+def read_folder(directory: Path) -> RecordingFolder:
     """Return the recordings in a folder and its sub-folders: videos, and sounds with a motion file of the same name.
 
     Beside ``take1.mp4`` may lie what was said: ``take1.txt``, ``take1.TextGrid``, ``take1.lab``.  What lies in a
@@ -23,7 +29,7 @@ def read_folder(directory: Path) -> Recordings:
     by_name: dict[str, list[Path]] = {}
     for path in sorted(directory.rglob("*")):
         inner = path.relative_to(directory)
-        if not any(part.startswith(".") for part in inner.parts) and (_has_motion(path) or videos([path])):
+        if not any(part.startswith(".") for part in inner.parts) and (_has_motion(path) or video_files([path])):
             by_name.setdefault("-".join(inner.with_suffix("").parts), []).append(path)
     lists = frozenset(directory / name for name in LISTS)
     items, problems = [], {}
@@ -33,20 +39,20 @@ def read_folder(directory: Path) -> Recordings:
         except InputError as error:
             problems[name] = str(error)
     items.sort(key=lambda item: item.name)
-    return with_splits(Recordings(_kind(by_name), tuple(items), problems), directory)
+    return assign_splits(RecordingFolder(_kind(by_name), tuple(items), problems), directory)
 
 
-def _recording(name: str, path: Path, directory: Path, lists: frozenset[Path]) -> Recording:
-    labels: Labels = labels_beside(path, ignored=lists)
+def _recording(name: str, path: Path, directory: Path, lists: frozenset[Path]) -> SourceRecording:
+    labels: RecordingLabels = labels_beside(path, ignored=lists)
     curves = None
     if _is_sound(path):
         beside = motion_files(path)
         if len(beside) > 1:
             raise InputError(f"{path}: {len(beside)} motion files beside it: {', '.join(map(str, beside))}; keep one")
-        curves = Curves(beside[0])
+        curves = MotionFile(beside[0])
     folders = path.relative_to(directory).parts[:-1]
     speaker = folders[0] if folders else ""
-    return Recording(name, path, labels.words, speaker=speaker, phones=labels.phones, curves=curves)
+    return SourceRecording(name, path, labels.words, speaker=speaker, phones=labels.phones, curves=curves)
 
 
 def motion_files(sound: Path) -> list[Path]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from lipmotion.corpora.base import Recording, Recordings, videos
-from lipmotion.corpora.splits import with_splits
+from lipmotion.corpora.source_recordings import RecordingFolder, SourceRecording, video_files
+from lipmotion.corpora.splits import assign_splits
 from lipmotion.errors import InputError, shortened
 
 KIND = "GRID corpus"
@@ -30,31 +30,31 @@ NAME = re.compile(r"[blps][bgrw][abiw][a-vx-z][z1-9][anps]")
 """A letter for each of the six words: command, colour, preposition, letter (there is no w), digit, adverb."""
 
 
-def read_grid(directory: Path) -> Recordings | None:
+def read_grid(directory: Path) -> RecordingFolder | None:
     """Return the sentences of a GRID folder, or None if most of its videos are not named like GRID's.
 
     directory : holds clips/ or the videos themselves; align/ or the .align files beside the videos; the lists
     """
     clips = directory / "clips"
-    files = videos((clips if clips.is_dir() else directory).iterdir())
-    if 2 * sum(sentence(path.stem) is not None for path in files) <= len(files):
+    files = video_files((clips if clips.is_dir() else directory).iterdir())
+    if 2 * sum(words_of_name(path.stem) is not None for path in files) <= len(files):
         return None
-    items, problems, speaker = [], {}, speaker_of(directory.resolve().name)
+    items, problems, speaker = [], {}, speaker_of_folder(directory.resolve().name)
     for path in files:
         try:
-            items.append(Recording(path.stem, path, _words(directory, path), rights=RIGHTS, speaker=speaker))
+            items.append(SourceRecording(path.stem, path, _words(directory, path), rights=RIGHTS, speaker=speaker))
         except InputError as error:
             problems[path.stem] = str(error)
-    return with_splits(Recordings(KIND, tuple(items), problems), directory)
+    return assign_splits(RecordingFolder(KIND, tuple(items), problems), directory)
 
 
-def speaker_of(folder: str) -> str:
+def speaker_of_folder(folder: str) -> str:
     """Return the speaker that a folder is named after (``s1``, ``grid-s1``), or an empty text."""
     found = re.search(r"(?:^|[^a-z0-9])(s[1-9]\d?)$", folder.lower())
     return found[1] if found else ""
 
 
-def sentence(name: str) -> tuple[str, ...] | None:
+def words_of_name(name: str) -> tuple[str, ...] | None:
     """Return the six words that a GRID file name spells out, or None if it is not one."""
     if not NAME.fullmatch(name):
         return None
@@ -69,11 +69,11 @@ def _words(directory: Path, video: Path) -> tuple[str, ...] | None:
     for folder in (directory / "align", video.parent):
         path = folder / f"{video.stem}.align"
         if path.is_file():
-            return aligned_words(path)
-    return sentence(video.stem)
+            return read_aligned_words(path)
+    return words_of_name(video.stem)
 
 
-def aligned_words(path: Path) -> tuple[str, ...]:
+def read_aligned_words(path: Path) -> tuple[str, ...]:
     """Return the words of a word-time file: lines of start, end (unit 1/25000 s) and word.
 
     Raises InputError: not such a file, or without a word.

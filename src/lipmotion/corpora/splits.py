@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from lipmotion.corpora.base import Recordings
+from lipmotion.corpora.source_recordings import RecordingFolder
 from lipmotion.errors import CorpusError, InputError
-from lipmotion.storage.files import text_in
+from lipmotion.storage.files import read_text_file
 
 SPLITS = ("train", "val", "test")
 LISTS = tuple(f"{split}.txt" for split in SPLITS)
@@ -17,7 +17,7 @@ MOST_MISSING = 20_000
 """Names without a recording that are reported one by one; more of them are the list of another folder."""
 
 
-def with_splits(found: Recordings, directory: Path) -> Recordings:
+def assign_splits(found: RecordingFolder, directory: Path) -> RecordingFolder:
     """Return the recordings with the splits that the lists in ``directory`` give them.
 
     Without lists everything is ``train``. With a train.txt, recordings in no list become problems, for training on
@@ -44,26 +44,26 @@ def with_splits(found: Recordings, directory: Path) -> Recordings:
             problems[item.name] = f"in none of the lists of {directory} ({', '.join(LISTS)}); add it to one"
         else:
             items.append(replace(item, split=split))
-    return Recordings(found.kind, tuple(items), found.problems | problems)
+    return RecordingFolder(found.kind, tuple(items), found.problems | problems)
 
 
 def _read_lists(directory: Path) -> dict[str, str]:
     split_of: dict[str, str] = {}
     for split in SPLITS:
         path = directory / f"{split}.txt"
-        for name in names_in(path) if path.is_file() else ():
+        for name in read_names(path) if path.is_file() else ():
             if split_of.setdefault(name, split) != split:
                 raise CorpusError(f"{name} is in {split_of[name]}.txt and in {split}.txt of {directory}; keep one")
     return split_of
 
 
-def names_in(path: Path) -> list[str]:
+def read_names(path: Path) -> list[str]:
     """Return the names of utterances that a text file lists, one a line.
 
     Raises CorpusError: no such file, or not UTF-8 text.
     """
     try:
-        lines = text_in(path, "list", LARGEST_LIST).splitlines()
+        lines = read_text_file(path, "list", LARGEST_LIST).splitlines()
     except InputError as error:
         raise CorpusError(f"{error}; required: one name a line") from error
     return [line.strip().replace("/", "-") for line in lines if line.strip()]

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from lipmotion.corpora.entry import MOST, is_name, read_entry, read_utterance, write_utterance
+from lipmotion.corpora.entry import LARGEST_NUMBER, is_utterance_name, read_entry, read_utterance, write_utterance
 from lipmotion.corpora.splits import SPLITS
 from lipmotion.errors import CorpusError, ExportError
-from lipmotion.storage.files import TEMPORARY, remove_unfinished, text_in, whole_file
+from lipmotion.storage.files import TEMPORARY, read_text_file, remove_unfinished, whole_file
 from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.types import Utterance
 
@@ -184,7 +184,7 @@ def _motion(entry: dict[str, Any]) -> str:
 
 def _read_manifest(path: Path) -> dict[str, dict[str, Any]]:
     try:
-        content = from_json(text_in(path, "manifest"))
+        content = from_json(read_text_file(path, "manifest"))
         found, version = content["format"], content["version"]
     except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise CorpusError(f"{path.parent}: not a corpus (no readable {MANIFEST}); give a prepared corpus") from error
@@ -197,7 +197,9 @@ def _read_manifest(path: Path) -> dict[str, dict[str, Any]]:
         )
     try:
         index: dict[str, dict[str, Any]] = content["utterances"]
-        damaged = next((name for name, entry in index.items() if not is_name(name) or not _is_listed(entry)), None)
+        damaged = next(
+            (name for name, entry in index.items() if not is_utterance_name(name) or not _is_listed(entry)), None
+        )
     except (KeyError, TypeError, AttributeError, ValueError, OverflowError) as error:
         raise CorpusError(f"{path}: the list of utterances is damaged ({error!r}); prepare the corpus again") from error
     if damaged is not None:
@@ -207,5 +209,5 @@ def _read_manifest(path: Path) -> dict[str, dict[str, Any]]:
 
 def _is_listed(entry: dict[str, Any]) -> bool:
     numbers = [float(entry[key]) for key in ("duration_s", "frames", "unseen_frames")]
-    possible = all(0 <= number <= MOST for number in numbers)
+    possible = all(0 <= number <= LARGEST_NUMBER for number in numbers)
     return entry["split"] in SPLITS and isinstance(entry.get("speaker", ""), str) and possible

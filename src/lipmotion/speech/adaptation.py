@@ -13,10 +13,10 @@ from lipmotion.speech.general.acoustic import STREAMS
 from lipmotion.speech.general.front_end import general_features
 from lipmotion.speech.mfcc import FEATURES, mfcc
 from lipmotion.stats.affine import identity, transformed
-from lipmotion.storage.schema import STANDARD, Arrays, Member, checked, only
+from lipmotion.storage.schema import STANDARD, Arrays, ArraySpec, checked_arrays, refuse_undeclared
 from lipmotion.types import Audio, Features
 
-WIDEST_WARP = 2.0
+LARGEST_WARP = 2.0
 """Frequencies are not stretched by more, nor by less than its inverse."""
 _GENERAL = (len(STREAMS), STREAMS[0].stop, STREAMS[0].stop + 1)
 
@@ -51,7 +51,7 @@ class Adaptation:
         return np.concatenate(streams, axis=1)
 
 
-def unadapted(warp: float, trust: float) -> Adaptation:
+def identity_adaptation(warp: float, trust: float) -> Adaptation:
     """Return an adaptation whose transforms change nothing."""
     streams, size, _ = _GENERAL
     return Adaptation(warp, trust, identity(FEATURES), np.stack([identity(size)] * streams))
@@ -66,19 +66,19 @@ def adaptation_arrays(adaptation: Adaptation) -> dict[str, NDArray[Any]]:
 def adaptation_from_arrays(arrays: Arrays) -> Adaptation:
     """Return an adaptation again. Raises ModelFormatError: something is missing, or cannot be a transform."""
     try:
-        only(arrays, TRANSFORMS)
-        found = checked(arrays, TRANSFORMS)
+        refuse_undeclared(arrays, ADAPTATION_MEMBERS)
+        found = checked_arrays(arrays, ADAPTATION_MEMBERS)
         warp, trust = found["numbers"].tolist()
-        if not 1 / WIDEST_WARP <= warp <= WIDEST_WARP or not 0 <= trust <= 1:
+        if not 1 / LARGEST_WARP <= warp <= LARGEST_WARP or not 0 <= trust <= 1:
             raise ValueError(f"a warp of {warp} and a trust of {trust}")
         return Adaptation(warp, trust, found["own"], found["general"])
     except (KeyError, ValueError, TypeError) as error:
         raise ModelFormatError(f"the adaptation is damaged ({error}); adapt the model again") from error
 
 
-TRANSFORMS = {
-    "numbers": Member(np.float64, "2"),
-    "own": Member(np.float64, f"{FEATURES} {FEATURES + 1}", -STANDARD, STANDARD),
-    "general": Member(np.float64, " ".join(map(str, _GENERAL)), -STANDARD, STANDARD),
+ADAPTATION_MEMBERS = {
+    "numbers": ArraySpec(np.float64, "2"),
+    "own": ArraySpec(np.float64, f"{FEATURES} {FEATURES + 1}", -STANDARD, STANDARD),
+    "general": ArraySpec(np.float64, " ".join(map(str, _GENERAL)), -STANDARD, STANDARD),
 }
 """How an adaptation is stored."""

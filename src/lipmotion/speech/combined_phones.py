@@ -8,13 +8,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.hmm.log_likelihoods import Chosen, LogLikelihoods
+from lipmotion.hmm.log_likelihoods import DensitySelection, LogLikelihoods
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.hmm.states import StateTable
-from lipmotion.speech.general.acoustic import column, general_model
+from lipmotion.speech.general.acoustic import density_column, general_model
 from lipmotion.speech.general.language import english_bigram
 from lipmotion.stats.bigram import Bigram
-from lipmotion.units import PHONES, SILENCE, is_silent, stand_in
+from lipmotion.units import PHONES, SILENCE, is_silent, most_similar_phone
 
 NOISES = ("+nsn+", "+spn+")
 """Units of the general models alone: noise, and noise of the mouth (a breath, a cough)."""
@@ -26,7 +26,7 @@ KEPT_FRAMES = 400_000
 Those of a longer one are computed twice."""
 
 
-class Joint(NamedTuple):
+class CombinedPhones(NamedTuple):
     """Models of every phone of the inventory and of the noises.
 
     hmm     : its own densities are those of the own models; a phone that these have never heard borrows the
@@ -38,11 +38,11 @@ class Joint(NamedTuple):
     columns: NDArray[np.intp]
 
 
-def joined(own: UnitHmm) -> Joint:
+def combine_phones(own: UnitHmm) -> CombinedPhones:
     """Return the own models with all phones. Raises MissingDependencyError: pocketsphinx is not installed."""
     old, known = own.table, [unit for unit in own.table.units if not is_silent(unit)]
     new = tuple(unit for unit in (*PHONES, *NOISES) if unit not in old.units)
-    borrowed = [SILENCE if unit in NOISES or is_silent(unit) else stand_in(unit, known) for unit in new]
+    borrowed = [SILENCE if unit in NOISES or is_silent(unit) else most_similar_phone(unit, known) for unit in new]
     plain = len(own.log_stay)
     added = [(unit, state, old.density(source, state)) for unit, source in zip(new, borrowed, strict=True)
              for state in range(old.count(source))]  # fmt: skip
@@ -61,12 +61,12 @@ def joined(own: UnitHmm) -> Joint:
         log_stay=own.log_stay[sources[: plain + len(added)]],
         bigram=_bigram(own.bigram, table.units),
     )
-    return Joint(hmm, np.array([_column(table, name) for name in table.names], np.intp))
+    return CombinedPhones(hmm, np.array([_column(table, name) for name in table.names], np.intp))
 
 
 def _column(table: StateTable, name: str) -> int:
     unit, _, rest = name.partition(".")
-    return column(unit, int(rest.partition("<")[0].partition(">")[0]), table.count(unit))
+    return density_column(unit, int(rest.partition("<")[0].partition(">")[0]), table.count(unit))
 
 
 def _bigram(own: Bigram, units: tuple[str, ...]) -> Bigram:
@@ -78,8 +78,8 @@ def _bigram(own: Bigram, units: tuple[str, ...]) -> Bigram:
     return Bigram(units, np.log(np.maximum(mixed, 1e-9)).astype(np.float32))
 
 
-def joint_evidence(
-    joint: Joint, own_features: NDArray[np.float32], trust: float, general: NDArray[np.float32]
+def combined_log_likelihoods(
+    joint: CombinedPhones, own_features: NDArray[np.float32], trust: float, general: NDArray[np.float32]
 ) -> LogLikelihoods:
     """Return what both models say about a recording: the sum of their log densities.
 
@@ -90,7 +90,7 @@ def joint_evidence(
     model = general_model()
     kept = model.log_density(general) if len(general) <= KEPT_FRAMES else None
 
-    def log_density(first: int, end: int, chosen: Chosen) -> NDArray[np.float32]:
+    def log_density(first: int, end: int, chosen: DensitySelection) -> NDArray[np.float32]:
         heard = kept[first:end] if kept is not None else model.log_density(general[first:end])
         values = heard[:, joint.columns if chosen is None else joint.columns[chosen]]
         if trust > 0:

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from lipmotion.kernels.trellis import cheapest_arrivals, traced
+from lipmotion.kernels.trellis import cheapest_arrivals, trace_back
+from lipmotion.speech.audio_files import SPEECH_RATE_HZ
 from lipmotion.speech.mfcc import HOP, checked_samples, frame_count
-from lipmotion.speech.read import SPEECH_RATE_HZ
 from lipmotion.types import Audio
 
 LOWEST_HZ, HIGHEST_HZ = 60.0, 400.0
@@ -73,7 +73,7 @@ def log_f0(audio: Audio) -> Floats:
         pitch[:-1, block], cost = candidates(correlations(samples, block, silence))
         before = pitch[:-1, max(start - 1, 0)]  # the first frame continues what it is
         arrival, pointers[block] = cheapest_arrivals(arrival - arrival.min(), _steps(before, pitch[:-1, block], cost))
-    return pitch[traced(pointers, int(arrival.argmin())), np.arange(frames)]
+    return pitch[trace_back(pointers, int(arrival.argmin())), np.arange(frames)]
 
 
 def correlations(samples: Floats, block: slice, silence: float) -> Floats:

@@ -15,15 +15,15 @@ from lipmotion.types import Features
 
 Array = NDArray[np.float64]
 
-STATIC = 13
+STATIC_FEATURES = 13
 """The columns used: c1-c12 and log energy; their surroundings hold the deltas."""
-AROUND = tuple(range(-15, 16, 3))
+FRAME_OFFSETS = tuple(range(-15, 16, 3))
 """Frames before and after that are looked at: 150 ms either way."""
 RIDGE = 100.0
 WEIGHTS = "lip-speed.json"
 
 
-def opening_speed(features: Features) -> Array:
+def predicted_opening_speed(features: Features) -> Array:
     """Return how fast the lips are likely to part [shape=(T,)], in no particular unit.
 
     Of no use as lip motion; its maximum over shifts against tracked lips tells the offset of sound and video.
@@ -31,7 +31,7 @@ def opening_speed(features: Features) -> Array:
     return _surroundings(features) @ _weights()
 
 
-def speed(opening: Array) -> Array:
+def measured_opening_speed(opening: Array) -> Array:
     """Return how fast measured lips part: the slope over ±2 frames [shape=(T,)]."""
     return regression_delta(opening.astype(np.float32)[:, None])[:, 0].astype(float)
 
@@ -39,9 +39,9 @@ def speed(opening: Array) -> Array:
 def fit_opening_speed(examples: Iterable[tuple[Features, Array]]) -> Array:
     """Return the weights [shape=(143,)] of the map, by ridge regression.
 
-    examples : features and ``speed`` of the lips [shape=(at most T,)], of clips where the two are in step
+    examples : features and ``measured_opening_speed`` of the lips [shape=(at most T,)], of clips where the two are in step
     """
-    count = STATIC * len(AROUND)
+    count = STATIC_FEATURES * len(FRAME_OFFSETS)
     products: Array = RIDGE * np.eye(count)
     targets: Array = np.zeros(count)
     for features, measured in examples:
@@ -54,8 +54,8 @@ def fit_opening_speed(examples: Iterable[tuple[Features, Array]]) -> Array:
 
 
 def _surroundings(features: Features) -> Array:
-    static = features.values[:, :STATIC].astype(float)
-    frames = np.arange(len(static))[:, None] + np.array(AROUND)
+    static = features.values[:, :STATIC_FEATURES].astype(float)
+    frames = np.arange(len(static))[:, None] + np.array(FRAME_OFFSETS)
     return static[np.clip(frames, 0, len(static) - 1)].reshape(len(static), -1)
 
 

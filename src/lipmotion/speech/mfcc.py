@@ -11,7 +11,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.speech.read import SPEECH_RATE_HZ
+from lipmotion.speech.audio_files import SPEECH_RATE_HZ
 from lipmotion.types import FRAME_RATE_HZ, Audio, Features
 
 WINDOW = 400  # 25 ms

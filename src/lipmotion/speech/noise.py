@@ -12,37 +12,37 @@ from lipmotion.hmm.loudness import loud_frames
 from lipmotion.speech.mfcc import HOP, checked_samples, log_energy
 from lipmotion.types import Audio
 
-KINDS = ("white", "babble")
+NOISE_KINDS = ("white", "babble")
 SMOOTHING = 11
 """The energy is averaged over so many frames before speech is told from pauses."""
 FEWEST_TALKERS = 2
 """One other voice is an interruption, not a babble."""
-FAINTEST = 1e-6
+SILENT_RMS = 1e-6
 """Speech of a lower root mean square, full scale 1, is silence."""
 
 Samples = NDArray[np.float32]
 
 
-def noisy(audio: Audio, kind: str, snr_db: float, talkers: Sequence[Audio] = (), seed: int = 0) -> Audio:
+def noisy_audio(audio: Audio, kind: str, snr_db: float, talkers: Sequence[Audio] = (), seed: int = 0) -> Audio:
     """Return a recording with noise of a kind added to it.
 
-    kind    : one of ``KINDS``
-    snr_db  : as ``with_noise`` measures it
+    kind    : one of ``NOISE_KINDS``
+    snr_db  : as ``add_noise`` measures it
     talkers : of the babble, other people than the one in ``audio``; white noise needs none, and takes no notice of them
     seed    : the same arguments give the same samples
-    Raises InputError: another kind, a talker that is the recording itself, or as ``with_noise`` and ``babble``.
+    Raises InputError: another kind, a talker that is the recording itself, or as ``add_noise`` and ``babble_noise``.
     """
-    if kind not in KINDS:
-        raise InputError(f"unknown noise {kind!r}; required one of: {', '.join(KINDS)}")
+    if kind not in NOISE_KINDS:
+        raise InputError(f"unknown noise {kind!r}; required one of: {', '.join(NOISE_KINDS)}")
     count = len(checked_samples(audio))
     if kind == "white":
-        return with_noise(audio, white(count, seed), snr_db)
+        return add_noise(audio, white_noise(count, seed), snr_db)
     if any(np.array_equal(talker.samples, audio.samples) for talker in talkers):
         raise InputError("the recording is one of the talkers of its own babble; leave its speaker out of the talkers")
-    return with_noise(audio, babble(talkers, count, seed), snr_db)
+    return add_noise(audio, babble_noise(talkers, count, seed), snr_db)
 
 
-def with_noise(audio: Audio, noise: NDArray[np.floating], snr_db: float) -> Audio:
+def add_noise(audio: Audio, noise: NDArray[np.floating], snr_db: float) -> Audio:
     """Return the recording with noise, scaled to a signal-to-noise ratio, added from start to end.
 
     noise  : as many samples as the recording has [shape=(N,)], of any level
@@ -64,13 +64,13 @@ def with_noise(audio: Audio, noise: NDArray[np.floating], snr_db: float) -> Audi
     return Audio((audio.samples + gain * noise).astype(np.float32), audio.rate_hz)
 
 
-def white(samples: int, seed: int = 0) -> Samples:
+def white_noise(samples: int, seed: int = 0) -> Samples:
     """Return Gaussian noise of variance 1 [shape=(samples,)]. Raises InputError: fewer than 1 sample."""
     _check_length(samples)
     return np.random.default_rng(seed).standard_normal(samples, np.float32)
 
 
-def babble(voices: Sequence[Audio], samples: int, seed: int = 0) -> Samples:
+def babble_noise(voices: Sequence[Audio], samples: int, seed: int = 0) -> Samples:
     """Return several talkers at once, each as loud as the others [shape=(samples,)].
 
     voices : at least ``FEWEST_TALKERS`` recordings at 16 kHz, none of them of the speaker whom they will disturb
@@ -105,7 +105,7 @@ def spoken_samples(audio: Audio) -> NDArray[np.bool_]:
     nearest = np.minimum((np.arange(len(samples)) + HOP // 2) // HOP, len(loud) - 1)
     spoken: NDArray[np.bool_] = loud[nearest]
     level = np.sqrt(_power(audio, spoken))
-    if level < FAINTEST:
+    if level < SILENT_RMS:
         raise InputError(f"the recording is silent (root mean square {level:.1g}); give one in which something is said")
     return spoken
 

@@ -17,14 +17,14 @@ from lipmotion.hmm.log_likelihoods import LogLikelihoods, log_likelihoods_of, pe
 from lipmotion.hmm.loudness import loud_frames, quiet_frames
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.speech.adaptation import Adaptation
-from lipmotion.speech.combined_phones import NOISES, Joint, joined, joint_evidence
+from lipmotion.speech.combined_phones import NOISES, CombinedPhones, combine_phones, combined_log_likelihoods
 from lipmotion.speech.general.front_end import general_features
 from lipmotion.speech.mfcc import LOG_ENERGY, log_energy
-from lipmotion.speech.speaker_similarity import fitted
+from lipmotion.speech.speaker_similarity import speaker_similarity
 from lipmotion.types import FRAME_RATE_HZ, Audio, Features, Span, Timeline, Unit
-from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent, stand_in
+from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent, most_similar_phone
 
-KINDS = ("auto", "own", "general")
+RECOGNISER_KINDS = ("auto", "own", "general")
 """Own models only, the general ones only, or both, the own ones as far as they know the voice."""
 FOREIGN, FAMILIAR = -9.0, -5.0
 """Own models that explain a recording this much worse than their training data (``Voice.fit``) are not heard at all;
@@ -34,7 +34,7 @@ FEW_GAUSSIANS = 2
 """Own models of so few Gaussians a state learned from less than two minutes: forced alignment is left to the general
 ones then. With 20 clips of GRID that raises ACC of opening on the validation list from 0.767 to 0.786 (audio only),
 from 0.806 to 0.841 (transcripts)."""
-LOUD_FRAMES = 11
+ENERGY_SMOOTHING_FRAMES = 11
 """The energy is averaged over so many frames before it rules silence out."""
 SHORT_PAUSE_S = 0.2
 """Silence shorter than this is a pause between words."""
@@ -44,14 +44,14 @@ class Recogniser:
     """Forced alignment and recognition with a model's own phone models and those of many voices.
 
     own        : the phone models of a corpus
-    kind       : one of ``KINDS``
+    kind       : one of ``RECOGNISER_KINDS``
     adaptation : how they hear the voice that they were adapted to, if they were
     Raises InputError: another kind.
     """
 
     def __init__(self, own: UnitHmm, kind: str = "auto", adaptation: Adaptation | None = None):
-        if kind not in KINDS:
-            raise InputError(f"unknown recogniser {kind!r}; required one of: {', '.join(KINDS)}")
+        if kind not in RECOGNISER_KINDS:
+            raise InputError(f"unknown recogniser {kind!r}; required one of: {', '.join(RECOGNISER_KINDS)}")
         self.own = own
         self.kind = kind
         self.adaptation = adaptation
@@ -86,12 +86,12 @@ class Recogniser:
         Raises MissingDependencyError: as ``recognise``.
         """
         hmm, evidence = self._evidence(audio, features, aligning=True)
-        evidence = penalise_silence(hmm, evidence, loud_frames(features.values[:, LOG_ENERGY], LOUD_FRAMES))
+        evidence = penalise_silence(hmm, evidence, loud_frames(features.values[:, LOG_ENERGY], ENERGY_SMOOTHING_FRAMES))
         known_words = {word: lexicon.pronunciations(word) for word in set(words)}
         variants = [known_words[word] for word in words]
         known = [unit for unit in hmm.table.units if not is_silent(unit)]
         sounds = {
-            word: [tuple(stand_in(p, known) for p in variant) for variant in choices]
+            word: [tuple(most_similar_phone(p, known) for p in variant) for variant in choices]
             for word, choices in known_words.items()
         }
         said = choose_pronunciations(hmm, evidence, [sounds[word] for word in words], PAUSE)
@@ -128,9 +128,9 @@ class Recogniser:
         return Timeline(tuple(replace(span, label=replace(span.label, word="")) for span in placed))
 
     @cached_property
-    def joint(self) -> Joint:
+    def joint(self) -> CombinedPhones:
         """The own models with all phones. Raises MissingDependencyError: pocketsphinx is not installed."""
-        return joined(self.own)
+        return combine_phones(self.own)
 
     @cached_property
     def _loop(self) -> UnitLoop:
@@ -153,23 +153,23 @@ class Recogniser:
         if trust == 0:  # they are not heard, and those of a long recording are large
             own = features.values
         general = general_features(audio) if self.adaptation is None else self.adaptation.general_features(audio)
-        return self.joint.hmm, joint_evidence(self.joint, own, trust, general)
+        return self.joint.hmm, combined_log_likelihoods(self.joint, own, trust, general)
 
     def _own_features(self, audio: Audio, features: Features) -> tuple[NDArray[np.float32], float]:
         """Return what the own models hear, and how far they know it, from 0 to 1."""
         if self.adaptation is not None:
             return self.adaptation.own_features(audio, features), self.adaptation.trust
-        voice = fitted(self.own, audio, features)
-        return voice.features.values, trusted(voice.fit)
+        voice = speaker_similarity(self.own, audio, features)
+        return voice.features.values, own_model_weight(voice.fit)
 
 
 @lru_cache(maxsize=4)
-def recogniser(own: UnitHmm, kind: str = "auto", adaptation: Adaptation | None = None) -> Recogniser:
+def cached_recogniser(own: UnitHmm, kind: str = "auto", adaptation: Adaptation | None = None) -> Recogniser:
     """Return the recogniser of some models; the last few are kept with the networks that they search."""
     return Recogniser(own, kind, adaptation)
 
 
-def trusted(fit: float) -> float:
+def own_model_weight(fit: float) -> float:
     """Return how far own models that fit a recording so well (``Voice.fit``) are heard beside the general ones."""
     return min(max((fit - FOREIGN) / (FAMILIAR - FOREIGN), 0.0), 1.0)
 

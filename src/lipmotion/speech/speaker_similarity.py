@@ -18,7 +18,7 @@ JUDGED_FRAMES = 2000
 
 
 @dataclass(frozen=True, eq=False)
-class Voice:
+class SpeakerSimilarity:
     """A recording as some models hear it best.
 
     features : warped by ``warp``
@@ -31,7 +31,7 @@ class Voice:
     fit: float
 
 
-def fitted(hmm: UnitHmm, audio: Audio, features: Features) -> Voice:
+def speaker_similarity(hmm: UnitHmm, audio: Audio, features: Features) -> SpeakerSimilarity:
     """Return a recording made most like the voices that the models know.
 
     features : of the audio, not warped
@@ -44,7 +44,7 @@ def fitted(hmm: UnitHmm, audio: Audio, features: Features) -> Voice:
     warp = max(fits, key=lambda warp: (fits[warp], -abs(warp - 1)))
     if judged is not audio:
         heard[warp] = features if warp == 1 else mfcc(audio, warp)
-    return Voice(heard[warp], warp, fits[warp] - hmm.typical_fit)
+    return SpeakerSimilarity(heard[warp], warp, fits[warp] - hmm.typical_fit)
 
 
 def _loudest(audio: Audio, features: Features) -> Audio:

@@ -1,9 +1,18 @@
 """What is spoken: phones, visemes, words. Data and look-ups, no audio."""
 
 from lipmotion.units.classes import phone_classes
+from lipmotion.units.length_limits import check_phones, check_text, check_words
 from lipmotion.units.lexicon import Lexicon, Pronunciation, phone_named, with_reduced_vowels
-from lipmotion.units.phones import LIP_CLOSING, PAUSE, PHONES, RELATIVES, SILENCE, is_silent, stand_in, unknown_phone
-from lipmotion.units.speaking_rate import check_phones, check_text, check_words
+from lipmotion.units.phones import (
+    LIP_CLOSING,
+    PAUSE,
+    PHONES,
+    SILENCE,
+    SIMILAR_PHONES,
+    is_silent,
+    most_similar_phone,
+    unknown_phone_message,
+)
 from lipmotion.units.transcript import words_of
 from lipmotion.units.unit_set import UnitSet
 from lipmotion.units.unit_sets import UNIT_SETS, unit_set
@@ -13,8 +22,8 @@ __all__ = [
     "LIP_CLOSING",
     "PAUSE",
     "PHONES",
-    "RELATIVES",
     "SILENCE",
+    "SIMILAR_PHONES",
     "UNIT_SETS",
     "VISEMES",
     "VISEME_OF",
@@ -25,11 +34,11 @@ __all__ = [
     "check_text",
     "check_words",
     "is_silent",
+    "most_similar_phone",
     "phone_classes",
     "phone_named",
-    "stand_in",
     "unit_set",
-    "unknown_phone",
+    "unknown_phone_message",
     "with_reduced_vowels",
     "words_of",
 ]

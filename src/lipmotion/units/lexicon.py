@@ -10,14 +10,14 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from lipmotion.errors import InputError, MissingDependencyError, shortened
-from lipmotion.storage.files import text_in
+from lipmotion.storage.files import read_text_file
 from lipmotion.units.phones import PHONES, is_silent
-from lipmotion.units.spelling import guess
-from lipmotion.units.transcript import plain
+from lipmotion.units.spelling import guess_pronunciation
+from lipmotion.units.transcript import normalised_text
 
 Pronunciation = tuple[str, ...]
 
-REDUCED = {"ah": "ax", "er": "axr", "ih": "ix"}
+REDUCED_VOWELS = {"ah": "ax", "er": "axr", "ih": "ix"}
 """What the unstressed forms of these ARPAbet vowels are called in the inventory."""
 FULL_VOWELS = frozenset("aa ae ao aw ay eh ey iy ow oy uh uw".split())
 WEAK_WORDS = frozenset("a an the of and from was but than that's her were your for if in is it its".split())
@@ -26,7 +26,7 @@ LARGEST_LEXICON, MOST_LINES = 1 << 25, 1 << 20
 """Bytes and lines of a user's file; the dictionary of 134,000 words has 3.3 million bytes."""
 LONGEST_LINE = 2000
 """Characters of a word, its phones and a comment."""
-VARIANT = re.compile(r"\(\d+\)$")
+VARIANT_NUMBER = re.compile(r"\(\d+\)$")
 """The dictionary's number of a further pronunciation."""
 MOST_VARIANTS = 32
 """Pronunciations of a word: alignment tries each after each of the word before. The dictionary's most are six."""
@@ -36,7 +36,7 @@ MOST_VARIANTS = 32
 def phone_named(label: str) -> str | None:
     """Return the phone that a label means, or None. ARPAbet in either case, stressed or not, or the project's own."""
     name = re.sub(r"\d$", "", label.lower())
-    name = REDUCED.get(name, name) if label.endswith("0") else name
+    name = REDUCED_VOWELS.get(name, name) if label.endswith("0") else name
     return name if name in PHONES else None
 
 
@@ -75,7 +75,7 @@ class Lexicon:
             return self.user[word]
         entries = _dictionary_entries(word)
         variants = [with_reduced_vowels(word, entry) for entry in entries]
-        return tuple(dict.fromkeys(variants)) or (with_reduced_vowels(word, guess(word)),)
+        return tuple(dict.fromkeys(variants)) or (with_reduced_vowels(word, guess_pronunciation(word)),)
 
 
 def _add_line(user: dict[str, list[Pronunciation]], line: str) -> None:
@@ -87,7 +87,7 @@ def _add_line(user: dict[str, list[Pronunciation]], line: str) -> None:
     word, *phones = line.split("#", maxsplit=1)[0].split() or [""]
     if not word:
         return
-    word = VARIANT.sub("", plain(word)).strip("'")  # as in ``words_of``
+    word = VARIANT_NUMBER.sub("", normalised_text(word)).strip("'")  # as in ``words_of``
     variants = user.setdefault(word, [])
     if len(variants) == MOST_VARIANTS:
         raise InputError(f"more than {MOST_VARIANTS} pronunciations of {shortened(word)!r}; keep those that are said")
@@ -96,7 +96,7 @@ def _add_line(user: dict[str, list[Pronunciation]], line: str) -> None:
 
 def _lines(path: Path) -> Iterator[str]:
     """Give the lines of a lexicon one by one. Raises InputError: not a text, or more than a lexicon holds."""
-    text = text_in(path, "lexicon", LARGEST_LEXICON)
+    text = read_text_file(path, "lexicon", LARGEST_LEXICON)
     count = text.count("\n") + 1
     if count > MOST_LINES:
         raise InputError(f"{path}: {count} lines, required at most {MOST_LINES}; keep the words that are said")
@@ -169,9 +169,9 @@ def with_reduced_vowels(word: str, phones: Pronunciation) -> Pronunciation:
     unstressed, but for the first vowel when it follows a consonant and no full vowel (see FULL_VOWELS)
     precedes the last syllable's: ``b ah t axr`` but ``ax b aw t``.
     """
-    vowels = [i for i, phone in enumerate(phones) if phone in FULL_VOWELS or phone in REDUCED]
+    vowels = [i for i, phone in enumerate(phones) if phone in FULL_VOWELS or phone in REDUCED_VOWELS]
     stressed = set() if word in WEAK_WORDS else {_stressed_vowel(phones, vowels)}
-    return tuple(REDUCED.get(p, p) if i not in stressed else p for i, p in enumerate(phones))
+    return tuple(REDUCED_VOWELS.get(p, p) if i not in stressed else p for i, p in enumerate(phones))
 
 
 def _stressed_vowel(phones: Pronunciation, vowels: list[int]) -> int:

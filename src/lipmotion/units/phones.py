@@ -15,7 +15,7 @@ PHONES: tuple[str, ...] = tuple(sorted(VISEME_OF))
 LIP_CLOSING: tuple[str, ...] = (*VISEMES["bi"], "em")
 """The phones in which the lips meet."""
 
-RELATIVES: dict[str, tuple[str, ...]] = {
+SIMILAR_PHONES: dict[str, tuple[str, ...]] = {
     # A phone that a corpus never says borrows the sound of the first of these that it does say.
     "aa": ("ao", "ah"),
     "ae": ("eh", "aa"),
@@ -72,14 +72,14 @@ def is_silent(phone: str) -> bool:
     return phone in (SILENCE, PAUSE)
 
 
-def unknown_phone(phone: str, where: str = "") -> str:
+def unknown_phone_message(phone: str, where: str = "") -> str:
     """Return what to say of a phone that is not in the inventory; an empty one is of a recognised unit."""
     if not phone:
         return f"a unit without a phone{where}: only the model that recognised it can use it; give phones instead"
     return f"unknown phone {phone!r}{where}; the phones: {' '.join(PHONES)}"
 
 
-def stand_in(phone: str, known: Collection[str]) -> str:
+def most_similar_phone(phone: str, known: Collection[str]) -> str:
     """Return the phone itself if known, else the known phone that sounds most like it.
 
     First its relatives, then the relatives of those, then its viseme class, then any.
@@ -88,6 +88,6 @@ def stand_in(phone: str, known: Collection[str]) -> str:
     for candidate in queue:
         if candidate in known:
             return candidate
-        queue += [relative for relative in RELATIVES[candidate] if relative not in queue]
+        queue += [relative for relative in SIMILAR_PHONES[candidate] if relative not in queue]
     alike = [other for other in VISEMES[VISEME_OF[phone]] if other in known]
     return alike[0] if alike else min(known)

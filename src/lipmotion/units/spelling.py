@@ -92,7 +92,7 @@ _LONG_VOWEL = re.compile(r"[aeiou][bcdfgklmnpstvz]e('?s)?$")
 """Vowel, consonant, final e."""
 
 
-def guess(word: str) -> tuple[str, ...]:
+def guess_pronunciation(word: str) -> tuple[str, ...]:
     """Return a guessed pronunciation of a lower-case word, in ARPAbet.
 
     Raises InputError: a character is not a letter of the English alphabet.

@@ -23,14 +23,14 @@ def words_of(text: str) -> tuple[str, ...]:
     Raises InputError: there is no word in it.
     """
     words: list[str] = []
-    for token in re.findall(r"[^\W\d_]+(?:'[^\W\d_]+)*|\d+", re.sub(r"(?<=\d),(?=\d{3})", "", plain(text))):
+    for token in re.findall(r"[^\W\d_]+(?:'[^\W\d_]+)*|\d+", re.sub(r"(?<=\d),(?=\d{3})", "", normalised_text(text))):
         words += number_words(token) if token.isdecimal() else [token]
     if not words:
         raise InputError(f"the transcript {text[:40]!r} holds no word; give the words that are spoken")
     return tuple(words)
 
 
-def plain(text: str) -> str:
+def normalised_text(text: str) -> str:
     """Return a text in lower case, its characters and apostrophes in one form each."""
     return unicodedata.normalize("NFKC", _few_marks(text)).lower().replace("’", "'")
 

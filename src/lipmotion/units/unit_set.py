@@ -8,14 +8,14 @@ from functools import cached_property
 from pathlib import Path
 
 from lipmotion.errors import InputError, shortened
-from lipmotion.storage.files import text_in
+from lipmotion.storage.files import read_text_file
 from lipmotion.types import Unit
 from lipmotion.units.classes import phone_classes
-from lipmotion.units.phones import PHONES, SILENCE, is_silent, unknown_phone
+from lipmotion.units.phones import PHONES, SILENCE, is_silent, unknown_phone_message
 
 LARGEST_TABLE = 1 << 18
 """Bytes of a table: one of 47 phones has some hundred."""
-CLOSED = "closed"
+CLOSED_UNIT = "closed"
 """The only unit that silence may share with speech."""
 
 
@@ -74,7 +74,7 @@ class UnitSet:
     def unit(self, phone: str) -> str:
         """Return the unit of a phone. Raises InputError: it is not in the inventory."""
         if phone not in self.of:
-            raise InputError(unknown_phone(phone))
+            raise InputError(unknown_phone_message(phone))
         return self.of[phone]
 
     def unit_of(self, label: Unit) -> str:
@@ -133,7 +133,7 @@ def read_unit_table(path: Path) -> UnitSet:
     unit_line: dict[str, int] = {}
     phone_line: dict[str, int] = {}
     of: dict[str, str] = {}
-    for number, line in enumerate(text_in(path, "unit table", LARGEST_TABLE).splitlines(), start=1):
+    for number, line in enumerate(read_text_file(path, "unit table", LARGEST_TABLE).splitlines(), start=1):
         unit, *phones = line.split("#")[0].split() or [""]
         if not unit:
             continue
@@ -162,10 +162,10 @@ def read_unit_table(path: Path) -> UnitSet:
 def _mixed(of: Mapping[str, str]) -> list[str]:
     """Return the units, other than ``closed``, in which silence stands beside speech."""
     silent, spoken = ({unit for phone, unit in of.items() if is_silent(phone) is wanted} for wanted in (True, False))
-    return sorted((silent & spoken) - {CLOSED})
+    return sorted((silent & spoken) - {CLOSED_UNIT})
 
 
 _ADVICE = (
     "unit {!r} holds silence and speech; give sil and sp a unit without other phones, or call this one "
-    f"{CLOSED!r}: silence is then a closed mouth"
+    f"{CLOSED_UNIT!r}: silence is then a closed mouth"
 )

@@ -17,11 +17,11 @@ from typing import NamedTuple
 
 from lipmotion.errors import InputError
 from lipmotion.units.phones import PAUSE, PHONES
-from lipmotion.units.unit_set import CLOSED, UnitSet, read_unit_table
+from lipmotion.units.unit_set import CLOSED_UNIT, UnitSet, read_unit_table
 from lipmotion.units.visemes import VISEME_OF
 
 
-class Group(NamedTuple):
+class UnitGroup(NamedTuple):
     """The phones of one unit, and why they are together."""
 
     unit: str
@@ -32,24 +32,26 @@ class Group(NamedTuple):
 _OPEN_PHONES = (
     "aa ae ah ao aw ax axr ay ch d dh eh el en er ey f g hh ih ix iy jh k l n ng ow oy r s sh t th uh uw v w y z zh"
 )
-_BILABIAL = Group("bilabial", "p b m em", "the lips meet")
-_LABIODENTAL = Group("labiodental", "f v", "the lower lip is at the upper teeth")
-_SILENCE = Group("silence", "sil sp", "nothing is said; the mouth rests or gets ready")
+_BILABIAL = UnitGroup("bilabial", "p b m em", "the lips meet")
+_LABIODENTAL = UnitGroup("labiodental", "f v", "the lower lip is at the upper teeth")
+_SILENCE = UnitGroup("silence", "sil sp", "nothing is said; the mouth rests or gets ready")
 
-GROUPS: dict[str, tuple[Group, ...]] = {
+GROUPS: dict[str, tuple[UnitGroup, ...]] = {
     "2vis": (
-        Group("open", _OPEN_PHONES, "the lips are apart; of f v, too: the lip is at the teeth, not at the other lip"),
-        Group(CLOSED, "p b m em sil sp", "the lips meet; in silence they rest on each other"),
+        UnitGroup(
+            "open", _OPEN_PHONES, "the lips are apart; of f v, too: the lip is at the teeth, not at the other lip"
+        ),
+        UnitGroup(CLOSED_UNIT, "p b m em sil sp", "the lips meet; in silence they rest on each other"),
     ),
     "sVis": (
-        Group("front", "iy ih ix eh ey ax axr er", "not low, not back: jaw half shut, lips spread or slack"),
-        Group(
+        UnitGroup("front", "iy ih ix eh ey ax axr er", "not low, not back: jaw half shut, lips spread or slack"),
+        UnitGroup(
             "low", "aa ae ah aw ay", "low: the jaw drops; diphthongs stand where they begin, for that part is longer"
         ),
-        Group("back", "ao ow oy uh uw", "back, not low: the vowels that round the lips"),
+        UnitGroup("back", "ao ow oy uh uw", "back, not low: the vowels that round the lips"),
         _BILABIAL,
         _LABIODENTAL,
-        Group(
+        UnitGroup(
             "other",
             "ch d dh el en g hh jh k l n ng r s sh t th w y z zh",
             "all other consonants: lips hardly needed; w rounds them, but does not shut them",
@@ -57,45 +59,45 @@ GROUPS: dict[str, tuple[Group, ...]] = {
         _SILENCE,
     ),
     "pbVis": (
-        Group("AI", "aa ae ah aw ay", "wide open: a as in father, i as in ice"),
-        Group(
+        UnitGroup("AI", "aa ae ah aw ay", "wide open: a as in father, i as in ice"),
+        UnitGroup(
             "E", "eh ey iy ih ix ax er axr", "open and spread: e as in let and in see, and the slack vowels near them"
         ),
-        Group("O", "ao ow oy", "round and open"),
-        Group("U", "uh uw", "round and nearly shut"),
-        Group("WQ", "w", "puckered tightly; q is written k w here"),
-        Group("MBP", "p b m em", "the lips meet"),
-        Group("FV", "f v", "the lower lip is at the upper teeth"),
-        Group("L", "l el", "the tongue shows behind the upper teeth"),
-        Group(
+        UnitGroup("O", "ao ow oy", "round and open"),
+        UnitGroup("U", "uh uw", "round and nearly shut"),
+        UnitGroup("WQ", "w", "puckered tightly; q is written k w here"),
+        UnitGroup("MBP", "p b m em", "the lips meet"),
+        UnitGroup("FV", "f v", "the lower lip is at the upper teeth"),
+        UnitGroup("L", "l el", "the tongue shows behind the upper teeth"),
+        UnitGroup(
             "etc",
             "ch d dh en g hh jh k n ng r s sh t th y z zh",
             "teeth together: his C D G K N R S TH Y Z and those made like them",
         ),
-        Group("rest", "sil sp", "lips together and relaxed"),
+        UnitGroup("rest", "sil sp", "lips together and relaxed"),
     ),
     "eVis": (
-        Group("aw", "aw", "diphthong: open, then rounding"),
-        Group("ay", "ay", "diphthong: open, then spreading"),
-        Group("ey", "ey", "diphthong: half open, then spreading"),
-        Group("ow", "ow", "diphthong: rounded, then narrower"),
-        Group("oy", "oy", "diphthong: rounded, then spreading"),
-        Group("high", "iy ih ix", "high front vowels: jaw nearly shut, lips spread"),
-        Group("mid", "eh ax axr er", "mid vowels, front and central: jaw half shut, lips slack"),
-        Group("low", "aa ae ah", "low vowels: the jaw drops"),
-        Group("back", "ao uh uw", "back vowels: lips rounded"),
+        UnitGroup("aw", "aw", "diphthong: open, then rounding"),
+        UnitGroup("ay", "ay", "diphthong: open, then spreading"),
+        UnitGroup("ey", "ey", "diphthong: half open, then spreading"),
+        UnitGroup("ow", "ow", "diphthong: rounded, then narrower"),
+        UnitGroup("oy", "oy", "diphthong: rounded, then spreading"),
+        UnitGroup("high", "iy ih ix", "high front vowels: jaw nearly shut, lips spread"),
+        UnitGroup("mid", "eh ax axr er", "mid vowels, front and central: jaw half shut, lips slack"),
+        UnitGroup("low", "aa ae ah", "low vowels: the jaw drops"),
+        UnitGroup("back", "ao uh uw", "back vowels: lips rounded"),
         _BILABIAL,
         _LABIODENTAL,
-        Group("dental", "th dh", "the tongue's tip at or between the teeth: the jaw stays a little open for it"),
-        Group("alveolar", "t d n en", "the tongue at the gum, lips free to do what the neighbours want"),
-        Group("sibilant", "s z", "teeth together"),
-        Group("palatal", "sh zh ch jh", "teeth together, lips pushed forward"),
-        Group("hidden", "k g ng hh", "made at the back: nothing of it shows, the neighbours decide"),
-        Group("glide", "l el y", "the tongue raised, lips not rounded"),
-        Group("rounded", "w r", "lips rounded or pushed forward"),
+        UnitGroup("dental", "th dh", "the tongue's tip at or between the teeth: the jaw stays a little open for it"),
+        UnitGroup("alveolar", "t d n en", "the tongue at the gum, lips free to do what the neighbours want"),
+        UnitGroup("sibilant", "s z", "teeth together"),
+        UnitGroup("palatal", "sh zh ch jh", "teeth together, lips pushed forward"),
+        UnitGroup("hidden", "k g ng hh", "made at the back: nothing of it shows, the neighbours decide"),
+        UnitGroup("glide", "l el y", "the tongue raised, lips not rounded"),
+        UnitGroup("rounded", "w r", "lips rounded or pushed forward"),
         _SILENCE,
     ),
-    "phone": tuple(Group(phone, phone, "itself") for phone in PHONES),
+    "phone": tuple(UnitGroup(phone, phone, "itself") for phone in PHONES),
 }
 _UNCOUNTED = {"sVis": "silence", "pbVis": "rest", "phone": PAUSE}
 """Units that the paper's count leaves out."""

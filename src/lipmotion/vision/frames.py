@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.storage.files import check_source
-from lipmotion.storage.media import MOST_PIXELS, moving_pictures, open_media, stated_duration_s
+from lipmotion.storage.media import MOST_PIXELS, open_media, stated_duration_s, video_streams
 
 
 @dataclass(frozen=True, eq=False)
-class Frame:
+class VideoFrame:
     """One picture.
 
     time_s : its time, relative to the container's time 0
@@ -29,7 +29,7 @@ class Frame:
 
 
 @dataclass(frozen=True, eq=False)
-class Video:
+class OpenVideo:
     """An open video.
 
     frames          : the pictures, decoded as they are asked for
@@ -38,7 +38,7 @@ class Video:
     damage          : of every packet or picture that was left out so far, why
     """
 
-    frames: Iterator[Frame]
+    frames: Iterator[VideoFrame]
     stated_rates_hz: tuple[float, ...]
     stated_s: float
     damage: list[str]
@@ -49,10 +49,10 @@ LEAST_SIDE, LONGEST_SIDE = 16, 8192
 
 
 @contextmanager
-def open_video(path: Path) -> Iterator[Video]:
+def open_video(path: Path) -> Iterator[OpenVideo]:
     """Open the first video stream of a file; memory use does not grow with its length.
 
-    Time 0 is the container's start, as in ``speech.read``, so sound and picture agree.
+    Time 0 is the container's start, as in ``speech.audio_files``, so sound and picture agree.
     Raises InputError: no such file, empty, not a video, no video stream, or no picture that can be decoded.
     What is damaged later is left out and counted.
     """
@@ -65,7 +65,7 @@ def open_video(path: Path) -> Iterator[Video]:
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"{path}: not a readable video ({reason}); give a video file") from error
     with container:
-        stream = next(iter(moving_pictures(container)), None)
+        stream = next(iter(video_streams(container)), None)
         if stream is None:
             raise InputError(f"{path}: has no video stream; give a video that shows the speaker's face")
         if stream.codec_context is None:
@@ -75,10 +75,10 @@ def open_video(path: Path) -> Iterator[Video]:
         rates = [float(rate) for rate in (stream.guessed_rate, stream.average_rate) if rate]
         damage: list[str] = []
         with closing(_frames(container, stream, path, damage)) as frames:  # decoding from a closed one would crash
-            yield Video(frames, tuple(rates), stated_duration_s(container, stream), damage)
+            yield OpenVideo(frames, tuple(rates), stated_duration_s(container, stream), damage)
 
 
-def _frames(container: Any, stream: Any, path: Path, damage: list[str]) -> Generator[Frame, None, None]:
+def _frames(container: Any, stream: Any, path: Path, damage: list[str]) -> Generator[VideoFrame, None, None]:
     start_s = (container.start_time or 0) / 1e6
     pixel_shape = stream.sample_aspect_ratio
     last_s = float("-inf")
@@ -87,7 +87,7 @@ def _frames(container: Any, stream: Any, path: Path, damage: list[str]) -> Gener
             continue  # without a time, or shown twice: it cannot be placed
         last_s = picture.time - start_s
         _check_size(path, picture.width, picture.height, float(pixel_shape or 1))
-        yield Frame(last_s, _upright(picture, float(pixel_shape or 1)))
+        yield VideoFrame(last_s, _upright(picture, float(pixel_shape or 1)))
     if last_s == float("-inf"):
         raise InputError(f"{path}: holds no picture that can be decoded; export the video again")
 

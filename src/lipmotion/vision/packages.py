@@ -29,7 +29,7 @@ def import_face_mesh() -> Any:
     return face_mesh
 
 
-def versions() -> dict[str, str]:
+def package_versions() -> dict[str, str]:
     """Return the versions of the packages that a track depends on. Raises MissingDependencyError."""
     try:
         mediapipe = metadata.version("mediapipe")

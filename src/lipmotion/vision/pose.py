@@ -54,7 +54,7 @@ def head_pose(points: Array, layout: Sequence[int]) -> HeadPose:
     column = {index: n for n, index in enumerate(layout)}
     rigid = points[:, [column[index] for index in RIGID_POINTS]]
     face = _mean_face(rigid)
-    turn, scale, shift = similarity(rigid, face)
+    turn, scale, shift = similarity_transforms(rigid, face)
     axes, origin, unit = _head_axes(face)
     return HeadPose(axes @ turn, scale, (shift - origin) @ axes.T, unit)
 
@@ -70,7 +70,7 @@ def head_frame(points: Array, layout: Sequence[int]) -> Array:
     return head_pose(points, layout).still(points)
 
 
-def similarity(points: Array, target: Array) -> tuple[Array, Array, Array]:
+def similarity_transforms(points: Array, target: Array) -> tuple[Array, Array, Array]:
     """Return the rotations, scales and shifts that bring each frame closest to one shape.
 
     points : array [shape=(T, K, 3)]
@@ -93,7 +93,7 @@ def _mean_face(rigid: Array) -> Array:
     face = rigid[0] - rigid[0].mean(axis=0)
     size = np.linalg.norm(face)
     for _ in range(ROUNDS):
-        turn, scale, shift = similarity(rigid, face)
+        turn, scale, shift = similarity_transforms(rigid, face)
         face = (scale[:, None, None] * (rigid @ turn.transpose(0, 2, 1)) + shift[:, None, :]).mean(axis=0)
         face *= size / np.linalg.norm(face)  # without this the mean shrinks from round to round
     return face

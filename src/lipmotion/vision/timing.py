@@ -38,7 +38,7 @@ def frame_count(times_s: Array, rate_hz: float) -> int:
     return round(float(times_s[-1]) * rate_hz) + 1
 
 
-def nearest(times_s: Array, wanted_s: Array) -> NDArray[np.intp]:
+def nearest_indices(times_s: Array, wanted_s: Array) -> NDArray[np.intp]:
     """Return the index of the time nearest to each wanted time [shape=(len(wanted_s),)]."""
     after = np.clip(np.searchsorted(times_s, wanted_s), 1, max(len(times_s) - 1, 1))
     before = after - 1
@@ -46,7 +46,7 @@ def nearest(times_s: Array, wanted_s: Array) -> NDArray[np.intp]:
     return np.where(wanted_s - times_s[before] <= times_s[after] - wanted_s, before, after)
 
 
-def at_constant_rate(times_s: Array, values: Array, rate_hz: float, count: int) -> Array:
+def resample_to_constant_rate(times_s: Array, values: Array, rate_hz: float, count: int) -> Array:
     """Return the values at n / rate_hz seconds.
 
     times_s : array [shape=(S,)], rising
@@ -57,7 +57,7 @@ def at_constant_rate(times_s: Array, values: Array, rate_hz: float, count: int) 
     from scipy.interpolate import CubicSpline
 
     wanted_s = np.clip(np.arange(count) / rate_hz, times_s[0], times_s[-1])
-    index = nearest(times_s, wanted_s)
+    index = nearest_indices(times_s, wanted_s)
     result: Array = values[index].copy()
     after = np.clip(np.searchsorted(times_s, wanted_s), 1, max(len(times_s) - 1, 1))
     moved = np.abs(times_s[index] - wanted_s) * rate_hz > TIME_TOLERANCE

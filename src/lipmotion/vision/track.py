@@ -10,19 +10,19 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.types import Channel, Motion, Track
-from lipmotion.vision.follow import Follower
-from lipmotion.vision.frames import Video, open_video
+from lipmotion.vision.face_follower import FaceFollower
+from lipmotion.vision.frames import OpenVideo, open_video
+from lipmotion.vision.image_similarity import mouth_thumbnail, occluded_mouths
 from lipmotion.vision.landmarks import DISTANCES, EYE_CORNERS, JAW_POINTS, LIP_POINTS, TRACKED_POINTS
 from lipmotion.vision.mouth import eyes_to_image, face_to_image, mouth_crop
 from lipmotion.vision.pose import head_frame
-from lipmotion.vision.similarity import mouth_of, strange_mouths
 from lipmotion.vision.timing import (
     HIGHEST_HZ,
     LOWEST_HZ,
-    at_constant_rate,
     frame_count,
-    nearest,
+    nearest_indices,
     nominal_rate_hz,
+    resample_to_constant_rate,
 )
 
 Array = NDArray[np.float64]
@@ -59,7 +59,7 @@ class _Sighting:
         if points is not None:
             eyes = points[[COLUMN[i] for i in EYE_CORNERS], :2]
             self.points.append(points)
-            self.mouths.append(mouth_of(mouth_crop(image, eyes_to_image(eyes))))
+            self.mouths.append(mouth_thumbnail(mouth_crop(image, eyes_to_image(eyes))))
 
     def leave_out(self, wrong: NDArray[np.bool_]) -> int:
         """Take out some of the frames that show a face [shape=(number of them,)]; return how many."""
@@ -84,11 +84,11 @@ def track(path: Path, *, crops: bool = True) -> Track:
     Raises MissingDependencyError: MediaPipe or OpenCV is not installed.
     """
     sighting = _Sighting()
-    with open_video(path) as video, Follower() as follower:
+    with open_video(path) as video, FaceFollower() as follower:
         for frame in video.frames:
             sighting.add(frame.time_s, frame.image, follower.points(frame.image))
     others = sighting.leave_out(~follower.person()[sighting.seen])
-    covered = sighting.leave_out(strange_mouths(np.stack(sighting.mouths))) if sighting.mouths else 0
+    covered = sighting.leave_out(occluded_mouths(np.stack(sighting.mouths))) if sighting.mouths else 0
     times_s = np.array(sighting.times_s)
     rate_hz = nominal_rate_hz(times_s, video.stated_rates_hz)
     notes = (
@@ -113,7 +113,7 @@ def _mouths(path: Path, sighting: _Sighting) -> NDArray[np.uint8]:
         return np.stack([mouth_crop(frame.image, next(maps)) for seen, frame in shown if seen])
 
 
-def _damage(video: Video, times_s: Array, rate_hz: float) -> list[str]:
+def _damage(video: OpenVideo, times_s: Array, rate_hz: float) -> list[str]:
     notes = []
     end_s = float(times_s[-1]) + 1 / rate_hz
     if video.damage:
@@ -143,7 +143,7 @@ def _distance(flat: Array, pair: tuple[int, int]) -> Array:
     return distance
 
 
-def _check(path: Path, sighting: _Sighting, video: Video, rate_hz: float, notes: tuple[str, ...]) -> None:
+def _check(path: Path, sighting: _Sighting, video: OpenVideo, rate_hz: float, notes: tuple[str, ...]) -> None:
     times_s, seen = np.array(sighting.times_s), np.array(sighting.seen)
     if not LOWEST_HZ <= rate_hz <= HIGHEST_HZ:
         raise InputError(
@@ -171,9 +171,9 @@ def _check(path: Path, sighting: _Sighting, video: Video, rate_hz: float, notes:
 
 def _assembled(sighting: _Sighting, mouths: NDArray[np.uint8] | None, rate_hz: float, count: int) -> Track:
     times_s = np.array(sighting.times_s)[sighting.seen]
-    values = at_constant_rate(times_s, motion_values(np.stack(sighting.points)), rate_hz, count)
+    values = resample_to_constant_rate(times_s, motion_values(np.stack(sighting.points)), rate_hz, count)
     wanted_s = np.arange(count) / rate_hz
-    index = nearest(times_s, wanted_s)
+    index = nearest_indices(times_s, wanted_s)
     seen = np.abs(times_s[index] - wanted_s) * rate_hz <= 0.5
     crops = mouths[index] if mouths is not None else None
     return Track(Motion(values, rate_hz, CHANNELS), seen, crops)

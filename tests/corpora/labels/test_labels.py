@@ -8,11 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lipmotion.corpora.labels import labels_beside, read_labels
-from lipmotion.corpora.labels.beside import LARGEST_LABELS
+from lipmotion.corpora.labels.label_files import LARGEST_LABELS
 from lipmotion.corpora.labels.tier import MOST_LABELS
 from lipmotion.errors import InputError
 from lipmotion.units import PHONES, phone_named
-from lipmotion.units.speaking_rate import LARGEST_TRANSCRIPT
+from lipmotion.units.length_limits import LARGEST_TRANSCRIPT
 
 SPOKEN = [phone for phone in PHONES if phone not in ("sil", "sp")]
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from lipmotion.corpora.labels import read_labels
-from lipmotion.corpora.labels.textgrid import interval_tiers
+from lipmotion.corpora.labels.textgrid import parse_interval_tiers
 from lipmotion.errors import InputError
 
 Interval = tuple[float, float, str]
@@ -66,13 +66,13 @@ def test_windows_line_ends(tmp_path):
 def test_texts_may_hold_anything():
     rows = [(0.0, 1.0, 'he said ""no"" ! 5 <exists>'), (1.0, 2.0, "two\nlines")]
     for form in (long_form, short_form):
-        (tier,) = interval_tiers(form({"words": rows}), "a")
+        (tier,) = parse_interval_tiers(form({"words": rows}), "a")
         assert [label.text for label in tier.labels] == ['he said "no" ! 5 <exists>', "two\nlines"]
 
 
 def test_comments_are_passed_over():
     text = short_form(TIERS).replace("<exists>", "<exists> ! are there 7 tiers?")
-    assert [tier.name for tier in interval_tiers(text, "a")] == ["tier 'words'", "tier 'phones'"]
+    assert [tier.name for tier in parse_interval_tiers(text, "a")] == ["tier 'words'", "tier 'phones'"]
 
 
 def test_a_grid_without_tiers(tmp_path):
@@ -159,7 +159,7 @@ def test_hostile_grids_are_refused_in_one_short_line(tmp_path, old, new, words):
 
 def test_quotes_in_a_text_are_written_twice() -> None:
     rows: list[Interval] = [(0, 1, '""'), (1, 2, '""a""""'), (2, 3, ""), (3, 4, '""' * 5000)]
-    (tier,) = interval_tiers(short_form({"words": rows}), "a.TextGrid")
+    (tier,) = parse_interval_tiers(short_form({"words": rows}), "a.TextGrid")
     assert [label.text for label in tier.labels] == ['"', '"a""', "", '"' * 5000]
 
 

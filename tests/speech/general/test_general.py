@@ -7,11 +7,11 @@ import pytest
 from pocketsphinx import Decoder
 
 from lipmotion.errors import InputError, MissingDependencyError
+from lipmotion.speech.formant_synthesiser import synthesise
 from lipmotion.speech.general import acoustic
-from lipmotion.speech.general.acoustic import GAUSSIANS, PHONES, STATES, STREAMS, column, general_model
+from lipmotion.speech.general.acoustic import GAUSSIANS, PHONES, STATES, STREAMS, density_column, general_model
 from lipmotion.speech.general.front_end import general_features
 from lipmotion.speech.general.language import english_bigram
-from lipmotion.speech.synthesise import synthesise
 from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Audio
 from lipmotion.units import PHONES as OURS
@@ -63,7 +63,7 @@ def test_vowels_are_told_apart() -> None:
 
     def best(start_s: float, end_s: float, phones: tuple[str, ...]) -> str:
         frames = density[round(start_s * 100) : round(end_s * 100)]
-        return max(phones, key=lambda phone: frames[:, column(phone, 1, 3)].sum())
+        return max(phones, key=lambda phone: frames[:, density_column(phone, 1, 3)].sum())
 
     assert best(0.4, 0.6, ("iy", "aa", "uw", "s", "sil")) == "iy"
     assert best(0.75, 0.95, ("iy", "aa", "uw", "s", "sil")) == "s"
@@ -72,11 +72,11 @@ def test_vowels_are_told_apart() -> None:
 
 
 def test_every_phone_has_a_column() -> None:
-    columns = [column(phone, state, 3) for phone in OURS for state in range(3)]
+    columns = [density_column(phone, state, 3) for phone in OURS for state in range(3)]
     assert min(columns) >= 2 * STATES  # the noises are nobody's
     assert {PHONES[c // STATES] for c in columns} == set(PHONES[2:])
-    assert [column("b", state, 5) % 3 for state in range(5)] == [0, 0, 1, 2, 2]
-    assert column("sp", 0, 1) == column("sil", 1, 3)
+    assert [density_column("b", state, 5) % 3 for state in range(5)] == [0, 0, 1, 2, 2]
+    assert density_column("sp", 0, 1) == density_column("sil", 1, 3)
 
 
 def test_features_are_those_of_the_recognised_sound_at_any_level() -> None:
@@ -115,7 +115,7 @@ def test_pocketsphinx_s_own_alignment_agrees(toy_sentence: ToySentence) -> None:
     """Its decoder, with its own features and search, puts the phones of a sentence where our densities do."""
     from lipmotion.hmm.align import align_units
     from lipmotion.pipeline.model import load_model
-    from lipmotion.speech.combined_phones import joined, joint_evidence
+    from lipmotion.speech.combined_phones import combine_phones, combined_log_likelihoods
 
     sample = (toy_sentence.audio.samples * 32767).astype("<i2").tobytes()
     decoder = Decoder(lm=None, loglevel="FATAL", beam=1e-80, wbeam=1e-60, pbeam=1e-80)
@@ -127,10 +127,10 @@ def test_pocketsphinx_s_own_alignment_agrees(toy_sentence: ToySentence) -> None:
         if again:
             decoder.set_alignment()
     theirs = [(p.name.lower(), p.start / 100) for word in decoder.get_alignment() for p in word if p.name != "SIL"]
-    joint = joined(load_model().phones)
+    joint = combine_phones(load_model().phones)
     general = general_features(toy_sentence.audio)
     units = ["sil", *(name for name, _ in theirs), "sil"]
-    bounds = align_units(joint.hmm, joint_evidence(joint, general, 0.0, general), units)[1:-2] / 100
+    bounds = align_units(joint.hmm, combined_log_likelihoods(joint, general, 0.0, general), units)[1:-2] / 100
     assert np.median(np.abs(bounds - [start_s for _, start_s in theirs])) <= 0.03
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lipmotion.speech.voices.espeak_times import phones_in
+from lipmotion.speech.voices.espeak_times import corrected_phone_times
 from lipmotion.types import Audio
 
 RATE_HZ = 16_000
@@ -21,7 +21,7 @@ def sound(*silences: tuple[float, float], duration_s: float = 1.0) -> Audio:
 
 
 def starts(labels: list[tuple[str, float]], audio: Audio) -> list[float]:
-    return [round(span.start_s, 4) for span in phones_in(labels, audio)]
+    return [round(span.start_s, 4) for span in corrected_phone_times(labels, audio)]
 
 
 @pytest.mark.parametrize("stop", ["p", "t2", "k", "tS", "b", "d", "g", "dZ"])
@@ -54,7 +54,7 @@ def test_an_l_that_is_late_gets_its_share_of_the_vowel() -> None:
 
 
 def test_the_last_lasts_to_the_end() -> None:
-    phones = phones_in([("a", 0.1), ("s", 0.5)], sound())
+    phones = corrected_phone_times([("a", 0.1), ("s", 0.5)], sound())
     assert [(span.label, span.end_s) for span in phones] == [("a", 0.5), ("s", 1.0)]
 
 

@@ -11,12 +11,12 @@ import pytest
 from lipmotion.errors import InputError, LipMotionError, MissingDependencyError
 from lipmotion.pipeline.model import Model
 from lipmotion.speech.mfcc import mfcc
-from lipmotion.speech.noise import noisy
+from lipmotion.speech.noise import noisy_audio
 from lipmotion.speech.recogniser import Recogniser
 from lipmotion.speech.voices import base, espeak_events
-from lipmotion.speech.voices.base import SyntheticVoice
-from lipmotion.speech.voices.flite import phones_in
-from lipmotion.speech.voices.installed import SYNTHESISERS, installed_voices, speak, speak_all
+from lipmotion.speech.voices.flite import parse_phone_ends
+from lipmotion.speech.voices.installed import SYNTHESISERS, installed_voices, speak_sentence, speak_sentences
+from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.units import PHONES, Lexicon, is_silent, words_of
 
 FAKED = [
@@ -40,13 +40,13 @@ def test_without_synthesisers_there_are_none() -> None:
     assert installed_voices() == ()
     for voice in EACH:
         with pytest.raises(MissingDependencyError, match=f"apt install {voice.synthesiser}"):
-            speak("Hello", voice)
+            speak_sentence("Hello", voice)
 
 
 @pytest.mark.parametrize("voice", FAKED)
 @pytest.mark.usefixtures("faked")
 def test_a_voice_says_phones_in_time(voice: SyntheticVoice) -> None:
-    audio, units = speak("Hello", voice)
+    audio, units = speak_sentence("Hello", voice)
     assert audio.rate_hz == 16_000
     assert audio.duration_s == pytest.approx(1.0)
     found = [(span.label.phone, span.label.word, round(span.start_s, 6)) for span in units]
@@ -64,7 +64,7 @@ def test_a_voice_says_phones_in_time(voice: SyntheticVoice) -> None:
 @pytest.mark.parametrize("text", HARD)
 @pytest.mark.usefixtures("faked")
 def test_any_letters_reach_the_synthesiser(voice: SyntheticVoice, text: str) -> None:
-    assert len(list(speak_all([text, text], voice, Lexicon({"helló": (("hh", "ax", "l", "ow"),)})))) == 2
+    assert len(list(speak_sentences([text, text], voice, Lexicon({"helló": (("hh", "ax", "l", "ow"),)})))) == 2
 
 
 @pytest.mark.parametrize("voice", EACH)
@@ -79,13 +79,13 @@ def test_any_letters_reach_the_synthesiser(voice: SyntheticVoice, text: str) -> 
 )
 def test_errors_are_clear_and_nothing_stays(faked: Path, voice: SyntheticVoice, text: str, message: str) -> None:
     with pytest.raises(InputError, match=message):
-        speak(text, voice)
+        speak_sentence(text, voice)
     assert list(faked.iterdir()) == []
 
 
 def test_a_sentence_that_festival_leaves_out_is_missed(faked: Path) -> None:
     with pytest.raises(InputError, match="1 of 2 sentences"):
-        list(speak_all(["hello", "stop here"], FAKED[2]))
+        list(speak_sentences(["hello", "stop here"], FAKED[2]))
     assert list(faked.iterdir()) == []
 
 
@@ -94,13 +94,13 @@ def test_a_program_that_hangs_is_stopped(faked: Path, voice: SyntheticVoice, mon
     monkeypatch.setattr(base, "START_S", 1.0)
     monkeypatch.setattr(base, "EACH_S", 0.0)
     with pytest.raises(InputError, match="did not end within 1 s"):
-        speak("hang", voice)
+        speak_sentence("hang", voice)
     assert list(faked.iterdir()) == []
 
 
 @pytest.mark.parametrize("voice", EACH)
 def test_temporary_files_go_even_if_not_all_is_heard(faked: Path, voice: SyntheticVoice) -> None:
-    said = speak_all(["hello", "hello"], voice)
+    said = speak_sentences(["hello", "hello"], voice)
     next(said)
     assert len(list(faked.iterdir())) == 1
     said.close()
@@ -109,7 +109,7 @@ def test_temporary_files_go_even_if_not_all_is_heard(faked: Path, voice: Synthet
 
 @pytest.mark.usefixtures("faked")
 def test_no_texts_are_nothing() -> None:
-    assert list(speak_all([], FAKED[0])) == []
+    assert list(speak_sentences([], FAKED[0])) == []
 
 
 @pytest.mark.parametrize(
@@ -122,11 +122,11 @@ def test_no_texts_are_nothing() -> None:
 @pytest.mark.usefixtures("faked")
 def test_unknown_voices(voice: SyntheticVoice, message: str) -> None:
     with pytest.raises(InputError, match=message):
-        speak("Hello", voice)
+        speak_sentence("Hello", voice)
 
 
 def test_flite_begins_again_at_each_utterance() -> None:
-    phones = phones_in("pau:0.2 ay:0.5 \npau:0.1 y:0.3 \n")
+    phones = parse_phone_ends("pau:0.2 ay:0.5 \npau:0.1 y:0.3 \n")
     assert [(span.label, span.start_s, span.end_s) for span in phones] == [
         ("pau", 0, 0.2),
         ("ay", 0.2, 0.5),
@@ -158,7 +158,7 @@ TEXTS = ["Please put both blue bowls on the table.", "The judge measured the bei
 
 def test_real_voices_say_what_the_dictionary_says(real: SyntheticVoice) -> None:
     lexicon = Lexicon()
-    for text, (audio, units) in zip(TEXTS, speak_all(TEXTS, real), strict=True):
+    for text, (audio, units) in zip(TEXTS, speak_sentences(TEXTS, real), strict=True):
         words = words_of(text)
         assert [span.label.word for span in units if not is_silent(span.label.phone)] != []
         assert list(dict.fromkeys(span.label.word for span in units if span.label.word)) == list(dict.fromkeys(words))
@@ -171,15 +171,15 @@ def test_real_voices_say_what_the_dictionary_says(real: SyntheticVoice) -> None:
 
 
 def test_real_voices_say_the_same_again(real: SyntheticVoice) -> None:
-    first, again = speak(TEXTS[0], real), speak(TEXTS[0], real)
+    first, again = speak_sentence(TEXTS[0], real), speak_sentence(TEXTS[0], real)
     assert np.array_equal(first[0].samples, again[0].samples)
     assert first[1] == again[1]
 
 
 def test_the_times_of_real_voices_are_those_that_the_aligner_hears(real: SyntheticVoice, toy_model: Model) -> None:
     recogniser, late_s = Recogniser(toy_model.phones, "general"), []
-    for audio, units in speak_all(TEXTS, real):
-        room = noisy(audio, "white", 50)
+    for audio, units in speak_sentences(TEXTS, real):
+        room = noisy_audio(audio, "white", 50)
         placed = recogniser.place(room, mfcc(room), units)
         said, heard = ([span for span in part if not is_silent(span.label.phone)] for part in (units, placed))
         late_s += [a.start_s - b.start_s for a, b in zip(said, heard, strict=True)]

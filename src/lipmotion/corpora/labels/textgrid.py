@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from lipmotion.corpora.labels.tier import Label, Tier, check_count, required_time
+from lipmotion.corpora.labels.tier import LabelTier, TimedLabel, check_count, required_time
 from lipmotion.errors import InputError, shortened
 
 TOKEN = re.compile(
@@ -27,14 +27,14 @@ def is_textgrid(text: str) -> bool:
     return MARK.match(text) is not None
 
 
-def interval_tiers(text: str, where: str) -> list[Tier]:
+def parse_interval_tiers(text: str, where: str) -> list[LabelTier]:
     """Return the interval tiers of a TextGrid; point tiers are passed over.
 
     where : the file's name, for messages
     Raises InputError: not a whole TextGrid.
     """
     tokens = _tokens(text)
-    tiers: list[Tier] = []
+    tiers: list[LabelTier] = []
     total = 0
     place = "the header"
     try:
@@ -53,7 +53,7 @@ def interval_tiers(text: str, where: str) -> list[Tier]:
             check_count(total, where)
             labels = [_label(tokens, kind, f"{place}, interval {i + 1}", where) for i in range(count)]
             if kind == INTERVALS:
-                tiers.append(Tier(place, tuple(labels)))
+                tiers.append(LabelTier(place, tuple(labels)))
         place = "what follows the last tier"
         if next(tokens, None) is not None:
             raise _DamagedError("more is there than the counts say")
@@ -83,12 +83,12 @@ def _text_end(text: str, at: int) -> int:
     return at
 
 
-def _label(tokens: Iterator[tuple[str, str]], kind: str, place: str, where: str) -> Label:
+def _label(tokens: Iterator[tuple[str, str]], kind: str, place: str, where: str) -> TimedLabel:
     if kind not in (INTERVALS, POINTS):
         raise _DamagedError(f"its kind is {shortened(kind)!r}, required {INTERVALS} or {POINTS}")
     start_s = required_time(_take(tokens, "number"), place, where)
     end_s = required_time(_take(tokens, "number"), place, where) if kind == INTERVALS else start_s
-    return Label(start_s, end_s, _take(tokens, "text").replace('""', '"').strip(), place)
+    return TimedLabel(start_s, end_s, _take(tokens, "text").replace('""', '"').strip(), place)
 
 
 def _pass_range(tokens: Iterator[tuple[str, str]]) -> None:

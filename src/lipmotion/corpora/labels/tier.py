@@ -20,14 +20,14 @@ ROUNDING_S = 1e-3
 """Times are written with three digits or more."""
 IN_CONTEXT = re.compile(r"[^-+]*-([^-+]+)\+.*")
 """HTK's and HTS's names of a phone between its neighbours: ``t-iy+n``, ``x^sil-hh+iy=t@...``."""
-STATE = re.compile(r"\[(\d{1,9})\]$")
+STATE_NUMBER = re.compile(r"\[(\d{1,9})\]$")
 MOST_LABELS = 250_000
 """Labels of a file: those of phones in five hours of speech."""
-REDUCED = frozenset({"ax", "axr", "ix"})
+REDUCED_VOWELS = frozenset({"ax", "axr", "ix"})
 
 
 @dataclass(frozen=True, slots=True)
-class Label:
+class TimedLabel:
     """One label: its time, its text, and where it stands (for messages). An unknown end is infinite."""
 
     start_s: float
@@ -37,11 +37,11 @@ class Label:
 
 
 @dataclass(frozen=True)
-class Tier:
+class LabelTier:
     """Labels that belong together, and what to call them in messages."""
 
     name: str
-    labels: tuple[Label, ...]
+    labels: tuple[TimedLabel, ...]
 
 
 def check_count(count: int, where: str) -> None:
@@ -58,22 +58,22 @@ def required_time(text: str, place: str, where: str) -> float:
     return time
 
 
-def is_of_phones(tier: Tier) -> bool:
+def holds_phones(tier: LabelTier) -> bool:
     """Whether a tier says by its name that it holds phones, or nearly all that is spoken in it are phones."""
     spoken = [label for label in tier.labels if not _is_silence(label.text)]
-    if not spoken or is_named_words(tier):
+    if not spoken or is_named_as_words(tier):
         return False
     if re.search(r"phone|segment|\bmau\b", tier.name.lower()):
         return True
     return sum(_phone(label.text) is not None for label in spoken) >= PHONES_SHARE * len(spoken)
 
 
-def is_named_words(tier: Tier) -> bool:
+def is_named_as_words(tier: LabelTier) -> bool:
     """Whether a tier's name says that it holds words."""
     return re.search(r"\bwords?\b|transcript|\bort", tier.name.lower()) is not None
 
 
-def words_in(tier: Tier, where: str) -> tuple[str, ...]:
+def tier_words(tier: LabelTier, where: str) -> tuple[str, ...]:
     """Return the words of a tier, silence left out. Raises InputError: labels overlap, or there is no word."""
     _check_order(tier, where)
     said = " ".join(label.text for label in tier.labels if not _is_silence(label.text))
@@ -83,7 +83,7 @@ def words_in(tier: Tier, where: str) -> tuple[str, ...]:
         raise InputError(f"{where}: {tier.name} holds no word; remove the file if the words are not known") from error
 
 
-def phones_in(tier: Tier, words: Tier | None, where: str) -> Timeline[Unit]:
+def phone_timeline(tier: LabelTier, words: LabelTier | None, where: str) -> Timeline[Unit]:
     """Return the phones of a tier in time.
 
     words : the words of the same recording in time, if known: where the phones mark no stress, the lexicon's rule
@@ -99,7 +99,7 @@ def phones_in(tier: Tier, words: Tier | None, where: str) -> Timeline[Unit]:
             )
     labels = _without_states(tier.labels)
     phones = [_required_phone(label, where) for label in labels]
-    marked = any(re.search(r"\d$", label.text) for label in labels) or REDUCED & set(phones)
+    marked = any(re.search(r"\d$", label.text) for label in labels) or REDUCED_VOWELS & set(phones)
     if words is not None and not marked:
         phones = _reduced(labels, phones, words)
     starts_s = [label.start_s for label in labels]
@@ -107,7 +107,7 @@ def phones_in(tier: Tier, words: Tier | None, where: str) -> Timeline[Unit]:
     return Timeline(tuple(Span(*row) for row in zip(starts_s, ends_s, map(Unit, phones), strict=True)))
 
 
-def _check_order(tier: Tier, where: str) -> None:
+def _check_order(tier: LabelTier, where: str) -> None:
     end_s = 0.0
     for label in tier.labels:
         if label.end_s < label.start_s:
@@ -132,12 +132,12 @@ def _inner(text: str) -> str | None:
 
 
 def _phone(text: str) -> str | None:
-    text = STATE.sub("", text)
+    text = STATE_NUMBER.sub("", text)
     name = phone_named(text) or phone_named(_inner(text) or "")
     return SILENCE if name is None and _is_silence(text) else name
 
 
-def _required_phone(label: Label, where: str) -> str:
+def _required_phone(label: TimedLabel, where: str) -> str:
     phone = _phone(label.text)
     if phone is None:
         raise InputError(
@@ -146,23 +146,23 @@ def _required_phone(label: Label, where: str) -> str:
     return phone
 
 
-def _without_states(labels: Sequence[Label]) -> list[Label]:
+def _without_states(labels: Sequence[TimedLabel]) -> list[TimedLabel]:
     """Return whole phones where a file labels their states: ``...[2]``, ``...[3]``, ... are one phone."""
-    whole: list[Label] = []
+    whole: list[TimedLabel] = []
     last = -1
     for label in labels:
-        match = STATE.search(label.text)
+        match = STATE_NUMBER.search(label.text)
         state = int(match[1]) if match else -1
-        name = STATE.sub("", label.text)
+        name = STATE_NUMBER.sub("", label.text)
         if whole and state > last >= 0 and whole[-1].text == name:
-            whole[-1] = Label(whole[-1].start_s, label.end_s, name, whole[-1].place)
+            whole[-1] = TimedLabel(whole[-1].start_s, label.end_s, name, whole[-1].place)
         else:
-            whole.append(Label(label.start_s, label.end_s, name, label.place))
+            whole.append(TimedLabel(label.start_s, label.end_s, name, label.place))
         last = state
     return whole
 
 
-def _reduced(labels: Sequence[Label], phones: Sequence[str], words: Tier) -> list[str]:
+def _reduced(labels: Sequence[TimedLabel], phones: Sequence[str], words: LabelTier) -> list[str]:
     """Return the phones, unstressed vowels reduced in every word by the lexicon's rule."""
     result = list(phones)
     middles_s = [(label.start_s + label.end_s) / 2 for label in labels]

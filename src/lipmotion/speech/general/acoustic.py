@@ -69,15 +69,17 @@ class GeneralModel:
         return (np.log(np.maximum(mixed, np.float32(1e-30))) + best).reshape(len(x), -1)
 
 
-def column(phone: str, state: int, states: int) -> int:
+def density_column(phone: str, state: int, states: int) -> int:
     """Return where the density of a phone's state is found; phones with other counts of states share theirs.
 
     phone : of our inventory, or one of the two noises
     """
-    return PHONES.index(SPELT_OTHERWISE.get(phone, phone.upper())) * STATES + (2 * state + 1) * STATES // (2 * states)
+    return PHONES.index(GENERAL_PHONE_NAMES.get(phone, phone.upper())) * STATES + (2 * state + 1) * STATES // (
+        2 * states
+    )
 
 
-SPELT_OTHERWISE = {"ax": "AH", "axr": "ER", "ix": "IH", "el": "L", "em": "M", "en": "N", "sp": "SIL"}
+GENERAL_PHONE_NAMES = {"ax": "AH", "axr": "ER", "ix": "IH", "el": "L", "em": "M", "en": "N", "sp": "SIL"}
 
 
 @cache

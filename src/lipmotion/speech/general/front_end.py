@@ -7,8 +7,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.speech.audio_files import SPEECH_RATE_HZ
 from lipmotion.speech.mfcc import FFT_SIZE, checked_samples, liftered_cosine, log_mel, triangles
-from lipmotion.speech.read import SPEECH_RATE_HZ
 from lipmotion.types import Audio
 
 FILTERS = 25

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import MissingDependencyError
-from lipmotion.speech.general.acoustic import PHONES, SPELT_OTHERWISE
+from lipmotion.speech.general.acoustic import GENERAL_PHONE_NAMES, PHONES
 from lipmotion.units.lexicon import english_data
 
-SHARE = {
+PROBABILITY_SHARE = {
     "ah": 0.3, "ax": 0.7, "er": 0.4, "axr": 0.6, "ih": 0.55, "ix": 0.45,
     "l": 0.93, "el": 0.07, "m": 0.99, "em": 0.01, "n": 0.96, "en": 0.04, "sp": 1e-4, "+nsn+": 0.05, "+spn+": 0.05,
 }  # fmt: skip
@@ -25,9 +25,9 @@ def english_bigram(units: Sequence[str]) -> NDArray[np.float64]:
     Raises MissingDependencyError: pocketsphinx is not installed.
     """
     kinds = _phones()
-    spelt = ["SIL" if unit.startswith("+") else SPELT_OTHERWISE.get(unit, unit.upper()) for unit in units]
+    spelt = ["SIL" if unit.startswith("+") else GENERAL_PHONE_NAMES.get(unit, unit.upper()) for unit in units]
     rows = [kinds.index(name) for name in spelt]
-    pairs = _phone_bigram()[np.ix_(rows, rows)] * np.array([SHARE.get(unit, 1.0) for unit in units])
+    pairs = _phone_bigram()[np.ix_(rows, rows)] * np.array([PROBABILITY_SHARE.get(unit, 1.0) for unit in units])
     return pairs / pairs.sum(axis=1, keepdims=True)
 
 

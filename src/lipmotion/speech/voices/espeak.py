@@ -14,10 +14,10 @@ from pathlib import Path
 from typing import Any
 
 from lipmotion.errors import InputError
-from lipmotion.speech.read import read_audio
-from lipmotion.speech.voices.base import Said, Synthesiser, SyntheticVoice, output_of
-from lipmotion.speech.voices.espeak_times import phones_in
-from lipmotion.speech.voices.sounds import ESPEAK
+from lipmotion.speech.audio_files import read_audio
+from lipmotion.speech.voices.espeak_times import corrected_phone_times
+from lipmotion.speech.voices.phone_maps import ESPEAK_PHONES
+from lipmotion.speech.voices.synthesiser import SynthesisedSentence, Synthesiser, SyntheticVoice, program_output
 
 PACKAGE = "espeak-ng"
 LANGUAGE = "en-us"
@@ -29,18 +29,18 @@ PROGRAM = [sys.executable, "-I", str(Path(__file__).with_name("espeak_events.py"
 def _voices() -> tuple[SyntheticVoice, ...]:
     if shutil.which("espeak-ng") is None:
         return ()
-    listed = output_of(["espeak-ng", "--voices=variant"], PACKAGE)
+    listed = program_output(["espeak-ng", "--voices=variant"], PACKAGE)
     names = [name for name in VARIANTS if f"!v/{name} " in f"{listed} "]
     return tuple(SyntheticVoice(f"{LANGUAGE}+{name}", "espeak-ng", f"espeak-{name}") for name in names)
 
 
-def _say(voice: str, texts: Sequence[str], folder: Path) -> Iterator[Said]:
+def _say(voice: str, texts: Sequence[str], folder: Path) -> Iterator[SynthesisedSentence]:
     task = json.dumps({"voice": voice, "texts": list(texts), "folder": str(folder)})
-    sentences = _answer(output_of(PROGRAM, PACKAGE, len(texts), task))
+    sentences = _answer(program_output(PROGRAM, PACKAGE, len(texts), task))
     for number, sentence in enumerate(sentences):
         path = folder / f"{number}.wav"
         audio = read_audio(path)
-        yield Said(audio, phones_in(sentence, audio))
+        yield SynthesisedSentence(audio, corrected_phone_times(sentence, audio))
         path.unlink()
 
 
@@ -51,4 +51,4 @@ def _answer(printed: str) -> Any:
         raise InputError(f"espeak-ng's library answers {printed[:40]!r}; install it again: {PACKAGE}") from error
 
 
-ESPEAK_NG = Synthesiser("espeak-ng", PACKAGE, _voices, _say, ESPEAK)
+ESPEAK_NG = Synthesiser("espeak-ng", PACKAGE, _voices, _say, ESPEAK_PHONES)

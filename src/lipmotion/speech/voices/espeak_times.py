@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.speech.voices.sounds import ESPEAK
+from lipmotion.speech.voices.phone_maps import ESPEAK_PHONES
 from lipmotion.types import Audio, Span, Timeline
 from lipmotion.units import SILENCE, phone_classes
 
@@ -27,7 +27,7 @@ aligner hears it."""
 Starts = Sequence[tuple[str, float]]
 
 
-def phones_in(starts: Starts, audio: Audio) -> Timeline[str]:
+def corrected_phone_times(starts: Starts, audio: Audio) -> Timeline[str]:
     """Return phones in time: each from its start on, put right, until the next or the end of the sound."""
     labels = [label for label, _ in starts]
     edges_s = [*(start_s for _, start_s in starts), audio.duration_s]
@@ -45,7 +45,7 @@ def phones_in(starts: Starts, audio: Audio) -> Timeline[str]:
 
 def _sound(label: str) -> str:
     """Return the last phone of a label; nothing for parts of others, and for what is not known."""
-    return (ESPEAK.get(label) or ("",))[-1]
+    return (ESPEAK_PHONES.get(label) or ("",))[-1]
 
 
 def _closure_s(closed: NDArray[np.bool_], burst_s: float, rate_hz: int) -> float:

@@ -8,9 +8,9 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from lipmotion.errors import InputError
-from lipmotion.speech.read import read_audio
-from lipmotion.speech.voices.base import Said, Synthesiser, SyntheticVoice, output_of
-from lipmotion.speech.voices.sounds import ARPABET
+from lipmotion.speech.audio_files import read_audio
+from lipmotion.speech.voices.phone_maps import ARPABET_PHONES
+from lipmotion.speech.voices.synthesiser import SynthesisedSentence, Synthesiser, SyntheticVoice, program_output
 from lipmotion.types import Span, Timeline
 
 PACKAGE = "festival festvox-us-slt-hts"
@@ -32,7 +32,7 @@ SPEAKING = f"""(define (say text path)
 def _voices() -> tuple[SyntheticVoice, ...]:
     if shutil.which("festival") is None:
         return ()
-    rows = [line.split() for line in output_of(["festival", "-b", LISTING], PACKAGE).splitlines()]
+    rows = [line.split() for line in program_output(["festival", "-b", LISTING], PACKAGE).splitlines()]
     names = [row[0] for row in rows if row[1:] == ["english", "american"]]
     return tuple(SyntheticVoice(name, "festival", _speaker(name)) for name in names)
 
@@ -42,21 +42,21 @@ def _speaker(name: str) -> str:
     return re.sub(r"^cmu_us_|_.*", "", re.sub(r"^cmu_us_", "", name))
 
 
-def _say(voice: str, texts: Sequence[str], folder: Path) -> Iterator[Said]:
+def _say(voice: str, texts: Sequence[str], folder: Path) -> Iterator[SynthesisedSentence]:
     paths = [folder / f"{number}.wav" for number in range(len(texts))]
     script = folder / "say.scm"
     calls = [f"(say {_quoted(text)} {_quoted(str(path))})" for text, path in zip(texts, paths, strict=True)]
     script.write_text("\n".join([f"(voice_{voice})", SPEAKING, *calls, ""]), encoding="utf-8")
-    printed = output_of(["festival", "-b", str(script)], PACKAGE, len(texts))
+    printed = program_output(["festival", "-b", str(script)], PACKAGE, len(texts))
     parts = printed.split(f"{MARK}\n")[1:]
     if len(parts) != len(texts):
         raise InputError(f"festival said {len(parts)} of {len(texts)} sentences; try another text or voice")
     for path, part in zip(paths, parts, strict=True):
-        yield Said(read_audio(path), phones_in(part))
+        yield SynthesisedSentence(read_audio(path), parse_segments(part))
         path.unlink()
 
 
-def phones_in(printed: str) -> Timeline[str]:
+def parse_segments(printed: str) -> Timeline[str]:
     """Return phones in time from lines of a name, a start and an end. Raises InputError: other lines."""
     spans = []
     for line in printed.splitlines():
@@ -72,4 +72,4 @@ def _quoted(text: str) -> str:
     return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
-FESTIVAL = Synthesiser("festival", PACKAGE, _voices, _say, ARPABET)
+FESTIVAL = Synthesiser("festival", PACKAGE, _voices, _say, ARPABET_PHONES)

@@ -7,9 +7,9 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from lipmotion.errors import InputError
-from lipmotion.speech.read import read_audio
-from lipmotion.speech.voices.base import Said, Synthesiser, SyntheticVoice, output_of
-from lipmotion.speech.voices.sounds import ARPABET
+from lipmotion.speech.audio_files import read_audio
+from lipmotion.speech.voices.phone_maps import ARPABET_PHONES
+from lipmotion.speech.voices.synthesiser import SynthesisedSentence, Synthesiser, SyntheticVoice, program_output
 from lipmotion.types import Span, Timeline
 
 PACKAGE = "flite"
@@ -21,18 +21,18 @@ SPEAKERS = {"kal16": "kal"}
 def _voices() -> tuple[SyntheticVoice, ...]:
     if shutil.which("flite") is None:
         return ()
-    names = output_of(["flite", "-lv"], PACKAGE).partition(":")[2].split()
+    names = program_output(["flite", "-lv"], PACKAGE).partition(":")[2].split()
     return tuple(SyntheticVoice(name, "flite", SPEAKERS.get(name, name)) for name in names if name not in UNUSED)
 
 
-def _say(voice: str, texts: Sequence[str], folder: Path) -> Iterator[Said]:
+def _say(voice: str, texts: Sequence[str], folder: Path) -> Iterator[SynthesisedSentence]:
     path = folder / "flite.wav"
     for text in texts:
-        printed = output_of(["flite", "-voice", voice, "-psdur", "-o", str(path), "-t", text], PACKAGE)
-        yield Said(read_audio(path), phones_in(printed))
+        printed = program_output(["flite", "-voice", voice, "-psdur", "-o", str(path), "-t", text], PACKAGE)
+        yield SynthesisedSentence(read_audio(path), parse_phone_ends(printed))
 
 
-def phones_in(printed: str) -> Timeline[str]:
+def parse_phone_ends(printed: str) -> Timeline[str]:
     """Return phones in time from what ``flite -psdur`` prints: ``pau:0.220 k:0.346``, a line an utterance.
 
     The number is the end of the phone in its utterance; a long text is several utterances.
@@ -52,4 +52,4 @@ def phones_in(printed: str) -> Timeline[str]:
     return Timeline(tuple(spans))
 
 
-FLITE = Synthesiser("flite", PACKAGE, _voices, _say, ARPABET)
+FLITE = Synthesiser("flite", PACKAGE, _voices, _say, ARPABET_PHONES)

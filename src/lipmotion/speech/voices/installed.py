@@ -8,11 +8,11 @@ from contextlib import closing
 from pathlib import Path
 
 from lipmotion.errors import InputError, MissingDependencyError
-from lipmotion.speech.voices.base import Synthesiser, SyntheticVoice
 from lipmotion.speech.voices.espeak import ESPEAK_NG
 from lipmotion.speech.voices.festival import FESTIVAL
 from lipmotion.speech.voices.flite import FLITE
-from lipmotion.speech.voices.labels import labelled
+from lipmotion.speech.voices.inventory_phones import inventory_timeline
+from lipmotion.speech.voices.synthesiser import Synthesiser, SyntheticVoice
 from lipmotion.types import Audio, Timeline, Unit
 from lipmotion.units import Lexicon, words_of
 
@@ -24,20 +24,20 @@ def installed_voices() -> tuple[SyntheticVoice, ...]:
     return tuple(voice for synthesiser in SYNTHESISERS.values() for voice in synthesiser.voices())
 
 
-def speak(text: str, voice: SyntheticVoice, lexicon: Lexicon | None = None) -> tuple[Audio, Timeline[Unit]]:
+def speak_sentence(text: str, voice: SyntheticVoice, lexicon: Lexicon | None = None) -> tuple[Audio, Timeline[Unit]]:
     """Return a sentence in a voice: the sound at 16 kHz, and the phones that are in it, in time, from 0 s to its end.
 
     lexicon : whose words tell which vowels are unstressed; the built-in one by default
-    Raises as ``speak_all``.
+    Raises as ``speak_sentences``.
     """
-    with closing(speak_all([text], voice, lexicon)) as said:
+    with closing(speak_sentences([text], voice, lexicon)) as said:
         return next(said)
 
 
-def speak_all(
+def speak_sentences(
     texts: Sequence[str], voice: SyntheticVoice, lexicon: Lexicon | None = None
 ) -> Generator[tuple[Audio, Timeline[Unit]], None, None]:
-    """Give several sentences in a voice, as ``speak``; the program is started once for all of them where it can be.
+    """Give several sentences in a voice, as ``speak_sentence``; the program is started once for all of them where it can be.
 
     Raises MissingDependencyError: the synthesiser is not installed (the message names the package).
     Raises InputError: no such synthesiser or voice, a text without a word, or one that the synthesiser cannot say.
@@ -50,7 +50,7 @@ def speak_all(
         said = synthesiser.say(voice.name, plain, Path(folder)) if plain else iter(())
         for one, said_words in zip(said, words, strict=True):
             audio = one.audio
-            yield audio, labelled(one.phones, synthesiser.labels, said_words, lexicon, audio.duration_s)
+            yield audio, inventory_timeline(one.phones, synthesiser.labels, said_words, lexicon, audio.duration_s)
 
 
 def _synthesiser(voice: SyntheticVoice) -> Synthesiser:

@@ -8,9 +8,9 @@ from contextlib import ExitStack
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.vision.image_similarity import face_thumbnail, image_correlation, scene_thumbnail
 from lipmotion.vision.landmarks import EYE_CORNERS, TRACKED_POINTS
 from lipmotion.vision.mesh import FaceMesh
-from lipmotion.vision.similarity import face_of, likeness, scene_of
 
 Image = NDArray[np.uint8]
 Array = NDArray[np.float64]
@@ -32,7 +32,7 @@ LOOK_STEP, LOOKS = 5, 20
 _EYES = [TRACKED_POINTS.index(index) for index in EYE_CORNERS]
 
 
-class Follower:
+class FaceFollower:
     """Finds one face in every scene of a clip, frame by frame, and says at the end in which scenes it is one person's.
 
     Use it as a context manager.
@@ -43,7 +43,7 @@ class Follower:
         self._picture: Array | None = None
         self._found: list[int | None] = []  # by frame: the scene whose face was found
 
-    def __enter__(self) -> Follower:
+    def __enter__(self) -> FaceFollower:
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -54,7 +54,7 @@ class Follower:
 
         Of several, the one followed so far; where a scene begins, one that is known, else the largest and most central.
         """
-        before, self._picture = self._picture, scene_of(image)
+        before, self._picture = self._picture, scene_thumbnail(image)
         is_cut = before is not None and np.abs(self._picture - before).mean() > CUT_LEVELS
         if is_cut or self._scenes[-1].away > LOST_FRAMES:
             self._begin_scene()
@@ -125,7 +125,7 @@ class _Scene:
             self.away += self._last is not None
             return None
         if self._seen % LOOK_STEP == 0 and len(self.looks) < LOOKS:
-            self.looks.append(face_of(image, face[_EYES, :2]))
+            self.looks.append(face_thumbnail(image, face[_EYES, :2]))
         self._seen += 1
         self._last, self.away = face, 0
         return face
@@ -167,7 +167,7 @@ class _Scene:
 
     def _claim(self, image: Image, face: Array) -> tuple[bool, float]:
         """Return what the face is chosen by: known before; then its size, half of it at the edge of the picture."""
-        is_known = _likeness([face_of(image, face[_EYES, :2])], self._known) > SAME_PERSON
+        is_known = _likeness([face_thumbnail(image, face[_EYES, :2])], self._known) > SAME_PERSON
         return is_known, _size(face) * (1 - abs(float(_middle(face)[0]) / image.shape[1] - 0.5))
 
 
@@ -175,7 +175,7 @@ def _likeness(looks: Sequence[Array], others: Sequence[Array]) -> float:
     """Return how alike the two most alike faces are."""
     if not looks or not others:
         return 0.0
-    return float(likeness(np.stack(looks)[:, None], np.stack(others)).max())
+    return float(image_correlation(np.stack(looks)[:, None], np.stack(others)).max())
 
 
 def _distance(face: Array, other: Array) -> float:

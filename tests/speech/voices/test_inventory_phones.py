@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lipmotion.errors import InputError
-from lipmotion.speech.voices import labels as module
-from lipmotion.speech.voices.labels import labelled, matches, with_words
-from lipmotion.speech.voices.sounds import ARPABET, ESPEAK
+from lipmotion.speech.voices import inventory_phones as module
+from lipmotion.speech.voices.inventory_phones import inventory_timeline, matches, with_words
+from lipmotion.speech.voices.phone_maps import ARPABET_PHONES, ESPEAK_PHONES
 from lipmotion.types import Span, Timeline, Unit
 from lipmotion.units import PHONES, Lexicon
 from oracles.edits import least_cost
@@ -63,7 +63,7 @@ def test_pauses_are_named_by_place_and_length() -> None:
     said = timeline(
         ("pau", 0.0, 0.1), ("ih", 0.1, 0.2), ("pau", 0.2, 0.35), ("t", 0.35, 0.4), ("pau", 0.4, 0.65), ("ih", 0.65, 1.0)
     )
-    units = labelled(said, ARPABET, ["it"], LEXICON, 1.1)
+    units = inventory_timeline(said, ARPABET_PHONES, ["it"], LEXICON, 1.1)
     assert [span.label.phone for span in units] == ["sil", "ih", "sp", "t", "sil", "ih", "sil"]
     assert [span.start_s for span in units] == pytest.approx([0, 0.1, 0.2, 0.35, 0.4, 0.65, 1.0])
     assert units[-1].end_s == pytest.approx(1.1)
@@ -71,7 +71,7 @@ def test_pauses_are_named_by_place_and_length() -> None:
 
 def test_what_is_not_covered_is_silent_and_what_is_too_late_is_cut() -> None:
     said = timeline(("ih", 0.1, 0.2), ("t", 0.3, 0.6), ("t", 0.7, 0.8))
-    units = labelled(said, ARPABET, ["it"], LEXICON, 0.5)
+    units = inventory_timeline(said, ARPABET_PHONES, ["it"], LEXICON, 0.5)
     assert [(span.label.phone, span.start_s, span.end_s) for span in units] == [
         ("sil", 0.0, 0.1),
         ("ih", 0.1, 0.2),
@@ -82,7 +82,7 @@ def test_what_is_not_covered_is_silent_and_what_is_too_late_is_cut() -> None:
 
 def test_several_phones_share_a_label_and_parts_join() -> None:
     said = timeline(("A@", 0.0, 0.2), (";", 0.2, 0.3), ("t", 0.3, 0.3), ("z", 0.3, 0.4))
-    units = labelled(said, ESPEAK, ["is"], LEXICON, 0.4)
+    units = inventory_timeline(said, ESPEAK_PHONES, ["is"], LEXICON, 0.4)
     assert [(span.label.phone, span.start_s, span.end_s) for span in units] == [
         ("aa", 0.0, 0.1),
         ("r", 0.1, pytest.approx(0.3)),
@@ -96,11 +96,11 @@ def test_several_phones_share_a_label_and_parts_join() -> None:
 )
 def test_it_says_what_is_wrong(said: Timeline[str], message: str) -> None:
     with pytest.raises(InputError, match=message):
-        labelled(said, ARPABET, ["it"], LEXICON, 0.2)
+        inventory_timeline(said, ARPABET_PHONES, ["it"], LEXICON, 0.2)
 
 
 def test_tables_lead_to_the_inventory() -> None:
-    for table in (ARPABET, ESPEAK):
+    for table in (ARPABET_PHONES, ESPEAK_PHONES):
         assert {phone for phones in table.values() for phone in phones} <= set(PHONES)
-    spoken = {phone for phones in ESPEAK.values() for phone in phones}
+    spoken = {phone for phones in ESPEAK_PHONES.values() for phone in phones}
     assert set(PHONES) - spoken == {"sp"}

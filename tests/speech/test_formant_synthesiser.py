@@ -12,7 +12,7 @@ from scipy.linalg import solve_toeplitz
 from scipy.signal import spectrogram
 
 from lipmotion.errors import InputError
-from lipmotion.speech.synthesise import SOUNDS, synthesise
+from lipmotion.speech.formant_synthesiser import PHONE_TARGETS, synthesise
 from lipmotion.units.phones import PHONES
 
 RATE_HZ = 16000
@@ -47,12 +47,12 @@ def measured_formants(samples: NDArray[np.float32], order: int = 18) -> NDArray[
 
 
 def test_it_speaks_the_inventory() -> None:
-    assert sorted(SOUNDS) == sorted(PHONES)
+    assert sorted(PHONE_TARGETS) == sorted(PHONES)
 
 
-@pytest.mark.parametrize("phone", SOUNDS)
+@pytest.mark.parametrize("phone", PHONE_TARGETS)
 def test_the_parts_of_a_phone_fill_it(phone: str) -> None:
-    assert sum(part.share for part in SOUNDS[phone]) == pytest.approx(1)
+    assert sum(part.share for part in PHONE_TARGETS[phone]) == pytest.approx(1)
 
 
 @pytest.mark.parametrize("rate_hz", [16000, 22050, 44100])
@@ -79,7 +79,7 @@ def test_the_sound_begins_and_ends_with_its_phone() -> None:
 
 def test_silence_is_quiet_and_speech_is_not_clipped() -> None:
     assert level_db(spoken("sil")) == pytest.approx(-70, abs=0.5)
-    for phone in set(SOUNDS) - {"sil", "sp"}:
+    for phone in set(PHONE_TARGETS) - {"sil", "sp"}:
         samples = spoken(phone)
         assert level_db(samples) > -50, phone
         assert np.abs(samples).max() < 0.9, phone
@@ -94,7 +94,7 @@ def test_the_seed_is_all_the_chance_there_is() -> None:
 
 @pytest.mark.parametrize("phone", ["iy", "ih", "eh", "ae", "aa", "ah", "ax", "uw"])
 def test_vowels_have_their_formants(phone: str) -> None:
-    formants = SOUNDS[phone][0].formants
+    formants = PHONE_TARGETS[phone][0].formants
     assert formants is not None
     assert measured_formants(spoken(phone)[800:-800])[:2] == pytest.approx(formants[:2], rel=0.12)
 
@@ -144,7 +144,7 @@ def test_moving_formants_do_not_click() -> None:
 
 
 def test_no_two_phones_sound_the_same() -> None:
-    names = sorted(set(SOUNDS) - {"sil", "sp"})
+    names = sorted(set(PHONE_TARGETS) - {"sil", "sp"})
 
     def picture(phone: str, seed: int) -> NDArray[np.float64]:
         audio, _ = synthesise([("aa", 0.1), (phone, 0.2), ("aa", 0.1)], seed=seed)
@@ -177,7 +177,7 @@ def test_it_says_what_is_wrong(phones: list[tuple[str, float]], options: dict[st
 
 
 def test_a_minute_takes_seconds() -> None:
-    phones = [(phone, 0.15) for phone in SOUNDS] * 9
+    phones = [(phone, 0.15) for phone in PHONE_TARGETS] * 9
     before_s = time.process_time()
     audio, _ = synthesise(phones[:400])
     assert audio.duration_s == pytest.approx(60)

@@ -7,7 +7,7 @@ import pytest
 
 from lipmotion.errors import CorpusError
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.speech.phones import train_phones
+from lipmotion.speech.phone_models import train_phone_models
 from lipmotion.testing.toy import WORDS, ToySentence, toy_sentences
 from lipmotion.types.progress import silent_monitor
 from lipmotion.units import PAUSE, SILENCE, Lexicon
@@ -23,7 +23,7 @@ def sentences() -> list[ToySentence]:
 def test_training_is_reported_and_does_not_get_worse(sentences: list[ToySentence]) -> None:
     steps: list[tuple[str, float]] = []
     spoken = [(sentence.audio, sentence.words) for sentence in sentences[:4]]
-    hmm = train_phones(spoken, Lexicon(), SMALL, lambda event: steps.append((event.stage, event.figure)))
+    hmm = train_phone_models(spoken, Lexicon(), SMALL, lambda event: steps.append((event.stage, event.figure)))
     assert {"flat start", "pronunciations"} <= {step for step, _ in steps}
     for stage in ("flat start", "pronunciations"):
         values = [value for step, value in steps if step == stage and value is not None]
@@ -35,7 +35,7 @@ def test_training_is_reported_and_does_not_get_worse(sentences: list[ToySentence
 def test_transcripts_that_do_not_fit_are_left_out(sentences: list[ToySentence]) -> None:
     good = [(sentence.audio, sentence.words) for sentence in sentences[:4]]
     bad = (good[0][0], ("five",) * 100)
-    hmm = train_phones([*good, bad], Lexicon(), SMALL, silent_monitor)
-    assert np.array_equal(hmm.mixtures.means, train_phones(good, Lexicon(), SMALL, silent_monitor).mixtures.means)
+    hmm = train_phone_models([*good, bad], Lexicon(), SMALL, silent_monitor)
+    assert np.array_equal(hmm.mixtures.means, train_phone_models(good, Lexicon(), SMALL, silent_monitor).mixtures.means)
     with pytest.raises(CorpusError, match="none of 1 utterances has a transcript that fits into its recording"):
-        train_phones([bad], Lexicon(), SMALL, silent_monitor)
+        train_phone_models([bad], Lexicon(), SMALL, silent_monitor)

@@ -42,7 +42,7 @@ _GAIN = 0.12
 
 
 @dataclass(frozen=True)
-class Part:
+class TargetSegment:
     """A stretch of a phone with fixed targets.
 
     share              : of the phone's duration; the shares of one phone sum to 1
@@ -61,42 +61,46 @@ class Part:
     hiss_width: float = 2000.0
 
 
-Sound = tuple[Part, ...]
+PhoneTargets = tuple[TargetSegment, ...]
 
 
-def _vowel(start: Formants, end: Formants | None = None) -> Sound:
+def _vowel(start: Formants, end: Formants | None = None) -> PhoneTargets:
     if end is None:
-        return (Part(1.0, start, voice=1.0, breath=0.01),)
-    return Part(0.5, start, voice=1.0, breath=0.01), Part(0.5, end, voice=0.9, breath=0.01)
+        return (TargetSegment(1.0, start, voice=1.0, breath=0.01),)
+    return TargetSegment(0.5, start, voice=1.0, breath=0.01), TargetSegment(0.5, end, voice=0.9, breath=0.01)
 
 
-def _glide(formants: Formants) -> Sound:
-    return (Part(1.0, formants, (60.0, 110.0, 180.0), voice=0.6),)
+def _glide(formants: Formants) -> PhoneTargets:
+    return (TargetSegment(1.0, formants, (60.0, 110.0, 180.0), voice=0.6),)
 
 
-def _nasal(formants: Formants) -> Sound:
-    return (Part(1.0, formants, (70.0, 300.0, 350.0), voice=0.45),)
+def _nasal(formants: Formants) -> PhoneTargets:
+    return (TargetSegment(1.0, formants, (70.0, 300.0, 350.0), voice=0.45),)
 
 
-def _fricative(formants: Formants, hiss: float, hiss_hz: float, hiss_width: float, voice: float = 0.0) -> Sound:
-    return (Part(1.0, formants, (120.0, 150.0, 200.0), voice, 0.0, hiss, hiss_hz, hiss_width),)
+def _fricative(formants: Formants, hiss: float, hiss_hz: float, hiss_width: float, voice: float = 0.0) -> PhoneTargets:
+    return (TargetSegment(1.0, formants, (120.0, 150.0, 200.0), voice, 0.0, hiss, hiss_hz, hiss_width),)
 
 
-def _stop(formants: Formants, hiss: float, hiss_hz: float, hiss_width: float, voiced: bool) -> Sound:
+def _stop(formants: Formants, hiss: float, hiss_hz: float, hiss_width: float, voiced: bool) -> PhoneTargets:
     """Closure, burst, release; a voiced one murmurs in its closure, an unvoiced one is aspirated."""
-    closure = Part(0.6, formants, (150.0, 300.0, 400.0), voice=0.12 if voiced else 0.0)
-    burst = Part(0.14, formants, hiss=hiss, hiss_hz=hiss_hz, hiss_width=hiss_width)
-    release = Part(0.26, formants, voice=0.6) if voiced else Part(0.26, formants, (200.0, 150.0, 200.0), breath=0.12)
+    closure = TargetSegment(0.6, formants, (150.0, 300.0, 400.0), voice=0.12 if voiced else 0.0)
+    burst = TargetSegment(0.14, formants, hiss=hiss, hiss_hz=hiss_hz, hiss_width=hiss_width)
+    release = (
+        TargetSegment(0.26, formants, voice=0.6)
+        if voiced
+        else TargetSegment(0.26, formants, (200.0, 150.0, 200.0), breath=0.12)
+    )
     return closure, burst, release
 
 
-def _affricate(formants: Formants, hiss: float, hiss_hz: float, hiss_width: float, voice: float = 0.0) -> Sound:
+def _affricate(formants: Formants, hiss: float, hiss_hz: float, hiss_width: float, voice: float = 0.0) -> PhoneTargets:
     """Closure, then a fricative."""
     (release,) = _fricative(formants, hiss, hiss_hz, hiss_width, voice)
-    return Part(0.4, formants, (150.0, 300.0, 400.0), voice=voice / 2), replace(release, share=0.6)
+    return TargetSegment(0.4, formants, (150.0, 300.0, 400.0), voice=voice / 2), replace(release, share=0.6)
 
 
-def _syllabic(sound: Sound) -> Sound:
+def _syllabic(sound: PhoneTargets) -> PhoneTargets:
     """A schwa that runs into a consonant."""
     return replace(_vowel(SCHWA)[0], share=0.35), *(replace(part, share=0.65 * part.share) for part in sound)
 
@@ -105,9 +109,9 @@ SCHWA: Formants = (500, 1400, 2450)
 _PALATAL, _ALVEOLAR, _LABIAL, _VELAR = (270, 1850, 2500), (280, 1700, 2650), (260, 850, 2100), (270, 1900, 2300)
 _M, _N, _L = _nasal((260, 1000, 2200)), _nasal((270, 1550, 2600)), _glide((340, 1050, 2750))
 
-SOUNDS: dict[str, Sound] = {
-    "sil": (Part(),),
-    "sp": (Part(),),
+PHONE_TARGETS: dict[str, PhoneTargets] = {
+    "sil": (TargetSegment(),),
+    "sp": (TargetSegment(),),
     "iy": _vowel((290, 2200, 2950)),
     "ih": _vowel((400, 1920, 2560)),
     "ix": _vowel((420, 1700, 2500)),
@@ -136,7 +140,7 @@ SOUNDS: dict[str, Sound] = {
     "n": _N,
     "en": _syllabic(_N),
     "ng": _nasal((280, 2100, 2600)),
-    "hh": (Part(widths=(200.0, 150.0, 200.0), breath=0.12),),
+    "hh": (TargetSegment(widths=(200.0, 150.0, 200.0), breath=0.12),),
     "f": _fricative((300, 1050, 2200), 0.10, 5000, 5000),
     "v": _fricative((280, 1050, 2200), 0.05, 5000, 5000, voice=0.35),
     "th": _fricative((300, 1350, 2550), 0.08, 6500, 2500),
@@ -167,12 +171,12 @@ def synthesise(
     rate_hz  : sampling rate, 16,000 Hz or more
     seed     : of the noise; the same arguments give the same samples
     Returns Audio of ``round(sum of durations · rate_hz)`` samples, silence at −70 dB; and the phones in time, from 0 s.
-    Raises InputError: a phone that is not in ``SOUNDS``, or a duration, pitch or rate out of range.
+    Raises InputError: a phone that is not in ``PHONE_TARGETS``, or a duration, pitch or rate out of range.
     """
     _check(phones, pitch_hz, rate_hz)
     edges_s = np.concatenate([[0.0], np.cumsum([duration_s for _, duration_s in phones])])
     noise = np.random.default_rng(seed).standard_normal((3, round(float(edges_s[-1]) * rate_hz)))
-    speech = _speech(_tracks([SOUNDS[phone] for phone, _ in phones], edges_s, rate_hz), noise, pitch_hz, rate_hz)
+    speech = _speech(_tracks([PHONE_TARGETS[phone] for phone, _ in phones], edges_s, rate_hz), noise, pitch_hz, rate_hz)
     samples = _GAIN * speech + 10 ** (FLOOR_DB / 20) * noise[2]
     spans = (Span(float(a), float(b), Unit(p)) for (p, _), a, b in zip(phones, edges_s, edges_s[1:], strict=False))
     return Audio(samples.astype(np.float32), rate_hz), Timeline(tuple(spans))
@@ -182,8 +186,8 @@ def _check(phones: Sequence[tuple[str, float]], pitch_hz: float, rate_hz: int) -
     if not phones:
         raise InputError("there are no phones to speak; give at least one")
     for phone, duration_s in phones:
-        if phone not in SOUNDS:
-            raise InputError(f"phone {phone!r} is not known; use one of: {' '.join(sorted(SOUNDS))}")
+        if phone not in PHONE_TARGETS:
+            raise InputError(f"phone {phone!r} is not known; use one of: {' '.join(sorted(PHONE_TARGETS))}")
         if not SHORTEST_S <= duration_s < np.inf:
             raise InputError(f"phone {phone!r} lasts {duration_s} s, required at least {SHORTEST_S} s")
     if not 50 <= pitch_hz <= 500:
@@ -201,7 +205,7 @@ class _Tracks(NamedTuple):
     hiss: Array
 
 
-def _tracks(sounds: Sequence[Sound], edges_s: Array, rate_hz: int) -> _Tracks:
+def _tracks(sounds: Sequence[PhoneTargets], edges_s: Array, rate_hz: int) -> _Tracks:
     hop_s = (rate_hz // CONTROL_HZ) / rate_hz
     time_s = (np.arange(int(edges_s[-1] / hop_s) + 1) + 0.5) * hop_s
     parts = _with_formants([part for sound in sounds for part in sound])
@@ -219,7 +223,7 @@ def _tracks(sounds: Sequence[Sound], edges_s: Array, rate_hz: int) -> _Tracks:
     )
 
 
-def _with_formants(parts: Sequence[Part]) -> list[Part]:
+def _with_formants(parts: Sequence[TargetSegment]) -> list[TargetSegment]:
     """Give the parts without formants those of the next that has some, at the end those of the last."""
     following: Formants = next((part.formants for part in reversed(parts) if part.formants), SCHWA)
     filled = []

@@ -17,7 +17,7 @@ AUDIO_SUFFIXES = frozenset(f".{name}" for name in "aac aif aiff flac m4a mp3 oga
 
 
 @dataclass(frozen=True)
-class Curves:
+class MotionFile:
     """Motion in a file of its own.
 
     file     : what ``animate`` writes (.csv .json .npz), or a bare array of numbers (.npy)
@@ -31,7 +31,7 @@ class Curves:
 
 
 @dataclass(frozen=True)
-class Recording:
+class SourceRecording:
     """One sentence, heard and seen.
 
     name    : unique in its folder, usable as a folder's name
@@ -51,11 +51,11 @@ class Recording:
     rights: dict[str, str] = field(default_factory=dict)
     speaker: str = ""
     phones: Timeline[Unit] | None = None
-    curves: Curves | None = None
+    curves: MotionFile | None = None
 
 
 @dataclass(frozen=True)
-class Recordings:
+class RecordingFolder:
     """All that was found in a folder.
 
     kind     : the reader that fitted, in words
@@ -64,10 +64,10 @@ class Recordings:
     """
 
     kind: str
-    items: tuple[Recording, ...]
+    items: tuple[SourceRecording, ...]
     problems: dict[str, str] = field(default_factory=dict)
 
 
-def videos(paths: Iterable[Path]) -> list[Path]:
+def video_files(paths: Iterable[Path]) -> list[Path]:
     """Return the visible files with a video's suffix, sorted."""
     return sorted(path for path in paths if path.suffix.lower() in VIDEO_SUFFIXES and path.is_file())

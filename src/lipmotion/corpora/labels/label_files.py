@@ -6,14 +6,14 @@ import codecs
 from dataclasses import dataclass
 from pathlib import Path
 
-from lipmotion.corpora.labels.lines import timed_lines
-from lipmotion.corpora.labels.plain import check_other_labels
-from lipmotion.corpora.labels.textgrid import MARK, interval_tiers, is_textgrid
-from lipmotion.corpora.labels.tier import Tier, is_named_words, is_of_phones, phones_in, words_in
+from lipmotion.corpora.labels.plain_text import check_no_labels
+from lipmotion.corpora.labels.textgrid import MARK, is_textgrid, parse_interval_tiers
+from lipmotion.corpora.labels.tier import LabelTier, holds_phones, is_named_as_words, phone_timeline, tier_words
+from lipmotion.corpora.labels.timed_lines import parse_timed_lines
 from lipmotion.errors import InputError
 from lipmotion.types import Timeline, Unit
 from lipmotion.units import phone_named, words_of
-from lipmotion.units.speaking_rate import LARGEST_TRANSCRIPT
+from lipmotion.units.length_limits import LARGEST_TRANSCRIPT
 
 FOR_WORDS = (".txt", ".TextGrid", ".textgrid", ".lab")
 """Where words are looked for: a plain text before labels in time, which may say other things than words."""
@@ -23,7 +23,7 @@ LARGEST_LABELS = 1 << 24
 
 
 @dataclass(frozen=True)
-class Labels:
+class RecordingLabels:
     """What label files say of a recording.
 
     words  : the transcript, lower case, or None
@@ -34,56 +34,56 @@ class Labels:
     phones: Timeline[Unit] | None = None
 
 
-def labels_beside(recording: Path, *, ignored: frozenset[Path] = frozenset()) -> Labels:
+def labels_beside(recording: Path, *, ignored: frozenset[Path] = frozenset()) -> RecordingLabels:
     """Return what the files beside a recording say that have its name: ``.txt``, ``.TextGrid``, ``.lab``.
 
     ignored : files that are something else (the lists of the splits)
     Raises InputError: one of them cannot be read.
     """
-    found: dict[str, tuple[Path, Labels]] = {}
+    found: dict[str, tuple[Path, RecordingLabels]] = {}
     for suffix in FOR_WORDS:
         path = recording.with_suffix(suffix)
         if path not in ignored and path.is_file() and not any(path.samefile(other) for other, _ in found.values()):
             found[suffix] = path, read_labels(path)
     words = [found[suffix][1].words for suffix in FOR_WORDS if suffix in found]
     phones = [found[suffix][1].phones for suffix in FOR_PHONES if suffix in found]
-    return Labels(next(filter(None, words), None), next(filter(None, phones), None))
+    return RecordingLabels(next(filter(None, words), None), next(filter(None, phones), None))
 
 
-def read_labels(path: Path) -> Labels:
+def read_labels(path: Path) -> RecordingLabels:
     """Return the words and phones of one file: a TextGrid, labels with times, or plain text.
 
     Raises InputError: not text, damaged, overlapping, or with labels that are no phones among phones.
     """
     text = _text(path)
     if is_textgrid(text):
-        return _chosen(interval_tiers(text, str(path)), str(path))
-    lines = timed_lines(text, str(path))
+        return _chosen(parse_interval_tiers(text, str(path)), str(path))
+    lines = parse_timed_lines(text, str(path))
     if lines is not None:
         return _chosen([lines], str(path))
     if len(text) > LARGEST_TRANSCRIPT:
         raise InputError(f"{path}: {len(text)} characters, required at most {LARGEST_TRANSCRIPT}: is it a transcript?")
-    check_other_labels(text, str(path))
+    check_no_labels(text, str(path))
     tokens = text.split()
     one_a_line = len(tokens) == sum(bool(line.strip()) for line in text.splitlines())
     if len(tokens) > 1 and one_a_line and all(map(phone_named, tokens)):
         raise InputError(f"{path}: a list of phones without times; add their times, or give the words instead")
-    return Labels(words_of(text) if tokens else None)
+    return RecordingLabels(words_of(text) if tokens else None)
 
 
-def _chosen(tiers: list[Tier], where: str) -> Labels:
+def _chosen(tiers: list[LabelTier], where: str) -> RecordingLabels:
     """Return the phones of the one tier that has them, and the words of the tier named so, else of the first other."""
-    phones = [tier for tier in tiers if is_of_phones(tier)]
+    phones = [tier for tier in tiers if holds_phones(tier)]
     if len(phones) > 1:
         raise InputError(f"{where}: {phones[0].name} and {phones[1].name} both hold phones; keep one")
     others = [tier for tier in tiers if tier not in phones and any(label.text for label in tier.labels)]
-    words = next(filter(is_named_words, others), others[0] if others else None)
+    words = next(filter(is_named_as_words, others), others[0] if others else None)
     if not phones and words is None:
-        return Labels()
+        return RecordingLabels()
     timed = words if words is not None and all(len(label.text.split()) < 2 for label in words.labels) else None
-    return Labels(
-        words_in(words, where) if words else None,
-        phones_in(phones[0], timed, where) if phones else None,
+    return RecordingLabels(
+        tier_words(words, where) if words else None,
+        phone_timeline(phones[0], timed, where) if phones else None,
     )
 
 

@@ -7,10 +7,10 @@ from itertools import groupby
 
 from lipmotion.errors import InputError
 from lipmotion.speech.recogniser import SHORT_PAUSE_S
-from lipmotion.speech.voices.sounds import Labels
+from lipmotion.speech.voices.phone_maps import PhoneMap
 from lipmotion.types import Span, Timeline, Unit
 from lipmotion.units import PAUSE, SILENCE, VISEME_OF, Lexicon, is_silent, phone_classes
-from lipmotion.units.lexicon import REDUCED
+from lipmotion.units.lexicon import REDUCED_VOWELS
 
 GAP, ALIKE, OTHER, UNLIKE = 0.7, 0.3, 0.8, 1.5
 """What it costs to match a phone with none, with a form of itself, with another of its kind (vowel, consonant), or with
@@ -19,8 +19,8 @@ VOWELS = phone_classes()["vowel"]
 Phones = Sequence[tuple[str, float, float]]
 
 
-def labelled(
-    said: Timeline[str], table: Labels, words: Sequence[str], lexicon: Lexicon, duration_s: float
+def inventory_timeline(
+    said: Timeline[str], table: PhoneMap, words: Sequence[str], lexicon: Lexicon, duration_s: float
 ) -> Timeline[Unit]:
     """Return what a synthesiser says of its phones as the project's own aligner would.
 
@@ -54,7 +54,7 @@ def with_words(phones: Sequence[str], words: Sequence[str], lexicon: Lexicon) ->
     units, word = [], wanted[0][1]
     for phone, match in zip(phones, matches(phones, [phone for phone, _ in wanted]), strict=True):
         meant, word = wanted[match] if match >= 0 else ("", word)
-        units.append(Unit(meant if REDUCED.get(phone) == meant else phone, word=word))
+        units.append(Unit(meant if REDUCED_VOWELS.get(phone) == meant else phone, word=word))
     return units
 
 
@@ -85,12 +85,12 @@ def matches(found: Sequence[str], wanted: Sequence[str]) -> list[int]:
 def _cost(phone: str, other: str) -> float:
     if phone == other:
         return 0.0
-    if REDUCED.get(phone, phone) == REDUCED.get(other, other) or VISEME_OF[phone] == VISEME_OF[other]:
+    if REDUCED_VOWELS.get(phone, phone) == REDUCED_VOWELS.get(other, other) or VISEME_OF[phone] == VISEME_OF[other]:
         return ALIKE
     return OTHER if (phone in VOWELS) == (other in VOWELS) else UNLIKE
 
 
-def _translated(said: Timeline[str], table: Labels) -> list[tuple[str, float, float]]:
+def _translated(said: Timeline[str], table: PhoneMap) -> list[tuple[str, float, float]]:
     phones: list[tuple[str, float, float]] = []
     for span in said:
         if span.label not in table:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from lipmotion.errors import InputError, MissingDependencyError
-from lipmotion.speech.voices.sounds import Labels
+from lipmotion.speech.voices.phone_maps import PhoneMap
 from lipmotion.types import Audio, Timeline
 
 START_S, EACH_S = 30.0, 5.0
@@ -33,7 +33,7 @@ class SyntheticVoice:
 
 
 @dataclass(frozen=True, eq=False)
-class Said:
+class SynthesisedSentence:
     """One sentence as a synthesiser says it.
 
     audio  : 16 kHz
@@ -57,11 +57,11 @@ class Synthesiser:
     name: str
     package: str
     voices: Callable[[], tuple[SyntheticVoice, ...]]
-    say: Callable[[str, Sequence[str], Path], Iterator[Said]]
-    labels: Labels
+    say: Callable[[str, Sequence[str], Path], Iterator[SynthesisedSentence]]
+    labels: PhoneMap
 
 
-def output_of(command: Sequence[str], package: str, sentences: int = 1, given: str = "") -> str:
+def program_output(command: Sequence[str], package: str, sentences: int = 1, given: str = "") -> str:
     """Return what a program writes.
 
     package : of Debian, that brings it

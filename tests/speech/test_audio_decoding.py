@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from lipmotion.errors import InputError
-from lipmotion.speech.read import read_audio
+from lipmotion.speech.audio_files import read_audio
 from lipmotion.storage.media import open_media
 from speech.opened import opened_in
 from speech.sound import babble, write_constant_flac, write_pictures, write_sound, write_stamped
@@ -303,7 +303,7 @@ PEAK = """
 import sys
 from pathlib import Path
 from lipmotion.errors import InputError
-from lipmotion.speech.read import read_audio
+from lipmotion.speech.audio_files import read_audio
 try:
     read_audio(Path(sys.argv[1]))
 except InputError as error:
@@ -392,5 +392,5 @@ def test_memory_is_that_of_the_result(tmp_path: Path, suffix: str, codec: str) -
 
 def test_eight_channels_do_not_crash_a_process(tmp_path: Path) -> None:
     path = write_sound(tmp_path / "a.flac", np.tile(babble(48_000), (8, 1)), 48_000, "flac")
-    code = f"from pathlib import Path; from lipmotion.speech.read import read_audio; read_audio(Path({str(path)!r}))"
+    code = f"from pathlib import Path; from lipmotion.speech.audio_files import read_audio; read_audio(Path({str(path)!r}))"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

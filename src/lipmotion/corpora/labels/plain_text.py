@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from io import StringIO
 from itertools import islice
 
-from lipmotion.corpora.labels.lines import timed_lines
 from lipmotion.corpora.labels.textgrid import is_textgrid
+from lipmotion.corpora.labels.timed_lines import parse_timed_lines
 from lipmotion.errors import InputError, shortened
 
 MASTER = "#!MLF!#"
@@ -24,17 +24,17 @@ TIME = re.compile(r"(?<![\w.])(?:\d*\.\d+|\d{5,})(?![\w.])")
 """Seconds with decimals, or a number that counts parts of a second."""
 
 
-def check_plain(text: str, where: str) -> None:
+def check_plain_text(text: str, where: str) -> None:
     """Raise InputError unless a text is words alone: what stands in labels and subtitles besides would be read as such.
 
     where : the file's name, for messages
     """
-    if is_textgrid(text) or timed_lines(text, where) is not None:
+    if is_textgrid(text) or parse_timed_lines(text, where) is not None:
         raise InputError(f"{where}: holds labels in time, required the words alone; write them into a text file")
-    check_other_labels(text, where)
+    check_no_labels(text, where)
 
 
-def check_other_labels(text: str, where: str) -> None:
+def check_no_labels(text: str, where: str) -> None:
     """Raise InputError for labels, subtitles and documents in forms that are not read."""
     start = text[:200].lstrip()
     if "\0" in text:

@@ -6,24 +6,24 @@ from collections.abc import Sequence
 from itertools import cycle
 
 from lipmotion.hmm.model import HmmConfig, UnitHmm
-from lipmotion.hmm.train import Transcribed, UnitInventory, train_hmm
+from lipmotion.hmm.train import TranscribedUtterance, UnitInventory, train_hmm
 from lipmotion.speech.mfcc import LOG_ENERGY, mfcc
-from lipmotion.storage.checkpoint import NOTHING_KEPT, Checkpoint
+from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import Audio, Monitor, ParallelMap
 from lipmotion.units import PAUSE, SILENCE, Lexicon
 
-TURNS = (1.0, 0.88, 1.0, 0.94, 1.12, 1.06)
+WARP_CYCLE = (1.0, 0.88, 1.0, 0.94, 1.12, 1.06)
 """Warps of the recordings, in turns."""
-WARPED_FROM = 60
+FEWEST_WARPED = 60
 """With fewer recordings than this there is too little to learn one voice from, let alone several."""
 
 
-def train_phones(
+def train_phone_models(
     spoken: Sequence[tuple[Audio, tuple[str, ...]]],
     lexicon: Lexicon,
     config: HmmConfig,
     monitor: Monitor,
-    checkpoint: Checkpoint = NOTHING_KEPT,
+    checkpoint: Checkpoint = NO_CHECKPOINT,
     each: ParallelMap = map,
 ) -> UnitHmm:
     """Train phone models from recordings and the words said in them.
@@ -33,9 +33,9 @@ def train_phones(
     Raises CorpusError: no transcript fits into its recording.
     Source: Jaitly & Hinton 2013 (vocal tract length perturbation), without random draws or more data.
     """
-    turns = TURNS if len(spoken) >= WARPED_FROM else (1.0,)
+    turns = WARP_CYCLE if len(spoken) >= FEWEST_WARPED else (1.0,)
     utterances = [
-        Transcribed(mfcc(audio, warp).values, tuple(lexicon.pronunciations(word) for word in words))
+        TranscribedUtterance(mfcc(audio, warp).values, tuple(lexicon.pronunciations(word) for word in words))
         for (audio, words), warp in zip(spoken, cycle(turns), strict=False)
     ]
     return train_hmm(utterances, UnitInventory(SILENCE, PAUSE, LOG_ENERGY), config, monitor, checkpoint, each)

@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.hmm.model import UnitHmm
-from lipmotion.speech.adaptation import Adaptation, unadapted
+from lipmotion.speech.adaptation import Adaptation, identity_adaptation
 from lipmotion.speech.combined_phones import NOISES
 from lipmotion.speech.general.acoustic import STREAMS, general_model
 from lipmotion.speech.general.front_end import general_features
 from lipmotion.speech.mfcc import FEATURES, mfcc
-from lipmotion.speech.recogniser import Recogniser, trusted
+from lipmotion.speech.recogniser import Recogniser, own_model_weight
 from lipmotion.speech.speaker_similarity import WARPS
-from lipmotion.stats.affine import AffineStatistics, Array, heard_statistics, improved, own_statistics
+from lipmotion.stats.affine import AffineStatistics, Array, improved_transform, prior_statistics, transform_statistics
 from lipmotion.stats.mixture import Mixtures
 from lipmotion.types import FRAME_RATE_HZ, Audio
 from lipmotion.units import is_silent
@@ -32,14 +32,14 @@ SHORT_S, SHORT_RELEVANCE = 10.0, 1000.0
 LEAST_SPEECH_S = 1.0
 
 
-class Adapted(NamedTuple):
+class EstimatedAdaptation(NamedTuple):
     """How a voice is heard, and how much of its speech that was learned from."""
 
     adaptation: Adaptation
     speech_s: float
 
 
-def adapted(own: UnitHmm, recordings: Sequence[Audio]) -> Adapted:
+def estimate_adaptation(own: UnitHmm, recordings: Sequence[Audio]) -> EstimatedAdaptation:
     """Return how phone models should hear a voice, after recognising its recordings with all models.
 
     own : not adapted
@@ -52,7 +52,7 @@ def adapted(own: UnitHmm, recordings: Sequence[Audio]) -> Adapted:
     warp, fit = _common_warp(own, recordings)
     sound = np.concatenate([mfcc(audio, warp).values for audio in recordings])
     general = np.concatenate([general_features(audio) for audio in recordings])
-    adaptation, speech_s = unadapted(warp, trusted(fit)), 0.0
+    adaptation, speech_s = identity_adaptation(warp, own_model_weight(fit)), 0.0
     for _ in range(PASSES):
         hear = Recogniser(own, adaptation=adaptation)
         densities = np.concatenate([hear.densities(audio, mfcc(audio)) for audio in recordings])
@@ -61,7 +61,7 @@ def adapted(own: UnitHmm, recordings: Sequence[Audio]) -> Adapted:
         matrix = _improved(hear.joint.hmm.mixtures, prior, sound, densities, adaptation.own, free)
         streams = _general_improved(general, hear.joint.columns[densities], adaptation.general)
         adaptation = replace(adaptation, own=matrix, general=streams)
-    return Adapted(adaptation, speech_s)
+    return EstimatedAdaptation(adaptation, speech_s)
 
 
 def _checked_speech_s(names: Sequence[str], densities: NDArray[np.intp]) -> float:
@@ -92,14 +92,14 @@ def _own_prior(own: UnitHmm, *, short: bool) -> tuple[AffineStatistics, NDArray[
     group = np.arange(FEATURES + 1) // (FEATURES // 3 if short else FEATURES)
     free = (group[:-1, None] == group) | (np.arange(FEATURES + 1) == FEATURES)
     plain = np.arange(len(own.log_stay), dtype=np.intp)
-    return own_statistics(own.mixtures, plain).times(SHORT_RELEVANCE if short else OWN_RELEVANCE), free
+    return prior_statistics(own.mixtures, plain).times(SHORT_RELEVANCE if short else OWN_RELEVANCE), free
 
 
 def _general_improved(features: NDArray[np.float32], densities: NDArray[np.intp], transforms: Array) -> Array:
     found = []
     for number, (stream, transform) in enumerate(zip(STREAMS, transforms, strict=True)):
         mixtures = general_model().mixtures(number)
-        prior = own_statistics(mixtures, np.arange(mixtures.size[0])).times(GENERAL_RELEVANCE)
+        prior = prior_statistics(mixtures, np.arange(mixtures.size[0])).times(GENERAL_RELEVANCE)
         free = np.ones(transform.shape, bool)
         found.append(_improved(mixtures, prior, features[:, stream], densities, transform, free))
     return np.stack(found)
@@ -115,6 +115,6 @@ def _improved(
 ) -> Array:
     """Return a transform [shape=(D, D + 1)] that makes frames more probable under the density of each."""
     for _ in range(ITERATIONS):
-        statistics, _ = heard_statistics(mixtures, features, densities, transform)
-        transform = improved(transform, statistics + prior, free)
+        statistics, _ = transform_statistics(mixtures, features, densities, transform)
+        transform = improved_transform(transform, statistics + prior, free)
     return transform

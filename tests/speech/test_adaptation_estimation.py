@@ -6,7 +6,7 @@ from scipy.signal import butter, lfilter
 
 from lipmotion.errors import InputError
 from lipmotion.pipeline.model import Model
-from lipmotion.speech.adapt import Adapted, adapted
+from lipmotion.speech.adaptation_estimation import EstimatedAdaptation, estimate_adaptation
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.recogniser import Recogniser
 from lipmotion.stats.affine import log_determinant
@@ -21,8 +21,8 @@ def voice() -> list[Audio]:
 
 
 @pytest.fixture(scope="module")
-def familiar(toy_model: Model, voice: list[Audio]) -> Adapted:
-    return adapted(toy_model.phones, voice)
+def familiar(toy_model: Model, voice: list[Audio]) -> EstimatedAdaptation:
+    return estimate_adaptation(toy_model.phones, voice)
 
 
 def through_a_telephone(audio: Audio) -> Audio:
@@ -30,12 +30,14 @@ def through_a_telephone(audio: Audio) -> Audio:
     return Audio(np.asarray(samples, np.float32), audio.rate_hz)
 
 
-def fit(model: Model, found: Adapted, audio: Audio) -> float:
+def fit(model: Model, found: EstimatedAdaptation, audio: Audio) -> float:
     heard = found.adaptation.own_features(audio, mfcc(audio))
     return model.phones.fit(heard) + log_determinant(found.adaptation.own)
 
 
-def test_the_known_voice_is_trusted_and_hardly_changed(toy_model: Model, voice: list[Audio], familiar: Adapted) -> None:
+def test_the_known_voice_is_trusted_and_hardly_changed(
+    toy_model: Model, voice: list[Audio], familiar: EstimatedAdaptation
+) -> None:
     one = familiar.adaptation
     assert (one.warp, one.trust) == (1.0, 1.0)
     assert 0.3 < familiar.speech_s / sum(audio.duration_s for audio in voice) < 1
@@ -50,34 +52,38 @@ def test_the_known_voice_is_trusted_and_hardly_changed(toy_model: Model, voice: 
 
 def test_a_voice_in_another_channel_is_heard_better(toy_model: Model, voice: list[Audio]) -> None:
     far = [through_a_telephone(audio) for audio in voice]
-    found = adapted(toy_model.phones, far[1:])
+    found = estimate_adaptation(toy_model.phones, far[1:])
     assert fit(toy_model, found, far[0]) > toy_model.phones.fit(mfcc(far[0], found.adaptation.warp).values) + 1
 
 
 def test_a_short_recording_moves_features_deltas_and_their_deltas_apart(toy_model: Model, voice: list[Audio]) -> None:
-    own = adapted(toy_model.phones, [through_a_telephone(voice[0])]).adaptation.own
+    own = estimate_adaptation(toy_model.phones, [through_a_telephone(voice[0])]).adaptation.own
     block = np.arange(39) // 13
     between = block[:, None] != block
     assert not own[:, :-1][between].any()
     assert np.abs(own[:, :-1][~between]).sum() > 39
 
 
-def test_much_speech_moves_them_together(familiar: Adapted, toy_model: Model, voice: list[Audio]) -> None:
-    long = adapted(toy_model.phones, voice * 3)
+def test_much_speech_moves_them_together(familiar: EstimatedAdaptation, toy_model: Model, voice: list[Audio]) -> None:
+    long = estimate_adaptation(toy_model.phones, voice * 3)
     assert long.speech_s == pytest.approx(3 * familiar.speech_s, rel=0.1)
     assert long.speech_s > 10
     assert np.abs(long.adaptation.own[:13, 13:39]).max() > 1e-3
 
 
-def test_the_same_recordings_give_the_same_adaptation(toy_model: Model, voice: list[Audio], familiar: Adapted) -> None:
-    again = adapted(toy_model.phones, voice).adaptation
+def test_the_same_recordings_give_the_same_adaptation(
+    toy_model: Model, voice: list[Audio], familiar: EstimatedAdaptation
+) -> None:
+    again = estimate_adaptation(toy_model.phones, voice).adaptation
     assert np.array_equal(again.own, familiar.adaptation.own)
     assert np.array_equal(again.general, familiar.adaptation.general)
 
 
-def test_silence_beside_speech_does_no_harm(toy_model: Model, voice: list[Audio], familiar: Adapted) -> None:
+def test_silence_beside_speech_does_no_harm(
+    toy_model: Model, voice: list[Audio], familiar: EstimatedAdaptation
+) -> None:
     silence = Audio(np.zeros(16_000, np.float32), 16_000)
-    found = adapted(toy_model.phones, [*voice, silence])
+    found = estimate_adaptation(toy_model.phones, [*voice, silence])
     assert found.speech_s == pytest.approx(familiar.speech_s, rel=0.1)
     assert np.isfinite(found.adaptation.own).all()
 
@@ -86,11 +92,11 @@ def test_silence_beside_speech_does_no_harm(toy_model: Model, voice: list[Audio]
 def test_no_speech(toy_model: Model, noise: float) -> None:
     samples = noise * np.random.default_rng(0).normal(size=32_000)
     with pytest.raises(InputError, match="no speech found in the recordings; give some of the voice"):
-        adapted(toy_model.phones, [Audio(samples.astype(np.float32), 16_000)])
+        estimate_adaptation(toy_model.phones, [Audio(samples.astype(np.float32), 16_000)])
 
 
 def test_too_little_speech(toy_model: Model, voice: list[Audio]) -> None:
     loud = int(np.abs(voice[0].samples).argmax())
     samples = np.concatenate([np.zeros(16_000), voice[0].samples[max(loud - 4000, 0) : loud + 4000], np.zeros(16_000)])
     with pytest.raises(InputError, match=r"found 0.\d s of speech, required at least 1 s; give more of this voice"):
-        adapted(toy_model.phones, [Audio(samples.astype(np.float32), 16_000)])
+        estimate_adaptation(toy_model.phones, [Audio(samples.astype(np.float32), 16_000)])

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from io import StringIO
 from itertools import islice
 
-from lipmotion.corpora.labels.tier import MOST_LABELS, Label, Tier, check_count, required_time
+from lipmotion.corpora.labels.tier import MOST_LABELS, LabelTier, TimedLabel, check_count, required_time
 from lipmotion.errors import InputError
 
 TICKS_PER_S = 10_000_000
@@ -20,7 +20,7 @@ STARTS = re.compile(r"(\d+)\s+([^\d\s]\S*)")
 SECONDS = re.compile(r"([-+]?\d*\.\d+)\s+([-+]?\d*\.\d+)(?:\s+(.*))?")
 
 
-def timed_lines(text: str, where: str) -> Tier | None:
+def parse_timed_lines(text: str, where: str) -> LabelTier | None:
     """Return the labels of a file whose lines hold times, or None if they do not.
 
     HTK's ``start end label`` in 100 ns (further columns are passed over), or ``start label``, a label then lasting to
@@ -54,24 +54,24 @@ def _listed(text: str, where: str) -> list[tuple[int, str]]:
     return lines
 
 
-def _spans(lines: list[tuple[int, str]], form: re.Pattern[str], per_s: int, where: str) -> Tier:
+def _spans(lines: list[tuple[int, str]], form: re.Pattern[str], per_s: int, where: str) -> LabelTier:
     labels = []
     for number, line in lines:
         start, end, text = _fitted(form, number, line, "start end label", where)
         place = f"line {number}"
         start_s, end_s = (required_time(time, place, where) / per_s for time in (start, end))
-        labels.append(Label(start_s, end_s, (text or "").strip(), place))
-    return Tier("the list of labels", tuple(labels))
+        labels.append(TimedLabel(start_s, end_s, (text or "").strip(), place))
+    return LabelTier("the list of labels", tuple(labels))
 
 
-def _from_starts(lines: list[tuple[int, str]], where: str) -> Tier:
+def _from_starts(lines: list[tuple[int, str]], where: str) -> LabelTier:
     rows = [(number, _fitted(STARTS, number, line, "start label", where)) for number, line in lines]
     starts_s = [required_time(row[0], f"line {number}", where) / TICKS_PER_S for number, row in rows]
     ends_s = [*starts_s[1:], math.inf]
-    return Tier(
+    return LabelTier(
         "the list of labels",
         tuple(
-            Label(start_s, end_s, row[1], f"line {number}")
+            TimedLabel(start_s, end_s, row[1], f"line {number}")
             for (number, row), start_s, end_s in zip(rows, starts_s, ends_s, strict=True)
         ),
     )

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from lipmotion.vision import follow
-from lipmotion.vision.follow import JUMP, LOST_FRAMES, Follower
+from lipmotion.vision import face_follower as follow
+from lipmotion.vision.face_follower import JUMP, LOST_FRAMES, FaceFollower
 from lipmotion.vision.landmarks import EYE_CORNERS, TRACKED_POINTS
 
 pytestmark = pytest.mark.video
@@ -57,7 +57,7 @@ class Mesh:
         return [points(face) for face in Mesh.shown if face[0].islower()][: self.most]
 
 
-Show = Callable[[Sequence[tuple[Sequence[Face], int]]], tuple[Follower, list[float | None]]]
+Show = Callable[[Sequence[tuple[Sequence[Face], int]]], tuple[FaceFollower, list[float | None]]]
 
 
 @pytest.fixture
@@ -66,9 +66,9 @@ def show(monkeypatch: pytest.MonkeyPatch) -> Show:
     pytest.importorskip("cv2")
     monkeypatch.setattr(follow, "FaceMesh", Mesh)
 
-    def run(frames: Sequence[tuple[Sequence[Face], int]]) -> tuple[Follower, list[float | None]]:
+    def run(frames: Sequence[tuple[Sequence[Face], int]]) -> tuple[FaceFollower, list[float | None]]:
         followed: list[float | None] = []
-        with Follower() as follower:
+        with FaceFollower() as follower:
             for faces, place in frames:
                 Mesh.shown = faces
                 found = follower.points(picture(faces, place))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.speech.decode import Decoded, check_form, decode
+from lipmotion.speech.audio_decoding import DecodedAudio, check_sound_format, decode_audio
 from lipmotion.storage.files import check_source
 from lipmotion.storage.media import open_media
 from lipmotion.types import Audio
@@ -56,13 +56,13 @@ def read_audio(path: Path, rate_hz: int = SPEECH_RATE_HZ) -> Audio:
     return _checked(path, Audio(sound.samples, rate_hz))
 
 
-def _decoded(path: Path, rate_hz: int, channel: int | None) -> Decoded:
+def _decoded(path: Path, rate_hz: int, channel: int | None) -> DecodedAudio:
     import av
 
     try:
         with open_media(path) as container:
             _first_track(path, container)
-            return decode(container, rate_hz, channel)
+            return decode_audio(container, rate_hz, channel)
     except (av.FFmpegError, ValueError) as error:
         if isinstance(error, InputError):
             raise
@@ -80,10 +80,10 @@ def _first_track(path: Path, container: Any) -> None:
 def _check_stream(path: Path, stream: Any) -> None:
     if stream.codec_context is None:
         raise InputError(f"{path}: its sound is coded in an unknown way; export it as .wav or .flac")
-    check_form(str(path), stream.rate or 0, stream.channels or 0)
+    check_sound_format(str(path), stream.rate or 0, stream.channels or 0)
 
 
-def _report_damage(path: Path, sound: Decoded) -> None:
+def _report_damage(path: Path, sound: DecodedAudio) -> None:
     held_s = len(sound.samples) / sound.rate_hz - sound.silence_s
     found = f"{sound.damaged} of {sound.packets} packets of sound cannot be decoded"
     if sound.damaged > (1 - USABLE) * sound.packets:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from lipmotion.corpora.labels import check_plain, read_labels
+from lipmotion.corpora.labels import check_plain_text, read_labels
 from lipmotion.errors import InputError
 
 OTHER = {
@@ -45,12 +45,12 @@ def test_what_would_be_read_as_words_is_refused(tmp_path: Path, kind: str, suffi
     with pytest.raises(InputError, match=message):
         read_labels(path)
     with pytest.raises(InputError, match=message):
-        check_plain(text, "a.txt")
+        check_plain_text(text, "a.txt")
 
 
 @pytest.mark.parametrize("text", WORDS)
 def test_words_with_numbers_are_words(tmp_path: Path, text: str) -> None:
-    check_plain(text, "a.txt")
+    check_plain_text(text, "a.txt")
     (tmp_path / "a.txt").write_text(text, encoding="utf-8")
     assert read_labels(tmp_path / "a.txt").words
 
@@ -58,4 +58,4 @@ def test_words_with_numbers_are_words(tmp_path: Path, text: str) -> None:
 @pytest.mark.parametrize("text", ["0 1000000 p\n1000000 2000000 aa\n", "0.0\t0.5\thello\n", '"ooTextFile" "TextGrid"'])
 def test_labels_in_time_are_no_plain_text(text: str) -> None:
     with pytest.raises(InputError, match=r"a\.txt: holds labels in time, required the words alone"):
-        check_plain(text, "a.txt")
+        check_plain_text(text, "a.txt")

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.storage.media import moving_pictures, stated_duration_s
+from lipmotion.storage.media import stated_duration_s, video_streams
 
 HOLE_S = 0.04
 """A frame this much later than the end of the one before leaves a hole; time stamps are rounded to 1 ms or better."""
@@ -28,7 +28,7 @@ MOST_CHANNELS = 64
 
 
 @dataclass(frozen=True, eq=False)
-class Decoded:
+class DecodedAudio:
     """What a sound track holds.
 
     samples     : float32 array [shape=(N,)]
@@ -51,7 +51,7 @@ class Decoded:
     stated_s: float
 
 
-def decode(container: Any, rate_hz: int, channel: int | None = None) -> Decoded:
+def decode_audio(container: Any, rate_hz: int, channel: int | None = None) -> DecodedAudio:
     """Return the first sound track of an open container.
 
     channel : the one to take; None: the mean of all
@@ -63,7 +63,7 @@ def decode(container: Any, rate_hz: int, channel: int | None = None) -> Decoded:
     return _Track(container, rate_hz, channel).decoded()
 
 
-def check_form(name: str, rate_hz: int, channels: int) -> None:
+def check_sound_format(name: str, rate_hz: int, channels: int) -> None:
     """Raise InputError before a mistaken header fills the memory: a rate of 1 Hz makes 16,000 samples out of one."""
     if not LOWEST_HZ <= rate_hz <= HIGHEST_HZ:
         raise InputError(
@@ -93,9 +93,9 @@ class _Track:
         self._holes: list[tuple[int, int]] = []  # where in the bytes, and how many
         self._packets = self._damaged = self._size = 0
 
-    def decoded(self) -> Decoded:
+    def decoded(self) -> DecodedAudio:
         for frame in self._frames():
-            check_form(self._name, frame.sample_rate, frame.layout.nb_channels)
+            check_sound_format(self._name, frame.sample_rate, frame.layout.nb_channels)
             self._sound_s += frame.samples / frame.sample_rate
             self._check_length(self._sound_s)
             self._place(frame)
@@ -103,7 +103,7 @@ class _Track:
         self._flush()
         self._check_silence()
         self._fill_holes()
-        return Decoded(
+        return DecodedAudio(
             samples=np.frombuffer(self._bytes, np.float32)[self._cut :],
             rate_hz=self._rate_hz,
             energies=tuple(np.atleast_1d(self._energies).tolist()),
@@ -147,7 +147,7 @@ class _Track:
             self._clock_s += frame.samples / frame.sample_rate
 
     def _start(self, time_s: float) -> None:
-        has_pictures = bool(moving_pictures(self._container))
+        has_pictures = bool(video_streams(self._container))
         offset_s = time_s - (self._container.start_time or 0) / 1e6 if has_pictures else 0.0
         self._bytes += bytes(self._silence(max(offset_s, 0.0)))
         self._cut = max(round(-offset_s * self._rate_hz), 0)

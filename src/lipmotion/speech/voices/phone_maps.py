@@ -10,10 +10,10 @@ from collections.abc import Mapping
 
 from lipmotion.units import PHONES, SILENCE
 
-Labels = Mapping[str, tuple[str, ...]]
+PhoneMap = Mapping[str, tuple[str, ...]]
 """The phones of the inventory that a label means."""
 
-ARPABET: Labels = {phone: (phone,) for phone in PHONES} | {"pau": (SILENCE,)}
+ARPABET_PHONES: PhoneMap = {phone: (phone,) for phone in PHONES} | {"pau": (SILENCE,)}
 """Flite and Festival (phone set ``radio``). They have their own ax; their er and ih are stressed and unstressed."""
 
 _ESPEAK: dict[str, str] = {
@@ -58,5 +58,7 @@ _ESPEAK: dict[str, str] = {
     # parts of what is before: the glide from a vowel to the next, the beginning of an unstressed vowel
     "; @-": "",
 }  # fmt: skip
-ESPEAK: Labels = {label: tuple(phones.split()) for labels, phones in _ESPEAK.items() for label in labels.split()}
+ESPEAK_PHONES: PhoneMap = {
+    label: tuple(phones.split()) for labels, phones in _ESPEAK.items() for label in labels.split()
+}
 """espeak-ng's mnemonics (as ``espeak-ng -x`` writes them), voice en-us."""

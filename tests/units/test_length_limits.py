@@ -4,7 +4,7 @@ import pytest
 
 from lipmotion.errors import AlignmentError, InputError
 from lipmotion.units import check_phones, check_text, check_words
-from lipmotion.units.speaking_rate import CHARACTERS_PER_S, FEW_PHONES, PHONES_PER_S, SHORT_TEXT
+from lipmotion.units.length_limits import CHARACTERS_PER_S, FEW_PHONES, PHONES_PER_S, SHORT_TEXT
 
 
 @pytest.mark.parametrize("duration_s", [0.0, 1.0, 3600.0])
