@@ -4,43 +4,59 @@ from __future__ import annotations
 
 import pytest
 
-from lipmotion.engines import ENGINES, engine_as_told, engine_named
+from lipmotion.engines import ENGINES, engine_from_settings, engine_named
 from lipmotion.engines.coupled.chains.structures import SYSTEMS
 from lipmotion.errors import InputError
 
 
-@pytest.mark.parametrize("name", sorted(ENGINES))
+@pytest.mark.parametrize("name", sorted(ENGINES.names))
 def test_an_engine_of_which_nothing_is_said_is_as_it_is(name: str) -> None:
-    assert engine_as_told(name) == engine_named(name, {})
+    assert engine_from_settings(name) == engine_named(name, {})
 
 
 @pytest.mark.parametrize("system", SYSTEMS)
 def test_the_six_systems(system: str) -> None:
-    assert engine_as_told("coupled", system=system) == engine_named("coupled", SYSTEMS[system])
+    assert engine_from_settings("coupled", preset=system) == engine_named("coupled", SYSTEMS[system])
 
 
 def test_settings_are_of_the_option_s_kind_and_have_the_last_word() -> None:
-    settings = ["states=4", "audio_weight=2", "follows=no", "full_range=TRUE", "chains=sVis 2vis", "asynchrony=0"]
-    config = engine_as_told("coupled", system="ph-CHMM", settings=settings).config
-    assert (config.states, config.audio_weight, config.follows, config.full_range) == (4, 2.0, False, True)
+    settings = [
+        "states=4",
+        "audio_weight=2",
+        "acoustic_regression=no",
+        "variance_scaling=TRUE",
+        "chains=sVis 2vis",
+        "asynchrony=0",
+    ]
+    config = engine_from_settings("coupled", preset="ph-CHMM", settings=settings).config
+    assert (config.states, config.audio_weight, config.acoustic_regression, config.variance_scaling) == (
+        4,
+        2.0,
+        False,
+        True,
+    )
     assert (config.structure, config.chains, config.asynchrony) == ("coupled", "sVis 2vis", 0)
-    assert engine_as_told("trajectory", units="eVis", settings=["units=2vis"]).config.units == "2vis"
-    assert engine_as_told("joint", units="eVis", settings=["mixtures=2"]).config.mixtures == 2
+    assert engine_from_settings("trajectory", units="eVis", settings=["units=2vis"]).config.units == "2vis"
+    assert engine_from_settings("joint", units="eVis", settings=["mixtures=2"]).config.mixtures == 2
 
 
 @pytest.mark.parametrize(
     ("name", "told", "words"),
     [
         ("joined", {}, "no engine 'joined'; there are: trajectory, coupled, joint"),
-        ("trajectory", {"system": "ph-HMM"}, "add --engine coupled"),
-        ("coupled", {"system": "ph-hmm"}, "no system 'ph-hmm'; there are: ph-HMM, ph-MSHMM"),
+        ("trajectory", {"preset": "ph-HMM"}, "add --engine coupled"),
+        ("coupled", {"preset": "ph-hmm"}, "no system 'ph-hmm'; there are: ph-HMM, ph-MSHMM"),
         ("coupled", {"units": "eVis"}, '--set chains="phone viseme"'),
         ("coupled", {"settings": ["states"]}, "the setting 'states' has no value; required NAME=VALUE"),
         ("coupled", {"settings": ["state=3"]}, "no option 'state'; there are: structure, chains, states, "),
         ("coupled", {"settings": ["states=three"]}, "states is 'three', required a whole number"),
         ("coupled", {"settings": ["states=0"]}, "states is 0, required a whole number from 1"),
         ("coupled", {"settings": ["audio_weight=much"]}, "audio_weight is 'much', required a number"),
-        ("coupled", {"settings": ["follows=perhaps"]}, "follows is 'perhaps', required true or false"),
+        (
+            "coupled",
+            {"settings": ["acoustic_regression=perhaps"]},
+            "acoustic_regression is 'perhaps', required true or false",
+        ),
         ("coupled", {"settings": ["conversion=magic"]}, "conversion is 'magic', required one of: trajectory"),
         ("coupled", {"settings": ["chains=phone visem"]}, "no unit set 'visem'"),
         ("coupled", {"settings": ["chains=phone"]}, "structure coupled with 1 chains"),
@@ -50,5 +66,5 @@ def test_settings_are_of_the_option_s_kind_and_have_the_last_word() -> None:
 )
 def test_what_cannot_be_asked_for(name: str, told: dict[str, object], words: str) -> None:
     with pytest.raises(InputError) as error:
-        engine_as_told(name, **told)  # type: ignore[arg-type]
+        engine_from_settings(name, **told)  # type: ignore[arg-type]
     assert words in str(error.value)

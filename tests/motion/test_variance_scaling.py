@@ -10,7 +10,7 @@ from lipmotion.motion.variance_scaling import LARGEST_FACTOR, scaled
 from lipmotion.types import Constraints, Pin
 from lipmotion.types.progress import silent_monitor
 
-OPTIONS = {"parts": 3, "silent_parts": 7, "components": 2, "axes": 20}
+OPTIONS = {"states": 3, "silent_states": 7, "components": 2, "acoustic_components": 20}
 
 
 def test_the_trajectory_grows_about_rest_and_its_variance_with_it():
@@ -34,7 +34,9 @@ def noisy():
 
 
 def test_the_full_range_is_nearer_to_the_original(noisy):
-    engines = [engine_named("trajectory", {**OPTIONS, "full_range": on, "closures": False}) for on in (False, True)]
+    engines = [
+        engine_named("trajectory", {**OPTIONS, "variance_scaling": on, "closures": False}) for on in (False, True)
+    ]
     learned = engines[0].fit(noisy, silent_monitor).model
     assert 1 < learned.gain[0] <= LARGEST_FACTOR
     spreads = [

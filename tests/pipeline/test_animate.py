@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_limits
 from lipmotion.errors import AlignmentError, InputError
 from lipmotion.pipeline.animate import animate, write
 from lipmotion.pipeline.model import Model
-from lipmotion.speech.read import read_audio
+from lipmotion.speech.audio_files import read_audio
 from lipmotion.testing.toy import ToySentence, toy_motion
 from lipmotion.types import Audio, Constraints, Generation, Motion, Pin, Span, Timeline, Unit
 from lipmotion.units import Lexicon

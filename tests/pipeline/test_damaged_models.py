@@ -13,7 +13,7 @@ from lipmotion.errors import ModelFormatError
 from lipmotion.hmm.model import hmm_arrays
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.understand import understand
-from lipmotion.speech.adaptation import adaptation_arrays, unadapted
+from lipmotion.speech.adaptation import adaptation_arrays, identity_adaptation
 from lipmotion.testing.toy import ToySentence
 from pipeline.damage import DAMAGES, FAR, QUICK, UNREADABLE, animated, damaged, distance, refused
 
@@ -68,7 +68,7 @@ def test_damaged_arrays_of_all_other_parts(pictured_model: Model) -> None:
     parts = {
         "phones": hmm_arrays(model.phones),
         "eigenlips": eigenlips_arrays(model.eigenlips),
-        "adaptation": adaptation_arrays(unadapted(1.0, 0.5)),
+        "adaptation": adaptation_arrays(identity_adaptation(1.0, 0.5)),
     }
     read = [
         f"{part}/{name}: {what}"

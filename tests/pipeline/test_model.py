@@ -71,7 +71,7 @@ def test_the_same_model_gives_the_same_bytes(toy_model: Model, toy_model_file: P
 def test_the_file_is_plain_arrays_and_a_header(toy_model_file: Path) -> None:
     header = read_header(toy_model_file)
     assert (header["format"], header["version"], header["engine"]) == ("lipmotion.model", VERSION, "trajectory")
-    assert header["configuration"]["parts"] == 5
+    assert header["configuration"]["states"] == 5
     assert header["recogniser"]["mixtures"] == 1
     assert header["licence"] == ["synthesised by lipmotion"]
     with zipfile.ZipFile(toy_model_file) as file:
@@ -161,7 +161,7 @@ def test_a_part_is_missing_or_wrong(changes: dict[str, bytes | None], toy_model_
     [
         ({"engine": "concatenative"}, "no engine 'concatenative'; there are: trajectory"),
         ({"configuration": {"part": 5}}, "unexpected keyword argument 'part'"),
-        ({"configuration": {"parts": 4}}, "parts is 4, required an odd number"),
+        ({"configuration": {"states": 4}}, "states is 4, required an odd number"),
         ({"recogniser": {"state": 3}}, "unexpected keyword argument 'state'"),
         ({"recogniser": []}, "damaged"),
         ({"configuration": None}, "damaged"),

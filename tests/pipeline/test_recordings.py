@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from lipmotion.corpora.store import Corpus
+from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.pipeline.evaluation.evaluate import evaluate
 from lipmotion.pipeline.model import load_model, save_model
 from lipmotion.pipeline.training.train import train
@@ -49,7 +49,7 @@ def test_from_videos_to_figures(some_of_grid: Path, tmp_path: Path) -> None:
     model, trained = train(corpus)
     assert not trained.skipped
     save_model(model, tmp_path / "s1.lipmotion")
-    figures = evaluate(load_model(tmp_path / "s1.lipmotion"), corpus, split="test")
+    figures = evaluate(load_model(tmp_path / "s1.lipmotion"), corpus, selection=Selection("test"))
 
     # With 80 of 452 clips: 0.82 and 0.87 were measured; the bars leave room for another tracker build.
     heard, read = figures["conditions"]["audio only"], figures["conditions"]["with transcript"]

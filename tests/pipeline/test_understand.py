@@ -24,7 +24,7 @@ class Listening(Engine[Any]):
     config: Any = None
     found: Timeline[Unit] | None = None
     name: ClassVar[str] = "listening"
-    hears_f0: ClassVar[bool] = True  # type: ignore[misc]
+    wants_f0: ClassVar[bool] = True  # type: ignore[misc]
 
     def listen(self, model: object, speech: Speech) -> Timeline[Unit] | None:  # noqa: ARG002
         assert len(speech.units) == 0
@@ -51,7 +51,7 @@ def test_what_the_engine_hears_is_placed_as_in_training(toy_model: Model, toy_se
     speech = heard(Listening(found=late), toy_model, toy_sentence)
     assert [s.label.phone for s in speech.units] == [s.label.phone for s in toy_sentence.units]
     assert {s.label.word for s in speech.units} == {""}
-    aligned = Recogniser(toy_model.phones, "own").place(toy_sentence.audio, mfcc(toy_sentence.audio), late)
+    aligned = Recogniser(toy_model.phones, "own").align_phones(toy_sentence.audio, mfcc(toy_sentence.audio), late)
     assert speech.units == aligned
     errors = [abs(a.start_s - b.start_s) for a, b in zip(speech.units, toy_sentence.units, strict=True)]
     assert np.median(errors) < 0.03
@@ -79,6 +79,6 @@ def test_f0_is_computed_for_engines_that_want_it(toy_sentence: ToySentence) -> N
 
     @dataclass(frozen=True)
     class Deaf(Listening):
-        hears_f0: ClassVar[bool] = False  # type: ignore[misc]
+        wants_f0: ClassVar[bool] = False  # type: ignore[misc]
 
     assert hear(Deaf(), toy_sentence.audio, features, toy_sentence.units).log_f0 is None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,23 @@ VERSION = 2
 READ_VERSIONS = (1, 2)
 MANIFEST = "corpus.json"
 UTTERANCES = "utterances"
+
+
+@dataclass(frozen=True)
+class Selection:
+    """Some utterances of a corpus.
+
+    split    : the list ``train``, ``val`` or ``test``; None: all utterances
+    speakers : theirs only; empty: all speakers
+    names    : exactly these utterances, whatever their list and speaker
+
+    >>> Selection("val", speakers=("s1",))
+    Selection(split='val', speakers=('s1',), names=None)
+    """
+
+    split: str | None = "train"
+    speakers: Sequence[str] = ()
+    names: Sequence[str] | None = None
 
 
 class Corpus:
@@ -100,6 +118,14 @@ class Corpus:
             who = f" by {', '.join(speakers)}" if speakers else ""
             raise CorpusError(f"{self.path}: no utterances of split {split!r}{who} (there are {found})")
         return names
+
+    def selected(self, selection: Selection) -> tuple[str, ...]:
+        """Return the names of the utterances of a selection. Raises CorpusError: there are none, or no such speaker."""
+        if selection.names is None:
+            return self.required(selection.split, selection.speakers)
+        if not selection.names:
+            raise CorpusError(f"{self.path}: an empty list of names was given; name at least one utterance")
+        return tuple(selection.names)
 
     def summary(self) -> dict[str, str]:
         """Return what a user wants to know of the corpus, by name."""

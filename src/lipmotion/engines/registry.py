@@ -1,108 +1,84 @@
-"""Engines by the name that stands in a model's header."""
+"""Engines by name: the built-in ones, and those of installed packages."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import Field, fields
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from lipmotion.engines.base import Engine
-from lipmotion.engines.coupled.chains.structures import SYSTEMS, structure_of
-from lipmotion.engines.coupled.config import CoupledConfig
-from lipmotion.engines.coupled.engine import CoupledEngine
-from lipmotion.engines.joint.engine import JointEngine, JointEngineConfig
-from lipmotion.engines.trajectory.engine import TrajectoryConfig, TrajectoryEngine
 from lipmotion.errors import InputError
-from lipmotion.units import unit_set
+from lipmotion.extensions import Registry
 
-ENGINES: dict[str, Callable[..., Engine[Any]]] = {
-    TrajectoryEngine.name: lambda **options: TrajectoryEngine(TrajectoryConfig(**options)),
-    CoupledEngine.name: lambda **options: CoupledEngine(CoupledConfig(**options)),
-    JointEngine.name: lambda **options: JointEngine(JointEngineConfig(**options)),
-}
-
-
-CONFIGURATIONS: dict[str, type[Any]] = {
-    TrajectoryEngine.name: TrajectoryConfig,
-    CoupledEngine.name: CoupledConfig,
-    JointEngine.name: JointEngineConfig,
-}
-TRUTHS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
+ENGINES: Registry[type[Engine[Any]]] = Registry(
+    "engine",
+    "lipmotion.engines",
+    {
+        "trajectory": "lipmotion.engines.trajectory.engine:TrajectoryEngine",
+        "coupled": "lipmotion.engines.coupled.engine:CoupledEngine",
+        "joint": "lipmotion.engines.joint.engine:JointEngine",
+    },
+)
 
 
-def engine_named(name: str, configuration: Mapping[str, Any]) -> Engine[Any]:
-    """Return an engine with its configuration. Raises InputError: unknown engine or option."""
-    if name not in ENGINES:
-        raise InputError(f"no engine {name!r}; there are: {', '.join(ENGINES)}")
+def engine_named(name: str, configuration: Mapping[str, Any] | None = None) -> Engine[Any]:
+    """Return an engine with its configuration.
+
+    name          : ``trajectory``, ``coupled``, ``joint``, or one that an installed package adds
+    configuration : options by name; all others have their defaults
+    Raises InputError: no such engine or option, or a value that is not allowed.
+    """
+    chosen = _class_of(name)
     try:
-        return ENGINES[name](**configuration)
-    except TypeError as error:
+        return _made(chosen, chosen.Config.parsed(configuration or {}))
+    except InputError as error:
         raise InputError(f"engine {name!r}: {error}") from error
 
 
-def engine_as_told(
-    name: str, *, system: str | None = None, units: str | None = None, settings: Sequence[str] = ()
+def engine_from_settings(
+    name: str, *, preset: str | None = None, units: str | None = None, settings: Sequence[str] = ()
 ) -> Engine[Any]:
-    """Return an engine as a command line asks for it.
+    """Return an engine configured by texts, as a command line gives them.
 
-    system   : one of the coupled engine's six, whose structure and chains it sets
-    units    : the unit set of an engine that has one
-    settings : ``NAME=VALUE`` for any option of its configuration; these have the last word
-    Raises InputError: no such engine, system, unit set or option, or a value that is not of its kind.
+    preset   : a named combination of options, as ``ph-vi-CHMM`` of the engine ``coupled``
+    units    : the unit set, of engines with an option ``units``
+    settings : ``NAME=VALUE`` for any option of the configuration; these override the others
+    Raises InputError: no such engine, preset, unit set or option, or a value that is not allowed.
     """
-    if name not in ENGINES:
-        raise InputError(f"no engine {name!r}; there are: {', '.join(ENGINES)}")
-    options: dict[str, Any] = {}
-    if system is not None:
-        options |= _of_system(name, system)
-    if units is not None:
-        options |= _of_units(name, units)
-    engine = engine_named(name, options | _settings(name, settings))
-    _check_units(engine.config)
+    chosen = _class_of(name)
+    options: dict[str, Any] = dict(_preset(chosen, name, preset)) if preset is not None else {}
+    try:
+        if units is not None:
+            options |= chosen.Config.values_of([f"units={units}"])
+        options |= chosen.Config.values_of(settings)
+        engine = _made(chosen, chosen.Config.parsed(options))
+        engine.config.check_files()
+    except InputError as error:
+        raise InputError(f"engine {name!r}: {error}") from error
     return engine
 
 
-def _check_units(config: Any) -> None:
-    """Raise InputError unless all unit sets are there, and fit together: before long work."""
-    if isinstance(config, CoupledConfig):
-        structure_of(config.structure, config.chains, config.states, config.asynchrony, config.crosses)
-    else:
-        unit_set(config.units)
+def _class_of(name: str) -> type[Engine[Any]]:
+    """Return the class of an engine. Raises InputError: none of that name, or what a package adds is no engine."""
+    chosen = ENGINES.load(name)
+    if not (isinstance(chosen, type) and issubclass(chosen, Engine)):
+        raise InputError(
+            f"{chosen!r} is called an engine, {name!r}, by an installed package; required a class of Engine"
+        )
+    return chosen
 
 
-def _of_system(name: str, system: str) -> Mapping[str, Any]:
-    if name != CoupledEngine.name:
-        raise InputError(f"a system ({system}) is of the coupled engine, not of {name!r}; add --engine coupled")
-    if system not in SYSTEMS:
-        raise InputError(f"no system {system!r}; there are: {', '.join(SYSTEMS)}")
-    return SYSTEMS[system]
+def _made(chosen: type[Engine[Any]], config: Any) -> Engine[Any]:
+    make: Any = chosen  # every engine is a dataclass of one field
+    made: Engine[Any] = make(config)
+    return made
 
 
-def _of_units(name: str, units: str) -> Mapping[str, Any]:
-    if "units" not in {option.name for option in fields(CONFIGURATIONS[name])}:
-        raise InputError(f'the engine {name!r} has a unit set a chain; say --set chains="phone viseme", not --units')
-    return {"units": units}
-
-
-def _settings(name: str, settings: Sequence[str]) -> dict[str, Any]:
-    options = {option.name: option for option in fields(CONFIGURATIONS[name])}
-    found = {}
-    for setting in settings:
-        key, equals, text = setting.partition("=")
-        if not equals:
-            raise InputError(f"the setting {setting!r} has no value; required NAME=VALUE")
-        if key not in options:
-            raise InputError(f"the engine {name!r} has no option {key!r}; there are: {', '.join(options)}")
-        found[key] = _value(options[key], text)
-    return found
-
-
-def _value(option: Field[Any], text: str) -> Any:
-    """Return what a text says for an option; the configuration itself decides whether it will do."""
-    kinds: dict[str, Callable[[str], Any]] = {"int": int, "float": float, "bool": lambda t: TRUTHS[t.lower()]}
-    kind = str(option.type)
-    try:
-        return kinds.get(kind, str)(text)
-    except (ValueError, KeyError) as error:
-        wanted = {"int": "a whole number", "float": "a number", "bool": "true or false"}[kind]
-        raise InputError(f"{option.name} is {text!r}, required {wanted}") from error
+def _preset(chosen: type[Engine[Any]], name: str, preset: str) -> Mapping[str, Any]:
+    presets = chosen.Config.presets
+    if preset in presets:
+        return presets[preset]
+    having = [other for other in ENGINES.names if preset in _class_of(other).Config.presets]
+    if having:
+        raise InputError(f"{preset} is a system of the engine {having[0]!r}, not of {name!r}; add --engine {having[0]}")
+    known = f"there are: {', '.join(presets)}" if presets else f"the engine {name!r} has none"
+    raise InputError(f"no system {preset!r}; {known}")

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from lipmotion.motion.closure import OPENING, Closure
 from lipmotion.motion.space import MotionSpace
 from lipmotion.stats.pca import Pca, check_orthonormal
-from lipmotion.storage.schema import Arrays, Member, checked, only
+from lipmotion.storage.schema import Arrays, ArraySpec, checked_arrays, refuse_undeclared
 from lipmotion.types import Channel
 from lipmotion.units import UNIT_SETS, UnitSet
 
@@ -42,28 +42,28 @@ def motion_from_arrays(arrays: Arrays, units: str) -> tuple[UnitSet, MotionSpace
     space = _space(arrays)
     closure = None
     if OPENING in space.direct_names:
-        found = checked(arrays, CLOSURE, Q=space.dimensions)
+        found = checked_arrays(arrays, CLOSURE, Q=space.dimensions)
         column, closed = found["closure"]
         if column != space.direct_names.index(OPENING) or closed < 0:
             raise ValueError(f"closure of column {column:g} at {closed:g}, required that of {OPENING}, 0 or more")
         closure = Closure(int(column), float(closed), found["closure_follow"])
-    of = SINGLE if units == SINGLE.name else UnitSet(units, _mapping(checked(arrays, UNITS)["units"]))
+    of = SINGLE if units == SINGLE.name else UnitSet(units, _mapping(checked_arrays(arrays, UNITS)["units"]))
     return of, space, closure
 
 
-CHANNELS = {"channels": Member(np.str_, "P 2"), "direct": Member(np.intp, "d", 0, 1e6)}
+CHANNELS = {"channels": ArraySpec(np.str_, "P 2"), "direct": ArraySpec(np.intp, "d", 0, 1e6)}
 POINTS = {
-    "points_mean": Member(np.float64, "R", -1e6, 1e6),
-    "points_basis": Member(np.float64, "K R", -1.01, 1.01),
+    "points_mean": ArraySpec(np.float64, "R", -1e6, 1e6),
+    "points_basis": ArraySpec(np.float64, "K R", -1.01, 1.01),
 }
-CLOSURE = {"closure": Member(np.float64, "2"), "closure_follow": Member(np.float64, "Q")}
-UNITS = {"units": Member(np.str_, "N 2")}
+CLOSURE = {"closure": ArraySpec(np.float64, "2"), "closure_follow": ArraySpec(np.float64, "Q")}
+UNITS = {"units": ArraySpec(np.str_, "N 2")}
 MOTION_ARRAYS = (*CHANNELS, *POINTS, *CLOSURE, *UNITS)
 """How they are stored: P channels, of which R are reduced to K dimensions."""
 
 
 def _space(arrays: Arrays) -> MotionSpace:
-    named = checked(arrays, CHANNELS)
+    named = checked_arrays(arrays, CHANNELS)
     count, direct = named.sizes["P"], named["direct"]
     channels = tuple(Channel(name, unit) for name, unit in named["channels"].tolist())
     if len({channel.name for channel in channels}) < count:
@@ -71,9 +71,9 @@ def _space(arrays: Arrays) -> MotionSpace:
     if len(set(direct.tolist()) & set(range(count))) < len(direct):
         raise ValueError(f"direct channels {direct.tolist()}, required different ones under {count}")
     if len(direct) == count:
-        only(arrays.keys() & POINTS.keys())
+        refuse_undeclared(arrays.keys() & POINTS.keys())
         return MotionSpace(channels, direct, None)
-    found = checked(arrays, POINTS, R=count - len(direct))
+    found = checked_arrays(arrays, POINTS, R=count - len(direct))
     check_orthonormal("points_basis", found["points_basis"])
     return MotionSpace(channels, direct, Pca(found["points_mean"], found["points_basis"]))
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.storage.schema import STANDARD, Checked, Member
+from lipmotion.storage.schema import STANDARD, ArraySpec, CheckedArrays
 
 OFFSETS = (-24, -18, -12, -8, -4, 0, 4, 8, 12, 18, 24)
 """Frames whose features are heard, relative to the one whose motion is wanted: dense near it, a quarter of a second
@@ -19,8 +19,8 @@ LEAST_DEVIATION = 1e-3
 FEATURES = 39
 INPUTS = FEATURES * len(OFFSETS)
 WINDOW = {
-    "window": Member(np.float32, f"2 {INPUTS}", -STANDARD, STANDARD),
-    "window_basis": Member(np.float32, f"{INPUTS} A", -STANDARD, STANDARD),
+    "window": ArraySpec(np.float32, f"2 {INPUTS}", -STANDARD, STANDARD),
+    "window_basis": ArraySpec(np.float32, f"{INPUTS} A", -STANDARD, STANDARD),
 }
 """How a window is stored: means above scales, and the basis."""
 
@@ -66,7 +66,7 @@ def fit_acoustic_context(recordings: Iterable[NDArray[np.float32]], size: int) -
     return AcousticContext(*(array.astype(np.float32) for array in (mean, scale, basis * factor)))
 
 
-def acoustic_context_from(found: Checked) -> AcousticContext:
+def acoustic_context_from(found: CheckedArrays) -> AcousticContext:
     """Return a stored window, as ``WINDOW`` says. Raises ValueError: a scale that is not more than 0."""
     mean, scale = found["window"]
     if not (scale > 0).all():

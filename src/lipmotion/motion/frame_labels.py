@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
+from lipmotion.motion.rest import away_from_speech, speech_intervals
 from lipmotion.types import FRAME_RATE_HZ, Span, Timeline, Unit
-from lipmotion.units import PHONES, SILENCE, UNIT_SETS, UnitSet, is_silent, unknown_phone
+from lipmotion.units import PHONES, SILENCE, UNIT_SETS, UnitSet, is_silent, unknown_phone_message
 
 RESTING = -1
 """The part of silence that is no part of it."""
@@ -98,27 +99,19 @@ def full_context_states(units: Timeline[Unit], frames: int, cut: StateLayout) ->
     """
     for span in units:
         if span.label.phone not in PHONES:
-            raise InputError(unknown_phone(span.label.phone, f" at {span.start_s} s"))
+            raise InputError(unknown_phone_message(span.label.phone, f" at {span.start_s} s"))
     result = [cut.rest] * frames
+    speech_s = speech_intervals(units)
     for left, span, right in with_neighbours(units):
         edges = np.ceil(np.array([span.start_s, span.end_s]) * FRAME_RATE_HZ - 1e-6)
         first, stop = np.clip(edges, 0, frames).astype(int).tolist()
         time_s = np.arange(first, stop) / FRAME_RATE_HZ
         before, unit, after = map(cut.units.unit, (left, span.label.phone, right))
-        rests = _rests(time_s, left, span, right, cut.rest_s)
+        rests = is_silent(span.label.phone) & away_from_speech(time_s, speech_s, cut.rest_s)
         part = _parts(time_s, span.start_s, span.end_s, cut.parts(unit), cut.edge_s)
         for i in np.nonzero(~rests)[0]:
             result[first + i] = FullContextState(before, unit, after, int(part[i]))
     return result
-
-
-def _rests(time_s: NDArray[np.float64], left: str, span: Span[Unit], right: str, rest_s: float) -> NDArray[np.bool_]:
-    """Return which frames of a span are silence away from speech; beyond the recording's ends there is none."""
-    if not is_silent(span.label.phone):
-        return np.zeros(len(time_s), bool)
-    after = np.full(len(time_s), is_silent(left)) | (time_s - span.start_s > rest_s)
-    before = np.full(len(time_s), is_silent(right)) | (span.end_s - time_s > rest_s)
-    return after & before
 
 
 def _parts(time_s: NDArray[np.float64], start_s: float, end_s: float, parts: int, edge_s: float) -> NDArray[np.intp]:

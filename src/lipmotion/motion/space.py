@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import CorpusError
-from lipmotion.stats.delta_windows import within
+from lipmotion.stats.delta_windows import dynamics_known
 from lipmotion.stats.pca import Pca, fit_pca
 from lipmotion.types import Channel, Example
 
@@ -82,7 +82,7 @@ def fit_reduced_motion(examples: Sequence[Example], components: int) -> tuple[Mo
 
     Raises CorpusError: no motion was seen, or the examples have different channels.
     """
-    if not any(within(example.valid).any() for example in examples):
+    if not any(dynamics_known(example.valid).any() for example in examples):
         raise CorpusError(f"none of {len(examples)} examples has motion to learn from; prepare a corpus with faces")
     found = {example.motion.channels for example in examples}
     if len(found) > 1:

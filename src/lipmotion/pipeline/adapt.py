@@ -9,8 +9,8 @@ from pathlib import Path
 from lipmotion.errors import InputError
 from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.speech.adapt import adapted
-from lipmotion.speech.read import read_audio
+from lipmotion.speech.adaptation_estimation import estimate_adaptation
+from lipmotion.speech.audio_files import read_audio
 from lipmotion.types import Audio
 
 
@@ -26,6 +26,8 @@ def adapt(model: Model | str | Path | None, recordings: Sequence[str | Path | Au
     if isinstance(recordings, str | Path | Audio) or not len(recordings):
         raise InputError("required: a list of one recording or more of the voice to adapt to")
     chosen = model if isinstance(model, Model) else load_model(model)
-    found = adapted(chosen.phones, [one if isinstance(one, Audio) else read_audio(Path(one)) for one in recordings])
+    found = estimate_adaptation(
+        chosen.phones, [one if isinstance(one, Audio) else read_audio(Path(one)) for one in recordings]
+    )
     about = {**chosen.about, "adapted": {"recordings": len(recordings), "speech_s": round(found.speech_s, 1)}}
     return replace(chosen, about=about, adaptation=found.adaptation)

@@ -9,11 +9,11 @@ from lipmotion.errors import ExportError, InputError
 from lipmotion.export.base import MOTION_SUFFIXES, check_motion, write_motion
 from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.model import Model, load_model
+from lipmotion.pipeline.request import SpeechInput, request_of
 from lipmotion.pipeline.understand import understand
-from lipmotion.speech.read import read_audio
+from lipmotion.speech.audio_files import read_audio
 from lipmotion.storage.files import as_text, check_distinct, check_target
-from lipmotion.types import Audio, Constraints, Generation, Timeline, Unit
-from lipmotion.units import Lexicon
+from lipmotion.types import Constraints, Generation
 
 VIDEO_SUFFIX = ".mp4"
 SOUND_RATE_HZ = 48_000
@@ -24,33 +24,28 @@ SLOWEST_HZ, FASTEST_HZ = 1.0, 1000.0
 
 @one_thread()
 def animate(
-    speech: str | Path | Audio,
+    speech: SpeechInput,
     *,
-    transcript: str | Path | None = None,
-    units: Timeline[Unit] | None = None,
     model: Model | str | Path | None = None,
-    lexicon: Lexicon | None = None,
+    transcript: str | Path | None = None,
     constraints: Constraints | None = None,
-    recogniser: str = "auto",
 ) -> Generation:
     """Return the lip motion that goes with speech.
 
-    speech      : an audio or video file, or samples at 16 kHz
-    transcript  : what is said, if known, or a Path to a text file: phones are then aligned instead of recognised
-    units       : phones in time, for instance edited ones of an earlier result; nothing is recognised then
+    speech      : an audio or video file, samples at 16 kHz, or a ``SpeechRequest``, which says what else is known
     model       : from ``load_model``, or its file; the shipped one by default
-    lexicon     : pronunciations of words that the dictionary does not have
+    transcript  : what is said, if known, or a Path to a text file: short for a request with this transcript
     constraints : values that the motion must take
-    recogniser  : ``own``: the model's own phone models; ``general``: those of many voices; ``auto``: both, the own ones
-                  as far as they know this voice
     Raises InputError: the recording, the transcript or a constraint is not usable.
     Raises AlignmentError: the transcript does not fit into the recording.
+
+    >>> import lipmotion
+    >>> result = lipmotion.animate("examples/welcome.flac", transcript=Path("examples/welcome.txt"))
+    >>> result.motion.rate_hz, result.motion.names[:3]
+    (100.0, ('opening', 'width', 'outer'))
     """
     chosen = model if isinstance(model, Model) else load_model(model)
-    audio = speech if isinstance(speech, Audio) else read_audio(Path(speech))
-    known = understand(chosen, audio, transcript=transcript, units=units, lexicon=lexicon, recogniser=recogniser)
-    del audio  # of a long recording it is much
-    return chosen.engine.generate(chosen.learned, known, constraints)
+    return chosen.engine.generate(chosen.learned, understand(chosen, request_of(speech, transcript)), constraints)
 
 
 def write(

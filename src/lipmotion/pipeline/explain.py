@@ -1,34 +1,31 @@
-"""Why a frame is what it is: ``explain(model, speech, at_s) → explanations``."""
+"""What determined a frame: ``explain(speech, at=…) → explanations``, and explanations as text and JSON."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from textwrap import wrap
 from typing import Any
 
+from lipmotion.engines.base import Explains, explain_by_trace
 from lipmotion.errors import InputError
 from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.pipeline.understand import understand
+from lipmotion.pipeline.request import SpeechInput, request_of
+from lipmotion.pipeline.understand import audio_of, understand
 from lipmotion.printable import printable
 from lipmotion.speech.mfcc import frame_count
-from lipmotion.speech.read import read_audio
 from lipmotion.types import (
     FRAME_RATE_HZ,
-    Audio,
     ChainStates,
     ChannelValue,
     DominantGaussian,
     Explanation,
     NamedProbability,
     RegressedMean,
-    Timeline,
-    Unit,
     frame_of,
 )
-from lipmotion.units import Lexicon
 
 LINE = 110
 """Letters of a line of text, its name aside."""
@@ -38,29 +35,35 @@ SHOWN = 6
 
 @one_thread()
 def explain(
-    model: Model | str | Path | None,
-    speech: str | Path | Audio,
-    at_s: float | Sequence[float],
+    speech: SpeechInput,
     *,
+    at: float | Sequence[float],
+    model: Model | str | Path | None = None,
     transcript: str | Path | None = None,
-    units: Timeline[Unit] | None = None,
-    lexicon: Lexicon | None = None,
-    recogniser: str = "auto",
 ) -> tuple[Explanation, ...]:
-    """Return what stands behind some frames of what ``animate`` makes of the same speech.
+    """Return what determined some frames of the motion that ``animate`` generates for the same speech.
 
+    speech, transcript : as of ``animate``
+    at    : one or several times, in seconds; the nearest 10 ms frame of each is explained
     model : from ``load_model``, or its file; None: the shipped one
-    at_s  : one or several times, in seconds: the nearest 10 ms frame of each
-    All other arguments, and what is raised, as of ``animate``.
-    Raises InputError: a time lies outside the recording.
+    Raises InputError: a time lies outside the recording; else as ``animate``.
+
+    >>> import lipmotion
+    >>> (found,) = lipmotion.explain("examples/welcome.flac", at=1.0)
+    >>> found.frame
+    100
     """
     chosen = model if isinstance(model, Model) else load_model(model)
-    audio = speech if isinstance(speech, Audio) else read_audio(Path(speech))
-    times = [at_s] if isinstance(at_s, int | float) else at_s
+    request = request_of(speech, transcript)
+    audio = audio_of(request)
+    times = [at] if isinstance(at, int | float) else at
     count = frame_count(audio.samples)
     frames = [_frame(time_s, count) for time_s in times]
-    known = understand(chosen, audio, transcript=transcript, units=units, lexicon=lexicon, recogniser=recogniser)
-    return chosen.engine.explain(chosen.learned, known, frames)
+    known = understand(chosen, replace(request, recording=audio))
+    if isinstance(chosen.engine, Explains):
+        return chosen.engine.explain(chosen.learned, known, frames)
+    result = chosen.engine.generate(chosen.learned, known)
+    return tuple(explain_by_trace(result, frame) for frame in frames)
 
 
 def _frame(time_s: float, frames: int) -> int:
@@ -140,8 +143,8 @@ def _gaussian(gaussian: DominantGaussian) -> str:
 
 def _followed(regression: RegressedMean) -> str:
     if regression.shares[0].name == "rest":
-        return "the pose at rest: silence away from speech"
-    return f"follows what is heard and believed around the frame: {_listed(regression.shares)}"
+        return "the rest pose: silence away from speech"
+    return f"regression on the acoustic features and posteriors around the frame: {_listed(regression.shares)}"
 
 
 def _values(channels: Mapping[str, ChannelValue]) -> Iterator[tuple[str, str]]:

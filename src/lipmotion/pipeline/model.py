@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 from pathlib import Path
@@ -19,7 +19,7 @@ from lipmotion.pipeline.training.channels import EIGENLIPS, GEOMETRY
 from lipmotion.speech.adaptation import Adaptation, adaptation_arrays, adaptation_from_arrays
 from lipmotion.speech.mfcc import FEATURES
 from lipmotion.storage.archive import UNREADABLE, read_archive, read_archive_header, write_archive
-from lipmotion.storage.schema import only, under
+from lipmotion.storage.schema import arrays_under, refuse_undeclared
 
 FORMAT = "lipmotion.model"
 VERSION = 3
@@ -66,8 +66,8 @@ def save_model(model: Model, path: str | Path) -> None:
         "format": FORMAT,
         "version": VERSION,
         "engine": model.engine.name,
-        "configuration": asdict(model.engine.config),
-        "recogniser": asdict(model.phones.config),
+        "configuration": model.engine.config.as_mapping(),
+        "recogniser": model.phones.config.as_mapping(),
         **model.about,
     }
     write_archive(Path(path), header, arrays)
@@ -124,12 +124,10 @@ def _read(path: Path) -> Model:
     try:
         stored = read_archive(path)
         for part in _PARTS:
-            arrays[part] = under(stored, f"{part}/")
-        only(stored, (f"{part}/{key}" for part, own in arrays.items() for key in own))
+            arrays[part] = arrays_under(stored, f"{part}/")
+        refuse_undeclared(stored, (f"{part}/{key}" for part, own in arrays.items() for key in own))
         engine = engine_named(header["engine"], header["configuration"])
-        _check_options(engine.config)
-        config = HmmConfig(**header["recogniser"])
-        _check_options(config)
+        config = HmmConfig.parsed(header["recogniser"])
         phones = hmm_from_arrays(arrays["phones"], config)
         if phones.mixtures.size[2] != FEATURES:
             raise ValueError(f"phone models of {phones.mixtures.size[2]} features, required {FEATURES}")
@@ -146,18 +144,5 @@ def _read(path: Path) -> Model:
     return Model(phones, engine, learned, about, adaptation, eigenlips)
 
 
-def _check_options(config: Any) -> None:
-    """Raise TypeError for an option of another type than its default's, ValueError for one that is never meant."""
-    for option in fields(config):
-        value, kind = getattr(config, option.name), type(option.default)
-        if type(value) is not kind and not (kind is float and type(value) is int):
-            raise TypeError(f"{option.name} is {value!r}, required {_WORDS[kind]}")
-        if isinstance(value, int | float) and abs(value) > LARGEST_OPTION:
-            raise ValueError(f"{option.name} is {value}, required at most {LARGEST_OPTION:g}")
-
-
-LARGEST_OPTION = 1e6
-"""Of numbers in a header."""
-_WORDS = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
 _PARTS = ("phones", "engine", "adaptation", "eigenlips")
 _OWN_KEYS = ("format", "version", "engine", "configuration", "recogniser")

@@ -1,41 +1,37 @@
-"""What the chains of a model believe while speech becomes motion, and its picture."""
+"""Posterior probabilities of the chains of a model while speech becomes motion, and their picture."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from lipmotion.errors import ExportError
+from lipmotion.engines import ENGINES
+from lipmotion.engines.base import HasPosteriors
+from lipmotion.errors import ExportError, InputError
 from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.request import SpeechInput, request_of
 from lipmotion.pipeline.understand import understand
-from lipmotion.speech.read import read_audio
 from lipmotion.storage.files import check_target, whole_file
-from lipmotion.types import ChainPosteriors, Generation, Timeline, Unit
-from lipmotion.units import Lexicon
+from lipmotion.types import ChainPosteriors, Generation
 
 SUFFIX = ".png"
 
 
 @one_thread()
-def animate_with_posteriors(
-    speech: str | Path,
-    *,
-    model: Model,
-    transcript: str | Path | None = None,
-    units: Timeline[Unit] | None = None,
-    lexicon: Lexicon | None = None,
-    recogniser: str = "auto",
-) -> tuple[Generation, tuple[ChainPosteriors, ...]]:
-    """Return what ``animate`` does, and what every chain of the model believes over time.
+def animate_with_posteriors(speech: SpeechInput, *, model: Model) -> tuple[Generation, tuple[ChainPosteriors, ...]]:
+    """Return what ``animate`` returns, and the posterior probabilities of the units of every chain of the model.
 
     Raises InputError: as ``animate``, or the model's engine has no chains of states.
     """
     engine, learned = model.engine, model.learned
-    engine.check_chains()
-    told = understand(
-        model, read_audio(Path(speech)), transcript=transcript, units=units, lexicon=lexicon, recogniser=recogniser
-    )
-    return engine.generate(learned, told), engine.beliefs(learned, told)
+    if not isinstance(engine, HasPosteriors):
+        having = [name for name in ENGINES.names if hasattr(ENGINES.load(name), "posteriors")]
+        raise InputError(
+            f"the engine {engine.name!r} has no chains of states whose posteriors could be shown; give a model that "
+            f"was trained with --engine {' or '.join(having)}"
+        )
+    known = understand(model, request_of(speech))
+    return engine.generate(learned, known), engine.posteriors(learned, known)
 
 
 def check_picture(path: Path, speech: Path | None = None) -> None:
@@ -46,7 +42,7 @@ def check_picture(path: Path, speech: Path | None = None) -> None:
 
 
 def write_posteriors(path: Path, generation: Generation, beliefs: tuple[ChainPosteriors, ...]) -> None:
-    """Write a picture of what chains believe over time (docs/explain.md).
+    """Write a picture of the posteriors of chains over time (docs/explain.md).
 
     Raises ExportError: another suffix, or the file cannot be written.
     """

@@ -6,14 +6,14 @@ import logging
 from collections.abc import Sequence
 from pathlib import Path
 
-from lipmotion.corpora.labels import check_plain
+from lipmotion.corpora.labels import check_plain_text
 from lipmotion.errors import shortened
-from lipmotion.speech.agreement import DOUBTFUL, agreement
+from lipmotion.speech.agreement import DOUBTFUL_SCORE, agreement_score
 from lipmotion.speech.recogniser import Recogniser
-from lipmotion.storage.files import text_in
+from lipmotion.storage.files import read_text_file
 from lipmotion.types import Audio, Features, Timeline, Unit
 from lipmotion.units import Lexicon, check_words
-from lipmotion.units.speaking_rate import LARGEST_TRANSCRIPT
+from lipmotion.units.length_limits import LARGEST_TRANSCRIPT
 
 LOG = logging.getLogger("lipmotion")
 MOST_GUESSES = 20
@@ -52,20 +52,20 @@ def read_transcript(path: Path) -> str:
 
     Raises InputError: no such file, larger than ``LARGEST_TRANSCRIPT``, not UTF-8 text, or labels in time.
     """
-    text = text_in(path, "transcript", LARGEST_TRANSCRIPT)
-    check_plain(text, str(path))
+    text = read_text_file(path, "transcript", LARGEST_TRANSCRIPT)
+    check_plain_text(text, str(path))
     return text
 
 
 def report_doubt(audio: Audio, units: Timeline[Unit]) -> None:
     """Warn if the phones of a transcript, aligned, are not what is heard."""
-    found = agreement(audio, units)
-    if found < DOUBTFUL:
+    found = agreement_score(audio, units)
+    if found < DOUBTFUL_SCORE:
         LOG.warning(
             "the transcript seems not to be what is said (its phones agree with the sound at %.1f, required %.1f or "
             "more); check it, or leave it out",
             found,
-            DOUBTFUL,
+            DOUBTFUL_SCORE,
         )
 
 

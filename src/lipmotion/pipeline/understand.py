@@ -1,4 +1,4 @@
-"""Recordings as engines hear them."""
+"""Recordings as engines take them: acoustic features, phones in time, F0."""
 
 from __future__ import annotations
 
@@ -10,13 +10,15 @@ from pathlib import Path
 from typing import Any
 
 from lipmotion.engines import Animator
+from lipmotion.engines.base import RecognisesPhones, WantsF0
 from lipmotion.errors import AlignmentError, InputError
 from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.request import SpeechRequest
 from lipmotion.pipeline.transcribe import read_transcript, transcribe
+from lipmotion.speech.audio_files import read_audio
 from lipmotion.speech.f0 import log_f0
 from lipmotion.speech.mfcc import mfcc
-from lipmotion.speech.recogniser import Recogniser
-from lipmotion.speech.recogniser import recogniser as cached_recogniser
+from lipmotion.speech.recogniser import Recogniser, cached_recogniser
 from lipmotion.types import Audio, Features, Speech, Timeline, Unit
 from lipmotion.units import Lexicon, check_phones, check_text, words_of
 
@@ -25,34 +27,37 @@ LATE_S = 0.1
 LOG = logging.getLogger("lipmotion")
 
 
-def understand(
-    model: Model,
-    audio: Audio,
-    *,
-    transcript: str | Path | None = None,
-    units: Timeline[Unit] | None = None,
-    lexicon: Lexicon | None = None,
-    recogniser: str = "auto",
-) -> Speech:
-    """Return a recording as the engine of a model hears it; arguments, and what is raised, as of ``animate``."""
-    phones = cached_recogniser(model.phones, recogniser, model.adaptation)
-    if units is not None:
-        _check_units(units, audio.duration_s)
-        return hear(model.engine, audio, mfcc(audio), units)
-    words = _words(transcript, audio.duration_s)
+def understand(model: Model, request: SpeechRequest) -> Speech:
+    """Return the speech of a request as the engine of a model takes it: features, phones in time, F0 if wanted.
+
+    Raises InputError: the recording, the transcript or the units are not usable, or there is no such recogniser.
+    Raises AlignmentError: the transcript does not fit into the recording.
+    """
+    audio = audio_of(request)
+    phones = cached_recogniser(model.phones, request.recogniser, model.adaptation)
+    if request.units is not None:
+        _check_units(request.units, audio.duration_s)
+        return speech_of(model.engine, audio, mfcc(audio), request.units)
+    words = _words(request.transcript, audio.duration_s)
     features = mfcc(audio)
-    found = partial(transcribe, phones, audio, features, words, lexicon or Lexicon())
+    transcribed = partial(transcribe, phones, audio, features, words, request.lexicon or Lexicon())
     if words is not None:
-        return hear(model.engine, audio, features, found())
-    return hear_unsaid(model.engine, model.learned, audio, features, phones, found)
+        return speech_of(model.engine, audio, features, transcribed())
+    return recognised_speech(model.engine, model.learned, audio, features, phones, transcribed)
 
 
-def hear(engine: Animator[Any], audio: Audio, features: Features, units: Timeline[Unit]) -> Speech:
-    """Return a recording with its phones in time, and with its F0 where the engine wants it."""
-    return Speech(features, units, log_f0(audio) if engine.hears_f0 else None)
+def audio_of(request: SpeechRequest) -> Audio:
+    """Return the samples of a request's recording. Raises InputError: it cannot be read."""
+    recording = request.recording
+    return recording if isinstance(recording, Audio) else read_audio(Path(recording))
 
 
-def hear_unsaid(
+def speech_of(engine: Animator[Any], audio: Audio, features: Features, units: Timeline[Unit]) -> Speech:
+    """Return features with phones in time, and with the F0 of the recording where the engine wants it."""
+    return Speech(features, units, log_f0(audio) if isinstance(engine, WantsF0) and engine.wants_f0 else None)
+
+
+def recognised_speech(
     engine: Animator[Any],
     learned: Any,
     audio: Audio,
@@ -60,17 +65,19 @@ def hear_unsaid(
     phones: Recogniser,
     recognise: Callable[[], Timeline[Unit]],
 ) -> Speech:
-    """Return a recording whose words are not known, with its phones in time.
+    """Return a recording whose words are not known, with recognised phones in time.
 
-    They are those that the engine's own models hear, if they know the voice, placed by the recogniser as it placed
-    those of the training; else those that ``recognise`` gives.
+    They are those that the engine's own model recognises, if it was trained on this voice, placed in time by ``phones``
+    as the phones of the training were; else those that ``recognise`` returns.
     """
-    speech = hear(engine, audio, features, Timeline(()))
-    found = engine.listen(learned, speech) if phones.kind != "general" else None
+    speech = speech_of(engine, audio, features, Timeline(()))
+    found = None
+    if isinstance(engine, RecognisesPhones) and phones.kind != "general":
+        found = engine.recognise(learned, speech)
     if found is None:
         return replace(speech, units=recognise(), said=False)
     try:
-        return replace(speech, units=phones.place(audio, features, found), said=False)
+        return replace(speech, units=phones.align_phones(audio, features, found), said=False)
     except AlignmentError:
         return replace(speech, units=recognise(), said=False)
 

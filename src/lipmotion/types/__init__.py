@@ -1,6 +1,7 @@
 """The data that flows. Plain frozen values; nothing here computes more than a look-up."""
 
 from lipmotion.types.audio import Audio
+from lipmotion.types.configuration import Configuration, Rule, option
 from lipmotion.types.each import ParallelMap
 from lipmotion.types.explanation import (
     ChainPosteriors,
@@ -28,6 +29,7 @@ __all__ = [
     "ChainStates",
     "Channel",
     "ChannelValue",
+    "Configuration",
     "Constraints",
     "DominantGaussian",
     "Example",
@@ -43,6 +45,7 @@ __all__ = [
     "Progress",
     "ReducedVariance",
     "RegressedMean",
+    "Rule",
     "Span",
     "Speech",
     "Timeline",
@@ -54,6 +57,7 @@ __all__ = [
     "check_magnitude",
     "counted",
     "frame_of",
+    "option",
     "part_of",
     "silent_monitor",
 ]

@@ -11,14 +11,15 @@ from lipmotion.engines.coupled.chains.structures import COUPLED, HMM, Structure
 from lipmotion.engines.coupled.chains.transitions import first_transitions
 from lipmotion.stats.mixture import Mixtures
 from lipmotion.units import PHONES, UnitSet
-from lipmotion.units.unit_set import CLOSED
+from lipmotion.units.unit_set import CLOSED_UNIT
 
 BILABIAL = ("p", "b", "m", "em")
 SHUT = (*BILABIAL, "sil", "sp")
 THREE = UnitSet(
-    "three", {phone: CLOSED if phone in SHUT else "round" if phone in ("uw", "ow", "w") else "open" for phone in PHONES}
+    "three",
+    {phone: CLOSED_UNIT if phone in SHUT else "round" if phone in ("uw", "ow", "w") else "open" for phone in PHONES},
 )
-TWO = UnitSet("two", {phone: CLOSED if phone in SHUT else "open" for phone in PHONES})
+TWO = UnitSet("two", {phone: CLOSED_UNIT if phone in SHUT else "open" for phone in PHONES})
 """What looks alike on the second chain: round and open."""
 
 

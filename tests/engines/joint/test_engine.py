@@ -25,7 +25,7 @@ def trained(units: str) -> JointModel:
 
 
 def engine(units: str = "eVis", recognises: bool = True, **options: object) -> JointEngine:
-    found = engine_named("joint", {"units": units, "recognises": recognises, "mixtures": 1} | options)
+    found = engine_named("joint", {"units": units, "recognise_units": recognises, "mixtures": 1} | options)
     assert isinstance(found, JointEngine)
     return found
 

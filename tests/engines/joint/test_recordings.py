@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 
 from lipmotion.hmm.multistream.align import align
-from lipmotion.hmm.multistream.generate import densities_along, generate
+from lipmotion.hmm.multistream.generate import densities_of_path, generate
 from lipmotion.hmm.multistream.inventory import Inventory
-from lipmotion.hmm.multistream.labels import in_frames
+from lipmotion.hmm.multistream.labels import units_in_frames
 from lipmotion.hmm.multistream.model import JointConfig
 from lipmotion.hmm.multistream.recognise import JointRecogniser
-from lipmotion.hmm.multistream.streams import observe
-from lipmotion.hmm.multistream.train import Transcribed, train_joint
+from lipmotion.hmm.multistream.streams import stream_observations
+from lipmotion.hmm.multistream.train import TrainingUtterance, train_joint
+from lipmotion.speech.audio_files import read_audio
 from lipmotion.speech.f0 import log_f0
 from lipmotion.speech.mfcc import LOG_ENERGY, mfcc
-from lipmotion.speech.read import read_audio
 from lipmotion.types import Progress, Span, Timeline, Unit
 from lipmotion.units import PHONES, Lexicon
 from lipmotion.units.classes import phone_classes
@@ -26,7 +26,7 @@ from lipmotion.units.classes import phone_classes
 TRAIN, TEST = 30, 6
 
 
-def transcribed(grid: Path, name: str) -> Transcribed:
+def transcribed(grid: Path, name: str) -> TrainingUtterance:
     """Return a sentence; its phones share the time of their word."""
     audio, lexicon = read_audio(grid / "clips" / f"{name}.mkv"), Lexicon()
     features = mfcc(audio).values
@@ -37,10 +37,10 @@ def transcribed(grid: Path, name: str) -> Transcribed:
             phones = ("sil",) if word == "sil" else ("sp",) if word == "sp" else lexicon.pronunciations(word)[0]
             edges = np.linspace(start_s, end_s, len(phones) + 1).tolist()
             spans += [Span(a, b, Unit(phone)) for a, b, phone in zip(edges, edges[1:], phones, strict=False)]
-    units, bounds = in_frames(Timeline(tuple(spans)), len(features), "sil")
+    units, bounds = units_in_frames(Timeline(tuple(spans)), len(features), "sil")
     window = np.hanning(15) / np.hanning(15).sum()
     loudness = np.convolve(np.pad(features[:, LOG_ENERGY].astype(float), 7, "edge"), window, "valid")
-    return Transcribed(observe(features, log_f0(audio), loudness[:, None]), units, bounds)
+    return TrainingUtterance(stream_observations(features, log_f0(audio), loudness[:, None]), units, bounds)
 
 
 @pytest.mark.recordings
@@ -59,7 +59,7 @@ def test_thirty_sentences_are_enough_to_follow_another(recordings: Path) -> None
         said = JointRecogniser(hmm).recognise(utterance.observed)
         bounds = np.array([*(s.first for s in said), utterance.observed.frames])
         path = align(hmm, utterance.observed, [s.unit for s in said], bounds)
-        generated.append(generate(densities_along(hmm, path)).values[:, 0])
+        generated.append(generate(densities_of_path(hmm, path)).values[:, 0])
         original.append(utterance.observed.streams["motion"].values[:, 0])
     inner = [np.s_[1:-1]] * TEST
     found = np.concatenate([g[i] for g, i in zip(generated, inner, strict=True)])

@@ -10,11 +10,13 @@ from lipmotion.engines.trajectory.engine import TrajectoryConfig
 from lipmotion.engines.trajectory.train import fit_trajectory
 from lipmotion.motion.context_window import OFFSETS, SCALE, fit_acoustic_context
 from lipmotion.motion.frame_labels import full_context_states
-from lipmotion.stats.regression import fit_tree, owner, ridge, zero_statistics
+from lipmotion.stats.regression import fit_tree_regressions, regression_node, ridge, zero_statistics
 from lipmotion.stats.trees import Question, Tree
 from lipmotion.types.progress import silent_monitor
 
-HOW = TrajectoryConfig(parts=3, silent_parts=7, components=2, axes=20, ridge=10.0, ridge_frames=50.0).learning
+HOW = TrajectoryConfig(
+    states=3, silent_states=7, components=2, acoustic_components=20, ridge=10.0, ridge_frames=50.0
+).learning
 
 
 def moments_of(z, r):
@@ -51,20 +53,20 @@ def test_the_owner_is_the_last_node_with_enough_frames():
     tree = small_tree()
     paths = [tree.path_to(leaf) for leaf in (1, 3, 4)]
     assert paths == [[0, 1], [0, 2, 3], [0, 2, 4]]
-    assert [owner(tree, path, 45) for path in paths] == [0, 3, 2]
-    assert [owner(tree, path, 1000) for path in paths] == [0, 0, 0]
+    assert [regression_node(tree, path, 45) for path in paths] == [0, 3, 2]
+    assert [regression_node(tree, path, 1000) for path in paths] == [0, 0, 0]
 
 
 def test_each_node_is_drawn_towards_the_one_above():
     tree, truth = small_tree(), np.random.default_rng(5).normal(size=(3, 2))
     parts = {node: moments_of(*sample(frames, truth + node, node)) for node, frames in ((0, 40), (2, 10), (3, 50))}
-    found = fit_tree(tree, parts, np.zeros((3, 2)), 7.0)
+    found = fit_tree_regressions(tree, parts, np.zeros((3, 2)), 7.0)
     root = ridge(parts[0] + parts[2] + parts[3], np.zeros((3, 2)), 7.0)
     below = ridge(parts[2] + parts[3], root, 7.0)
     assert found[0] == pytest.approx(root)
     assert found[2] == pytest.approx(below)
     assert found[3] == pytest.approx(ridge(parts[3], below, 7.0))
-    stiff = fit_tree(tree, parts, np.ones((3, 2)), 1e12)
+    stiff = fit_tree_regressions(tree, parts, np.ones((3, 2)), 1e12)
     assert stiff[3] == pytest.approx(np.ones((3, 2)), abs=1e-6)
 
 
@@ -128,7 +130,9 @@ def error(model, corpus):
 
 def test_means_follow_the_sound():
     corpus = list(loud_and_soft(16))
-    deaf, listening = (fit_trajectory(corpus[:12], replace(HOW, listens=on), silent_monitor) for on in (False, True))
+    deaf, listening = (
+        fit_trajectory(corpus[:12], replace(HOW, acoustic_regression=on), silent_monitor) for on in (False, True)
+    )
     assert error(listening, corpus[12:]) < 0.75 * error(deaf, corpus[12:])
     assert listening.emission.variances[:-1, 0, 0].mean() < deaf.emission.variances[:-1, 0, 0].mean()
 

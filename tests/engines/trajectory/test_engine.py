@@ -10,29 +10,29 @@ from lipmotion.errors import InputError
 from lipmotion.types import WEIGHT, Channel, Constraints, Pin
 from lipmotion.types.progress import silent_monitor
 
-ENGINE = engine_named("trajectory", {"silent_parts": 7})  # at rest from 0.24 s on
+ENGINE = engine_named("trajectory", {"silent_states": 7})  # at rest from 0.24 s on
 MODEL = ENGINE.fit(examples(), silent_monitor).model
 
 
 @pytest.mark.parametrize(
     "options",
     [
-        {"parts": 0},
-        {"parts": 4},
-        {"parts": -3},
-        {"parts": 2.5},
+        {"states": 0},
+        {"states": 4},
+        {"states": -3},
+        {"states": 2.5},
         {"edge_s": 0.0},
         {"components": 0},
         {"shrinkage": -1.0},
-        {"silent_parts": 2},
-        {"axes": 0},
+        {"silent_states": 2},
+        {"acoustic_components": 0},
         {"ridge": 0.0},
         {"tree_factor": -0.1},
         {"ridge_frames": float("nan")},
         {"variance_shrinkage": 0.0},
         {"shrinkage": float("nan")},
         {"edge_s": float("inf")},
-        {"parts": "many"},
+        {"states": "many"},
     ],
 )
 def test_a_configuration_that_makes_no_sense_is_an_input_error(options):
@@ -40,16 +40,16 @@ def test_a_configuration_that_makes_no_sense_is_an_input_error(options):
         engine_named("trajectory", options)
 
 
-@pytest.mark.parametrize("parts", [1, 3, 7])
-def test_any_odd_number_of_parts_works(parts):
-    engine = engine_named("trajectory", {"parts": parts, "components": 2})
+@pytest.mark.parametrize("states", [1, 3, 7])
+def test_any_odd_number_of_states_works(states):
+    engine = engine_named("trajectory", {"states": states, "components": 2})
     model = engine.fit(examples(4), silent_monitor).model
     values = engine.generate(model, speech(timeline(("p", "aa", "m")))).motion.values
     assert np.isfinite(values).all()
 
 
 def test_configuration_and_model_are_different_things():
-    assert ENGINE.config == TrajectoryConfig(silent_parts=7)
+    assert ENGINE.config == TrajectoryConfig(silent_states=7)
     fit = ENGINE.fit(examples(3), silent_monitor)
     assert fit.figures["frames"] == sum(int(e.valid.sum()) for e in examples(3))
     assert fit.figures["leaves"] == len(fit.model.emission.means)

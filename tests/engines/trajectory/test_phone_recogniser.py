@@ -9,7 +9,7 @@ from engines.synthetic import example, examples, speech, timeline
 from lipmotion.engines import engine_named
 from lipmotion.engines.trajectory import phone_recogniser as module
 from lipmotion.errors import ModelFormatError
-from lipmotion.storage.checkpoint import NOTHING_KEPT, Checkpoint
+from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import Features, Timeline
 from lipmotion.types.progress import silent_monitor
 
@@ -20,7 +20,7 @@ def phones(units):
     return [span.label.phone for span in units]
 
 
-def fitted(corpus, checkpoint=NOTHING_KEPT):
+def fitted(corpus, checkpoint=NO_CHECKPOINT):
     values = [one.motion.values[:, :2] for one in corpus]
     return module.fit_phone_recogniser(corpus, values, silent_monitor, checkpoint)
 
@@ -96,7 +96,7 @@ def test_what_was_trained_is_kept(corpus, listener, tmp_path, monkeypatch):
 
 def test_the_engine_listens_if_there_is_speech_enough(monkeypatch):
     monkeypatch.setattr(module, "LEAST_MINUTES", 0.1)
-    engine = engine_named("trajectory", {"components": 2, "axes": 20})
+    engine = engine_named("trajectory", {"components": 2, "acoustic_components": 20})
     corpus = examples(10)
     model = engine.fit(corpus, silent_monitor).model
     spoken = example(SENTENCE, seed=50).speech
@@ -104,5 +104,5 @@ def test_the_engine_listens_if_there_is_speech_enough(monkeypatch):
     assert phones(heard) == ["sil", *SENTENCE, "sil"]
     back = engine.from_arrays(engine.to_arrays(model))
     assert phones(engine.listen(back, spoken)) == phones(heard)
-    deaf = engine_named("trajectory", {"components": 2, "axes": 20, "joint": False})
+    deaf = engine_named("trajectory", {"components": 2, "acoustic_components": 20, "joint_recogniser": False})
     assert deaf.listen(deaf.fit(corpus, silent_monitor).model, spoken) is None

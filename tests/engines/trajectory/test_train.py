@@ -9,7 +9,7 @@ from lipmotion.engines.trajectory.train import LEAST_VARIANCE, fit_trajectory
 from lipmotion.motion.frame_labels import FullContextState, StateLayout, full_context_states
 from lipmotion.types.progress import silent_monitor
 
-HOW = replace(TrajectoryConfig(parts=3, silent_parts=7, components=2, listens=False).learning)
+HOW = replace(TrajectoryConfig(states=3, silent_states=7, components=2, acoustic_regression=False).learning)
 CUT = HOW.cut
 
 
@@ -74,7 +74,7 @@ def test_a_channel_that_never_moves_keeps_a_variance():
     corpus = examples(4)
     for example in corpus:
         example.motion.values[:, 1] = 0.0
-    emission = fit(corpus, listens=True, axes=20).emission
+    emission = fit(corpus, acoustic_regression=True, acoustic_components=20).emission
     assert (emission.variances >= LEAST_VARIANCE / 1e4).all()
     rows = np.array([emission.row(place, CUT) for place in full_context_states(corpus[0].speech.units, 99, CUT)])
     for statistic in emission.statistics(rows, corpus[0].speech.features.values, slice(0, 99)):

@@ -15,14 +15,14 @@ from lipmotion.types import Generation
 from lipmotion.types.progress import silent_monitor
 from lipmotion.units import LIP_CLOSING, PHONES, UNIT_SETS, unit_set
 
-PLAIN = {"listens": False, "silent_parts": 7}
+PLAIN = {"acoustic_regression": False, "silent_states": 7}
 SPOKEN = speech(timeline(("t", "aa", "p", "iy", "zh", "m", "uw", "sp", "s", "aa")))
 named = pytest.mark.parametrize("name", UNIT_SETS)
 
 
 @cache
 def trained(units: str, listens: bool = False):
-    engine = engine_named("trajectory", PLAIN | {"units": units, "listens": listens})
+    engine = engine_named("trajectory", PLAIN | {"units": units, "acoustic_regression": listens})
     return engine, engine.fit(examples(), silent_monitor).model
 
 
@@ -38,7 +38,7 @@ def renamed_phones(folder: Path) -> str:
     return str(path)
 
 
-@pytest.mark.parametrize("listens", [False, True])
+@pytest.mark.parametrize("acoustic_regression", [False, True])
 def test_phones_by_another_name_move_the_same_to_the_bit(tmp_path, listens):
     own, renamed = (trained(units, listens) for units in ("phone", renamed_phones(tmp_path)))
     one, two = (engine.generate(model, SPOKEN) for engine, model in (own, renamed))

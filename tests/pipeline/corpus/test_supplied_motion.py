@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lipmotion.corpora.base import Curves, Recording
+from lipmotion.corpora.source_recordings import MotionFile, SourceRecording
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import InputError, MissingDependencyError
 from lipmotion.export.base import write_motion
@@ -104,14 +104,14 @@ def test_what_does_not_fit_is_listed_and_the_rest_goes_on(studio, tmp_path):
 
 def test_a_bare_array_at_another_rate_is_noticed(tmp_path):
     np.save(tmp_path / "a.npy", np.zeros((50, 2)))
-    curves = Curves(tmp_path / "a.npy", 30.0, CHANNELS)
+    curves = MotionFile(tmp_path / "a.npy", 30.0, CHANNELS)
     assert given_track(curves, 1.7).motion.rate_hz == 30
     with pytest.raises(InputError, match=r"50 frames at 30 Hz last 1\.67 s, the sound lasts 5\.00 s"):
         given_track(curves, 5.0)
 
 
-def recording(phones: Timeline[Unit] | None) -> Recording:
-    return Recording("a", Path("a.wav"), None, phones=phones)
+def recording(phones: Timeline[Unit] | None) -> SourceRecording:
+    return SourceRecording("a", Path("a.wav"), None, phones=phones)
 
 
 def spans(*rows: tuple[float, float, str]) -> Timeline[Unit]:
@@ -190,7 +190,7 @@ def test_facegood_from_recordings_to_figures(recordings: Path, tmp_path: Path) -
 
 
 def test_a_source_is_not_touched(studio):
-    item = replace(recording(spans((0, 1, "aa"))), curves=Curves(studio / "a.npz"))
+    item = replace(recording(spans((0, 1, "aa"))), curves=MotionFile(studio / "a.npz"))
     assert set(digest(item)) == {"motion_file", "motion_sha256", "phones_sha256"}
     assert digest(item) == digest(item)
     assert digest(item) != digest(replace(item, phones=spans((0, 1.001, "aa"))))
@@ -198,12 +198,12 @@ def test_a_source_is_not_touched(studio):
 
 def test_labels_beyond_what_a_recording_holds(tmp_path):
     spans = tuple(Span(i / 1e5, (i + 1) / 1e5, Unit("p")) for i in range(2000))
-    recording = Recording("a", tmp_path / "a.wav", None, phones=Timeline(spans))
+    recording = SourceRecording("a", tmp_path / "a.wav", None, phones=Timeline(spans))
     with pytest.raises(InputError, match=r"a\.wav: 2000 units in time, required at most 1200 for 2.00 s of sound"):
         given_phones(recording, 2.0)
 
 
 def test_labels_that_last_no_time(tmp_path):
-    recording = Recording("a", tmp_path / "a.wav", None, phones=Timeline((Span(1.0, 1.0, Unit("p")),) * 3))
+    recording = SourceRecording("a", tmp_path / "a.wav", None, phones=Timeline((Span(1.0, 1.0, Unit("p")),) * 3))
     with pytest.raises(InputError, match="none of its 3 labels is a phone that lasts longer than 0 s"):
         given_phones(recording, 2.0)

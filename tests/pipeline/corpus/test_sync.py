@@ -12,8 +12,8 @@ from lipmotion.corpora.entry import read_entry
 from lipmotion.corpora.store import Corpus
 from lipmotion.pipeline.corpus import sync as module
 from lipmotion.pipeline.corpus.sync import clip_scores, offsets, sync
+from lipmotion.speech.audio_files import read_audio
 from lipmotion.speech.mfcc import mfcc
-from lipmotion.speech.read import read_audio
 from lipmotion.types import Audio, Channel, Motion, Span, Timeline, Track, Unit, Utterance
 from lipmotion.vision.track import track
 

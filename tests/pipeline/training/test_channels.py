@@ -10,18 +10,19 @@ import numpy as np
 import pytest
 
 from lipmotion.appearance.eigenlips import Eigenlips, fit_eigenlips
-from lipmotion.corpora.store import Corpus
+from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, ExportError, InputError, ModelFormatError
 from lipmotion.export.base import read_motion
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.measures.report import table
+from lipmotion.measures.report import figures_table
 from lipmotion.pipeline.animate import animate, write
-from lipmotion.pipeline.evaluation.evaluate import clips, evaluate, recorded
+from lipmotion.pipeline.evaluation.conditions import compared_clips, held_out_recordings
+from lipmotion.pipeline.evaluation.evaluate import evaluate
 from lipmotion.pipeline.model import Model, load_model, save_model
 from lipmotion.pipeline.training.channels import BOTH, EIGENLIPS, GEOMETRY, as_learned, learned_eigenlips
-from lipmotion.pipeline.training.train import train
-from lipmotion.speech.recogniser import recogniser
+from lipmotion.pipeline.training.train import Run, train
+from lipmotion.speech.recogniser import cached_recogniser
 from lipmotion.testing.toy import toy_utterances
 from lipmotion.types import Utterance
 
@@ -143,8 +144,8 @@ def test_figures_of_pictures(models: dict[str, Path], toy_corpus: Corpus) -> Non
         assert (condition["acc"], condition["amse"]) == (lips["acc"], lips["amse"])
         assert lips["channels"]["lips_r_01"]["acc"] > 0.9
         assert condition["leading"] in lips["channels"]
-    assert "90 eigenlips" in table(figures)
-    assert "lips_r_01 " not in table(figures).replace("lag of lips_r_01 ", "")
+    assert "90 eigenlips" in figures_table(figures)
+    assert "lips_r_01 " not in figures_table(figures).replace("lag of lips_r_01 ", "")
 
 
 def test_figures_of_both(models: dict[str, Path], toy_model: Model, toy_corpus: Corpus) -> None:
@@ -160,15 +161,17 @@ def test_figures_of_both(models: dict[str, Path], toy_model: Model, toy_corpus: 
         assert condition["amse"] < 0.1  # eye distances
         assert condition["eigenlips"]["amse"] > 10  # grey levels
         assert condition["leading"] == "opening"
-    assert "AMSE of the eigenlips" in table(figures)
+    assert "AMSE of the eigenlips" in figures_table(figures)
 
 
 def test_originals_are_the_projected_pictures(models: dict[str, Path], toy_corpus: Corpus) -> None:
     model = load_model(models[BOTH])
     assert model.eigenlips is not None
-    found = recorded(toy_corpus, recogniser(model.phones), visual=model.visual, eigenlips=model.eigenlips)
+    found = held_out_recordings(
+        toy_corpus, cached_recogniser(model.phones), visual=model.visual, eigenlips=model.eigenlips
+    )
     assert found.channels == ("opening", "width", "outer", *(channel.name for channel in model.eigenlips.channels))
-    made = clips(found, "with transcript", model.engine, model.learned)
+    made = compared_clips(found, "with transcript", model.engine, model.learned)
     for clip, name in zip(made, toy_corpus.names("test"), strict=True):
         images = crops([toy_corpus.utterance(name)])[0]
         assert np.array_equal(clip.original[:, 3:], model.eigenlips.project(images))
@@ -176,7 +179,13 @@ def test_originals_are_the_projected_pictures(models: dict[str, Path], toy_corpu
 
 def test_the_joint_engine_learns_pictures_too(toy_corpus: Corpus) -> None:
     engine = engine_named("joint", {})
-    model, _ = train(toy_corpus, names=toy_corpus.names("train")[:4], recogniser=SMALL, engine=engine, visual=EIGENLIPS)
+    model, _ = train(
+        toy_corpus,
+        selection=Selection(names=toy_corpus.names("train")[:4]),
+        recogniser=SMALL,
+        engine=engine,
+        visual=EIGENLIPS,
+    )
     assert (
         evaluate(model, toy_corpus)["conditions"]["with transcript"]["eigenlips"]["channels"]["lips_r_01"]["acc"] > 0.5
     )
@@ -185,7 +194,7 @@ def test_the_joint_engine_learns_pictures_too(toy_corpus: Corpus) -> None:
 def test_it_is_the_same_file_again(models: dict[str, Path], toy_corpus: Corpus, tmp_path: Path) -> None:
     save_model(load_model(models[BOTH]), tmp_path / "again")
     assert (tmp_path / "again").read_bytes() == models[BOTH].read_bytes()
-    save_model(train(toy_corpus, recogniser=SMALL, visual=BOTH, work=tmp_path)[0], tmp_path / "anew")
+    save_model(train(toy_corpus, recogniser=SMALL, visual=BOTH, run=Run(work=tmp_path))[0], tmp_path / "anew")
     assert (tmp_path / "anew").read_bytes() == models[BOTH].read_bytes()
 
 
@@ -193,7 +202,7 @@ def test_what_was_kept_for_other_channels_is_not_used(
     toy_corpus: Corpus, models: dict[str, Path], tmp_path: Path
 ) -> None:
     for visual in (GEOMETRY, BOTH):
-        model, _ = train(toy_corpus, recogniser=SMALL, visual=visual, work=tmp_path)
+        model, _ = train(toy_corpus, recogniser=SMALL, visual=visual, run=Run(work=tmp_path))
     save_model(model, tmp_path / "both")
     assert (tmp_path / "both").read_bytes() == models[BOTH].read_bytes()
 

@@ -16,7 +16,7 @@ from lipmotion.hmm.model import HmmConfig
 from lipmotion.pipeline.model import Model, save_model
 from lipmotion.pipeline.training import labels
 from lipmotion.pipeline.training import train as module
-from lipmotion.pipeline.training.train import train
+from lipmotion.pipeline.training.train import Run, train
 from lipmotion.types import Item, Monitor, Progress, silent_monitor
 from lipmotion.units import Lexicon
 
@@ -57,7 +57,7 @@ def corpus(toy_corpus: Corpus, tmp_path_factory: pytest.TempPathFactory) -> Corp
 
 
 def run(corpus: Corpus, work: Path | None = None, monitor: Monitor = silent_monitor) -> Model:
-    return train(corpus, recogniser=CONFIG, work=work, monitor=monitor)[0]
+    return train(corpus, recogniser=CONFIG, run=Run(work=work, monitor=monitor))[0]
 
 
 def content(model: Model, folder: Path) -> bytes:
@@ -130,7 +130,7 @@ def test_another_job_starts_over(corpus: Corpus, work: Path, tmp_path: Path, wha
     else:
         options["names"] = corpus.names("train")[:4]
     expected = content(train(corpus, **options)[0], tmp_path)  # type: ignore[arg-type]
-    assert content(train(corpus, **options, work=work)[0], tmp_path) == expected  # type: ignore[arg-type]
+    assert content(train(corpus, **options, run=Run(work=work))[0], tmp_path) == expected  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("name", ["phones", "labels-0"])
@@ -150,7 +150,7 @@ def test_threads_of_matrix_products_change_nothing(
     monkeypatch.setattr(module, "FEWEST", 1)
     monkeypatch.setenv("OMP_NUM_THREADS", str(there))
     with threadpool_limits(here, user_api="blas"):
-        assert content(train(corpus, recogniser=CONFIG, workers=2)[0], tmp_path) == whole
+        assert content(train(corpus, recogniser=CONFIG, run=Run(workers=2))[0], tmp_path) == whole
         assert {each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"} == {here}
 
 
@@ -165,6 +165,6 @@ def test_in_two_processes(
     before = set(multiprocessing.active_children())
     if stop:
         with pytest.raises(Stopped):
-            train(corpus, recogniser=CONFIG, work=work, monitor=stopping_after(stop), workers=2)
+            train(corpus, recogniser=CONFIG, run=Run(work=work, monitor=stopping_after(stop), workers=2))
         assert set(multiprocessing.active_children()) == before
-    assert content(train(corpus, recogniser=CONFIG, work=work, workers=2)[0], tmp_path) == whole
+    assert content(train(corpus, recogniser=CONFIG, run=Run(work=work, workers=2))[0], tmp_path) == whole

@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion.corpora.store import Corpus
+from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.pipeline.model import Model, save_model
 from lipmotion.pipeline.training import train as module
-from lipmotion.pipeline.training.train import labels_of, model_motion, train
+from lipmotion.pipeline.training.train import Run, labels_of, model_motion, train
 from lipmotion.pipeline.training.voices import Heard
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.recogniser import Recogniser
@@ -52,22 +52,29 @@ def test_the_same_corpus_gives_the_same_model(toy_corpus: Corpus, toy_model_file
 
 def test_every_stage_is_reported(toy_corpus: Corpus) -> None:
     steps: list[str] = []
-    train(toy_corpus, names=TRAINED[:3], recogniser=SMALL, monitor=lambda event: steps.append(event.stage))
+    train(
+        toy_corpus,
+        selection=Selection(names=TRAINED[:3]),
+        recogniser=SMALL,
+        run=Run(monitor=lambda event: steps.append(event.stage)),
+    )
     assert list(dict.fromkeys(steps))[:2] == ["learning phones: flat start", "learning phones: pronunciations"]
     assert "learning motion: trees" in steps
 
 
 def test_other_lists_all_and_given_names(toy_corpus: Corpus) -> None:
-    assert train(toy_corpus, split="val", recogniser=SMALL)[1].used == ("toy08", "toy09")
-    model, report = train(toy_corpus, split=None, recogniser=SMALL)
+    assert train(toy_corpus, selection=Selection("val"), recogniser=SMALL)[1].used == ("toy08", "toy09")
+    model, report = train(toy_corpus, selection=Selection(None), recogniser=SMALL)
     assert (len(report.used), model.about["split"]) == (12, "all")
-    model, report = train(toy_corpus, names=("toy10", "toy02", "toy03"), recogniser=SMALL)
+    model, report = train(toy_corpus, selection=Selection(names=("toy10", "toy02", "toy03")), recogniser=SMALL)
     assert (report.used, model.about["split"]) == (("toy10", "toy02", "toy03"), "given names")
 
 
 def test_configurations_are_used(toy_corpus: Corpus) -> None:
-    engine = engine_named("trajectory", {"parts": 3})
-    model, _ = train(toy_corpus, names=TRAINED[:4], engine=engine, recogniser=replace(SMALL, states=2))
+    engine = engine_named("trajectory", {"states": 3})
+    model, _ = train(
+        toy_corpus, selection=Selection(names=TRAINED[:4]), engine=engine, recogniser=replace(SMALL, states=2)
+    )
     assert model.engine is engine
     assert model.phones.table.count("aa") == 2
 
@@ -122,14 +129,14 @@ def test_labelled_and_transcribed_utterances_together(toy_corpus: Corpus, tmp_pa
 def test_one_speaker(toy_corpus: Corpus, tmp_path: Path) -> None:
     names = ("anna", "ben", "ben", "anna", "anna")
     corpus = corpus_of([replace(u, speaker=n) for u, n in zip(some(toy_corpus), names, strict=True)], tmp_path)
-    model, report = train(corpus, speakers=["anna"], recogniser=SMALL)
+    model, report = train(corpus, selection=Selection(speakers=["anna"]), recogniser=SMALL)
     assert report.used == ("toy00", "toy03", "toy04")
     assert model.about["speakers"] == ["anna"]
-    model, report = train(corpus, speakers=["ben", "anna"], recogniser=SMALL)
+    model, report = train(corpus, selection=Selection(speakers=["ben", "anna"]), recogniser=SMALL)
     assert len(report.used) == 5
     assert "speakers" not in train(corpus, recogniser=SMALL)[0].about
     with pytest.raises(CorpusError, match="no speaker 'carl'"):
-        train(corpus, speakers=["carl"])
+        train(corpus, selection=Selection(speakers=["carl"]))
 
 
 def test_a_transcript_that_does_not_fit_is_skipped_and_reported(toy_corpus: Corpus, tmp_path: Path) -> None:
@@ -184,12 +191,12 @@ def test_licence_and_attribution_go_with_the_model(toy_corpus: Corpus, tmp_path:
 
 def test_an_empty_split_names_the_others(toy_corpus: Corpus) -> None:
     with pytest.raises(CorpusError, match=r"no utterances of split 'tset' \(there are train: 8, val: 2, test: 2\)"):
-        train(toy_corpus, split="tset")
+        train(toy_corpus, selection=Selection("tset"))
 
 
 def test_names_that_are_not_there(toy_corpus: Corpus) -> None:
     with pytest.raises(CorpusError, match="no utterance 'toy99' among 12"):
-        train(toy_corpus, names=("toy00", "toy99"))
+        train(toy_corpus, selection=Selection(names=("toy00", "toy99")))
 
 
 def test_nothing_usable(toy_corpus: Corpus, tmp_path: Path) -> None:
@@ -229,10 +236,12 @@ def others() -> Iterator[Heard]:
 
 def test_voices_of_others_teach_engines_that_have_a_use_for_them(toy_corpus: Corpus) -> None:
     stages: list[str] = []
-    plain = {"states": 1, "asynchrony": 0, "mixtures": 1, "follows": False, "full_range": False}
-    engine = engine_named("coupled", plain | {"more_mixtures": 1})
+    plain = {"states": 1, "asynchrony": 0, "mixtures": 1, "acoustic_regression": False, "variance_scaling": False}
+    engine = engine_named("coupled", plain | {"speech_only_mixtures": 1})
     chosen = {"names": TRAINED[:4], "recogniser": SMALL, "engine": engine}
-    model, report = train(toy_corpus, **chosen, voices=others(), monitor=lambda event: stages.append(event.stage))
+    model, report = train(
+        toy_corpus, **chosen, voices=others(), run=Run(monitor=lambda event: stages.append(event.stage))
+    )
     alone, _ = train(toy_corpus, **chosen)
     assert model.about["voices"] == ["anna", "bert"]
     assert model.about["utterances"] == 4

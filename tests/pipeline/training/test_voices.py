@@ -15,12 +15,12 @@ from lipmotion.errors import CorpusError, InputError, MissingDependencyError
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.training import voices as module
 from lipmotion.pipeline.training.voices import heard, is_for_judging, many_voices, recorded_voices
+from lipmotion.speech.formant_synthesiser import synthesise
 from lipmotion.speech.mfcc import FEATURES
 from lipmotion.speech.noise import spoken_samples
 from lipmotion.speech.recogniser import Recogniser
-from lipmotion.speech.synthesise import synthesise
-from lipmotion.speech.voices.base import SyntheticVoice
 from lipmotion.speech.voices.installed import installed_voices
+from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.testing.toy import ToySentence, toy_sentences
 from lipmotion.types import Audio, Item, Timeline, Unit
 from lipmotion.units import Lexicon, words_of

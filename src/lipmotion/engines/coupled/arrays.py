@@ -22,19 +22,19 @@ from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.motion.arrays import MOTION_ARRAYS, SINGLE, motion_arrays, motion_from_arrays
 from lipmotion.motion.context_window import FEATURES, WINDOW, acoustic_context_from
 from lipmotion.motion.limits import check_poses, check_rest
-from lipmotion.stats.bigram import check_sums
-from lipmotion.stats.mixture import MIXTURES, mixtures_from
+from lipmotion.stats.bigram import check_sums_to_one
+from lipmotion.stats.mixture import MIXTURES, mixtures_from_arrays
 from lipmotion.storage.schema import (
     BELOW_ONE,
     LARGEST_VARIANCE,
     POSITIVE,
     STANDARD,
     Arrays,
-    Member,
+    ArraySpec,
+    arrays_under,
     check_index,
-    checked,
-    only,
-    under,
+    checked_arrays,
+    refuse_undeclared,
 )
 from lipmotion.units import UnitSet
 
@@ -103,18 +103,18 @@ def coupled_from_arrays(arrays: Arrays, config: CoupledConfig) -> CoupledModel:
     try:
         _, space, closure = motion_from_arrays(arrays, SINGLE.name)
         structure = _structure(arrays, config)
-        poses = checked(arrays, POSES, Q=space.dimensions)
+        poses = checked_arrays(arrays, POSES, Q=space.dimensions)
         streams = tuple(poses["streams"].tolist())
         _check_names(arrays, structure, len(streams))
         if structure.counts[0] > arrays["group_0/tie"].size:
             raise ValueError(f"{structure.counts[0]} states of the first chain, of {arrays['group_0/tie'].size} in all")
         transitions = _transitions(arrays, structure)
         visual = tuple(
-            _visual(under(arrays, f"visual_{number}/"), name, space.dimensions, config.dynamic)
+            _visual(arrays_under(arrays, f"visual_{number}/"), name, space.dimensions, config.dynamic)
             for number, name in enumerate(streams[1:])
         )
         chains = Chains(streams, transitions, _groups(arrays, transitions.product.chain_states.shape[1], visual))
-        follow = _follow(arrays, structure, visual) if config.dynamic and config.follows else None
+        follow = _follow(arrays, structure, visual) if config.dynamic and config.acoustic_regression else None
         model = CoupledModel(chains, space, visual, follow, poses["gain"], poses["rest"], closure)
         check_rest(model.rest, model.poses)
         check_poses(model.poses, space, closure)
@@ -124,35 +124,35 @@ def coupled_from_arrays(arrays: Arrays, config: CoupledConfig) -> CoupledModel:
 
 
 POSES = {
-    "gain": Member(np.float64, "Q", POSITIVE, 10),
-    "rest": Member(np.float64, "Q", -1e6, 1e6),
-    "streams": Member(np.str_, "S"),
+    "gain": ArraySpec(np.float64, "Q", POSITIVE, 10),
+    "rest": ArraySpec(np.float64, "Q", -1e6, 1e6),
+    "streams": ArraySpec(np.str_, "S"),
 }
-UNITS = {"units": Member(np.str_, "N 2")}
+UNITS = {"units": ArraySpec(np.str_, "N 2")}
 CHAIN = {
-    "bigram": Member(np.float64, "U U", POSITIVE, 1.1),
-    "first": Member(np.float64, "U", POSITIVE, 1.1),
-    "advance": Member(np.float64, "R", POSITIVE, BELOW_ONE),
+    "bigram": ArraySpec(np.float64, "U U", POSITIVE, 1.1),
+    "first": ArraySpec(np.float64, "U", POSITIVE, 1.1),
+    "advance": ArraySpec(np.float64, "R", POSITIVE, BELOW_ONE),
 }
-ROWS = {"rows": Member(np.intp, "J", 0, 1e9)}
-PAIRS = {"pairs": Member(np.intp, "p 2", 0, 1e9)}
-VISUAL = {"columns": Member(np.intp, "C", 0, 1e6), "scale": Member(np.float64, "2 D", -1e6, 1e6)}
+ROWS = {"rows": ArraySpec(np.intp, "J", 0, 1e9)}
+PAIRS = {"pairs": ArraySpec(np.intp, "p 2", 0, 1e9)}
+VISUAL = {"columns": ArraySpec(np.intp, "C", 0, 1e6), "scale": ArraySpec(np.float64, "2 D", -1e6, 1e6)}
 GROUP = {
     **MIXTURES,
-    "streams": Member(np.intp, "S", 0, 1e6),
-    "weights": Member(np.float64, "S", 0, 1e6, whole=True),
-    "tie": Member(np.intp, "J", 0, 1e9),
+    "streams": ArraySpec(np.intp, "S", 0, 1e6),
+    "weights": ArraySpec(np.float64, "S", 0, 1e6, whole=True),
+    "tie": ArraySpec(np.intp, "J", 0, 1e9),
 }
 AROUND = {
     **WINDOW,
-    "belief": Member(np.float32, "N B", -1.01, 1.01),
-    "mean": Member(np.float32, "I", -STANDARD, STANDARD),
-    "basis": Member(np.float32, "I F", -1.01, 1.01),
+    "belief": ArraySpec(np.float32, "N B", -1.01, 1.01),
+    "mean": ArraySpec(np.float32, "I", -STANDARD, STANDARD),
+    "basis": ArraySpec(np.float32, "I F", -1.01, 1.01),
 }
 FOLLOWING = {
-    "kind": Member(np.intp, "N", 0, 1e6),
-    "coefficients": Member(np.float32, "E F D"),
-    "variances": Member(np.float32, "N D", POSITIVE, LARGEST_VARIANCE),
+    "kind": ArraySpec(np.intp, "N", 0, 1e6),
+    "coefficients": ArraySpec(np.float32, "E F D"),
+    "variances": ArraySpec(np.float32, "N D", POSITIVE, LARGEST_VARIANCE),
 }
 """How a model is stored: its chains, streams, groups of them, and what visual means follow."""
 
@@ -167,47 +167,47 @@ def _check_names(arrays: Arrays, structure: Structure, streams: int) -> None:
         for key in table
     )
     group = (f"group_{number}/{key}" for number in range(streams) for key in GROUP)
-    only(arrays, MOTION_ARRAYS, POSES, PAIRS, chain, seen, group, (f"around/{key}" for key in AROUND))
+    refuse_undeclared(arrays, MOTION_ARRAYS, POSES, PAIRS, chain, seen, group, (f"around/{key}" for key in AROUND))
 
 
 def _structure(arrays: Arrays, config: CoupledConfig) -> Structure:
     sets = []
     for number, name in enumerate(config.chains.split()):
-        pairs = checked(under(arrays, f"chain_{number}/"), UNITS)["units"]
+        pairs = checked_arrays(arrays_under(arrays, f"chain_{number}/"), UNITS)["units"]
         sets.append(UnitSet(name, dict(pairs.tolist())))
     limit = None if config.asynchrony < 0 else config.asynchrony
-    return Structure(config.structure, tuple(sets), config.states, limit, config.crosses)
+    return Structure(config.structure, tuple(sets), config.states, limit, config.cross_units)
 
 
 def _transitions(arrays: Arrays, structure: Structure) -> Transitions | FreeTransitions:
-    mine = [under(arrays, f"chain_{number}/") for number in range(len(structure.chains))]
-    found = [checked(own, CHAIN, U=len(units)) for own, units in zip(mine, structure.units, strict=True)]
+    mine = [arrays_under(arrays, f"chain_{number}/") for number in range(len(structure.chains))]
+    found = [checked_arrays(own, CHAIN, U=len(units)) for own, units in zip(mine, structure.units, strict=True)]
     for each in found:
-        check_sums("first", each["first"].sum(keepdims=True))
-        check_sums("bigram", each["bigram"].sum(axis=1))
+        check_sums_to_one("first", each["first"].sum(keepdims=True))
+        check_sums_to_one("bigram", each["bigram"].sum(axis=1))
     grammar = Grammar(tuple(each["bigram"] for each in found), tuple(each["first"] for each in found))
     advance = tuple(each["advance"] for each in found)
     if structure.kind == FACTORIAL and structure.limit is None and len(found) == 2:
         first, second = advance
-        pairs = checked(arrays, PAIRS)["pairs"]
+        pairs = checked_arrays(arrays, PAIRS)["pairs"]
         for chain, count in enumerate(structure.counts):
             if len(advance[chain]) != count:
                 raise ValueError(f"chain_{chain}/advance of {len(advance[chain])} states, required {count}")
             check_index(f"pairs of chain {chain}", pairs[:, chain], count)
         return FreeTransitions(FreeProduct(structure, grammar), (first, second), pairs)
     product = reachable(structure, grammar)
-    rows = tuple(checked(own, ROWS, J=len(product.joints))["rows"] for own in mine)
+    rows = tuple(checked_arrays(own, ROWS, J=len(product.joints))["rows"] for own in mine)
     for chain, row in enumerate(rows):
         check_index(f"chain_{chain}/rows", row, len(advance[chain]))
     return Transitions(product, rows, advance)
 
 
 def _visual(arrays: Arrays, name: str, dimensions: int, dynamic: bool) -> VisualStream:
-    columns = checked(arrays, VISUAL)["columns"]
+    columns = checked_arrays(arrays, VISUAL)["columns"]
     check_index(f"columns of {name}", columns, dimensions)
     if len(set(columns.tolist())) < len(columns):
         raise ValueError(f"columns of {name} that repeat")
-    mean, deviation = checked(arrays, VISUAL, D=len(columns) * (3 if dynamic else 1))["scale"]
+    mean, deviation = checked_arrays(arrays, VISUAL, D=len(columns) * (3 if dynamic else 1))["scale"]
     if not (deviation > 0).all():
         raise ValueError(f"scale of {name} with deviations that are not more than 0")
     return VisualStream(name, columns, dynamic, mean, deviation)
@@ -216,14 +216,14 @@ def _visual(arrays: Arrays, name: str, dimensions: int, dynamic: bool) -> Visual
 def _groups(arrays: Arrays, states: int, visual: tuple[VisualStream, ...]) -> tuple[Group, ...]:
     groups, widths = [], [FEATURES, *(len(stream.mean) for stream in visual)]
     for number in range(sum(key.endswith("/tie") for key in arrays)):
-        mine = under(arrays, f"group_{number}/")
-        streams = tuple(checked(mine, {"streams": GROUP["streams"]})["streams"].tolist())
+        mine = arrays_under(arrays, f"group_{number}/")
+        streams = tuple(checked_arrays(mine, {"streams": GROUP["streams"]})["streams"].tolist())
         check_index(f"group_{number}/streams", np.array(streams), len(widths))
         edges = np.cumsum([0, *(widths[stream] for stream in streams)]).tolist()
-        found = checked(mine, GROUP, J=states, D=edges[-1])
+        found = checked_arrays(mine, GROUP, J=states, D=edges[-1])
         check_index(f"group_{number}/tie", found["tie"], found.sizes["G"])
         columns, weights = tuple(slice(a, b) for a, b in pairwise(edges)), tuple(found["weights"].tolist())
-        groups.append(Group(streams, columns, mixtures_from(found), weights, found["tie"]))
+        groups.append(Group(streams, columns, mixtures_from_arrays(found), weights, found["tie"]))
     if sorted(stream for group in groups for stream in group.streams) != list(range(len(widths))):
         raise ValueError("streams that no group has, or two")
     return tuple(groups)
@@ -232,16 +232,16 @@ def _groups(arrays: Arrays, states: int, visual: tuple[VisualStream, ...]) -> tu
 def _follow(
     arrays: Arrays, structure: Structure, visual: tuple[VisualStream, ...]
 ) -> tuple[Surroundings, tuple[Following, ...]]:
-    mine = under(arrays, "around/")
-    checked(mine, AROUND, N=structure.counts[0])
+    mine = arrays_under(arrays, "around/")
+    checked_arrays(mine, AROUND, N=structure.counts[0])
     axes = mine["window_basis"].shape[1] + mine["belief"].shape[1] * len(OFFSETS)
-    found = checked(mine, AROUND, N=structure.counts[0], I=axes)
+    found = checked_arrays(mine, AROUND, N=structure.counts[0], I=axes)
     around = Surroundings(acoustic_context_from(found), found["belief"], found["mean"], found["basis"])
     following = []
     for number, stream in enumerate(visual):
         count = structure.counts[structure.chain_of(number + 1)]
         sizes = {"N": count, "F": found.sizes["F"] + 1, "D": len(stream.mean)}
-        own = checked(under(arrays, f"following_{number}/"), FOLLOWING, **sizes)
+        own = checked_arrays(arrays_under(arrays, f"following_{number}/"), FOLLOWING, **sizes)
         check_index(f"following_{number}/kind", own["kind"], own.sizes["E"])
         following.append(Following(own["kind"], own["coefficients"], own["variances"]))
     return around, tuple(following)

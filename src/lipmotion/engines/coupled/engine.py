@@ -9,7 +9,7 @@ from typing import Any, ClassVar, final
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.base import Arrays, Engine, Fit, traced
+from lipmotion.engines.base import Arrays, Engine, Fit, explain_by_trace
 from lipmotion.engines.coupled.arrays import coupled_arrays, coupled_from_arrays
 from lipmotion.engines.coupled.chains.densities import Single
 from lipmotion.engines.coupled.chains.lattice import Lattice
@@ -25,10 +25,11 @@ from lipmotion.kernels.banded import generate
 from lipmotion.motion.closure import closing_spans
 from lipmotion.motion.generation import Statistics, generated_motion, generation_blocks, resolved_pins
 from lipmotion.motion.variance_scaling import scaled
-from lipmotion.storage.checkpoint import NOTHING_KEPT, Checkpoint
+from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import (
     FRAME_RATE_HZ,
     ChainPosteriors,
+    Configuration,
     Constraints,
     Example,
     Explanation,
@@ -56,22 +57,23 @@ class CoupledEngine(Engine[CoupledModel]):
 
     config: CoupledConfig
     name: ClassVar[str] = "coupled"
+    Config: ClassVar[type[Configuration]] = CoupledConfig
 
     @property
-    def hears_others(self) -> bool:  # noqa: D102
+    def trains_on_speech_alone(self) -> bool:  # noqa: D102
         return True
 
     def fit(  # noqa: D102
         self,
         examples: Sequence[Example],
         monitor: Monitor,
-        checkpoint: Checkpoint = NOTHING_KEPT,  # noqa: ARG002 - training takes a minute
+        checkpoint: Checkpoint = NO_CHECKPOINT,  # noqa: ARG002 - training takes a minute
     ) -> Fit[CoupledModel]:
         model = fit_coupled(examples, self.config, monitor)
         frames = sum(int(example.valid.sum()) for example in examples)
         return Fit(model, {"frames": frames, "joint_states": model.chains.transitions.product.chain_states.shape[1]})
 
-    def unpinned(self) -> CoupledEngine:  # noqa: D102
+    def without_closures(self) -> CoupledEngine:  # noqa: D102
         return replace(self, config=replace(self.config, closures=False))
 
     def generate(self, model: CoupledModel, speech: Speech, constraints: Constraints | None = None) -> Generation:  # noqa: D102
@@ -82,7 +84,7 @@ class CoupledEngine(Engine[CoupledModel]):
         def statistics(wanted: slice) -> Statistics:
             lattice = self.lattice(model, speech, wanted)
             found, path[wanted] = self._statistics(model, features[wanted], lattice)
-            return scaled(*found, model.gain, model.rest) if self.config.full_range else found
+            return scaled(*found, model.gain, model.rest) if self.config.variance_scaling else found
 
         motion, spread = generated_motion(
             statistics,
@@ -140,16 +142,14 @@ class CoupledEngine(Engine[CoupledModel]):
             inside = [frame for frame in frames if inner.start <= frame < inner.stop]
             if inside:
                 inferred = self.inferred(model, features[outer], self.lattice(model, speech, outer))
-                known, rows = [traced(result, frame) for frame in inside], [frame - outer.start for frame in inside]
+                known, rows = (
+                    [explain_by_trace(result, frame) for frame in inside],
+                    [frame - outer.start for frame in inside],
+                )
                 found.update(zip(inside, explained(known, model, inferred, rows), strict=True))
         return tuple(found[frame] for frame in frames)
 
-    @property
-    def has_chains(self) -> bool:
-        """Whether it has chains of states that ``beliefs`` tells of."""
-        return True
-
-    def beliefs(self, model: CoupledModel, speech: Speech) -> tuple[ChainPosteriors, ...]:  # noqa: D102
+    def posteriors(self, model: CoupledModel, speech: Speech) -> tuple[ChainPosteriors, ...]:  # noqa: D102
         features, found = np.asarray(speech.features.values), []
         for inner, outer in generation_blocks(len(features)):
             inferred = self.inferred(model, features[outer], self.lattice(model, speech, outer))
@@ -157,7 +157,7 @@ class CoupledEngine(Engine[CoupledModel]):
             found.append(units_believed(model.chains, inferred.posteriors, kept))
         return tuple(joined(parts) for parts in zip(*found, strict=True))
 
-    def trees(self, model: CoupledModel) -> str:  # noqa: D102
+    def describe(self, model: CoupledModel) -> str:  # noqa: D102
         return described(model)
 
     def to_arrays(self, model: CoupledModel) -> dict[str, NDArray[Any]]:  # noqa: D102

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar, final
 
@@ -14,32 +14,35 @@ from lipmotion.engines.base import Arrays, Engine, Fit
 from lipmotion.errors import CorpusError, InputError, ModelFormatError
 from lipmotion.hmm.multistream.align import StatePath, align
 from lipmotion.hmm.multistream.arrays import joint_arrays, joint_from_arrays
-from lipmotion.hmm.multistream.generate import densities_along, densities_of, settled
+from lipmotion.hmm.multistream.generate import densities_of_path, densities_of_paths, single_gaussians
 from lipmotion.hmm.multistream.inventory import Inventory
-from lipmotion.hmm.multistream.labels import in_frames, in_time
+from lipmotion.hmm.multistream.labels import units_in_frames, units_in_time
 from lipmotion.hmm.multistream.model import JointConfig, JointHmm
 from lipmotion.hmm.multistream.recognise import joint_recogniser
-from lipmotion.hmm.multistream.streams import MOTION, Observed, StreamWeights, observe
-from lipmotion.hmm.multistream.train import Transcribed, train_joint
+from lipmotion.hmm.multistream.streams import MOTION, StreamObservations, StreamWeights, stream_observations
+from lipmotion.hmm.multistream.train import TrainingUtterance, train_joint
 from lipmotion.motion.arrays import MOTION_ARRAYS, motion_arrays, motion_from_arrays
 from lipmotion.motion.closure import Closure, closing_spans, fit_closure_of
 from lipmotion.motion.frame_labels import with_unit_names
 from lipmotion.motion.generation import Statistics, generated_motion, resolved_pins
 from lipmotion.motion.limits import MotionLimits, check_poses, limits_of
 from lipmotion.motion.space import MotionSpace, fit_reduced_motion
-from lipmotion.storage.checkpoint import NOTHING_KEPT, Checkpoint
-from lipmotion.storage.schema import only, under
+from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
+from lipmotion.storage.schema import arrays_under, refuse_undeclared
 from lipmotion.types import (
     FRAME_RATE_HZ,
+    Configuration,
     Constraints,
     Example,
     Generation,
     Monitor,
     Motion,
+    Rule,
     Speech,
     Timeline,
     Trace,
     Unit,
+    option,
 )
 from lipmotion.units import LIP_CLOSING, UnitSet, unit_set
 
@@ -47,45 +50,50 @@ PREFIX = "joint_"
 """What the names of the joint model's own arrays begin with."""
 
 
+COUNT = Rule(least=1)
+
+
 @dataclass(frozen=True)
-class JointEngineConfig:
+class JointEngineConfig(Configuration):
     """How the joint engine models speech, F0 and motion.
 
     units      : what is modelled: a unit set's name, or a table's (docs/unit-sets.md)
     states     : states per unit, left to right, no skips
     mixtures, motion_mixtures : Gaussians per state of speech, and of motion (powers of two)
-    components : dimensions that all point channels are reduced to
-    f0         : hear the three streams of F0 (False: they are switched off everywhere)
-    sees       : let motion have a say, in training, in when states begin
-    recognises : find the model's own units by its own bigram where neither words nor units are given (False: take the
-                 phones in time that the shared recogniser finds). What is given always wins
-    paths      : generate from so many sequences of states, drawn from all that may have been said, instead of the
-                 best one, wherever units are recognised; needs ``recognises``
-    seed       : of the drawing
+    components : principal components that all point channels are reduced to
+    f0         : model the three streams of F0 (False: their weights are 0 everywhere)
+    motion_in_training : give the motion stream weight 1 when states are aligned in training (False: weight 0)
+    recognise_units : recognise the model's own units by its own bigram where neither words nor units are given (False:
+                 take the phones that the shared recogniser finds). Given units or words always win
+    paths      : generate from so many state sequences, sampled from their posterior, instead of the best one, wherever
+                 units are recognised; needs ``recognise_units``
+    seed       : of the sampling
     closures   : make the lips meet in every p, b and m, and in every recognised unit of these alone
     """
 
     units: str = "phone"
-    states: int = 3
-    mixtures: int = 4
-    motion_mixtures: int = 1
-    components: int = 16
+    states: int = option(3, COUNT)
+    mixtures: int = option(4, COUNT)
+    motion_mixtures: int = option(1, COUNT)
+    components: int = option(16, COUNT)
     f0: bool = True
-    sees: bool = True
-    recognises: bool = False
-    paths: int = 1
-    seed: int = 0
+    motion_in_training: bool = True
+    recognise_units: bool = False
+    paths: int = option(1, COUNT)
+    seed: int = option(0, Rule(least=0))
     closures: bool = True
 
+    former: ClassVar[Mapping[str, str]] = {"sees": "motion_in_training", "recognises": "recognise_units"}
+
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value, least = getattr(self, field.name), 0 if field.name == "seed" else 1
-            if field.type == "int" and (type(value) is not int or value < least):
-                raise InputError(f"{field.name} is {value!r}, required a whole number from {least}")
-        if not isinstance(self.units, str):
-            raise InputError(f"units is {self.units!r}, required the name of a unit set or a table")
-        if self.paths > 1 and not self.recognises:
-            raise InputError(f"paths is {self.paths}: several are drawn only where units are recognised (recognises)")
+        super().__post_init__()
+        if self.paths > 1 and not self.recognise_units:
+            raise InputError(
+                f"paths is {self.paths}: several are sampled only where units are recognised (recognise_units)"
+            )
+
+    def check_files(self) -> None:  # noqa: D102
+        unit_set(self.units)
 
     @property
     def joint(self) -> JointConfig:
@@ -96,7 +104,7 @@ class JointEngineConfig:
             states=self.states,
             mixtures=self.mixtures,
             motion_mixtures=self.motion_mixtures,
-            training=StreamWeights(f0=f0, f0_slope=f0, f0_curvature=f0, motion=float(self.sees)),
+            training=StreamWeights(f0=f0, f0_slope=f0, f0_curvature=f0, motion=float(self.motion_in_training)),
             recognition=heard,
         )
 
@@ -116,12 +124,12 @@ class JointModel:
     @cached_property
     def reach(self) -> MotionLimits:
         """Between which values motion lies."""
-        return self.poses.widened(self.hmm.parts[MOTION].scale.deviation[: self.space.dimensions])
+        return self.poses.widened(self.hmm.models[MOTION].scale.deviation[: self.space.dimensions])
 
     @property
     def poses(self) -> MotionLimits:
         """Between which values the means of all states lie."""
-        part, Q = self.hmm.parts[MOTION], self.space.dimensions
+        part, Q = self.hmm.models[MOTION], self.space.dimensions
         means = part.tied.mixtures.means[:, :, :Q].reshape(-1, Q)
         return limits_of(means * part.scale.deviation[:Q] + part.scale.mean[:Q])
 
@@ -138,17 +146,17 @@ class JointEngine(Engine[JointModel]):
 
     config: JointEngineConfig
     name: ClassVar[str] = "joint"
+    Config: ClassVar[type[Configuration]] = JointEngineConfig
 
     @property
-    def hears_f0(self) -> bool:
-        """Whether it wants ``Speech.log_f0``."""
+    def wants_f0(self) -> bool:  # noqa: D102
         return self.config.f0
 
     def fit(  # noqa: D102
         self,
         examples: Sequence[Example],
         monitor: Monitor,
-        checkpoint: Checkpoint = NOTHING_KEPT,  # noqa: ARG002 - a matter of two minutes
+        checkpoint: Checkpoint = NO_CHECKPOINT,  # noqa: ARG002 - a matter of two minutes
     ) -> Fit[JointModel]:
         units = unit_set(self.config.units)
         space, values = fit_reduced_motion(examples, self.config.components)
@@ -158,23 +166,23 @@ class JointEngine(Engine[JointModel]):
         inventory = Inventory(units.units, units.silence[:1] + _also_silent(units), self.config.states)
         hmm = train_joint(utterances, inventory, units.classes(), self.config.joint, monitor)
         closure = fit_closure_of(space.direct_names, values, examples)
-        figures = {f"leaves_{name}": float(part.forest.size) for name, part in hmm.parts.items()}
+        figures = {f"leaves_{name}": float(part.forest.size) for name, part in hmm.models.items()}
         frames = sum(int(example.valid.sum()) for example in examples)
         return Fit(JointModel(units, space, hmm, closure), {"frames": frames, **figures})
 
-    def unpinned(self) -> JointEngine:  # noqa: D102
+    def without_closures(self) -> JointEngine:  # noqa: D102
         return replace(self, config=replace(self.config, closures=False))
 
     def generate(self, model: JointModel, speech: Speech, constraints: Constraints | None = None) -> Generation:  # noqa: D102
         frames = len(speech.features.values)
         pins = resolved_pins(constraints, model.space, frames)
         observed = self._observed(speech)
-        if self.config.recognises and not speech.said:
+        if self.config.recognise_units and not speech.said:
             spoken, paths = self._recognised(model, observed, speech.features.duration_s)
         else:
             spoken, paths = speech.units, [_aligned(model, observed, speech.units)]
-        densities = densities_along(model.hmm, paths[0]) if len(paths) == 1 else densities_of(model.hmm, paths)
-        means, precisions = settled(densities)
+        densities = densities_of_path(model.hmm, paths[0]) if len(paths) == 1 else densities_of_paths(model.hmm, paths)
+        means, precisions = single_gaussians(densities)
 
         def statistics(wanted: slice) -> Statistics:
             return means[wanted], precisions[wanted]
@@ -195,7 +203,7 @@ class JointEngine(Engine[JointModel]):
             Trace(_sources(model.hmm, paths[0]), paths[0].frames),
         )
 
-    def trees(self, model: JointModel) -> str:  # noqa: D102
+    def describe(self, model: JointModel) -> str:  # noqa: D102
         return model.hmm.text()
 
     def to_arrays(self, model: JointModel) -> dict[str, NDArray[Any]]:  # noqa: D102
@@ -204,12 +212,12 @@ class JointEngine(Engine[JointModel]):
 
     def from_arrays(self, arrays: Arrays) -> JointModel:  # noqa: D102
         try:
-            only(arrays, MOTION_ARRAYS, (name for name in arrays if name.startswith(PREFIX)))
+            refuse_undeclared(arrays, MOTION_ARRAYS, (name for name in arrays if name.startswith(PREFIX)))
             units, space, closure = motion_from_arrays(arrays, self.config.units)
-            hmm = joint_from_arrays(under(arrays, PREFIX), self.config.joint)
+            hmm = joint_from_arrays(arrays_under(arrays, PREFIX), self.config.joint)
             if set(hmm.inventory.names) != set(units.units):
                 raise ValueError(f"the units {' '.join(hmm.inventory.names)}, required {' '.join(units.units)}")
-            if MOTION not in hmm.parts or len(hmm.parts[MOTION].scale.mean) != 3 * space.dimensions:
+            if MOTION not in hmm.models or len(hmm.models[MOTION].scale.mean) != 3 * space.dimensions:
                 raise ValueError(f"motion that is not of {space.dimensions} dimensions")
             model = JointModel(units, space, hmm, closure)
             check_poses(model.poses, space, closure)
@@ -219,21 +227,21 @@ class JointEngine(Engine[JointModel]):
 
     def _observed(
         self, speech: Speech, motion: NDArray[np.float64] | None = None, seen: NDArray[np.bool_] | None = None
-    ) -> Observed:
+    ) -> StreamObservations:
         f0 = speech.log_f0 if self.config.f0 else None
-        return observe(np.asarray(speech.features.values), f0, motion, seen)
+        return stream_observations(np.asarray(speech.features.values), f0, motion, seen)
 
-    def _transcribed(self, example: Example, values: NDArray[np.float64], units: UnitSet) -> Transcribed:
+    def _transcribed(self, example: Example, values: NDArray[np.float64], units: UnitSet) -> TrainingUtterance:
         observed = self._observed(example.speech, values, example.valid)
-        said, bounds = in_frames(example.speech.units, observed.frames, units.silence[0], units.unit_of)
-        return Transcribed(observed, said, bounds)
+        said, bounds = units_in_frames(example.speech.units, observed.frames, units.silence[0], units.unit_of)
+        return TrainingUtterance(observed, said, bounds)
 
     def _recognised(
-        self, model: JointModel, observed: Observed, duration_s: float
+        self, model: JointModel, observed: StreamObservations, duration_s: float
     ) -> tuple[Timeline[Unit], list[StatePath]]:
         recogniser = joint_recogniser(model.hmm)
         said = recogniser.recognise(observed)
-        spoken = in_time(said, duration_s, model.units.label)
+        spoken = units_in_time(said, duration_s, model.units.label)
         if self.config.paths > 1:
             return spoken, recogniser.sampled_paths(observed, self.config.paths, self.config.seed)
         bounds = np.array([*(one.first for one in said), observed.frames])
@@ -244,15 +252,15 @@ def _also_silent(units: UnitSet) -> tuple[str, ...]:
     return tuple(unit for unit in units.silence[1:] if units.silent(unit))
 
 
-def _aligned(model: JointModel, observed: Observed, units: Timeline[Unit]) -> StatePath:
-    said, bounds = in_frames(units, observed.frames, model.units.silence[0], model.units.unit_of)
+def _aligned(model: JointModel, observed: StreamObservations, units: Timeline[Unit]) -> StatePath:
+    said, bounds = units_in_frames(units, observed.frames, model.units.silence[0], model.units.unit_of)
     return align(model.hmm, observed, said, bounds)
 
 
 def _sources(hmm: JointHmm, path: StatePath) -> tuple[str, ...]:
     """Return what stands behind every state of a path, in words."""
-    forest = hmm.parts[MOTION].forest
+    forest = hmm.models[MOTION].forest
     return tuple(
         f"{left}-{unit}+{right}.{state}: {forest.name(forest.leaf(((left, unit, right), state)))}"
-        for (left, unit, right), state in path.states.places
+        for (left, unit, right), state in path.states.triphones
     )

@@ -11,7 +11,13 @@ from numpy.typing import NDArray
 from lipmotion.engines.trajectory.emission import AcousticRegression, Emission, add_acoustic_regression
 from lipmotion.engines.trajectory.training_data import TrainingClip, TrainingOptions, rows_of
 from lipmotion.motion.context_window import AcousticContext, fit_acoustic_context
-from lipmotion.stats.regression import RegressionStatistics, fit_tree, owner, ridge, zero_statistics
+from lipmotion.stats.regression import (
+    RegressionStatistics,
+    fit_tree_regressions,
+    regression_node,
+    ridge,
+    zero_statistics,
+)
 
 Array = NDArray[np.float64]
 MOST = 170
@@ -27,7 +33,7 @@ def fit_acoustic_regression(emission: Emission, observed: Sequence[TrainingClip]
     A linear regression on the sound around the frame is learned from all frames, one for each node of the trees with
     enough of them, drawn towards that of the node above it: so a state with little data listens as its relatives do.
     """
-    window = fit_acoustic_context((one.features for one in observed), how.axes)
+    window = fit_acoustic_context((one.features for one in observed), how.acoustic_components)
     owners = _owners(emission, how)
     axes, outputs = window.basis.shape[1], emission.means[0].size
     moments = {key: zero_statistics(axes, outputs) for key in dict.fromkeys(owners) if key is not None}
@@ -48,7 +54,7 @@ def _owners(emission: Emission, how: TrainingOptions) -> list[_Key | None]:
     least = max(how.ridge_frames, sum(float(tree.frames[0]) for tree in emission.forest.values()) / MOST)
     found: list[_Key | None] = []
     for name, tree in emission.forest.items():
-        found += [(name, owner(tree, tree.path_to(int(leaf)), least)) for leaf in tree.leaves]
+        found += [(name, regression_node(tree, tree.path_to(int(leaf)), least)) for leaf in tree.leaves]
     return [*found, None]
 
 
@@ -84,7 +90,7 @@ def _coefficients(
     found: dict[_Key, Array] = {}
     for name, tree in emission.forest.items():
         own = {node: moments[tree_name, node] for tree_name, node in moments if tree_name == name}
-        found |= {(name, node): matrix for node, matrix in fit_tree(tree, own, shared, how.ridge).items()}
+        found |= {(name, node): matrix for node, matrix in fit_tree_regressions(tree, own, shared, how.ridge).items()}
     index = {key: number for number, key in enumerate(found)}
     return np.array(list(found.values()), np.float32), index
 

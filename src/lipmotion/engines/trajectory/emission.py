@@ -14,7 +14,7 @@ from lipmotion.motion.context_window import WINDOW, AcousticContext, acoustic_co
 from lipmotion.motion.frame_labels import FullContextState, StateLayout
 from lipmotion.motion.limits import check_spread
 from lipmotion.stats.trees import TREES, Tree, tree_arrays, trees_from_arrays
-from lipmotion.storage.schema import POSITIVE, Arrays, Member, checked
+from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, checked_arrays
 
 Array = NDArray[np.float64]
 
@@ -119,24 +119,24 @@ def emission_from_arrays(arrays: Arrays, cut: StateLayout, dimensions: int) -> E
     if len(forest) != cut.speech + cut.silence or list(forest) != cut.names:
         raise ValueError(f"trees for {len(forest)} parts, required {cut.speech} of speech and {cut.silence} of silence")
     leaves = sum(len(tree.leaves) for tree in forest.values()) + 1
-    found = checked(arrays, DENSITIES, L=leaves, Q=dimensions)
+    found = checked_arrays(arrays, DENSITIES, L=leaves, Q=dimensions)
     check_spread(found["means"][:, 0], found["variances"][:, 0])
     hearing = _hearing(arrays, leaves, dimensions) if HEARING.keys() & arrays.keys() else None
     return Emission(forest, found["means"], found["variances"], hearing)
 
 
-DENSITIES = {"means": Member(np.float32, "L 3 Q"), "variances": Member(np.float32, "L 3 Q", POSITIVE)}
+DENSITIES = {"means": ArraySpec(np.float32, "L 3 Q"), "variances": ArraySpec(np.float32, "L 3 Q", POSITIVE)}
 HEARING = {
     **WINDOW,
-    "coefficients": Member(np.float32, "C A V"),
-    "coefficient_rows": Member(np.int32, "L", -1, 1e6),
+    "coefficients": ArraySpec(np.float32, "C A V"),
+    "coefficient_rows": ArraySpec(np.int32, "L", -1, 1e6),
 }
 EMISSION = (*TREES, *DENSITIES, *HEARING)
 """How they are stored: L leaves and C regressions."""
 
 
 def _hearing(arrays: Arrays, leaves: int, dimensions: int) -> AcousticRegression:
-    found = checked(arrays, HEARING, L=leaves, V=3 * dimensions)
+    found = checked_arrays(arrays, HEARING, L=leaves, V=3 * dimensions)
     rows = found["coefficient_rows"]
     if rows.max() >= found.sizes["C"]:
         raise ValueError(f"a density that follows regression {rows.max()} of {found.sizes['C']}")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar, final
 
@@ -13,90 +13,88 @@ from lipmotion.engines.base import Arrays, Engine, Fit
 from lipmotion.engines.trajectory.model import TrajectoryModel, model_arrays, model_from_arrays
 from lipmotion.engines.trajectory.train import fit_trajectory
 from lipmotion.engines.trajectory.training_data import TrainingOptions
-from lipmotion.errors import InputError
 from lipmotion.motion.closure import closing_spans
 from lipmotion.motion.frame_labels import StateLayout, full_context_states, with_unit_names
 from lipmotion.motion.generation import Statistics, generated_motion, resolved_pins
 from lipmotion.motion.variance_scaling import scaled
 from lipmotion.printable import printable
-from lipmotion.storage.checkpoint import NOTHING_KEPT, Checkpoint
+from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import (
     FRAME_RATE_HZ,
+    Configuration,
     Constraints,
     Example,
     Generation,
     Monitor,
     Motion,
+    Rule,
     Speech,
     Timeline,
     Trace,
     Unit,
+    option,
 )
 from lipmotion.units import UnitSet, unit_set
 
+POSITIVE, ODD = Rule(above=0), Rule(least=1, odd=True)
+
 
 @dataclass(frozen=True)
-class TrajectoryConfig:
+class TrajectoryConfig(Configuration):
     """How the trajectory engine models motion (chosen on the validation list; see docs/decisions/0009).
 
-    parts, silent_parts : parts that a phone, and a silence, is cut into; odd numbers
-    edge_s     : most seconds that a part before or after the middle one lasts
-    components : dimensions that all point channels are reduced to
+    states, silent_states : states of a phone, and of a silence; odd numbers
+    edge_s     : longest duration of a state before or after the middle one, seconds
+    components : principal components that all point channels are reduced to
     tree_factor: what a split of a decision tree must gain, in units of its description length
     least_frames : frames that a leaf of a tree must have
-    shrinkage, variance_shrinkage : frames that the mean, and the variance, of the node above count for
-    listens    : let the means follow the sound around the frame (False: plain Gaussians, at the same fixed times)
-    axes       : numbers that the sound around a frame is reduced to
-    ridge, shared_ridge : how strongly a regression on the sound is drawn towards that of the node above, and the one
-                 that all share towards none
-    ridge_frames : frames that a node must have for a regression of its own (``hearing.MOST`` asks for more)
-    trajectory_steps : steps of training for the least error of the generated trajectory (0: none)
-    full_range : make movements as large as the original's
+    shrinkage, variance_shrinkage : frames that the mean, and the variance, of the parent node count for
+    acoustic_regression : regress the means on the acoustic features around the frame (False: plain Gaussians)
+    acoustic_components : principal components that the acoustic features around a frame are reduced to
+    ridge, shared_ridge : ridge parameters: of a regression towards that of the parent node, and of the one that all
+                 share towards zero
+    ridge_frames : frames that a node must have for a regression of its own
+    variance_scaling : scale movements to the variance of the recorded ones
     closures   : make the lips meet in every p, b and m, whatever their units are
-    joint      : train the joint model of speech, F0 and motion as well, if there is speech enough: it finds the
-                 phones of voices that it knows (``listening``)
+    joint_recogniser : train the joint model as well, where there is enough speech: it recognises the phones of voices
+                 that it was trained on
     units      : what is modelled: a unit set's name, or a table's (docs/unit-sets.md); training reads the table
     """
 
-    parts: int = 5
-    silent_parts: int = 13
-    edge_s: float = 0.08
-    components: int = 16
-    tree_factor: float = 0.2
-    least_frames: float = 8.0
-    shrinkage: float = 10.0
-    variance_shrinkage: float = 20.0
-    listens: bool = True
-    axes: int = 150
-    ridge: float = 2000.0
-    shared_ridge: float = 100.0
-    ridge_frames: float = 100.0
-    trajectory_steps: int = 0
-    full_range: bool = True
+    states: int = option(5, ODD)
+    silent_states: int = option(13, ODD)
+    edge_s: float = option(0.08, POSITIVE)
+    components: int = option(16, Rule(least=1))
+    tree_factor: float = option(0.2, POSITIVE)
+    least_frames: float = option(8.0, POSITIVE)
+    shrinkage: float = option(10.0, POSITIVE)
+    variance_shrinkage: float = option(20.0, POSITIVE)
+    acoustic_regression: bool = True
+    acoustic_components: int = option(150, Rule(least=1))
+    ridge: float = option(2000.0, POSITIVE)
+    shared_ridge: float = option(100.0, POSITIVE)
+    ridge_frames: float = option(100.0, POSITIVE)
+    variance_scaling: bool = True
     closures: bool = True
-    joint: bool = True
+    joint_recogniser: bool = True
     units: str = "phone"
 
-    def __post_init__(self) -> None:
-        for name in ("parts", "silent_parts"):
-            if getattr(self, name) < 1 or getattr(self, name) % 2 != 1:
-                raise InputError(f"{name} is {getattr(self, name)}, required an odd number from 1")
-        if not isinstance(self.units, str):
-            raise InputError(f"units is {self.units!r}, required the name of a unit set or a table")
-        numbers = [
-            getattr(self, field.name)
-            for field in fields(self)
-            if field.type not in ("bool", "str") and field.name != "trajectory_steps"
-        ]
-        if not all(0 < number < float("inf") for number in numbers):
-            raise InputError(f"all numbers of the configuration must be more than 0 and finite: {self}")
+    former: ClassVar[Mapping[str, str]] = {
+        "parts": "states",
+        "silent_parts": "silent_states",
+        "listens": "acoustic_regression",
+        "axes": "acoustic_components",
+        "full_range": "variance_scaling",
+        "joint": "joint_recogniser",
+    }
+    gone: ClassVar[Mapping[str, Any]] = {"trajectory_steps": 0}
 
-        if self.trajectory_steps < 0:
-            raise InputError(f"trajectory_steps is {self.trajectory_steps}, required 0 or more")
+    def check_files(self) -> None:  # noqa: D102
+        unit_set(self.units)
 
     def cut(self, units: UnitSet) -> StateLayout:
         """Return how units are cut into parts."""
-        return StateLayout(self.parts, self.silent_parts, self.edge_s, units)
+        return StateLayout(self.states, self.silent_states, self.edge_s, units)
 
     @property
     def learning(self) -> TrainingOptions:
@@ -116,23 +114,23 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
 
     config: TrajectoryConfig
     name: ClassVar[str] = "trajectory"
+    Config: ClassVar[type[Configuration]] = TrajectoryConfig
 
     @property
-    def hears_f0(self) -> bool:
-        """Whether it wants ``Speech.log_f0``."""
-        return self.config.joint
+    def wants_f0(self) -> bool:  # noqa: D102
+        return self.config.joint_recogniser
 
     def fit(  # noqa: D102
-        self, examples: Sequence[Example], monitor: Monitor, checkpoint: Checkpoint = NOTHING_KEPT
+        self, examples: Sequence[Example], monitor: Monitor, checkpoint: Checkpoint = NO_CHECKPOINT
     ) -> Fit[TrajectoryModel]:
         model = fit_trajectory(examples, self.config.learning, monitor, checkpoint)
         frames = sum(int(example.valid.sum()) for example in examples)
         return Fit(model, {"frames": frames, "leaves": len(model.emission.means)})
 
-    def listen(self, model: TrajectoryModel, speech: Speech) -> Timeline[Unit] | None:  # noqa: D102
+    def recognise(self, model: TrajectoryModel, speech: Speech) -> Timeline[Unit] | None:  # noqa: D102
         return model.listener.phones(speech) if model.listener is not None else None
 
-    def unpinned(self) -> TrajectoryEngine:  # noqa: D102
+    def without_closures(self) -> TrajectoryEngine:  # noqa: D102
         return replace(self, config=replace(self.config, closures=False))
 
     def generate(self, model: TrajectoryModel, speech: Speech, constraints: Constraints | None = None) -> Generation:  # noqa: D102
@@ -145,7 +143,7 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
 
         def statistics(wanted: slice) -> Statistics:
             found = model.emission.statistics(rows[path[wanted]], features, wanted)
-            if not self.config.full_range:
+            if not self.config.variance_scaling:
                 return found
             return scaled(*found, model.gain, model.emission.means[-1, 0])
 
@@ -165,7 +163,7 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
             Trace(tuple(model.emission.source(place, cut) for place in distinct), path),
         )
 
-    def trees(self, model: TrajectoryModel) -> str:  # noqa: D102
+    def describe(self, model: TrajectoryModel) -> str:  # noqa: D102
         return "\n\n".join(f"{printable(name)}\n{tree.text()}" for name, tree in model.emission.forest.items())
 
     def to_arrays(self, model: TrajectoryModel) -> dict[str, NDArray[Any]]:  # noqa: D102

@@ -23,7 +23,7 @@ from lipmotion.motion.closure import Closure
 from lipmotion.motion.frame_labels import StateLayout
 from lipmotion.motion.limits import MotionLimits, check_poses, limits_of
 from lipmotion.motion.space import MotionSpace
-from lipmotion.storage.schema import POSITIVE, Arrays, Member, checked, only
+from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, checked_arrays, refuse_undeclared
 from lipmotion.units import UnitSet
 
 
@@ -72,10 +72,10 @@ def model_from_arrays(arrays: Arrays, cut: Callable[[UnitSet], StateLayout], uni
     Raises ModelFormatError: something is missing, undeclared, out of place or out of range.
     """
     try:
-        only(arrays, MOTION_ARRAYS, EMISSION, GAIN, (name for name in arrays if name.startswith(LISTENER)))
+        refuse_undeclared(arrays, MOTION_ARRAYS, EMISSION, GAIN, (name for name in arrays if name.startswith(LISTENER)))
         of, space, closure = motion_from_arrays(arrays, units)
         emission = emission_from_arrays(arrays, cut(of), space.dimensions)
-        gain = checked(arrays, GAIN, Q=space.dimensions)["gain"]
+        gain = checked_arrays(arrays, GAIN, Q=space.dimensions)["gain"]
         model = TrajectoryModel(of, space, emission, gain, closure, recogniser_from_arrays(arrays))
         check_poses(model.poses, space, closure)
         return model
@@ -83,4 +83,4 @@ def model_from_arrays(arrays: Arrays, cut: Callable[[UnitSet], StateLayout], uni
         raise ModelFormatError(f"the trajectory model is damaged ({error}); train or download it again") from error
 
 
-GAIN = {"gain": Member(np.float64, "Q", POSITIVE, 10)}
+GAIN = {"gain": ArraySpec(np.float64, "Q", POSITIVE, 10)}

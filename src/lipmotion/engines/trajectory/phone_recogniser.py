@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from lipmotion.errors import AlignmentError
 from lipmotion.hmm.multistream.arrays import joint_arrays, joint_from_arrays
 from lipmotion.hmm.multistream.inventory import Inventory
-from lipmotion.hmm.multistream.labels import in_frames, in_time
+from lipmotion.hmm.multistream.labels import units_in_frames, units_in_time
 from lipmotion.hmm.multistream.model import JointConfig, JointHmm
 from lipmotion.hmm.multistream.recognise import joint_recogniser
-from lipmotion.hmm.multistream.streams import SPEECH, Observed, observe
-from lipmotion.hmm.multistream.train import Transcribed, train_joint
+from lipmotion.hmm.multistream.streams import SPEECH, StreamObservations, stream_observations
+from lipmotion.hmm.multistream.train import TrainingUtterance, train_joint
 from lipmotion.storage.checkpoint import Checkpoint
-from lipmotion.storage.schema import Arrays, Member, checked, under
+from lipmotion.storage.schema import Arrays, ArraySpec, arrays_under, checked_arrays
 from lipmotion.types import FRAME_RATE_HZ, Example, Monitor, Speech, Timeline, Unit
 from lipmotion.units import UNIT_SETS, is_silent
 
@@ -36,7 +36,7 @@ HEARD_FRAMES = 400
 _STAGE = "joint"
 LISTENER = "joint_"
 """What the names of its arrays begin with."""
-TYPICAL = {"typical": Member(np.float64, "1", -1e6, 1e6)}
+TYPICAL = {"typical": ArraySpec(np.float64, "1", -1e6, 1e6)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +62,7 @@ class OwnPhoneRecogniser:
             found = joint_recogniser(self.hmm).recognise(observed)
         except AlignmentError:  # shorter than any phone
             return None
-        return in_time(found, speech.features.duration_s)
+        return units_in_time(found, speech.features.duration_s)
 
 
 def fit_phone_recogniser(
@@ -99,31 +99,31 @@ def recogniser_arrays(listener: OwnPhoneRecogniser) -> dict[str, NDArray[Any]]:
 
 def recogniser_from_arrays(arrays: Arrays) -> OwnPhoneRecogniser | None:
     """Return it again, or None. Raises ModelFormatError, KeyError, ValueError: something is missing or damaged."""
-    own = under(arrays, LISTENER)
+    own = arrays_under(arrays, LISTENER)
     if not own:
         return None
-    (typical,) = checked(own, TYPICAL)["typical"].tolist()
+    (typical,) = checked_arrays(own, TYPICAL)["typical"].tolist()
     hmm = joint_from_arrays({name: array for name, array in own.items() if name not in TYPICAL}, CONFIG)
     if set(hmm.inventory.names) != set(PHONES.units):
         raise ValueError(f"the units {' '.join(hmm.inventory.names)}, required {' '.join(PHONES.units)}")
     return OwnPhoneRecogniser(hmm, typical)
 
 
-def _observed(speech: Speech) -> Observed:
-    return observe(np.asarray(speech.features.values), speech.log_f0)
+def _observed(speech: Speech) -> StreamObservations:
+    return stream_observations(np.asarray(speech.features.values), speech.log_f0)
 
 
-def _transcribed(example: Example, values: NDArray[np.float64]) -> Transcribed:
+def _transcribed(example: Example, values: NDArray[np.float64]) -> TrainingUtterance:
     speech = example.speech
-    observed = observe(np.asarray(speech.features.values), speech.log_f0, values, example.valid)
-    units, bounds = in_frames(speech.units, observed.frames, PHONES.silence[0], PHONES.unit_of)
-    return Transcribed(observed, units, bounds)
+    observed = stream_observations(np.asarray(speech.features.values), speech.log_f0, values, example.valid)
+    units, bounds = units_in_frames(speech.units, observed.frames, PHONES.silence[0], PHONES.unit_of)
+    return TrainingUtterance(observed, units, bounds)
 
 
-def _fit(hmm: JointHmm, observed: Observed) -> float:
+def _fit(hmm: JointHmm, observed: StreamObservations) -> float:
     """Return the mean log density of some frames' features, each under the leaf that fits it best."""
-    part = hmm.parts[SPEECH]
-    rows = hmm.inside(observed, hmm.config.recognition)[SPEECH]
+    part = hmm.models[SPEECH]
+    rows = hmm.standardise(observed, hmm.config.recognition)[SPEECH]
     chosen = rows[np.linspace(0, len(rows) - 1, min(len(rows), HEARD_FRAMES)).astype(int)]
     leaves = np.arange(part.forest.size)
     return float(part.tied.log_density(chosen, leaves, part.scale.log_volume).max(axis=1).mean())

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from lipmotion.engines.trajectory.acoustic_regression import fit_acoustic_regression
 from lipmotion.engines.trajectory.emission import Emission
-from lipmotion.engines.trajectory.generation_error import minimise_generation_error
 from lipmotion.engines.trajectory.model import TrajectoryModel
 from lipmotion.engines.trajectory.phone_recogniser import fit_phone_recogniser
 from lipmotion.engines.trajectory.training_data import TrainingClip, TrainingOptions, rows_of
@@ -19,9 +18,9 @@ from lipmotion.motion.closure import fit_closure_of
 from lipmotion.motion.frame_labels import FullContextState, StateLayout, full_context_states
 from lipmotion.motion.space import fit_reduced_motion
 from lipmotion.motion.variance_scaling import scaling_factors
-from lipmotion.stats.delta_windows import with_dynamics, within
-from lipmotion.stats.trees import Question, Tree, gaussian_likelihood, grow
-from lipmotion.storage.checkpoint import NOTHING_KEPT, Checkpoint
+from lipmotion.stats.delta_windows import dynamics_known, with_dynamics
+from lipmotion.stats.trees import Question, Tree, gaussian_log_likelihood, grow_tree
+from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import Example, Monitor, Progress, part_of
 
 Array = NDArray[np.float64]
@@ -30,7 +29,7 @@ LEAST_VARIANCE_SHARE, LEAST_VARIANCE = 1e-3, 1e-12
 
 
 def fit_trajectory(
-    examples: Sequence[Example], how: TrainingOptions, monitor: Monitor, checkpoint: Checkpoint = NOTHING_KEPT
+    examples: Sequence[Example], how: TrainingOptions, monitor: Monitor, checkpoint: Checkpoint = NO_CHECKPOINT
 ) -> TrajectoryModel:
     """Return densities of the motion for every part of a phone in context, tied by decision trees.
 
@@ -38,7 +37,7 @@ def fit_trajectory(
     """
     space, values = fit_reduced_motion(examples, how.components)
     listener = None
-    if how.joint:
+    if how.joint_recogniser:
         listener = fit_phone_recogniser(examples, values, part_of(monitor, 0, 0.8), checkpoint)
     monitor = part_of(monitor, 0.8, 1)
     observed = [training_clip(example, x, how.cut) for example, x in zip(examples, values, strict=True)]
@@ -50,11 +49,9 @@ def fit_trajectory(
         )
     monitor(Progress(_STAGE, 1, 3, 0.1))
     emission = _tied(observed, how)
-    if how.listens:
+    if how.acoustic_regression:
         monitor(Progress(_STAGE, 2, 3, 0.3))
         emission = fit_acoustic_regression(emission, observed, how)
-    if how.trajectory_steps:
-        emission = minimise_generation_error(emission, observed, how)
     gain = _scaling(emission, observed, how)
     monitor(Progress(_STAGE, 3, 3, 1.0))
     closure = fit_closure_of(space.direct_names, values, examples)
@@ -78,7 +75,7 @@ def _scaling(emission: Emission, observed: Sequence[TrainingClip], how: Training
 
 def training_clip(example: Example, values: Array, cut: StateLayout) -> TrainingClip:
     """Return what training needs of an example, whose motion in the model's space is ``values`` [shape=(T, Q)]."""
-    frames = np.nonzero(within(example.valid))[0]
+    frames = np.nonzero(dynamics_known(example.valid))[0]
     where = full_context_states(example.speech.units, len(values), cut)
     features = np.asarray(example.speech.features.values)
     dynamics = with_dynamics(values)[frames].astype(np.float32)
@@ -110,11 +107,11 @@ def _tied(observed: Sequence[TrainingClip], how: TrainingOptions) -> Emission:
 def _grown(contexts: _Contexts, parameters: int, how: TrainingOptions) -> Tree:
     """Return the tree of one part; a single leaf where the part was never seen."""
     unseen = {how.cut.rest.context: np.zeros(1 + parameters)}
-    return grow(
+    return grow_tree(
         list(contexts or unseen),
         np.array(list((contexts or unseen).values())),
         [Question(place, *named) for place in range(3) for named in how.cut.units.classes().items()],
-        gaussian_likelihood,
+        gaussian_log_likelihood,
         parameters=parameters,
         factor=how.tree_factor,
         least=how.least_frames,

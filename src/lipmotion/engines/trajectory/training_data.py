@@ -21,12 +21,11 @@ class TrainingOptions:
     tree_factor: what a split of a tree must gain, in units of its description length
     least_frames : frames that a leaf must have
     shrinkage, variance_shrinkage : frames that the mean, and the variance, of the node above count for
-    listens    : let the means follow the sound around the frame
-    axes       : numbers that the sound around a frame is reduced to
+    acoustic_regression : regress the means on the acoustic features around the frame
+    acoustic_components : principal components that these features are reduced to
     ridge, shared_ridge : how strongly a regression is drawn towards the one above it, and the shared one towards none
     ridge_frames : frames that a node must have for a regression of its own
-    trajectory_steps : steps of training for the least error of the generated trajectory (0: none)
-    joint : train the joint model as well
+    joint_recogniser : train the joint model as well
     """
 
     cut: StateLayout
@@ -35,13 +34,12 @@ class TrainingOptions:
     least_frames: float
     shrinkage: float
     variance_shrinkage: float
-    listens: bool
-    axes: int
+    acoustic_regression: bool
+    acoustic_components: int
     ridge: float
     shared_ridge: float
     ridge_frames: float
-    trajectory_steps: int
-    joint: bool
+    joint_recogniser: bool
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,20 +12,20 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from lipmotion.corpora.base import Recording, Recordings
 from lipmotion.corpora.discover import discover
-from lipmotion.corpora.entry import quantised, read_entry, write_utterance
+from lipmotion.corpora.entry import quantise, read_entry, write_utterance
+from lipmotion.corpora.source_recordings import RecordingFolder, SourceRecording
 from lipmotion.corpora.store import UTTERANCES, Corpus
 from lipmotion.errors import AlignmentError, CorpusError, ExportError, InputError, MissingDependencyError
 from lipmotion.pipeline.corpus.supplied_motion import DIGESTS, digest, given_phones, given_track
 from lipmotion.pipeline.workers import working
+from lipmotion.speech.audio_files import read_audio
 from lipmotion.speech.mfcc import mfcc
-from lipmotion.speech.read import read_audio
 from lipmotion.storage.files import locked, remove_unfinished, sha256_of
 from lipmotion.storage.sources import Source, check_apart, is_folder
 from lipmotion.types import Item, Monitor, Progress, Track, Utterance, silent_monitor
 from lipmotion.units import check_words
-from lipmotion.vision.packages import versions
+from lipmotion.vision.packages import package_versions
 from lipmotion.vision.track import track
 
 RECIPE = "4"
@@ -70,7 +70,7 @@ class PrepareReport:
 class _Job:
     """One recording, the folder it becomes, and what is known of it beforehand."""
 
-    recording: Recording
+    recording: SourceRecording
     folder: Path
     source: dict[str, str]
     settings: dict[str, str]
@@ -113,7 +113,7 @@ def prepare(
         raise InputError(f"{workers} processes, required at least 1; leave it out for one a core")
     check_apart((), [Source(directory, "folder of recordings")], folders=[output])
     found = discover(directory)
-    packages = versions() if any(item.curves is None for item in found.items) else {}
+    packages = package_versions() if any(item.curves is None for item in found.items) else {}
     is_new = not is_folder(output)
     with locked(output):
         corpus = Corpus.create(output)
@@ -131,7 +131,7 @@ def prepare(
     return report
 
 
-def _report(corpus: Corpus, found: Recordings, outcomes: list[_Outcome], seconds: float) -> PrepareReport:
+def _report(corpus: Corpus, found: RecordingFolder, outcomes: list[_Outcome], seconds: float) -> PrepareReport:
     outcomes = sorted(outcomes, key=lambda outcome: outcome.name)
     good = [outcome for outcome in outcomes if not outcome.problem]
     problems = found.problems | {outcome.name: outcome.problem for outcome in outcomes if outcome.problem}
@@ -147,7 +147,7 @@ def _report(corpus: Corpus, found: Recordings, outcomes: list[_Outcome], seconds
     )
 
 
-def _job(recording: Recording, directory: Path, corpus: Corpus, packages: dict[str, str], crops: bool) -> _Job:
+def _job(recording: SourceRecording, directory: Path, corpus: Corpus, packages: dict[str, str], crops: bool) -> _Job:
     collection = "/".join(directory.parts[-2:]).strip("/")
     name = recording.name
     if _is_taken(corpus.folder(name), recording.file, collection):
@@ -210,7 +210,7 @@ def _kept(job: _Job, source: dict[str, str]) -> dict[str, Any] | None:
 
 
 def _utterance(job: _Job, source: dict[str, str]) -> Utterance:
-    audio = quantised(read_audio(job.recording.file))
+    audio = quantise(read_audio(job.recording.file))
     check_words(job.recording.words or (), audio.duration_s)
     return Utterance(
         name=job.recording.name,
@@ -231,7 +231,7 @@ def _track(job: _Job, duration_s: float) -> Track:
     return track(job.recording.file, crops=job.settings["crops"] == "yes")
 
 
-def _heard(found: Recordings, coming: Iterator[_Outcome], count: int, monitor: Monitor) -> list[_Outcome]:
+def _heard(found: RecordingFolder, coming: Iterator[_Outcome], count: int, monitor: Monitor) -> list[_Outcome]:
     """Return all outcomes; each is reported as soon as it is known."""
     for name, problem in found.problems.items():
         monitor(Item(name, "skipped", problem))

@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from lipmotion.corpora.base import Curves, Recording
-from lipmotion.corpora.facegood import read_array
+from lipmotion.corpora.facegood import read_bare_motion
+from lipmotion.corpora.source_recordings import MotionFile, SourceRecording
 from lipmotion.errors import InputError
 from lipmotion.export.base import read_motion
 from lipmotion.speech.recogniser import SHORT_PAUSE_S
@@ -25,7 +25,7 @@ PHONES_MARGIN_S = 0.1
 """Labels may end this long after the sound: tools round."""
 
 
-def digest(recording: Recording) -> dict[str, str]:
+def digest(recording: SourceRecording) -> dict[str, str]:
     """Return what identifies the motion and the phones that came with a recording, if any."""
     found = {}
     if recording.curves is not None:
@@ -37,13 +37,13 @@ def digest(recording: Recording) -> dict[str, str]:
     return found
 
 
-def given_track(curves: Curves, duration_s: float) -> Track:
+def given_track(curves: MotionFile, duration_s: float) -> Track:
     """Return the motion in a file as a track that was seen everywhere, without mouth images.
 
     duration_s : of the sound that it belongs to
     Raises InputError: not a motion file, or of another length than the sound.
     """
-    motion = read_array(curves) if curves.channels else read_motion(curves.file)[0]
+    motion = read_bare_motion(curves) if curves.channels else read_motion(curves.file)[0]
     length_s = len(motion.values) / motion.rate_hz
     if abs(length_s - duration_s) > max(CURVES_MARGIN_S, CURVES_MARGIN_SHARE * duration_s):
         raise InputError(
@@ -53,7 +53,7 @@ def given_track(curves: Curves, duration_s: float) -> Track:
     return Track(motion, np.ones(len(motion.values), bool))
 
 
-def given_phones(recording: Recording, duration_s: float) -> Timeline[Unit] | None:
+def given_phones(recording: SourceRecording, duration_s: float) -> Timeline[Unit] | None:
     """Return the labelled phones of a recording from 0 s to the end of its sound, or None if there are none.
 
     Silence is named as recognition names it: a short one between phones is a pause.

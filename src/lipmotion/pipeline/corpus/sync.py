@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from lipmotion.corpora.entry import read_entry
 from lipmotion.corpora.store import Corpus
 from lipmotion.kernels.threads import one_thread
-from lipmotion.measures.offset import Offset, offset, pooled_offset, shift_scores
+from lipmotion.measures.offset import Offset, best_offset, pooled_offset, shift_scores
 from lipmotion.motion.resample import to_model_frames
-from lipmotion.speech.lip_speed import opening_speed, speed
+from lipmotion.speech.lip_speed import measured_opening_speed, predicted_opening_speed
 from lipmotion.speech.mfcc import WINDOW, mfcc
 from lipmotion.storage.files import locked
 from lipmotion.types import FRAME_RATE_HZ, Audio, Timeline, Unit, Utterance
@@ -63,7 +63,7 @@ class CorpusOffsets:
 def clip_scores(utterance: Utterance) -> NDArray[np.float64]:
     """Return how well sound and lips agree at every shift of up to ``REACH_S`` [shape=(81,)]."""
     motion = utterance.track.motion
-    predicted = opening_speed(utterance.features)
+    predicted = predicted_opening_speed(utterance.features)
     opening, valid = to_model_frames(
         np.asarray(motion[OPENING], float)[:, None],
         np.asarray(utterance.track.seen),
@@ -71,7 +71,7 @@ def clip_scores(utterance: Utterance) -> NDArray[np.float64]:
         len(predicted),
         FRAME_RATE_HZ,
     )
-    return shift_scores(predicted, speed(opening[:, 0]), valid, round(REACH_S * FRAME_RATE_HZ))
+    return shift_scores(predicted, measured_opening_speed(opening[:, 0]), valid, round(REACH_S * FRAME_RATE_HZ))
 
 
 def offsets(corpus: Corpus) -> CorpusOffsets:
@@ -88,7 +88,7 @@ def offsets(corpus: Corpus) -> CorpusOffsets:
             scores[name] = clip_scores(utterance)
             members.setdefault(_group(utterance), []).append(name)
     return CorpusOffsets(
-        clips={name: offset(score, FRAME_RATE_HZ) for name, score in scores.items()},
+        clips={name: best_offset(score, FRAME_RATE_HZ) for name, score in scores.items()},
         collections={
             collection: pooled_offset([scores[name] for name in names], FRAME_RATE_HZ)
             for collection, names in members.items()

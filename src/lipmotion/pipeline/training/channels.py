@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lipmotion.appearance.eigenlips import COMPONENTS, Eigenlips, fit_eigenlips
 from lipmotion.errors import CorpusError, InputError
-from lipmotion.stats.pca import evenly
+from lipmotion.stats.pca import evenly_spaced
 from lipmotion.types import Motion, Track, Utterance
 
 GEOMETRY, EIGENLIPS, BOTH = "geometry", "eigenlips", "both"
@@ -35,7 +35,7 @@ def learned_eigenlips(
     """
     seen = [np.flatnonzero(utterance.track.seen) for utterance in utterances]
     ends = np.cumsum([len(frames) for frames in seen])
-    chosen = evenly(pictures, int(ends[-1]) if len(ends) else 0)
+    chosen = evenly_spaced(pictures, int(ends[-1]) if len(ends) else 0)
     if not len(chosen):
         raise CorpusError(f"no face is seen in {len(utterances)} utterances; prepare a corpus of videos with faces")
     parts = np.split(chosen, np.searchsorted(chosen, ends[:-1]))

@@ -6,7 +6,6 @@ import hashlib
 import json
 import platform
 from collections.abc import Sequence
-from dataclasses import asdict
 from importlib import metadata
 from typing import Any
 
@@ -28,8 +27,8 @@ def fingerprint(
     """Return a digest of the utterances' content, the configuration, the user's words, and what computes."""
     digest = hashlib.sha256()
     job = {
-        "engine": [engine.name, asdict(engine.config)],
-        "recogniser": asdict(recogniser),
+        "engine": [engine.name, engine.config.as_mapping()],
+        "recogniser": recogniser.as_mapping(),
         "words": lexicon.user,
         "visual": visual,
         "versions": {name: metadata.version(name) for name in ("lipmotion", "numpy", "scipy", "pocketsphinx")},

@@ -13,8 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from lipmotion.corpora.store import Corpus
+from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines import Engine, engine_named
+from lipmotion.engines.base import TrainsOnSpeechAlone
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.model import HmmConfig, UnitHmm
 from lipmotion.kernels.threads import one_thread
@@ -27,9 +28,9 @@ from lipmotion.pipeline.training.voices import Heard
 from lipmotion.pipeline.transcribe import phones_in_time, report_guesses
 from lipmotion.pipeline.workers import working
 from lipmotion.speech.f0 import log_f0
-from lipmotion.speech.phones import train_phones
+from lipmotion.speech.phone_models import train_phone_models
 from lipmotion.speech.recogniser import Recogniser
-from lipmotion.storage.checkpoint import NOTHING_KEPT, Checkpoint
+from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
 from lipmotion.storage.sources import Source, check_apart
 from lipmotion.types import (
     FRAME_RATE_HZ,
@@ -68,39 +69,48 @@ class TrainReport:
     figures: Mapping[str, float]
 
 
+@dataclass(frozen=True, eq=False)
+class Run:
+    """How long work is run, which changes nothing of its result.
+
+    monitor : called with the progress, and with the utterances that are left out
+    work    : a folder for checkpoints, from which the same call continues after it was stopped
+              (``storage.files.unfinished_work`` makes one); the model is the same to the byte
+    workers : processes that share the work, fewer if the corpus is small. With more than one, a script must call under
+              ``if __name__ == "__main__":``, as for every process pool
+    """
+
+    monitor: Monitor = silent_monitor
+    work: Path | None = None
+    workers: int = 1
+
+
+QUIETLY, TRAINING_LIST = Run(), Selection("train")
+
+
 @one_thread()
 def train(
     corpus: Corpus,
     *,
-    split: str | None = "train",
-    names: Sequence[str] | None = None,
-    speakers: Sequence[str] = (),
-    voices: Iterable[Heard] = (),
+    selection: Selection = TRAINING_LIST,
     engine: Engine[Any] | None = None,
     recogniser: HmmConfig | None = None,
     lexicon: Lexicon | None = None,
     visual: str = GEOMETRY,
-    monitor: Monitor = silent_monitor,
-    work: Path | None = None,
-    workers: int = 1,
+    voices: Iterable[Heard] = (),
+    run: Run = QUIETLY,
 ) -> tuple[Model, TrainReport]:
     """Train phone models on what is transcribed, then the motion of everything.
 
     corpus     : from ``prepare``
-    split      : the list to train on; None: all utterances
-    names      : these utterances only, whatever their list (learning curves)
-    speakers   : theirs only; all by default
-    voices     : speech of other speakers, without motion, for the second stage of training (``pipeline.voices.heard``);
-                 only for engines that have one (``coupled``). What is kept in ``work`` does not depend on them
+    selection  : the utterances to train on; the list ``train`` by default
     engine     : with its configuration; the trajectory engine by default
     recogniser : configuration of the phone models
     visual     : ``geometry``: the channels that were tracked or given; ``eigenlips``: principal components of the mouth
                  pictures (docs/eigenlips.md); ``both``
-    monitor    : hears how far it is, and which utterances are left out
-    work       : a folder that keeps what is finished, so that the same call goes on from there after it was stopped
-                 (``files.unfinished_work`` gives one); the model is the same to the byte
-    workers    : processes that share the work, fewer if the corpus is small; the model does not depend on it. With more
-                 than one, a script must call this under ``if __name__ == "__main__":``, as for every process pool
+    voices     : speech of other speakers, without motion, for the second stage of training
+                 (``pipeline.training.voices``); only for engines that ``TrainsOnSpeechAlone``
+    run        : monitor, checkpoints and processes: the model does not depend on any of them
     Phones that are labelled are taken as they are. Utterances without a transcript are recognised, by the phone models
     of the others or, where there are none, by those of the shipped model.
     Nothing here is random: the same corpus gives the same model.
@@ -108,30 +118,30 @@ def train(
     Raises InputError: no such ``visual``, or voices and an engine that has no use for them.
     """
     check_visual(visual)
-    if work is not None:
-        check_apart((), [Source(corpus.path, "corpus")], folders=[work])
+    if run.work is not None:
+        check_apart((), [Source(corpus.path, "corpus")], folders=[run.work])
     lexicon = lexicon or Lexicon()
     engine = engine or engine_named("trajectory", {})
-    chosen = tuple(names) if names is not None else corpus.required(split, speakers)
-    if not chosen:
-        raise CorpusError(f"{corpus.path}: an empty list of names was given; name at least one utterance")
+    chosen = corpus.selected(selection)
     recogniser = recogniser or HmmConfig()
-    others = list(examples_of_others(engine, voices, monitor))
+    others = list(examples_of_others(engine, voices, run.monitor))
     utterances = [corpus.utterance(name) for name in chosen]
     eigenlips = learned_eigenlips(utterances) if visual != GEOMETRY else None
     utterances = [as_learned(utterance, visual, eigenlips) for utterance in utterances]
-    job = fingerprint(corpus, chosen, engine, recogniser, lexicon, visual) if work else ""
-    checkpoint = Checkpoint(work, job) if work else NOTHING_KEPT
-    with working(min(workers, len(chosen) // FEWEST)) as team:
-        listening = part_of(monitor, 0, 0.9)
+    job = fingerprint(corpus, chosen, engine, recogniser, lexicon, visual) if run.work else ""
+    checkpoint = Checkpoint(run.work, job) if run.work else NO_CHECKPOINT
+    with working(min(run.workers, len(chosen) // FEWEST)) as team:
+        listening = part_of(run.monitor, 0, 0.9)
         phones, examples, skipped = phones_and_examples(
             utterances, recogniser, lexicon, listening, checkpoint, team.each
         )
-    fit = engine.fit([*examples, *others], part_of(monitor, 0.9, 1, "learning motion: "), checkpoint)
+    fit = engine.fit([*examples, *others], part_of(run.monitor, 0.9, 1, "learning motion: "), checkpoint)
     used = tuple(example.name for example in examples)
-    about = _about(corpus, utterances, "given names" if names is not None else split or "all", len(used))
-    if speakers:
-        about["speakers"] = sorted(set(speakers))
+    about = _about(
+        corpus, utterances, "given names" if selection.names is not None else selection.split or "all", len(used)
+    )
+    if selection.speakers and selection.names is None:
+        about["speakers"] = sorted(set(selection.speakers))
     if others:
         about["voices"] = sorted({example.name for example in others})
     if eigenlips is not None:
@@ -166,10 +176,10 @@ def examples_of_others(
     Raises InputError: the engine has no use for them.
     """
     for number, (features, units, speaker) in enumerate(voices, start=1):
-        if not engine.hears_others:
+        if not (isinstance(engine, TrainsOnSpeechAlone) and engine.trains_on_speech_alone):
             raise InputError(
-                f"the {engine.name} engine cannot learn from other voices without motion; use the coupled engine, or "
-                "leave the voices out"
+                f"the engine {engine.name!r} does not learn from other voices without motion; use one that does "
+                "(--engine coupled), or leave the voices out"
             )
         monitor(Progress("hearing other voices", number, number, 0.0))
         frames = len(features.values)
@@ -212,7 +222,7 @@ def _phones(
     runs = {" ".join(run): (run,) for _, found in given for run in found}
     as_words = [(audio, tuple(map(" ".join, found))) for audio, found in given]
     words = Lexicon(lexicon.user | runs)
-    return train_phones([*spoken, *as_words], words, config, monitor, checkpoint, each)
+    return train_phone_models([*spoken, *as_words], words, config, monitor, checkpoint, each)
 
 
 def _runs(phones: Timeline[Unit]) -> list[tuple[str, ...]]:

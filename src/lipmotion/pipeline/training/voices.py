@@ -15,19 +15,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lipmotion.corpora.base import AUDIO_SUFFIXES
 from lipmotion.corpora.labels import labels_beside
+from lipmotion.corpora.source_recordings import AUDIO_SUFFIXES
 from lipmotion.errors import AlignmentError, CorpusError, InputError, MissingDependencyError
 from lipmotion.pipeline.corpus.prompts import prompts
 from lipmotion.pipeline.model import load_model
 from lipmotion.pipeline.transcribe import phones_in_time
-from lipmotion.speech.agreement import DOUBTFUL, agreement
+from lipmotion.speech.agreement import DOUBTFUL_SCORE, agreement_score
+from lipmotion.speech.audio_files import read_audio
 from lipmotion.speech.mfcc import mfcc
-from lipmotion.speech.noise import noisy
-from lipmotion.speech.read import read_audio
+from lipmotion.speech.noise import noisy_audio
 from lipmotion.speech.recogniser import Recogniser
-from lipmotion.speech.voices.base import SyntheticVoice
-from lipmotion.speech.voices.installed import SYNTHESISERS, installed_voices, speak_all
+from lipmotion.speech.voices.installed import SYNTHESISERS, installed_voices, speak_sentences
+from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.storage.files import check_listable
 from lipmotion.types import Audio, Features, Item, Monitor, ParallelMap, Span, Timeline, Unit, silent_monitor
 from lipmotion.units import SILENCE, Lexicon, is_silent
@@ -86,7 +86,7 @@ def many_voices(
     voices : all that are installed by default
     each   : shares the work, a voice at a time; the same arguments give the same samples
     A pause of 0.25 s is put before and after each, and white noise 50 dB under the speech throughout.
-    Raises MissingDependencyError: no synthesiser is installed. Raises InputError: as ``speech.voices.speak_all``.
+    Raises MissingDependencyError: no synthesiser is installed. Raises InputError: as ``speech.voices.speak_sentences``.
     """
     chosen = installed_voices() if voices is None else tuple(voices)
     if not chosen:
@@ -163,7 +163,7 @@ def _in_voice(voice: SyntheticVoice, texts: Sequence[str], lexicon: Lexicon | No
     name = f"{voice.synthesiser}-{voice.name}"
     return [
         SpokenSentence(f"{name}-{number:03d}", voice.speaker, *_in_a_room(audio, units, number))
-        for number, (audio, units) in enumerate(speak_all(texts, voice, lexicon), start=1)
+        for number, (audio, units) in enumerate(speak_sentences(texts, voice, lexicon), start=1)
     ]
 
 
@@ -178,7 +178,7 @@ def _in_a_room(audio: Audio, units: Timeline[Unit], seed: int) -> tuple[Audio, T
         del spoken[-1]
     before = Span(0.0, spoken[0].start_s, Unit(SILENCE))
     after = Span(spoken[-1].end_s, longer.duration_s, Unit(SILENCE))
-    return noisy(longer, "white", FLOOR_DB, seed=seed), Timeline((before, *spoken, after))
+    return noisy_audio(longer, "white", FLOOR_DB, seed=seed), Timeline((before, *spoken, after))
 
 
 def _speaker(name: str, inner: Path, speakers: Mapping[str, str]) -> str:
@@ -189,10 +189,10 @@ def _speaker(name: str, inner: Path, speakers: Mapping[str, str]) -> str:
 def _aligned(path: Path, words: Sequence[str], phones: Recogniser, lexicon: Lexicon) -> tuple[Audio, Timeline[Unit]]:
     audio = read_audio(path)
     units = phones_in_time(phones, audio, mfcc(audio), words, lexicon)
-    found = agreement(audio, units)
-    if found < DOUBTFUL:
+    found = agreement_score(audio, units)
+    if found < DOUBTFUL_SCORE:
         raise InputError(
             f"its transcript seems not to be what is said (its phones agree with the sound at {found:.1f}, required "
-            f"{DOUBTFUL} or more); check it"
+            f"{DOUBTFUL_SCORE} or more); check it"
         )
     return audio, units

@@ -92,7 +92,7 @@ def test_every_viseme_has_a_regression_for_each_place():
     assert len(TWO.units) == 2
 
 
-@pytest.mark.parametrize("follows", [True, False])
+@pytest.mark.parametrize("acoustic_regression", [True, False])
 def test_following_brings_motion_closer(follows):
     config = CoupledConfig(follows=follows, mixtures=1, closures=False)
     model = fit_coupled(examples(), config, silent_monitor)

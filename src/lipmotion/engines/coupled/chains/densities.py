@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.stats.mixture import Mixtures, Quadratic, divided_components, with_squares
+from lipmotion.stats.mixture import Mixtures, QuadraticForm, normalised_components, with_squares
 
 Index = NDArray[np.intp]
 Single = NDArray[np.float32]
@@ -78,7 +78,7 @@ class Ready:
     """A group with the matrices of its streams, without the weights of components."""
 
     group: Group
-    forms: tuple[Quadratic, ...]
+    forms: tuple[QuadraticForm, ...]
 
     def divided(self, observed: Observed, chosen: Index) -> tuple[Single, Single | None]:
         """Return the log density of some mixtures [shape=(T, G')], and their components' shares [shape=(T, M, G')].
@@ -87,7 +87,7 @@ class Ready:
         A stream that was not seen is left out, which is exact: its density integrates to 1. Shares are None where
         there is one component.
         """
-        return divided_components(self._components(observed, chosen))
+        return normalised_components(self._components(observed, chosen))
 
     def _components(self, observed: Observed, chosen: Index) -> Single:
         group = self.group
@@ -107,12 +107,12 @@ class Ready:
         return total
 
 
-def _among(form: Quadratic, chosen: Index) -> Quadratic:
+def _among(form: QuadraticForm, chosen: Index) -> QuadraticForm:
     """Return the matrix of some densities."""
     if np.array_equal(chosen, np.arange(form.constant.shape[1])):
         return form
     columns = form.form.reshape(len(form.form), *form.constant.shape)[:, :, chosen]
-    return Quadratic(columns.reshape(len(columns), -1), form.constant[:, chosen])
+    return QuadraticForm(columns.reshape(len(columns), -1), form.constant[:, chosen])
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from lipmotion.engines.coupled.chains.densities import Single
 from lipmotion.engines.coupled.chains.lattice import Joint, Lattice, Posteriors, summed
 from lipmotion.engines.coupled.chains.transitions import Transitions
-from lipmotion.kernels.network import Expectation
+from lipmotion.kernels.network import ForwardBackwardNetwork
 from lipmotion.kernels.viterbi import best_path
 
 Index = NDArray[np.intp]
@@ -28,7 +28,7 @@ class NetworkLattice(Lattice):
 
     states: Index
     chain_states: Index
-    network: Expectation
+    network: ForwardBackwardNetwork
 
     def posteriors(self, transitions: Transitions, logs: Sequence[Single]) -> Posteriors:  # noqa: D102
         ready = self.network.with_arcs(transitions.arc_log[self.counts], transitions.log_initial[self.states])
@@ -93,7 +93,7 @@ def network_lattice(
     arcs = np.flatnonzero(inside[product.arc_from] & inside[product.arc_to])
     place = np.cumsum(inside) - 1
     arc_from, arc_to = place[product.arc_from[arcs]], place[product.arc_to[arcs]]
-    network = Expectation.of(
+    network = ForwardBackwardNetwork.of(
         arc_from,
         np.zeros(len(arcs)),
         np.searchsorted(arc_to, np.arange(len(states))),

@@ -16,7 +16,7 @@ from lipmotion.engines.coupled.chains.product import Grammar
 from lipmotion.engines.coupled.chains.structures import Structure
 from lipmotion.kernels.factorial import factorial_posteriors
 from lipmotion.kernels.factorial_path import factorial_best_path
-from lipmotion.kernels.loops import Evidence, Loop, LoopCounts
+from lipmotion.kernels.loops import FactorialLogLikelihoods, Loop, LoopCounts
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -142,10 +142,10 @@ class FreeLattice(Lattice):
     def _loops(self, transitions: FreeTransitions) -> tuple[Loop, Loop]:
         return transitions.loop(0, self.units[0]), transitions.loop(1, self.units[1])
 
-    def _evidence(self, logs: Sequence[Single]) -> Evidence:
+    def _evidence(self, logs: Sequence[Single]) -> FactorialLogLikelihoods:
         heard, seen = logs[0], sum(logs[2:], logs[1])
         first, second = (len(states) for states in self.states)
-        return Evidence(
+        return FactorialLogLikelihoods(
             np.ascontiguousarray(heard[:, :first]),
             np.ascontiguousarray(seen[:, :second]),
             heard[:, first:] + seen[:, second:],

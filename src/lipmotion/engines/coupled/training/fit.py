@@ -34,9 +34,10 @@ from lipmotion.engines.coupled.training.train import Labelled, Schedule, Step, g
 from lipmotion.errors import CorpusError
 from lipmotion.kernels.banded import generate
 from lipmotion.motion.closure import fit_closure_of
+from lipmotion.motion.rest import away_from_speech, speech_intervals
 from lipmotion.motion.space import fit_reduced_motion
 from lipmotion.motion.variance_scaling import scaling_factors
-from lipmotion.stats.delta_windows import within
+from lipmotion.stats.delta_windows import dynamics_known
 from lipmotion.types import FRAME_RATE_HZ, Example, Monitor, Progress, Timeline, Unit, part_of
 from lipmotion.units import VISEME_OF, is_silent
 
@@ -64,12 +65,12 @@ def growing_models(
 
     Raises as ``fit_coupled``.
     """
-    structure = structure_of(config.structure, config.chains, config.states, config.asynchrony, config.crosses)
-    moving = [example for example in examples if within(example.valid).any()]
+    structure = structure_of(config.structure, config.chains, config.states, config.asynchrony, config.cross_units)
+    moving = [example for example in examples if dynamics_known(example.valid).any()]
     space, values = fit_reduced_motion(moving or examples, config.components)
     if all(is_silent(span.label.phone) for example in moving for span in example.speech.units):
         raise CorpusError(f"nothing is said in {len(moving)} examples with motion; learn from speech")
-    seen = [within(example.valid) for example in moving]
+    seen = [dynamics_known(example.valid) for example in moving]
     visual = visual_streams(space, values, seen, config.dynamic)
     data = [
         Labelled(
@@ -82,7 +83,7 @@ def growing_models(
     others = [
         Labelled(unseen(_features(example), visual), example.speech.units)
         for example in examples
-        if not within(example.valid).any()
+        if not dynamics_known(example.valid).any()
     ]
     first, second = (0.4, 0.7) if others else (0.7, 0.7)
 
@@ -90,10 +91,10 @@ def growing_models(
         if others:
             chains = _second_stage(chains, data, others, config, part_of(monitor, first, second))
         model = CoupledModel(chains, space, visual, None, np.ones(space.dimensions), rest, closure)
-        if config.dynamic and config.follows:
+        if config.dynamic and config.acoustic_regression:
             monitor(Progress("following the sound", 1, 1, 0.75))
             model = replace(model, follow=_follow(model, data))
-        if config.dynamic and config.full_range:
+        if config.dynamic and config.variance_scaling:
             model = replace(model, gain=_gain(model, data, values))
         monitor(Progress("following the sound", 1, 1, 1.0))
         return model
@@ -118,7 +119,7 @@ def _second_stage(
     chains: Chains, data: Sequence[Labelled], others: Sequence[Labelled], config: CoupledConfig, monitor: Monitor
 ) -> Chains:
     """Return the chains after the second stage of training, on speech without motion as well."""
-    more = MoreSpeech(config.more_mixtures, config.more_steps, config.more_weight)
+    more = MoreSpeech(config.speech_only_mixtures, config.speech_only_steps, config.speech_only_weight)
     steps = more.steps * max(more.mixtures // config.mixtures, 1).bit_length()
     return with_more_speech(chains, data, others, more, _told("more speech", steps, monitor), workers())
 
@@ -160,12 +161,7 @@ def _rest(examples: Sequence[Example], values: Sequence[Array], seen: Sequence[N
 
 def calm(units: Timeline[Unit], frames: int) -> NDArray[np.bool_]:
     """Return which frames are silence away from speech [shape=(T,)]."""
-    times = np.arange(frames) / FRAME_RATE_HZ
-    away = np.ones(frames, bool)
-    for span in units:
-        if not is_silent(span.label.phone):
-            away &= (times < span.start_s - CALM_S) | (times > span.end_s + CALM_S)
-    return away
+    return away_from_speech(np.arange(frames) / FRAME_RATE_HZ, speech_intervals(units), CALM_S)
 
 
 def _follow(model: CoupledModel, data: Sequence[Labelled]) -> tuple[Surroundings, tuple[Following, ...]]:

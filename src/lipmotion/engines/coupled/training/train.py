@@ -17,11 +17,11 @@ from lipmotion.engines.coupled.chains.product import Grammar, Joint, Product, re
 from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, Structure
 from lipmotion.engines.coupled.chains.transitions import Transitions, first_transitions
 from lipmotion.engines.coupled.training.expectation import Expected, Recording, expected, maximised
-from lipmotion.hmm.multistream.labels import in_frames
+from lipmotion.hmm.multistream.labels import units_in_frames
 from lipmotion.stats.bigram import estimate_bigram
 from lipmotion.stats.mixture import Mixtures
 from lipmotion.types import FRAME_RATE_HZ, Timeline, Unit
-from lipmotion.units import SILENCE, stand_in
+from lipmotion.units import SILENCE, most_similar_phone
 
 Index = NDArray[np.intp]
 
@@ -183,7 +183,7 @@ def allowed_units(structure: Structure, phones: Timeline[Unit], frames: int) -> 
 
 def frame_labels(structure: Structure, phones: Timeline[Unit], frames: int) -> list[tuple[int, int, int]]:
     """Return the unit of the first chain, the first frame and the end of every label that has a frame."""
-    names, bounds = in_frames(phones, frames, SILENCE)
+    names, bounds = units_in_frames(phones, frames, SILENCE)
     units = [structure.units[0].index(structure.chains[0].unit(name)) for name in names]
     return list(zip(units, bounds[:-1].tolist(), bounds[1:].tolist(), strict=True))
 
@@ -301,7 +301,7 @@ def _borrowed(group: Group, known: NDArray[np.bool_], structure: Structure, chai
             phone for i, name in enumerate(units) if known[structure.state(i, place)] for phone in of.phones(name)
         ]
         if phones:
-            alike = of.unit(stand_in(of.phones(units[unit])[0], phones))
+            alike = of.unit(most_similar_phone(of.phones(units[unit])[0], phones))
             source[state] = structure.state(units.index(alike), place)
     return replace(group, mixtures=group.mixtures.picked(source))
 
