@@ -31,7 +31,7 @@ def test_sync(run: Run, toy_corpus: Corpus, here: Path, monkeypatch: pytest.Monk
     assert run("corpus", "sync", "mine") == (0, ["studio: sound moved by -120 ms"], [])
     monkeypatch.setattr(offset, "sync", lambda _corpus: {})
     assert run("corpus", "sync", "mine").out == [
-        "mine: nothing to move: the sound is in step, or it is not known how late it is"
+        "mine: nothing moved: the sound is in step, or its offset could not be measured"
     ]
     assert is_one_error(run("corpus", "sync", "missing"), 4)
 

@@ -7,7 +7,7 @@ import pytest
 
 from cli.conftest import Run, is_one_error
 from lipmotion.corpora.store import Corpus
-from lipmotion.measures.report import table
+from lipmotion.measures.report import figures_table
 from lipmotion.pipeline.evaluation.evaluate import evaluate
 from lipmotion.pipeline.model import VERSION, load_model
 
@@ -16,7 +16,7 @@ def test_the_figures_are_those_of_the_function(run: Run, toy_corpus: Corpus, toy
     done = run("evaluate", toy_model_file, toy_corpus.path, "-o", "figures.json")
     assert (done.code, done.err) == (0, [])
     figures = evaluate(load_model(toy_model_file), toy_corpus)
-    assert "\n".join(done.out) == table(figures)
+    assert "\n".join(done.out) == figures_table(figures)
     assert json.loads((here / "figures.json").read_text()) == json.loads(json.dumps(figures))
     assert [path.name for path in here.iterdir()] == ["figures.json"]
 

@@ -11,16 +11,16 @@ from lipmotion.corpora.store import Corpus
 from lipmotion.experiments import comparison, folds, learning_curve
 from lipmotion.experiments.hofer2008 import unit_sets
 from lipmotion.experiments.xie_liu2007 import table3_text
-from lipmotion.measures.bootstrap import interval
-from lipmotion.pipeline.evaluation import evaluate
+from lipmotion.measures.bootstrap import bootstrap_interval
+from lipmotion.pipeline.evaluation import figures as evaluation_figures
 
 
 @pytest.fixture(autouse=True)
 def few_draws(monkeypatch: pytest.MonkeyPatch) -> None:
-    """And the first two unit sets of the paper beside the one that they are compared with."""
-    for module in (comparison, evaluate):
-        monkeypatch.setattr(module, "interval", partial(interval, draws=20))
-    monkeypatch.setattr(unit_sets, "PAPER", {name: unit_sets.PAPER[name] for name in ("2vis", "pbVis", "phone")})
+    """Few draws of the bootstrap intervals, and only three of the paper's unit sets."""
+    for module in (comparison, evaluation_figures):
+        monkeypatch.setattr(module, "bootstrap_interval", partial(bootstrap_interval, draws=20))
+    monkeypatch.setattr(unit_sets, "PAPER", {name: unit_sets.PAPER_SCORES[name] for name in ("2vis", "pbVis", "phone")})
 
 
 def test_the_table_is_that_of_the_figures(run: Run, toy_corpus: Corpus, here: Path) -> None:

@@ -16,7 +16,7 @@ def test_a_model_says_whose_recordings_it_comes_from(run: Run, toy_model_file: P
     assert said["licence"] == "synthesised by lipmotion"
     assert said["engine"] == "trajectory"
     assert said["utterances"] == "8"
-    assert "parts=5" in said["configuration"]
+    assert "states=5" in said["configuration"]
     assert [line.split()[0] for line in done.out[1:]] == list(read_header(toy_model_file))
 
 

@@ -22,12 +22,12 @@ from cli.conftest import Run
 from lipmotion.cli import info
 from lipmotion.cli.events import Events
 from lipmotion.cli.main import main
-from lipmotion.cli.output import say, say_json, say_lines
+from lipmotion.cli.output import print_json, print_line, print_lines
 from lipmotion.cli.progress import reporting
 from lipmotion.cli.stop import Stopper
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines.trajectory.engine import TrajectoryEngine
-from lipmotion.measures.report import table
+from lipmotion.measures.report import figures_table
 from lipmotion.pipeline.explain import explanation_text
 from lipmotion.types import ChannelValue, Explanation, Item, Progress, Span, Unit
 
@@ -180,10 +180,10 @@ def test_warnings(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_progress(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, watched: bool) -> None:
     monkeypatch.setattr(sys.stderr, "isatty", lambda: watched, raising=False)
     with reporting(Namespace(machine_readable=False, stopper=Stopper(), events=Events())) as report:
-        report.hear(Progress(EVIL, 0, 2, 0.0))
-        report.hear(Item(EVIL, "skipped", EVIL))
+        report.receive(Progress(EVIL, 0, 2, 0.0))
+        report.receive(Item(EVIL, "skipped", EVIL))
         report.warn(EVIL)
-        report.hear(Progress(EVIL, 1, 2, 0.5))
+        report.receive(Progress(EVIL, 1, 2, 0.5))
         report.finish(f"two\nlines{EVIL[:9]}")
     out, err = capsys.readouterr()
     assert out == "two\nlines" + SHOWN[:12] + "\n"
@@ -202,8 +202,8 @@ def test_tables_have_a_line_a_row() -> None:
         "clips": 1,
         "conditions": {EVIL: condition},
     }
-    assert table(figures).count(SHOWN) == 5
-    assert OBEYED.search(table(figures)) is None
+    assert figures_table(figures).count(SHOWN) == 5
+    assert OBEYED.search(figures_table(figures)) is None
     span = Span(0.0, 1.0, Unit(EVIL, EVIL, EVIL))
     explained = Explanation(0.0, 0, span, EVIL, {EVIL: ChannelValue(0.0, 1.0)})
     assert OBEYED.search(explanation_text(explained)) is None
@@ -211,15 +211,15 @@ def test_tables_have_a_line_a_row() -> None:
 
 def test_trees_have_a_line_a_node(toy_model: Any) -> None:
     engine: TrajectoryEngine = toy_model.engine
-    text = engine.trees(toy_model.learned)
+    text = engine.describe(toy_model.learned)
     assert OBEYED.search(text) is None
     assert text.count("\n") > 3
 
 
 def test_what_is_laid_out_stays_so(capsys: pytest.CaptureFixture[str]) -> None:
-    say_lines("one\ttwo\n\n  three é 語 👩‍👧\n")
-    say("tab\tand\nend")
-    say_json({"name": EVIL, "n": np.float64(1.5).item()})
+    print_lines("one\ttwo\n\n  three é 語 👩‍👧\n")
+    print_line("tab\tand\nend")
+    print_json({"name": EVIL, "n": np.float64(1.5).item()})
     out, _ = capsys.readouterr()
     *lines, document = out.splitlines()
     assert lines == ["one\ttwo", "", "  three é 語 👩‍👧", "", "tab\\tand\\nend"]

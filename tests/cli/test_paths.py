@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from cli.conftest import Run, is_one_error
+from lipmotion.pipeline.request import SpeechRequest
 from lipmotion.cli.command_line import parser
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import ExportError
@@ -180,15 +181,15 @@ def _verbs(found: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
 def test_from_python(laid: Path, toy_speech: Path, toy_model_file: Path, suffix: str) -> None:
     speech = laid / f"speech{suffix}"
     shutil.copy(toy_speech, speech)
-    made = animate(toy_speech, model=toy_model_file, recogniser="own")
+    made = animate(SpeechRequest(toy_speech, recogniser="own"), model=toy_model_file)
     corpus = Corpus.open(laid / "c")
     calls: list[Callable[[], object]] = [
         lambda: write(made, speech, speech=speech),
         lambda: write_cues(cues(made), speech, speech=speech, form="json"),
         lambda: prepare(laid / "r", laid / "r" / "corpus"),
         lambda: prepare(laid / "r", laid),
-        lambda: train(corpus, work=corpus.path),
-        lambda: train(corpus, work=laid),
+        lambda: train(corpus, run=Run(work=corpus.path)),
+        lambda: train(corpus, run=Run(work=laid)),
     ]
     before = content(laid)
     for call in calls:

@@ -14,7 +14,7 @@ import pytest
 
 from cli.conftest import Done, Run
 from lipmotion.cli import evaluate
-from lipmotion.cli.events import Events, Lines
+from lipmotion.cli.events import Events, JsonLines
 from lipmotion.cli.main import main
 from lipmotion.cli.progress import reporting
 from lipmotion.cli.stop import Stopper
@@ -37,14 +37,14 @@ def objects(done: Done) -> list[dict[str, object]]:
 
 def options(machine_readable: bool) -> Namespace:
     return Namespace(
-        machine_readable=machine_readable, stopper=Stopper(), events=Lines() if machine_readable else Events()
+        machine_readable=machine_readable, stopper=Stopper(), events=JsonLines() if machine_readable else Events()
     )
 
 
 def test_every_event_is_one_json_object_on_a_line(capsys: pytest.CaptureFixture[str]) -> None:
     with reporting(options(machine_readable=True)) as report:
         for event in EVENTS:
-            report.hear(event)
+            report.receive(event)
         logging.getLogger("lipmotion").warning("strange %s", "word")
         report.finish("done", used=3, kind="video")
     out, err = capsys.readouterr()
@@ -63,7 +63,7 @@ def test_every_event_is_one_json_object_on_a_line(capsys: pytest.CaptureFixture[
 def test_where_nobody_watches_only_warnings_and_the_result_are_said(capsys: pytest.CaptureFixture[str]) -> None:
     with reporting(options(machine_readable=False)) as report:
         for event in EVENTS:
-            report.hear(event)
+            report.receive(event)
         report.finish("done", used=3, kind="video")
     assert capsys.readouterr() == ("done\n", "lipmotion: warning: skipped b: no face\\nanywhere\n")
 
@@ -72,7 +72,7 @@ def test_a_terminal_gets_a_bar(capsys: pytest.CaptureFixture[str], monkeypatch: 
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
     with reporting(options(machine_readable=False)) as report:
         for event in EVENTS:
-            report.hear(event)
+            report.receive(event)
         report.finish("done")
     out, err = capsys.readouterr()
     assert out == "done\n"
@@ -176,7 +176,7 @@ def test_what_is_swallowed_stops_at_the_next_event(monkeypatch: pytest.MonkeyPat
                 signal.raise_signal(signal.SIGTERM)
             except BaseException:  # noqa: S110
                 pass
-            report.hear(EVENTS[0])
+            report.receive(EVENTS[0])
             raise AssertionError
 
     monkeypatch.setattr(evaluate, "run", swallows)

@@ -101,16 +101,16 @@ def test_while_packages_are_imported(number: signal.Signals, toy_speech: Path, h
 
 PAUSING = """
 import os, signal, sys
-from lipmotion.cli.events import Lines
+from lipmotion.cli.events import JsonLines
 from lipmotion.cli.main import main
 
-def pausing(self, kind, /, say=Lines.say, **fields):
-    say(self, kind, **fields)
-    if "pronunciations" in fields.get("stage", "") and Lines.say is pausing:
-        Lines.say = say
+def pausing(self, kind, /, emit=JsonLines.emit, **fields):
+    emit(self, kind, **fields)
+    if "pronunciations" in fields.get("stage", "") and JsonLines.emit is pausing:
+        JsonLines.emit = emit
         os.kill(os.getpid(), signal.SIGSTOP)
 
-Lines.say = pausing
+JsonLines.emit = pausing
 sys.exit(main())
 """
 """Training that waits, once it has something to go on from."""
@@ -237,7 +237,7 @@ def test_once_settled_a_signal_comes_too_late() -> None:
         stopper.settle()
         assert stopper.code is None
     finally:
-        stopper.leave(for_good=False)
+        stopper.stop_listening(process_ends=False)
 
 
 def test_what_was_swallowed_is_not_settled() -> None:
@@ -250,7 +250,7 @@ def test_what_was_swallowed_is_not_settled() -> None:
             stopper.settle()
         assert stopper.code == 143
     finally:
-        stopper.leave(for_good=False)
+        stopper.stop_listening(process_ends=False)
 
 
 def test_little_is_loaded_before_signals_are_listened_to() -> None:

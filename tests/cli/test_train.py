@@ -14,7 +14,7 @@ from lipmotion.export.base import read_motion
 from lipmotion.pipeline.model import Model, load_model, save_model
 from lipmotion.pipeline.training.train import TrainReport, train
 from lipmotion.pipeline.training.voices import Heard, SpokenSentence
-from lipmotion.speech.voices.base import SyntheticVoice
+from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.testing.toy import toy_sentences
 from lipmotion.units import unit_set
 
@@ -70,7 +70,7 @@ def test_the_joint_engine(run: Run, toy_corpus: Corpus, here: Path) -> None:
 def test_what_is_given_wins_over_what_the_joint_engine_recognises(
     run: Run, toy_corpus: Corpus, toy_speech: Path, here: Path
 ) -> None:
-    own = ["--units", "eVis", "--set", "recognises=true", "--set", "mixtures=1"]
+    own = ["--units", "eVis", "--set", "recognise_units=true", "--set", "mixtures=1"]
     assert run("train", toy_corpus.path, "-o", "m", "--engine", "joint", *own).code == 0
     told = {"alone": [], "right": ["--transcript", "see bob papa mama"], "wrong": ["--transcript", "we saw a weasel"]}
     for name, options in (told | {"again": ["--units", "alone.json"]}).items():
@@ -86,10 +86,10 @@ def test_what_is_given_wins_over_what_the_joint_engine_recognises(
 
 
 def test_a_system_of_the_coupled_engine(run: Run, toy_corpus: Corpus, here: Path) -> None:
-    wanted = ["--engine", "coupled", "--system", "ph-MSHMM", "--set", "chains=2vis", "--set", "follows=no"]
+    wanted = ["--engine", "coupled", "--system", "ph-MSHMM", "--set", "chains=2vis", "--set", "acoustic_regression=no"]
     assert run("train", toy_corpus.path, "-o", "m", *wanted).code == 0
     config = load_model(here / "m").engine.config
-    assert (config.structure, config.chains, config.follows) == ("multistream", "2vis", False)
+    assert (config.structure, config.chains, config.acoustic_regression) == ("multistream", "2vis", False)
     said = run("info", "m", "--trees").out
     assert said[0].startswith("multistream: one chain")
     assert "chain 1: 2vis, 2 units of 3 states" in said
@@ -161,7 +161,7 @@ def test_an_engine_without_a_use_for_voices(
         (["CORPUS", "-o", "m", "--engine", "coupled", "--recordings", "missing"], 4, "missing: no such folder"),
         (["CORPUS", "-o", "m", "--engine", "coupled", "--units", "eVis"], 3, '--set chains="phone viseme"'),
         (["CORPUS", "-o", "m", "--system", "ph-HMM"], 3, "add --engine coupled"),
-        (["CORPUS", "-o", "m", "--set", "tree=1"], 3, "no option 'tree'; there are: parts, silent_parts"),
+        (["CORPUS", "-o", "m", "--set", "tree=1"], 3, "no option 'tree'; there are: states, silent_states"),
         (["CORPUS", "-o", "m", "--engine", "joined"], 3, "no engine 'joined'; there are: trajectory, coupled, joint"),
     ],
 )

@@ -6,14 +6,14 @@ from functools import partial
 import pytest
 
 from lipmotion.experiments import comparison
-from lipmotion.measures.bootstrap import interval
-from lipmotion.pipeline.evaluation import evaluate as evaluation
+from lipmotion.measures.bootstrap import bootstrap_interval
+from lipmotion.pipeline.evaluation import figures as evaluation_figures
 
 
 @pytest.fixture(scope="package", autouse=True)
 def few_draws() -> Iterator[None]:
-    """Intervals of 50 draws: what they say is tested with the measures."""
+    """Bootstrap intervals of 50 draws, for speed; their values are tested with the measures."""
     with pytest.MonkeyPatch.context() as patch:
-        for module in (comparison, evaluation):
-            patch.setattr(module, "interval", partial(interval, draws=50))
+        for module in (comparison, evaluation_figures):
+            patch.setattr(module, "bootstrap_interval", partial(bootstrap_interval, draws=50))
         yield

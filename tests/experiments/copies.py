@@ -11,6 +11,7 @@ from lipmotion.types import Channel, Utterance
 
 
 def copied(corpus: Corpus, folder: Path, change: Callable[[Utterance], Utterance]) -> Corpus:
+    """Return a copy of the corpus with every utterance changed by ``change``."""
     result = Corpus.create(folder / "copy")
     for name in corpus.names():
         result.add(change(corpus.utterance(name)))
@@ -18,7 +19,7 @@ def copied(corpus: Corpus, folder: Path, change: Callable[[Utterance], Utterance
 
 
 def renamed(corpus: Corpus, folder: Path, *names: str) -> Corpus:
-    """The first channels, by other names; the others are left out."""
+    """Return a copy of the corpus with the first channels under other names, and without the others."""
 
     def change(utterance: Utterance) -> Utterance:
         motion = utterance.track.motion

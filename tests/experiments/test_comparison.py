@@ -3,7 +3,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lipmotion.experiments.comparison import Tally, correlation_tally, distance_tally, mark, score_tally
+from lipmotion.experiments.comparison import (
+    ClipStatistic,
+    closing_score_statistic,
+    correlation_statistic,
+    distance_statistic,
+    significance_mark,
+)
 from lipmotion.measures import curves
 from lipmotion.measures.closures import closure_figures
 
@@ -12,7 +18,7 @@ Clips = list[np.ndarray]
 
 @pytest.fixture
 def clips() -> tuple[Clips, Clips, Clips]:
-    """Recorded, close to it, and not so close: six clips of three channels far from 0."""
+    """Original curves, curves close to them, and curves less close: six clips of three channels far from 0."""
     draw = np.random.default_rng(3)
     original = [draw.normal(size=(int(n), 3)) + 50 for n in draw.integers(20, 40, 6)]
     near = [0.9 * o + 0.2 * draw.normal(size=o.shape) for o in original]
@@ -23,24 +29,24 @@ def clips() -> tuple[Clips, Clips, Clips]:
 def test_figures_are_those_of_the_measures(clips: tuple[Clips, Clips, Clips]) -> None:
     original, near, _ = clips
     wanted = curves.pooled_correlation(near, original).mean()
-    assert correlation_tally(near, original).value == pytest.approx(wanted, abs=1e-12)
-    assert distance_tally(near, original).value == pytest.approx(curves.mean_distance(near, original), abs=1e-12)
+    assert correlation_statistic(near, original).value == pytest.approx(wanted, abs=1e-12)
+    assert distance_statistic(near, original).value == pytest.approx(curves.mean_distance(near, original), abs=1e-12)
     some, others = [g[:, :1] for g in near], [o[:, :1] for o in original]
     score = closure_figures([g[:, 0] for g in near], [o[:, 0] for o in original], 50, 25).score
-    assert score_tally(some, others, 50).value == pytest.approx(100 * score)
+    assert closing_score_statistic(some, others, 50).value == pytest.approx(100 * score)
 
 
 def test_a_channel_that_stands_still_explains_nothing(clips: tuple[Clips, Clips, Clips]) -> None:
     original, near, _ = clips
     still = [np.concatenate([g[:, :2], np.full((len(g), 1), 0.1)], axis=1) for g in near]
-    assert correlation_tally(still, original).value == pytest.approx(
+    assert correlation_statistic(still, original).value == pytest.approx(
         curves.pooled_correlation(still, original).mean(), abs=1e-12
     )
 
 
 def test_nothing_closes() -> None:
     open_mouth = [np.ones((5, 1))]
-    assert np.isnan(score_tally(open_mouth, open_mouth, 0.5).value)
+    assert np.isnan(closing_score_statistic(open_mouth, open_mouth, 0.5).value)
 
 
 def test_the_interval_is_that_of_drawn_clips(clips: tuple[Clips, Clips, Clips]) -> None:
@@ -51,17 +57,17 @@ def test_the_interval_is_that_of_drawn_clips(clips: tuple[Clips, Clips, Clips]) 
     def acc(made: Clips, chosen: np.ndarray) -> float:
         return float(curves.pooled_correlation([made[i] for i in chosen], [original[i] for i in chosen]).mean())
 
-    one, other = correlation_tally(near, original), correlation_tally(far, original)
+    one, other = correlation_statistic(near, original), correlation_statistic(far, original)
     wanted = np.percentile([acc(near, chosen) for chosen in drawn], [2.5, 97.5])
     assert one.interval(7) == pytest.approx(tuple(wanted), abs=1e-12)
     paired = np.percentile([acc(near, chosen) - acc(far, chosen) for chosen in drawn], [2.5, 97.5])
     assert one.gain(other, 7) == pytest.approx(tuple(paired), abs=1e-12)
-    assert mark(one.gain(other, 7)) == "*"
+    assert significance_mark(one.gain(other, 7)) == "*"
     assert one.gain(one, 7) == (0, 0)
 
 
-def test_a_tally_of_one_clip_has_no_spread() -> None:
-    one = Tally([np.array([3.0, 2.0])], lambda total: float(total[0] / total[1]))
+def test_the_interval_of_one_clip_is_its_value() -> None:
+    one = ClipStatistic([np.array([3.0, 2.0])], lambda total: float(total[0] / total[1]))
     assert one.interval(0) == (1.5, 1.5)
 
 
@@ -69,4 +75,4 @@ def test_a_tally_of_one_clip_has_no_spread() -> None:
     ("gain", "wanted"), [((0.1, 0.2), "*"), ((-2, -0.1), "*"), ((-0.1, 0.1), ""), ((0, 0), ""), ((None, None), "")]
 )
 def test_marks(gain: tuple[float, float], wanted: str) -> None:
-    assert mark(gain) == wanted
+    assert significance_mark(gain) == wanted

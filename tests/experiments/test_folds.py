@@ -9,17 +9,20 @@ import numpy as np
 import pytest
 
 from experiments.copies import copied, renamed
-from lipmotion.corpora.store import Corpus
+from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.experiments.folds import folds, table
+from lipmotion.experiments.runner import ExperimentSettings
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.measures.closures import closings
-from lipmotion.pipeline.evaluation.evaluate import BILABIAL, Clip, clips, recorded
+from lipmotion.pipeline.evaluation.conditions import ComparedClip, compared_clips, held_out_recordings
+from lipmotion.pipeline.evaluation.figures import BILABIAL
 from lipmotion.pipeline.training.train import train
-from lipmotion.speech.recogniser import recogniser
+from lipmotion.speech.recogniser import cached_recogniser
 from lipmotion.types import Progress
 
-SMALL = HmmConfig(mixtures=1, iterations=2)
+PHONE_MODELS = HmmConfig(mixtures=1, iterations=2)
+SMALL = ExperimentSettings(recogniser=PHONE_MODELS)
 CONDITIONS = ["audio only", "with transcript"]
 RATE_HZ = 25
 
@@ -31,19 +34,23 @@ def stages() -> list[Progress]:
 
 @pytest.fixture(scope="module")
 def figures(toy_corpus: Corpus, stages: list[Progress]) -> dict[str, Any]:
-    return folds(toy_corpus, count=3, recogniser=SMALL, monitor=stages.append)
+    return folds(toy_corpus, count=3, settings=replace(SMALL, monitor=stages.append))
 
 
 @pytest.fixture(scope="module")
-def by_hand(toy_corpus: Corpus) -> list[Clip]:
-    """Every clip of the training list, with transcript, by a model that was not trained on it."""
+def by_hand(toy_corpus: Corpus) -> list[ComparedClip]:
+    """Every clip of the training list, generated with its transcript by a model that was not trained on it."""
     names = toy_corpus.names("train")
     mixed = [names[i] for i in np.random.default_rng(0).permutation(len(names))]
     made = []
     for held_out in (mixed[0::3], mixed[1::3], mixed[2::3]):
-        model = train(toy_corpus, names=sorted(set(names) - set(held_out)), recogniser=SMALL)[0]
-        found = recorded(toy_corpus, recogniser(model.phones), names=sorted(held_out))
-        made += clips(found, "with transcript", model.engine, model.learned)
+        model = train(
+            toy_corpus, selection=Selection(names=sorted(set(names) - set(held_out))), recogniser=PHONE_MODELS
+        )[0]
+        found = held_out_recordings(
+            toy_corpus, cached_recogniser(model.phones), selection=Selection(names=sorted(held_out))
+        )
+        made += compared_clips(found, "with transcript", model.engine, model.learned)
     return made
 
 
@@ -54,7 +61,7 @@ def test_what_was_done(figures: dict[str, Any]) -> None:
     assert json.loads(json.dumps(figures, allow_nan=False))
 
 
-def test_figures_are_of_all_clips_as_one_split(figures: dict[str, Any], by_hand: list[Clip]) -> None:
+def test_figures_are_of_all_clips_as_one_split(figures: dict[str, Any], by_hand: list[ComparedClip]) -> None:
     generated = np.concatenate([clip.generated[:, 0] for clip in by_hand])
     original = np.concatenate([clip.original[:, 0] for clip in by_hand])
     row = figures["conditions"]["with transcript"]
@@ -66,7 +73,7 @@ def test_figures_are_of_all_clips_as_one_split(figures: dict[str, Any], by_hand:
     assert low <= row["acc"] <= high
 
 
-def test_closings_are_of_all_clips_as_one_split(figures: dict[str, Any], by_hand: list[Clip]) -> None:
+def test_closings_are_of_all_clips_as_one_split(figures: dict[str, Any], by_hand: list[ComparedClip]) -> None:
     under, row = figures["closed_under"], figures["conditions"]["with transcript"]
     pairs = [(closings(c.generated[:, 0], under), closings(c.original[:, 0], under)) for c in by_hand]
     hits = [any(abs(int(g) - int(o)) <= 2 for g in made) for made, recorded_ones in pairs for o in recorded_ones]
@@ -75,7 +82,7 @@ def test_closings_are_of_all_clips_as_one_split(figures: dict[str, Any], by_hand
     assert (row["score"], row["precision"]) == pytest.approx((100 * np.mean(hits), 100 * np.mean(good)))
 
 
-def test_p_b_m_and_elsewhere_by_hand(figures: dict[str, Any], by_hand: list[Clip]) -> None:
+def test_p_b_m_and_elsewhere_by_hand(figures: dict[str, Any], by_hand: list[ComparedClip]) -> None:
     under, row = figures["closed_under"], figures["conditions"]["with transcript"]
     wanted, hit, elsewhere, speech_s = 0, 0, [0, 0], 0.0
     for clip in by_hand:
@@ -98,7 +105,7 @@ def test_p_b_m_and_elsewhere_by_hand(figures: dict[str, Any], by_hand: list[Clip
 
 
 def test_the_seed_cuts_the_list(figures: dict[str, Any], toy_corpus: Corpus) -> None:
-    other = folds(toy_corpus, count=3, seed=1, recogniser=SMALL)
+    other = folds(toy_corpus, count=3, settings=replace(SMALL, seed=1))
     assert other["seed"] == 1
     assert other["conditions"]["audio only"]["acc"] != figures["conditions"]["audio only"]["acc"]
     assert other["conditions"]["audio only"]["closings"] == figures["conditions"]["audio only"]["closings"]
@@ -113,9 +120,9 @@ def test_progress_goes_from_nothing_to_all(figures: dict[str, Any], stages: list
 
 
 def test_what_is_not_transcribed_is_recognised(toy_corpus: Corpus, tmp_path: Path) -> None:
-    """A fold with such an utterance has no ``with transcript``, so that the whole has none."""
-    untold = copied(toy_corpus, tmp_path, lambda u: replace(u, words=None) if u.name == "toy00" else u)
-    assert list(folds(untold, count=2, recogniser=SMALL)["conditions"]) == ["audio only"]
+    """A fold with such an utterance lacks the condition ``with transcript``, so all folds together lack it."""
+    untranscribed = copied(toy_corpus, tmp_path, lambda u: replace(u, words=None) if u.name == "toy00" else u)
+    assert list(folds(untranscribed, count=2, settings=SMALL)["conditions"]) == ["audio only"]
 
 
 @pytest.mark.parametrize("count", [-1, 0, 1, 9])

@@ -9,15 +9,17 @@ import numpy as np
 import pytest
 
 from experiments.copies import copied, renamed
-from lipmotion.corpora.store import Corpus
+from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.experiments.learning_curve import SIZES, learning_curve, table
+from lipmotion.experiments.runner import ExperimentSettings
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.pipeline.evaluation.evaluate import evaluate
 from lipmotion.pipeline.training.train import train
 from lipmotion.types import Progress
 
-SMALL = HmmConfig(mixtures=1, iterations=2)
+PHONE_MODELS = HmmConfig(mixtures=1, iterations=2)
+SMALL = ExperimentSettings(recogniser=PHONE_MODELS)
 CONDITIONS = ["audio only", "with transcript"]
 
 
@@ -33,7 +35,7 @@ def order(toy_corpus: Corpus) -> tuple[str, ...]:
 
 @pytest.fixture(scope="module")
 def figures(toy_corpus: Corpus, order: tuple[str, ...], stages: list[Progress]) -> dict[str, Any]:
-    return learning_curve(toy_corpus, order=order, sizes=[8, 4, 4], recogniser=SMALL, monitor=stages.append)
+    return learning_curve(toy_corpus, order=order, sizes=[8, 4, 4], settings=replace(SMALL, monitor=stages.append))
 
 
 def test_each_size_once_the_smallest_first(figures: dict[str, Any]) -> None:
@@ -48,7 +50,7 @@ def test_a_row_is_what_train_and_evaluate_say(
     row: int, figures: dict[str, Any], toy_corpus: Corpus, order: tuple[str, ...]
 ) -> None:
     names = sorted(order[: figures["rows"][row]["names"]])
-    wanted = evaluate(train(toy_corpus, names=names, recogniser=SMALL)[0], toy_corpus)
+    wanted = evaluate(train(toy_corpus, selection=Selection(names=names), recogniser=PHONE_MODELS)[0], toy_corpus)
     assert figures["closed_under"] == wanted["closed_under"]
     for condition in CONDITIONS:
         made, said = figures["rows"][row]["conditions"][condition], wanted["conditions"][condition]
@@ -80,16 +82,16 @@ def test_by_default_the_training_list_is_shuffled(toy_corpus: Corpus, monkeypatc
     monkeypatch.setattr("lipmotion.experiments.learning_curve.SIZES", (3, 9))
     trained: list[tuple[str, ...]] = []
 
-    def heard(event: Any) -> None:
+    def collect(event: Any) -> None:
         trained.append(event.stage.partition(":")[0])
 
-    one = learning_curve(toy_corpus, seed=1, recogniser=SMALL, monitor=heard)
+    one = learning_curve(toy_corpus, settings=replace(SMALL, seed=1, monitor=collect))
     assert sorted(set(trained)) == ["3 clips", "8 clips"]
     assert (one["order"], one["seed"]) == ("shuffled", 1)
     names = toy_corpus.names("train")
     mixed = [names[i] for i in np.random.default_rng(1).permutation(8)]
     assert sorted(mixed[:3]) != list(names[:3])
-    same = learning_curve(toy_corpus, order=mixed, sizes=[3], seed=1, recogniser=SMALL)
+    same = learning_curve(toy_corpus, order=mixed, sizes=[3], settings=replace(SMALL, seed=1))
     assert same["rows"][0]["conditions"] == one["rows"][0]["conditions"]
     assert "the training list shuffled with seed 1" in table(one)
 
@@ -103,7 +105,7 @@ def test_progress_goes_from_nothing_to_all(figures: dict[str, Any], stages: list
 
 
 def test_channels_that_are_not_there_are_dashes(toy_corpus: Corpus, tmp_path: Path) -> None:
-    made = learning_curve(renamed(toy_corpus, tmp_path, "opening", "smile"), sizes=[8], recogniser=SMALL)
+    made = learning_curve(renamed(toy_corpus, tmp_path, "opening", "smile"), sizes=[8], settings=SMALL)
     row = made["rows"][0]["conditions"]["audio only"]
     assert (row["acc_width"], row["acc_outer"]) == (None, None)
     assert table(made).splitlines()[4].split()[-2:] == ["–", "–"]

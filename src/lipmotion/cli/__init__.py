@@ -1,1 +1,1 @@
-"""The command line: one file a verb, each a call of the API function of the same name."""
+"""The command line: one module for each verb; each calls the API function of the same name."""

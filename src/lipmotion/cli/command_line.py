@@ -1,4 +1,4 @@
-"""The arguments of a command, and the call that they ask for."""
+"""The parser of the command line, and the execution of one command."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import NoReturn
 
 from lipmotion.cli import adapt, animate, corpus, cues, evaluate, experiment, explain, info, train
 from lipmotion.cli.events import Events
-from lipmotion.cli.output import flush_output, own, refused, say
+from lipmotion.cli.output import flush_output, output_error, print_line, with_program_name
 from lipmotion.cli.paths import check_paths
 from lipmotion.cli.stop import Stopper
 from lipmotion.printable import printable
@@ -24,9 +24,13 @@ EXIT_CODES = """exit codes: 0 done, 1 a bug, 2 wrong command line, 3 unusable in
 
 
 def run(arguments: Sequence[str] | None, stopper: Stopper, events: Events) -> None:
-    """Run one command. Raises whatever it raises; SystemExit: help was asked for, or the command line is wrong."""
-    _log_printable()
-    shown, warnings.showwarning = warnings.showwarning, _log_warning
+    """Parse and run one command.
+
+    arguments : words of the command line without the program's name; None: those of the process
+    Raises whatever the command raises; SystemExit: help was asked for, or the command line is wrong.
+    """
+    _log_warnings_as_lines()
+    show_before, warnings.showwarning = warnings.showwarning, _log_warning
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # a terminal may not know every letter of a file's name
     try:
@@ -37,15 +41,15 @@ def run(arguments: Sequence[str] | None, stopper: Stopper, events: Events) -> No
         stopper.settle()
     except OSError as error:
         if error.errno == errno.ENOSPC and error.filename is None:
-            raise refused(error) from error
+            raise output_error(error) from error
         raise
     finally:
-        warnings.showwarning = shown
+        warnings.showwarning = show_before
         flush_output()
 
 
 def parser() -> argparse.ArgumentParser:
-    """Return what knows all verbs."""
+    """Return the parser with all verbs."""
     whole = _Parser(
         prog="lipmotion",
         description="Speech in, lip motion out, with models trained from your own recordings.",
@@ -59,34 +63,34 @@ def parser() -> argparse.ArgumentParser:
 
 
 class _Parser(argparse.ArgumentParser):
-    """Repeats what it does not understand as printable text."""
+    """Reports a wrong command line as printable text."""
 
     def error(self, message: str) -> NoReturn:
         super().error(printable(message))
 
 
 class _Version(argparse.Action):
-    """Looks the version up only when it is wanted."""
+    """Prints the version, which is looked up only when the option is given."""
 
     def __call__(self, *_: object) -> None:
         from importlib.metadata import version
 
-        say(f"lipmotion {version('lipmotion')}")
+        print_line(f"lipmotion {version('lipmotion')}")
         sys.exit(0)
 
 
-class _Printable(logging.Formatter):
+class _WarningFormatter(logging.Formatter):
     def format(self, record: logging.LogRecord) -> str:
-        return own(f"warning: {record.getMessage()}")
+        return with_program_name(f"warning: {record.getMessage()}")
 
 
 def _log_warning(message: object, *_: object, **__: object) -> None:
-    """Take a warning of Python's own, or of another package: it may quote a file."""
+    """Log a warning of Python or of another package, so that it is printed as one printable line."""
     logging.getLogger("py.warnings").warning("%s", message)
 
 
-def _log_printable() -> None:
-    """Have warnings in one line on standard error."""
+def _log_warnings_as_lines() -> None:
+    """Print each logged warning as one line on standard error."""
     handler = logging.StreamHandler()
-    handler.setFormatter(_Printable())
+    handler.setFormatter(_WarningFormatter())
     logging.basicConfig(handlers=[handler], level=logging.WARNING)

@@ -1,4 +1,4 @@
-"""``lipmotion corpus prepare|info|sync|prompts``: recordings to a corpus, and what is in one."""
+"""``lipmotion corpus prepare|info|sync|prompts``: make a corpus of recordings, inspect and correct it."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from lipmotion.cli.paths import add_input, add_output
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add the verb."""
+    """Add the verb and its actions to the parser of the command line."""
     parser = verbs.add_parser("corpus", help="prepare recordings for training")
     actions = parser.add_subparsers(title="actions", required=True, metavar="ACTION")
-    prepare = actions.add_parser("prepare", help="make a corpus of a folder of recordings")
-    videos = "folder of videos, or of sounds with motion (docs/corpora.md)"
-    add_input(prepare, "recordings", what="folder of recordings", help=videos)
+    prepare = actions.add_parser("prepare", help="make a corpus from a folder of recordings")
+    layouts = "folder of videos, or of sounds with motion (docs/corpora.md)"
+    add_input(prepare, "recordings", what="folder of recordings", help=layouts)
     add_output(prepare, "-o", "--output", is_folder=True, required=True, metavar="CORPUS")
-    prepare.add_argument("--workers", type=int, help="processes (default: one a core)")
-    prepare.add_argument("--no-crops", dest="crops", action="store_false", help="do not keep mouth images")
+    prepare.add_argument("--workers", type=int, help="number of processes (default: one per core)")
+    prepare.add_argument("--no-crops", dest="crops", action="store_false", help="do not store mouth pictures")
     add_machine_readable(prepare)
     prepare.set_defaults(run=run_prepare)
     contents.add(actions)
@@ -27,11 +27,11 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 
 def run_prepare(options: argparse.Namespace) -> None:
-    """Call ``lipmotion.prepare``."""
+    """Call ``lipmotion.prepare``; report what was prepared, kept and skipped."""
     from lipmotion.cli.progress import reporting
     from lipmotion.pipeline.corpus.prepare import prepare
 
     given = {"workers": options.workers, "crops": options.crops}
     with reporting(options) as report:
-        done = prepare(options.recordings, options.output, **given, monitor=report.hear)
+        done = prepare(options.recordings, options.output, **given, monitor=report.receive)
         report.finish(str(done), corpus=str(done.corpus), kind=done.kind, **done.counts)

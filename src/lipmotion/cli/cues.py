@@ -1,4 +1,4 @@
-"""``lipmotion cues``: speech to held mouth shapes for 2D animation."""
+"""``lipmotion cues``: turn speech into held mouth shapes for 2D animation."""
 
 from __future__ import annotations
 
@@ -6,45 +6,50 @@ import argparse
 from contextlib import nullcontext
 from typing import Any
 
-from lipmotion.cli.output import flush_output, say, say_lines
+from lipmotion.cli.output import flush_output, print_line, print_lines
 from lipmotion.cli.paths import add_output
-from lipmotion.cli.speech import add_speech_arguments, speech_arguments
+from lipmotion.cli.speech import add_speech_arguments, request_and_model
 from lipmotion.cli.status import status_lines
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add the verb."""
+    """Add the verb to the parser of the command line."""
     parser = verbs.add_parser("cues", help="turn speech into mouth shapes for 2D animation (Rhubarb, Moho, OpenToonz)")
     add_speech_arguments(parser)
     add = parser.add_argument
-    several: dict[str, Any] = {"nargs": "+", "action": "extend", "default": []}
-    add_output(parser, "-o", "--output", force=True, help="FILE.tsv .xml .json .dat", **several)
-    add("-f", "--format", choices=("tsv", "xml", "json", "dat"), help="(default: the suffix; tsv without a file)")
+    outputs: dict[str, Any] = {"nargs": "+", "action": "extend", "default": []}
+    add_output(parser, "-o", "--output", force=True, help="FILE.tsv .xml .json .dat, or several", **outputs)
+    add(
+        "-f",
+        "--format",
+        choices=("tsv", "xml", "json", "dat"),
+        help="(default: that of the suffix; tsv on standard output)",
+    )
     add("--fps", type=float, default=24.0, help="frames per second of the animation (default: 24)")
-    add("--hold", type=int, metavar="FRAMES", help="least length of a shape (default: as two frames at 24)")
+    add("--hold", type=int, metavar="FRAMES", help="minimum length of a shape (default: that of two frames at 24 fps)")
     add("--shapes", default="GHX", help="optional shapes that the character has (default: GHX; none: '')")
-    add("--machine-readable", "--machineReadable", action="store_true", help="status as JSON lines on standard error")
+    add("--machine-readable", "--machineReadable", action="store_true", help="progress as JSON lines on standard error")
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:
-    """Call ``lipmotion.animate``, ``lipmotion.cues`` and ``lipmotion.write_cues``."""
+    """Call ``lipmotion.animate``, ``lipmotion.cues`` and ``lipmotion.write_cues``; print the cues or their paths."""
     from lipmotion.pipeline.animate import animate
     from lipmotion.pipeline.cues import check_cue_options, check_cue_outputs, cue_text, cues, write_cues
 
-    with status_lines(options) if options.machine_readable else nullcontext(lambda _: None) as done:
+    with status_lines(options) if options.machine_readable else nullcontext(lambda _: None) as set_progress:
         check_cue_options(options.fps, options.hold, options.shapes)
         check_cue_outputs(options.output, options.speech, options.format)
-        done(0.0)
-        told = speech_arguments(options)
-        done(0.1)
-        result = animate(options.speech, **told)
-        done(0.9)
+        set_progress(0.0)
+        request, model = request_and_model(options)
+        set_progress(0.1)
+        result = animate(request, model=model)
+        set_progress(0.9)
         sheet = cues(result, fps=options.fps, hold_frames=options.hold, shapes=options.shapes)
         write_cues(sheet, options.output, speech=options.speech, form=options.format)
-        done(1.0)
+        set_progress(1.0)
         for path in options.output:
-            say(path)
+            print_line(path)
         if not options.output:
-            say_lines(cue_text(sheet, speech=options.speech, form=options.format or "tsv").removesuffix("\n"))
+            print_lines(cue_text(sheet, speech=options.speech, form=options.format or "tsv").removesuffix("\n"))
         flush_output()

@@ -1,4 +1,4 @@
-"""``lipmotion evaluate``: how good a model is on recordings it has not seen."""
+"""``lipmotion evaluate``: compare generated with recorded motion on held-out recordings."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from lipmotion.cli.speech import add_recogniser_argument
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add the verb."""
+    """Add the verb to the parser of the command line."""
     parser = verbs.add_parser("evaluate", help="compare generated with recorded motion")
     add_input(parser, "model", what="model", replaceable=True)
     add_input(parser, "corpus", what="corpus")
     parser.add_argument("--split", default="test", help="train, val, test or all (default: test)")
-    parser.add_argument("--speaker", action="append", default=[], metavar="NAME", help="this one only (repeatable)")
+    parser.add_argument("--speaker", action="append", default=[], metavar="NAME", help="only this speaker (repeatable)")
     add_recogniser_argument(parser)
     add_figures_arguments(parser)
     parser.set_defaults(run=run)
@@ -26,7 +26,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 def run(options: argparse.Namespace) -> None:
     """Call ``lipmotion.evaluate`` and print its figures."""
     from lipmotion.corpora.store import Corpus
-    from lipmotion.measures.report import table
+    from lipmotion.measures.report import figures_table
     from lipmotion.pipeline.evaluation.evaluate import evaluate
     from lipmotion.pipeline.model import load_model
 
@@ -35,4 +35,4 @@ def run(options: argparse.Namespace) -> None:
     def compute(**given: Any) -> dict[str, Any]:
         return evaluate(load_model(options.model), Corpus.open(options.corpus), **chosen, **given)
 
-    report_figures(options, compute, table)
+    report_figures(options, compute, figures_table)

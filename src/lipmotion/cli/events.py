@@ -1,6 +1,6 @@
-"""What a program that runs this one is told with ``--machine-readable``: JSON objects, the last says how it ended.
+"""Events of ``--machine-readable``: JSON objects for the calling program; the last one says how the command ended.
 
-This module is loaded before any signal can be answered, and loads none that takes time.
+This module is loaded before signals are handled, so it imports nothing that takes time.
 """
 
 from __future__ import annotations
@@ -18,90 +18,90 @@ STATUS_VERBS, LINES_VERBS = ("cues",), ("corpus", "train", "evaluate", "experime
 
 
 class Events:
-    """None: nobody asked for them.
+    """No events, and the interface of the classes below.
 
-    alone : whether they take the place of what standard error would say
+    replaces_errors : whether the events take the place of error lines on standard error
     """
 
-    alone = False
+    replaces_errors = False
 
     def start(self, options: Namespace) -> None:
-        """Say that it starts."""
+        """Report that the command starts."""
 
     def fail(self, reason: str, code: int) -> None:
-        """Say why it ended before it was done, if nothing has said so yet."""
+        """Report why the command failed, unless its end has been reported already."""
 
 
-class Lines(Events):
-    """One object a line on standard output (docs/long-work.md)."""
+class JsonLines(Events):
+    """One JSON object per line on standard output (docs/long-work.md)."""
 
     def __init__(self) -> None:
-        self._over = False
+        self._ended = False
 
     def start(self, options: Namespace) -> None:  # noqa: D102, ARG002
-        self.say("start")
+        self.emit("start")
 
-    def say(self, kind: str, /, **fields: Any) -> None:
-        """Say that something happened; nothing after the end. Raises ExportError: standard output takes no more."""
-        if self._over:
+    def emit(self, kind: str, /, **fields: Any) -> None:
+        """Write one event; nothing after the last one. Raises ExportError: standard output cannot be written."""
+        if self._ended:
             return
-        from lipmotion.cli.output import refused, say_json
+        from lipmotion.cli.output import output_error, print_json
 
         try:
-            say_json({"type": kind, **fields})
-        except OSError as error:  # a full disk, or a reader that has gone: then there is nobody to work for
-            self._over = True
-            raise refused(error) from error
+            print_json({"type": kind, **fields})
+        except OSError as error:  # a full disk, or a reader that has gone: nobody would receive the result
+            self._ended = True
+            raise output_error(error) from error
 
     def succeed(self, **figures: Any) -> None:
-        """Say what came of it."""
-        self.say("success", **figures)
-        self._over = True
+        """Report success with the figures of the result."""
+        self.emit("success", **figures)
+        self._ended = True
 
     def fail(self, reason: str, code: int) -> None:  # noqa: D102
         from lipmotion.errors import ExportError
 
         with suppress(ExportError):
-            self.say("failure", reason=reason, exit_code=code)
-        self._over = True
+            self.emit("failure", reason=reason, exit_code=code)
+        self._ended = True
 
 
-class Status(Events):
-    """One object a line on standard error, and nothing else there: those of Rhubarb's ``--machineReadable``."""
+class RhubarbStatus(Events):
+    """One JSON object per line on standard error, and nothing else there: as Rhubarb's ``--machineReadable``."""
 
-    alone = True
+    replaces_errors = True
 
     def __init__(self) -> None:
-        self._over = False
+        self._ended = False
 
     def start(self, options: Namespace) -> None:  # noqa: D102
         from lipmotion.storage.files import as_text
 
         name = as_text(options.speech)
-        self.say("start", "Info", f'Application startup. Input file: "{name}".', file=name)
+        self.emit("start", "Info", f'Application startup. Input file: "{name}".', file=name)
 
-    def say(self, kind: str, level: str, message: str, **data: Any) -> None:
-        """Say that something happened; nothing after the end."""
-        if not self._over:
-            from lipmotion.cli.output import complain_json
+    def emit(self, kind: str, level: str, message: str, **data: Any) -> None:
+        """Write one event; nothing after the last one."""
+        if not self._ended:
+            from lipmotion.cli.output import print_error_json
 
-            complain_json({"type": kind, **data, "log": {"level": level, "message": message}})
+            print_error_json({"type": kind, **data, "log": {"level": level, "message": message}})
 
     def succeed(self) -> None:
-        """Say that all is done."""
-        self.say("success", "Info", "Application terminating normally.")
-        self._over = True
+        """Report success."""
+        self.emit("success", "Info", "Application terminating normally.")
+        self._ended = True
 
     def fail(self, reason: str, code: int) -> None:  # noqa: D102, ARG002
-        with suppress(OSError):  # nobody is there to be told
-            self.say("failure", "Fatal", f"Application terminating with error: {reason}", reason=reason)
-        self._over = True
+        with suppress(OSError):  # nobody reads standard error
+            self.emit("failure", "Fatal", f"Application terminating with error: {reason}", reason=reason)
+        self._ended = True
 
 
 def events_of(words: Sequence[str]) -> Events:
-    """Return the events that a command line asks for: known before it is parsed, so that nothing comes too early."""
+    """Return the events that a command line asks for, before it is parsed: parsing errors are events, too."""
     asked = any(len(word) > 2 and option.startswith(word) for option in OPTIONS for word in words)
     verb = next((word for word in words if not word.startswith("-")), "")
     if asked and verb in STATUS_VERBS:
-        return Status()
-    return Lines() if asked and verb in LINES_VERBS else Events()
+        return RhubarbStatus()
+    return JsonLines() if asked and verb in LINES_VERBS else Events()

@@ -1,4 +1,4 @@
-"""What the experiments of ``lipmotion experiment`` have in common."""
+"""Arguments and execution that the experiments of ``lipmotion experiment`` have in common."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from lipmotion.cli.paths import add_input
 
 
 def add_experiment_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the corpus, the processes, and where the figures go."""
+    """Add the corpus, ``--workers``, and the options of ``add_figures_arguments``."""
     add_input(parser, "corpus", what="corpus")
-    parser.add_argument("--workers", type=int, help="processes (default: one a core)")
+    parser.add_argument("--workers", type=int, help="number of processes (default: one per core)")
     add_figures_arguments(parser)
 
 
@@ -23,10 +23,12 @@ def run_experiment(
     experiment: Callable[..., dict[str, Any]],
     table: Callable[[dict[str, Any]], str],
 ) -> None:
-    """Call ``experiment(corpus, lexicon=..., workers=..., monitor=...)`` and print its table."""
+    """Call ``experiment(corpus, settings=...)`` and print its table."""
     from lipmotion.corpora.store import Corpus
+    from lipmotion.experiments.runner import ExperimentSettings
 
     def compute(**given: Any) -> dict[str, Any]:
-        return experiment(Corpus.open(options.corpus), workers=options.workers or os.cpu_count() or 1, **given)
+        settings = ExperimentSettings(workers=options.workers or os.cpu_count() or 1, **given)
+        return experiment(Corpus.open(options.corpus), settings=settings)
 
     report_figures(options, compute, table)

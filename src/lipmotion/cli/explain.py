@@ -1,33 +1,34 @@
-"""``lipmotion explain``: what stands behind a frame."""
+"""``lipmotion explain``: states, probabilities and Gaussians behind a generated frame."""
 
 from __future__ import annotations
 
 import argparse
 
-from lipmotion.cli.output import say_json, say_lines
+from lipmotion.cli.output import print_json, print_lines
 from lipmotion.cli.paths import add_input
-from lipmotion.cli.speech import add_hearing_arguments, speech_arguments
+from lipmotion.cli.speech import add_recording_arguments, request_and_model
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add the verb."""
-    parser = verbs.add_parser("explain", help="say which states and Gaussians a model's motion comes from")
+    """Add the verb to the parser of the command line."""
+    parser = verbs.add_parser("explain", help="print which states and Gaussians the motion of a frame comes from")
     add_input(parser, "model", what="model")
-    add_hearing_arguments(parser)
+    add_recording_arguments(parser)
     parser.add_argument(
-        "--at", type=float, action="append", required=True, metavar="SECONDS", help="which frame (repeatable)"
+        "--at", type=float, action="append", required=True, metavar="SECONDS", help="time of a frame (repeatable)"
     )
-    parser.add_argument("--json", action="store_true", help="one JSON object a time, with all channels")
+    parser.add_argument("--json", action="store_true", help="print one JSON object per time, with all channels")
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:
-    """Call ``lipmotion.explain`` and print what it found."""
+    """Call ``lipmotion.explain`` and print the explanations."""
     from lipmotion.pipeline.explain import explain, explanation_document, explanation_text
 
-    found = explain(speech=options.speech, at_s=options.at, **speech_arguments(options))
+    request, model = request_and_model(options)
+    explanations = explain(request, at=options.at, model=model)
     if options.json:
-        for explanation in found:
-            say_json(explanation_document(explanation))
+        for explanation in explanations:
+            print_json(explanation_document(explanation))
     else:
-        say_lines("\n\n".join(map(explanation_text, found)))
+        print_lines("\n\n".join(map(explanation_text, explanations)))

@@ -1,4 +1,4 @@
-"""Figures that a verb prints, and writes where it is told to."""
+"""Figures that a verb computes: their options, their file and their table."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ Figures = dict[str, Any]
 
 
 def add_figures_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the lexicon, where figures go, and ``--machine-readable``."""
+    """Add ``--lexicon``, ``--output`` and ``--machine-readable``."""
     add_lexicon_argument(parser)
-    add_output(parser, "-o", "--output", force=True, metavar="FILE.json", help="write all figures here as well")
+    add_output(parser, "-o", "--output", force=True, metavar="FILE.json", help="also write all figures to this file")
     add_machine_readable(parser)
 
 
@@ -28,15 +28,15 @@ def report_figures(
     """Call ``compute(lexicon=..., monitor=...)``, write its figures, and print their table."""
     from lipmotion.cli.progress import reporting
     from lipmotion.storage.files import check_target, whole_file
-    from lipmotion.storage.json_text import as_json, defined
+    from lipmotion.storage.json_text import as_json, nan_as_null
     from lipmotion.units import Lexicon
 
     with reporting(options) as report:
         if options.output:
             check_target(options.output)
         lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
-        figures = compute(lexicon=lexicon, monitor=report.hear)
+        figures = compute(lexicon=lexicon, monitor=report.receive)
         if options.output:
             with whole_file(options.output) as unfinished:
-                unfinished.write_text(as_json(defined(figures), indent=1) + "\n")
+                unfinished.write_text(as_json(nan_as_null(figures), indent=1) + "\n")
         report.finish(table(figures), figures=figures)

@@ -1,4 +1,4 @@
-"""``lipmotion experiment folds``: the whole training list, held out part by part."""
+"""``lipmotion experiment folds``: cross-validation on the training list."""
 
 from __future__ import annotations
 
@@ -10,8 +10,10 @@ from lipmotion.cli.experiments import add_experiment_arguments, run_experiment
 
 def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the experiment to ``lipmotion experiment``."""
-    parser = actions.add_parser("folds", help="each part of the training list by a model of the others")
-    parser.add_argument("--folds", type=int, default=5, metavar="K", help="so many parts (default: 5)")
+    parser = actions.add_parser(
+        "folds", help="cross-validation: generate each part of the training list by a model of the others"
+    )
+    parser.add_argument("--folds", type=int, default=5, metavar="K", help="number of parts (default: 5)")
     add_experiment_arguments(parser)
     parser.set_defaults(run=run)
 

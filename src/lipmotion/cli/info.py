@@ -1,37 +1,39 @@
-"""``lipmotion info``: what a model is and where it comes from."""
+"""``lipmotion info``: the header of a model, or its decision trees or chains."""
 
 from __future__ import annotations
 
 import argparse
 
-from lipmotion.cli.output import say, say_lines
+from lipmotion.cli.output import print_line, print_lines
 from lipmotion.cli.paths import add_input
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add the verb."""
-    parser = verbs.add_parser("info", help="say what a model is, and whose recordings it comes from")
+    """Add the verb to the parser of the command line."""
+    parser = verbs.add_parser("info", help="print what a model is, and whose recordings it was trained on")
     shipped = "default: the model that ships with the package"
     add_input(parser, "model", what="model", nargs="?", help=shipped)
-    parser.add_argument(
-        "--trees", action="store_true", help="print its decision trees, or its chains, and nothing else"
-    )
+    parser.add_argument("--trees", action="store_true", help="print only its decision trees, or its chains")
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:
-    """Print the model's header."""
+    """Print the header of the model, or its trees."""
+    from lipmotion.engines.base import Describes
+    from lipmotion.errors import InputError
     from lipmotion.pipeline.model import load_model, read_header, shipped_path
 
     path = options.model or shipped_path()
     if options.trees:
         model = load_model(path)
-        say_lines(model.engine.trees(model.learned))
+        if not isinstance(model.engine, Describes):
+            raise InputError(f"models of the engine {model.engine.name!r} cannot be printed; leave --trees out")
+        print_lines(model.engine.describe(model.learned))
         return
     header = read_header(path)
-    say(f"{'file':14} {path} ({path.stat().st_size / 1e6:.1f} MB)")
+    print_line(f"{'file':14} {path} ({path.stat().st_size / 1e6:.1f} MB)")
     for name, value in header.items():
-        say(f"{name:14} {_plain(value)}")
+        print_line(f"{name:14} {_plain(value)}")
 
 
 def _plain(value: object) -> str:

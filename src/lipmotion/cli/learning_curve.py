@@ -1,4 +1,4 @@
-"""``lipmotion experiment learning-curve``: how much speech a model needs."""
+"""``lipmotion experiment learning-curve``: quality of models over the amount of training data."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from lipmotion.cli.paths import add_input
 
 def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the experiment to ``lipmotion experiment``."""
-    parser = actions.add_parser("learning-curve", help="how good models of the first N recordings are")
-    order = "names of recordings, one a line (default: the training list, shuffled with seed 0)"
+    parser = actions.add_parser("learning-curve", help="quality of models trained on the first N recordings")
+    order = "names of recordings, one per line (default: the training list, shuffled with seed 0)"
     add_input(parser, "--order", what="list", replaceable=True, metavar="FILE", help=order)
-    sizes = "train on so many, one after another (default: 20,50,100,200 and all)"
+    sizes = "numbers of recordings to train on (default: 20,50,100,200 and all)"
     parser.add_argument("--sizes", type=numbers, metavar="N,N,...", help=sizes)
     parser.add_argument("--split", default="test", help="compare on val or test (default: test)")
     add_experiment_arguments(parser)
@@ -24,12 +24,12 @@ def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Call ``experiment.learning_curve`` and print its table."""
-    from lipmotion.corpora.splits import names_in
+    from lipmotion.corpora.splits import read_names
     from lipmotion.corpora.store import Corpus
     from lipmotion.experiments.learning_curve import learning_curve, table
 
     def experiment(corpus: Corpus, **given: Any) -> dict[str, Any]:
-        order = names_in(options.order) if options.order else None
+        order = read_names(options.order) if options.order else None
         return learning_curve(corpus, order=order, sizes=options.sizes, split=list_or_all(options.split), **given)
 
     run_experiment(options, experiment, table)

@@ -1,4 +1,4 @@
-"""``lipmotion VERB ...``: errors in one line, and an exit code that says what kind."""
+"""``lipmotion VERB ...``: the entry point; an error is one line and an exit code of its kind."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; return its exit code.
 
-    arguments : those of the process by default; the process is then taken to end with this call
+    arguments : words of the command line; None: those of the process, which is then expected to end with this call
     """
     stopper, events = Stopper(), events_of(sys.argv[1:] if arguments is None else arguments)
     try:
@@ -23,9 +23,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             stopper.listen()
             return _run(arguments, stopper, events)
         except KeyboardInterrupt:
-            return _told(events, stopper.code or 130, MESSAGE)
+            return _report_failure(events, stopper.code or 130, MESSAGE)
     finally:
-        stopper.leave(for_good=arguments is None)
+        stopper.stop_listening(process_ends=arguments is None)
 
 
 def _run(arguments: Sequence[str] | None, stopper: Stopper, events: Events) -> int:
@@ -33,13 +33,13 @@ def _run(arguments: Sequence[str] | None, stopper: Stopper, events: Events) -> i
         from lipmotion.cli import command_line
 
         command_line.run(arguments, stopper, events)
-    except BrokenPipeError:  # the reader of our output has gone; nothing is left to say
-        from lipmotion.cli.output import discard_output
+    except BrokenPipeError:  # the reader of standard output has gone
+        from lipmotion.cli.output import discard_pending_output
 
         stopper.settle()
-        discard_output()
+        discard_pending_output()
     except Exception as error:
-        stopper.check()  # what was interrupted may fail in any way
+        stopper.check()  # interrupted work may fail in any way
         from lipmotion.cli.outcome import outcome
 
         known = outcome(error)
@@ -48,7 +48,7 @@ def _run(arguments: Sequence[str] | None, stopper: Stopper, events: Events) -> i
             events.fail(f"{type(error).__name__}: {error}", 1)
             raise
         code, reason = known
-        return _told(events, code, f"error: {reason}")
+        return _report_failure(events, code, f"error: {reason}")
     except SystemExit as end:  # argparse: help, version, a wrong command line
         stopper.settle()
         code = int(end.code or 0)
@@ -58,12 +58,13 @@ def _run(arguments: Sequence[str] | None, stopper: Stopper, events: Events) -> i
     return 0
 
 
-def _told(events: Events, code: int, text: str) -> int:
-    from lipmotion.cli.output import complain
+def _report_failure(events: Events, code: int, text: str) -> int:
+    """Report an error as an event and as a line; return the exit code."""
+    from lipmotion.cli.output import print_error
 
     events.fail(text.removeprefix("error: "), code)
-    if not events.alone:
-        complain(text)
+    if not events.replaces_errors:
+        print_error(text)
     return code
 
 

@@ -7,18 +7,16 @@ import argparse
 
 def add_machine_readable(parser: argparse.ArgumentParser) -> None:
     """Add ``--machine-readable`` (docs/long-work.md)."""
-    parser.add_argument(
-        "--machine-readable", action="store_true", help="one JSON object a line on standard output, and nothing else"
-    )
+    parser.add_argument("--machine-readable", action="store_true", help="print only JSON objects, one per line")
 
 
 def list_or_all(split: str) -> str | None:
-    """Return the list that ``--split`` names; None for ``all``."""
+    """Return the name of the list that ``--split`` selects; None: all recordings."""
     return None if split == "all" else split
 
 
 def numbers(text: str) -> list[int]:
-    """Return whole numbers with commas between them."""
+    """Return the whole numbers of a text like ``1,2,4``. Raises ArgumentTypeError: not such a text."""
     try:
         return [int(part) for part in text.split(",")]
     except ValueError as error:

@@ -1,4 +1,4 @@
-"""What an error means to the caller of a command."""
+"""Exit codes and one-line messages of errors."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from lipmotion.errors import InputError, LipMotionError
 from lipmotion.printable import printable
 
 BEGIN, END = 700, 300
-"""Letters of a line that are shown at most, from both its ends."""
+"""Characters of a long line that are shown from its beginning and from its end."""
 
 
 def outcome(error: BaseException) -> tuple[int, str] | None:
-    """Return the exit code and one line about an error that can be expected; None for a bug."""
+    """Return the exit code and the one-line message of an expected error; None: the error is a bug."""
     if isinstance(error, LipMotionError):
         return error.exit_code, _cut(printable(error))
     if isinstance(error, MemoryError):
@@ -21,5 +21,5 @@ def outcome(error: BaseException) -> tuple[int, str] | None:
 
 
 def _cut(line: str) -> str:
-    """Return a line whose middle is left out where it repeats far too much of a file: its end says what to do."""
+    """Return a line of limited length; the middle of a longer one is left out, for its end says what to do."""
     return line if len(line) <= BEGIN + END else f"{line[:BEGIN]} ... {line[-END:]}"

@@ -1,4 +1,4 @@
-"""All that is printed: values of files and of the command line as printable text, never as what a terminal obeys.
+"""Printing: values from files and from the command line become printable text, without terminal control characters.
 
 Only this module writes to the standard streams.
 """
@@ -12,61 +12,61 @@ from typing import Any
 
 from lipmotion.errors import ExportError
 from lipmotion.printable import printable
-from lipmotion.storage.json_text import as_json, defined
+from lipmotion.storage.json_text import as_json, nan_as_null
 
 LINE_START = "\r\x1b[K"
-"""Over what is left of a progress bar, on a terminal."""
+"""Terminal control characters that erase the rest of a progress bar."""
 
 
-def say(text: object) -> None:
+def print_line(text: object) -> None:
     """Print one line on standard output."""
     print(printable(text))
 
 
-def say_lines(text: str) -> None:
-    """Print lines on standard output as they are laid out, with line ends and tabs; the values in them are one line."""
+def print_lines(text: str) -> None:
+    """Print lines on standard output, line ends and tabs kept; other control characters are escaped."""
     print("\n".join("\t".join(map(printable, line.split("\t"))) for line in text.split("\n")))
 
 
-def complain(text: object) -> None:
-    """Print one line of this program's own on standard error, if there is one that takes it."""
+def print_error(text: object) -> None:
+    """Print one line with the program's name on standard error, if standard error is open."""
     with suppress(OSError):
         if sys.stderr is not None:
-            print(f"{LINE_START if sys.stderr.isatty() else ''}{own(text)}", file=sys.stderr)
+            print(f"{LINE_START if sys.stderr.isatty() else ''}{with_program_name(text)}", file=sys.stderr)
 
 
-def own(text: object) -> str:
-    """Return a line that says who speaks."""
+def with_program_name(text: object) -> str:
+    """Return a text as one printable line that begins with the program's name."""
     return f"lipmotion: {printable(text)}"
 
 
-def say_json(document: Any) -> None:
-    """Print a document on one line of standard output, in ASCII."""
-    print(as_json(defined(document)), flush=True)
+def print_json(document: Any) -> None:
+    """Print a JSON document as one line of ASCII on standard output."""
+    print(as_json(nan_as_null(document)), flush=True)
 
 
-def complain_json(document: Any) -> None:
-    """Print a document on one line of standard error, in ASCII."""
-    print(as_json(defined(document)), file=sys.stderr, flush=True)
+def print_error_json(document: Any) -> None:
+    """Print a JSON document as one line of ASCII on standard error."""
+    print(as_json(nan_as_null(document)), file=sys.stderr, flush=True)
 
 
 def flush_output() -> None:
-    """Flush now, not when Python ends: nobody could be told then that it failed. Raises ExportError: as ``refused``."""
+    """Flush standard output now: when Python ends, a failure could not be reported. Raises ExportError: it failed."""
     try:
         if sys.stdout is not None:
             sys.stdout.flush()
     except BrokenPipeError:
         raise
     except OSError as error:
-        raise refused(error) from error
+        raise output_error(error) from error
 
 
-def discard_output() -> None:
-    """Throw away what is still to be written: Python tries again when it ends, and nobody could be told then."""
+def discard_pending_output() -> None:
+    """Discard buffered output, which Python would otherwise try to write again when it ends."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def refused(error: OSError) -> ExportError:
-    """Return the error that says that standard output takes no more, and discard the rest."""
-    discard_output()
+def output_error(error: OSError) -> ExportError:
+    """Discard pending output; return the error that says that standard output cannot be written."""
+    discard_pending_output()
     return ExportError(f"standard output cannot be written: {error.strerror or error}")

@@ -1,4 +1,4 @@
-"""Files and folders on a command line: every argument says whether it is read or written, before all work."""
+"""Paths on the command line: every path argument is declared as input or output, and conflicts are refused early."""
 
 from __future__ import annotations
 
@@ -13,34 +13,35 @@ from lipmotion.storage.sources import Source, check_apart, is_folder
 
 
 @dataclass(frozen=True)
-class Reads:
-    """An argument that names what is read.
+class InputArgument:
+    """An argument that names an input file or folder.
 
-    name        : of the option in the namespace
-    what        : what it is, in a word
-    replaceable : read whole before anything is written
-    is_text     : may be a text instead, or a name that means something: then a folder of that name is not meant
-    otherwise   : gives what is read where the argument is left out
+    name         : of the option in the namespace
+    what         : noun for it in error messages
+    replaceable  : read completely before anything is written, so that an output may replace it
+    is_text      : may be a text instead of a path: a folder of that name is then not an input
+    default_path : returns the input that is read where the argument is left out
     """
 
     name: str
     what: str
     replaceable: bool
     is_text: bool
-    otherwise: Callable[[], Path] | None
+    default_path: Callable[[], Path] | None
 
 
 @dataclass(frozen=True)
-class Writes:
-    """An argument that names what is written.
+class OutputArgument:
+    """An argument that names an output file or folder.
 
-    is_folder : a folder that is filled, not a file
-    keeps     : what is finished is kept in a folder beside it (``files.unfinished_work``)
+    name       : of the option in the namespace
+    is_folder  : whether it is a folder
+    keeps_work : whether finished stages are kept in a folder beside it (``files.unfinished_work``)
     """
 
     name: str
     is_folder: bool
-    keeps: bool
+    keeps_work: bool
 
 
 def add_input(
@@ -48,53 +49,59 @@ def add_input(
     *names: str,
     what: str,
     replaceable: bool = False,
-    otherwise: Callable[[], Path] | None = None,
+    default_path: Callable[[], Path] | None = None,
     **more: Any,
 ) -> None:
-    """Add an argument that names a file or a folder to read; the rest as ``add_argument``."""
+    """Add an argument that names an input, with the further arguments of ``add_argument``."""
     action = parser.add_argument(*names, **({"type": Path} | more))
-    _declare(parser, "reads", Reads(action.dest, what, replaceable, action.type is str, otherwise))
+    _declare(parser, "reads", InputArgument(action.dest, what, replaceable, action.type is str, default_path))
 
 
 def add_output(
     parser: argparse.ArgumentParser,
     *names: str,
     is_folder: bool = False,
-    keeps: bool = False,
+    keeps_work: bool = False,
     force: bool = False,
     **more: Any,
 ) -> None:
-    """Add an argument that names a file or a folder to write, and with ``force`` that option; the rest as there."""
+    """Add an argument that names an output, with the further arguments of ``add_argument``.
+
+    force : also add the option ``--force``
+    """
     action = parser.add_argument(*names, **({"type": Path} | more))
-    _declare(parser, "writes", Writes(action.dest, is_folder, keeps))
+    _declare(parser, "writes", OutputArgument(action.dest, is_folder, keeps_work))
     if force:
-        explained = "let an output replace a text, units or model file that is read; never a recording or a corpus"
-        parser.add_argument("--force", action="store_true", help=explained)
+        replacing = "let an output replace a text, units or model file that is read; never a recording or a corpus"
+        parser.add_argument("--force", action="store_true", help=replacing)
 
 
 def check_paths(options: argparse.Namespace) -> None:
-    """Raise ExportError if a command would write what it reads."""
-    declared: tuple[Writes, ...] = getattr(options, "writes", ())
-    written = [(one, path) for one in declared for path in _paths(getattr(options, one.name))]
+    """Raise ExportError if an output of a command is one of its inputs."""
+    declared: tuple[OutputArgument, ...] = getattr(options, "writes", ())
+    written = [(output, path) for output in declared for path in _paths(getattr(options, output.name))]
     if written:
-        folders = [path for one, path in written if one.is_folder]
-        folders += [work_folder(path) for one, path in written if one.keeps]
-        files = [path for one, path in written if not one.is_folder]
+        folders = [path for output, path in written if output.is_folder]
+        folders += [work_folder(path) for output, path in written if output.keeps_work]
+        files = [path for output, path in written if not output.is_folder]
         check_apart(files, _sources(options), folders=folders, force=getattr(options, "force", False))
 
 
 def _sources(options: argparse.Namespace) -> Iterator[Source]:
-    for one in options.reads:
-        found = _paths(getattr(options, one.name)) or ([one.otherwise()] if one.otherwise else [])
-        meant = [path for path in found if not (one.is_text and is_folder(path))]
-        yield from (Source(path, one.what, one.replaceable) for path in meant)
+    """Yield the inputs of a command."""
+    for argument in options.reads:
+        given = _paths(getattr(options, argument.name))
+        paths = given or ([argument.default_path()] if argument.default_path else [])
+        inputs = [path for path in paths if not (argument.is_text and is_folder(path))]
+        yield from (Source(path, argument.what, argument.replaceable) for path in inputs)
 
 
 def _paths(value: Any) -> list[Path]:
-    """Return the paths of an argument; a text that can be no name is none of a file."""
+    """Return the values of an argument as paths; none where it was left out."""
     given = value if isinstance(value, list) else [value]
-    return [Path(one) for one in given if one is not None]
+    return [Path(text) for text in given if text is not None]
 
 
-def _declare(parser: argparse.ArgumentParser, kind: str, one: Reads | Writes) -> None:
-    parser.set_defaults(**{kind: (*(parser.get_default(kind) or ()), one)})
+def _declare(parser: argparse.ArgumentParser, kind: str, argument: InputArgument | OutputArgument) -> None:
+    """Append a declaration to the parser's default ``reads`` or ``writes``."""
+    parser.set_defaults(**{kind: (*(parser.get_default(kind) or ()), argument)})

@@ -1,4 +1,4 @@
-"""Long work as a person follows it on a terminal, or as a program does (docs/long-work.md)."""
+"""Progress of long work, shown on a terminal or written as events for a program (docs/long-work.md)."""
 
 from __future__ import annotations
 
@@ -9,33 +9,37 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, Protocol
 
-from lipmotion.cli.events import Lines
-from lipmotion.cli.output import complain, own, say_lines
+from lipmotion.cli.events import JsonLines
+from lipmotion.cli.output import print_error, print_lines, with_program_name
 from lipmotion.cli.stop import Stopper
 from lipmotion.printable import printable
 from lipmotion.types.progress import Item, Progress
 
 
 class Report(Protocol):
-    """Says how the work goes on."""
+    """Receives the events of long work."""
 
-    def hear(self, event: Progress | Item) -> None:
-        """Take one event from the work."""
+    def receive(self, event: Progress | Item) -> None:
+        """Show or write one event."""
 
     def warn(self, text: str) -> None:
-        """Say what deserves attention."""
+        """Show or write a warning."""
 
     def finish(self, text: str, **figures: Any) -> None:
-        """Say what came of it: ``text`` to a person, ``figures`` to a program."""
+        """Give the result: ``text`` for a person, ``figures`` for a program."""
 
 
 @contextmanager
 def reporting(options: argparse.Namespace) -> Iterator[Report]:
-    """Give what the work reports to, while it lasts."""
-    chosen = _Program(options.stopper, options.events) if options.machine_readable else _Terminal(options.stopper)
+    """Yield the report of a command; meanwhile the package's warnings go to it, too."""
+    chosen = (
+        _MachineReport(options.stopper, options.events)
+        if options.machine_readable
+        else _TerminalReport(options.stopper)
+    )
     report: Report = chosen
     logger = logging.getLogger("lipmotion")
-    handler = _Warnings(report)
+    handler = _ReportHandler(report)
     logger.addHandler(handler)
     logger.propagate = False
     try:
@@ -46,7 +50,7 @@ def reporting(options: argparse.Namespace) -> Iterator[Report]:
         logger.propagate = True
 
 
-class _Warnings(logging.Handler):
+class _ReportHandler(logging.Handler):
     def __init__(self, report: Report) -> None:
         super().__init__(logging.WARNING)
         self._report = report
@@ -55,15 +59,15 @@ class _Warnings(logging.Handler):
         self._report.warn(record.getMessage())
 
 
-class _Terminal:
-    """A bar on standard error, if that is a terminal; warnings on it in any case; the result on standard output."""
+class _TerminalReport:
+    """A progress bar and warnings on standard error, the bar only on a terminal; the result on standard output."""
 
     def __init__(self, stopper: Stopper) -> None:
         self._stopper = stopper
         self._shown = sys.stderr is not None and sys.stderr.isatty()
         self._bar: Any = None
 
-    def hear(self, event: Progress | Item) -> None:
+    def receive(self, event: Progress | Item) -> None:
         self._stopper.check()
         if isinstance(event, Progress):
             self._draw(event)
@@ -73,14 +77,14 @@ class _Terminal:
     def warn(self, text: str) -> None:
         text = f"warning: {text}"
         if self._bar is None:
-            complain(text)
+            print_error(text)
         else:
-            self._bar.write(own(text), file=sys.stderr)
+            self._bar.write(with_program_name(text), file=sys.stderr)
 
     def finish(self, text: str, **_: Any) -> None:
         self.close()
         self._stopper.settle()
-        say_lines(text)
+        print_lines(text)
 
     def close(self) -> None:
         if self._bar is not None:
@@ -101,27 +105,27 @@ class _Terminal:
         self._bar.refresh()
 
 
-class _Program:
-    """Events for the program that runs this one."""
+class _MachineReport:
+    """JSON events for the calling program."""
 
-    def __init__(self, stopper: Stopper, events: Lines) -> None:
+    def __init__(self, stopper: Stopper, events: JsonLines) -> None:
         self._stopper, self._events = stopper, events
 
-    def hear(self, event: Progress | Item) -> None:
+    def receive(self, event: Progress | Item) -> None:
         self._stopper.check()
         if isinstance(event, Progress):
-            self._events.say(
+            self._events.emit(
                 "progress", stage=event.stage, step=event.step, steps=event.steps, value=round(event.share, 4)
             )
         else:
-            self._events.say("item", name=event.name, outcome=event.outcome, reason=event.reason)
+            self._events.emit("item", name=event.name, outcome=event.outcome, reason=event.reason)
 
     def warn(self, text: str) -> None:
-        self._events.say("warning", message=text)
+        self._events.emit("warning", message=text)
 
     def finish(self, text: str, **figures: Any) -> None:  # noqa: ARG002
         self._stopper.settle()
         self._events.succeed(**figures)
 
     def close(self) -> None:
-        """Nothing is shown that would have to go."""
+        """Do nothing: there is no progress bar to remove."""

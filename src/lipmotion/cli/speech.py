@@ -1,42 +1,46 @@
-"""Arguments of every verb that turns speech into motion."""
+"""Arguments of the verbs that turn speech into motion."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from lipmotion.cli.paths import add_input
 
-LEXICON = "pronunciations: WORD PHONE PHONE ... a line"
+if TYPE_CHECKING:
+    from lipmotion.pipeline.model import Model
+    from lipmotion.pipeline.request import SpeechRequest
+
+LEXICON = "pronunciations, one per line: WORD PHONE PHONE ..."
 MODEL = "trained model (default: the one that ships with the package)"
 
 
 def add_speech_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the recording, what ``lipmotion.animate`` may be told about it, and the model."""
-    add_hearing_arguments(parser)
+    """Add the recording, its transcript, lexicon, units and recogniser, and the model."""
+    add_recording_arguments(parser)
     add_model_argument(parser)
 
 
-def add_hearing_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the recording, and what may be told about it."""
+def add_recording_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the recording, its transcript, lexicon, units and recogniser."""
     add_input(parser, "speech", what="recording", help="audio or video file")
-    said: dict[str, Any] = {"type": str, "metavar": "TEXT|FILE", "help": "what is said, if known"}
-    add_input(parser, "--transcript", what="transcript", replaceable=True, **said)
+    transcript: dict[str, Any] = {"type": str, "metavar": "TEXT|FILE", "help": "the words that are spoken, if known"}
+    add_input(parser, "--transcript", what="transcript", replaceable=True, **transcript)
     add_lexicon_argument(parser)
-    edited = "phones of an earlier .json or .npz, edited or not"
+    edited = "phones in time from an earlier .json or .npz, edited or not"
     add_input(parser, "--units", what="units file", replaceable=True, metavar="FILE", help=edited)
     add_recogniser_argument(parser)
 
 
 def add_lexicon_argument(parser: argparse.ArgumentParser) -> None:
-    """Add the pronunciations of words that the dictionary does not have."""
+    """Add ``--lexicon``: pronunciations of words that the dictionary does not have."""
     add_input(parser, "--lexicon", what="lexicon", replaceable=True, metavar="FILE", help=LEXICON)
 
 
 def add_model_argument(parser: argparse.ArgumentParser) -> None:
-    """Add the model, which may be left out."""
-    add_input(parser, "--model", what="model", replaceable=True, otherwise=_shipped, help=MODEL)
+    """Add ``--model``; default: the model that ships with the package."""
+    add_input(parser, "--model", what="model", replaceable=True, default_path=_shipped, help=MODEL)
 
 
 def _shipped() -> Path:
@@ -46,22 +50,24 @@ def _shipped() -> Path:
 
 
 def add_recogniser_argument(parser: argparse.ArgumentParser) -> None:
-    """Add the choice of phone models."""
-    explained = "whose phone models: auto, own (the model's), general (those of many voices) (default: auto)"
-    parser.add_argument("--recogniser", default="auto", metavar="WHOSE", help=explained)
+    """Add ``--recogniser``: the choice of phone models."""
+    models = "phone models: auto, own (those of the model) or general (those of many voices) (default: auto)"
+    parser.add_argument("--recogniser", default="auto", metavar="WHOSE", help=models)
 
 
-def speech_arguments(options: argparse.Namespace) -> dict[str, Any]:
-    """Return them as ``lipmotion.animate`` takes them, files read."""
-    from lipmotion.cli.texts import text_or_file
+def request_and_model(options: argparse.Namespace) -> tuple[SpeechRequest, Model]:
+    """Return the request of the arguments of ``add_speech_arguments``, files read, and the model."""
+    from lipmotion.cli.texts import text_or_file_content
     from lipmotion.export.base import read_motion
     from lipmotion.pipeline.model import load_model
+    from lipmotion.pipeline.request import SpeechRequest
     from lipmotion.units import Lexicon
 
-    return {
-        "transcript": text_or_file(options.transcript) if options.transcript is not None else None,
-        "lexicon": Lexicon.from_file(options.lexicon) if options.lexicon else None,
-        "model": load_model(options.model),
-        "recogniser": options.recogniser,
-        "units": read_motion(options.units)[1] if options.units else None,
-    }
+    request = SpeechRequest(
+        options.speech,
+        transcript=text_or_file_content(options.transcript) if options.transcript is not None else None,
+        units=read_motion(options.units)[1] if options.units else None,
+        lexicon=Lexicon.from_file(options.lexicon) if options.lexicon else None,
+        recogniser=options.recogniser,
+    )
+    return request, load_model(options.model)

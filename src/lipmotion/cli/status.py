@@ -1,4 +1,4 @@
-"""Status for programs that run ``cues``: progress and warnings as events, those of Rhubarb's ``--machineReadable``."""
+"""Progress and warnings of ``cues`` as JSON events, in the format of Rhubarb's ``--machineReadable``."""
 
 from __future__ import annotations
 
@@ -7,27 +7,27 @@ import logging
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from lipmotion.cli.events import Status
+from lipmotion.cli.events import RhubarbStatus
 
 
 @contextmanager
 def status_lines(options: argparse.Namespace) -> Iterator[Callable[[float], None]]:
-    """Give a function to say how much is done, 0 to 1; say that all is, at the end. Warnings are events, too."""
-    events: Status = options.events
+    """Yield a function that reports progress, 0 to 1; report success at the end. Warnings become events, too."""
+    events: RhubarbStatus = options.events
     root = logging.getLogger()
-    handlers, root.handlers = root.handlers, [_Events(events)]
+    handlers, root.handlers = root.handlers, [_StatusHandler(events)]
     try:
-        yield lambda done: events.say("progress", "Trace", f"Progress: {done:.0%}", value=done)
+        yield lambda done: events.emit("progress", "Trace", f"Progress: {done:.0%}", value=done)
         options.stopper.settle()
         events.succeed()
     finally:
         root.handlers = handlers
 
 
-class _Events(logging.Handler):
-    def __init__(self, events: Status) -> None:
+class _StatusHandler(logging.Handler):
+    def __init__(self, events: RhubarbStatus) -> None:
         super().__init__()
         self._events = events
 
     def emit(self, record: logging.LogRecord) -> None:
-        self._events.say("log", record.levelname.capitalize(), record.getMessage())
+        self._events.emit("log", record.levelname.capitalize(), record.getMessage())

@@ -10,26 +10,35 @@ from lipmotion.cli.options import list_or_all, numbers
 from lipmotion.cli.paths import add_input, add_output
 from lipmotion.cli.train import VISUAL
 
-OPTIONS = ("sizes", "systems", "states", "mixtures", "visual", "transcripts")
+OPTIONS = ("systems", "states", "mixtures", "visual", "transcripts")
+"""Options that are fields of ``ComparisonOptions``."""
 
 
 def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the experiment to ``lipmotion experiment``."""
-    parser = actions.add_parser("table3", help="which structure of chains predicts lips (Xie & Liu 2007, Table 3)")
+    parser = actions.add_parser("table3", help="which structure of chains predicts lips best (Xie & Liu 2007, Table 3)")
     parser.add_argument("--split", default="test", help="compare on test, or another list (default: test)")
-    order = "names, one a line (default: train, shuffled)"
+    order = "names of recordings, one per line (default: train, shuffled)"
     add_input(parser, "--order", what="list", replaceable=True, metavar="FILE", help=order)
-    parser.add_argument("--sizes", type=numbers, metavar="N,N,...", help="train on so many (default: all of them)")
-    systems = "these only, with semicolons between them (default: all)"
+    parser.add_argument(
+        "--sizes", type=numbers, metavar="N,N,...", help="numbers of recordings to train on (default: all)"
+    )
+    systems = "only these systems, separated by semicolons (default: all)"
     parser.add_argument("--systems", type=lambda text: text.split(";"), metavar="NAME;NAME", help=systems)
-    parser.add_argument("--states", type=int, default=5, help="a unit, in the paper's systems (default: 5)")
-    gaussians = "a state may have, in the paper's systems; chosen with the list val (default: 1,2,4,8)"
+    parser.add_argument("--states", type=int, default=5, help="states per unit, in the paper's systems (default: 5)")
+    gaussians = "Gaussians per state, in the paper's systems, selected on the list val (default: 1,2,4,8)"
     parser.add_argument("--mixtures", type=numbers, default=[1, 2, 4, 8], metavar="K,K,...", help=gaussians)
     parser.add_argument("--visual", default="geometry", metavar="WHAT", help=VISUAL)
-    parser.add_argument("--transcripts", action="store_true", help="compare also with the words known")
-    parser.add_argument("--noise", default="", metavar="KIND,KIND", help="hear the clips in white noise, in babble")
-    parser.add_argument("--snr", type=numbers, default=[20, 10, 5, 0], metavar="DB,...", help="at these ratios")
-    talkers = "recordings of others, for the babble"
+    parser.add_argument("--transcripts", action="store_true", help="compare also with known transcripts")
+    parser.add_argument("--noise", default="", metavar="KIND,KIND", help="compare also in noise: white, babble")
+    parser.add_argument(
+        "--snr",
+        type=numbers,
+        default=[20, 10, 5, 0],
+        metavar="DB,...",
+        help="signal-to-noise ratios (default: 20,10,5,0)",
+    )
+    talkers = "recordings of other people, for the babble"
     add_input(parser, "--talkers", what="folder of recordings", metavar="FOLDER", help=talkers)
     add_output(parser, "--plots", metavar="FOLDER", help="write pictures like Figs. 7, 10 and 11 there")
     add_experiment_arguments(parser)
@@ -38,24 +47,19 @@ def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Call ``experiment.table3`` and print its table."""
-    from lipmotion.corpora.splits import names_in
+    from lipmotion.corpora.splits import read_names
     from lipmotion.corpora.store import Corpus
-    from lipmotion.experiments.noise import talkers_in
-    from lipmotion.experiments.xie_liu2007.table3 import Noises, table3
+    from lipmotion.experiments.noise import read_talkers
+    from lipmotion.experiments.xie_liu2007.table3 import ComparisonOptions, NoiseConditions, table3
     from lipmotion.experiments.xie_liu2007.table3_text import table
 
     def experiment(corpus: Corpus, **given: Any) -> dict[str, Any]:
         kinds = tuple(kind for kind in options.noise.split(",") if kind)
-        talkers = tuple(talkers_in(options.talkers)) if options.talkers else ()
+        talkers = tuple(read_talkers(options.talkers)) if options.talkers else ()
         chosen = {name: getattr(options, name) for name in OPTIONS}
-        return table3(
-            corpus,
-            split=list_or_all(options.split),
-            order=names_in(options.order) if options.order else None,
-            noises=Noises(kinds, tuple(map(float, options.snr)), talkers),
-            plots=options.plots,
-            **chosen,
-            **given,
-        )
+        order = read_names(options.order) if options.order else None
+        noise = NoiseConditions(kinds, tuple(map(float, options.snr)), talkers)
+        given |= {"order": order, "sizes": options.sizes, "plots": options.plots}
+        return table3(corpus, ComparisonOptions(**chosen, noise=noise), split=list_or_all(options.split), **given)
 
     run_experiment(options, experiment, table)

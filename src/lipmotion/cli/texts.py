@@ -1,4 +1,4 @@
-"""Arguments that are a text or the name of a file that holds it."""
+"""Arguments that are either a text or the path of a file with the text."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ from pathlib import Path
 from lipmotion.pipeline.transcribe import read_transcript
 
 
-def text_or_file(argument: str) -> str:
-    """Return the content of a file of that name, else the argument itself.
+def text_or_file_content(argument: str) -> str:
+    """Return the content of the file that the argument names, else the argument itself.
 
-    Raises InputError: it looks like a file's name but there is none, or the file is not UTF-8 text.
+    Raises InputError: the argument looks like a file name but no such file exists, or the file is not UTF-8 text.
     """
     path = Path(argument)
-    looks_like_one = path.suffix == ".txt" and " " not in argument
-    return read_transcript(path) if looks_like_one or _is_there(path) else argument
+    looks_like_path = path.suffix == ".txt" and " " not in argument
+    return read_transcript(path) if looks_like_path or _file_exists(path) else argument
 
 
-def _is_there(path: Path) -> bool:
-    """Whether there is a file of that name, or a pipe or a device; a word may be a folder's name."""
+def _file_exists(path: Path) -> bool:
+    """Return whether a file, a pipe or a device of that name exists; a folder does not count."""
     try:
         return path.exists() and not path.is_dir()
-    except (OSError, ValueError):  # too long for a file's name, or with a character that none can have
+    except (OSError, ValueError):  # too long for a file name, or with a character that no file name has
         return False

@@ -1,4 +1,4 @@
-"""``lipmotion train``: a corpus to a model."""
+"""``lipmotion train``: train a model on a corpus."""
 
 from __future__ import annotations
 
@@ -8,39 +8,40 @@ import os
 from lipmotion.cli.options import add_machine_readable, list_or_all
 from lipmotion.cli.paths import add_input, add_output
 from lipmotion.cli.speech import add_lexicon_argument
+from lipmotion.pipeline.training.train import Run
 
-ENGINE = "trajectory (default), coupled: chains of states for speech and lips, or joint: one model of five streams"
-SYSTEM = "of the coupled engine: ph-HMM, ph-MSHMM, ph-FHMM, ph-vi-FHMM, ph-CHMM or ph-vi-CHMM (default)"
-UNITS = "what is modelled: phone (default), eVis, sVis, pbVis, 2vis, or a table file (docs/unit-sets.md)"
-OTHERS = "and from transcribed speech (coupled)"
-VISUAL = "what is learned: geometry (tracked or given motion, default), eigenlips (mouth pictures), or both"
+ENGINE = "trajectory (default), coupled (chains of states for speech and for lips) or joint (one model, five streams)"
+SYSTEM = "structure of the coupled engine: ph-HMM, ph-MSHMM, ph-FHMM, ph-vi-FHMM, ph-CHMM or ph-vi-CHMM (default)"
+UNITS = "modelled units: phone (default), eVis, sVis, pbVis, 2vis, or a table file (docs/unit-sets.md)"
+OTHERS = "also train on transcribed recordings without motion (coupled)"
+VISUAL = "modelled motion: geometry (tracked or given curves, default), eigenlips (mouth pictures) or both"
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add the verb."""
-    parser = verbs.add_parser("train", help="train a model on a prepared corpus; again, to go on after a stop")
+    """Add the verb to the parser of the command line."""
+    parser = verbs.add_parser("train", help="train a model on a prepared corpus; run it again to go on after a stop")
     add_input(parser, "corpus", what="corpus")
-    add_output(parser, "-o", "--output", force=True, keeps=True, required=True, metavar="MODEL")
+    add_output(parser, "-o", "--output", force=True, keeps_work=True, required=True, metavar="MODEL")
     parser.add_argument("--split", default="train", help="train, val, test or all (default: train)")
-    parser.add_argument("--speaker", action="append", default=[], metavar="NAME", help="this one only (repeatable)")
+    parser.add_argument("--speaker", action="append", default=[], metavar="NAME", help="only this speaker (repeatable)")
     add_lexicon_argument(parser)
     parser.add_argument("--engine", default="trajectory", help=ENGINE)
     parser.add_argument("--system", metavar="NAME", help=SYSTEM)
     add_input(parser, "--units", what="table of units", replaceable=True, type=str, metavar="SET", help=UNITS)
-    parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="any option of the engine")
+    parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="engine option (repeatable)")
     parser.add_argument("--visual", default="geometry", metavar="WHAT", help=VISUAL)
-    parser.add_argument("--voices", action="store_true", help="learn from installed synthetic voices as well (coupled)")
+    parser.add_argument("--voices", action="store_true", help="also train on synthetic voices (coupled)")
     add_input(parser, "--recordings", what="folder of recordings", metavar="FOLDER", help=OTHERS)
-    parser.add_argument("--workers", type=int, help="processes (default: one a core)")
+    parser.add_argument("--workers", type=int, help="number of processes (default: one per core)")
     add_machine_readable(parser)
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:
-    """Call ``lipmotion.train`` and ``lipmotion.save_model``."""
+    """Call ``lipmotion.train`` and ``lipmotion.save_model``; report what was used."""
     from lipmotion.cli.progress import reporting
     from lipmotion.corpora.store import Corpus
-    from lipmotion.engines import engine_as_told
+    from lipmotion.engines import engine_from_settings
     from lipmotion.pipeline.model import save_model
     from lipmotion.pipeline.training.train import train
     from lipmotion.pipeline.training.voices import other_voices
@@ -50,12 +51,12 @@ def run(options: argparse.Namespace) -> None:
     split, workers = list_or_all(options.split), options.workers or os.cpu_count() or 1
     with reporting(options) as report:
         lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
-        engine = engine_as_told(options.engine, system=options.system, units=options.units, settings=options.set)
+        engine = engine_from_settings(options.engine, preset=options.system, units=options.units, settings=options.set)
         chosen = {"engine": engine, "split": split, "speakers": options.speaker, "lexicon": lexicon, "workers": workers}
-        heard = {"recordings": options.recordings, "lexicon": lexicon, "monitor": report.hear}
-        chosen |= {"visual": options.visual, "voices": other_voices(synthetic=options.voices, **heard)}
+        more = {"recordings": options.recordings, "lexicon": lexicon, "monitor": report.receive}
+        chosen |= {"visual": options.visual, "voices": other_voices(synthetic=options.voices, **more)}
         with unfinished_work(options.output) as work:
-            model, result = train(Corpus.open(options.corpus), **chosen, monitor=report.hear, work=work)
+            model, result = train(Corpus.open(options.corpus), **chosen, run=Run(monitor=report.receive, work=work))
             save_model(model, options.output)
         figures = {"used": len(result.used), "minutes": model.about["minutes"], "skipped": len(result.skipped)}
         text = ", ".join(f"{value} {name}" for name, value in figures.items())

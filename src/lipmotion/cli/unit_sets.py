@@ -11,9 +11,9 @@ from lipmotion.cli.options import list_or_all
 
 def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the experiment to ``lipmotion experiment``."""
-    parser = actions.add_parser("unit-sets", help="which units find the closings of the mouth (Hofer 2008, Table 1)")
+    parser = actions.add_parser("unit-sets", help="which unit set predicts closings of the mouth (Hofer 2008, Table 1)")
     parser.add_argument("--split", default="test", help="compare on train, val, test or all (default: test)")
-    parser.add_argument("--closures", action="store_true", help="make the lips meet in every p, b and m")
+    parser.add_argument("--closures", action="store_true", help="pin the lips closed in every p, b and m")
     add_experiment_arguments(parser)
     parser.set_defaults(run=run)
 

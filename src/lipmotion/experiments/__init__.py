@@ -1,1 +1,1 @@
-"""A corpus and engines to the tables of the papers."""
+"""Experiments: train and compare systems on a corpus, for tables like those of the papers."""

@@ -1,4 +1,4 @@
-"""Systems on the same clips: intervals of a figure, and of what it is more than that of another system."""
+"""Comparison of systems on the same clips: statistics with bootstrap intervals, and paired differences of them."""
 
 from __future__ import annotations
 
@@ -8,44 +8,46 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.measures.bootstrap import interval
-from lipmotion.measures.closures import found_closings
+from lipmotion.measures.bootstrap import bootstrap_interval
+from lipmotion.measures.closures import clip_closure_counts
 from lipmotion.measures.curves import Clips
-from lipmotion.pipeline.evaluation.evaluate import OPENING, Clip, Recorded
+from lipmotion.pipeline.evaluation.conditions import OPENING, ComparedClip, HeldOutRecordings
 from lipmotion.stats.rounding import varies
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Tally:
-    """A figure that follows from sums over clips, so that clips can be drawn thousands of times.
+class ClipStatistic:
+    """A statistic that is a function of sums over clips, so that bootstrap samples of clips are cheap.
 
-    sums : what each clip adds [all of one shape]
-    of   : the figure, from the total
+    sums       : contribution of each clip [all of one shape]
+    from_total : the statistic as a function of the sum of contributions
     """
 
     sums: Sequence[Array]
-    of: Callable[[Array], float]
+    from_total: Callable[[Array], float]
 
     @property
     def value(self) -> float:
-        """The figure over all clips."""
-        return self._of(self.sums)
+        """The statistic over all clips."""
+        return self._value(self.sums)
 
     def interval(self, seed: int) -> tuple[float, float]:
         """Return the 95 % bootstrap interval over clips."""
-        return interval(lambda own, _: self._of(own), self.sums, self.sums, seed)
+        return bootstrap_interval(lambda own, _: self._value(own), self.sums, self.sums, seed)
 
-    def gain(self, other: Tally, seed: int) -> tuple[float, float]:
-        """Return the paired interval of how much more it is than the same figure of another system."""
-        return interval(lambda own, its: self._of(own) - other._of(its), self.sums, other.sums, seed)
+    def gain(self, other: ClipStatistic, seed: int) -> tuple[float, float]:
+        """Return the paired 95 % bootstrap interval of this statistic minus that of another system."""
+        return bootstrap_interval(
+            lambda own, others: self._value(own) - other._value(others), self.sums, other.sums, seed
+        )
 
-    def _of(self, sums: Sequence[Array]) -> float:
-        return self.of(np.sum(sums, axis=0))
+    def _value(self, sums: Sequence[Array]) -> float:
+        return self.from_total(np.sum(sums, axis=0))
 
 
-def correlation_tally(generated: Clips, original: Clips) -> Tally:
+def correlation_statistic(generated: Clips, original: Clips) -> ClipStatistic:
     """Return the mean over channels of ``curves.pooled_correlation`` of clips [each shape=(T_i, P)]."""
     middle, everything = np.concatenate(original).mean(axis=0), np.concatenate(generated)
     still = ~varies(everything)
@@ -54,30 +56,34 @@ def correlation_tally(generated: Clips, original: Clips) -> Tally:
         a, b = np.where(still, 0, g - middle), o - middle
         return np.stack([np.full(a.shape[1], float(len(a))), *(x.sum(axis=0) for x in (a, b, a * a, b * b, a * b))])
 
-    return Tally([moments(g, o) for g, o in zip(generated, original, strict=True)], _mean_correlation)
+    return ClipStatistic([moments(g, o) for g, o in zip(generated, original, strict=True)], _mean_correlation)
 
 
-def distance_tally(generated: Clips, original: Clips) -> Tally:
+def distance_statistic(generated: Clips, original: Clips) -> ClipStatistic:
     """Return ``curves.mean_distance`` of clips [each shape=(T_i, P)]."""
     errors = [np.linalg.norm(g - o, axis=1) for g, o in zip(generated, original, strict=True)]
-    return Tally([np.array([error.sum(), len(error)]) for error in errors], lambda total: float(total[0] / total[1]))
+    sums = [np.array([error.sum(), len(error)]) for error in errors]
+    return ClipStatistic(sums, lambda total: float(total[0] / total[1]))
 
 
-def score_tally(generated: Clips, original: Clips, threshold: float) -> Tally:
-    """Return the closure score in % of openings [each shape=(T_i, 1)]; NaN where nothing closes."""
-    hits, count = found_closings(generated, original, threshold)
+def closing_score_statistic(generated: Clips, original: Clips, threshold: float) -> ClipStatistic:
+    """Return the share, in %, of original closings that are found in generated openings [each shape=(T_i, 1)].
+
+    Where no original opening closes, the statistic is NaN.
+    """
+    hits, count = clip_closure_counts(generated, original, threshold)
     sums = [np.concatenate(pair) for pair in zip(hits, count, strict=True)]
-    return Tally(sums, lambda total: float(100 * total[0] / total[1]) if total[1] else float("nan"))
+    return ClipStatistic(sums, lambda total: float(100 * total[0] / total[1]) if total[1] else float("nan"))
 
 
-def openings_of(found: Recorded, made: Sequence[Clip]) -> tuple[list[Array], list[Array]]:
-    """Return the generated and the recorded opening of every clip [each shape=(T, 1)]."""
-    column = slice(found.channels.index(OPENING), found.channels.index(OPENING) + 1)
+def opening_curves(recordings: HeldOutRecordings, made: Sequence[ComparedClip]) -> tuple[list[Array], list[Array]]:
+    """Return the generated and the original opening of every clip [each shape=(T, 1)]."""
+    column = slice(recordings.channels.index(OPENING), recordings.channels.index(OPENING) + 1)
     return [clip.generated[:, column] for clip in made], [clip.original[:, column] for clip in made]
 
 
-def mark(gain: Sequence[float | None]) -> str:
-    """Return a star where the interval of a difference leaves out 0."""
+def significance_mark(gain: Sequence[float | None]) -> str:
+    """Return ``*`` if the interval of a difference does not contain 0, else an empty text."""
     low, high = gain
     return "*" if low is not None and high is not None and (low > 0 or high < 0) else ""
 
@@ -85,5 +91,5 @@ def mark(gain: Sequence[float | None]) -> str:
 def _mean_correlation(total: Array) -> float:
     count, a, b, aa, bb, ab = total
     squares = np.maximum(aa - a * a / count, 0) * np.maximum(bb - b * b / count, 0)
-    found = (ab - a * b / count) / np.where(squares > 0, np.sqrt(squares), np.inf)
-    return float(found.mean())
+    correlations = (ab - a * b / count) / np.where(squares > 0, np.sqrt(squares), np.inf)
+    return float(correlations.mean())

@@ -1,4 +1,4 @@
-"""One system, trained on some recordings and compared with others."""
+"""Training one system on some recordings and generating the motion of held-out ones: shared by all experiments."""
 
 from __future__ import annotations
 
@@ -9,65 +9,98 @@ from typing import Any
 
 import numpy as np
 
-from lipmotion.corpora.store import Corpus
+from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.errors import CorpusError
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.pipeline.evaluation.evaluate import OPENING, Clip, Recorded, clips, compared_channels, recorded
-from lipmotion.pipeline.training.train import train
-from lipmotion.speech.recogniser import recogniser as cached_recogniser
-from lipmotion.types import Monitor, counted, part_of
+from lipmotion.pipeline.evaluation.conditions import (
+    OPENING,
+    ComparedClip,
+    HeldOutRecordings,
+    compared_channels,
+    compared_clips,
+    held_out_recordings,
+)
+from lipmotion.pipeline.training.train import Run, train
+from lipmotion.speech.recogniser import cached_recogniser
+from lipmotion.types import Monitor, counted, part_of, silent_monitor
 from lipmotion.units import Lexicon
 
 
-@dataclass(frozen=True, eq=False)
-class Trial:
-    """What a system makes of recordings that it was not trained on.
+@dataclass(frozen=True)
+class ExperimentSettings:
+    """Settings that all experiments have in common.
 
-    found   : the recordings
-    made    : the clips, by condition
-    used    : names of the utterances that it was trained on
-    seconds : of training, phone models and motion
+    recogniser : configuration of the phone models
+    lexicon    : pronunciations; None: those of the dictionary
+    seed       : of the shuffled training list, and of the bootstrap intervals
+    workers    : number of processes, as in ``train``
+    monitor    : receives the progress
     """
 
-    found: Recorded
-    made: Mapping[str, Sequence[Clip]]
+    recogniser: HmmConfig | None = None
+    lexicon: Lexicon | None = None
+    seed: int = 0
+    workers: int = 1
+    monitor: Monitor = silent_monitor
+
+
+DEFAULT_SETTINGS = ExperimentSettings()
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOutResult:
+    """Motion that one trained system generates for held-out recordings.
+
+    recordings : the held-out recordings
+    clips      : generated and original curves of each recording, by condition
+    used       : names of the utterances that the system was trained on
+    seconds    : time of training, phone models and motion
+    """
+
+    recordings: HeldOutRecordings
+    clips: Mapping[str, Sequence[ComparedClip]]
     used: tuple[str, ...]
     seconds: float
 
 
-def trial(
-    corpus: Corpus,
-    names: Sequence[str],
-    held_out: Sequence[str],
-    channels: Sequence[str],
-    *,
-    recogniser: HmmConfig | None,
-    lexicon: Lexicon | None,
-    monitor: Monitor,
-    workers: int,
-) -> Trial:
-    """Train everything on ``names``, and generate ``channels`` of ``held_out``.
+def train_and_generate(
+    corpus: Corpus, names: Sequence[str], held_out: Sequence[str], channels: Sequence[str], settings: ExperimentSettings
+) -> HeldOutResult:
+    """Train the default engine on the utterances ``names``; return the ``channels`` it generates for ``held_out``.
 
-    The order of the names says nothing: they are sorted, so that all of a list give what ``lipmotion train`` gives.
+    The names are sorted, so their order does not matter: all names of a list give the model of ``lipmotion train``.
     Raises as ``train`` and ``evaluate``.
     """
-    training = part_of(monitor, 0, 0.8)
+    monitor, lexicon = settings.monitor, settings.lexicon
     start_s = perf_counter()
     model, report = train(
-        corpus, names=sorted(names), recogniser=recogniser, lexicon=lexicon, monitor=training, workers=workers
+        corpus,
+        selection=Selection(names=sorted(names)),
+        recogniser=settings.recogniser,
+        lexicon=lexicon,
+        run=Run(monitor=part_of(monitor, 0, 0.8), workers=settings.workers),
     )
     seconds = perf_counter() - start_s
-    phones, listening = cached_recogniser(model.phones), part_of(monitor, 0.8, 0.95)
-    found = recorded(corpus, phones, names=sorted(held_out), channels=channels, lexicon=lexicon, monitor=listening)
-    conditions = counted(list(found.conditions), "comparing", part_of(monitor, 0.95, 1))
-    made = {condition: clips(found, condition, model.engine, model.learned) for condition in conditions}
-    return Trial(found, made, report.used, seconds)
+    phones, recognising = cached_recogniser(model.phones), part_of(monitor, 0.8, 0.95)
+    recordings = held_out_recordings(
+        corpus,
+        phones,
+        selection=Selection(names=sorted(held_out)),
+        channels=channels,
+        lexicon=lexicon,
+        monitor=recognising,
+    )
+    conditions = counted(list(recordings.conditions), "comparing", part_of(monitor, 0.95, 1))
+    generated = {
+        condition: compared_clips(recordings, condition, model.engine, model.learned) for condition in conditions
+    }
+    return HeldOutResult(recordings, generated, report.used, seconds)
 
 
 def channels_with_opening(corpus: Corpus, names: Sequence[str]) -> tuple[str, ...]:
-    """Return the channels to compare in some utterances: to be called before the long work.
+    """Return the channels to compare in some utterances: called before the long work.
 
-    Raises CorpusError: the opening is none of them, or the utterances have different ones.
+    Raises CorpusError: the opening is not among them, or the utterances have different channels.
     """
     channels, _ = compared_channels([corpus.utterance(name) for name in names])
     if OPENING not in channels:
@@ -81,7 +114,7 @@ def shuffled(names: Sequence[str], seed: int) -> tuple[str, ...]:
 
 
 def opening_row(figures: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what all tables show of the opening, out of the figures of a condition; shares of closings in %."""
+    """Return the figures of the opening that all tables show, from the figures of a condition; shares in %."""
     opening, closing, lips = figures["channels"][OPENING], figures["closures"], figures["closures_p_b_m"]
     return {
         "score": 100 * closing["score"],

@@ -8,8 +8,8 @@ import pytest
 from engines.synthetic import CHANNELS
 from engines.synthetic import examples as sentences
 from lipmotion.experiments.baselines import recurrent as network
-from lipmotion.experiments.baselines.recurrent import Blstm
-from lipmotion.experiments.baselines.regression import FrameModel
+from lipmotion.experiments.baselines.recurrent import BlstmBaseline
+from lipmotion.experiments.baselines.regression import FrameRegressionModel
 from lipmotion.types import Example, Progress
 
 pytest.importorskip("torch", reason="the extra 'network' is not installed")
@@ -17,7 +17,7 @@ pytest.importorskip("torch", reason="the extra 'network' is not installed")
 
 @pytest.fixture(scope="module")
 def examples() -> list[Example]:
-    """The last frames of each were not seen, and are wrong."""
+    """Sentences whose last frames are not valid, and have wrong values."""
     made = []
     for one in sentences(12):
         valid = one.valid.copy()
@@ -33,33 +33,33 @@ def stages() -> list[Progress]:
 
 
 @pytest.fixture(scope="module")
-def model(examples: list[Example], stages: list[Progress]) -> FrameModel:
+def model(examples: list[Example], stages: list[Progress]) -> FrameRegressionModel:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(network, "EPOCHS", 40)
         patch.setattr(network, "LEAST_STEPS", 1)
-        return Blstm().fit(examples, stages.append).model
+        return BlstmBaseline().fit(examples, stages.append).model
 
 
-def test_what_was_taught_comes_back(model: FrameModel) -> None:
-    unheard = sentences(14, seed=5)[-1]
-    result = Blstm().generate(model, unheard.speech)
+def test_held_out_motion_is_predicted(model: FrameRegressionModel) -> None:
+    held_out = sentences(14, seed=5)[-1]
+    result = BlstmBaseline().generate(model, held_out.speech)
     assert result.motion.channels == CHANNELS
-    assert result.motion.values.shape == result.variance.shape == unheard.motion.values.shape
+    assert result.motion.values.shape == result.variance.shape == held_out.motion.values.shape
     for name in ("opening", "width"):
-        assert np.corrcoef(result.motion[name], unheard.motion[name])[0, 1] > 0.8
-    assert result.motion["opening"].max() < 1  # not what was not seen
+        assert np.corrcoef(result.motion[name], held_out.motion[name])[0, 1] > 0.8
+    assert result.motion["opening"].max() < 1  # values of frames that are not valid are not learned
 
 
 def test_the_same_seed_gives_the_same(examples: list[Example], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(network, "EPOCHS", 1)
     monkeypatch.setattr(network, "LEAST_STEPS", 1)
-    one, same, other = (Blstm(seed).fit(examples, lambda _: None).model for seed in (0, 0, 1))
-    made = [Blstm().generate(each, examples[0].speech).motion.values for each in (one, same, other)]
+    one, same, other = (BlstmBaseline(seed).fit(examples, lambda _: None).model for seed in (0, 0, 1))
+    made = [BlstmBaseline().generate(each, examples[0].speech).motion.values for each in (one, same, other)]
     assert np.array_equal(made[0], made[1])
     assert not np.allclose(made[0], made[2])
 
 
-def test_lessons_are_counted(model: FrameModel, stages: list[Progress]) -> None:
+def test_epochs_are_counted(model: FrameRegressionModel, stages: list[Progress]) -> None:
     assert model
     assert (stages[0].share, stages[-1].share) == (0, 1)
     assert stages[-1].steps == 40

@@ -8,16 +8,16 @@ import pytest
 from engines.synthetic import CHANNELS
 from engines.synthetic import examples as sentences
 from lipmotion.errors import CorpusError
-from lipmotion.experiments.baselines.regression import REACH, Loudness, MeanPose, SoundAround
+from lipmotion.experiments.baselines.regression import REACH, ContextRidge, LoudnessRegression, MeanPose
 from lipmotion.speech.mfcc import LOG_ENERGY
 from lipmotion.types import Example, silent_monitor
 
-BASELINES = [MeanPose, Loudness, SoundAround]
+BASELINES = [MeanPose, LoudnessRegression, ContextRidge]
 
 
 @pytest.fixture(scope="module")
 def examples() -> list[Example]:
-    """Six sentences, the last frames of each not seen, and wrong there."""
+    """Six sentences whose last frames are not valid, and have wrong values."""
     made = []
     for one in sentences(6):
         valid = one.valid.copy()
@@ -27,7 +27,7 @@ def examples() -> list[Example]:
     return made
 
 
-def seen(examples: list[Example]) -> np.ndarray:
+def valid_motion(examples: list[Example]) -> np.ndarray:
     return np.concatenate([one.motion.values[one.valid] for one in examples])
 
 
@@ -37,25 +37,27 @@ def test_motion_has_a_row_for_every_feature_frame(baseline: type, examples: list
     fit = engine.fit(examples, silent_monitor)
     result = engine.generate(fit.model, examples[0].speech)
     frames = len(examples[0].speech.features.values)
-    assert fit.figures == {"frames": len(seen(examples))}
+    assert fit.figures == {"frames": len(valid_motion(examples))}
     assert (result.motion.rate_hz, result.motion.channels) == (100, CHANNELS)
     assert result.motion.values.shape == result.variance.shape == (frames, len(CHANNELS))
     assert np.isfinite(result.motion.values).all()
     assert (result.variance >= 0).all()
     assert len(result.trace.frames) == frames
-    assert engine.listen(fit.model, examples[0].speech) is None
+    assert not hasattr(engine, "recognise")
 
 
 def test_the_mean_pose(examples: list[Example]) -> None:
     model = MeanPose().fit(examples, silent_monitor).model
     made = MeanPose().generate(model, examples[0].speech)
-    assert made.motion.values == pytest.approx(np.broadcast_to(seen(examples).mean(axis=0), made.motion.values.shape))
+    assert made.motion.values == pytest.approx(
+        np.broadcast_to(valid_motion(examples).mean(axis=0), made.motion.values.shape)
+    )
     direct = made.motion.column("opening")
-    assert made.variance[0, direct] == pytest.approx(seen(examples)[:, direct].var())
+    assert made.variance[0, direct] == pytest.approx(valid_motion(examples)[:, direct].var())
 
 
-def moved_by(examples: list[Example], curve: np.ndarray, late: int) -> list[Example]:
-    """The same features, and an opening that is twice a column of them, later."""
+def with_delayed_opening(examples: list[Example], curve: np.ndarray, late: int) -> list[Example]:
+    """Return the examples with an opening that is twice a column of the features, ``late`` frames later."""
     made = []
     for one in examples:
         values = one.motion.values.copy()
@@ -71,21 +73,21 @@ def error(engine, examples: list[Example]) -> float:
     return float(np.abs(made - examples[0].motion["opening"])[inner].max())
 
 
-def test_the_sound_around_explains_what_it_holds(examples: list[Example]) -> None:
+def test_the_reach_of_the_acoustic_context(examples: list[Example]) -> None:
     column = np.eye(39)[3]
-    assert error(SoundAround(), moved_by(examples, column, REACH)) < 0.2
-    assert error(SoundAround(), moved_by(examples, column, REACH + 8)) > 1
+    assert error(ContextRidge(), with_delayed_opening(examples, column, REACH)) < 0.2
+    assert error(ContextRidge(), with_delayed_opening(examples, column, REACH + 8)) > 1
 
 
 def test_loudness_is_smoothed(examples: list[Example]) -> None:
-    made = moved_by(examples, np.eye(39)[LOG_ENERGY], 0)
+    made = with_delayed_opening(examples, np.eye(39)[LOG_ENERGY], 0)
     slow = []
     for one in made:
         opening = one.motion["opening"]
         values = one.motion.values.copy()
         values[:, one.motion.column("opening")] = [opening[max(t - 4, 0) : t + 5].mean() for t in range(len(opening))]
         slow.append(replace(one, motion=replace(one.motion, values=values)))
-    assert error(Loudness(), slow) < 0.05 < error(Loudness(), made)
+    assert error(LoudnessRegression(), slow) < 0.05 < error(LoudnessRegression(), made)
 
 
 @pytest.mark.parametrize("baseline", BASELINES)

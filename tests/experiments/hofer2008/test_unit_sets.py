@@ -13,17 +13,20 @@ from experiments.copies import copied, renamed
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError
-from lipmotion.experiments.hofer2008.unit_sets import PAPER, SYSTEMS, table, unit_sets
+from lipmotion.experiments.hofer2008.unit_sets import ENGINE_SETTINGS, PAPER_SCORES, table, unit_sets
+from lipmotion.experiments.runner import ExperimentSettings
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.measures.closures import closings
-from lipmotion.pipeline.evaluation.evaluate import clips, evaluate, recorded
+from lipmotion.pipeline.evaluation.conditions import compared_clips, held_out_recordings
+from lipmotion.pipeline.evaluation.evaluate import evaluate
 from lipmotion.pipeline.training.train import train
-from lipmotion.speech.recogniser import recogniser
+from lipmotion.speech.recogniser import cached_recogniser
 from lipmotion.types import Progress
 from lipmotion.units import unit_set
 
-SMALL = HmmConfig(mixtures=1, iterations=2)
-PLAIN, SHIPPED = SYSTEMS
+PHONE_MODELS = HmmConfig(mixtures=1, iterations=2)
+SMALL = ExperimentSettings(recogniser=PHONE_MODELS)
+PLAIN, SHIPPED = ENGINE_SETTINGS
 CONDITIONS = ["audio only", "with transcript"]
 Rows = dict[str, dict[str, Any]]
 
@@ -35,7 +38,7 @@ def stages() -> list[Progress]:
 
 @pytest.fixture(scope="module")
 def figures(toy_corpus: Corpus, stages: list[Progress]) -> dict[str, Any]:
-    return unit_sets(toy_corpus, recogniser=SMALL, monitor=stages.append)
+    return unit_sets(toy_corpus, settings=replace(SMALL, monitor=stages.append))
 
 
 def all_rows(figures: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
@@ -58,10 +61,10 @@ def test_the_rows_are_those_of_the_paper(figures: dict[str, Any]) -> None:
     assert json.loads(json.dumps(figures, allow_nan=False))
 
 
-@pytest.mark.parametrize("system", SYSTEMS)
+@pytest.mark.parametrize("system", ENGINE_SETTINGS)
 def test_a_row_is_what_train_and_evaluate_say(system: str, figures: dict[str, Any], toy_corpus: Corpus) -> None:
-    engine = engine_named("trajectory", SYSTEMS[system] | {"units": "eVis", "closures": False})
-    wanted = evaluate(train(toy_corpus, recogniser=SMALL, engine=engine)[0], toy_corpus)
+    engine = engine_named("trajectory", ENGINE_SETTINGS[system] | {"units": "eVis", "closures": False})
+    wanted = evaluate(train(toy_corpus, recogniser=PHONE_MODELS, engine=engine)[0], toy_corpus)
     assert figures["closed_under"] == wanted["closed_under"]
     for condition in CONDITIONS:
         row, said = figures["systems"][system][condition]["eVis"], wanted["conditions"][condition]
@@ -77,9 +80,9 @@ def test_a_row_is_what_train_and_evaluate_say(system: str, figures: dict[str, An
 def test_figures_by_hand(figures: dict[str, Any], toy_corpus: Corpus) -> None:
     """RMSE and score of one row, from the curves and the paper's rule."""
     engine = engine_named("trajectory", {"units": "2vis", "closures": False})
-    model = train(toy_corpus, recogniser=SMALL, engine=engine)[0]
-    found = recorded(toy_corpus, recogniser(model.phones))
-    pairs = [(c.generated[:, 0], c.original[:, 0]) for c in clips(found, "audio only", engine, model.learned)]
+    model = train(toy_corpus, recogniser=PHONE_MODELS, engine=engine)[0]
+    found = held_out_recordings(toy_corpus, cached_recogniser(model.phones))
+    pairs = [(c.generated[:, 0], c.original[:, 0]) for c in compared_clips(found, "audio only", engine, model.learned)]
     error = np.concatenate([g - o for g, o in pairs])
     points = [
         any(abs(int(g_frame) - int(o_frame)) <= 2 for g_frame in closings(g, found.closed_under))
@@ -111,10 +114,10 @@ def test_intervals_hold_their_figures_and_nothing_differs_from_itself(figures: d
 
 
 def test_lips_that_are_made_to_meet_do(toy_corpus: Corpus) -> None:
-    pinned = unit_sets(toy_corpus, recogniser=SMALL, closures=True, split="val")
+    pinned = unit_sets(toy_corpus, settings=SMALL, closures=True, split="val")
     assert (pinned["split"], pinned["closures"]) == ("val", True)
     rows = pinned["systems"][SHIPPED]["with transcript"]
-    assert [row["recall_p_b_m"] for row in rows.values()] == [100] * len(PAPER)
+    assert [row["recall_p_b_m"] for row in rows.values()] == [100] * len(PAPER_SCORES)
     assert all(row["p_b_m"] > 3 for row in rows.values())
     assert "lips made to meet on p b m" in table(pinned)
 
@@ -129,8 +132,8 @@ def test_progress_goes_from_nothing_to_all(figures: dict[str, Any], stages: list
 
 def test_without_transcripts_there_is_audio_only(toy_corpus: Corpus, tmp_path: Path) -> None:
     corpus = copied(toy_corpus, tmp_path, lambda u: u if u.split == "train" else replace(u, words=None))
-    untold = unit_sets(corpus, recogniser=SMALL)
-    assert [list(system) for system in untold["systems"].values()] == [["audio only"]] * 2
+    made = unit_sets(corpus, settings=SMALL)
+    assert [list(system) for system in made["systems"].values()] == [["audio only"]] * 2
 
 
 def test_motion_without_an_opening(toy_corpus: Corpus, tmp_path: Path) -> None:
@@ -142,7 +145,7 @@ def test_nothing_to_train_on_or_to_compare_with(toy_corpus: Corpus, tmp_path: Pa
     with pytest.raises(CorpusError, match="no utterances of split 'train'"):
         unit_sets(copied(toy_corpus, tmp_path, partial(replace, split="test")))
     with pytest.raises(CorpusError, match="no utterances of split 'tset'"):
-        unit_sets(toy_corpus, split="tset", recogniser=SMALL)
+        unit_sets(toy_corpus, split="tset", settings=SMALL)
 
 
 def row(**changes: Any) -> dict[str, Any]:
@@ -178,7 +181,7 @@ def test_figures_that_do_not_exist_are_dashes() -> None:
 
 
 def test_every_set_of_the_table_is_known() -> None:
-    assert all(unit_set(name).name == name for name in PAPER)
+    assert all(unit_set(name).name == name for name in PAPER_SCORES)
 
 
 def test_the_document_shows_the_figures_beside_it() -> None:
@@ -187,4 +190,4 @@ def test_the_document_shows_the_figures_beside_it() -> None:
     text = (results / "unit-sets.md").read_text(encoding="utf-8")
     assert f"```text\n{table(figures)}\n```" in text
     for name, row in all_rows(figures):
-        assert (row["units"], row["paper"]) == (unit_set(name).count, PAPER[name])
+        assert (row["units"], row["paper"]) == (unit_set(name).count, PAPER_SCORES[name])

@@ -12,19 +12,29 @@ from experiments.copies import copied, renamed
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, ExportError, InputError, MissingDependencyError
-from lipmotion.experiments.xie_liu2007.plots import NAMES
-from lipmotion.experiments.xie_liu2007.systems import BEST, BEST_PATH, BLSTM, PRINTED, RIVALS, chosen_rivals
-from lipmotion.experiments.xie_liu2007.table3 import Noises, table3
+from lipmotion.experiments.xie_liu2007.plots import PLOT_FILES
+from lipmotion.experiments.xie_liu2007.systems import (
+    BEST_PATH,
+    BLSTM,
+    COMPARED_SYSTEMS,
+    PAPER_FIGURES,
+    REFERENCE_SYSTEM,
+    selected_systems,
+)
+from lipmotion.experiments.xie_liu2007.table3 import ComparisonOptions, NoiseConditions, table3
 from lipmotion.experiments.xie_liu2007.table3_text import table
+from lipmotion.experiments.runner import ExperimentSettings
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.measures import curves
-from lipmotion.pipeline.evaluation.evaluate import clips, evaluate, recorded
+from lipmotion.pipeline.evaluation.conditions import compared_clips, held_out_recordings
+from lipmotion.pipeline.evaluation.evaluate import evaluate
 from lipmotion.pipeline.training.train import train
-from lipmotion.speech.recogniser import recogniser
+from lipmotion.speech.recogniser import cached_recogniser
 from lipmotion.types import Progress
 
-SMALL = HmmConfig(mixtures=1, iterations=2)
-SYSTEMS = [BEST, BEST_PATH, "trajectory HMM", "loudness", "mean pose"]
+PHONE_MODELS = HmmConfig(mixtures=1, iterations=2)
+SMALL = ExperimentSettings(recogniser=PHONE_MODELS)
+SYSTEMS = [REFERENCE_SYSTEM, BEST_PATH, "trajectory HMM", "loudness", "mean pose"]
 PICTURE = b"\x89PNG\r\n\x1a\n"
 
 
@@ -42,15 +52,16 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def figures(toy_corpus: Corpus, folder: Path, stages: list[Progress]) -> dict[str, Any]:
     return table3(
         toy_corpus,
-        systems=SYSTEMS,
+        ComparisonOptions(
+            systems=SYSTEMS,
+            states=2,
+            mixtures=[1],
+            transcripts=True,
+            noise=NoiseConditions(("white",), (0.0,)),
+        ),
         sizes=[8, 3],
-        states=2,
-        mixtures=[1],
-        transcripts=True,
-        noises=Noises(("white",), (0.0,)),
         plots=folder,
-        recogniser=SMALL,
-        monitor=stages.append,
+        settings=replace(SMALL, monitor=stages.append),
     )
 
 
@@ -66,32 +77,39 @@ def test_every_size_condition_and_system(figures: dict[str, Any]) -> None:
 
 
 def test_a_row_is_what_train_and_evaluate_say(figures: dict[str, Any], toy_corpus: Corpus) -> None:
-    wanted = evaluate(train(toy_corpus, recogniser=SMALL)[0], toy_corpus)
-    for condition, said in wanted["conditions"].items():
+    wanted = evaluate(train(toy_corpus, recogniser=PHONE_MODELS)[0], toy_corpus)
+    for condition, expected_figures in wanted["conditions"].items():
         row = figures["rows"][-1]["conditions"][condition]["trajectory HMM"]
-        assert (row["acc"], row["amse"]) == pytest.approx((said["acc"], said["amse"]))
-        assert row["opening_acc_95"] == pytest.approx(tuple(said["opening_acc_95"]))
-        expected = (said["lag_ms"], said["channels"]["opening"]["acc"])
+        assert (row["acc"], row["amse"]) == pytest.approx((expected_figures["acc"], expected_figures["amse"]))
+        assert row["opening_acc_95"] == pytest.approx(tuple(expected_figures["opening_acc_95"]))
+        expected = (expected_figures["lag_ms"], expected_figures["channels"]["opening"]["acc"])
         assert (row["lag_ms"], row["opening"]["acc"]) == pytest.approx(expected)
-        assert row["opening"]["false_per_minute"] == said["closures_p_b_m"]["false_per_minute"]
+        assert row["opening"]["false_per_minute"] == expected_figures["closures_p_b_m"]["false_per_minute"]
 
 
 def test_the_conversion_is_all_that_differs(figures: dict[str, Any], toy_corpus: Corpus) -> None:
-    """Both systems of the same chains, trained by hand."""
-    options = {"states": 2, "mixtures": 1, "full_range": False, "closures": False, "start": "viterbi", "steps": 10}
+    """The figures of both conversions agree with those of one model trained here."""
+    options = {
+        "states": 2,
+        "mixtures": 1,
+        "variance_scaling": False,
+        "closures": False,
+        "start": "viterbi",
+        "steps": 10,
+    }
     by_em = engine_named("coupled", options | {"conversion": "em"})
     by_path = engine_named("coupled", options | {"conversion": "viterbi"})
-    model = train(toy_corpus, recogniser=SMALL, engine=by_em)[0]
-    found = recorded(toy_corpus, recogniser(model.phones))
-    for name, engine in ((BEST, by_em), (BEST_PATH, by_path)):
-        made = clips(found, "audio only", engine, model.learned)
+    model = train(toy_corpus, recogniser=PHONE_MODELS, engine=by_em)[0]
+    recordings = held_out_recordings(toy_corpus, cached_recogniser(model.phones))
+    for name, engine in ((REFERENCE_SYSTEM, by_em), (BEST_PATH, by_path)):
+        made = compared_clips(recordings, "audio only", engine, model.learned)
         row = figures["rows"][-1]["conditions"]["audio only"][name]
         generated, original = [clip.generated for clip in made], [clip.original for clip in made]
         assert row["acc"] == pytest.approx(curves.pooled_correlation(generated, original).mean())
         assert row["opening"]["rmse"] == pytest.approx(curves.rmse(generated, original)[0])
     training = figures["rows"][-1]["training"]
-    assert training[BEST] == training[BEST_PATH]
-    assert training[BEST]["mixtures"] == 1
+    assert training[REFERENCE_SYSTEM] == training[BEST_PATH]
+    assert training[REFERENCE_SYSTEM]["mixtures"] == 1
 
 
 def test_intervals_hold_their_figures_and_nothing_differs_from_itself(figures: dict[str, Any]) -> None:
@@ -99,7 +117,7 @@ def test_intervals_hold_their_figures_and_nothing_differs_from_itself(figures: d
         for key in ("amse", "acc"):
             low, high = row[f"{key}_95"]
             assert low - 1e-9 <= row[key] <= high + 1e-9
-        assert (row["acc_gain_95"] == (0, 0)) == (name == BEST)
+        assert (row["acc_gain_95"] == (0, 0)) == (name == REFERENCE_SYSTEM)
 
 
 def test_a_pose_that_stands_still_has_no_lag(figures: dict[str, Any]) -> None:
@@ -111,14 +129,14 @@ def test_a_pose_that_stands_still_has_no_lag(figures: dict[str, Any]) -> None:
 def test_noise_makes_it_worse(figures: dict[str, Any]) -> None:
     clean = figures["rows"][-1]["conditions"]["audio only"]
     much = figures["noise"][0]["systems"]
-    for name in ("trajectory HMM", BEST):
+    for name in ("trajectory HMM", REFERENCE_SYSTEM):
         assert clean[name]["amse"] < much[name]["amse"]
     assert clean["mean pose"]["opening"] == much["mean pose"]["opening"]
 
 
 def test_pictures_are_written(figures: dict[str, Any], folder: Path) -> None:
     assert figures
-    assert sorted(path.name for path in folder.iterdir()) == sorted(NAMES.values())
+    assert sorted(path.name for path in folder.iterdir()) == sorted(PLOT_FILES.values())
     assert all(path.read_bytes().startswith(PICTURE) for path in folder.iterdir())
 
 
@@ -133,21 +151,22 @@ def test_the_text_names_every_system(figures: dict[str, Any]) -> None:
     lines = table(figures).splitlines()
     for name in SYSTEMS:
         assert sum(line.startswith(f"  {name}  ") for line in lines) == 5
-    assert any(line.split()[:3] == [BEST, "6.911", "0.696"] for line in lines)
+    assert any(line.split()[:3] == [REFERENCE_SYSTEM, "6.911", "0.696"] for line in lines)
     assert any(line.split()[-3:] == ["clean", "0", "dB"] for line in lines)
 
 
 @pytest.mark.parametrize("visual", ["eigenlips", "both"])
 def test_eigenlips(visual: str, toy_corpus: Corpus) -> None:
-    chosen = {"systems": ["trajectory HMM"], "states": 2, "mixtures": [1], "visual": visual}
-    made = table3(toy_corpus, **chosen, recogniser=SMALL)
-    said = evaluate(train(toy_corpus, recogniser=SMALL, visual=visual)[0], toy_corpus)["conditions"]["audio only"]
+    options = ComparisonOptions(systems=["trajectory HMM"], states=2, mixtures=[1], visual=visual)
+    made = table3(toy_corpus, options, settings=SMALL)
+    model = train(toy_corpus, recogniser=PHONE_MODELS, visual=visual)[0]
+    expected_figures = evaluate(model, toy_corpus)["conditions"]["audio only"]
     row = made["rows"][0]["conditions"]["audio only"]["trajectory HMM"]
-    assert (row["acc"], row["amse"]) == pytest.approx((said["acc"], said["amse"]))
+    assert (row["acc"], row["amse"]) == pytest.approx((expected_figures["acc"], expected_figures["amse"]))
     part = "eigenlips_" if visual == "both" else ""
-    assert row[f"{part}acc"] == pytest.approx(said["eigenlips"]["acc"])
-    assert row[f"{part}amse"] == pytest.approx(said["eigenlips"]["amse"])
-    assert len(made["channels"]) == len(said["eigenlips"]["channels"]) + (3 if visual == "both" else 0)
+    assert row[f"{part}acc"] == pytest.approx(expected_figures["eigenlips"]["acc"])
+    assert row[f"{part}amse"] == pytest.approx(expected_figures["eigenlips"]["amse"])
+    assert len(made["channels"]) == len(expected_figures["eigenlips"]["channels"]) + (3 if visual == "both" else 0)
     assert (row["opening"] is None) == (visual == "eigenlips")
     assert json.loads(json.dumps(made, allow_nan=False))
     starts = [line.split()[:1] for line in table(made).splitlines()]
@@ -184,17 +203,17 @@ def test_a_line_of_the_table() -> None:
 
 
 def test_systems_in_the_order_of_the_table() -> None:
-    assert chosen_rivals(["loudness", "ph-HMM"]) == ["ph-HMM", BEST, "loudness"]
-    assert list(PRINTED) == list(RIVALS)[:6]
+    assert selected_systems(["loudness", "ph-HMM"]) == ["ph-HMM", REFERENCE_SYSTEM, "loudness"]
+    assert list(PAPER_FIGURES) == list(COMPARED_SYSTEMS)[:6]
     with pytest.raises(InputError, match="no system 'ph-RNN'; there are: ph-HMM, "):
-        chosen_rivals(["ph-RNN"])
+        selected_systems(["ph-RNN"])
 
 
 def test_without_torch_the_network_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "torch", None)
-    assert chosen_rivals(None) == [name for name in RIVALS if name != BLSTM]
+    assert selected_systems(None) == [name for name in COMPARED_SYSTEMS if name != BLSTM]
     with pytest.raises(MissingDependencyError, match=r'needs PyTorch.*; pip install "lipmotion\[network\]"'):
-        chosen_rivals([BLSTM])
+        selected_systems([BLSTM])
 
 
 def test_without_matplotlib_there_are_no_pictures(
@@ -209,21 +228,25 @@ def test_without_matplotlib_there_are_no_pictures(
     ("options", "words"),
     [
         ({"systems": ["nothing"]}, "no system 'nothing'"),
-        ({"sizes": [9]}, "sizes 9; required: from 1 to 8"),
         ({"mixtures": []}, "numbers of Gaussians none; required: powers of two"),
         ({"mixtures": [3]}, "numbers of Gaussians 3; required: powers of two"),
     ],
 )
 def test_what_cannot_be_chosen(toy_corpus: Corpus, options: dict[str, Any], words: str) -> None:
     with pytest.raises(InputError, match=words):
-        table3(toy_corpus, **({"systems": [BEST], "recogniser": SMALL} | options))
+        table3(toy_corpus, ComparisonOptions(**({"systems": [REFERENCE_SYSTEM]} | options)), settings=SMALL)
+
+
+def test_sizes_that_the_list_does_not_have(toy_corpus: Corpus) -> None:
+    with pytest.raises(InputError, match="sizes 9; required: from 1 to 8"):
+        table3(toy_corpus, ComparisonOptions(systems=[REFERENCE_SYSTEM]), sizes=[9], settings=SMALL)
 
 
 def test_noise_that_cannot_be_made() -> None:
     with pytest.raises(InputError, match="unknown noise 'pink'; required some of: white, babble"):
-        Noises(("pink",))
+        NoiseConditions(("pink",))
     with pytest.raises(InputError, match="a babble of 0 talkers; required at least 2"):
-        Noises(("babble",))
+        NoiseConditions(("babble",))
 
 
 def test_corpora_that_cannot_be_used(toy_corpus: Corpus, tmp_path: Path) -> None:
@@ -243,4 +266,4 @@ def test_the_document_shows_the_figures_beside_it() -> None:
     for name in ("table3", "table3-noise"):
         figures = json.loads((results / f"{name}.json").read_text(encoding="utf-8"))
         assert f"```text\n{table(figures)}\n```" in text
-        assert BEST in figures["rows"][0]["training"]
+        assert REFERENCE_SYSTEM in figures["rows"][0]["training"]

@@ -1,1 +1,1 @@
-"""Baselines: methods that need no model of phones."""
+"""Baselines: methods without a model of phones."""

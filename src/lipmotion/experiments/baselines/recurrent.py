@@ -1,4 +1,4 @@
-"""A small recurrent network from sound to motion, as a rival. Needs the extra ``network``."""
+"""A small recurrent network from acoustic features to motion, as a baseline. It needs the extra ``network``."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import MissingDependencyError
-from lipmotion.experiments.baselines.regression import Array, Baseline, Single
+from lipmotion.experiments.baselines.regression import Array, Baseline, Float32Array
 from lipmotion.types import Monitor, counted
 
 UNITS, LAYERS = 192, 2
 STACKED = 4
-"""Frames of sound in one step of the network: its steps are as far apart as a video's pictures."""
-EPOCHS, AT_A_TIME, FASTEST = 40, 8, 4e-3
+"""Frames of features in one time step of the network: its steps are as far apart as the pictures of a video."""
+EPOCHS, BATCH_SIZE, LEARNING_RATE = 40, 8, 4e-3
 DROPOUT = 0.3
 LEAST_STEPS = 600
-"""Of learning: few recordings are gone through more often."""
+"""Least number of optimiser steps: with few recordings there are more epochs."""
 
 
-def network_here() -> bool:
+def torch_is_installed() -> bool:
     """Return whether torch can be imported."""
     try:
         import_torch()
@@ -32,8 +32,8 @@ def network_here() -> bool:
 
 
 @dataclass(frozen=True, eq=False)
-class Trained:
-    """A network, and mean and deviation of what it was taught [each shape=(Q,)]."""
+class TrainedNetwork:
+    """A network, and the mean and standard deviation of its training targets [each shape=(Q,)]."""
 
     network: Any
     mean: Array
@@ -42,44 +42,48 @@ class Trained:
 
 @final
 @dataclass(frozen=True)
-class Blstm(Baseline):
-    """Two layers of 192 long short-term memory cells in both directions, then a line; taught the least squared error.
+class BlstmBaseline(Baseline):
+    """Two bidirectional layers of 192 long short-term memory cells and a linear layer; least squared error.
 
-    seed : of the first weights, of the order of recordings, and of what is dropped
+    seed : of the initial weights, of the order of recordings, and of dropout
     """
 
     seed: int = 0
 
-    def learned(  # noqa: D102
-        self, features: Sequence[Single], values: Sequence[Array], seen: Sequence[NDArray[np.bool_]], monitor: Monitor
-    ) -> Trained:
+    def fit_map(  # noqa: D102
+        self,
+        features: Sequence[Float32Array],
+        values: Sequence[Array],
+        valid: Sequence[NDArray[np.bool_]],
+        monitor: Monitor,
+    ) -> TrainedNetwork:
         torch = import_torch()
         torch.manual_seed(self.seed)
-        everything = np.concatenate([x[mask] for x, mask in zip(values, seen, strict=True)])
+        everything = np.concatenate([x[mask] for x, mask in zip(values, valid, strict=True)])
         mean, deviation = everything.mean(axis=0), np.maximum(everything.std(axis=0), 1e-6)
-        lessons = [
-            (_stacked(f), _every(((x - mean) / deviation).astype(np.float32)), _every(mask))
-            for f, x, mask in zip(features, values, seen, strict=True)
+        sequences = [
+            (_stacked(f), _every_fourth(((x - mean) / deviation).astype(np.float32)), _every_fourth(mask))
+            for f, x, mask in zip(features, values, valid, strict=True)
         ]
-        network = _network(torch, lessons[0][0].shape[1], everything.shape[1])
-        epochs = max(EPOCHS, -(-LEAST_STEPS * AT_A_TIME // len(lessons)))
-        optimiser = torch.optim.Adam(network.parameters(), lr=FASTEST)
-        steps = epochs * -(-len(lessons) // AT_A_TIME)
-        pace = torch.optim.lr_scheduler.OneCycleLR(optimiser, FASTEST, total_steps=steps)
+        network = _network(torch, sequences[0][0].shape[1], everything.shape[1])
+        epochs = max(EPOCHS, -(-LEAST_STEPS * BATCH_SIZE // len(sequences)))
+        optimiser = torch.optim.Adam(network.parameters(), lr=LEARNING_RATE)
+        steps = epochs * -(-len(sequences) // BATCH_SIZE)
+        schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, LEARNING_RATE, total_steps=steps)
         order = np.random.default_rng(self.seed)
-        for _ in counted(range(epochs), "teaching the network", monitor):
-            mixed = order.permutation(len(lessons))
-            for start in range(0, len(mixed), AT_A_TIME):
-                _step(torch, network, optimiser, [lessons[i] for i in mixed[start : start + AT_A_TIME]])
-                pace.step()
-        return Trained(network.eval(), mean, deviation)
+        for _ in counted(range(epochs), "training the network", monitor):
+            mixed = order.permutation(len(sequences))
+            for start in range(0, len(mixed), BATCH_SIZE):
+                _step(torch, network, optimiser, [sequences[i] for i in mixed[start : start + BATCH_SIZE]])
+                schedule.step()
+        return TrainedNetwork(network.eval(), mean, deviation)
 
-    def mapped(self, learned: Trained, features: Single) -> Array:  # noqa: D102
+    def predict(self, learned: TrainedNetwork, features: Float32Array) -> Array:  # noqa: D102
         torch = import_torch()
         with torch.no_grad():
             steps = learned.network(torch.from_numpy(_stacked(features))[None])[0].numpy().astype(float)
-        places = np.arange(len(features)) / STACKED
-        curves = [np.interp(places, np.arange(len(steps)), step) for step in steps.T]
+        positions = np.arange(len(features)) / STACKED
+        curves = [np.interp(positions, np.arange(len(steps)), step) for step in steps.T]
         return np.stack(curves, axis=1) * learned.deviation + learned.mean
 
 
@@ -104,34 +108,37 @@ def _network(torch: Any, inputs: int, outputs: int) -> Any:
             self.drop = torch.nn.Dropout(DROPOUT)
             self.line = torch.nn.Linear(2 * UNITS, outputs)
 
-        def forward(self, heard: Any) -> Any:
-            return self.line(self.drop(self.memory(heard)[0]))
+        def forward(self, features: Any) -> Any:
+            return self.line(self.drop(self.memory(features)[0]))
 
     return Network()
 
 
 def _step(
-    torch: Any, network: Any, optimiser: Any, lessons: Sequence[tuple[Single, Single, NDArray[np.bool_]]]
+    torch: Any,
+    network: Any,
+    optimiser: Any,
+    batch: Sequence[tuple[Float32Array, Float32Array, NDArray[np.bool_]]],
 ) -> None:
-    """Learn from some recordings, the shorter ones filled up with what does not count."""
-    columns = zip(*lessons, strict=True)
-    heard, wanted, counts = (
-        torch.nn.utils.rnn.pad_sequence([torch.from_numpy(one) for one in column], batch_first=True)
+    """Take one optimiser step on a batch of recordings; the shorter ones are padded, and padding does not count."""
+    columns = zip(*batch, strict=True)
+    features, targets, valid = (
+        torch.nn.utils.rnn.pad_sequence([torch.from_numpy(array) for array in column], batch_first=True)
         for column in columns
     )
-    error = torch.square(network(heard) - wanted)[counts].mean()
+    error = torch.square(network(features) - targets)[valid].mean()
     optimiser.zero_grad()
     error.backward()
     torch.nn.utils.clip_grad_norm_(network.parameters(), 1.0)
     optimiser.step()
 
 
-def _stacked(features: Single) -> Single:
-    """Return the frames around every fourth one side by side [shape=(ceil(T / 4), 4·39)]."""
+def _stacked(features: Float32Array) -> Float32Array:
+    """Return each fourth frame with its neighbours, side by side [shape=(ceil(T / 4), 4·39)]."""
     centres = np.arange(0, len(features), STACKED)
     frames = np.clip(centres[:, None] + np.arange(STACKED) - STACKED // 2, 0, len(features) - 1)
     return np.ascontiguousarray(features[frames].reshape(len(centres), -1), np.float32)
 
 
-def _every(values: NDArray[Any]) -> NDArray[Any]:
+def _every_fourth(values: NDArray[Any]) -> NDArray[Any]:
     return np.ascontiguousarray(values[::STACKED])

@@ -1,4 +1,4 @@
-"""What needs no model of phones: yardsticks for those that have one."""
+"""Baselines that regress motion on acoustic features frame by frame, without a model of phones."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from lipmotion.engines import Animator, Fit
 from lipmotion.motion.space import MotionSpace, fit_reduced_motion
 from lipmotion.speech.mfcc import LOG_ENERGY
 from lipmotion.stats.regression import ridge, zero_statistics
-from lipmotion.storage.checkpoint import NOTHING_KEPT, Checkpoint
+from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import (
     FRAME_RATE_HZ,
     Constraints,
@@ -27,128 +27,132 @@ from lipmotion.types import (
 )
 
 Array = NDArray[np.float64]
-Single = NDArray[np.float32]
+Float32Array = NDArray[np.float32]
 COMPONENTS = 16
 """Dimensions that all point channels are reduced to, as in the engines."""
 SMOOTHING = 9
 """Frames that the log energy is averaged over: 90 ms, a little more than two pictures of a video."""
 REACH = 15
-"""Frames of sound to both sides: ±150 ms."""
+"""Frames of acoustic context on both sides: ±150 ms."""
 STRENGTH = 1e-3
-"""Of the ridge, in frames of training."""
+"""Strength of the ridge penalty, in frames of training."""
 
 
 @dataclass(frozen=True, eq=False)
-class FrameModel:
-    """A frame's motion from what is heard around it.
+class FrameRegressionModel:
+    """A map from the acoustic features of a frame and its neighbours to motion.
 
-    space  : of the motion
-    map    : what the baseline learned: coefficients [shape=(F, Q)], or anything of its own
-    spread : mean squared error in the space [shape=(Q,)]
+    space    : reduced space of the motion
+    learned  : coefficients [shape=(F, Q)], or another representation that the baseline has trained
+    variance : mean squared error in the reduced space [shape=(Q,)]
     """
 
     space: MotionSpace
-    map: Any
-    spread: Array
+    learned: Any
+    variance: Array
 
 
-class Baseline(Animator[FrameModel]):
-    """Learns the dimensions of motion from features, without phones."""
+class Baseline(Animator[FrameRegressionModel]):
+    """Predicts reduced motion from acoustic features, without phones."""
 
     def fit(  # noqa: D102
         self,
         examples: Sequence[Example],
         monitor: Monitor,
-        checkpoint: Checkpoint = NOTHING_KEPT,  # noqa: ARG002 - it takes seconds
-    ) -> Fit[FrameModel]:
+        checkpoint: Checkpoint = NO_CHECKPOINT,  # noqa: ARG002 - it takes seconds
+    ) -> Fit[FrameRegressionModel]:
         space, values = fit_reduced_motion(examples, COMPONENTS)
         features = [np.asarray(example.speech.features.values) for example in examples]
-        seen = [np.asarray(example.valid) for example in examples]
-        learned = self.learned(features, values, seen, monitor)
-        errors = [np.square(self.mapped(learned, f) - x)[s] for f, x, s in zip(features, values, seen, strict=True)]
-        model = FrameModel(space, learned, np.concatenate(errors).mean(axis=0))
-        return Fit(model, {"frames": sum(int(mask.sum()) for mask in seen)})
+        valid = [np.asarray(example.valid) for example in examples]
+        learned = self.fit_map(features, values, valid, monitor)
+        errors = [np.square(self.predict(learned, f) - x)[v] for f, x, v in zip(features, values, valid, strict=True)]
+        model = FrameRegressionModel(space, learned, np.concatenate(errors).mean(axis=0))
+        return Fit(model, {"frames": sum(int(mask.sum()) for mask in valid)})
 
     def generate(  # noqa: D102
         self,
-        model: FrameModel,
+        model: FrameRegressionModel,
         speech: Speech,
         constraints: Constraints | None = None,  # noqa: ARG002 - compared, never edited
     ) -> Generation:
-        mapped = self.mapped(model.map, np.asarray(speech.features.values))
-        values, variance = model.space.restore(mapped, np.broadcast_to(model.spread, mapped.shape))
+        predicted = self.predict(model.learned, np.asarray(speech.features.values))
+        values, variance = model.space.restore(predicted, np.broadcast_to(model.variance, predicted.shape))
         motion = Motion(values, FRAME_RATE_HZ, model.space.channels)
         return Generation(motion, variance, speech.units, Trace(("all",), np.zeros(len(values), np.intp)))
 
     @abstractmethod
-    def learned(
-        self, features: Sequence[Single], values: Sequence[Array], seen: Sequence[NDArray[np.bool_]], monitor: Monitor
+    def fit_map(
+        self,
+        features: Sequence[Float32Array],
+        values: Sequence[Array],
+        valid: Sequence[NDArray[np.bool_]],
+        monitor: Monitor,
     ) -> Any:
-        """Return what explains motion in its space [each shape=(T, Q)] by features [each shape=(T, 39)].
+        """Return a map from features [each shape=(T, 39)] to reduced motion [each shape=(T, Q)].
 
-        seen : where the motion holds [each shape=(T,)]
+        valid : frames whose motion was observed [each shape=(T,)]
         """
 
     @abstractmethod
-    def mapped(self, learned: Any, features: Single) -> Array:
-        """Return the motion in its space [shape=(T, Q)]."""
+    def predict(self, learned: Any, features: Float32Array) -> Array:
+        """Return the reduced motion [shape=(T, Q)] of features [shape=(T, 39)]."""
 
 
-class Linear(Baseline):
-    """Least squares of what ``heard`` gives for each frame."""
+class LinearBaseline(Baseline):
+    """Ridge regression of motion on the ``regressors`` of each frame."""
 
     strength: ClassVar[float] = 0.0
 
     @abstractmethod
-    def heard(self, features: Single) -> Array:
-        """Return the numbers that each frame's motion is a sum of [shape=(T, F)]."""
+    def regressors(self, features: Float32Array) -> Array:
+        """Return the regressors of each frame [shape=(T, F)]."""
 
-    def learned(  # noqa: D102
+    def fit_map(  # noqa: D102
         self,
-        features: Sequence[Single],
+        features: Sequence[Float32Array],
         values: Sequence[Array],
-        seen: Sequence[NDArray[np.bool_]],
+        valid: Sequence[NDArray[np.bool_]],
         monitor: Monitor,  # noqa: ARG002 - it takes seconds
     ) -> Array:
-        moments, frames = None, 0
-        for one, target, mask in zip(features, values, seen, strict=True):
-            rows = self.heard(one)[mask]
-            moments = moments or zero_statistics(rows.shape[1], target.shape[1])
-            moments.add(rows, target[mask])
+        statistics, frames = None, 0
+        for inputs, targets, mask in zip(features, values, valid, strict=True):
+            rows = self.regressors(inputs)[mask]
+            statistics = statistics or zero_statistics(rows.shape[1], targets.shape[1])
+            statistics.add(rows, targets[mask])
             frames += len(rows)
-        if moments is None:
+        if statistics is None:
             return np.zeros((0, 0))
-        return ridge(moments, np.zeros_like(moments.targets), self.strength * frames)
+        return ridge(statistics, np.zeros_like(statistics.targets), self.strength * frames)
 
-    def mapped(self, learned: Array, features: Single) -> Array:  # noqa: D102
-        return self.heard(features) @ learned
+    def predict(self, learned: Array, features: Float32Array) -> Array:  # noqa: D102
+        return self.regressors(features) @ learned
 
 
 @final
-class MeanPose(Linear):
-    """The mean of all frames, whatever is said."""
+class MeanPose(LinearBaseline):
+    """The mean of all training frames, for every frame."""
 
-    def heard(self, features: Single) -> Array:  # noqa: D102
+    def regressors(self, features: Float32Array) -> Array:  # noqa: D102
         return np.ones((len(features), 1))
 
 
 @final
-class Loudness(Linear):
-    """A line of the smoothed log energy."""
+class LoudnessRegression(LinearBaseline):
+    """Linear regression on the smoothed log energy."""
 
-    def heard(self, features: Single) -> Array:  # noqa: D102
+    def regressors(self, features: Float32Array) -> Array:  # noqa: D102
         padded = np.pad(features[:, LOG_ENERGY].astype(float), SMOOTHING // 2, "edge")
         smooth = np.convolve(padded, np.full(SMOOTHING, 1 / SMOOTHING), "valid")
         return np.stack([smooth, np.ones(len(smooth))], axis=1)
 
 
 @final
-class SoundAround(Linear):
+class ContextRidge(LinearBaseline):
     """Ridge regression on the features of all frames within ±150 ms."""
 
     strength = STRENGTH
 
-    def heard(self, features: Single) -> Array:  # noqa: D102
+    def regressors(self, features: Float32Array) -> Array:  # noqa: D102
         frames = np.clip(np.arange(len(features))[:, None] + np.arange(-REACH, REACH + 1), 0, len(features) - 1)
         rows = features[frames].reshape(len(features), -1)
         return np.concatenate([rows, np.ones((len(rows), 1), rows.dtype)], axis=1).astype(float)

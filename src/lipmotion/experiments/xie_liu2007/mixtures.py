@@ -1,4 +1,4 @@
-"""How many Gaussians a state of coupled chains should have: as many as are best on recordings kept aside."""
+"""The number of Gaussians per state of coupled chains, selected on validation recordings."""
 
 from __future__ import annotations
 
@@ -11,89 +11,93 @@ from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.engines.coupled.model import CoupledModel
 from lipmotion.engines.coupled.training.fit import growing_models
 from lipmotion.errors import InputError
-from lipmotion.experiments.comparison import correlation_tally
-from lipmotion.pipeline.evaluation.evaluate import Recorded, clips
+from lipmotion.experiments.comparison import correlation_statistic
+from lipmotion.pipeline.evaluation.conditions import AUDIO_ONLY, HeldOutRecordings, compared_clips
 from lipmotion.types import Example, Monitor, silent_monitor
 
-CANDIDATES = (1, 2, 4, 8)
+MIXTURE_COUNTS = (1, 2, 4, 8)
 
 
 @dataclass(frozen=True, eq=False)
-class Choice:
-    """A model with the number of Gaussians that was best.
+class MixtureSelection:
+    """A trained model with the selected number of Gaussians.
 
-    engine, model : with that number in all densities
-    seconds       : of the training of this model, and of no larger one
-    tried         : the mean ACC on the recordings kept aside, by the number of Gaussians
+    engine, model  : with that number in all densities
+    seconds        : training time up to this model, without that of larger ones
+    validation_acc : mean ACC on the validation recordings, by number of Gaussians
     """
 
     engine: CoupledEngine
     model: CoupledModel
     seconds: float
-    tried: dict[int, float]
+    validation_acc: dict[int, float]
 
 
-def chosen_mixtures(
+def select_mixtures(
     examples: Sequence[Example],
-    kept_aside: Recorded | None,
+    validation: HeldOutRecordings | None,
     config: CoupledConfig,
-    candidates: Sequence[int] = CANDIDATES,
-    condition: str = "audio only",
+    counts: Sequence[int] = MIXTURE_COUNTS,
+    condition: str = AUDIO_ONLY,
     monitor: Monitor = silent_monitor,
-) -> Choice:
-    """Return coupled chains with the number of Gaussians whose mean ACC on recordings kept aside is highest.
+) -> MixtureSelection:
+    """Return coupled chains with the number of Gaussians whose mean ACC on validation recordings is highest.
 
-    kept_aside : the recordings, of ``pipeline.evaluate.recorded``, not among the examples; None: one candidate only
-    config     : of everything else; all densities have the same number
-    candidates : powers of two; one of them alone is taken without being tried
-    condition  : what the chains are told of what is said
-    All are models on the way to the largest. Of equals, the smallest is taken.
+    validation : recordings of ``pipeline.evaluation``, not among the examples; None: ``counts`` has one number only
+    config     : all other options; all densities have the same number of Gaussians
+    counts     : numbers to select from, powers of two; a single one is taken without evaluation
+    condition  : whether the chains know the transcript (``with transcript``) or not (``audio only``)
+    The smaller models are stages of the training of the largest. Among equals, the smallest is selected.
     Source: Xie & Liu 2007, §7.1.
-    Raises InputError: no candidate, or one that is no power of two. Raises as ``Engine.fit``.
+    Raises InputError: no number, or one that is no power of two. Raises as ``Engine.fit``.
     """
-    check_numbers(candidates)
-    if kept_aside is None and len(candidates) > 1:
-        raise InputError(f"{len(candidates)} numbers of Gaussians and no recordings to choose with; give one number")
-    most = max(candidates)
-    tried: dict[int, float] = {}
+    check_mixture_counts(counts)
+    if validation is None and len(counts) > 1:
+        raise InputError(f"{len(counts)} numbers of Gaussians and no recordings to choose with; give one number")
+    most = max(counts)
+    validation_acc: dict[int, float] = {}
     best: tuple[int, CoupledModel, float] | None = None
-    for number, made, seconds in _grown(examples, _with(config, most), monitor):
-        if number not in candidates:
+    for count, make_model, seconds in _stages(examples, _with_mixtures(config, most), monitor):
+        if count not in counts:
             continue
-        model = made()
-        if kept_aside is not None:
-            engine = CoupledEngine(_with(config, number))
-            tried[number] = _acc(kept_aside, condition, engine, model)
-        if best is None or tried[number] > tried[best[0]]:
-            best = number, model, seconds
+        model = make_model()
+        if validation is not None:
+            engine = CoupledEngine(_with_mixtures(config, count))
+            validation_acc[count] = _mean_acc(validation, condition, engine, model)
+        if best is None or validation_acc[count] > validation_acc[best[0]]:
+            best = count, model, seconds
     if best is None:
-        raise InputError("chains with as many Gaussians as were asked for did not come about")
-    number, model, seconds = best
-    return Choice(CoupledEngine(_with(config, number)), model, seconds, tried)
+        raise InputError("no trained chains have as many Gaussians as were asked for")
+    count, model, seconds = best
+    return MixtureSelection(CoupledEngine(_with_mixtures(config, count)), model, seconds, validation_acc)
 
 
-def check_numbers(candidates: Sequence[int]) -> None:
+def check_mixture_counts(counts: Sequence[int]) -> None:
     """Raise InputError unless there are some numbers, all of them powers of two."""
-    if not candidates or any(number < 1 or number & (number - 1) for number in candidates):
-        found = ", ".join(map(str, candidates)) or "none"
-        raise InputError(f"numbers of Gaussians {found}; required: powers of two, as 1,2,4,8")
+    if not counts or any(count < 1 or count & (count - 1) for count in counts):
+        given = ", ".join(map(str, counts)) or "none"
+        raise InputError(f"numbers of Gaussians {given}; required: powers of two, as 1,2,4,8")
 
 
-def _with(config: CoupledConfig, number: int) -> CoupledConfig:
-    return replace(config, mixtures=number, visual_mixtures=number)
+def _with_mixtures(config: CoupledConfig, count: int) -> CoupledConfig:
+    return replace(config, mixtures=count, visual_mixtures=count)
 
 
-def _grown(
+def _stages(
     examples: Sequence[Example], config: CoupledConfig, monitor: Monitor
 ) -> Iterator[tuple[int, Callable[[], CoupledModel], float]]:
-    """Give the number of Gaussians, what makes the model, and the seconds of training so far."""
-    seconds, start_s, number = 0.0, perf_counter(), 1
-    for made in growing_models(examples, config, monitor):
+    """Yield, for each stage of training, the number of Gaussians, a function that returns the model, and the seconds.
+
+    The seconds are those of all training up to this stage.
+    """
+    seconds, start_s, count = 0.0, perf_counter(), 1
+    for make_model in growing_models(examples, config, monitor):
         seconds += perf_counter() - start_s
-        yield number, made, seconds
-        start_s, number = perf_counter(), 2 * number
+        yield count, make_model, seconds
+        start_s, count = perf_counter(), 2 * count
 
 
-def _acc(kept_aside: Recorded, condition: str, engine: CoupledEngine, model: CoupledModel) -> float:
-    made = clips(kept_aside, condition, engine, model)
-    return correlation_tally([clip.generated for clip in made], [clip.original for clip in made]).value
+def _mean_acc(validation: HeldOutRecordings, condition: str, engine: CoupledEngine, model: CoupledModel) -> float:
+    """Return the mean ACC over channels of what a model generates for validation recordings."""
+    made = compared_clips(validation, condition, engine, model)
+    return correlation_statistic([clip.generated for clip in made], [clip.original for clip in made]).value

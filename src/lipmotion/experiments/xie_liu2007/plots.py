@@ -11,16 +11,16 @@ import numpy as np
 from lipmotion.engines.coupled.conversion.em import converted
 from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.errors import ExportError, MissingDependencyError
-from lipmotion.experiments.noise import AUDIO_ONLY
-from lipmotion.experiments.xie_liu2007.systems import Contender
-from lipmotion.pipeline.evaluation.evaluate import Clip, Recorded, clips
+from lipmotion.experiments.xie_liu2007.systems import TrainedSystem
+from lipmotion.pipeline.evaluation.conditions import AUDIO_ONLY, ComparedClip, HeldOutRecordings, compared_clips
 from lipmotion.storage.files import whole_file
 from lipmotion.types import GREY
 
-EIGHT, SIX = 8, 6
-DOTS_AN_INCH = 110
-NAMES = {"start": "conversion.png", "steps": "convergence.png", "clips": "predicted.png"}
-"""Like Figs. 7, 10 and 11."""
+CONVERGENCE_RECORDINGS, PREDICTED_RECORDINGS = 8, 6
+"""Recordings that are shown in one picture."""
+DOTS_PER_INCH = 110
+PLOT_FILES = {"start": "conversion.png", "steps": "convergence.png", "clips": "predicted.png"}
+"""File names of the pictures like Figs. 7, 10 and 11."""
 
 
 def import_figure() -> Any:
@@ -34,8 +34,8 @@ def import_figure() -> Any:
     return Figure
 
 
-def check_plots(folder: Path) -> None:
-    """Find out before the long work whether pictures can be drawn, and written into a folder that may yet be made.
+def check_plot_folder(folder: Path) -> None:
+    """Check before the long work that pictures can be picture and written; the folder need not exist yet.
 
     Raises MissingDependencyError: no matplotlib. Raises ExportError: the folder cannot be made.
     """
@@ -46,76 +46,76 @@ def check_plots(folder: Path) -> None:
         raise ExportError(f"{folder}: is a file; give a folder for the pictures")
 
 
-def draw_plots(chains: Contender, found: Recorded, folder: Path) -> None:
-    """Write pictures of coupled chains that convert by EM: of the first recordings, audio only.
+def draw_plots(chains: TrainedSystem, recordings: HeldOutRecordings, folder: Path) -> None:
+    """Write pictures of the conversion by coupled chains with EM, of the first recordings, audio only.
 
-    folder : made if it is not there
+    folder : made if it does not exist
     Raises MissingDependencyError: no matplotlib. Raises ExportError: a picture cannot be written.
     """
     figure = import_figure()
-    few = replace(
-        found,
-        utterances=found.utterances[:EIGHT],
-        reference=found.reference[:EIGHT],
-        conditions={AUDIO_ONLY: found.conditions[AUDIO_ONLY][:EIGHT]},
+    some = replace(
+        recordings,
+        utterances=recordings.utterances[:CONVERGENCE_RECORDINGS],
+        reference=recordings.reference[:CONVERGENCE_RECORDINGS],
+        conditions={AUDIO_ONLY: recordings.conditions[AUDIO_ONLY][:CONVERGENCE_RECORDINGS]},
     )
-    by_em = clips(few, AUDIO_ONLY, chains.engine, chains.model)
+    by_em = compared_clips(some, AUDIO_ONLY, chains.engine, chains.model)
     path_engine = CoupledEngine(replace(chains.engine.config, conversion="viterbi"))
-    by_path = clips(few, AUDIO_ONLY, path_engine, chains.model)
+    by_path = compared_clips(some, AUDIO_ONLY, path_engine, chains.model)
     folder.mkdir(parents=True, exist_ok=True)
-    _save(_conversion(figure, few, by_em[0], by_path[0]), folder / NAMES["start"])
-    _save(_convergence(figure, few, chains), folder / NAMES["steps"])
-    _save(_predicted(figure, few, by_em[:SIX]), folder / NAMES["clips"])
+    _save(_conversion(figure, some, by_em[0], by_path[0]), folder / PLOT_FILES["start"])
+    _save(_convergence(figure, some, chains), folder / PLOT_FILES["steps"])
+    _save(_predicted(figure, some, by_em[:PREDICTED_RECORDINGS]), folder / PLOT_FILES["clips"])
 
 
-def _conversion(figure: Any, found: Recorded, by_em: Clip, by_path: Clip) -> Any:
-    drawn = figure(figsize=(10, 4.2), layout="constrained")
-    axes = drawn.subplots()
+def _conversion(figure: Any, recordings: HeldOutRecordings, by_em: ComparedClip, by_path: ComparedClip) -> Any:
+    picture = figure(figsize=(10, 4.2), layout="constrained")
+    axes = picture.subplots()
     axes.plot(by_em.time_s, by_em.original[:, 0], "k:", label="recorded")
     axes.plot(by_path.time_s, by_path.generated[:, 0], color="tab:orange", label="means along the best path")
-    axes.plot(by_em.time_s, by_em.generated[:, 0], color="tab:blue", label="EM, started from them")
-    _labelled(axes, found, f"Audio to visual conversion: {found.utterances[0].name}")
+    axes.plot(by_em.time_s, by_em.generated[:, 0], color="tab:blue", label="EM, started from these means")
+    _label_axes(axes, recordings, f"Audio to visual conversion: {recordings.utterances[0].name}")
     axes.set_xlabel("time (s)")
     axes.legend(loc="upper right")
-    return drawn
+    return picture
 
 
-def _convergence(figure: Any, found: Recorded, chains: Contender) -> Any:
-    drawn = figure(figsize=(7, 4.6), layout="constrained")
-    axes = drawn.subplots()
+def _convergence(figure: Any, recordings: HeldOutRecordings, chains: TrainedSystem) -> Any:
+    picture = figure(figsize=(7, 4.6), layout="constrained")
+    axes = picture.subplots()
     engine, model = chains.engine, chains.model
-    for utterance in found.utterances:
+    for utterance in recordings.utterances:
         observed = model.unseen(np.asarray(utterance.features.values))
         steps = converted(model.chains, observed, model.chains.everywhere, engine.config.em).log_likelihood
         axes.plot(range(len(steps)), steps, "o-", markersize=3, label=utterance.name)
     axes.set_xlabel("step of EM (0: means along the best path)")
-    axes.set_ylabel("log likelihood of sound and lips (nats a frame)")
-    axes.set_title(f"Convergence of the conversion, {len(found.utterances)} recordings")
-    drawn.legend(loc="outside right upper", fontsize="small")
+    axes.set_ylabel("log likelihood of speech and lips (nats per frame)")
+    axes.set_title(f"Convergence of the conversion, {len(recordings.utterances)} recordings")
+    picture.legend(loc="outside right upper", fontsize="small")
     axes.grid(alpha=0.3)
-    return drawn
+    return picture
 
 
-def _predicted(figure: Any, found: Recorded, made: list[Clip]) -> Any:
-    drawn = figure(figsize=(10, 2.2 * len(made)), layout="constrained")
-    every = drawn.subplots(len(made), 1, squeeze=False)[:, 0]
-    for axes, clip, utterance in zip(every, made, found.utterances, strict=False):
+def _predicted(figure: Any, recordings: HeldOutRecordings, made: list[ComparedClip]) -> Any:
+    picture = figure(figsize=(10, 2.2 * len(made)), layout="constrained")
+    all_axes = picture.subplots(len(made), 1, squeeze=False)[:, 0]
+    for axes, clip, utterance in zip(all_axes, made, recordings.utterances, strict=False):
         axes.plot(clip.time_s, clip.original[:, 0], "k:", label="recorded")
         axes.plot(clip.time_s, clip.generated[:, 0], color="tab:blue", label="predicted")
-        _labelled(axes, found, f"{utterance.name}: {' '.join(utterance.words or ())}")
-    every[0].legend(loc="upper right", ncols=2)
-    every[-1].set_xlabel("time (s)")
-    return drawn
+        _label_axes(axes, recordings, f"{utterance.name}: {' '.join(utterance.words or ())}")
+    all_axes[0].legend(loc="upper right", ncols=2)
+    all_axes[-1].set_xlabel("time (s)")
+    return picture
 
 
-def _labelled(axes: Any, found: Recorded, title: str) -> None:
-    name = found.channels[0]
-    unit = next(c.unit for c in found.utterances[0].track.motion.channels if c.name == name).replace("_", " ")
+def _label_axes(axes: Any, recordings: HeldOutRecordings, title: str) -> None:
+    name = recordings.channels[0]
+    unit = next(c.unit for c in recordings.utterances[0].track.motion.channels if c.name == name).replace("_", " ")
     axes.set_ylabel(f"{name} ({unit}{'s' if unit != GREY else ' levels'})")
     axes.set_title(title, fontsize="medium")
     axes.grid(alpha=0.3)
 
 
-def _save(drawn: Any, path: Path) -> None:
+def _save(picture: Any, path: Path) -> None:
     with whole_file(path) as unfinished:
-        drawn.savefig(unfinished, format="png", dpi=DOTS_AN_INCH)
+        picture.savefig(unfinished, format="png", dpi=DOTS_PER_INCH)

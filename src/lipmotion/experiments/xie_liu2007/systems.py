@@ -1,4 +1,4 @@
-"""The systems of Xie & Liu 2007, Table 3, what this project has beside them, and yardsticks."""
+"""The systems of Xie & Liu 2007, Table 3, the engines of this project beside them, and baselines."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from lipmotion.engines.coupled.chains.structures import SYSTEMS
 from lipmotion.engines.coupled.config import CoupledConfig
 from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.errors import InputError
-from lipmotion.experiments.baselines.recurrent import Blstm, import_torch, network_here
-from lipmotion.experiments.baselines.regression import Loudness, MeanPose, SoundAround
-from lipmotion.experiments.xie_liu2007.mixtures import chosen_mixtures
-from lipmotion.pipeline.evaluation.evaluate import Recorded
+from lipmotion.experiments.baselines.recurrent import BlstmBaseline, import_torch, torch_is_installed
+from lipmotion.experiments.baselines.regression import ContextRidge, LoudnessRegression, MeanPose
+from lipmotion.experiments.xie_liu2007.mixtures import select_mixtures
+from lipmotion.pipeline.evaluation.conditions import HeldOutRecordings
 from lipmotion.types import Example, Monitor, part_of
 
-BEST = "ph-vi-CHMM"
-"""What every other system is compared with."""
-PRINTED: dict[str, tuple[float, float]] = {
+REFERENCE_SYSTEM = "ph-vi-CHMM"
+"""The system that every other one is compared with."""
+PAPER_FIGURES: dict[str, tuple[float, float]] = {
     "ph-HMM": (8.043, 0.581),
     "ph-MSHMM": (8.050, 0.576),
     "ph-FHMM": (7.778, 0.593),
@@ -29,108 +29,117 @@ PRINTED: dict[str, tuple[float, float]] = {
     "ph-vi-CHMM": (6.911, 0.696),
 }
 """AMSE and ACC of the paper's Table 3: eigenlips of another speaker, so only their order compares."""
-AS_PRINTED: dict[str, Any] = {
+PAPER_CONVERSION: dict[str, Any] = {
     "conversion": "em",
     "start": "viterbi",
     "steps": 10,
-    "full_range": False,
+    "variance_scaling": False,
     "closures": False,
 }
-"""Conversion as in the paper: frame by frame, from the best path, nothing done to what comes out."""
+"""Conversion as in the paper: frame by frame, started from the best path, without changes to the generated motion."""
 BEST_PATH = "ph-vi-CHMM, best path"
 BLSTM = "BLSTM"
 
 
 @dataclass(frozen=True)
-class Rival:
-    """One system of the table.
+class ComparedSystem:
+    """How one system of the table is made.
 
-    made    : gives it; None: it is the coupled engine with ``options``, and its number of Gaussians is chosen
-    like    : the system whose model it takes, so that only the conversion differs, by the ``options``
+    make          : returns its engine; None: it is the coupled engine with ``options``, and its number of Gaussians is
+                    selected on validation recordings
+    options       : of the coupled engine
+    same_model_as : the system whose model it takes, so that only the conversion differs, by the ``options``
     """
 
-    made: Callable[[], Animator[Any]] | None = None
+    make: Callable[[], Animator[Any]] | None = None
     options: Mapping[str, Any] = field(default_factory=dict)
-    like: str = ""
+    same_model_as: str = ""
 
 
 def _engine(name: str, **options: Any) -> Callable[[], Animator[Any]]:
     return lambda: engine_named(name, options)
 
 
-RIVALS: dict[str, Rival] = {
-    **{name: Rival(options=AS_PRINTED | SYSTEMS[name]) for name in PRINTED},
-    "ph-vi-CHMM, soft start": Rival(options={"start": "soft"}, like=BEST),
-    BEST_PATH: Rival(options={"conversion": "viterbi"}, like=BEST),
-    "trajectory CHMM, own means": Rival(_engine("coupled", follows=False)),
-    "trajectory CHMM": Rival(_engine("coupled")),
-    "trajectory HMM": Rival(_engine("trajectory")),
-    BLSTM: Rival(Blstm),
-    "ridge, ±150 ms": Rival(SoundAround),
-    "loudness": Rival(Loudness),
-    "mean pose": Rival(MeanPose),
+COMPARED_SYSTEMS: dict[str, ComparedSystem] = {
+    **{name: ComparedSystem(options=PAPER_CONVERSION | SYSTEMS[name]) for name in PAPER_FIGURES},
+    "ph-vi-CHMM, soft start": ComparedSystem(options={"start": "soft"}, same_model_as=REFERENCE_SYSTEM),
+    BEST_PATH: ComparedSystem(options={"conversion": "viterbi"}, same_model_as=REFERENCE_SYSTEM),
+    "trajectory CHMM, own means": ComparedSystem(_engine("coupled", acoustic_regression=False)),
+    "trajectory CHMM": ComparedSystem(_engine("coupled")),
+    "trajectory HMM": ComparedSystem(_engine("trajectory")),
+    BLSTM: ComparedSystem(BlstmBaseline),
+    "ridge, ±150 ms": ComparedSystem(ContextRidge),
+    "loudness": ComparedSystem(LoudnessRegression),
+    "mean pose": ComparedSystem(MeanPose),
 }
-"""``best path``: means along it, no EM. ``own means``: the visual means do not follow what is around the frame."""
+"""The systems of the table, in its order.
+
+``best path``: means along the best path, no EM. ``own means``: no regression of the visual means on acoustic features.
+"""
 
 
-def chosen_rivals(names: Sequence[str] | None) -> list[str]:
-    """Return the systems to compare, in the table's order; all that can be, by default, and always ``BEST``.
+def selected_systems(names: Sequence[str] | None) -> list[str]:
+    """Return the names of the systems to compare, in the table's order; always with ``REFERENCE_SYSTEM``.
 
-    Raises InputError: no such system. Raises MissingDependencyError: a package of one that was asked for is missing.
+    names : None: all systems whose packages are installed
+    Raises InputError: no such system. Raises MissingDependencyError: a named system needs a package that is missing.
     """
     if names is None:
-        return [name for name in RIVALS if name != BLSTM or network_here()]
-    unknown = [name for name in names if name not in RIVALS]
+        return [name for name in COMPARED_SYSTEMS if name != BLSTM or torch_is_installed()]
+    unknown = [name for name in names if name not in COMPARED_SYSTEMS]
     if unknown:
-        raise InputError(f"no system {unknown[0]!r}; there are: {', '.join(RIVALS)}")
+        raise InputError(f"no system {unknown[0]!r}; there are: {', '.join(COMPARED_SYSTEMS)}")
     if BLSTM in names:
         import_torch()
-    return [name for name in RIVALS if name in names or name == BEST]
+    return [name for name in COMPARED_SYSTEMS if name in names or name == REFERENCE_SYSTEM]
 
 
 @dataclass(frozen=True, eq=False)
-class Contender:
-    """A trained rival.
+class TrainedSystem:
+    """One trained system of the table.
 
-    engine   : an ``Animator``
-    mixtures : Gaussians of its densities, where they were chosen;  tried : mean ACC on the recordings kept aside
+    engine         : an ``Animator``
+    model          : its trained model
+    seconds        : training time
+    mixtures       : Gaussians of its densities, where they were selected
+    validation_acc : mean ACC on the validation recordings, by number of Gaussians
     """
 
     engine: Any
     model: Any
     seconds: float
     mixtures: int | None = None
-    tried: Mapping[int, float] = field(default_factory=dict)
+    validation_acc: Mapping[int, float] = field(default_factory=dict)
 
 
-def trained_rivals(
+def train_systems(
     names: Sequence[str],
     examples: Sequence[Example],
-    kept_aside: Recorded | None,
+    validation: HeldOutRecordings | None,
     states: int,
     mixtures: Sequence[int],
     monitor: Monitor,
-) -> dict[str, Contender]:
-    """Return systems, trained.
+) -> dict[str, TrainedSystem]:
+    """Return the trained systems by name.
 
-    kept_aside : recordings that the number of Gaussians is chosen with; None: nothing is to be chosen
-    states     : per unit, of the systems of the paper;  mixtures : numbers of Gaussians that these may have
+    validation : recordings on which the number of Gaussians is selected; None: ``mixtures`` has one number only
+    states     : per unit, in the systems of the paper
+    mixtures   : numbers of Gaussians per state that these may have
     """
-    found: dict[str, Contender] = {}
+    trained: dict[str, TrainedSystem] = {}
     for number, name in enumerate(names):
         part = part_of(monitor, number / len(names), (number + 1) / len(names), f"{name}: ")
-        rival = RIVALS[name]
-        if rival.like:
-            twin = found[rival.like]
-            found[name] = replace(twin, engine=CoupledEngine(replace(twin.engine.config, **rival.options)))
-        elif rival.made is not None:
-            start_s, engine = perf_counter(), rival.made()
+        system = COMPARED_SYSTEMS[name]
+        if system.same_model_as:
+            twin = trained[system.same_model_as]
+            trained[name] = replace(twin, engine=CoupledEngine(replace(twin.engine.config, **system.options)))
+        elif system.make is not None:
+            start_s, engine = perf_counter(), system.make()
             model = engine.fit(examples, part).model
-            found[name] = Contender(engine, model, perf_counter() - start_s)
+            trained[name] = TrainedSystem(engine, model, perf_counter() - start_s)
         else:
-            config = CoupledConfig(**rival.options, states=states)
-            choice = chosen_mixtures(examples, kept_aside, config, mixtures, monitor=part)
-            found[name] = Contender(
-                choice.engine, choice.model, choice.seconds, choice.engine.config.mixtures, choice.tried
-            )
-    return found
+            config = CoupledConfig(**system.options, states=states)
+            selection = select_mixtures(examples, validation, config, mixtures, monitor=part)
+            count, acc = selection.engine.config.mixtures, selection.validation_acc
+            trained[name] = TrainedSystem(selection.engine, selection.model, selection.seconds, count, acc)
+    return trained

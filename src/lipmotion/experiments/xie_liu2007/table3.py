@@ -1,4 +1,4 @@
-"""Xie & Liu 2007, Table 3, on any corpus: which structure of chains predicts lips best, and what is better still."""
+"""Xie & Liu 2007, Table 3, on any corpus: which structure of chains predicts lips best, beside other systems."""
 
 from __future__ import annotations
 
@@ -12,29 +12,43 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.corpora.store import Corpus
+from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.errors import InputError
-from lipmotion.experiments.comparison import Tally, correlation_tally, distance_tally, openings_of
-from lipmotion.experiments.learning_curve import check_lists, steps_of
-from lipmotion.experiments.noise import AUDIO_ONLY, in_noise
-from lipmotion.experiments.runner import channels_with_opening, opening_row, shuffled
-from lipmotion.experiments.xie_liu2007.mixtures import CANDIDATES, check_numbers
-from lipmotion.experiments.xie_liu2007.plots import check_plots, draw_plots
-from lipmotion.experiments.xie_liu2007.systems import BEST, Contender, chosen_rivals, trained_rivals
+from lipmotion.experiments.comparison import ClipStatistic, correlation_statistic, distance_statistic, opening_curves
+from lipmotion.experiments.learning_curve import check_training_names, checked_sizes
+from lipmotion.experiments.noise import recordings_in_noise
+from lipmotion.experiments.runner import (
+    DEFAULT_SETTINGS,
+    ExperimentSettings,
+    channels_with_opening,
+    opening_row,
+    shuffled,
+)
+from lipmotion.experiments.xie_liu2007.mixtures import MIXTURE_COUNTS, check_mixture_counts
+from lipmotion.experiments.xie_liu2007.plots import check_plot_folder, draw_plots
+from lipmotion.experiments.xie_liu2007.systems import REFERENCE_SYSTEM, TrainedSystem, selected_systems, train_systems
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.kernels.threads import one_thread
 from lipmotion.measures import curves
-from lipmotion.pipeline.evaluation.evaluate import OPENING, Clip, Recorded, clips, figures_of, recorded
+from lipmotion.pipeline.evaluation.conditions import (
+    AUDIO_ONLY,
+    OPENING,
+    ComparedClip,
+    HeldOutRecordings,
+    compared_clips,
+    held_out_recordings,
+)
+from lipmotion.pipeline.evaluation.figures import figures_of
 from lipmotion.pipeline.training.channels import EIGENLIPS, GEOMETRY, as_learned, check_visual, learned_eigenlips
 from lipmotion.pipeline.training.train import FEWEST, phones_and_examples
 from lipmotion.pipeline.workers import working
-from lipmotion.speech.noise import FEWEST_TALKERS, KINDS
-from lipmotion.speech.recogniser import recogniser as cached_recogniser
+from lipmotion.speech.noise import FEWEST_TALKERS, NOISE_KINDS
+from lipmotion.speech.recogniser import cached_recogniser
 from lipmotion.stats.rounding import varies
-from lipmotion.storage.checkpoint import NOTHING_KEPT
-from lipmotion.storage.json_text import defined
+from lipmotion.storage.checkpoint import NO_CHECKPOINT
+from lipmotion.storage.json_text import nan_as_null
 from lipmotion.storage.sources import Source, check_apart
-from lipmotion.types import Audio, Monitor, counted, part_of, silent_monitor
+from lipmotion.types import Audio, Monitor, counted, part_of
 from lipmotion.units import Lexicon
 
 Array = NDArray[np.float64]
@@ -45,11 +59,12 @@ RATIOS_DB = (20.0, 10.0, 5.0, 0.0)
 
 
 @dataclass(frozen=True)
-class Noises:
-    """Noise to hear the recordings in.
+class NoiseConditions:
+    """Noise that is added to the held-out recordings.
 
-    kinds   : of ``speech.noise.KINDS``;  ratios_db : signal-to-noise ratios
-    talkers : of the babble
+    kinds     : of ``speech.noise.NOISE_KINDS``
+    ratios_db : signal-to-noise ratios
+    talkers   : recordings for the babble
     """
 
     kinds: tuple[str, ...] = ()
@@ -57,182 +72,212 @@ class Noises:
     talkers: tuple[Audio, ...] = ()
 
     def __post_init__(self) -> None:
-        unknown = [kind for kind in self.kinds if kind not in KINDS]
+        unknown = [kind for kind in self.kinds if kind not in NOISE_KINDS]
         if unknown:
-            raise InputError(f"unknown noise {unknown[0]!r}; required some of: {', '.join(KINDS)}")
+            raise InputError(f"unknown noise {unknown[0]!r}; required some of: {', '.join(NOISE_KINDS)}")
         if BABBLE in self.kinds and len(self.talkers) < FEWEST_TALKERS:
             raise InputError(f"a babble of {len(self.talkers)} talkers; required at least {FEWEST_TALKERS}: --talkers")
+
+
+@dataclass(frozen=True)
+class ComparisonOptions:
+    """Which systems are compared, and in which conditions.
+
+    systems     : names of ``systems.COMPARED_SYSTEMS``; None: all whose packages are installed
+    states      : per unit, in the systems of the paper
+    mixtures    : numbers of Gaussians per state of these systems; one is selected on the list ``val`` for each size
+    visual      : which motion is modelled and compared, as in ``train``; eigenlips are those of the training
+    transcripts : compare also with known transcripts
+    noise       : noise in which the systems trained on the largest size are compared as well
+    """
+
+    systems: Sequence[str] | None = None
+    states: int = STATES
+    mixtures: Sequence[int] = MIXTURE_COUNTS
+    visual: str = GEOMETRY
+    transcripts: bool = False
+    noise: NoiseConditions | None = None
+
+
+DEFAULT_OPTIONS = ComparisonOptions()
 
 
 @one_thread()
 def table3(
     corpus: Corpus,
+    options: ComparisonOptions = DEFAULT_OPTIONS,
     *,
     split: str | None = "test",
     order: Sequence[str] | None = None,
     sizes: Sequence[int] | None = None,
-    systems: Sequence[str] | None = None,
-    states: int = STATES,
-    mixtures: Sequence[int] = CANDIDATES,
-    visual: str = GEOMETRY,
-    transcripts: bool = False,
-    noises: Noises | None = None,
     plots: Path | None = None,
-    recogniser: HmmConfig | None = None,
-    lexicon: Lexicon | None = None,
-    seed: int = 0,
-    monitor: Monitor = silent_monitor,
-    workers: int = 1,
+    settings: ExperimentSettings = DEFAULT_SETTINGS,
 ) -> dict[str, Any]:
-    """Train the six systems of the paper, ours and yardsticks; return what they make of ``split``.
+    """Train the six systems of the paper, this project's engines and baselines; return their figures on ``split``.
 
-    order, sizes : train on the first N names of a list, as ``learning_curve``; by default on all of ``train``
-    systems     : names of ``rivals.RIVALS``; by default all that can be
-    states      : per unit, of the paper's systems
-    mixtures    : Gaussians per state that these may have, chosen with the list ``val`` for each size
-    visual      : what of a face is learned and compared, as ``train`` has it; eigenlips are those of the training
-    transcripts : compare also with the words known
-    noises      : that the systems hear ``split`` in as well, those of the largest size
-    plots       : a folder for pictures like Figs. 7, 10 and 11 of the paper, of the largest size
-    recogniser  : configuration of the phone models
-    workers     : processes that share the finding of the phones
-    The phones in time are found once for each size and are the same for all systems.
+    order, sizes : train on the first N names of a list, as in ``learning_curve``; by default on all of ``train``
+    plots        : a folder for pictures like Figs. 7, 10 and 11 of the paper, of the largest size
+    settings     : its workers share the forced alignment
+    The phones in time are computed once for each size and are the same for all systems.
     Raises InputError: no such system, sizes that the list does not have, numbers that are no powers of two.
     Raises CorpusError: no utterances to train on, to choose with, or of this split, or motion without an opening.
     Raises MissingDependencyError: a system or the pictures need a package that is not installed.
     Raises ExportError: the pictures cannot be written.
     """
-    names = chosen_rivals(systems)
-    check_numbers(mixtures)
-    check_visual(visual)
+    names, mixtures, seed = selected_systems(options.systems), options.mixtures, settings.seed
+    check_mixture_counts(mixtures)
+    check_visual(options.visual)
     listed = tuple(order) if order is not None else shuffled(corpus.required("train"), seed)
-    held_out, kept_aside = corpus.required(split), corpus.required("val") if len(mixtures) > 1 else ()
-    check_lists(corpus, listed, (*held_out, *kept_aside))
-    steps = steps_of(sizes if sizes is not None else [len(listed)], len(listed))
-    setup = _Setup(corpus, names, held_out, kept_aside, states, tuple(mixtures), visual, recogniser, lexicon, workers)
-    if visual != EIGENLIPS:
+    held_out, validation = corpus.required(split), corpus.required("val") if len(mixtures) > 1 else ()
+    check_training_names(corpus, listed, (*held_out, *validation))
+    steps = checked_sizes(sizes if sizes is not None else [len(listed)], len(listed))
+    setup = _TrainingSetup(corpus, names, held_out, validation, options, settings)
+    if options.visual != EIGENLIPS:
         channels_with_opening(corpus, held_out)  # before the long work
     if plots is not None:
-        check_plots(plots)
+        check_plot_folder(plots)
         check_apart([plots], [Source(corpus.path, "corpus")])
     shares = 0.9 * np.cumsum([0, *steps]) / sum(steps)
     rows: list[dict[str, Any]] = []
     for count, (start, stop) in zip(steps, pairwise(shares), strict=True):
-        part = part_of(monitor, float(start), float(stop), f"{count} clips: ")
-        tried = setup.trained(listed[:count], part)
-        rows.append({"names": count} | _size(tried, transcripts, seed))
-    loud = _in_noise(tried, noises or Noises(), seed, part_of(monitor, 0.9, 1))
+        part = part_of(settings.monitor, float(start), float(stop), f"{count} clips: ")
+        trained = setup.train(listed[:count], part)
+        rows.append({"names": count} | _size(trained, options.transcripts, seed))
+    noise = options.noise or NoiseConditions()
+    noise_rows = _noise_rows(trained, noise, seed, part_of(settings.monitor, 0.9, 1))
+    recordings = trained.recordings
     if plots is not None:
-        draw_plots(tried.contenders[BEST], tried.found, plots)
-    about = {"split": split or "all", "clips": len(held_out), "seed": seed, "states": states, "workers": workers}
-    about |= {"order": "given" if order is not None else "shuffled", "mixtures": list(mixtures)}
-    about |= {"visual": visual, "channels": list(tried.found.channels), "closed_under": tried.found.closed_under}
-    figures: dict[str, Any] = defined(about | {"rows": rows, "noise": loud})
+        draw_plots(trained.systems[REFERENCE_SYSTEM], recordings, plots)
+    about = {"split": split or "all", "clips": len(held_out), "seed": seed, "states": options.states}
+    about |= {"workers": settings.workers, "order": "given" if order is not None else "shuffled"}
+    about |= {"mixtures": list(mixtures), "visual": options.visual}
+    about |= {"channels": list(recordings.channels), "closed_under": recordings.closed_under}
+    figures: dict[str, Any] = nan_as_null(about | {"rows": rows, "noise": noise_rows})
     return figures
 
 
 @dataclass(frozen=True, eq=False)
-class _Tried:
-    """Systems trained on some utterances, and the recordings to compare with."""
+class _TrainedSystems:
+    """Systems trained on some utterances, and the held-out recordings.
+
+    used : names of the utterances that they were trained on
+    """
 
     used: tuple[str, ...]
-    found: Recorded
-    contenders: Mapping[str, Contender]
+    recordings: HeldOutRecordings
+    systems: Mapping[str, TrainedSystem]
 
 
 @dataclass(frozen=True, eq=False)
-class _Setup:
+class _TrainingSetup:
+    """What the trainings on all sizes have in common.
+
+    systems              : names
+    held_out, validation : names of utterances
+    """
+
     corpus: Corpus
     systems: Sequence[str]
     held_out: Sequence[str]
-    kept_aside: Sequence[str]
-    states: int
-    mixtures: tuple[int, ...]
-    visual: str
-    recogniser: HmmConfig | None
-    lexicon: Lexicon | None
-    workers: int
+    validation: Sequence[str]
+    options: ComparisonOptions
+    settings: ExperimentSettings
 
-    def trained(self, names: Sequence[str], monitor: Monitor) -> _Tried:
-        """Return all systems, trained on the same phones of some utterances."""
-        lexicon, config = self.lexicon or Lexicon(), self.recogniser or HmmConfig()
+    def train(self, names: Sequence[str], monitor: Monitor) -> _TrainedSystems:
+        """Return all systems, trained on the same phones of the utterances ``names``."""
+        lexicon, config = self.settings.lexicon or Lexicon(), self.settings.recogniser or HmmConfig()
+        visual, options = self.options.visual, self.options
         utterances = [self.corpus.utterance(name) for name in sorted(names)]
-        eigenlips = learned_eigenlips(utterances) if self.visual != GEOMETRY else None
-        utterances = [as_learned(utterance, self.visual, eigenlips) for utterance in utterances]
-        with working(min(self.workers, len(utterances) // FEWEST)) as team:
-            finding = part_of(monitor, 0, 0.2)
-            phones, examples, _ = phones_and_examples(utterances, config, lexicon, finding, NOTHING_KEPT, team.each)
-        listen = partial(recorded, self.corpus, cached_recogniser(phones), lexicon=lexicon)
-        listen = partial(listen, visual=self.visual, eigenlips=eigenlips)
-        found = listen(names=self.held_out, monitor=part_of(monitor, 0.2, 0.25))
-        kept_aside = None
-        if self.kept_aside:
-            listening = part_of(monitor, 0.25, 0.3)
-            kept_aside = listen(names=self.kept_aside, channels=found.channels, monitor=listening)
+        eigenlips = learned_eigenlips(utterances) if visual != GEOMETRY else None
+        utterances = [as_learned(utterance, visual, eigenlips) for utterance in utterances]
+        with working(min(self.settings.workers, len(utterances) // FEWEST)) as team:
+            aligning = part_of(monitor, 0, 0.2)
+            phones, examples, _ = phones_and_examples(utterances, config, lexicon, aligning, NO_CHECKPOINT, team.each)
+        read = partial(held_out_recordings, self.corpus, cached_recogniser(phones), lexicon=lexicon)
+        read = partial(read, visual=visual, eigenlips=eigenlips)
+        recordings = read(selection=Selection(names=self.held_out), monitor=part_of(monitor, 0.2, 0.25))
+        validation = None
+        if self.validation:
+            recognising = part_of(monitor, 0.25, 0.3)
+            validation = read(
+                selection=Selection(names=self.validation), channels=recordings.channels, monitor=recognising
+            )
         training = part_of(monitor, 0.3, 1)
-        contenders = trained_rivals(self.systems, examples, kept_aside, self.states, self.mixtures, training)
-        return _Tried(tuple(example.name for example in examples), found, contenders)
+        systems = train_systems(self.systems, examples, validation, options.states, options.mixtures, training)
+        return _TrainedSystems(tuple(example.name for example in examples), recordings, systems)
 
 
-def _size(tried: _Tried, transcripts: bool, seed: int) -> dict[str, Any]:
-    """Return the figures of all systems after training on so many utterances."""
-    told = list(tried.found.conditions) if transcripts else [AUDIO_ONLY]
+def _size(trained: _TrainedSystems, transcripts: bool, seed: int) -> dict[str, Any]:
+    """Return the figures of all systems trained on one number of utterances."""
+    recordings, systems = trained.recordings, trained.systems
+    conditions = list(recordings.conditions) if transcripts else [AUDIO_ONLY]
     return {
-        "used": len(tried.used),
-        "training": {
-            name: {"seconds": one.seconds, "mixtures": one.mixtures, "tried": {str(k): v for k, v in one.tried.items()}}
-            for name, one in tried.contenders.items()
-        },
-        "conditions": {condition: _rows(tried.found, condition, tried.contenders, seed) for condition in told},
+        "used": len(trained.used),
+        "training": {name: _training_row(system) for name, system in systems.items()},
+        "conditions": {condition: _rows(recordings, condition, systems, seed) for condition in conditions},
     }
 
 
-def _rows(found: Recorded, condition: str, contenders: Mapping[str, Contender], seed: int) -> dict[str, dict[str, Any]]:
-    """Return the figures of all systems on the same recordings, told the same."""
-    made = {name: clips(found, condition, one.engine, one.model) for name, one in contenders.items()}
-    return {name: _row(found, own, made[BEST], seed) for name, own in made.items()}
+def _training_row(system: TrainedSystem) -> dict[str, Any]:
+    """Return training time, number of Gaussians, and the ACC by which it was selected."""
+    tried = {str(count): acc for count, acc in system.validation_acc.items()}
+    return {"seconds": system.seconds, "mixtures": system.mixtures, "tried": tried}
 
 
-def _row(found: Recorded, made: Sequence[Clip], best: Sequence[Clip], seed: int) -> dict[str, Any]:
-    figures, others = figures_of(made, found, seed), _tallies(found, best)
+def _rows(
+    recordings: HeldOutRecordings, condition: str, systems: Mapping[str, TrainedSystem], seed: int
+) -> dict[str, dict[str, Any]]:
+    """Return the figures of all systems on the same recordings in one condition."""
+    made = {
+        name: compared_clips(recordings, condition, system.engine, system.model) for name, system in systems.items()
+    }
+    return {name: _row(recordings, own, made[REFERENCE_SYSTEM], seed) for name, own in made.items()}
+
+
+def _row(
+    recordings: HeldOutRecordings, made: Sequence[ComparedClip], reference: Sequence[ComparedClip], seed: int
+) -> dict[str, Any]:
+    """Return the figures of one system, and its differences from the reference system."""
+    figures, others = figures_of(made, recordings, seed), _statistics(recordings, reference)
     row: dict[str, Any] = {}
-    for name, tally in _tallies(found, made).items():
-        ends = {"95": tally.interval(seed), "gain_95": tally.gain(others[name], seed)}
-        row |= {name: tally.value} | {f"{name}_{key}": interval for key, interval in ends.items()}
+    for name, statistic in _statistics(recordings, made).items():
+        intervals = {"95": statistic.interval(seed), "gain_95": statistic.gain(others[name], seed)}
+        row |= {name: statistic.value} | {f"{name}_{key}": interval for key, interval in intervals.items()}
     still = not varies(np.concatenate([clip.generated for clip in made])).any()
     row |= {"lag_ms": None if still else figures["lag_ms"], "opening": None}
-    if OPENING not in found.channels:
+    if OPENING not in recordings.channels:
         return row
-    lips, (generated, original) = figures["closures_p_b_m"], openings_of(found, made)
+    lips, (generated, original) = figures["closures_p_b_m"], opening_curves(recordings, made)
     opening = opening_row(figures) | {"rmse": float(curves.rmse(generated, original)[0])}
     return row | {"opening": opening | {key: lips[key] for key in ("false_per_minute", "original_per_minute")}}
 
 
-def _tallies(found: Recorded, made: Sequence[Clip]) -> dict[str, Tally]:
-    """Return AMSE and ACC of geometry, or of eigenlips where there is nothing else; beside it those of the opening."""
-    pictured = np.array([name in found.pictured for name in found.channels])
+def _statistics(recordings: HeldOutRecordings, made: Sequence[ComparedClip]) -> dict[str, ClipStatistic]:
+    """Return AMSE and ACC of geometry, or of eigenlips if there is no geometry; and the ACC of the opening."""
+    pictured = np.array([name in recordings.pictured for name in recordings.channels])
     parts = {"": pictured} if pictured.all() else {"": ~pictured, "eigenlips_": pictured}
-    tallies = {}
+    statistics = {}
     for part, columns in parts.items():
         if columns.any():
             generated, original = ([side[:, columns] for side in sides] for sides in _sides(made))
-            tallies[f"{part}amse"] = distance_tally(generated, original)
-            tallies[f"{part}acc"] = correlation_tally(generated, original)
-    if OPENING in found.channels:
-        tallies["opening_acc"] = correlation_tally(*openings_of(found, made))
-    return tallies
+            statistics[f"{part}amse"] = distance_statistic(generated, original)
+            statistics[f"{part}acc"] = correlation_statistic(generated, original)
+    if OPENING in recordings.channels:
+        statistics["opening_acc"] = correlation_statistic(*opening_curves(recordings, made))
+    return statistics
 
 
-def _sides(made: Sequence[Clip]) -> tuple[list[Array], list[Array]]:
+def _sides(made: Sequence[ComparedClip]) -> tuple[list[Array], list[Array]]:
+    """Return the generated and the original curves."""
     return [clip.generated for clip in made], [clip.original for clip in made]
 
 
-def _in_noise(tried: _Tried, noises: Noises, seed: int, monitor: Monitor) -> list[dict[str, Any]]:
+def _noise_rows(trained: _TrainedSystems, noise: NoiseConditions, seed: int, monitor: Monitor) -> list[dict[str, Any]]:
     """Return the figures of all systems for every kind of noise and ratio."""
     rows = []
-    every = [(kind, ratio) for kind in noises.kinds for ratio in noises.ratios_db]
-    for kind, ratio in counted(every, "comparing in noise", monitor):
-        found = in_noise(tried.found, kind, ratio, noises.talkers, seed)
-        made = _rows(found, AUDIO_ONLY, tried.contenders, seed)
-        rows.append({"kind": kind, "snr_db": ratio, "systems": made})
+    conditions = [(kind, ratio_db) for kind in noise.kinds for ratio_db in noise.ratios_db]
+    for kind, ratio_db in counted(conditions, "comparing in noise", monitor):
+        recordings = recordings_in_noise(trained.recordings, kind, ratio_db, noise.talkers, seed)
+        systems = _rows(recordings, AUDIO_ONLY, trained.systems, seed)
+        rows.append({"kind": kind, "snr_db": ratio_db, "systems": systems})
     return rows

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from lipmotion.experiments.comparison import mark
-from lipmotion.experiments.xie_liu2007.systems import BEST, PRINTED
-from lipmotion.measures.report import number
+from lipmotion.experiments.comparison import significance_mark
+from lipmotion.experiments.xie_liu2007.systems import PAPER_FIGURES, REFERENCE_SYSTEM
+from lipmotion.measures.report import figure_text
 from lipmotion.printable import printable
 
 WIDTH = 27
 FEW = 8
-"""Channels that are named one by one."""
+"""Most channels that are named one by one."""
 HEAD = (
     f"  {'system':{WIDTH}}{'paper':>13}  {'AMSE (95 %)':25}  {'ACC (95 %)':22}  {'opening (95 %)':22}  "
     "nRMSE    RMSE    lag  score  p b m  false  variance  K  seconds"
@@ -36,21 +36,24 @@ def table(figures: Mapping[str, Any]) -> str:
             lines += _eigenlips(rows)
     for kind in dict.fromkeys(row["kind"] for row in figures["noise"]):
         lines += ["", *_noise(kind, figures)]
-    lines += ["", f"* differs from {BEST}: the 95 % interval of the difference on the same clips leaves out 0"]
+    lines += [
+        "",
+        f"* differs from {REFERENCE_SYSTEM}: the 95 % interval of the difference on the same clips leaves out 0",
+    ]
     return "\n".join(map(printable, lines))
 
 
 def _compared(channels: Sequence[str]) -> str:
-    """Return the names of channels, or how many there are."""
+    """Return the names of the channels, or their number where there are many."""
     return ", ".join(channels) if len(channels) <= FEW else f"{len(channels)} channels"
 
 
 def _line(name: str, row: Mapping[str, Any], training: Mapping[str, Any]) -> str:
-    printed = "{:.3f} {:.3f}".format(*PRINTED[name]) if name in PRINTED else ""
+    printed = "{:.3f} {:.3f}".format(*PAPER_FIGURES[name]) if name in PAPER_FIGURES else ""
     amse, acc = _with_interval(row, "amse", ".4f"), _with_interval(row, "acc", ".3f")
     return (
         f"  {name:{WIDTH}}{printed:>13}  {amse:25}  {acc:22}  {_opening(row)}"
-        f"{number(training['mixtures'], '3.0f')}{training['seconds']:9.1f}"
+        f"{figure_text(training['mixtures'], '3.0f')}{training['seconds']:9.1f}"
     )
 
 
@@ -59,14 +62,14 @@ def _opening(row: Mapping[str, Any]) -> str:
         ("nrmse", "rmse", "score", "recall_p_b_m", "false_per_minute", "global_variance")
     )
     return (
-        f"{_with_interval(row, 'opening_acc', '.3f'):22}{number(lips['nrmse'], '7.3f')}{number(lips['rmse'], '8.4f')}"
-        f"{number(row['lag_ms'], '+7.0f')}{number(lips['score'], '7.1f')}{number(lips['recall_p_b_m'], '7.1f')}"
-        f"{number(lips['false_per_minute'], '7.1f')}{number(lips['global_variance'], '10.2f')}"
+        f"{_with_interval(row, 'opening_acc', '.3f'):22}{figure_text(lips['nrmse'], '7.3f')}{figure_text(lips['rmse'], '8.4f')}"
+        f"{figure_text(row['lag_ms'], '+7.0f')}{figure_text(lips['score'], '7.1f')}{figure_text(lips['recall_p_b_m'], '7.1f')}"
+        f"{figure_text(lips['false_per_minute'], '7.1f')}{figure_text(lips['global_variance'], '10.2f')}"
     )
 
 
 def _eigenlips(rows: Mapping[str, Any]) -> list[str]:
-    """Return AMSE and ACC of eigenlips, where they are compared beside geometry."""
+    """Return the lines of AMSE and ACC of eigenlips; none where eigenlips are not compared beside geometry."""
     if "eigenlips_acc" not in next(iter(rows.values())):
         return []
     lines = [f"  {'eigenlips':{WIDTH}}{'AMSE (95 %)':27}{'ACC (95 %)'}"]
@@ -80,21 +83,21 @@ def _with_interval(row: Mapping[str, Any], name: str, form: str) -> str:
     if name not in row:
         return "–"
     low, high = (format(end, form) for end in row[f"{name}_95"])
-    return f"{row[name]:{form}}{mark(row[f'{name}_gain_95'])} ({low}–{high})"
+    return f"{row[name]:{form}}{significance_mark(row[f'{name}_gain_95'])} ({low}–{high})"
 
 
 def _noise(kind: str, figures: Mapping[str, Any]) -> list[str]:
-    """Return ACC and AMSE of every system, from clean to loudest."""
-    loud = [row for row in figures["noise"] if row["kind"] == kind]
+    """Return the lines of ACC and AMSE of every system, from clean sound to the loudest noise."""
+    in_noise = [row for row in figures["noise"] if row["kind"] == kind]
     size = figures["rows"][-1]
     clean = next(iter(size["conditions"].values()))
-    heads = ["clean", *(f"{row['snr_db']:g} dB" for row in loud)]
+    heads = ["clean", *(f"{row['snr_db']:g} dB" for row in in_noise)]
     lines = [f"{kind} noise, audio only, trained on {size['used']} clips without noise: ACC / AMSE"]
     lines.append(f"  {'system':{WIDTH}}" + "".join(f"{head:>17}" for head in heads))
     for name in clean:
         cells = [
-            f"{row['acc']:.3f}{mark(row['acc_gain_95'])} / {row['amse']:.4f}{mark(row['amse_gain_95'])}"
-            for row in (clean[name], *(each["systems"][name] for each in loud))
+            f"{row['acc']:.3f}{significance_mark(row['acc_gain_95'])} / {row['amse']:.4f}{significance_mark(row['amse_gain_95'])}"
+            for row in (clean[name], *(row["systems"][name] for row in in_noise))
         ]
         lines.append(f"  {name:{WIDTH}}" + "".join(f"{cell:>17}" for cell in cells))
     return lines
