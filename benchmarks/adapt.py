@@ -16,12 +16,13 @@ import numpy as np
 from robust import SPOKEN, edits, show, spoken
 
 from lipmotion import adapt, animate, load_model
-from lipmotion.corpora.grid import sentence
+from lipmotion.corpora.grid import words_of_name
 from lipmotion.errors import InputError
 from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.request import SpeechRequest
+from lipmotion.speech.audio_files import read_audio
 from lipmotion.speech.mfcc import mfcc
-from lipmotion.speech.read import read_audio
-from lipmotion.speech.recogniser import KINDS, Recogniser
+from lipmotion.speech.recogniser import RECOGNISER_KINDS, Recogniser
 from lipmotion.types import Audio
 from lipmotion.units import Lexicon, words_of
 from lipmotion.vision.track import track
@@ -81,7 +82,7 @@ def judged(model: Model, adapted: Model, audio: Audio, wanted: list[str]) -> dic
                 span.label.phone for span in Recogniser(one.phones, kind, one.adaptation).recognise(audio, features)
             ),
         )
-        for kind in KINDS
+        for kind in RECOGNISER_KINDS
         for when, one in (("before", model), ("after", adapted))
     }
 
@@ -108,7 +109,7 @@ def others(folder: Path, model: Model) -> None:
     errors: dict[str, list[tuple[int, int]]] = {}
     for clip in sorted(folder.glob("*.mpg")):
         tracked, audio = track(clip, crops=False), read_audio(clip)
-        adapted, words = adapt(model, [audio]), " ".join(sentence(clip.stem) or ())
+        adapted, words = adapt(model, [audio]), " ".join(words_of_name(clip.stem) or ())
         aligned = Recogniser(model.phones, "general").align(audio, mfcc(audio), words.split(), Lexicon())
         wanted = spoken(span.label.phone for span in aligned)
         for key, count in judged(model, adapted, audio, wanted).items():
@@ -116,7 +117,7 @@ def others(folder: Path, model: Model) -> None:
         for kind in ("auto", "own"):
             for when, one in (("before", model), ("after", adapted)):
                 for condition, text in (("audio only", None), ("with transcript", words)):
-                    motion = animate(clip, transcript=text, model=one, recogniser=kind).motion
+                    motion = animate(SpeechRequest(clip, transcript=text, recogniser=kind), model=one).motion
                     generated = np.interp(tracked.motion.time_s, motion.time_s, motion["opening"])[tracked.seen]
                     seen = tracked.motion["opening"][tracked.seen]
                     row = figures.setdefault(f"{kind}, {condition}, {when}", {})

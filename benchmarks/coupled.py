@@ -36,7 +36,7 @@ RUNS = {
 
 def constrained(options: Any, kind: type = np.float32) -> Work:
     """Posteriors and counts of the harness's constrained product, from log densities of both chains."""
-    from lipmotion.kernels.network import Expectation
+    from lipmotion.kernels.network import ForwardBackwardNetwork
 
     harness: Any = sys.modules["__main__"]
     transition, initial, audio, visual = harness.flat()
@@ -47,7 +47,7 @@ def constrained(options: Any, kind: type = np.float32) -> Work:
     )
     targets, sources = np.nonzero(transition.T)
     with np.errstate(divide="ignore"):
-        expectation = Expectation.of(
+        expectation = ForwardBackwardNetwork.of(
             sources, np.log(transition[sources, targets]), np.searchsorted(targets, np.arange(len(initial))),
             np.log(initial), np.zeros(len(initial)),
         )  # fmt: skip
@@ -67,7 +67,7 @@ def factorial(options: Any, visual_units: int = 13) -> Work:
     import numba  # noqa: F401
 
     from lipmotion.kernels.factorial import factorial_posteriors
-    from lipmotion.kernels.loops import Evidence, Loop
+    from lipmotion.kernels.loops import FactorialLogLikelihoods, Loop
 
     draw = np.random.default_rng(0)
 
@@ -79,7 +79,7 @@ def factorial(options: Any, visual_units: int = 13) -> Work:
     loops = loop(47), loop(visual_units)
     size = options.utts, options.T
     logs = [-draw.gamma(2.0, 1.5, size=(*size, part.stay.size)).astype(np.float32) for part in loops]
-    recordings = [Evidence.of(audio, visual) for audio, visual in zip(*logs, strict=True)]
+    recordings = [FactorialLogLikelihoods.of(audio, visual) for audio, visual in zip(*logs, strict=True)]
     return lambda: sum(factorial_posteriors(*loops, recording).log_likelihood for recording in recordings)
 
 

@@ -17,7 +17,7 @@ import numpy as np
 
 import lipmotion
 from lipmotion.pipeline.understand import hear_unsaid
-from lipmotion.speech.recogniser import recogniser
+from lipmotion.speech.recogniser import cached_recogniser
 
 
 def main() -> None:
@@ -28,7 +28,7 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=5)
     options = parser.parse_args()
     model, corpus = lipmotion.load_model(options.model), lipmotion.Corpus.open(options.corpus)
-    phones = recogniser(model.phones, "auto", model.adaptation)
+    phones = cached_recogniser(model.phones, "auto", model.adaptation)
     heard = []
     for name in corpus.names(options.split):
         said = corpus.utterance(name)

@@ -16,12 +16,12 @@ from itertools import pairwise
 import numpy as np
 
 import lipmotion
-from lipmotion.export.cues.choose import choose_cues, usual_hold
-from lipmotion.export.cues.evidence import frame_costs
+from lipmotion.export.cues.choose import choose_cues, default_hold_frames
+from lipmotion.export.cues.costs import frame_costs
 from lipmotion.export.cues.shapes import SHAPES
-from lipmotion.export.cues.sheet import CueSheet, frames_in, sheet_of
+from lipmotion.export.cues.sheet import CueSheet, frame_count, cue_sheet
 from lipmotion.pipeline.training.train import labels_of
-from lipmotion.speech.phones import recognise
+from lipmotion.speech.phone_models import recognise
 from lipmotion.types import Generation, Motion, Speech, Timeline, Trace
 from lipmotion.units import LIP_CLOSING, VISEMES, Lexicon, is_silent
 
@@ -58,10 +58,10 @@ def main() -> None:
 def frame_by_frame(result: Generation, fps: float) -> CueSheet:
     """Return the cheapest shape of every frame."""
     duration_s = max((len(result.motion.values) - 1) / result.motion.rate_hz, result.units[-1].end_s)
-    best = frame_costs(result, frames_in(duration_s, fps), fps).argmin(axis=1).tolist()
+    best = frame_costs(result, frame_count(duration_s, fps), fps).argmin(axis=1).tolist()
     changes = [0, *(k for k, (before, after) in enumerate(pairwise(best), start=1) if before != after)]
     names = list(SHAPES)
-    return sheet_of([(k, names[best[k]]) for k in changes], duration_s, fps, "".join(names))
+    return cue_sheet([(k, names[best[k]]) for k in changes], duration_s, fps, "".join(names))
 
 
 def figures(sheets: list[CueSheet], references: list[Timeline], fps: float) -> dict[str, object]:
@@ -80,7 +80,7 @@ def figures(sheets: list[CueSheet], references: list[Timeline], fps: float) -> d
                     )
         silent += [shape_at(sheet, t) in "AX" for t in silent_frames(units, fps)]
     duration_s = sum(sheet.duration_s for sheet in sheets)
-    flicker = sum(length < usual_hold(fps) for length in lengths)
+    flicker = sum(length < default_hold_frames(fps) for length in lengths)
     return {
         **{f"{kind} seen": f"{hit} of {wanted}" for kind, (hit, wanted) in seen.items()},
         "A or X in silence": round(float(np.mean(silent)), 4),

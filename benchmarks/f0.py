@@ -22,9 +22,9 @@ from typing import Any
 import numpy as np
 from scipy.signal import lfilter
 
+from lipmotion.speech.audio_files import read_audio
 from lipmotion.speech.f0 import HIGHEST_HZ, LOWEST_HZ, log_f0
-from lipmotion.speech.read import read_audio
-from lipmotion.speech.synthesise import SOUNDS, synthesise
+from lipmotion.speech.formant_synthesiser import PHONE_TARGETS, synthesise
 from lipmotion.types import Audio
 
 Array = np.ndarray[Any, Any]
@@ -131,7 +131,7 @@ def fitted(track: Array, frames: int) -> Array:
 
 def sentences() -> Iterator[tuple[Array, Array]]:
     """Give every phone twice in random order, at eight pitches."""
-    names = [name for name in SOUNDS if name not in ("sil", "sp")]
+    names = [name for name in PHONE_TARGETS if name not in ("sil", "sp")]
     for seed, pitch_hz in enumerate((70, 90, 120, 160, 200, 260, 320, 370)):
         random = np.random.default_rng(seed)
         phones = [(str(name), float(random.uniform(0.06, 0.2))) for name in random.permutation(2 * names)]
@@ -140,7 +140,7 @@ def sentences() -> Iterator[tuple[Array, Array]]:
         time_s = np.arange(len(known)) / 100
         hertz = pitch_hz * np.interp(time_s * RATE_HZ, [0, len(audio.samples)], [1.06, 0.94])
         for span in spans:
-            for part in SOUNDS[span.label.phone]:
+            for part in PHONE_TARGETS[span.label.phone]:
                 start_s, end_s = end_s, end_s + part.share * span.duration_s
                 inside = (time_s > start_s + 0.025) & (time_s < end_s - 0.025)
                 if part.voice >= 0.3 or part.voice == 0:

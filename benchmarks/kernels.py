@@ -59,7 +59,7 @@ def mlpg(options: Any) -> Work:
 
 def em(options: Any) -> Work:
     """One step of expectation and maximisation of all recordings."""
-    from lipmotion.hmm.loop_em import em_step
+    from network_em import em_step
 
     mixtures, network, data = _loop(options)
     floor = np.full(options.D, 1e-3, np.float32)

@@ -73,7 +73,7 @@ def gemm_seconds() -> float:
 
 def sixty_seconds(path: Path) -> Path:
     """Write the example sentence again and again, 60 s in all."""
-    from lipmotion.speech.read import read_audio
+    from lipmotion.speech.audio_files import read_audio
 
     audio = read_audio(EXAMPLE)
     samples = np.resize(audio.samples, 60 * audio.rate_hz)

@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 import lipmotion
-from lipmotion.measures.offset import Offset, offset, pooled_offset
+from lipmotion.measures.offset import Offset, best_offset, pooled_offset
 from lipmotion.pipeline.corpus.sync import clip_scores
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.types import FRAME_RATE_HZ, Audio, Utterance
@@ -34,7 +34,7 @@ def main() -> None:
     utterances = [corpus.utterance(name) for name in corpus.required(options.split)]
     shifts_ms = np.arange(-options.reach, options.reach + 1, options.step)
     scores = {ms: [clip_scores(late(utterance, ms)) for utterance in utterances] for ms in shifts_ms}
-    single = [(offset(score, FRAME_RATE_HZ), ms) for ms, row in scores.items() for score in row]
+    single = [(best_offset(score, FRAME_RATE_HZ), ms) for ms, row in scores.items() for score in row]
     print(json.dumps({"way": "single clips", "clips": len(utterances), **figures(single)}))
     pools = [
         (pooled_offset(part, FRAME_RATE_HZ), ms) for ms, row in scores.items() for part in parts(row, options.pool)
@@ -43,7 +43,7 @@ def main() -> None:
         print(json.dumps({"way": f"{options.pool} clips pooled", **figures(pools)}))
     turned = [*utterances[1:], utterances[0]]
     wrong = [
-        offset(clip_scores(replace(one, audio=other.audio, features=other.features)), FRAME_RATE_HZ)
+        best_offset(clip_scores(replace(one, audio=other.audio, features=other.features)), FRAME_RATE_HZ)
         for one, other in zip(utterances, turned, strict=True)
     ]
     print(json.dumps({"way": "sound of another clip", "known": share([found.known for found in wrong])}))

@@ -26,11 +26,12 @@ from pathlib import Path
 import numpy as np
 
 from lipmotion import animate, load_model
-from lipmotion.corpora.grid import sentence
+from lipmotion.corpora.grid import words_of_name
 from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.request import SpeechRequest
+from lipmotion.speech.audio_files import read_audio
 from lipmotion.speech.mfcc import mfcc
-from lipmotion.speech.read import read_audio
-from lipmotion.speech.recogniser import KINDS, recogniser
+from lipmotion.speech.recogniser import RECOGNISER_KINDS, cached_recogniser
 from lipmotion.types import Audio
 from lipmotion.units import Lexicon, is_silent, words_of
 from lipmotion.vision.track import track
@@ -64,11 +65,14 @@ def others(corpora: Path, model: Model, _: Path | None) -> None:
     """Compare with the tracks of five GRID speakers."""
     clips = sorted((corpora / "grid-others").glob("*.mpg"))
     tracks = {clip: track(clip, crops=False) for clip in clips}
-    for kind in KINDS:
+    for kind in RECOGNISER_KINDS:
         found: dict[str, list[float]] = {"audio only": [], "with transcript": []}
         for clip in clips:
-            for condition, words in (("audio only", None), ("with transcript", " ".join(sentence(clip.stem) or ()))):
-                motion = animate(clip, transcript=words, model=model, recogniser=kind).motion
+            for condition, words in (
+                ("audio only", None),
+                ("with transcript", " ".join(words_of_name(clip.stem) or ())),
+            ):
+                motion = animate(SpeechRequest(clip, transcript=words, recogniser=kind), model=model).motion
                 seen, recorded = tracks[clip].seen, tracks[clip].motion
                 generated = np.interp(recorded.time_s, motion.time_s, motion["opening"])
                 found[condition].append(float(np.corrcoef(generated[seen], recorded["opening"][seen])[0, 1]))
@@ -85,10 +89,10 @@ def phones(corpora: Path, model: Model, _: Path | None) -> None:
         text = (folder / name).with_suffix(".txt")
         words = words_of((text if text.exists() else text.with_suffix(".lab")).read_text())
         audio = read_audio(folder / name)
-        aligned = recogniser(model.phones, "general").align(audio, mfcc(audio), words, Lexicon())
+        aligned = cached_recogniser(model.phones, "general").align(audio, mfcc(audio), words, Lexicon())
         recordings.append((audio, spoken(span.label.phone for span in aligned)))
-    for kind in KINDS:
-        hear = recogniser(model.phones, kind)
+    for kind in RECOGNISER_KINDS:
+        hear = cached_recogniser(model.phones, kind)
         errors = [edits(wanted, spoken(s.label.phone for s in hear.recognise(a, mfcc(a)))) for a, wanted in recordings]
         count = sum(len(wanted) for _, wanted in recordings)
         total_s = sum(audio.duration_s for audio, _ in recordings)

@@ -22,8 +22,8 @@ from typing import Any
 import numpy as np
 
 import lipmotion
-from lipmotion.corpora.grid import sentence
-from lipmotion.corpora.store import Corpus
+from lipmotion.corpora.grid import words_of_name
+from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines import engine_named
 from lipmotion.engines.coupled.model import CoupledModel
 from lipmotion.pipeline.corpus.prompts import prompts
@@ -45,11 +45,11 @@ MODELS: dict[str, tuple[str, dict[str, Any]]] = {
     "one stage, 8 Gaussians": ("", {"mixtures": 8}),
     "one stage, 16 Gaussians": ("", {"mixtures": 16}),
     "two stages": ("voices recordings", {}),
-    "two stages, weight 1": ("voices recordings", {"more_weight": 1.0}),
-    "two stages, weight 0.1": ("voices recordings", {"more_weight": 0.1}),
-    "two stages, 4 Gaussians": ("voices recordings", {"more_mixtures": 4}),
-    "two stages, 16 Gaussians": ("voices recordings", {"more_mixtures": 16}),
-    "two stages, 2 steps": ("voices recordings", {"more_steps": 2}),
+    "two stages, weight 1": ("voices recordings", {"speech_only_weight": 1.0}),
+    "two stages, weight 0.1": ("voices recordings", {"speech_only_weight": 0.1}),
+    "two stages, 4 Gaussians": ("voices recordings", {"speech_only_mixtures": 4}),
+    "two stages, 16 Gaussians": ("voices recordings", {"speech_only_mixtures": 16}),
+    "two stages, 2 steps": ("voices recordings", {"speech_only_steps": 2}),
     "two stages, recordings only": ("recordings", {}),
     "two stages, voices only": ("voices", {}),
 }
@@ -112,13 +112,13 @@ def example(utterance: Utterance, phones: Recogniser) -> Example:
 
 def aligned(utterance: Utterance, phones: Recogniser) -> Heard:
     """Return a sentence of GRID with its phones in time."""
-    features, words = mfcc(utterance.audio), utterance.words or sentence(utterance.name)
+    features, words = mfcc(utterance.audio), utterance.words or words_of_name(utterance.name)
     return Heard(features, phones.align(utterance.audio, features, words or (), Lexicon()), utterance.speaker)
 
 
 def own(model: Model, corpus: Corpus) -> dict[str, float]:
     """Return the ACC of opening on the validation list, by condition."""
-    conditions = evaluate(model, corpus, split="val")["conditions"]
+    conditions = evaluate(model, corpus, selection=Selection("val"))["conditions"]
     return {name: round(found["channels"]["opening"]["acc"], 3) for name, found in conditions.items()}
 
 
@@ -130,7 +130,7 @@ def unknown(model: Model, strangers: Corpus) -> dict[str, float]:
         seen, recorded = np.asarray(one.track.seen), one.track.motion
         for condition, words in (
             ("audio only", None),
-            ("with transcript", " ".join(one.words or sentence(name) or ())),
+            ("with transcript", " ".join(one.words or words_of_name(name) or ())),
         ):
             motion = lipmotion.animate(one.audio, transcript=words, model=model).motion
             generated = np.interp(recorded.time_s, motion.time_s, motion["opening"])

@@ -66,7 +66,7 @@ def late(sentences: Sequence[SpokenSentence], general: Recogniser) -> dict[str, 
     late_ms, misfits = defaultdict(list), 0
     for sentence in sentences:
         try:
-            placed = general.place(sentence.audio, mfcc(sentence.audio), sentence.phones)
+            placed = general.align_phones(sentence.audio, mfcc(sentence.audio), sentence.phones)
         except AlignmentError:
             misfits += 1
             continue

@@ -16,7 +16,13 @@ import numpy as np
 
 import lipmotion
 from lipmotion.motion.resample import to_model_frames
-from lipmotion.speech.lip_speed import AROUND, STATIC, WEIGHTS, fit_opening_speed, speed
+from lipmotion.speech.lip_speed import (
+    FRAME_OFFSETS,
+    STATIC_FEATURES,
+    WEIGHTS,
+    fit_opening_speed,
+    measured_opening_speed,
+)
 from lipmotion.types import FRAME_RATE_HZ, Features
 
 
@@ -31,7 +37,7 @@ def main() -> None:
     weights = fit_opening_speed(examples(corpus, names))
     sources = [corpus.utterance(name).source for name in names]
     content = {
-        "about": f"c1-c12 and log energy, {len(AROUND)} frames around, to the speed of the lips' opening",
+        "about": f"c1-c12 and log energy, {len(FRAME_OFFSETS)} frames around, to the speed of the lips' opening",
         "clips": len(names),
         "licence": sorted({source.get("licence", "") for source in sources}),
         "attribution": sorted({source.get("attribution", "") for source in sources}),
@@ -39,7 +45,7 @@ def main() -> None:
     }
     target = Path(__file__).parents[1] / "src" / "lipmotion" / "models" / WEIGHTS
     target.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
-    print(f"{target}: {STATIC * len(AROUND)} weights from {len(names)} clips")
+    print(f"{target}: {STATIC_FEATURES * len(FRAME_OFFSETS)} weights from {len(names)} clips")
 
 
 def examples(corpus: lipmotion.Corpus, names: tuple[str, ...]) -> Iterator[tuple[Features, np.ndarray]]:
@@ -51,7 +57,7 @@ def examples(corpus: lipmotion.Corpus, names: tuple[str, ...]) -> Iterator[tuple
             opening = np.asarray(motion["opening"], float)[:, None]
             frames = len(utterance.features.values)
             values, valid = to_model_frames(opening, seen, motion.rate_hz, frames, FRAME_RATE_HZ)
-            yield utterance.features, speed(values[valid, 0])
+            yield utterance.features, measured_opening_speed(values[valid, 0])
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 TYPE_CHECKING = False  # as in typing, which takes longer to import than Ctrl-C should wait for an answer
 if TYPE_CHECKING:
-    from lipmotion.corpora.store import Corpus
+    from lipmotion.corpora.store import Corpus, Selection
     from lipmotion.engines import engine_named
     from lipmotion.export.base import read_motion
     from lipmotion.export.cues.sheet import CueSheet
@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from lipmotion.pipeline.evaluation.evaluate import evaluate
     from lipmotion.pipeline.explain import explain
     from lipmotion.pipeline.model import Model, load_model, save_model
-    from lipmotion.pipeline.training.train import train
+    from lipmotion.pipeline.request import SpeechRequest
+    from lipmotion.pipeline.training.train import Run, train
     from lipmotion.types import Audio, Constraints, Explanation, Generation, Motion, Pin, Span, Timeline, Unit
     from lipmotion.units import Lexicon
 
@@ -38,7 +39,10 @@ __all__ = [
     "Model",
     "Motion",
     "Pin",
+    "Run",
+    "Selection",
     "Span",
+    "SpeechRequest",
     "Timeline",
     "Unit",
     "adapt",
@@ -57,6 +61,9 @@ __all__ = [
 ]
 
 _HOMES = {
+    "Run": "lipmotion.pipeline.training.train",
+    "SpeechRequest": "lipmotion.pipeline.request",
+    "Selection": "lipmotion.corpora.store",
     "Corpus": "lipmotion.corpora.store",
     "CueSheet": "lipmotion.export.cues.sheet",
     "Lexicon": "lipmotion.units",

@@ -11,7 +11,6 @@ from pathlib import Path
 import pytest
 
 from cli.conftest import Run, is_one_error
-from lipmotion.pipeline.request import SpeechRequest
 from lipmotion.cli.command_line import parser
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import ExportError
@@ -19,6 +18,7 @@ from lipmotion.pipeline.animate import animate, write
 from lipmotion.pipeline.corpus.prepare import prepare
 from lipmotion.pipeline.cues import cues, write_cues
 from lipmotion.pipeline.model import load_model, shipped_path
+from lipmotion.pipeline.request import SpeechRequest
 from lipmotion.pipeline.training.train import train
 
 TALKING = "a.wav --transcript t.txt --lexicon l.txt --units u.json --model m.lipmotion"

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.export import MOTION_SUFFIXES, read_motion, write_motion
+from lipmotion.export import motion_suffixes, read_motion, write_motion
 from lipmotion.types import Channel, Generation, Motion, Timeline
 
 
@@ -14,7 +14,7 @@ def write(path: Path, generation: Generation) -> Path:
     return path
 
 
-@pytest.mark.parametrize("suffix", MOTION_SUFFIXES)
+@pytest.mark.parametrize("suffix", motion_suffixes())
 def test_motion_comes_back(tmp_path, generation, suffix):
     motion, units = read_motion(write(tmp_path / f"a{suffix}", generation))
     assert motion.names == generation.motion.names
@@ -23,14 +23,14 @@ def test_motion_comes_back(tmp_path, generation, suffix):
     assert len(units) == (0 if suffix == ".csv" else 2)
 
 
-@pytest.mark.parametrize("suffix", MOTION_SUFFIXES)
+@pytest.mark.parametrize("suffix", motion_suffixes())
 @pytest.mark.parametrize("rate_hz", [25.0, 29.97, 30.0, 60.0, 100.0])
 def test_the_rate_comes_back(tmp_path, generation, suffix, rate_hz):
     moved = replace(generation, motion=replace(generation.motion, rate_hz=rate_hz))
     assert read_motion(write(tmp_path / f"a{suffix}", moved))[0].rate_hz == rate_hz
 
 
-@pytest.mark.parametrize("suffix", MOTION_SUFFIXES)
+@pytest.mark.parametrize("suffix", motion_suffixes())
 def test_the_same_motion_gives_the_same_bytes(tmp_path, generation, suffix):
     first, second = (write(tmp_path / f"{name}{suffix}", generation).read_bytes() for name in "ab")
     assert first == second
@@ -49,7 +49,7 @@ def test_an_unknown_suffix_names_the_known_ones(tmp_path, generation, name, foun
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("suffix", MOTION_SUFFIXES)
+@pytest.mark.parametrize("suffix", motion_suffixes())
 def test_values_that_are_not_finite_are_not_written(tmp_path, generation, suffix):
     broken = Motion(np.array([[0.0], [np.nan]]), 100.0, (Channel("opening"),))
     with pytest.raises(ExportError, match="not finite"):
@@ -57,7 +57,7 @@ def test_values_that_are_not_finite_are_not_written(tmp_path, generation, suffix
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("suffix", MOTION_SUFFIXES)
+@pytest.mark.parametrize("suffix", motion_suffixes())
 def test_an_old_file_survives_a_failure(tmp_path, generation, suffix, monkeypatch):
     path = write(tmp_path / f"a{suffix}", generation)
     before = path.read_bytes()
@@ -72,7 +72,7 @@ def test_an_old_file_survives_a_failure(tmp_path, generation, suffix, monkeypatc
     assert list(tmp_path.iterdir()) == [path]
 
 
-@pytest.mark.parametrize("suffix", MOTION_SUFFIXES)
+@pytest.mark.parametrize("suffix", motion_suffixes())
 def test_a_missing_and_a_damaged_file_are_named(tmp_path, suffix):
     path = tmp_path / f"a{suffix}"
     with pytest.raises(InputError, match=rf"a\{suffix}: cannot be read: No such file"):

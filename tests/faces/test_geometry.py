@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lipmotion.faces.portrait.geometry import HALF_WIDTH, LINE_Y, TEETH_EDGE, inside, lips, roundness
+from lipmotion.faces.portrait.geometry import HALF_WIDTH, LINE_Y, TEETH_EDGE, mouth_interior, lip_outlines, roundness
 from lipmotion.faces.portrait.pose import TUCKED_GAP, WIDEST, MouthPose, jaw_drop
 
 X = np.linspace(-0.5, 0.5, 1001)
@@ -27,8 +27,8 @@ poses = st.builds(
 @settings(max_examples=200, deadline=None)
 @given(poses)
 def test_outlines_never_cross(drawn):
-    shape = lips(drawn, X)
-    within = inside(drawn, X, shape)
+    shape = lip_outlines(drawn, X)
+    within = mouth_interior(drawn, X, shape)
     for upper, lower in [
         (shape.upper_outer, shape.upper_inner),
         (shape.upper_inner, shape.lower_inner),
@@ -47,7 +47,7 @@ def test_outlines_never_cross(drawn):
 @settings(max_examples=200, deadline=None)
 @given(poses)
 def test_the_gap_is_exact_and_lips_have_body_all_around_it(drawn):
-    shape = lips(drawn, X)
+    shape = lip_outlines(drawn, X)
     gap = shape.lower_inner - shape.upper_inner
     assert gap[MIDDLE] == pytest.approx(drawn.gap, abs=1e-6)
     assert gap.max() <= drawn.gap + 1e-6
@@ -59,7 +59,7 @@ def test_the_gap_is_exact_and_lips_have_body_all_around_it(drawn):
 @settings(max_examples=100, deadline=None)
 @given(poses)
 def test_the_mouth_ends_at_its_corners_and_is_symmetric(drawn):
-    shape = lips(drawn, X)
+    shape = lip_outlines(drawn, X)
     outside = np.abs(X) >= HALF_WIDTH * drawn.width
     assert np.ptp(shape.upper_outer[outside]) < 1e-6
     assert (shape.lower_outer - shape.upper_outer)[outside].max() < 1e-6
@@ -70,7 +70,7 @@ def test_the_mouth_ends_at_its_corners_and_is_symmetric(drawn):
 
 
 def test_closed_lips_touch_along_the_whole_mouth():
-    shape = lips(pose(0), X)
+    shape = lip_outlines(pose(0), X)
     assert (shape.upper_inner == shape.lower_inner).all()
     assert shape.seam[MIDDLE] > 0
 
@@ -78,7 +78,7 @@ def test_closed_lips_touch_along_the_whole_mouth():
 def test_upper_teeth_stay_with_the_skull_and_lower_teeth_go_with_the_jaw():
     for gap in (0.08, 0.15, 0.3):
         drawn = pose(gap)
-        within = inside(drawn, X, lips(drawn, X))
+        within = mouth_interior(drawn, X, lip_outlines(drawn, X))
         assert within.teeth_upper[MIDDLE] == pytest.approx(LINE_Y + TEETH_EDGE)
         assert within.teeth_lower[MIDDLE] == pytest.approx(LINE_Y + 0.01 + drawn.jaw)
 
@@ -86,24 +86,24 @@ def test_upper_teeth_stay_with_the_skull_and_lower_teeth_go_with_the_jaw():
 @pytest.mark.parametrize("gap", TUCKED_GAP)
 def test_tucked_the_lower_lip_touches_the_upper_teeth(gap):
     drawn = pose(gap, tuck=1)
-    shape = lips(drawn, X)
+    shape = lip_outlines(drawn, X)
     near = np.abs(X) < 0.05
-    assert (inside(drawn, X, shape).teeth_upper[near] == shape.lower_inner[near]).all()
-    assert shape.lower_inner[MIDDLE] > lips(pose(0), X).lower_inner[MIDDLE]
+    assert (mouth_interior(drawn, X, shape).teeth_upper[near] == shape.lower_inner[near]).all()
+    assert shape.lower_inner[MIDDLE] > lip_outlines(pose(0), X).lower_inner[MIDDLE]
 
 
 def test_the_raised_tongue_reaches_the_upper_teeth():
     for gap in (0.07, 0.1, 0.2):
         low, high = pose(gap), pose(gap, tip=1)
-        below = inside(low, X, lips(low, X)).tongue_top[MIDDLE]
-        raised = inside(high, X, lips(high, X))
+        below = mouth_interior(low, X, lip_outlines(low, X)).tongue_top[MIDDLE]
+        raised = mouth_interior(high, X, lip_outlines(high, X))
         assert raised.tongue_top[MIDDLE] < below
         assert 0 < raised.teeth_upper[MIDDLE] - raised.tongue_top[MIDDLE] < 0.02
 
 
 def test_rounded_lips_part_over_a_smaller_share_of_the_mouth():
     def share(width: float) -> float:
-        shape = lips(pose(0.06, width=width), X)
+        shape = lip_outlines(pose(0.06, width=width), X)
         return float(np.mean(shape.lower_inner - shape.upper_inner > 1e-6)) / width
 
     assert roundness(pose(0, width=1)) == 0

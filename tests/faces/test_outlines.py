@@ -1,24 +1,24 @@
 import numpy as np
 import pytest
 
-from lipmotion.faces.portrait.outlines import STEPS, closed, corners, ellipse, lowered, opened, stroke, symmetric
+from lipmotion.faces.portrait.outlines import STEPS, closed_curve, path_points, ellipse, lowered, open_curve, stroke, symmetric
 
 PATH = "0 0, 1 0.5, 2 -0.5, 3 0"
 
 
 def test_curves_go_through_their_points():
-    assert opened(PATH)[::STEPS] == pytest.approx(corners(PATH))
-    assert closed(PATH)[::STEPS] == pytest.approx(corners(PATH))
+    assert open_curve(PATH)[::STEPS] == pytest.approx(path_points(PATH))
+    assert closed_curve(PATH)[::STEPS] == pytest.approx(path_points(PATH))
 
 
 def test_curves_are_smooth():
-    steps = np.diff(closed("0 0, 1 0, 1 1, 0 1"), axis=0)
+    steps = np.diff(closed_curve("0 0, 1 0, 1 1, 0 1"), axis=0)
     turns = np.abs(np.diff(np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))))
     assert turns.max() < 0.3
 
 
 def test_a_straight_path_stays_straight():
-    line = opened([(0.0, 0.0), (1.0, 1.0), (2.0, 2.0)])
+    line = open_curve([(0.0, 0.0), (1.0, 1.0), (2.0, 2.0)])
     assert line[:, 0] == pytest.approx(line[:, 1])
 
 
@@ -30,7 +30,7 @@ def test_symmetric_outlines_mirror_themselves():
 
 
 def test_a_stroke_is_as_wide_as_asked():
-    outline = stroke(opened("0 0, 1 0, 2 0"), [0.2, 0.4])
+    outline = stroke(open_curve("0 0, 1 0, 2 0"), [0.2, 0.4])
     assert outline[0, 1] - outline[-1, 1] == pytest.approx(0.2)
     assert np.ptp(outline[:, 1]) == pytest.approx(0.4)
 

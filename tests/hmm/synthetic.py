@@ -7,7 +7,7 @@ import numpy as np
 
 from lipmotion.hmm.model import HmmConfig, UnitHmm
 from lipmotion.hmm.states import plain_states
-from lipmotion.hmm.train import Transcribed, UnitInventory
+from lipmotion.hmm.train import TranscribedUtterance, UnitInventory
 from lipmotion.stats.bigram import Bigram, estimate_bigram
 from lipmotion.stats.mixture import Mixtures
 
@@ -107,7 +107,7 @@ def recordings(seed: int, count: int, who: Speaker, pauses: bool = False):
             units += [PAUSE] * (pauses and number % 2 == 0 and position == 2)
             units += word
         features, where = who.say(draw, [*units, SILENCE])
-        transcribed.append(Transcribed(features, tuple((word,) for word in words)))
+        transcribed.append(TranscribedUtterance(features, tuple((word,) for word in words)))
         said.append((*units, SILENCE))
         edges.append(where)
     return transcribed, said, edges

@@ -3,14 +3,14 @@ import pytest
 
 from hmm.synthetic import PAUSE, SILENCE, known_hmm, random_hmm, recordings, speaker
 from lipmotion.errors import AlignmentError
-from lipmotion.hmm.align import align_units, chain_of, choose_pronunciations, state_path
+from lipmotion.hmm.align import align_units, choose_pronunciations, state_path, state_sequence
 from lipmotion.hmm.log_likelihoods import log_likelihoods_of
 from oracles import sequences
 
 
 def test_chains_name_states_in_context_and_fall_back_where_unseen():
     hmm = random_hmm(1, contexts=8)
-    chain = chain_of(hmm, ("sil", "a", "b", "sp", "a"))
+    chain = state_sequence(hmm, ("sil", "a", "b", "sp", "a"))
     names = [name for name, _ in chain.names]
     assert names[3:6] == ["a.0<sil", "a.1", "a.2>b"]
     assert names[6:9] == ["b.0<a", "b.1", "b.2>sil"]  # a pause is silence to its neighbours

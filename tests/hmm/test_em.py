@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from hmm.synthetic import known_hmm, random_hmm, recordings, speaker
 from lipmotion.hmm import em as module
 from lipmotion.hmm import train
-from lipmotion.hmm.align import chain_of
-from lipmotion.hmm.em import adapt_contexts, baum_welch, expect
+from lipmotion.hmm.align import state_sequence
+from lipmotion.hmm.em import accumulate_statistics, adapt_contexts, baum_welch
 from lipmotion.hmm.log_likelihoods import log_likelihoods_of
 from lipmotion.hmm.model import HmmConfig
 from oracles import chains
@@ -67,7 +67,7 @@ def test_the_e_step_agrees_with_the_enumeration_of_all_paths(monkeypatch):
     occupied, stays, total = np.zeros(len(hmm.table.names)), np.zeros(len(hmm.log_stay)), 0.0
     visits = stays.copy()
     for x, units in zip(data, said, strict=True):
-        chain = chain_of(hmm, units)
+        chain = state_sequence(hmm, units)
         stay = hmm.log_stay[chain.plain].astype(float)
         emission = hmm.mixtures.log_likelihood(x)[:, chain.densities].astype(float)
         posterior, stay, log_likelihood = chains.chain_posteriors(emission, stay, np.log(-np.expm1(stay)))
@@ -75,7 +75,7 @@ def test_the_e_step_agrees_with_the_enumeration_of_all_paths(monkeypatch):
         np.add.at(visits, chain.plain, posterior.sum(axis=0))
         np.add.at(stays, chain.plain, stay)
         total += log_likelihood
-    statistics = expect(hmm, data, said)
+    statistics = accumulate_statistics(hmm, data, said)
     found = np.zeros_like(occupied)
     for density, _, share in statistics.by_density():
         found[density] = share.sum()
@@ -150,7 +150,7 @@ def coarticulated(count: int):
     data = []
     for utterance, units in zip(transcribed, said, strict=True):
         x = utterance.features.copy()
-        path = chain_of(known_hmm(who), units)
+        path = state_sequence(known_hmm(who), units)
         first = {position for position, unit in enumerate(units) if unit == "a" and units[position - 1] == "d"}
         nearest = train.state_path(known_hmm(who), log_likelihoods_of(known_hmm(who), x), units)[1]
         for position in first:

@@ -13,7 +13,7 @@ from lipmotion.hmm.decode import decode_units, unit_loop
 from lipmotion.hmm.em import LONGEST_SILENCE, LONGEST_STATE
 from lipmotion.hmm.log_likelihoods import log_likelihoods_of
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.hmm.train import Transcribed, train_hmm
+from lipmotion.hmm.train import TranscribedUtterance, train_hmm
 from lipmotion.stats.bigram import estimate_bigram
 from lipmotion.types.progress import silent_monitor
 
@@ -103,7 +103,9 @@ def test_names_of_units_change_nothing():
     transcribed, said, _ = recordings(3, 20, speaker(3))
     other = dict(zip(UNITS, ("z", "y", "x", "w", "v"), strict=True))
     renamed = [
-        Transcribed(u.features, tuple(tuple(tuple(other[unit] for unit in v) for v in word) for word in u.words))
+        TranscribedUtterance(
+            u.features, tuple(tuple(tuple(other[unit] for unit in v) for v in word) for word in u.words)
+        )
         for u in transcribed
     ]
     hmm, again = (train_hmm(data, INVENTORY, CONFIG, silent_monitor) for data in (transcribed, renamed))
@@ -129,7 +131,7 @@ def test_the_pronunciation_said_is_learned():
     for number, words in enumerate(sentences(5, 30)):
         units = [SILENCE, *variants[number % 2], *(unit for word in words for unit in word), SILENCE]
         features, _ = who.say(draw, units)
-        transcribed.append(Transcribed(features, (variants, *((word,) for word in words))))
+        transcribed.append(TranscribedUtterance(features, (variants, *((word,) for word in words))))
         said.append(tuple(units))
     hmm = train_hmm(transcribed, INVENTORY, CONFIG, silent_monitor)
     for utterance, units in zip(transcribed, said, strict=True):
@@ -149,7 +151,9 @@ def test_clicks_in_the_silence_behind_the_last_word_do_not_become_part_of_it():
         room = np.repeat(who.means[SILENCE][:1], 60, axis=0) + draw.normal(0, who.spread, (60, 4))
         for click in draw.integers(5, 55, size=3):
             room[click : click + 2] = draw.normal([3.0, 0, 0, 0], 2, (2, 4))
-        transcribed.append(Transcribed(np.r_[features, room].astype(np.float32), tuple((w,) for w in (*words, last))))
+        transcribed.append(
+            TranscribedUtterance(np.r_[features, room].astype(np.float32), tuple((w,) for w in (*words, last)))
+        )
         said.append(units)
         edges.append([*where[:-1], where[-1] + 60])
     hmm = train_hmm(transcribed, INVENTORY, CONFIG, silent_monitor)
@@ -181,14 +185,14 @@ def test_the_bigram_is_that_of_what_was_said_pauses_being_silence(trained):
 def test_nothing_to_train_on_says_so():
     with pytest.raises(CorpusError, match="none of 0"):
         train_hmm([], INVENTORY, CONFIG, silent_monitor)
-    short = Transcribed(np.zeros((8, 4), np.float32), ((("a",),),))
+    short = TranscribedUtterance(np.zeros((8, 4), np.float32), ((("a",),),))
     with pytest.raises(CorpusError, match="none of 1"):
         train_hmm([short], INVENTORY, CONFIG, silent_monitor)
 
 
 def test_an_utterance_too_short_for_its_words_is_left_out():
     transcribed, _, _ = recordings(2, 10, speaker(2))
-    short = Transcribed(transcribed[0].features[:15], transcribed[0].words)
+    short = TranscribedUtterance(transcribed[0].features[:15], transcribed[0].words)
     with_it = train_hmm([short, *transcribed], INVENTORY, CONFIG, silent_monitor)
     without = train_hmm(transcribed, INVENTORY, CONFIG, silent_monitor)
     assert np.array_equal(with_it.mixtures.means, without.mixtures.means)

@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kernels.networks import phone_loop, random_network
-from lipmotion.kernels.arcs import laid_out, weights_of
+from lipmotion.kernels.arcs import arc_layout, arc_weights
 
 
 def arcs_in(layout):
@@ -20,7 +20,7 @@ def arcs_in(layout):
 
 
 def all_are_there(arrays) -> None:
-    layout = laid_out(arrays["arc_from"], arrays["arc_start"])
+    layout = arc_layout(arrays["arc_from"], arrays["arc_start"])
     counts = np.diff(arrays["arc_start"], append=len(arrays["arc_from"]))
     targets = np.repeat(np.arange(len(counts)), counts)
     assert sorted(arcs_in(layout)) == list(zip(range(len(targets)), arrays["arc_from"], targets, strict=True))
@@ -40,13 +40,13 @@ def test_every_arc_of_a_loop_has_its_place(units, states):
 
 def test_a_loop_of_phones_is_one_block_and_few_runs():
     arrays, _ = phone_loop(1, units=21, states=5)
-    layout = laid_out(arrays["arc_from"], arrays["arc_start"])
+    layout = arc_layout(arrays["arc_from"], arrays["arc_start"])
     assert [tuple(block[[1, 3]]) for block in layout.blocks] == [(20, 21)]
     assert len(layout.runs) == 5
 
 
 def test_padding_has_the_weight_of_nothing():
     arrays, _ = phone_loop(1)
-    layout = laid_out(arrays["arc_from"], arrays["arc_start"])
-    weights = weights_of(layout, np.ones(len(arrays["arc_from"])), 0.0)
+    layout = arc_layout(arrays["arc_from"], arrays["arc_start"])
+    weights = arc_weights(layout, np.ones(len(arrays["arc_from"])), 0.0)
     assert weights.blocks.sum() == np.prod(layout.blocks[:, [1, 3]])

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from lipmotion.kernels import factorial
 from lipmotion.kernels.factorial import factorial_posteriors
 from lipmotion.kernels.factorial_path import factorial_best_path
-from lipmotion.kernels.loops import Evidence, Loop
+from lipmotion.kernels.loops import FactorialLogLikelihoods, Loop
 from lipmotion.kernels.network import network_posteriors
 from oracles import factorial as oracle
 from oracles.paths import path_score
@@ -40,7 +40,7 @@ def random_model(seed: int, frames: int, shapes=((2, 2), (2, 1)), spread: float 
     chosen = draw.choice(sizes[0] * sizes[1], size=min(pairs, sizes[0] * sizes[1]), replace=False)
     logs = (draw.normal(-20, spread, (frames, size)) for size in sizes)
     own = draw.normal(-38, spread, (frames, len(chosen)))
-    return audio, visual, Evidence(*logs, own, np.stack(np.unravel_index(chosen, sizes), axis=1))
+    return audio, visual, FactorialLogLikelihoods(*logs, own, np.stack(np.unravel_index(chosen, sizes), axis=1))
 
 
 def agree(model, tolerance=1e-9, **options) -> None:
@@ -71,7 +71,7 @@ def test_loops_of_any_shape_agree_with_the_enumeration(shapes):
 @pytest.mark.parametrize("precision", [np.float32, np.float64])
 def test_agrees_with_the_network_of_all_joint_states(precision):
     audio, visual, evidence = random_model(2, 40, ((3, 5), (2, 4)), 5.0, 20)
-    evidence = Evidence(*(part.astype(precision) for part in evidence[:3]), evidence.pairs)
+    evidence = FactorialLogLikelihoods(*(part.astype(precision) for part in evidence[:3]), evidence.pairs)
     found = factorial_posteriors(audio, visual, evidence)
     log_density, initial, final = oracle.joint_logs(audio, visual, evidence)
     arcs = sorted(oracle.joint_arcs(audio, visual).items(), key=lambda item: item[0][1])
@@ -107,7 +107,7 @@ def test_beside_a_single_state_a_loop_is_a_plain_hidden_markov_model():
 @pytest.mark.parametrize("precision", [np.float32, np.float64])
 def test_posteriors_sum_to_one_and_counts_are_as_many_as_steps(precision):
     audio, visual, evidence = random_model(4, 150, ((3, 6), (3, 4)), 20.0, 10)
-    evidence = Evidence(*(part.astype(precision) for part in evidence[:3]), evidence.pairs)
+    evidence = FactorialLogLikelihoods(*(part.astype(precision) for part in evidence[:3]), evidence.pairs)
     found = factorial_posteriors(audio, visual, evidence)
     tolerance = 1e-9 if precision is np.float64 else 1e-4
     for posterior, counts in ((found.audio, found.audio_counts), (found.visual, found.visual_counts)):
@@ -134,7 +134,7 @@ def test_masked_states_and_pairs_agree_with_the_enumeration(seed):
     audio, visual, evidence = random_model(seed, 4, pairs=4)
     draw = np.random.default_rng([seed, 4])
     masked = [np.where(draw.random(part.shape) < 0.3, -np.inf, part) for part in evidence[:3]]
-    agree((audio, visual, Evidence(*masked, evidence.pairs)))
+    agree((audio, visual, FactorialLogLikelihoods(*masked, evidence.pairs)))
 
 
 def test_a_pair_of_its_own_density_may_be_where_both_states_are_masked():
@@ -158,8 +158,8 @@ def test_impossible_evidence_says_so():
 @pytest.mark.parametrize("spread", [5.0, 100.0, 1e3])
 def test_single_precision_is_close_however_loud(spread):
     audio, visual, evidence = random_model(8, 60, ((3, 8), (3, 5)), spread, 30)
-    single = Evidence(*(part.astype(np.float32) for part in evidence[:3]), evidence.pairs)
-    double = Evidence(*(part.astype(np.float64) for part in single[:3]), evidence.pairs)
+    single = FactorialLogLikelihoods(*(part.astype(np.float32) for part in evidence[:3]), evidence.pairs)
+    double = FactorialLogLikelihoods(*(part.astype(np.float64) for part in single[:3]), evidence.pairs)
     found, wanted = (factorial_posteriors(audio, visual, given) for given in (single, double))
     assert found.audio == pytest.approx(wanted.audio, abs=1e-4)
     assert found.pair == pytest.approx(wanted.pair, abs=1e-4)
@@ -176,7 +176,7 @@ def test_a_unit_far_behind_comes_back_in_single_precision(third):
         stay=same, onward=same[:1], leave=same[0], enter=np.eye(3), initial=same / 3, final=same + 0.5
     )
     log_density = np.repeat([[-72.0, 0, third] * 2, [0, -85.0, third] * 2], 20, axis=0) / 20
-    evidence = Evidence.of(log_density.astype(np.float32), np.zeros((40, 1), np.float32))
+    evidence = FactorialLogLikelihoods.of(log_density.astype(np.float32), np.zeros((40, 1), np.float32))
     found = factorial_posteriors(audio, visual, evidence)
     assert found.audio[:, ::3].sum(axis=1) == pytest.approx(np.ones(40), abs=1e-4)
 

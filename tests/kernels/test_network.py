@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from kernels.networks import arrays_of, phone_loop, random_network
 from lipmotion.kernels import network
-from lipmotion.kernels.network import Expectation, network_posteriors
+from lipmotion.kernels.network import ForwardBackwardNetwork, network_posteriors
 from oracles import networks
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -95,7 +95,7 @@ def test_no_path_says_so():
 def test_many_recordings_are_as_each_alone(frames):
     arrays, _ = phone_loop(3)
     emission = arrays.pop("emission")
-    expectation = Expectation.of(**arrays)
+    expectation = ForwardBackwardNetwork.of(**arrays)
     log_emission = random_emission(3, sum(frames), len(emission))
     together = expectation.over(log_emission, emission[expectation.layout.order], np.array(frames))
     counts, start = np.zeros(len(arrays["arc_log"])), 0
@@ -120,7 +120,7 @@ def test_inputs_stay_as_they_were():
 def chained(seed: int, frames: int, spread: float, chains: int = 2):
     """A loop of phones whose densities are products: expectation, factors, and the density of each place in each."""
     arrays, _ = phone_loop(seed)
-    expectation = Expectation.of(**{name: values for name, values in arrays.items() if name != "emission"})
+    expectation = ForwardBackwardNetwork.of(**{name: values for name, values in arrays.items() if name != "emission"})
     draw = np.random.default_rng([seed, 2])
     factors = [draw.normal(-20, spread, (frames, 4 + chain)) for chain in range(chains)]
     columns = [draw.integers(4 + chain, size=len(arrays["emission"])) for chain in range(chains)]
@@ -150,7 +150,7 @@ def test_densities_of_chains_are_as_their_products(seed, chains, spread):
 def test_densities_of_chains_agree_with_the_enumeration_of_all_paths():
     arrays, arcs = random_network(5, states=4, densities=4, density_of_arcs=0.5)
     arrays["emission"] = np.arange(4)
-    expectation = Expectation.of(**{name: values for name, values in arrays.items() if name != "emission"})
+    expectation = ForwardBackwardNetwork.of(**{name: values for name, values in arrays.items() if name != "emission"})
     draw = np.random.default_rng(5)
     factors, columns = [draw.normal(0, 3, (5, n)) for n in (3, 2)], [np.array([0, 1, 2, 0]), np.array([1, 0, 0, 1])]
     order, place = expectation.layout.order, expectation.layout.place
@@ -188,7 +188,7 @@ def test_chains_that_allow_nothing_together_have_no_path():
 def test_a_state_far_behind_comes_back_in_single_precision(against, frames):
     """Evidence speaks for a state up to 300 nats, and then more for another that cannot be reached from it."""
     arcs = {(0, 0): 0.0, (1, 1): 0.0}
-    expectation = Expectation.of(**arrays_of(arcs, 2), log_initial=np.log([0.5, 0.5]), log_final=np.zeros(2))
+    expectation = ForwardBackwardNetwork.of(**arrays_of(arcs, 2), log_initial=np.log([0.5, 0.5]), log_final=np.zeros(2))
     log_emission = np.zeros((3 * frames, 2), np.float32)
     log_emission[:frames, 0], log_emission[frames:, 1] = -against, -against
     found = expectation.over_chains([log_emission], [expectation.layout.order], np.array([3 * frames]))
@@ -218,8 +218,8 @@ def test_other_probabilities_on_the_same_arcs(seed):
     columns, frames = np.arange(len(old["emission"])), np.array([30])
     arrays = ("arc_from", "arc_log", "arc_start", "log_initial", "log_final")
     initial = np.random.default_rng(seed).normal(-3, 1, len(columns))
-    changed = Expectation.of(*(old[name] for name in arrays)).with_arcs(new["arc_log"], initial)
-    fresh = Expectation.of(*((new | {"log_initial": initial})[name] for name in arrays))
+    changed = ForwardBackwardNetwork.of(*(old[name] for name in arrays)).with_arcs(new["arc_log"], initial)
+    fresh = ForwardBackwardNetwork.of(*((new | {"log_initial": initial})[name] for name in arrays))
     one, other = (network.over(log_emission, columns, frames) for network in (changed, fresh))
     for found, expected in zip(one, other, strict=True):
         np.testing.assert_array_equal(found, expected)

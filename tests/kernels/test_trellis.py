@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lipmotion.kernels.trellis import cheapest_arrivals, traced
+from lipmotion.kernels.trellis import cheapest_arrivals, trace_back
 from oracles import trellis
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -25,7 +25,7 @@ def test_no_path_is_cheaper(states: int, frames: int, seed: int) -> None:
     arrival, pointers = cheapest_arrivals(start, steps)
     path, cost = trellis.cheapest_path(start, steps)
     assert arrival.min() == pytest.approx(cost)
-    assert traced(pointers, int(arrival.argmin())).tolist() == path
+    assert trace_back(pointers, int(arrival.argmin())).tolist() == path
 
 
 @settings(max_examples=60, deadline=None)
@@ -36,7 +36,7 @@ def test_every_last_state_is_reached_at_least_cost_by_the_way_traced(states: int
     assert pointers.shape == (frames, states)
     assert arrival == pytest.approx(trellis.arrivals(start, steps))
     for last in range(states):
-        path = traced(pointers, last).tolist()
+        path = trace_back(pointers, last).tolist()
         assert trellis.path_cost([pointers[0, path[0]], *path], start, steps) == pytest.approx(arrival[last])
 
 
@@ -61,4 +61,4 @@ def test_what_cannot_be_is_not_chosen() -> None:
     steps = np.zeros((2, 2, 10))
     steps[:, 0, 5] = np.inf
     arrival, pointers = cheapest_arrivals(np.array([0.0, np.inf]), steps + np.array([0.0, 1.0])[:, None])
-    assert traced(pointers, int(arrival.argmin())).tolist() == [0, 0, 0, 0, 0, 1, 0, 0, 0, 0]
+    assert trace_back(pointers, int(arrival.argmin())).tolist() == [0, 0, 0, 0, 0, 1, 0, 0, 0, 0]

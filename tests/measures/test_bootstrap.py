@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lipmotion.measures.bootstrap import interval
+from lipmotion.measures.bootstrap import bootstrap_interval
 from lipmotion.measures.curves import mean_distance, pooled_correlation
 
 
@@ -21,32 +21,32 @@ def clips(seed: int, count: int = 12):
 @settings(deadline=None, max_examples=10)
 def test_the_interval_holds_the_figure_itself(seed):
     generated, original = clips(seed)
-    low, high = interval(acc, generated, original, seed=0, draws=200)
+    low, high = bootstrap_interval(acc, generated, original, seed=0, draws=200)
     assert low < acc(generated, original) < high
     assert high - low < 0.3
 
 
 def test_the_seed_decides():
     generated, original = clips(1)
-    one = interval(acc, generated, original, seed=5, draws=100)
-    assert interval(acc, generated, original, seed=5, draws=100) == one
-    assert interval(acc, generated, original, seed=6, draws=100) != one
+    one = bootstrap_interval(acc, generated, original, seed=5, draws=100)
+    assert bootstrap_interval(acc, generated, original, seed=5, draws=100) == one
+    assert bootstrap_interval(acc, generated, original, seed=6, draws=100) != one
 
 
 def test_clips_are_drawn_whole_and_together():
     """Every clip has its own value, generated and original alike: a draw that parted them would show."""
     values = [np.full((3, 1), float(n)) for n in range(5)]
-    assert interval(mean_distance, values, values, seed=0, draws=50) == (0, 0)
+    assert bootstrap_interval(mean_distance, values, values, seed=0, draws=50) == (0, 0)
 
 
 def test_one_clip_has_no_spread():
     generated, original = clips(2, count=1)
-    low, high = interval(acc, generated, original, seed=0, draws=20)
+    low, high = bootstrap_interval(acc, generated, original, seed=0, draws=20)
     assert low == high == pytest.approx(acc(generated, original))
 
 
 def test_more_clips_are_surer():
-    few, many = (np.diff(interval(acc, *clips(3, count), seed=0, draws=200))[0] for count in (5, 80))
+    few, many = (np.diff(bootstrap_interval(acc, *clips(3, count), seed=0, draws=200))[0] for count in (5, 80))
     assert many < few / 2
 
 
@@ -54,6 +54,6 @@ def test_95_percent_of_the_draws_lie_inside():
     """The mean of 200 values is nearly normal: 1.96 standard errors to either side."""
     values = np.abs(np.random.default_rng(4).normal(5, 1, 200))
     generated, original = [np.full((1, 1), value) for value in values], [np.zeros((1, 1))] * 200
-    low, high = interval(mean_distance, generated, original, seed=0)
+    low, high = bootstrap_interval(mean_distance, generated, original, seed=0)
     assert (low + high) / 2 == pytest.approx(values.mean(), abs=0.02)
     assert high - low == pytest.approx(2 * 1.96 * values.std() / np.sqrt(200), rel=0.07)

@@ -4,12 +4,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lipmotion.measures.closures import (
+    clip_closure_counts,
     closed_threshold,
     closings,
     closure_figures,
-    found_closings,
-    match,
-    near,
+    match_closings,
+    matched_count,
     phone_closures,
 )
 from oracles import matching
@@ -40,7 +40,7 @@ def test_a_closing_is_the_first_closed_frame_after_an_open_one():
 @given(generated=FRAMES, original=FRAMES)
 @settings(deadline=None, max_examples=60)
 def test_matching_is_one_to_one_and_nearest_first(generated, original):
-    pairs = match(generated, original)
+    pairs = match_closings(generated, original)
     assert len({g for g, _ in pairs}) == len({o for _, o in pairs}) == len(pairs)
     for g in generated:
         for o in original:  # no two would rather have each other
@@ -51,21 +51,21 @@ def test_matching_is_one_to_one_and_nearest_first(generated, original):
 @given(generated=FRAMES, original=FRAMES)
 @settings(deadline=None, max_examples=40)
 def test_as_many_as_possible_are_matched_as_near_as_possible(generated, original):
-    pairs = match(generated, original, reach=1)
+    pairs = match_closings(generated, original, reach=1)
     found = tuple(sum(abs(g - o) == distance for g, o in pairs) for distance in range(2))
     assert found == matching.nearest_first(generated.tolist(), original.tolist(), 1)
 
 
 def test_matching_by_hand():
-    assert match(np.array([10, 12]), np.array([11])) == [(10, 11)]
-    assert match(np.array([8, 11]), np.array([10])) == [(11, 10)]
-    assert match(np.array([7]), np.array([10])) == []
-    assert match(np.array([9, 12]), np.array([10, 11])) == [(9, 10), (12, 11)]
+    assert match_closings(np.array([10, 12]), np.array([11])) == [(10, 11)]
+    assert match_closings(np.array([8, 11]), np.array([10])) == [(11, 10)]
+    assert match_closings(np.array([7]), np.array([10])) == []
+    assert match_closings(np.array([9, 12]), np.array([10, 11])) == [(9, 10), (12, 11)]
 
 
 @given(some=FRAMES, others=FRAMES)
 def test_near_counts_whichever_is_near(some, others):
-    assert near(some, others) == sum(any(abs(a - b) <= 2 for b in others) for a in some)
+    assert matched_count(some, others) == sum(any(abs(a - b) <= 2 for b in others) for a in some)
 
 
 def test_figures_by_hand():
@@ -141,7 +141,7 @@ def test_phones_beyond_the_clip_and_clips_without_phones():
 @settings(deadline=None, max_examples=40)
 def test_closings_found_clip_by_clip_add_up_to_the_score(clips):
     generated, original = ([opening(list(clip[side]))[:, None] for clip in clips] for side in (0, 1))
-    hits, count = found_closings(generated, original, 0.5)
+    hits, count = clip_closure_counts(generated, original, 0.5)
     for (g, o), hit, wanted in zip(zip(generated, original, strict=True), hits, count, strict=True):
         times = [closings(side[:, 0], 0.5).tolist() for side in (g, o)]
         assert wanted.tolist() == [len(times[1])]

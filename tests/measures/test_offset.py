@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from lipmotion.measures.offset import offset, pooled_offset, shift_scores
+from lipmotion.measures.offset import best_offset, pooled_offset, shift_scores
 
 RATE_HZ = 100.0
 REACH = 40
@@ -31,7 +31,7 @@ def scores(late_frames: float, seed: int = 0, noise: float = 0.0, valid: NDArray
 @settings(deadline=None, max_examples=40)
 @given(st.floats(-30, 30), st.integers(0, 20))
 def test_a_shift_is_found(late_frames: float, seed: int) -> None:
-    found = offset(scores(late_frames, seed), RATE_HZ)
+    found = best_offset(scores(late_frames, seed), RATE_HZ)
     assert found.late_s == pytest.approx(late_frames / RATE_HZ, abs=0.002)
     assert found.known
     assert found.low_s == found.late_s == found.high_s
@@ -52,12 +52,12 @@ def test_frames_without_a_face_do_not_count() -> None:
     valid[80:140] = False
     measured = wave(0)
     measured[80:140] = 1e3
-    assert offset(shift_scores(wave(-7), measured, valid, REACH), RATE_HZ).late_s == pytest.approx(0.07, abs=0.001)
+    assert best_offset(shift_scores(wave(-7), measured, valid, REACH), RATE_HZ).late_s == pytest.approx(0.07, abs=0.001)
 
 
 def test_unlike_curves_are_not_known() -> None:
     found = [
-        offset(shift_scores(wave(0, seed=n), wave(0, seed=n + 50), np.ones(300, bool), REACH), RATE_HZ)
+        best_offset(shift_scores(wave(0, seed=n), wave(0, seed=n + 50), np.ones(300, bool), REACH), RATE_HZ)
         for n in range(20)
     ]
     assert sum(each.known for each in found) <= 4
@@ -66,20 +66,20 @@ def test_unlike_curves_are_not_known() -> None:
 def test_a_repeating_curve_is_not_known() -> None:
     time_s = np.arange(300) / RATE_HZ
     beat = np.sin(2 * np.pi * 5 * time_s)
-    found = offset(shift_scores(beat, beat, np.ones(300, bool), REACH), RATE_HZ)
+    found = best_offset(shift_scores(beat, beat, np.ones(300, bool), REACH), RATE_HZ)
     assert found.score > 0.9
     assert not found.known
 
 
 def test_constant_curves_are_not_known() -> None:
-    found = offset(shift_scores(np.ones(300), wave(0), np.ones(300, bool), REACH), RATE_HZ)
+    found = best_offset(shift_scores(np.ones(300), wave(0), np.ones(300, bool), REACH), RATE_HZ)
     assert (found.score, found.known) == (0, False)
 
 
 def test_clips_together_know_better_than_each() -> None:
     clips = [scores(6.0, seed, noise=12.0) for seed in range(30)]
     found = pooled_offset(clips, RATE_HZ)
-    worst_s = max(abs(offset(clip, RATE_HZ).late_s - 0.06) for clip in clips)
+    worst_s = max(abs(best_offset(clip, RATE_HZ).late_s - 0.06) for clip in clips)
     assert abs(found.late_s - 0.06) < 0.01 < worst_s
     assert found.low_s <= found.late_s <= found.high_s
     assert found.low_s < 0.06 < found.high_s or found.high_s - found.low_s < 0.01

@@ -2,7 +2,7 @@ from itertools import count
 
 import pytest
 
-from lipmotion.measures.report import table
+from lipmotion.measures.report import figures_table
 
 
 def figures():
@@ -77,7 +77,7 @@ def figures():
 
 def test_every_figure_is_printed_as_often_as_it_is_there():
     result, printed = figures()
-    text = table(result)
+    text = figures_table(result)
     assert len(set(printed)) == len(printed)
     words = text.replace(",", " ").replace(";", " ").replace(")", " ").replace("(", " ").split()
     missing = [number for number in printed if number not in words]
@@ -88,7 +88,7 @@ def test_every_figure_is_printed_as_often_as_it_is_there():
 
 def test_columns_line_up():
     result, _ = figures()
-    lines = table(result).splitlines()
+    lines = figures_table(result).splitlines()
     head = next(line for line in lines if "channel" in line)
     rows = [line for line in lines if line.startswith(("  opening  ", "  width  "))]
     assert len(rows) == 4
@@ -100,15 +100,15 @@ def test_figures_that_do_not_exist_are_printed_too(part):
     result, _ = figures()
     condition = result["conditions"]["audio only"]
     condition[part] = {key: 0 if isinstance(value, int) else None for key, value in condition[part].items()}
-    assert "–" in table(result)
+    assert "–" in figures_table(result)
 
 
 def test_pins_are_named_where_there_are_some():
     result, _ = figures()
-    assert "are pinned" in table(result)
+    assert "are pinned" in figures_table(result)
     for condition in result["conditions"].values():
         del condition["unpinned"]
-    assert "pin" not in table(result)
+    assert "pin" not in figures_table(result)
 
 
 def test_motion_without_an_opening_has_a_shorter_table():
@@ -120,7 +120,7 @@ def test_motion_without_an_opening_has_a_shorter_table():
     condition["channels"] = {"a_rather_long_name": condition["channels"]["width"]}
     condition["leading"] = "a_rather_long_name"
     del result["conditions"]["with transcript"]
-    lines = table(result).splitlines()
+    lines = figures_table(result).splitlines()
     assert lines[:2] == ["split val: 101 clips", "left out, for they do not move: brow, ear"]
     assert len(lines[4]) == len(lines[5])
     assert len(lines) == 7

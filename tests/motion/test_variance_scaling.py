@@ -6,7 +6,7 @@ import pytest
 from engines.synthetic import examples, speech, timeline
 from lipmotion.engines import engine_named
 from lipmotion.kernels.banded import generate
-from lipmotion.motion.variance_scaling import LARGEST_FACTOR, scaled
+from lipmotion.motion.variance_scaling import LARGEST_FACTOR, VarianceScaling
 from lipmotion.types import Constraints, Pin
 from lipmotion.types.progress import silent_monitor
 
@@ -18,7 +18,7 @@ def test_the_trajectory_grows_about_rest_and_its_variance_with_it():
     means, precisions = draw.normal(size=(40, 3, 2)), draw.uniform(1, 9, (40, 3, 2))
     gain, rest = np.array([1.5, 1.0]), np.array([0.3, -1.0])
     plain, variance = generate(means, precisions)
-    large, larger_variance = generate(*scaled(means, precisions, gain, rest))
+    large, larger_variance = generate(*VarianceScaling(gain, rest).apply(means, precisions))
     assert large == pytest.approx(rest + gain * (plain - rest))
     assert larger_variance == pytest.approx(variance * gain * gain)
 
@@ -38,7 +38,7 @@ def test_the_full_range_is_nearer_to_the_original(noisy):
         engine_named("trajectory", {**OPTIONS, "variance_scaling": on, "closures": False}) for on in (False, True)
     ]
     learned = engines[0].fit(noisy, silent_monitor).model
-    assert 1 < learned.gain[0] <= LARGEST_FACTOR
+    assert 1 < learned.variance_factors[0] <= LARGEST_FACTOR
     spreads = [
         np.mean([engine.generate(learned, one.speech).motion["opening"].std() for one in noisy]) for engine in engines
     ]

@@ -31,8 +31,8 @@ def log_density(hmm, observed, place, frame, weights) -> float:
     """Return the weighted sum of all streams' log densities of a state in its context."""
     total = 0.0
     for name, weight in weights:
-        if weight and name in hmm.parts and name in observed.streams:
-            stream, part = observed.streams[name], hmm.parts[name]
+        if weight and name in hmm.models and name in observed.streams:
+            stream, part = observed.streams[name], hmm.models[name]
             leaf = part.forest.leaf(place)
             total += weight * stream_density(part, leaf, stream.values[frame], stream.known[frame])
     return total
@@ -59,7 +59,7 @@ def score(hmm, densities, units, lengths) -> float:
         for state in range(inventory.count(unit)):
             place, length = ((around[position], unit, around[position + 2]), state), next(lasting)
             total += sum(densities(place, t) for t in range(frame, frame + length))
-            stay = hmm.log_stay[inventory.rows[unit, state]]
+            stay = hmm.log_stay[inventory.monophones[unit, state]]
             total += (length - 1) * stay + np.log(1 - np.exp(stay))
             frame += length
     return float(total)

@@ -10,6 +10,7 @@ from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.pipeline.adapt import adapt
 from lipmotion.pipeline.animate import animate
 from lipmotion.pipeline.model import Model, load_model, read_header, save_model
+from lipmotion.pipeline.request import SpeechRequest
 from lipmotion.testing.toy import toy_sentences
 from lipmotion.types import Audio
 from pipeline.test_model import npy, rewritten
@@ -43,9 +44,9 @@ def test_it_is_used_from_then_on(toy_model: Model, adapted: Model, toy_speech: P
     plain = kind.own_features
     monkeypatch.setattr(kind, "own_features", lambda one, *given: used.append(one) or plain(one, *given))
     for words in (None, "ba"):
-        animate(toy_speech, model=adapted, transcript=words, recogniser="own")
+        animate(SpeechRequest(toy_speech, transcript=words, recogniser="own"), model=adapted)
     assert used == [adapted.adaptation] * 2
-    animate(toy_speech, model=toy_model, recogniser="own")
+    animate(SpeechRequest(toy_speech, recogniser="own"), model=toy_model)
     assert len(used) == 2
 
 

@@ -11,6 +11,7 @@ from threadpoolctl import threadpool_limits
 from lipmotion.errors import AlignmentError, InputError
 from lipmotion.pipeline.animate import animate, write
 from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.request import SpeechRequest
 from lipmotion.speech.audio_files import read_audio
 from lipmotion.testing.toy import ToySentence, toy_motion
 from lipmotion.types import Audio, Constraints, Generation, Motion, Pin, Span, Timeline, Unit
@@ -22,7 +23,9 @@ Animate = Callable[..., Generation]
 @pytest.fixture(scope="module")
 def move(toy_model: Model, toy_sentence: ToySentence) -> Animate:
     """Animates the toy sentence with the toy model."""
-    return lambda **options: animate(toy_sentence.audio, model=toy_model, **options)
+    return lambda *, constraints=None, **known: animate(
+        SpeechRequest(toy_sentence.audio, **known), model=toy_model, constraints=constraints
+    )
 
 
 @pytest.fixture(scope="module")
@@ -211,7 +214,7 @@ def test_text_beyond_the_recording_is_refused_before_it_is_split(
 def test_units_beyond_the_recording_are_refused(toy_model: Model, toy_sentence: ToySentence) -> None:
     units = Timeline(tuple(Span(i / 1e4, (i + 1) / 1e4, Unit("p")) for i in range(2000)))
     with pytest.raises(InputError, match=r"2000 units in time, required at most 1276 for 2.76 s of sound"):
-        animate(toy_sentence.audio, units=units, model=toy_model)
+        animate(SpeechRequest(toy_sentence.audio, units=units), model=toy_model)
 
 
 @pytest.mark.parametrize("threads", [1, 2])

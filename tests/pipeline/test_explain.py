@@ -12,6 +12,7 @@ import lipmotion
 from lipmotion.errors import InputError
 from lipmotion.pipeline.explain import explanation_document, explanation_text
 from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.request import SpeechRequest
 from lipmotion.testing.toy import ToySentence
 from lipmotion.types import ChannelValue, Explanation, Span, Unit
 
@@ -20,19 +21,19 @@ WORDS = "See Bob, papa & mama!"
 
 def test_it_explains_what_animate_makes(coupled_model: Model, toy_sentence: ToySentence, toy_speech: Path) -> None:
     result = lipmotion.animate(toy_speech, model=coupled_model, transcript=WORDS)
-    one, other = lipmotion.explain(coupled_model, toy_speech, [0.804, 1.0], transcript=WORDS)
+    one, other = lipmotion.explain(toy_speech, at=[0.804, 1.0], model=coupled_model, transcript=WORDS)
     assert (one.frame, one.time_s, other.frame) == (80, 0.8, 100)
     assert one.state == result.trace.states[result.trace.frames[80]]
     assert [value.value for value in one.motion.values()] == pytest.approx(result.motion.values[80].tolist())
     assert one.span in result.units.spans
-    (same,) = lipmotion.explain(coupled_model, toy_sentence.audio, 0.8, units=result.units)
+    (same,) = lipmotion.explain(SpeechRequest(toy_sentence.audio, units=result.units), at=0.8, model=coupled_model)
     assert same.state == one.state
     assert [chain.name for chain in one.chains] == ["sVis", "2vis"]
     assert sum(one.chains[1].lead.values()) == pytest.approx(1, abs=1e-4)
 
 
 def test_a_model_file_and_any_engine(toy_model_file: Path, toy_speech: Path) -> None:
-    (found,) = lipmotion.explain(toy_model_file, toy_speech, 0.8)
+    (found,) = lipmotion.explain(toy_speech, at=0.8, model=toy_model_file)
     assert "speech." in found.state or found.state == "rest"
     assert (found.chains, found.gaussians, found.joint) == ((), (), None)
 
@@ -41,12 +42,12 @@ def test_a_model_file_and_any_engine(toy_model_file: Path, toy_speech: Path) -> 
 def test_a_time_outside_the_recording(coupled_model: Model, toy_sentence: ToySentence, time_s: float) -> None:
     frames = len(lipmotion.animate(toy_sentence.audio, model=coupled_model).motion.values)
     with pytest.raises(InputError, match=rf"outside the recording \(0 to {(frames - 1) / 100:.2f} s\)"):
-        lipmotion.explain(coupled_model, toy_sentence.audio, [0.1, time_s])
+        lipmotion.explain(toy_sentence.audio, at=[0.1, time_s], model=coupled_model)
 
 
 def test_the_last_frame_is_inside(coupled_model: Model, toy_sentence: ToySentence) -> None:
     result = lipmotion.animate(toy_sentence.audio, model=coupled_model)
-    (last,) = lipmotion.explain(coupled_model, toy_sentence.audio, float(result.motion.time_s[-1]))
+    (last,) = lipmotion.explain(toy_sentence.audio, at=float(result.motion.time_s[-1]), model=coupled_model)
     assert last.frame == len(result.motion.values) - 1
 
 
@@ -57,7 +58,7 @@ def test_a_unit_whose_phone_is_not_known_has_no_phone_in_the_text() -> None:
 
 
 def test_the_text_names_everything(coupled_model: Model, toy_sentence: ToySentence) -> None:
-    (found,) = lipmotion.explain(coupled_model, toy_sentence.audio, 0.8, transcript=WORDS)
+    (found,) = lipmotion.explain(toy_sentence.audio, at=0.8, model=coupled_model, transcript=WORDS)
     text = explanation_text(found)
     lines = text.splitlines()
     assert lines[0] == "0.80 s (frame 80)"
@@ -73,7 +74,7 @@ def test_the_text_names_everything(coupled_model: Model, toy_sentence: ToySenten
 
 
 def test_the_document_is_json_with_all_channels(coupled_model: Model, toy_sentence: ToySentence) -> None:
-    (found,) = lipmotion.explain(coupled_model, toy_sentence.audio, 0.8)
+    (found,) = lipmotion.explain(toy_sentence.audio, at=0.8, model=coupled_model)
     document = json.loads(json.dumps(explanation_document(found), allow_nan=False))
     assert document["frame"] == 80
     assert list(document["motion"]) == list(found.motion)

@@ -160,9 +160,9 @@ def test_a_part_is_missing_or_wrong(changes: dict[str, bytes | None], toy_model_
     ("changes", "message"),
     [
         ({"engine": "concatenative"}, "no engine 'concatenative'; there are: trajectory"),
-        ({"configuration": {"part": 5}}, "unexpected keyword argument 'part'"),
+        ({"configuration": {"part": 5}}, "no option 'part'; there are: states, "),
         ({"configuration": {"states": 4}}, "states is 4, required an odd number"),
-        ({"recogniser": {"state": 3}}, "unexpected keyword argument 'state'"),
+        ({"recogniser": {"state": 3}}, "no option 'state'; there are: states, "),
         ({"recogniser": []}, "damaged"),
         ({"configuration": None}, "damaged"),
     ],

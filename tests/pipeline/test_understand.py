@@ -9,7 +9,7 @@ import numpy as np
 
 from lipmotion.engines import Engine
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.understand import hear, hear_unsaid
+from lipmotion.pipeline.understand import speech_of, recognised_speech
 from lipmotion.speech.f0 import log_f0
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.recogniser import Recogniser
@@ -19,7 +19,7 @@ from lipmotion.types import Speech, Timeline, Unit
 
 @dataclass(frozen=True)
 class Listening(Engine[Any]):
-    """Hears what it is told to hear."""
+    """Hears what it is told to speech_of."""
 
     config: Any = None
     found: Timeline[Unit] | None = None
@@ -42,7 +42,7 @@ RECOGNISED: Timeline[Unit] = Timeline(())
 
 def heard(engine: Engine[Any], model: Model, sentence: ToySentence, kind: str = "own") -> Speech:
     phones, features = Recogniser(model.phones, kind), mfcc(sentence.audio)
-    return hear_unsaid(engine, None, sentence.audio, features, phones, lambda: RECOGNISED)
+    return recognised_speech(engine, None, sentence.audio, features, phones, lambda: RECOGNISED)
 
 
 def test_what_the_engine_hears_is_placed_as_in_training(toy_model: Model, toy_sentence: ToySentence) -> None:
@@ -73,7 +73,7 @@ def test_phones_that_do_not_fit_are_not_taken(toy_model: Model, toy_sentence: To
 
 def test_f0_is_computed_for_engines_that_want_it(toy_sentence: ToySentence) -> None:
     features = mfcc(toy_sentence.audio)
-    found = hear(Listening(), toy_sentence.audio, features, toy_sentence.units).log_f0
+    found = speech_of(Listening(), toy_sentence.audio, features, toy_sentence.units).log_f0
     assert found is not None
     np.testing.assert_array_equal(found, log_f0(toy_sentence.audio))
 
@@ -81,4 +81,4 @@ def test_f0_is_computed_for_engines_that_want_it(toy_sentence: ToySentence) -> N
     class Deaf(Listening):
         wants_f0: ClassVar[bool] = False  # type: ignore[misc]
 
-    assert hear(Deaf(), toy_sentence.audio, features, toy_sentence.units).log_f0 is None
+    assert speech_of(Deaf(), toy_sentence.audio, features, toy_sentence.units).log_f0 is None

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import lipmotion
-from lipmotion.corpora.store import Corpus
+from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines import engine_named
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.pipeline.model import Model
@@ -63,7 +63,9 @@ def trained() -> Results:
             corpus.add(utterance)
         for name, options in ENGINES.items():
             engine = engine_named(name, options)
-            model, _ = train(corpus, engine=engine, recogniser=HmmConfig(mixtures=1, iterations=2), split=None)
+            model, _ = train(
+                corpus, engine=engine, recogniser=HmmConfig(mixtures=1, iterations=2), selection=Selection(None)
+            )
             yield from animated(f"{name}, trained here", model, toy_sentences(3)[0].audio)
 
 

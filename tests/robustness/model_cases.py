@@ -61,9 +61,9 @@ _header("another format", *NO_MODEL, format="other")
 _header("an unknown engine", *DAMAGED, "no engine 'quantum'; there are: trajectory", engine="quantum")
 _header("an engine that is a list", *DAMAGED, engine=[])
 _header("an unknown option", *DAMAGED, "unexpected keyword argument", configuration={"colour": 1})
-_header("an option that is a text", *DAMAGED, configuration={"parts": "5"})
+_header("an option that is a text", *DAMAGED, configuration={"states": "5"})
 _header("an option of NaN", *NO_MODEL, "the number NaN, required a finite one", configuration={"edge_s": float("nan")})
-_header("more parts than were learned", *DAMAGED, configuration={"parts": 9})
+_header("more parts than were learned", *DAMAGED, configuration={"states": 9})
 _header("a recogniser's option that is a text", *DAMAGED, recogniser={"bigram_weight": "much"})
 
 
@@ -154,10 +154,10 @@ _changed("a member that is no array", "engine/notes.txt", b"hello", *DAMAGED, "u
 _changed("a header with a key twice", "header.json", b'{"format": "lipmotion.model", "format": "other"}', *NO_MODEL,
          "the key 'format' stands there twice")  # fmt: skip
 _changed("a header of 1e999", "header.json", b'{"format": "lipmotion.model", "version": 1e999}', *NO_MODEL, "1e999")
-_header("an option of a billion", *DAMAGED, "required at most", configuration={"parts": 10**9 + 1})
+_header("an option of a billion", *DAMAGED, "required at most", configuration={"states": 10**9 + 1})
 _header("states by the billion", *DAMAGED, engine="joint", configuration={"states": 10**6})
-_header("an option that is true", *DAMAGED, "required a whole number", configuration={"parts": True})
-_header("a truth value that is a text", *DAMAGED, "required true or false", configuration={"listens": "no"})
+_header("an option that is true", *DAMAGED, "required a whole number", configuration={"states": True})
+_header("a truth value that is a text", *DAMAGED, "required true or false", configuration={"acoustic_regression": "no"})
 
 
 @case(GROUP, "a member that is there twice", 6, *NO_MODEL, "is in it twice")

@@ -68,10 +68,10 @@ _option("--posteriors of a model without chains", 3, ("'trajectory' has no chain
 _option("--posteriors as .jpg", 7, ("unknown format '.jpg'; required: .png",), "--posteriors", "a.jpg")
 
 for _name, _options, _says in [
-    ("--set without a value", ("--set", "parts"), "the setting 'parts' has no value; required NAME=VALUE"),
+    ("--set without a value", ("--set", "states"), "the setting 'states' has no value; required NAME=VALUE"),
     ("--set of an unknown option", ("--set", "part=5"), "has no option 'part'; there are: parts"),
-    ("--set of a number that is none", ("--set", "parts=many"), "parts is 'many', required a whole number"),
-    ("--set of a number out of range", ("--set", "parts=4"), "parts is 4, required an odd number from 1"),
+    ("--set of a number that is none", ("--set", "states=many"), "states is 'many', required a whole number"),
+    ("--set of a number out of range", ("--set", "states=4"), "states is 4, required an odd number from 1"),
     ("--system of another engine", ("--system", "ph-HMM"), "add --engine coupled"),
     ("--system of an unknown name", ("--engine", "coupled", "--system", "HMM"), "no system 'HMM'; there are: ph-HMM"),
     ("--units of chains", ("--engine", "coupled", "--units", "eVis"), "has a unit set a chain; say --set chains="),

@@ -7,6 +7,7 @@ import pytest
 
 from lipmotion.errors import ModelFormatError
 from lipmotion.speech.adaptation import Adaptation, adaptation_arrays, adaptation_from_arrays, identity_adaptation
+from lipmotion.speech.analysed_audio import analysed
 from lipmotion.speech.general.front_end import general_features
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.testing.toy import toy_sentences
@@ -24,20 +25,20 @@ def some() -> Adaptation:
 
 
 def test_no_adaptation_changes_nothing(audio: Audio) -> None:
-    nothing, features = identity_adaptation(1.0, 0.5), mfcc(audio)
-    assert np.array_equal(nothing.own_features(audio, features), features.values)
-    assert np.array_equal(nothing.general_features(audio), general_features(audio))
+    nothing = identity_adaptation(1.0, 0.5)
+    assert np.array_equal(nothing.own_features(analysed(audio)), mfcc(audio).values)
+    assert np.array_equal(nothing.general_features(analysed(audio)), general_features(audio))
 
 
 def test_own_features_are_warped_then_transformed(audio: Audio) -> None:
     one = some()
     expected = mfcc(audio, 1.06).values @ one.own[:, :-1].T + one.own[:, -1]
-    np.testing.assert_allclose(one.own_features(audio, mfcc(audio)), expected, rtol=1e-4, atol=1e-3)
+    np.testing.assert_allclose(one.own_features(analysed(audio)), expected, rtol=1e-4, atol=1e-3)
 
 
 def test_general_features_are_transformed_stream_by_stream(audio: Audio) -> None:
     one, plain = some(), general_features(audio)
-    found = one.general_features(audio)
+    found = one.general_features(analysed(audio))
     for number in range(3):
         columns = slice(13 * number, 13 * number + 13)
         expected = plain[:, columns] @ one.general[number, :, :-1].T + one.general[number, :, -1]
@@ -47,7 +48,7 @@ def test_general_features_are_transformed_stream_by_stream(audio: Audio) -> None
 def test_arrays_and_back() -> None:
     one = some()
     again = adaptation_from_arrays(adaptation_arrays(one))
-    assert (again.warp, again.trust) == (one.warp, one.trust)
+    assert (again.warp, again.own_weight) == (one.warp, one.own_weight)
     assert np.array_equal(again.own, one.own)
     assert np.array_equal(again.general, one.general)
 
@@ -67,7 +68,7 @@ def changed(values: np.ndarray, value: float) -> np.ndarray:
         ({"own": np.zeros((39, 39))}, "own of shape"),
         ({"general": np.zeros((13, 14))}, "general of shape"),
         ({"numbers": np.array([1.0])}, "numbers of shape"),
-        ({"numbers": np.array([1.0, 1.5])}, "a warp of 1.0 and a trust of 1.5"),
+        ({"numbers": np.array([1.0, 1.5])}, "a warp of 1.0 and a weight of the own models of 1.5"),
         ({"numbers": np.array([0.0, 0.5])}, "a warp of 0.0"),
         ({"numbers": np.array([np.nan, 0.5])}, "not finite"),
         ({"numbers": np.array(["a", "b"])}, "numbers holds <U1, required fractions"),
@@ -84,5 +85,5 @@ def test_damaged_arrays(arrays: dict[str, np.ndarray | None], says: str) -> None
 
 def test_a_warp_of_one_needs_no_other_features(audio: Audio, monkeypatch: pytest.MonkeyPatch) -> None:
     features = mfcc(audio)
-    monkeypatch.setattr("lipmotion.speech.adaptation.mfcc", lambda *_: pytest.fail("computed twice"))
-    assert replace(some(), warp=1.0).own_features(audio, features).shape == features.values.shape
+    monkeypatch.setattr("lipmotion.speech.analysed_audio.mfcc_of_warps", lambda *_: pytest.fail("computed twice"))
+    assert replace(some(), warp=1.0).own_features(analysed(audio, features)).shape == features.values.shape

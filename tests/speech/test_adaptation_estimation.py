@@ -7,6 +7,7 @@ from scipy.signal import butter, lfilter
 from lipmotion.errors import InputError
 from lipmotion.pipeline.model import Model
 from lipmotion.speech.adaptation_estimation import EstimatedAdaptation, estimate_adaptation
+from lipmotion.speech.analysed_audio import analysed
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.recogniser import Recogniser
 from lipmotion.stats.affine import log_determinant
@@ -21,7 +22,7 @@ def voice() -> list[Audio]:
 
 
 @pytest.fixture(scope="module")
-def familiar(toy_model: Model, voice: list[Audio]) -> EstimatedAdaptation:
+def same_speaker(toy_model: Model, voice: list[Audio]) -> EstimatedAdaptation:
     return estimate_adaptation(toy_model.phones, voice)
 
 
@@ -31,26 +32,26 @@ def through_a_telephone(audio: Audio) -> Audio:
 
 
 def fit(model: Model, found: EstimatedAdaptation, audio: Audio) -> float:
-    heard = found.adaptation.own_features(audio, mfcc(audio))
-    return model.phones.fit(heard) + log_determinant(found.adaptation.own)
+    adapted = found.adaptation.own_features(analysed(audio))
+    return model.phones.fit(adapted) + log_determinant(found.adaptation.own)
 
 
-def test_the_known_voice_is_trusted_and_hardly_changed(
-    toy_model: Model, voice: list[Audio], familiar: EstimatedAdaptation
+def test_the_speaker_of_the_training_has_full_weight_and_changes_little(
+    toy_model: Model, voice: list[Audio], same_speaker: EstimatedAdaptation
 ) -> None:
-    one = familiar.adaptation
-    assert (one.warp, one.trust) == (1.0, 1.0)
-    assert 0.3 < familiar.speech_s / sum(audio.duration_s for audio in voice) < 1
+    one = same_speaker.adaptation
+    assert (one.warp, one.own_weight) == (1.0, 1.0)
+    assert 0.3 < same_speaker.speech_s / sum(audio.duration_s for audio in voice) < 1
     before, after = (Recogniser(toy_model.phones, "own", how) for how in (None, one))
     for audio in voice:
         features = mfcc(audio)
-        changed = one.own_features(audio, features) - features.values
+        changed = one.own_features(analysed(audio)) - features.values
         assert np.sqrt(np.square(changed).mean()) < 0.5
-        first, then = ([s.label.phone for s in hear.recognise(audio, features)] for hear in (before, after))
+        first, then = ([s.label.phone for s in recogniser.recognise(audio, features)] for recogniser in (before, after))
         assert sum(a != b for a, b in zip(first, then, strict=False)) + abs(len(first) - len(then)) <= 2
 
 
-def test_a_voice_in_another_channel_is_heard_better(toy_model: Model, voice: list[Audio]) -> None:
+def test_a_voice_in_another_channel_becomes_more_probable(toy_model: Model, voice: list[Audio]) -> None:
     far = [through_a_telephone(audio) for audio in voice]
     found = estimate_adaptation(toy_model.phones, far[1:])
     assert fit(toy_model, found, far[0]) > toy_model.phones.fit(mfcc(far[0], found.adaptation.warp).values) + 1
@@ -64,27 +65,29 @@ def test_a_short_recording_moves_features_deltas_and_their_deltas_apart(toy_mode
     assert np.abs(own[:, :-1][~between]).sum() > 39
 
 
-def test_much_speech_moves_them_together(familiar: EstimatedAdaptation, toy_model: Model, voice: list[Audio]) -> None:
+def test_much_speech_moves_them_together(
+    same_speaker: EstimatedAdaptation, toy_model: Model, voice: list[Audio]
+) -> None:
     long = estimate_adaptation(toy_model.phones, voice * 3)
-    assert long.speech_s == pytest.approx(3 * familiar.speech_s, rel=0.1)
+    assert long.speech_s == pytest.approx(3 * same_speaker.speech_s, rel=0.1)
     assert long.speech_s > 10
     assert np.abs(long.adaptation.own[:13, 13:39]).max() > 1e-3
 
 
 def test_the_same_recordings_give_the_same_adaptation(
-    toy_model: Model, voice: list[Audio], familiar: EstimatedAdaptation
+    toy_model: Model, voice: list[Audio], same_speaker: EstimatedAdaptation
 ) -> None:
     again = estimate_adaptation(toy_model.phones, voice).adaptation
-    assert np.array_equal(again.own, familiar.adaptation.own)
-    assert np.array_equal(again.general, familiar.adaptation.general)
+    assert np.array_equal(again.own, same_speaker.adaptation.own)
+    assert np.array_equal(again.general, same_speaker.adaptation.general)
 
 
 def test_silence_beside_speech_does_no_harm(
-    toy_model: Model, voice: list[Audio], familiar: EstimatedAdaptation
+    toy_model: Model, voice: list[Audio], same_speaker: EstimatedAdaptation
 ) -> None:
     silence = Audio(np.zeros(16_000, np.float32), 16_000)
     found = estimate_adaptation(toy_model.phones, [*voice, silence])
-    assert found.speech_s == pytest.approx(familiar.speech_s, rel=0.1)
+    assert found.speech_s == pytest.approx(same_speaker.speech_s, rel=0.1)
     assert np.isfinite(found.adaptation.own).all()
 
 

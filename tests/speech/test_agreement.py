@@ -38,7 +38,7 @@ def test_it_is_the_mean_over_frames_of_the_best_state_of_what_is_said(sentences:
     for frame, phone in spoken[::FRAME_STEP]:
         row = PHONES.index(names.get(phone, phone.upper()))
         wanted.append(density[frame].reshape(len(PHONES), 3)[row].max())
-    assert agreement_score(sentence.audio, words_of_name.units) == pytest.approx(np.mean(wanted), abs=1e-4)
+    assert agreement_score(sentence.audio, sentence.units) == pytest.approx(np.mean(wanted), abs=1e-4)
 
 
 def test_right_words_agree_and_wrong_ones_do_not(sentences: list[ToySentence], toy_model: Model) -> None:

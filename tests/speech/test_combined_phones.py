@@ -12,16 +12,16 @@ from lipmotion.units import PHONES, SILENCE
 
 def test_all_phones_are_there_and_the_own_ones_are_as_they_were(toy_model: Model) -> None:
     own = toy_model.phones
-    joint = combine_phones(own)
-    table = joint.hmm.table
+    combined = combine_phones(own)
+    table = combined.hmm.table
     assert set(table.units) == {*PHONES, *NOISES}
     assert table.free[0] == SILENCE
-    assert len(joint.columns) == len(table.names) == len(joint.hmm.mixtures.means)
+    assert len(combined.columns) == len(table.names) == len(combined.hmm.mixtures.means)
     for index, name in enumerate(own.table.names):
         there = table.names.index(name)
-        assert np.array_equal(joint.hmm.mixtures.means[there], own.mixtures.means[index])
-    assert joint.hmm.stay("b", 0) == own.stay("b", 0)
-    assert np.exp(joint.hmm.bigram.log_probability).sum(axis=1) == pytest.approx(1, abs=1e-4)
+        assert np.array_equal(combined.hmm.mixtures.means[there], own.mixtures.means[index])
+    assert combined.hmm.stay("b", 0) == own.stay("b", 0)
+    assert np.exp(combined.hmm.bigram.log_probability).sum(axis=1) == pytest.approx(1, abs=1e-4)
 
 
 def test_phones_never_heard_borrow(toy_model: Model) -> None:
@@ -39,10 +39,12 @@ def test_evidence_is_the_sum_of_both(
     monkeypatch.setattr(module, "KEPT_FRAMES", kept)
     draw = np.random.default_rng(0)
     own, general = draw.normal(size=(2, 9, 39)).astype(np.float32)
-    joint = combine_phones(toy_model.phones)
-    evidence = combined_log_likelihoods(joint, own, trust, general)
-    wanted = general_model().log_density(general)[:, joint.columns] + trust * joint.hmm.mixtures.log_likelihood(own)
-    assert evidence.frames == 9
-    assert evidence.log_density(0, 9, None) == pytest.approx(wanted, abs=2e-3)
+    combined = combine_phones(toy_model.phones)
+    log_likelihoods = combined_log_likelihoods(combined, own, trust, general)
+    wanted = general_model().log_density(general)[:, combined.columns] + trust * combined.hmm.mixtures.log_likelihood(
+        own
+    )
+    assert log_likelihoods.frames == 9
+    assert log_likelihoods.log_density(0, 9, None) == pytest.approx(wanted, abs=2e-3)
     some = np.array([5, 2, 40])
-    assert evidence.log_density(3, 7, some) == pytest.approx(wanted[3:7, some], abs=2e-3)
+    assert log_likelihoods.log_density(3, 7, some) == pytest.approx(wanted[3:7, some], abs=2e-3)

@@ -11,11 +11,18 @@ import pytest
 from lipmotion.errors import AlignmentError, InputError
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.speech import cached_recogniser as module
+from lipmotion.speech import recogniser as module
 from lipmotion.speech.audio_files import read_audio
 from lipmotion.speech.formant_synthesiser import synthesise
 from lipmotion.speech.mfcc import mfcc
-from lipmotion.speech.recogniser import FAMILIAR, FOREIGN, RECOGNISER_KINDS, SHORT_PAUSE_S, Recogniser, recogniser
+from lipmotion.speech.recogniser import (
+    FULL_WEIGHT_SCORE,
+    NO_WEIGHT_SCORE,
+    RECOGNISER_KINDS,
+    SHORT_PAUSE_S,
+    Recogniser,
+    cached_recogniser,
+)
 from lipmotion.speech.speaker_similarity import SpeakerSimilarity
 from lipmotion.testing.toy import WORDS, ToySentence, toy_sentences
 from lipmotion.types import Audio, Timeline, Unit
@@ -184,18 +191,24 @@ def test_an_unknown_kind() -> None:
         Recogniser(load_model().phones, "best")
 
 
-def test_the_own_models_are_heard_as_far_as_they_know_the_voice(
+def test_the_own_models_are_weighted_by_the_speaker_similarity(
     hmm: UnitHmm, sentences: list[ToySentence], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(module, "FEW_GAUSSIANS", 0)
-    trusted = []
-    real = module.joint_evidence
-    monkeypatch.setattr(module, "joint_evidence", lambda *given: trusted.append(given[2]) or real(*given))
-    audio = sentences[0].audio
-    for fit, wanted in ((0.0, 1.0), (FAMILIAR, 1.0), ((FAMILIAR + FOREIGN) / 2, 0.5), (FOREIGN, 0.0), (-99.0, 0.0)):
-        monkeypatch.setattr(module, "fitted", lambda *_, fit=fit: SpeakerSimilarity(mfcc(audio), 1.0, fit))
-        recognise(hmm, audio, "auto")
-        assert trusted[-1] == pytest.approx(wanted)
+    weights = []
+    real = module.combined_log_likelihoods
+    monkeypatch.setattr(module, "combined_log_likelihoods", lambda *given: weights.append(given[2]) or real(*given))
+    middle = (FULL_WEIGHT_SCORE + NO_WEIGHT_SCORE) / 2
+    for score, weight in (
+        (0.0, 1.0),
+        (FULL_WEIGHT_SCORE, 1.0),
+        (middle, 0.5),
+        (NO_WEIGHT_SCORE, 0.0),
+        (-99.0, 0.0),
+    ):
+        monkeypatch.setattr(module, "speaker_similarity", lambda *_, score=score: SpeakerSimilarity(1.0, score))
+        recognise(hmm, sentences[0].audio, "auto")
+        assert weights[-1] == pytest.approx(weight)
 
 
 def test_own_models_that_learned_little_do_not_align(hmm: UnitHmm, sentences: list[ToySentence]) -> None:
@@ -206,7 +219,7 @@ def test_own_models_that_learned_little_do_not_align(hmm: UnitHmm, sentences: li
     assert aligned == align(hmm, said.audio, said.words, lexicon, "general")
     assert aligned != align(hmm, said.audio, said.words, lexicon, "own")
     found = recognise(hmm, said.audio, "auto")
-    assert found == Recogniser(hmm, "general").place(said.audio, mfcc(said.audio), found)
+    assert found == Recogniser(hmm, "general").align_phones(said.audio, mfcc(said.audio), found)
 
 
 def test_own_models_that_learned_enough_align_too(
@@ -227,8 +240,8 @@ def test_noises_are_silence_and_silences_are_one(hmm: UnitHmm, monkeypatch: pyte
 
 
 def test_recognisers_are_kept(hmm: UnitHmm) -> None:
-    assert recogniser(hmm) is recogniser(hmm)
-    assert recogniser(hmm, "own") is not recogniser(hmm)
+    assert cached_recogniser(hmm) is cached_recogniser(hmm)
+    assert cached_recogniser(hmm, "own") is not cached_recogniser(hmm)
 
 
 @pytest.mark.recordings

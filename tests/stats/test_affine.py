@@ -7,11 +7,11 @@ from hypothesis import strategies as st
 
 from lipmotion.stats.affine import (
     AffineStatistics,
-    heard_statistics,
     identity,
-    improved,
+    improved_transform,
     log_determinant,
-    own_statistics,
+    prior_statistics,
+    transform_statistics,
     transformed,
 )
 from lipmotion.stats.mixture import Mixtures
@@ -59,7 +59,7 @@ def test_statistics_are_those_of_the_sums_written_out(seed: int) -> None:
     draw = np.random.default_rng(seed)
     mixtures, transform = random_mixtures(draw), random_transform(draw)
     features, densities = spoken(draw, mixtures, 20)
-    found, log_likelihood = heard_statistics(mixtures, features, densities, transform)
+    found, log_likelihood = transform_statistics(mixtures, features, densities, transform)
     quadratic, linear = oracle.statistics(mixtures, features, densities, transform)
     assert found.count == 20
     np.testing.assert_allclose(found.quadratic, quadratic, rtol=1e-4, atol=1e-4)
@@ -72,7 +72,7 @@ def test_the_objective_has_the_slope_of_the_likelihood() -> None:
     draw = np.random.default_rng(5)
     mixtures, transform = random_mixtures(draw), random_transform(draw)
     features, densities = spoken(draw, mixtures, 20)
-    statistics, _ = heard_statistics(mixtures, features, densities, transform)
+    statistics, _ = transform_statistics(mixtures, features, densities, transform)
     slope = gradient(statistics, transform)
     for place in np.ndindex(*transform.shape):
         moved = np.zeros(transform.shape)
@@ -87,11 +87,11 @@ def test_the_objective_has_the_slope_of_the_likelihood() -> None:
 def test_no_row_lowers_the_objective(seed: int, frames: int) -> None:
     draw = np.random.default_rng(seed)
     mixtures, transform = random_mixtures(draw), random_transform(draw)
-    statistics, _ = heard_statistics(mixtures, *spoken(draw, mixtures, frames), transform)
-    statistics += own_statistics(mixtures, np.arange(4)).times(5)
+    statistics, _ = transform_statistics(mixtures, *spoken(draw, mixtures, frames), transform)
+    statistics += prior_statistics(mixtures, np.arange(4)).times(5)
     values = [statistics.objective(transform)]
     for _ in range(4):
-        transform = improved(transform, statistics, ALL, sweeps=1)
+        transform = improved_transform(transform, statistics, ALL, sweeps=1)
         values.append(statistics.objective(transform))
     assert (np.diff(values) >= -1e-8 * np.abs(values[1:])).all()
 
@@ -100,8 +100,8 @@ def test_at_the_end_nothing_rises_any_more() -> None:
     draw = np.random.default_rng(8)
     mixtures = random_mixtures(draw)
     features, densities = spoken(draw, mixtures, 200)
-    statistics, _ = heard_statistics(mixtures, features, densities, identity(SIZE))
-    best = improved(identity(SIZE), statistics, ALL, sweeps=50)
+    statistics, _ = transform_statistics(mixtures, features, densities, identity(SIZE))
+    best = improved_transform(identity(SIZE), statistics, ALL, sweeps=50)
     assert np.abs(gradient(statistics, best)).max() < 1e-2
     assert np.abs(gradient(statistics, identity(SIZE))).max() > 1
 
@@ -112,12 +112,12 @@ def test_the_likelihood_never_falls() -> None:
     mixtures = random_mixtures(draw)
     features, densities = spoken(draw, mixtures, 60)
     features = transformed(features, random_transform(draw))
-    prior = own_statistics(mixtures, np.arange(4)).times(30)
+    prior = prior_statistics(mixtures, np.arange(4)).times(30)
     transform, values = identity(SIZE), []
     for _ in range(12):
-        statistics, log_likelihood = heard_statistics(mixtures, features, densities, transform)
+        statistics, log_likelihood = transform_statistics(mixtures, features, densities, transform)
         values.append(log_likelihood + prior.objective(transform))
-        transform = improved(transform, statistics + prior, ALL)
+        transform = improved_transform(transform, statistics + prior, ALL)
     assert (np.diff(values) > -1e-3).all()
     assert values[-1] > values[0] + 10
 
@@ -128,23 +128,23 @@ def test_a_known_distortion_is_undone() -> None:
     clean, densities = spoken(draw, mixtures, 4000)
     distortion = random_transform(draw)
     features, transform = transformed(clean, distortion), identity(SIZE)
-    _, before = heard_statistics(mixtures, features, densities, transform)
+    _, before = transform_statistics(mixtures, features, densities, transform)
     for _ in range(30):
-        statistics, _ = heard_statistics(mixtures, features, densities, transform)
-        transform = improved(transform, statistics, ALL)
+        statistics, _ = transform_statistics(mixtures, features, densities, transform)
+        transform = improved_transform(transform, statistics, ALL)
     restored = transformed(features, transform)
     assert np.abs(restored - clean).mean() < 0.1 < np.abs(features - clean).mean()
-    _, after = heard_statistics(mixtures, features, densities, transform)
+    _, after = transform_statistics(mixtures, features, densities, transform)
     assert after > before + 1000
     assert log_determinant(transform) == pytest.approx(-log_determinant(distortion), abs=0.1)
 
 
 def test_the_models_own_data_ask_for_no_change() -> None:
     mixtures = random_mixtures(np.random.default_rng(4))
-    prior = own_statistics(mixtures, np.array([0, 2]))
+    prior = prior_statistics(mixtures, np.array([0, 2]))
     assert prior.count == pytest.approx(1)
     assert np.abs(gradient(prior, identity(SIZE))).max() < 1e-6
-    np.testing.assert_allclose(improved(identity(SIZE), prior, ALL), identity(SIZE), atol=1e-8)
+    np.testing.assert_allclose(improved_transform(identity(SIZE), prior, ALL), identity(SIZE), atol=1e-8)
     for seed in range(20):
         other = random_transform(np.random.default_rng(seed))
         assert prior.objective(other) < prior.objective(identity(SIZE))
@@ -154,8 +154,8 @@ def test_own_statistics_are_those_of_many_frames_drawn() -> None:
     draw = np.random.default_rng(6)
     mixtures = random_mixtures(draw, densities=2, gaussians=1)
     features, densities = spoken(draw, mixtures, 40_000)
-    found, _ = heard_statistics(mixtures, features, densities, identity(SIZE))
-    expected = own_statistics(mixtures, np.arange(2)).times(40_000)
+    found, _ = transform_statistics(mixtures, features, densities, identity(SIZE))
+    expected = prior_statistics(mixtures, np.arange(2)).times(40_000)
     np.testing.assert_allclose(found.quadratic / 40_000, expected.quadratic / 40_000, atol=0.3)
     np.testing.assert_allclose(found.linear / 40_000, expected.linear / 40_000, atol=0.3)
 
@@ -164,7 +164,7 @@ def test_switched_off_gaussians_say_nothing() -> None:
     mixtures = random_mixtures(np.random.default_rng(4))
     mixtures.log_weights[:] = [0, -np.inf]
     alone = Mixtures(mixtures.log_weights[:, :1], mixtures.means[:, :1], mixtures.variances[:, :1])
-    found, wanted = (own_statistics(one, np.arange(4)) for one in (mixtures, alone))
+    found, wanted = (prior_statistics(one, np.arange(4)) for one in (mixtures, alone))
     np.testing.assert_allclose(found.quadratic, wanted.quadratic)
     np.testing.assert_allclose(found.linear, wanted.linear)
 
@@ -173,10 +173,10 @@ def test_a_prior_holds_a_transform_of_few_frames_back() -> None:
     draw = np.random.default_rng(9)
     mixtures = random_mixtures(draw)
     features, densities = spoken(draw, mixtures, 10)
-    statistics, _ = heard_statistics(mixtures, features + 2, densities, identity(SIZE))
-    prior = own_statistics(mixtures, np.arange(4))
+    statistics, _ = transform_statistics(mixtures, features + 2, densities, identity(SIZE))
+    prior = prior_statistics(mixtures, np.arange(4))
     moved = [
-        np.abs(improved(identity(SIZE), statistics + prior.times(frames), ALL) - identity(SIZE)).max()
+        np.abs(improved_transform(identity(SIZE), statistics + prior.times(frames), ALL) - identity(SIZE)).max()
         for frames in (1, 100, 1e6)
     ]
     assert moved[0] > moved[1] > moved[2]
@@ -186,11 +186,11 @@ def test_a_prior_holds_a_transform_of_few_frames_back() -> None:
 def test_entries_that_are_not_free_stay() -> None:
     draw = np.random.default_rng(3)
     mixtures, start = random_mixtures(draw), random_transform(draw)
-    statistics, _ = heard_statistics(mixtures, *spoken(draw, mixtures, 50), start)
+    statistics, _ = transform_statistics(mixtures, *spoken(draw, mixtures, 50), start)
     free = np.eye(SIZE, SIZE + 1, dtype=bool)
     free[:, -1] = True
-    better = improved(start, statistics, free)
+    better = improved_transform(start, statistics, free)
     assert np.array_equal(better[~free], start[~free])
     assert statistics.objective(better) > statistics.objective(start)
-    slope = gradient(statistics, improved(start, statistics, free, sweeps=60))
+    slope = gradient(statistics, improved_transform(start, statistics, free, sweeps=60))
     assert np.abs(slope[free]).max() < 1e-2 < np.abs(slope[~free]).max()

@@ -5,9 +5,9 @@ import pytest
 
 from lipmotion.stats.trees import (
     Question,
-    gaussian_likelihood,
-    grow,
-    multispace_likelihood,
+    gaussian_log_likelihood,
+    grow_tree,
+    multispace_log_likelihood,
     tree_arrays,
     trees_from_arrays,
 )
@@ -29,8 +29,8 @@ def sample(mean_of, frames=20, seed=0):
 
 
 def grown(values, factor=1.0, least=10.0, contexts=CONTEXTS):
-    return grow(
-        contexts, statistics_of(values), QUESTIONS, gaussian_likelihood, parameters=4, factor=factor, least=least
+    return grow_tree(
+        contexts, statistics_of(values), QUESTIONS, gaussian_log_likelihood, parameters=4, factor=factor, least=least
     )
 
 
@@ -38,7 +38,7 @@ def test_the_likelihood_is_that_of_the_gaussian_fitted_to_the_frames():
     x = np.random.default_rng(0).normal([1, -2], [0.5, 3], (50, 2))
     mean, variance = x.mean(axis=0), x.var(axis=0)
     expected = (-0.5 * (np.log(2 * np.pi * variance) + (x - mean) ** 2 / variance)).sum()
-    assert gaussian_likelihood(statistics_of([x]))[0] == pytest.approx(expected, rel=1e-9)
+    assert gaussian_log_likelihood(statistics_of([x]))[0] == pytest.approx(expected, rel=1e-9)
 
 
 def test_the_question_that_matters_is_asked_first():
@@ -93,7 +93,9 @@ def test_a_context_never_seen_is_treated_like_those_that_answer_alike():
     seen = [context for context in CONTEXTS if context[0] != "b"]
     values = [x for x, c in zip(sample(lambda c: 5.0 * (c[0] in "ab")), CONTEXTS, strict=True) if c[0] != "b"]
     questions = [q for q in QUESTIONS if q.name == "early"]  # the only ones that know b
-    tree = grow(seen, statistics_of(values), questions, gaussian_likelihood, parameters=4, factor=1.0, least=10.0)
+    tree = grow_tree(
+        seen, statistics_of(values), questions, gaussian_log_likelihood, parameters=4, factor=1.0, least=10.0
+    )
     assert tree.path(("b", "a", "a"))[-1] == tree.path(("a", "a", "a"))[-1]
     assert tree.path(("b", "a", "a"))[-1] != tree.path(("c", "a", "a"))[-1]
 
@@ -149,10 +151,12 @@ def test_frames_without_a_value_are_as_likely_as_they_are_frequent():
     known = x[:3]
     gaussian = -0.5 * (np.log(2 * np.pi * known.var()) + (known - known.mean()) ** 2 / known.var())
     expected = 3 * np.log(0.6) + 2 * np.log(0.4) + gaussian.sum()
-    assert multispace_likelihood(spaces_of([x]))[0] == pytest.approx(expected)
-    assert multispace_likelihood(spaces_of([np.full(4, np.nan)]))[0] == pytest.approx(0)
-    assert multispace_likelihood(spaces_of([known])) == pytest.approx(gaussian_likelihood(spaces_of([known])[:, 1:]))
-    assert multispace_likelihood(np.zeros((1, 4)))[0] == pytest.approx(0)
+    assert multispace_log_likelihood(spaces_of([x]))[0] == pytest.approx(expected)
+    assert multispace_log_likelihood(spaces_of([np.full(4, np.nan)]))[0] == pytest.approx(0)
+    assert multispace_log_likelihood(spaces_of([known])) == pytest.approx(
+        gaussian_log_likelihood(spaces_of([known])[:, 1:])
+    )
+    assert multispace_log_likelihood(np.zeros((1, 4)))[0] == pytest.approx(0)
 
 
 def test_voicing_alone_is_worth_a_question():
@@ -161,15 +165,17 @@ def test_voicing_alone_is_worth_a_question():
         np.where(draw.random(30) < (0.9 if context[1] in "ab" else 0.1), draw.normal(0, 1, 30), np.nan)
         for context in CONTEXTS
     ]
-    tree = grow(CONTEXTS, spaces_of(values), QUESTIONS, multispace_likelihood, parameters=3, factor=1.0, least=10.0)
+    tree = grow_tree(
+        CONTEXTS, spaces_of(values), QUESTIONS, multispace_log_likelihood, parameters=3, factor=1.0, least=10.0
+    )
     assert tree.questions[tree.asked[0]] == Question(1, "early", frozenset("ab"))
 
 
 def test_frames_that_are_all_alike_gain_no_more_than_the_least_variance_allows():
     x = np.full((5, 1), 3.0)
-    assert gaussian_likelihood(statistics_of([x]), 0.5)[0] == pytest.approx(-2.5 * np.log(2 * np.pi * 0.5))
+    assert gaussian_log_likelihood(statistics_of([x]), 0.5)[0] == pytest.approx(-2.5 * np.log(2 * np.pi * 0.5))
     spread = np.array([[0.0], [2.0]])  # a variance of 1 under a Gaussian of 4
-    assert gaussian_likelihood(statistics_of([spread]), 4.0)[0] == pytest.approx(-(np.log(2 * np.pi * 4) + 0.25))
+    assert gaussian_log_likelihood(statistics_of([spread]), 4.0)[0] == pytest.approx(-(np.log(2 * np.pi * 4) + 0.25))
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -181,8 +187,10 @@ def test_of_questions_that_split_alike_the_first_is_asked_however_sums_are_round
     rounding = np.random.default_rng(seed)
 
     def likelihood(statistics):
-        found = gaussian_likelihood(statistics)
+        found = gaussian_log_likelihood(statistics)
         return found * (1 + 1e-14 * rounding.normal(size=found.shape))
 
-    tree = grow(CONTEXTS, statistics_of(values), [*alike, *others], likelihood, parameters=4, factor=1.0, least=10.0)
+    tree = grow_tree(
+        CONTEXTS, statistics_of(values), [*alike, *others], likelihood, parameters=4, factor=1.0, least=10.0
+    )
     assert tree.questions[tree.asked[0]].name == "0"

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import ExportError
-from lipmotion.storage.checkpoint import NOTHING_KEPT, Checkpoint
+from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
 
 ARRAYS = {
     "single": np.float32([[1 / 3, np.nan], [-0.0, np.inf]]),
@@ -40,8 +40,8 @@ def test_the_last_state_counts(tmp_path: Path) -> None:
 
 
 def test_without_a_folder_nothing_is_kept() -> None:
-    NOTHING_KEPT.save("stage", ARRAYS)
-    assert NOTHING_KEPT.load("stage") is None
+    NO_CHECKPOINT.save("stage", ARRAYS)
+    assert NO_CHECKPOINT.load("stage") is None
 
 
 def test_another_job_is_not_gone_on_with(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from lipmotion.errors import ExportError
-from lipmotion.storage.json_text import as_json, defined, from_json
+from lipmotion.storage.json_text import as_json, from_json, nan_as_null
 
 NAN, INFINITE = float("nan"), float("inf")
 
@@ -24,7 +24,7 @@ def test_numbers_that_json_does_not_have(content: object) -> None:
 
 def test_a_figure_that_nothing_defines_is_null() -> None:
     nested = {"a": [1.5, NAN, (INFINITE, "b", -INFINITE)], "c": 2, "d": "nan", "e": None, "f": True}
-    assert defined(nested) == {"a": [1.5, None, (None, "b", None)], "c": 2, "d": "nan", "e": None, "f": True}
+    assert nan_as_null(nested) == {"a": [1.5, None, (None, "b", None)], "c": 2, "d": "nan", "e": None, "f": True}
 
 
 @pytest.mark.parametrize(

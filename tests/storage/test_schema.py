@@ -3,17 +3,26 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lipmotion.storage.schema import BELOW_ONE, NEGATIVE, POSITIVE, Member, check_index, checked, only, under
+from lipmotion.storage.schema import (
+    BELOW_ONE,
+    NEGATIVE,
+    POSITIVE,
+    ArraySpec,
+    arrays_under,
+    check_index,
+    checked_arrays,
+    refuse_undeclared,
+)
 
 TABLE = {
-    "means": Member(np.float32, "G 3 D", -500, 500),
-    "variances": Member(np.float32, "G 3 D", POSITIVE),
-    "log_weights": Member(np.float32, "G", -np.inf, 0),
-    "share": Member(np.float64, "G", POSITIVE, BELOW_ONE),
-    "log_stay": Member(np.float64, "G", -10, NEGATIVE),
-    "rows": Member(np.int32, "n", -1, 9),
-    "names": Member(np.str_, "D"),
-    "weights": Member(np.float64, "D", 0, whole=True, optional=True),
+    "means": ArraySpec(np.float32, "G 3 D", -500, 500),
+    "variances": ArraySpec(np.float32, "G 3 D", POSITIVE),
+    "log_weights": ArraySpec(np.float32, "G", -np.inf, 0),
+    "share": ArraySpec(np.float64, "G", POSITIVE, BELOW_ONE),
+    "log_stay": ArraySpec(np.float64, "G", -10, NEGATIVE),
+    "rows": ArraySpec(np.int32, "n", -1, 9),
+    "names": ArraySpec(np.str_, "D"),
+    "weights": ArraySpec(np.float64, "D", 0, whole=True, optional=True),
 }
 
 
@@ -30,14 +39,14 @@ def good() -> dict[str, np.ndarray]:
 
 
 def test_arrays_become_what_the_table_says() -> None:
-    found = checked(good(), TABLE)
+    found = checked_arrays(good(), TABLE)
     assert found.sizes == {"G": 4, "D": 2, "n": 0}
     assert {name: found[name].dtype.kind for name in found.arrays} == dict.fromkeys(TABLE.keys() - {"weights"}) | {
         "means": "f", "variances": "f", "log_weights": "f", "share": "f", "log_stay": "f", "rows": "i", "names": "U",
     }  # fmt: skip
     assert (found["means"].dtype, found["share"].dtype, found["rows"].dtype) == (np.float32, np.float64, np.int32)
     assert np.array_equal(found["means"], good()["means"])
-    assert checked(good() | {"weights": np.array([1, 2])}, TABLE)["weights"].tolist() == [1.0, 2.0]
+    assert checked_arrays(good() | {"weights": np.array([1, 2])}, TABLE)["weights"].tolist() == [1.0, 2.0]
 
 
 def put(name: str, value: float) -> dict[str, np.ndarray]:
@@ -76,35 +85,35 @@ def put(name: str, value: float) -> dict[str, np.ndarray]:
 )
 def test_what_is_refused(changes: dict[str, np.ndarray], says: str) -> None:
     with pytest.raises(ValueError, match=says) as caught:
-        checked(good() | changes, TABLE)
+        checked_arrays(good() | changes, TABLE)
     assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("name", sorted(TABLE.keys() - {"weights"}))
 def test_a_missing_array_is_named(name: str) -> None:
     with pytest.raises(KeyError, match=f"{name} is missing"):
-        checked({key: array for key, array in good().items() if key != name}, TABLE)
+        checked_arrays({key: array for key, array in good().items() if key != name}, TABLE)
 
 
 def test_known_sizes_hold() -> None:
-    assert checked(good(), TABLE, G=4).sizes["G"] == 4
+    assert checked_arrays(good(), TABLE, G=4).sizes["G"] == 4
     with pytest.raises(ValueError, match=r"required \(5, 3, D\)"):
-        checked(good(), TABLE, G=5)
+        checked_arrays(good(), TABLE, G=5)
 
 
 def test_the_smallest_numbers_of_half_precision_are_more_than_0() -> None:
     tiny = np.full((4, 3, 2), np.float16(6e-8))
-    assert (checked(good() | {"variances": tiny}, TABLE)["variances"] > 0).all()
+    assert (checked_arrays(good() | {"variances": tiny}, TABLE)["variances"] > 0).all()
 
 
 def test_arrays_that_no_table_has() -> None:
-    only(good(), TABLE, ["other"])
+    refuse_undeclared(good(), TABLE, ["other"])
     with pytest.raises(ValueError, match="undeclared 'other'"):
-        only([*good(), "other"], TABLE)
+        refuse_undeclared([*good(), "other"], TABLE)
 
 
 def test_parts_have_names_of_their_own() -> None:
-    assert list(under({"a/x": np.zeros(1), "ab/y": np.zeros(1), "a/b/z": np.zeros(1)}, "a/")) == ["x", "b/z"]
+    assert list(arrays_under({"a/x": np.zeros(1), "ab/y": np.zeros(1), "a/b/z": np.zeros(1)}, "a/")) == ["x", "b/z"]
 
 
 @pytest.mark.parametrize("numbers", [[0, 3], [-1]])

@@ -12,11 +12,11 @@ import pytest
 from numpy.typing import NDArray
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.speech.read import read_audio
+from lipmotion.speech.audio_files import read_audio
 from lipmotion.testing.toy import (
-    LEAD_S,
+    LIP_LEAD_S,
     LIPS_TOUCH,
-    SHAPES,
+    LIP_TARGETS,
     WORDS,
     ToySentence,
     toy_motion,
@@ -50,7 +50,7 @@ def test_words_are_pronounced_as_in_the_dictionary(word: str) -> None:
 
 
 def test_the_lips_know_the_inventory() -> None:
-    assert sorted(SHAPES) == sorted(PHONES)
+    assert sorted(LIP_TARGETS) == sorted(PHONES)
 
 
 def test_sentences_say_their_words(sentences: list[ToySentence]) -> None:
@@ -129,8 +129,8 @@ def test_lips_are_rounded_in_uw_and_spread_in_iy() -> None:
 def test_the_lips_lead_the_sound() -> None:
     motion = toy_motion(spelled(("sil", 0.5), ("aa", 0.2), ("sil", 0.5)), 100.0)
     middle_s = np.average(motion.time_s, weights=motion["opening"])
-    assert middle_s == pytest.approx(0.6 - LEAD_S, abs=0.002)
-    assert 0 < LEAD_S < 1 / FPS
+    assert middle_s == pytest.approx(0.6 - LIP_LEAD_S, abs=0.002)
+    assert 0 < LIP_LEAD_S < 1 / FPS
 
 
 def test_motion_is_smooth_and_the_same_at_every_rate(sentences: list[ToySentence]) -> None:

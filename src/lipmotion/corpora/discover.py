@@ -2,18 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
-from lipmotion.corpora.facegood import read_facegood
-from lipmotion.corpora.folder import MOTION_SUFFIXES, read_folder
-from lipmotion.corpora.grid import read_grid
+from lipmotion.corpora.folder import MOTION_SUFFIXES
 from lipmotion.corpora.source_recordings import VIDEO_SUFFIXES, RecordingFolder
 from lipmotion.errors import CorpusError, InputError
+from lipmotion.extensions import Registry
 from lipmotion.storage.files import check_listable
+
+CorpusReader = Callable[[Path], RecordingFolder | None]
+"""Returns the recordings in a folder; None where the folder is not of the reader's kind."""
+READERS: Registry[CorpusReader] = Registry(
+    "corpus reader",
+    "lipmotion.corpus_readers",
+    {
+        "grid": "lipmotion.corpora.grid:read_grid",
+        "facegood": "lipmotion.corpora.facegood:read_facegood",
+        "folder": "lipmotion.corpora.folder:read_folder",
+    },
+)
 
 
 def discover(directory: Path) -> RecordingFolder:
-    """Return what a folder holds, read by the first reader that fits: GRID, FACEGOOD, then any other folder.
+    """Return what a folder holds, read by the first reader that fits.
+
+    GRID, FACEGOOD, then what installed packages add in alphabetical order, then any folder of videos or sounds.
 
     Raises InputError: no such folder. Raises CorpusError: no recordings in it, or its lists contradict each other.
     """
@@ -22,10 +36,15 @@ def discover(directory: Path) -> RecordingFolder:
     if not directory.is_dir():
         raise InputError(f"{directory}: no such folder; give a folder of recordings")
     check_listable(directory)
-    found = read_grid(directory) or read_facegood(directory) or read_folder(directory)
+    found = next(filter(None, (READERS.load(name)(directory) for name in _order())))
     if not found.items and not found.problems:
         raise CorpusError(
             f"{directory}: no videos in it, and no sounds with motion beside them; required: files ending in one of "
             f"{' '.join(sorted(VIDEO_SUFFIXES))}, or a sound and a file of the same name in {' '.join(MOTION_SUFFIXES)}"
         )
     return found
+
+
+def _order() -> list[str]:
+    """Return the names of all readers; the one that reads any folder is the last."""
+    return [name for name in READERS.names if name != "folder"] + ["folder"]

@@ -1,4 +1,4 @@
-"""Motion files: the format follows from the file's suffix."""
+"""Motion files: the format is chosen by the suffix, among the built-in ones and those that installed packages add."""
 
 from __future__ import annotations
 
@@ -9,36 +9,44 @@ from pathlib import Path
 import numpy as np
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.export.motion import motion_csv, motion_json, motion_npz
+from lipmotion.extensions import Registry
 from lipmotion.storage.files import check_regular, whole_file
 from lipmotion.types import Generation, Motion, Timeline, Unit
 
 About = Mapping[str, str]
+LARGEST_MOTION = 1 << 31
+"""Bytes of a motion file: four hours of a hundred channels."""
 
 
 @dataclass(frozen=True)
 class MotionFormat:
-    """How one kind of file is written and read; both functions are in the module named after it.
+    """How one kind of motion file is written and read.
 
-    write : path, what to write, and where its speech and its model came from
-    read  : path → motion and units; raises InputError
+    write : writes a result to a path; the mappings say where its speech and its model came from
+    read  : returns motion and units of a file, and raises InputError; None: the format is only written
     check : raises ExportError for motion that does not fit into such a file
     """
 
     write: Callable[[Path, Generation, About, About], None]
-    read: Callable[[Path], tuple[Motion, Timeline[Unit]]]
+    read: Callable[[Path], tuple[Motion, Timeline[Unit]]] | None = None
     check: Callable[[Motion], None] = lambda _: None
 
 
-_FORMATS: dict[str, MotionFormat] = {
-    ".json": MotionFormat(motion_json.write, motion_json.read),
-    ".csv": MotionFormat(motion_csv.write, motion_csv.read, motion_csv.check),
-    ".npz": MotionFormat(motion_npz.write, motion_npz.read),
-}
-MOTION_SUFFIXES: tuple[str, ...] = tuple(_FORMATS)
-"""The suffixes that ``write_motion`` knows."""
-LARGEST_MOTION = 1 << 31
-"""Bytes of a motion file: four hours of a hundred channels."""
+MOTION_FORMATS: Registry[MotionFormat] = Registry(
+    "motion format",
+    "lipmotion.exporters",
+    {
+        "json": "lipmotion.export.motion.motion_json:MOTION_FORMAT",
+        "csv": "lipmotion.export.motion.motion_csv:MOTION_FORMAT",
+        "npz": "lipmotion.export.motion.motion_npz:MOTION_FORMAT",
+    },
+)
+"""Motion formats by suffix, without the dot."""
+
+
+def motion_suffixes() -> tuple[str, ...]:
+    """Return the suffixes of all motion formats, with the dot."""
+    return tuple(f".{name}" for name in MOTION_FORMATS.names)
 
 
 def write_motion(path: Path, generation: Generation, *, source: dict[str, str], model: dict[str, str]) -> None:
@@ -49,14 +57,15 @@ def write_motion(path: Path, generation: Generation, *, source: dict[str, str], 
     """
     check_motion(path, generation.motion)
     with whole_file(path) as temporary:
-        _FORMATS[path.suffix.lower()].write(temporary, generation, source, model)
+        _format_of(path).write(temporary, generation, source, model)
 
 
 def check_motion(path: Path, motion: Motion) -> None:
     """Raise ExportError if motion cannot be written to a file of that name: unknown suffix, or it does not fit."""
-    chosen = _FORMATS.get(path.suffix.lower())
-    if chosen is None:
-        raise ExportError(f"{path}: cannot write motion as {_suffix(path)}; use one of {', '.join(MOTION_SUFFIXES)}")
+    try:
+        chosen = _format_of(path)
+    except InputError as error:
+        raise ExportError(f"{path}: cannot write motion as {_suffix(path)}; use one of {_known()}") from error
     if not np.isfinite(motion.values).all():
         raise ExportError(f"{path}: the motion has values that are not finite; interpolate them before writing")
     chosen.check(motion)
@@ -68,15 +77,17 @@ def read_motion(path: str | Path) -> tuple[Motion, Timeline[Unit]]:
     Raises InputError: unknown suffix, no such file, or not a motion file.
     """
     path = Path(path)
-    chosen = _FORMATS.get(path.suffix.lower())
-    if chosen is None:
-        raise InputError(f"{path}: cannot read motion from {_suffix(path)}; use one of {', '.join(MOTION_SUFFIXES)}")
+    read = None
+    if path.suffix.lower() in motion_suffixes():
+        read = _format_of(path).read
+    if read is None:
+        raise InputError(f"{path}: cannot read motion from {_suffix(path)}; use one of {_known()}")
     check_regular(path, "motion file")
     try:
         size = path.stat().st_size
         if size > LARGEST_MOTION:
             raise InputError(f"{size} bytes, required at most {LARGEST_MOTION}: is it a motion file?")
-        motion, units = chosen.read(path)
+        motion, units = read(path)
         if not np.isfinite(motion.values).all():
             raise InputError("there are values that are not finite; interpolate them first")
         return motion, units
@@ -84,6 +95,18 @@ def read_motion(path: str | Path) -> tuple[Motion, Timeline[Unit]]:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
+
+
+def _format_of(path: Path) -> MotionFormat:
+    """Return the format of a file's suffix. Raises InputError: none, or what a package adds is no format."""
+    chosen = MOTION_FORMATS.load(path.suffix.lower().removeprefix("."))
+    if not isinstance(chosen, MotionFormat):
+        raise InputError(f"what an installed package adds as {_suffix(path)} is {chosen!r}, required a MotionFormat")
+    return chosen
+
+
+def _known() -> str:
+    return ", ".join(motion_suffixes())
 
 
 def _suffix(path: Path) -> str:

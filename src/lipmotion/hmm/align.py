@@ -1,4 +1,4 @@
-"""Forced alignment: where each unit of a known sequence begins and ends."""
+"""Forced alignment: the first frame of each unit of a known sequence, and the choice of pronunciations."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from lipmotion.hmm.model import UnitHmm
 from lipmotion.hmm.network import Network, NetworkBuilder
 
 FEW_ARCS, ARCS_A_FRAME = 1_000_000, 10
-"""Arcs of a network that may always be built, and how many more for each frame; sentences need about one a frame."""
+"""The largest number of arcs of a network, and how many more for each frame; sentences need about one a frame."""
 
 
 @dataclass(frozen=True, eq=False)
-class Chain:
+class StateSequence:
     """The states of a sequence of units, one after another.
 
-    names     : the state's full name in its context, and its density without context
+    names     : of each state, its full name in context, and its density without context
     densities : [shape=(S,)], the density of each state
-    plain     : [shape=(S,)], its density without context, which carries its duration
-    positions : [shape=(S,)], which unit of the sequence it belongs to
+    plain     : [shape=(S,)], its density without context, which has its duration
+    positions : [shape=(S,)], the unit of the sequence that it belongs to
     """
 
     names: tuple[tuple[str, int], ...]
@@ -34,45 +34,45 @@ class Chain:
     positions: NDArray[np.intp]
 
 
-def chain_of(hmm: UnitHmm, units: Sequence[str]) -> Chain:
-    """Return the chain of context-dependent states of a unit sequence; beyond its ends lies silence."""
+def state_sequence(hmm: UnitHmm, units: Sequence[str]) -> StateSequence:
+    """Return the context-dependent states of a unit sequence; beyond its ends lies silence."""
     table, silence = hmm.table, hmm.table.free[0]
-    around = [silence, *(silence if unit in table.free else unit for unit in units), silence]
+    neighbours = [silence, *(silence if unit in table.free else unit for unit in units), silence]
     names: list[tuple[str, int]] = []
     densities, positions = [], []
     for i, unit in enumerate(units):
         for state in range(table.count(unit)):
-            names.append((table.name(around[i], unit, around[i + 2], state), table.density(unit, state)))
-            densities.append(table.density(unit, state, table.neighbour(around[i], unit, around[i + 2], state)))
+            names.append((table.name(neighbours[i], unit, neighbours[i + 2], state), table.density(unit, state)))
+            densities.append(table.density(unit, state, table.neighbour(neighbours[i], unit, neighbours[i + 2], state)))
             positions.append(i)
     plain = np.array([plain for _, plain in names], np.intp)
-    return Chain(tuple(names), np.array(densities, np.intp), plain, np.array(positions, np.intp))
+    return StateSequence(tuple(names), np.array(densities, np.intp), plain, np.array(positions, np.intp))
 
 
 def state_path(
-    hmm: UnitHmm, evidence: LogLikelihoods, units: Sequence[str]
+    hmm: UnitHmm, log_likelihoods: LogLikelihoods, units: Sequence[str]
 ) -> tuple[tuple[tuple[str, int], ...], NDArray[np.intp]]:
-    """Return the states of a unit sequence (``Chain.names``) and which of them holds in each frame [shape=(T,)].
+    """Return the states of a unit sequence (``StateSequence.names``) and which of them holds in each frame [shape=(T,)].
 
     Raises AlignmentError: fewer frames than states.
     """
-    chain = chain_of(hmm, units)
+    chain = state_sequence(hmm, units)
     used, local = np.unique(chain.densities, return_inverse=True)
-    path = _chain_network(hmm, chain, local).best_path(evidence, used)
+    path = _chain_network(hmm, chain, local).best_path(log_likelihoods, used)
     return chain.names, path
 
 
-def align_units(hmm: UnitHmm, evidence: LogLikelihoods, units: Sequence[str]) -> NDArray[np.intp]:
+def align_units(hmm: UnitHmm, log_likelihoods: LogLikelihoods, units: Sequence[str]) -> NDArray[np.intp]:
     """Return the first frame of each unit, and the frame count at the end [shape=(len(units) + 1,)].
 
     Raises AlignmentError: fewer frames than states.
     """
-    _, path = state_path(hmm, evidence, units)
-    positions = chain_of(hmm, units).positions[path]
-    return np.append(np.searchsorted(positions, np.arange(len(units))), evidence.frames)
+    _, path = state_path(hmm, log_likelihoods, units)
+    positions = state_sequence(hmm, units).positions[path]
+    return np.append(np.searchsorted(positions, np.arange(len(units))), log_likelihoods.frames)
 
 
-def _chain_network(hmm: UnitHmm, chain: Chain, emission: NDArray[np.intp]) -> Network:
+def _chain_network(hmm: UnitHmm, chain: StateSequence, emission: NDArray[np.intp]) -> Network:
     builder = NetworkBuilder()
     stay = hmm.log_stay[chain.plain].astype(float)
     move = np.log(-np.expm1(stay))
@@ -85,8 +85,8 @@ def _chain_network(hmm: UnitHmm, chain: Chain, emission: NDArray[np.intp]) -> Ne
     return builder.build()
 
 
-class Said(NamedTuple):
-    """One part of what was said: the word's position (-1: no word), which of its pronunciations, its units."""
+class SpokenWord(NamedTuple):
+    """One part of an utterance: the word's position (-1: no word), which of its pronunciations, its units."""
 
     word: int
     variant: int
@@ -94,58 +94,58 @@ class Said(NamedTuple):
 
 
 def choose_pronunciations(
-    hmm: UnitHmm, evidence: LogLikelihoods, words: Sequence[Sequence[Sequence[str]]], pause: str
-) -> list[Said]:
-    """Choose how each word was said, and where there was a pause.
+    hmm: UnitHmm, log_likelihoods: LogLikelihoods, words: Sequence[Sequence[Sequence[str]]], pause: str
+) -> list[SpokenWord]:
+    """Choose how each word was choice, and where there was a pause.
 
     words : for each word, its possible pronunciations
     pause : the unit that may stand between words; silence (the first free unit) surrounds them all
     The states without context decide, so that a pronunciation's ends need not know its neighbours.
     Raises AlignmentError: the words do not fit into the frames.
     """
-    _check_room(hmm, evidence, words)
-    silence = Said(-1, 0, (hmm.table.free[0],))
-    slots: list[list[Said]] = [[silence]]
+    _check_room(hmm, log_likelihoods, words)
+    silence = SpokenWord(-1, 0, (hmm.table.free[0],))
+    slots: list[list[SpokenWord]] = [[silence]]
     for word, variants in enumerate(words):
         if word:
-            slots.append([Said(-1, 0, (pause,)), Said(-1, 1, ())])
-        slots.append([Said(word, number, tuple(variant)) for number, variant in enumerate(variants)])
+            slots.append([SpokenWord(-1, 0, (pause,)), SpokenWord(-1, 1, ())])
+        slots.append([SpokenWord(word, number, tuple(variant)) for number, variant in enumerate(variants)])
     slots.append([silence])
     builder = NetworkBuilder()
-    owners: list[tuple[int, Said]] = []
+    owners: list[tuple[int, SpokenWord]] = []
     open_ends: list[tuple[int, float]] = []
     for slot, choices in enumerate(slots):
         ends: list[tuple[int, float]] = []
-        for said in choices:
+        for choice in choices:
             begin = len(owners)
-            ends += _append(builder, hmm, said.units, open_ends)
-            owners += [(slot, said)] * sum(hmm.table.count(unit) for unit in said.units)
+            ends += _append(builder, hmm, choice.units, open_ends)
+            owners += [(slot, choice)] * sum(hmm.table.count(unit) for unit in choice.units)
             if slot == 0:
                 builder.initial(begin)
         open_ends = ends
     for state, move in open_ends:
         builder.final(state, move)
     plain = np.arange(len(hmm.log_stay), dtype=np.intp)
-    path = builder.build().best_path(evidence, plain)
-    return [said for _, said in sorted({owners[state] for state in path})]
+    path = builder.build().best_path(log_likelihoods, plain)
+    return [choice for _, choice in sorted({owners[state] for state in path})]
 
 
-def _check_room(hmm: UnitHmm, evidence: LogLikelihoods, words: Sequence[Sequence[Sequence[str]]]) -> None:
+def _check_room(hmm: UnitHmm, log_likelihoods: LogLikelihoods, words: Sequence[Sequence[Sequence[str]]]) -> None:
     """Raise AlignmentError before a network is built that no path fits through, or that may fill the memory."""
     states = _states_of(hmm, words)
     least = sum(min(states[id(variants)]) for variants in words)
-    if least > evidence.frames:
+    if least > log_likelihoods.frames:
         raise AlignmentError(
-            f"{len(words)} words take at least {least} frames of 10 ms, found {evidence.frames}: the recording is too "
-            "short for what should be said in it; give its own transcript"
+            f"{len(words)} words take at least {least} frames of 10 ms, found {log_likelihoods.frames}: the recording is too "
+            "short for what should be choice in it; give its own transcript"
         )
     ends = [1, *(len(variants) + 1 for variants in words)]  # of the word before, and of the pause
     arcs = sum(2 * sum(states[id(v)]) + len(v) * before for v, before in zip(words, ends, strict=False))
-    most = FEW_ARCS + ARCS_A_FRAME * evidence.frames
+    most = FEW_ARCS + ARCS_A_FRAME * log_likelihoods.frames
     if arcs > most:
         raise AlignmentError(
             f"{len(words)} words in all their pronunciations make {arcs} arcs, required at most {most} for "
-            f"{evidence.frames} frames of 10 ms; give fewer pronunciations"
+            f"{log_likelihoods.frames} frames of 10 ms; give fewer pronunciations"
         )
 
 

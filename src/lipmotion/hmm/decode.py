@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from lipmotion.hmm.log_likelihoods import LogLikelihoods
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.hmm.network import Network, NetworkBuilder
-from lipmotion.hmm.states import Context
+from lipmotion.hmm.states import Neighbour
 
-Row = dict[Context, int]
+Row = dict[Neighbour, int]
 """One state of a unit: its node for each neighbour that has one of its own, under None that for all others."""
 
 
@@ -88,7 +88,7 @@ def _unit_rows(
     return rows
 
 
-def _contexts(hmm: UnitHmm, unit: str, state: int, inventory: Sequence[str]) -> list[Context]:
+def _contexts(hmm: UnitHmm, unit: str, state: int, inventory: Sequence[str]) -> list[Neighbour]:
     """Return the neighbours that need a node of their own; all others share one, whose densities are the same.
 
     A neighbour known to any state on one side of the unit counts for all states on that side: so a path never
@@ -96,7 +96,7 @@ def _contexts(hmm: UnitHmm, unit: str, state: int, inventory: Sequence[str]) -> 
     """
     side = hmm.table.side(unit, state)
     alike = [k for k in range(hmm.table.count(unit)) if hmm.table.side(unit, k) == side] if side else []
-    own: list[Context] = [
+    own: list[Neighbour] = [
         neighbour
         for neighbour in inventory
         if any(hmm.table.density(unit, k, neighbour) != hmm.table.density(unit, k) for k in alike)

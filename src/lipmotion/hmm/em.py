@@ -1,91 +1,112 @@
-"""Embedded Baum–Welch: what utterances say about every state, and the models that follow from it."""
+"""Embedded Baum–Welch training of unit models: statistics of whole utterances, and the models re-estimated from them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.hmm.align import Chain, chain_of
+from lipmotion.hmm.align import StateSequence, state_sequence
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.hmm.states import StateTable
 from lipmotion.kernels.forward_backward import IMPOSSIBLE, chain_posteriors
+from lipmotion.stats.em import EmResult, no_report, run_em
 from lipmotion.stats.mixture import Mixtures
 from lipmotion.types import ParallelMap
 
 CELLS = 1_000_000
-"""Frames × utterances × states whose posteriors are computed together: 8 MB an array, some fifty in all."""
+"""Frames × utterances × states of a batch whose posteriors are computed together: 8 MB an array, some fifty arrays."""
 LEAST_POSTERIOR = 1e-3
-"""State posteriors under this are left out of the statistics."""
+"""Smaller state posteriors are left out of the statistics of densities."""
 LONGEST_SILENCE, LONGEST_STATE = 200.0, 12.0
-"""Most frames that a state of silence, or of any other unit, may last on average. Without the second limit the
-closure of a stop that begins every other sentence takes the silence before it for its own."""
+"""Largest mean duration, in frames, of a state of silence, and of a state of any other unit. Without the second limit
+the closure of a stop that begins every other sentence absorbs the silence before it."""
+AfterStep = Callable[[int, UnitHmm, "UnitStatistics"], None]
+"""Called after every EM step with its number, the new models, and the statistics that they were estimated from."""
 
 
 def baum_welch(
-    hmm: UnitHmm, data: Sequence[NDArray[np.float32]], sequences: Sequence[tuple[str, ...]], each: ParallelMap = map
-) -> tuple[UnitHmm, float]:
-    """Take one embedded Baum–Welch step.
+    hmm: UnitHmm,
+    data: Sequence[NDArray[np.float32]],
+    sequences: Sequence[tuple[str, ...]],
+    steps: int = 1,
+    after_step: AfterStep = no_report,
+    each: ParallelMap = map,
+) -> EmResult[UnitHmm, UnitStatistics]:
+    """Take some steps of embedded Baum–Welch: re-estimate all densities, and the durations of all states.
 
     data      : features of every utterance [shape=(T, D)]
-    sequences : the units said in each
+    sequences : the units spoken in each
     each      : shares the work; the result is the same to the bit
-    Returns the new models, and the mean log likelihood per frame under the old ones.
+    Returns the re-estimated models, and the mean log likelihood per frame before every step.
     An utterance too short for its units is left out.
     """
-    statistics = expect(hmm, data, sequences, each)
-    better = replace(hmm, mixtures=maximised(hmm, statistics, data), log_stay=statistics.log_stay())
-    return better, statistics.mean_log_likelihood
+
+    def maximise(model: UnitHmm, statistics: UnitStatistics) -> UnitHmm:
+        mixtures = reestimated_mixtures(model, statistics, data)
+        return replace(model, mixtures=mixtures, log_stay=statistics.log_stay())
+
+    return run_em(hmm, lambda model: accumulate_statistics(model, data, sequences, each), maximise, steps, after_step)
 
 
 def adapt_contexts(
-    hmm: UnitHmm, data: Sequence[NDArray[np.float32]], sequences: Sequence[tuple[str, ...]], each: ParallelMap = map
-) -> tuple[UnitHmm, float | None]:
-    """Take one step of adapting the states in context to their data, those without context as their prior.
+    hmm: UnitHmm,
+    data: Sequence[NDArray[np.float32]],
+    sequences: Sequence[tuple[str, ...]],
+    steps: int = 1,
+    after_step: AfterStep = no_report,
+    each: ParallelMap = map,
+) -> EmResult[UnitHmm, UnitStatistics]:
+    """Take some steps of adapting the states in context to their data, with the states without context as their prior.
 
-    Returns the new models, and the mean log likelihood per frame under the old ones (None: no contexts, nothing to do).
+    Parameters and result as for ``baum_welch``; the states without context, and all durations, stay as they are.
     """
-    plain, parents = len(hmm.log_stay), hmm.table.parents()
-    if len(parents) == plain:
-        return hmm, None
-    statistics = expect(hmm, data, sequences, each)
-    mixtures = hmm.mixtures.copy()
-    for density, x, share in statistics.by_density():
-        if density >= plain:
-            mixtures.adapt(density, x, share, int(parents[density]), hmm.config.relevance)
-    return replace(hmm, mixtures=mixtures), statistics.mean_log_likelihood
+
+    def maximise(model: UnitHmm, statistics: UnitStatistics) -> UnitHmm:
+        plain, parents = len(model.log_stay), model.table.parents()
+        mixtures = model.mixtures.copy()
+        for density, x, weights in statistics.by_density():
+            if density >= plain:
+                mixtures.adapt(density, x, weights, int(parents[density]), model.config.relevance)
+        return replace(model, mixtures=mixtures)
+
+    return run_em(hmm, lambda model: accumulate_statistics(model, data, sequences, each), maximise, steps, after_step)
 
 
-def maximised(hmm: UnitHmm, statistics: Statistics, data: Sequence[NDArray[np.float32]]) -> Mixtures:
-    """Return the densities that explain the statistics best (the M-step)."""
+def reestimated_mixtures(hmm: UnitHmm, statistics: UnitStatistics, data: Sequence[NDArray[np.float32]]) -> Mixtures:
+    """Return the densities re-estimated from the statistics (the M-step).
+
+    data : all features, whose variance gives the variance floor
+    A density with less than one frame of data stays as it is.
+    """
     mixtures = hmm.mixtures.copy()
     floor = hmm.config.variance_floor * np.concatenate(data).var(axis=0)
-    for density, x, share in statistics.by_density():
-        if share.sum() >= 1:
-            mixtures.improve(density, x, share, floor)
+    for density, x, weights in statistics.by_density():
+        if weights.sum() >= 1:
+            mixtures.improve(density, x, weights, floor)
     return mixtures
 
 
-def expect(
+def accumulate_statistics(
     hmm: UnitHmm, data: Sequence[NDArray[np.float32]], sequences: Sequence[tuple[str, ...]], each: ParallelMap = map
-) -> Statistics:
-    """Return what the utterances say about every state (the E-step)."""
-    statistics = Statistics(hmm)
+) -> UnitStatistics:
+    """Return the sufficient statistics of utterances for every state (the E-step). Parameters as ``baum_welch``."""
+    statistics = UnitStatistics(hmm)
     states = [sum(hmm.table.count(unit) for unit in sequence) for sequence in sequences]
     groups = list(batches([len(x) for x in data], states))
     jobs = (_Batch(hmm, [data[i] for i in batch], [sequences[i] for i in batch]) for batch in groups)
-    for batch, (found, log_likelihood, frames) in zip(groups, each(_heard, jobs), strict=True):
-        for i, utterance_statistics in zip(batch, found, strict=True):
-            statistics.add(data[i], utterance_statistics)
-        statistics.count(log_likelihood, frames)
+    for batch, (of_utterances, log_likelihood, frames) in zip(groups, each(_batch_statistics, jobs), strict=True):
+        for i, of_utterance in zip(batch, of_utterances, strict=True):
+            statistics.add(data[i], of_utterance)
+        statistics.add_log_likelihood(log_likelihood, frames)
     return statistics
 
 
 @dataclass(frozen=True, eq=False)
 class _Batch:
-    """Some utterances, and the models that they are heard with."""
+    """Some utterances, their unit sequences, and the models that give their posteriors."""
 
     hmm: UnitHmm
     data: list[NDArray[np.float32]]
@@ -94,11 +115,13 @@ class _Batch:
 
 @dataclass(frozen=True, eq=False)
 class UtteranceStatistics:
-    """What one utterance says about the states of its chain.
+    """The statistics of one utterance for the S states of its unit sequence.
 
-    plain    : [shape=(S,)], the states' numbers without context
-    stay, occupied : [shape=(S,)], how often each was kept, and how many frames it had
-    frames, densities, shares : [shape=(N,)], every posterior that counts: its frame, its density, and itself
+    plain    : [shape=(S,)], the densities of the states without context
+    stay     : [shape=(S,)], expected number of transitions from each state to itself
+    occupied : [shape=(S,)], expected number of frames in each state
+    frames, densities, weights : [shape=(N,)], one entry for each state posterior above ``LEAST_POSTERIOR``: its frame,
+        its density, and the posterior
     """
 
     plain: NDArray[np.intp]
@@ -106,21 +129,24 @@ class UtteranceStatistics:
     occupied: NDArray[np.float64]
     frames: NDArray[np.intp]
     densities: NDArray[np.intp]
-    shares: NDArray[np.float32]
+    weights: NDArray[np.float32]
 
 
 def utterance_statistics(
-    chain: Chain, posterior: NDArray[np.float64], stay: NDArray[np.float64]
+    sequence: StateSequence, posterior: NDArray[np.float64], stay: NDArray[np.float64]
 ) -> UtteranceStatistics:
-    """Return what an utterance says whose state posteriors are known."""
+    """Return the statistics of an utterance from its state posteriors [shape=(T, S)].
+
+    stay : [shape=(S,)], expected number of transitions from each state to itself
+    """
     frame, state = np.nonzero(posterior > LEAST_POSTERIOR)
-    shares = posterior[frame, state].astype(np.float32)
-    return UtteranceStatistics(chain.plain, stay, posterior.sum(axis=0), frame, chain.densities[state], shares)
+    weights = posterior[frame, state].astype(np.float32)
+    return UtteranceStatistics(sequence.plain, stay, posterior.sum(axis=0), frame, sequence.densities[state], weights)
 
 
-def _heard(batch: _Batch) -> tuple[list[UtteranceStatistics], float, int]:
-    """Return what each utterance says, their log likelihood, and the frames of those that are possible."""
-    hmm, chains = batch.hmm, [chain_of(batch.hmm, sequence) for sequence in batch.sequences]
+def _batch_statistics(batch: _Batch) -> tuple[list[UtteranceStatistics], float, int]:
+    """Return the statistics of each utterance, and the log likelihood and frame count of all that have a path."""
+    hmm, chains = batch.hmm, [state_sequence(batch.hmm, sequence) for sequence in batch.sequences]
     frames = np.array([len(x) for x in batch.data], np.intp)
     states = np.array([len(chain.densities) for chain in chains], np.intp)
     log_emission = np.zeros((frames.max(), len(chains), states.max()))
@@ -131,16 +157,20 @@ def _heard(batch: _Batch) -> tuple[list[UtteranceStatistics], float, int]:
         log_stay[u, : states[u]] = hmm.log_stay[chain.plain]
     log_move = np.log(-np.expm1(log_stay))
     posterior, stay, log_likelihood = chain_posteriors(log_emission, log_stay, log_move, frames, states)
-    found = [
+    statistics = [
         utterance_statistics(chain, posterior[: frames[u], u, : states[u]], stay[u, : states[u]])
         for u, chain in enumerate(chains)
     ]
     possible = log_likelihood > IMPOSSIBLE / 2
-    return found, float(log_likelihood[possible].sum()), int(frames[possible].sum())
+    return statistics, float(log_likelihood[possible].sum()), int(frames[possible].sum())
 
 
 def batches(frames: Sequence[int], states: Sequence[int]) -> Iterator[list[int]]:
-    """Give utterances in groups of like length, padded to no more than ``CELLS`` unless one alone is larger."""
+    """Give the numbers of utterances in batches of similar length.
+
+    frames, states : of each utterance
+    Padded to its longest utterance, a batch has at most ``CELLS`` cells, unless one utterance alone has more.
+    """
     batch: list[int] = []
     most = 0
     for i in sorted(range(len(frames)), key=lambda i: frames[i]):
@@ -153,8 +183,8 @@ def batches(frames: Sequence[int], states: Sequence[int]) -> Iterator[list[int]]
         yield batch
 
 
-class Statistics:
-    """What one pass over the data says about every state."""
+class UnitStatistics:
+    """The sufficient statistics of one pass over the data, for the states of unit models."""
 
     def __init__(self, hmm: UnitHmm) -> None:
         self._hmm = hmm
@@ -162,48 +192,52 @@ class Statistics:
         self._stay = np.zeros(len(hmm.log_stay))
         self._occupied = np.zeros(len(hmm.log_stay))
         self._densities: list[NDArray[np.intp]] = []
-        self._shares: list[NDArray[np.float32]] = []
+        self._weights: list[NDArray[np.float32]] = []
         self._rows: list[NDArray[np.intp]] = []
         self._features: list[NDArray[np.float32]] = []
-        self._seen = 0
+        self._frames_added = 0
 
     @property
     def mean_log_likelihood(self) -> float:
-        """Per frame."""
+        """Mean log likelihood per frame."""
         return self._log_likelihood / max(self._frames, 1)
 
-    def add(self, x: NDArray[np.float32], utterance_statistics: UtteranceStatistics) -> None:
-        """Add one utterance with features ``x``."""
-        np.add.at(self._stay, utterance_statistics.plain, utterance_statistics.stay)
-        np.add.at(self._occupied, utterance_statistics.plain, utterance_statistics.occupied)
-        self._densities.append(utterance_statistics.densities)
-        self._shares.append(utterance_statistics.shares)
-        self._rows.append(utterance_statistics.frames + self._seen)
+    def add(self, x: NDArray[np.float32], utterance: UtteranceStatistics) -> None:
+        """Accumulate the statistics of one utterance with features ``x`` [shape=(T, D)]."""
+        np.add.at(self._stay, utterance.plain, utterance.stay)
+        np.add.at(self._occupied, utterance.plain, utterance.occupied)
+        self._densities.append(utterance.densities)
+        self._weights.append(utterance.weights)
+        self._rows.append(utterance.frames + self._frames_added)
         self._features.append(x)
-        self._seen += len(x)
+        self._frames_added += len(x)
 
-    def count(self, log_likelihood: float, frames: int) -> None:
-        """Add to the log likelihood, and to the frames that it is of."""
+    def add_log_likelihood(self, log_likelihood: float, frames: int) -> None:
+        """Accumulate the log likelihood of so many frames."""
         self._log_likelihood += log_likelihood
         self._frames += frames
 
     def by_density(self) -> Iterator[tuple[int, NDArray[np.float32], NDArray[np.float32]]]:
-        """Give every density that was visited: its number, the frames, and its posterior in each."""
-        densities, shares = np.concatenate(self._densities), np.concatenate(self._shares)
+        """Give each density that has data: its number, its frames [shape=(N, D)] and their posteriors [shape=(N,)]."""
+        densities, weights = np.concatenate(self._densities), np.concatenate(self._weights)
         rows, features = np.concatenate(self._rows), np.concatenate(self._features)
         order = np.argsort(densities, kind="stable")
         visited, starts = np.unique(densities[order], return_index=True)
         for density, mine in zip(visited, np.split(order, starts[1:]), strict=True):
-            yield int(density), features[rows[mine]], shares[mine]
+            yield int(density), features[rows[mine]], weights[mine]
 
     def log_stay(self) -> NDArray[np.float32]:
-        """Return log P(keep the state) of every state without context."""
+        """Return the re-estimated log P(stay in the state) of every state without context [shape=(R,)].
+
+        A state without data keeps its probability; all are limited by the largest mean durations.
+        """
         kept = self._stay / np.maximum(self._occupied, 1e-9)
         keep = np.where(self._occupied > 0, kept, np.exp(self._hmm.log_stay))
-        return np.log(np.clip(keep, 0.05, 1 - 1 / longest(self._hmm.table)[: len(keep)])).astype(np.float32)
+        longest = longest_mean_durations(self._hmm.table)[: len(keep)]
+        return np.log(np.clip(keep, 0.05, 1 - 1 / longest)).astype(np.float32)
 
 
-def longest(table: StateTable) -> NDArray[np.float64]:
-    """Return the most frames each state may last on average [shape=(G,)]."""
+def longest_mean_durations(table: StateTable) -> NDArray[np.float64]:
+    """Return the largest mean duration allowed for each state, in frames [shape=(G,)]."""
     units = [name.split(".")[0] for name in table.names]
     return np.array([LONGEST_SILENCE if unit in table.free else LONGEST_STATE for unit in units])

@@ -15,7 +15,7 @@ LOUD_SILENCE = 8.0
 QUIET_SPEECH = 1000.0
 """What the log densities of all else lose in a quiet one."""
 
-Chosen = NDArray[np.intp] | None
+DensitySelection = NDArray[np.intp] | None
 """The densities wanted; None: all."""
 
 
@@ -28,7 +28,7 @@ class LogLikelihoods:
     """
 
     frames: int
-    log_density: Callable[[int, int, Chosen], NDArray[np.float32]]
+    log_density: Callable[[int, int, DensitySelection], NDArray[np.float32]]
 
 
 def log_likelihoods_of(hmm: UnitHmm, features: NDArray[np.float32]) -> LogLikelihoods:
@@ -61,7 +61,7 @@ def _without(
 ) -> LogLikelihoods:
     """Return evidence in which some densities lose something in some frames."""
 
-    def log_density(first: int, end: int, chosen: Chosen) -> NDArray[np.float32]:
+    def log_density(first: int, end: int, chosen: DensitySelection) -> NDArray[np.float32]:
         values = evidence.log_density(first, end, chosen)
         lost = densities if chosen is None else densities[chosen]
         values[np.ix_(frames[first:end], lost)] -= loss

@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import ModelFormatError
 from lipmotion.hmm.states import StateTable, plain_states
-from lipmotion.stats.bigram import BIGRAM, Bigram, bigram_from
-from lipmotion.stats.mixture import MIXTURES, Mixtures, mixtures_from
-from lipmotion.storage.schema import NEGATIVE, Arrays, Member, checked, only
+from lipmotion.stats.bigram import BIGRAM, Bigram, bigram_from_array
+from lipmotion.stats.mixture import MIXTURES, Mixtures, mixtures_from_arrays
+from lipmotion.storage.schema import NEGATIVE, Arrays, ArraySpec, checked_arrays, refuse_undeclared
+from lipmotion.types import Configuration
 
 
 @dataclass(frozen=True)
-class HmmConfig:
+class HmmConfig(Configuration):
     """How unit models are built and trained.
 
     states       : states per unit, left to right, no skips
@@ -89,29 +90,31 @@ def hmm_arrays(hmm: UnitHmm, precision: type[np.floating[Any]] = np.float16) -> 
 def hmm_from_arrays(arrays: Arrays, config: HmmConfig) -> UnitHmm:
     """Return the models again. Raises ModelFormatError: something is missing, out of place or out of range."""
     try:
-        only(arrays, NAMES, MODELS)
-        named = checked(arrays, NAMES)
+        refuse_undeclared(arrays, NAMES, MODELS)
+        named = checked_arrays(arrays, NAMES)
         units, counts, names, free = (tuple(named[key].tolist()) for key in ("units", "counts", "names", "free"))
         _check_names(units, counts, names, free)
-        found = checked(arrays, MODELS, **named.sizes, R=sum(counts))
+        found = checked_arrays(arrays, MODELS, **named.sizes, R=sum(counts))
         table = StateTable(units, counts, names, free)
-        bigram = bigram_from(units, found["bigram"])
-        return UnitHmm(config, table, mixtures_from(found), found["log_stay"], bigram, float(found["typical_fit"][0]))
+        bigram = bigram_from_array(units, found["bigram"])
+        return UnitHmm(
+            config, table, mixtures_from_arrays(found), found["log_stay"], bigram, float(found["typical_fit"][0])
+        )
     except (KeyError, ValueError, TypeError, IndexError, OverflowError) as error:
         raise ModelFormatError(f"the phone models are damaged ({error}); train or download the model again") from error
 
 
 NAMES = {
-    "units": Member(np.str_, "U"),
-    "counts": Member(np.int32, "U", 1, 1000),
-    "names": Member(np.str_, "G"),
-    "free": Member(np.str_, "F"),
+    "units": ArraySpec(np.str_, "U"),
+    "counts": ArraySpec(np.int32, "U", 1, 1000),
+    "names": ArraySpec(np.str_, "G"),
+    "free": ArraySpec(np.str_, "F"),
 }
 MODELS = {
     **MIXTURES,
     **BIGRAM,
-    "log_stay": Member(np.float32, "R", -1e4, NEGATIVE),
-    "typical_fit": Member(np.float64, "1", -1e6, 1e6),
+    "log_stay": ArraySpec(np.float32, "R", -1e4, NEGATIVE),
+    "typical_fit": ArraySpec(np.float64, "1", -1e6, 1e6),
 }
 """How unit models are stored; R states have no context."""
 

@@ -1,4 +1,4 @@
-"""Networks of states that the best path is searched in."""
+"""Networks of states, in which the best path is searched."""
 
 from __future__ import annotations
 
@@ -10,17 +10,16 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError
 from lipmotion.hmm.log_likelihoods import LogLikelihoods
-from lipmotion.kernels.arcs import Layout, laid_out
-from lipmotion.kernels.network import Expectation
+from lipmotion.kernels.arcs import ArcLayout, arc_layout
 from lipmotion.kernels.viterbi import best_path
 
 KEPT_FRAMES = 12_000
-"""Two minutes: up to here densities are computed once and kept; those of longer recordings twice, by blocks."""
+"""Up to so many frames (two minutes), log densities are computed once and kept; for longer recordings twice, in blocks."""
 
 
 @dataclass(frozen=True, eq=False)
 class Network:
-    """States joined by arcs, ready for the Viterbi kernel."""
+    """States joined by arcs, in the form that ``kernels.viterbi.best_path`` takes."""
 
     emission: NDArray[np.intp]
     arc_from: NDArray[np.intp]
@@ -30,31 +29,27 @@ class Network:
     log_final: NDArray[np.float32]
 
     @cached_property
-    def layout(self) -> Layout:
-        """Where the arcs lie for compiled kernels."""
-        return laid_out(self.arc_from, self.arc_start)
-
-    def expectation(self) -> Expectation:
-        """Return the network ready for forward–backward."""
-        return Expectation.of(self.arc_from, self.arc_log, self.arc_start, self.log_initial, self.log_final)
+    def layout(self) -> ArcLayout:
+        """The layout of the arcs for compiled kernels."""
+        return arc_layout(self.arc_from, self.arc_start)
 
     def best_path(
-        self, evidence: LogLikelihoods, chosen: NDArray[np.intp] | None = None, beam: float | None = None
+        self, log_likelihoods: LogLikelihoods, chosen: NDArray[np.intp] | None = None, beam: float | None = None
     ) -> NDArray[np.intp]:
-        """Return the best path's states [shape=(T,)].
+        """Return the states of the best path [shape=(T,)].
 
-        chosen : the densities that ``emission`` counts; all by default
-        beam   : states whose score falls more than this under the frame's best are dropped; None: exact
+        chosen : the densities that ``emission`` numbers; None: all
+        beam   : states with a score lower than the best of the frame by more than this are dropped; None: exact
         Raises AlignmentError: no path reaches the end.
         """
-        kept = evidence.log_density(0, evidence.frames, chosen) if evidence.frames <= KEPT_FRAMES else None
+        kept = log_likelihoods.log_density(0, log_likelihoods.frames, chosen) if log_likelihoods.frames <= KEPT_FRAMES else None
 
         def log_emission(first: int, end: int) -> NDArray[np.float32]:
-            return evidence.log_density(first, end, chosen) if kept is None else kept[first:end]
+            return log_likelihoods.log_density(first, end, chosen) if kept is None else kept[first:end]
 
         path, score = best_path(
             log_emission,
-            evidence.frames,
+            log_likelihoods.frames,
             self.emission,
             self.arc_from,
             self.arc_log,
@@ -66,14 +61,14 @@ class Network:
         )
         if not np.isfinite(score):
             raise AlignmentError(
-                f"no path through {len(self.emission)} states in {evidence.frames} frames of 10 ms: "
+                f"no path through {len(self.emission)} states in {log_likelihoods.frames} frames of 10 ms: "
                 "the recording is too short for what should be said in it"
             )
         return path
 
 
 class NetworkBuilder:
-    """Collects states and arcs; ``build`` sorts them for the kernel."""
+    """Builder of a ``Network``, to which states and arcs are added in any order."""
 
     def __init__(self) -> None:
         self._emission: list[int] = []
@@ -82,26 +77,26 @@ class NetworkBuilder:
         self._final: dict[int, float] = {}
 
     def state(self, density: int, stay: float) -> int:
-        """Add a state with its loop; return its number."""
+        """Add a state with an arc to itself of log probability ``stay``; return its number."""
         number = len(self._emission)
         self._emission.append(density)
         self._arcs.append((number, number, stay))
         return number
 
     def arc(self, source: int, target: int, log_probability: float) -> None:
-        """Add an arc."""
+        """Add an arc between two states."""
         self._arcs.append((target, source, log_probability))
 
     def initial(self, state: int, log_probability: float = 0.0) -> None:
-        """Let paths begin here."""
+        """Let paths begin in a state."""
         self._initial[state] = log_probability
 
     def final(self, state: int, log_probability: float = 0.0) -> None:
-        """Let paths end here."""
+        """Let paths end in a state."""
         self._final[state] = log_probability
 
     def build(self) -> Network:
-        """Return the network."""
+        """Return the network, with its arcs sorted by target."""
         arcs = sorted(self._arcs, key=lambda arc: arc[0])
         targets = np.array([arc[0] for arc in arcs], np.intp)
         count = len(self._emission)
@@ -110,12 +105,13 @@ class NetworkBuilder:
             arc_from=np.array([arc[1] for arc in arcs], np.intp),
             arc_log=np.array([arc[2] for arc in arcs], np.float32),
             arc_start=np.searchsorted(targets, np.arange(count)).astype(np.intp),
-            log_initial=_sparse(self._initial, count),
-            log_final=_sparse(self._final, count),
+            log_initial=_dense(self._initial, count),
+            log_final=_dense(self._final, count),
         )
 
 
-def _sparse(values: dict[int, float], count: int) -> NDArray[np.float32]:
+def _dense(values: dict[int, float], count: int) -> NDArray[np.float32]:
+    """Return the values by number [shape=(count,)], -inf where there is none."""
     full = np.full(count, -np.inf, np.float32)
     full[list(values)] = list(values.values())
     return full

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-Context = str | None
+Neighbour = str | None
 """The neighbouring unit a state depends on; None: it depends on none."""
 
 
@@ -52,7 +52,7 @@ class StateTable:
         side = self.side(unit, state)
         return f"{unit}.{state}" + (side + {"<": left, ">": right}[side] if side else "")
 
-    def density(self, unit: str, state: int, neighbour: Context = None) -> int:
+    def density(self, unit: str, state: int, neighbour: Neighbour = None) -> int:
         """Return the density of a state; without one for this neighbour, the one without context."""
         if neighbour is not None:
             found = self._index.get(f"{unit}.{state}{self.side(unit, state)}{neighbour}")
@@ -60,7 +60,7 @@ class StateTable:
                 return found
         return self._index[f"{unit}.{state}"]
 
-    def neighbour(self, left: str, unit: str, right: str, state: int) -> Context:
+    def neighbour(self, left: str, unit: str, right: str, state: int) -> Neighbour:
         """Return the neighbour that a state depends on."""
         return {"<": left, ">": right, "": None}[self.side(unit, state)]
 

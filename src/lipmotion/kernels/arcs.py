@@ -21,7 +21,7 @@ PADDED = 16
 """Rows of a block are padded to a multiple of this."""
 
 
-class Layout(NamedTuple):
+class ArcLayout(NamedTuple):
     """Where everything of a network lies. A place is the position of a state in the new order.
 
     order, place : [shape=(S,)], the state at each place, and the place of each state
@@ -41,14 +41,14 @@ class Layout(NamedTuple):
     block_arcs: Index
 
 
-class Weights(NamedTuple):
+class ArcWeights(NamedTuple):
     """Values of arcs, laid out."""
 
     runs: NDArray[Any]
     blocks: NDArray[Any]
 
 
-def laid_out(arc_from: Index, arc_start: Index) -> Layout:
+def arc_layout(arc_from: Index, arc_start: Index) -> ArcLayout:
     """Return the layout of a network whose arcs are sorted by target.
 
     arc_from  : [shape=(E,)], the source states of all arcs
@@ -65,14 +65,14 @@ def laid_out(arc_from: Index, arc_start: Index) -> Layout:
     place = np.empty(states, np.intp)
     place[order] = np.arange(states)
     runs, positions = _runs(place[arc_from[rest]], place[arc_to[rest]])
-    return Layout(order, place, runs, rest[positions], *_blocks(groups, arc_from, place))
+    return ArcLayout(order, place, runs, rest[positions], *_blocks(groups, arc_from, place))
 
 
-def weights_of(layout: Layout, values: NDArray[Any], nothing: float) -> Weights:
+def arc_weights(layout: ArcLayout, values: NDArray[Any], nothing: float) -> ArcWeights:
     """Return the values of arcs [shape=(E,)] by run and by block; ``nothing`` where a block is padded."""
     blocks = values[layout.block_arcs]
     blocks[layout.block_arcs < 0] = nothing
-    return Weights(values[layout.run_arcs], blocks)
+    return ArcWeights(values[layout.run_arcs], blocks)
 
 
 _Groups = list[tuple[Index, Index]]

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from lipmotion.kernels import factorial_steps
 from lipmotion.kernels.choice import numba_works
-from lipmotion.kernels.loops import Array, Density, Evidence, Loop, LoopCounts, Moves
+from lipmotion.kernels.loops import Array, FactorialLogLikelihoods, FrameDensity, Loop, LoopCounts, LoopTransitions
 
 ROOM_BYTES = 2**27
 """Forward probabilities of as many frames as fit are kept at once, if they are not many more than √T."""
@@ -40,7 +40,7 @@ class FactorialPosteriors(NamedTuple):
 
 
 def factorial_posteriors(
-    audio: Loop, visual: Loop, evidence: Evidence, stretch: int | None = None
+    audio: Loop, visual: Loop, evidence: FactorialLogLikelihoods, stretch: int | None = None
 ) -> FactorialPosteriors:
     """Return what a recording says about two loops.
 
@@ -61,7 +61,7 @@ def factorial_posteriors(
     return found._replace(pair=found.pair[:, np.argsort(order)])
 
 
-def kept(frames: int, frame_bytes: int) -> int:
+def kept_frames(frames: int, frame_bytes: int) -> int:
     """Return how many frames' forward probabilities are kept at once."""
     return max(math.isqrt(max(frames - 1, 0)) + 1, min(frames, ROOM_BYTES // frame_bytes))
 
@@ -70,21 +70,23 @@ class _Recording(NamedTuple):
     """One recording in one precision; ``room``, ``leaving`` and ``densities`` are of one stretch."""
 
     loops: tuple[Loop, Loop]
-    moves: tuple[Moves, Moves]
-    evidence: Evidence
+    moves: tuple[LoopTransitions, LoopTransitions]
+    evidence: FactorialLogLikelihoods
     stretch: int
     room: NDArray[Any]
     leaving: NDArray[Any]
-    densities: list[Density]
+    densities: list[FrameDensity]
     steps: Any
 
     @classmethod
-    def of(cls, audio: Loop, visual: Loop, evidence: Evidence, stretch: int | None, kind: np.dtype[Any]) -> _Recording:
+    def of(
+        cls, audio: Loop, visual: Loop, evidence: FactorialLogLikelihoods, stretch: int | None, kind: np.dtype[Any]
+    ) -> _Recording:
         states = audio.stay.size, visual.stay.size
-        stretch = stretch or kept(len(evidence.audio), states[0] * states[1] * kind.itemsize)
+        stretch = stretch or kept_frames(len(evidence.audio), states[0] * states[1] * kind.itemsize)
         room = np.empty((stretch, *states), kind)
         leaving = np.empty((stretch, states[0], len(visual.leave)), kind)
-        moves = Moves.of(audio, kind), Moves.of(visual, kind)
+        moves = LoopTransitions.of(audio, kind), LoopTransitions.of(visual, kind)
         steps: Any = factorial_steps
         if numba_works():
             from lipmotion.kernels import factorial_fused as steps
@@ -103,10 +105,10 @@ class _Recording(NamedTuple):
             last = self.room[self._stop(start) - start - 1].copy()
         final = np.multiply.outer(*(loop.final.ravel() for loop in self.loops)).astype(last.dtype)
         found = _Found.of(self.loops, self.evidence)
-        closed = factorial_steps.closed(last, final, self.densities[-1])
+        closed = factorial_steps.frame_posteriors(last, final, self.densities[-1])
         if not found.take(len(self.evidence.audio) - 1, closed, 0):
             return None
-        backward, _ = factorial_steps.emitted(final, self.densities[-1])
+        backward, _ = factorial_steps.times_density(final, self.densities[-1])
         for start, before in zip(reversed(starts), reversed(befores), strict=True):
             if start != starts[-1]:
                 self._forward(start, before)
@@ -132,7 +134,7 @@ class _Recording(NamedTuple):
         for t, density in enumerate(self.densities, start):
             if t == 0:
                 initial = np.multiply.outer(*(loop.initial.ravel() for loop in self.loops)).astype(self.room.dtype)
-                self.room[0], log = factorial_steps.emitted(initial, density)
+                self.room[0], log = factorial_steps.times_density(initial, density)
             else:
                 self.room[t - start], self.leaving[t - start], log = self.steps.advance(before, *self.moves, density)
             before, log_total = self.room[t - start], log_total + log
@@ -151,11 +153,11 @@ class _Found(NamedTuple):
     visual_entered: Array
 
     @classmethod
-    def of(cls, loops: tuple[Loop, Loop], evidence: Evidence) -> _Found:
+    def of(cls, loops: tuple[Loop, Loop], evidence: FactorialLogLikelihoods) -> _Found:
         shapes = [log.shape for log in (evidence.audio, evidence.visual, evidence.pair)]
         return cls(*(np.zeros(shape) for shape in (*shapes, *(loop.enter.shape for loop in loops))))
 
-    def take(self, t: int, closed: factorial_steps.Closed, least_overlap: float) -> bool:
+    def take(self, t: int, closed: factorial_steps.FramePosteriors, least_overlap: float) -> bool:
         """Take the posteriors of a frame; return whether they are sure."""
         self.audio[t], self.visual[t], self.pair[t] = closed.audio, closed.visual, closed.pair
         return closed.overlap > least_overlap
@@ -179,7 +181,7 @@ def _counted(loop: Loop, posterior: Array, entered: Array) -> LoopCounts:
     return LoopCounts(stay, out[:-1], enter, frames[0])
 
 
-def _nothing(audio: Loop, visual: Loop, evidence: Evidence) -> FactorialPosteriors:
+def _nothing(audio: Loop, visual: Loop, evidence: FactorialLogLikelihoods) -> FactorialPosteriors:
     counts = [
         LoopCounts(*(np.zeros_like(part) for part in (loop.stay, loop.onward, loop.enter, loop.initial)))
         for loop in (audio, visual)

@@ -8,15 +8,17 @@ import numpy as np
 
 from lipmotion.kernels import factorial_steps
 from lipmotion.kernels.compiled import factorial
-from lipmotion.kernels.factorial_steps import Closed, Joint, Retreat
-from lipmotion.kernels.loops import Density, Moves
+from lipmotion.kernels.factorial_steps import BackwardStep, FramePosteriors, Joint
+from lipmotion.kernels.loops import FrameDensity, LoopTransitions
 
 LEAST = {np.dtype(np.float32): (1e-37, 1e-30), np.dtype(np.float64): (1e-140, 1e-140)}
 """Products of less are 0, as are shares of a frame."""
 
 
-def advance(before: Joint, audio: Moves, visual: Moves, density: Density) -> tuple[Joint, Joint, float]:
-    """Return what ``factorial_steps.advance`` does."""
+def forward_step(
+    before: Joint, audio: LoopTransitions, visual: LoopTransitions, density: FrameDensity
+) -> tuple[Joint, Joint, float]:
+    """Return what ``factorial_steps.forward_step`` does."""
     entering = audio.leaving.T @ before[-len(audio.leaving) :]
     moved = factorial.moved_to_last(before, audio.stay, audio.onward, entering, len(visual.leaving))
     after = np.empty_like(before)
@@ -27,11 +29,18 @@ def advance(before: Joint, audio: Moves, visual: Moves, density: Density) -> tup
     )  # fmt: skip
     if total > 0:
         return after, moved, math.log(total) + density.best
-    return factorial_steps.advance(before, audio, visual, density)
+    return factorial_steps.forward_step(before, audio, visual, density)
 
 
-def retreat(before: Joint, backward: Joint, leaving: Joint, audio: Moves, visual: Moves, density: Density) -> Retreat:
-    """Return what ``factorial_steps.retreat`` does."""
+def backward_step(
+    before: Joint,
+    backward: Joint,
+    leaving: Joint,
+    audio: LoopTransitions,
+    visual: LoopTransitions,
+    density: FrameDensity,
+) -> BackwardStep:
+    """Return what ``factorial_steps.backward_step`` does."""
     units, first = len(audio.leaving), backward[:, : len(visual.leaving)]
     moved = factorial.moved_back(backward, visual.stay, visual.onward, first @ visual.leaving.T)
     after = np.empty_like(before)
@@ -43,8 +52,8 @@ def retreat(before: Joint, backward: Joint, leaving: Joint, audio: Moves, visual
     )  # fmt: skip
     overlap = float(by_audio.sum())
     if not (total > 0 and overlap > 0):
-        return factorial_steps.retreat(before, backward, leaving, audio, visual, density)
+        return factorial_steps.backward_step(before, backward, leaving, audio, visual, density)
     scale = 1 / overlap
-    closed = Closed(by_audio * scale, by_visual * scale, by_pair * scale, overlap)
+    closed = FramePosteriors(by_audio * scale, by_visual * scale, by_pair * scale, overlap)
     audio_entered, visual_entered = before[-units:] @ moved[:units].T, leaving.T @ first
-    return Retreat(closed, after, np.float64(scale) * audio_entered, np.float64(scale) * visual_entered)
+    return BackwardStep(closed, after, np.float64(scale) * audio_entered, np.float64(scale) * visual_entered)

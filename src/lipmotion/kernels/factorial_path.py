@@ -8,11 +8,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.kernels.loops import Array, Evidence, Index, Loop
+from lipmotion.kernels.loops import Array, FactorialLogLikelihoods, Index, Loop
 
 
 def factorial_best_path(
-    audio: Loop, visual: Loop, evidence: Evidence, stretch: int | None = None
+    audio: Loop, visual: Loop, evidence: FactorialLogLikelihoods, stretch: int | None = None
 ) -> tuple[Index, Index, float]:
     """Return the most probable states of both loops [shapes=(T,)] and the log probability of path and evidence.
 
@@ -91,7 +91,7 @@ class _LogMoves(NamedTuple):
 class _Search(NamedTuple):
     audio: _LogMoves
     visual: _LogMoves
-    evidence: Evidence
+    evidence: FactorialLogLikelihoods
 
     def log_density(self, t: int) -> Array:
         """Return the log density of every joint state."""

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.kernels.loops import Density, Moves
+from lipmotion.kernels.loops import FrameDensity, LoopTransitions
 
 Joint = NDArray[np.floating[Any]]
 """[shape=(Na, Nv)]"""
@@ -15,7 +15,7 @@ LEAST_TOTAL = 1e-100
 """Of what is emitted: less is computed again in logarithms."""
 
 
-class Closed(NamedTuple):
+class FramePosteriors(NamedTuple):
     """What forward and backward probabilities say of a frame.
 
     audio, visual, pair : [shapes=(Na,), (Nv,), (P,)], posteriors
@@ -28,7 +28,7 @@ class Closed(NamedTuple):
     overlap: float
 
 
-class Retreat(NamedTuple):
+class BackwardStep(NamedTuple):
     """What a step back says.
 
     closed : of the frame before
@@ -37,50 +37,61 @@ class Retreat(NamedTuple):
         the probability that they do
     """
 
-    closed: Closed
+    frame_posteriors: FramePosteriors
     backward: Joint
     audio_entered: Joint
     visual_entered: Joint
 
 
-def advance(before: Joint, audio: Moves, visual: Moves, density: Density) -> tuple[Joint, Joint, float]:
+def forward_step(
+    before: Joint, audio: LoopTransitions, visual: LoopTransitions, density: FrameDensity
+) -> tuple[Joint, Joint, float]:
     """Return forward probabilities one frame on (sum 1), those that have moved in the audio loop only and are in last
     visual states [shape=(Na, Uv)], and the log of what the former are divided by (-inf: all are 0).
     """
     moved = audio.forward(before)
-    joint, log_total = emitted(visual.forward(moved.T).T, density)
+    joint, log_total = times_density(visual.forward(moved.T).T, density)
     return joint, moved[:, -len(visual.leaving) :], log_total
 
 
-def retreat(before: Joint, backward: Joint, leaving: Joint, audio: Moves, visual: Moves, density: Density) -> Retreat:
+def backward_step(
+    before: Joint,
+    backward: Joint,
+    leaving: Joint,
+    audio: LoopTransitions,
+    visual: LoopTransitions,
+    density: FrameDensity,
+) -> BackwardStep:
     """Return what a step back says.
 
     before   : forward probabilities of the frame before
     backward : backward probabilities and densities of this frame, multiplied
-    leaving  : as ``advance`` returned from ``before``
+    leaving  : as ``forward_step`` returned from ``before``
     density  : of the frame before
     """
     units_audio, units_visual = len(audio.leaving), len(visual.leaving)
     moved = visual.backward(backward.T).T
     beta = audio.backward(moved)
-    found = closed(before, beta, density)
+    found = frame_posteriors(before, beta, density)
     scale = 1 / found.overlap if found.overlap > 0 else 0.0
     audio_entered = before[-units_audio:] @ moved[:units_audio].T
     visual_entered = leaving.T @ backward[:, :units_visual]
-    return Retreat(
-        found, emitted(beta, density)[0], np.float64(scale) * audio_entered, np.float64(scale) * visual_entered
+    return BackwardStep(
+        found, times_density(beta, density)[0], np.float64(scale) * audio_entered, np.float64(scale) * visual_entered
     )
 
 
-def closed(forward: Joint, backward: Joint, density: Density) -> Closed:
+def frame_posteriors(forward: Joint, backward: Joint, density: FrameDensity) -> FramePosteriors:
     """Return posteriors of a frame."""
     joint = np.multiply(forward, backward, dtype=np.float64)
     overlap = float(joint.sum())
     joint /= overlap if overlap > 0 else 1
-    return Closed(joint.sum(axis=1), joint.sum(axis=0), joint[density.pair_audio, density.pair_visual], overlap)
+    return FramePosteriors(
+        joint.sum(axis=1), joint.sum(axis=0), joint[density.pair_audio, density.pair_visual], overlap
+    )
 
 
-def emitted(prior: Joint, density: Density) -> tuple[Joint, float]:
+def times_density(prior: Joint, density: FrameDensity) -> tuple[Joint, float]:
     """Return probabilities times densities, sum 1, and the log of what they are divided by (-inf: all are 0)."""
     joint = prior * density.audio[:, None] * density.visual
     joint[density.pair_audio, density.pair_visual] = prior[density.pair_audio, density.pair_visual] * density.pair
@@ -90,7 +101,7 @@ def emitted(prior: Joint, density: Density) -> tuple[Joint, float]:
     return (joint / total).astype(prior.dtype, copy=False), np.log(total) + density.best
 
 
-def _emitted_in_logs(prior: Joint, density: Density) -> tuple[Joint, float]:
+def _emitted_in_logs(prior: Joint, density: FrameDensity) -> tuple[Joint, float]:
     audio, visual, pair = density.logs
     joint = np.add.outer(audio, visual, dtype=np.float64)
     joint[density.pair_audio, density.pair_visual] = pair

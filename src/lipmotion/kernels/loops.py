@@ -47,7 +47,7 @@ class LoopCounts(NamedTuple):
     initial: Array
 
 
-class Evidence(NamedTuple):
+class FactorialLogLikelihoods(NamedTuple):
     """Log densities of one recording, finite or -inf; all as precise.
 
     audio, visual : [shape=(T, Na)] and [shape=(T, Nv)]; that of a joint state is their sum,
@@ -61,11 +61,11 @@ class Evidence(NamedTuple):
     pairs: Index
 
     @classmethod
-    def of(cls, audio: Logs, visual: Logs) -> Evidence:
+    def of(cls, audio: Logs, visual: Logs) -> FactorialLogLikelihoods:
         """Return that without pairs."""
         return cls(audio, visual, np.empty((len(audio), 0), audio.dtype), np.empty((0, 2), np.intp))
 
-    def densities(self, start: int, stop: int) -> list[Density]:
+    def densities(self, start: int, stop: int) -> list[FrameDensity]:
         """Return the densities of some frames."""
         logs = self.audio[start:stop], self.visual[start:stop], self.pair[start:stop]
         tops = [log.max(axis=1, initial=-np.inf).astype(np.float64) for log in logs]
@@ -76,12 +76,12 @@ class Evidence(NamedTuple):
         )
         one, other = self.pairs.T
         return [
-            Density(audio[t], visual[t], pair[t], one, other, float(best[t]), (logs[0][t], logs[1][t], logs[2][t]))
+            FrameDensity(audio[t], visual[t], pair[t], one, other, float(best[t]), (logs[0][t], logs[1][t], logs[2][t]))
             for t in range(stop - start)
         ]
 
 
-class Density(NamedTuple):
+class FrameDensity(NamedTuple):
     """Densities of a frame relative to the best that is possible.
 
     audio, visual : [shapes=(Na,), (Nv,)], whose products are those of joint states, but for pairs
@@ -100,7 +100,7 @@ class Density(NamedTuple):
     logs: tuple[Logs, Logs, Logs]
 
 
-class Moves(NamedTuple):
+class LoopTransitions(NamedTuple):
     """The probabilities of a loop, ready to be applied.
 
     stay    : [shape=(N,)]
@@ -113,7 +113,7 @@ class Moves(NamedTuple):
     leaving: NDArray[Any]
 
     @classmethod
-    def of(cls, loop: Loop, kind: np.dtype[Any]) -> Moves:
+    def of(cls, loop: Loop, kind: np.dtype[Any]) -> LoopTransitions:
         """Return those of a loop, in a precision."""
         leaving = loop.leave[:, None] * loop.enter
         return cls(*(np.ascontiguousarray(part, kind) for part in (loop.stay.ravel(), loop.onward.ravel(), leaving)))

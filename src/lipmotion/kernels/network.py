@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.kernels.arcs import PADDED, Layout, Weights, laid_out, weights_of
+from lipmotion.kernels.arcs import PADDED, ArcLayout, ArcWeights, arc_layout, arc_weights
 from lipmotion.kernels.choice import numba_works
 
 Index = NDArray[np.intp]
@@ -44,13 +44,13 @@ def network_posteriors(
     then; posteriors under 1e-12 are 0; and what is given in single precision comes back as precise.
     Cost: O(T·E), by NumPy some fifty times slower.
     """
-    expectation = Expectation.of(arc_from, arc_log, arc_start, log_initial, log_final)
+    expectation = ForwardBackwardNetwork.of(arc_from, arc_log, arc_start, log_initial, log_final)
     order, place = expectation.layout.order, expectation.layout.place
     found = expectation.over(log_emission, emission[order], np.array([len(log_emission)]))
     return found.posterior[:, place], found.counts, float(found.log_likelihood[0])
 
 
-class Expected(NamedTuple):
+class NetworkPosteriors(NamedTuple):
     """What recordings say about a network.
 
     posterior      : [shape=(T, S)], by place (``kernels.arcs``), of all recordings one after the other
@@ -76,7 +76,7 @@ class Chunks(NamedTuple):
     arcs: Index
 
     @classmethod
-    def of(cls, layout: Layout, weights: Weights) -> Chunks:
+    def of(cls, layout: ArcLayout, weights: ArcWeights) -> Chunks:
         """Return the runs of a layout."""
         runs = layout.runs.copy()
         runs[:, 2] = -(-runs[:, 2] // CHUNK) * CHUNK
@@ -87,7 +87,7 @@ class Chunks(NamedTuple):
         return cls(runs.astype(np.uintp), weight, arcs)
 
 
-class Expectation(NamedTuple):
+class ForwardBackwardNetwork(NamedTuple):
     """A network ready for forward–backward; arrays as in ``network_posteriors``.
 
     layout  : of the arcs
@@ -101,8 +101,8 @@ class Expectation(NamedTuple):
     arc_start: Index
     log_initial: Array
     log_final: Array
-    layout: Layout
-    weights: Weights
+    layout: ArcLayout
+    weights: ArcWeights
     turned: Array
     chunks: Chunks
 
@@ -114,20 +114,22 @@ class Expectation(NamedTuple):
         arc_start: Index,
         log_initial: NDArray[np.floating[Any]],
         log_final: NDArray[np.floating[Any]],
-    ) -> Expectation:
+    ) -> ForwardBackwardNetwork:
         """Return a network ready."""
-        layout = laid_out(arc_from, arc_start)
+        layout = arc_layout(arc_from, arc_start)
         weights, turned, chunks = _weighted(layout, arc_log)
         arc_log, log_initial, log_final = (log.astype(np.float64) for log in (arc_log, log_initial, log_final))
         return cls(arc_from, arc_log, arc_start, log_initial, log_final, layout, weights, turned, chunks)
 
-    def with_arcs(self, arc_log: NDArray[np.floating[Any]], log_initial: NDArray[np.floating[Any]]) -> Expectation:
+    def with_arcs(
+        self, arc_log: NDArray[np.floating[Any]], log_initial: NDArray[np.floating[Any]]
+    ) -> ForwardBackwardNetwork:
         """Return the network with other probabilities [shapes=(E,), (S,)]; nothing is laid out anew."""
         weights, turned, chunks = _weighted(self.layout, arc_log)
         changed = self._replace(weights=weights, turned=turned, chunks=chunks)
         return changed._replace(arc_log=arc_log.astype(np.float64), log_initial=log_initial.astype(np.float64))
 
-    def over(self, log_emission: NDArray[np.floating[Any]], columns: Index, frames: Index) -> Expected:
+    def over(self, log_emission: NDArray[np.floating[Any]], columns: Index, frames: Index) -> NetworkPosteriors:
         """Return what recordings say, one after the other in ``log_emission``.
 
         log_emission : [shape=(T, G)]; the result's posteriors are as precise as these
@@ -143,7 +145,7 @@ class Expectation(NamedTuple):
 
     def over_chains(
         self, log_emissions: Sequence[NDArray[np.floating[Any]]], columns: Sequence[Index], frames: Index
-    ) -> Expected:
+    ) -> NetworkPosteriors:
         """Return what recordings say whose densities are products, one factor from each of some chains.
 
         log_emissions : one or more [shape=(T, G_c)], all as precise; the log density of the state at place s is the
@@ -169,12 +171,12 @@ class Expectation(NamedTuple):
         log_emissions: Sequence[NDArray[np.floating[Any]]],
         columns: Sequence[Index],
         frames: Index,
-        expected: Expected | None,
-    ) -> Expected:
+        expected: NetworkPosteriors | None,
+    ) -> NetworkPosteriors:
         """Return what was found, what has no path yet in logarithms."""
         if expected is None:
             posterior = np.zeros((len(log_emissions[0]), len(columns[0])), log_emissions[0].dtype)
-            expected = Expected(posterior, np.zeros(len(self.arc_log)), np.full(len(frames), -np.inf))
+            expected = NetworkPosteriors(posterior, np.zeros(len(self.arc_log)), np.full(len(frames), -np.inf))
         edges = np.append(0, np.cumsum(frames))
         for u in np.flatnonzero(np.isneginf(expected.log_likelihood)):
             mine = slice(edges[u], edges[u + 1])
@@ -187,7 +189,9 @@ class Expectation(NamedTuple):
             expected.counts[:] += counts
         return expected
 
-    def _compiled(self, root: NDArray[Any], best: NDArray[Any], frames: Index, single: bool = False) -> Expected:
+    def _compiled(
+        self, root: NDArray[Any], best: NDArray[Any], frames: Index, single: bool = False
+    ) -> NetworkPosteriors:
         """Return what recordings say, where there are paths within reach.
 
         root : [shape=(T, S)], by place, the eighth roots of densities relative to ``best``; becomes the posteriors
@@ -212,7 +216,7 @@ class Expectation(NamedTuple):
         _count_blocks(counts, layout, self.weights, leaving, entering)
         with np.errstate(divide="ignore"):
             log_likelihood = np.add.reduceat(np.log(scales) + best, edges[:-1]) + (np.log(ends) + first + last)
-        return Expected(root, counts, log_likelihood)
+        return NetworkPosteriors(root, counts, log_likelihood)
 
     def _in_logs(self, log_emission: Array) -> tuple[Array, Array, float]:
         """Return posteriors, counts and log likelihood of one recording by NumPy, in logarithms: none is too small.
@@ -276,13 +280,13 @@ def _probabilities(log: Array) -> tuple[Array, float]:
     return np.exp(log - best), best
 
 
-def _weighted(layout: Layout, arc_log: NDArray[np.floating[Any]]) -> tuple[Weights, Array, Chunks]:
+def _weighted(layout: ArcLayout, arc_log: NDArray[np.floating[Any]]) -> tuple[ArcWeights, Array, Chunks]:
     """Return the probabilities of arcs, given by their logarithms [shape=(E,)], in all forms that kernels take."""
-    weights = weights_of(layout, np.exp(arc_log.astype(np.float64)), 0.0)
+    weights = arc_weights(layout, np.exp(arc_log.astype(np.float64)), 0.0)
     return weights, _turned(layout, weights), Chunks.of(layout, weights)
 
 
-def _turned(layout: Layout, weights: Weights) -> Array:
+def _turned(layout: ArcLayout, weights: ArcWeights) -> Array:
     """Return the weights of all blocks, targets as rows, sources as columns, padded."""
     turned = [np.empty((0, -(-layout.blocks[:, 3].max(initial=0) // PADDED) * PADDED))]
     for _, targets, first, sources in layout.blocks:
@@ -292,7 +296,7 @@ def _turned(layout: Layout, weights: Weights) -> Array:
     return np.concatenate(turned)
 
 
-def _count_blocks(counts: Array, layout: Layout, weights: Weights, leaving: Array, entering: Array) -> None:
+def _count_blocks(counts: Array, layout: ArcLayout, weights: ArcWeights, leaving: Array, entering: Array) -> None:
     """Fill in the expected counts of the arcs of all blocks: one matrix product each."""
     start = 0
     for _, targets, first, sources in layout.blocks:

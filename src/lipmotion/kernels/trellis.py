@@ -32,7 +32,7 @@ def cheapest_arrivals(start: Array, steps: Array) -> tuple[Array, NDArray[np.uin
     return arrivals[-1, :, -1], in_order
 
 
-def traced(pointers: NDArray[np.uint8], last: int) -> NDArray[np.intp]:
+def trace_back(pointers: NDArray[np.uint8], last: int) -> NDArray[np.intp]:
     """Return the state of every frame [shape=(T,)] on the way that ends in ``last``."""
     states, table = pointers.shape[1], pointers.tobytes()
     path = [last]

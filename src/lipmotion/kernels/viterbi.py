@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.kernels.arcs import Layout, Weights, laid_out, weights_of
+from lipmotion.kernels.arcs import ArcLayout, ArcWeights, arc_layout, arc_weights
 from lipmotion.kernels.choice import compiled_pays
 
 Index = NDArray[np.intp]
@@ -31,7 +31,7 @@ def best_path(
     log_initial: NDArray[np.float32],
     log_final: NDArray[np.float32],
     beam: float | None = None,
-    layout: Callable[[], Layout] | None = None,
+    layout: Callable[[], ArcLayout] | None = None,
 ) -> tuple[NDArray[np.intp], float]:
     """Return the most probable path and its log probability (-inf: no path).
 
@@ -50,7 +50,7 @@ def best_path(
     """
     arcs = (emission, arc_from, arc_log, arc_start, np.inf if beam is None else beam)
     if compiled_pays(count * (FRAME_S + ARC_S * len(arc_from))):
-        search = _laid_out(arcs, layout() if layout else laid_out(arc_from, arc_start))
+        search = _laid_out(arcs, layout() if layout else arc_layout(arc_from, arc_start))
     else:
         search = _Search(*arcs, order=np.arange(len(emission)), place=np.arange(len(emission)))
     starts = range(0, count, BLOCK)
@@ -90,8 +90,8 @@ class _Search:
     beam: float
     order: Index
     place: Index
-    layout: Layout | None = None
-    weights: Weights | None = None
+    layout: ArcLayout | None = None
+    weights: ArcWeights | None = None
 
     def scores(self, first: Scores, log_emission: Scores) -> tuple[Scores, float]:
         """Return the best scores into every state, frame by frame, each frame's best taken off, and their sum."""
@@ -138,5 +138,5 @@ class _Search:
             path[frame] = state
 
 
-def _laid_out(arcs: tuple[Index, Index, Scores, Index, float], layout: Layout) -> _Search:
-    return _Search(*arcs, layout.order, layout.place, layout, weights_of(layout, arcs[2], -np.inf))
+def _laid_out(arcs: tuple[Index, Index, Scores, Index, float], layout: ArcLayout) -> _Search:
+    return _Search(*arcs, layout.order, layout.place, layout, arc_weights(layout, arcs[2], -np.inf))

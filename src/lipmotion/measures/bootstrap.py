@@ -11,7 +11,7 @@ Clips = Sequence[NDArray[np.float64]]
 DRAWS = 2000
 
 
-def interval(
+def bootstrap_interval(
     figure: Callable[[Clips, Clips], float], generated: Clips, original: Clips, seed: int, draws: int = DRAWS
 ) -> tuple[float, float]:
     """Return the 95 % bootstrap interval of a figure over clips."""

@@ -58,7 +58,9 @@ def closings(opening: Curve, threshold: float) -> NDArray[np.intp]:
     return np.nonzero(closed[1:] & ~closed[:-1])[0] + 1
 
 
-def match(generated: NDArray[np.intp], original: NDArray[np.intp], reach: int = REACH) -> list[tuple[int, int]]:
+def match_closings(
+    generated: NDArray[np.intp], original: NDArray[np.intp], reach: int = REACH
+) -> list[tuple[int, int]]:
     """Return pairs of closings no further apart than ``reach``, one to one, nearest first."""
     pairs = sorted(
         (abs(int(g) - int(o)), int(g), int(o)) for g in generated for o in original if abs(int(g) - int(o)) <= reach
@@ -74,7 +76,7 @@ def match(generated: NDArray[np.intp], original: NDArray[np.intp], reach: int = 
     return chosen
 
 
-def near(some: NDArray[np.intp], others: NDArray[np.intp], reach: int = REACH) -> int:
+def matched_count(some: NDArray[np.intp], others: NDArray[np.intp], reach: int = REACH) -> int:
     """Return how many of some closings have one of the others within ``reach``, whichever it is."""
     return int((np.abs(some[:, None] - others) <= reach).any(axis=1).sum())
 
@@ -87,17 +89,17 @@ def closure_figures(
     o_closings = [closings(o, threshold) for o in original]
     both = list(zip(g_closings, o_closings, strict=True))
     g_count, o_count = sum(map(len, g_closings)), sum(map(len, o_closings))
-    errors = [g_frame - o_frame for g, o in both for g_frame, o_frame in match(g, o)]
+    errors = [g_frame - o_frame for g, o in both for g_frame, o_frame in match_closings(g, o)]
     return Closures(
-        score=sum(near(o, g) for g, o in both) / o_count if o_count else float("nan"),
-        precision=sum(near(g, o) for g, o in both) / g_count if g_count else float("nan"),
+        score=sum(matched_count(o, g) for g, o in both) / o_count if o_count else float("nan"),
+        precision=sum(matched_count(g, o) for g, o in both) / g_count if g_count else float("nan"),
         timing_ms=float(np.median(errors)) / rate_hz * 1000 if errors else float("nan"),
         original=o_count,
         generated=g_count,
     )
 
 
-def found_closings(
+def clip_closure_counts(
     generated: Sequence[Curve], original: Sequence[Curve], threshold: float
 ) -> tuple[list[Curve], list[Curve]]:
     """Return, clip by clip, how many original closings have a generated one near them, and how many there are.
@@ -107,7 +109,7 @@ def found_closings(
     are drawn for an interval.
     """
     wanted = [closings(o[:, 0], threshold) for o in original]
-    hits = [near(o, closings(g[:, 0], threshold)) for g, o in zip(generated, wanted, strict=True)]
+    hits = [matched_count(o, closings(g[:, 0], threshold)) for g, o in zip(generated, wanted, strict=True)]
     return [np.array([hit], float) for hit in hits], [np.array([len(o)], float) for o in wanted]
 
 

@@ -54,7 +54,7 @@ def shift_scores(predicted: Array, measured: Array, valid: NDArray[np.bool_], re
     return np.array([_score(predicted, measured, valid, shift) for shift in range(-reach, reach + 1)])
 
 
-def offset(scores: Array, rate_hz: float) -> Offset:
+def best_offset(scores: Array, rate_hz: float) -> Offset:
     """Return where the scores [shape=(2·reach + 1,)] are highest, refined by a parabola."""
     late_s, score, margin = _highest(scores, rate_hz)
     return Offset(late_s, score, margin, late_s, late_s)

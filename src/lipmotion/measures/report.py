@@ -13,7 +13,7 @@ PINNED = (
 )
 
 
-def table(figures: Mapping[str, Any]) -> str:
+def figures_table(figures: Mapping[str, Any]) -> str:
     """Return the figures of ``lipmotion.evaluate`` as text."""
     closed, still = figures["closed_under"], figures["still_channels"]
     lines = [f"split {figures['split']}: {figures['clips']} clips"]
@@ -26,9 +26,9 @@ def table(figures: Mapping[str, Any]) -> str:
         lines += ["", name, f"  {'channel':{size}}{'ACC':>7}{'per clip':>10}{'nRMSE':>7}{'variance':>10}{'jerk':>7}"]
         for channel, row in rows.items():
             lines.append(
-                f"  {channel:{size}}{number(row['acc'], '7.3f')}{number(row['acc_per_clip'], '10.3f')}"
-                f"{number(row['nrmse'], '7.3f')}{number(row['global_variance'], '10.2f')}"
-                f"{number(row['jerk'], '7.2f')}"
+                f"  {channel:{size}}{figure_text(row['acc'], '7.3f')}{figure_text(row['acc_per_clip'], '10.3f')}"
+                f"{figure_text(row['nrmse'], '7.3f')}{figure_text(row['global_variance'], '10.2f')}"
+                f"{figure_text(row['jerk'], '7.2f')}"
             )
         lines += _rest(condition)
     return "\n".join(map(printable, lines))
@@ -57,8 +57,8 @@ def _rest(condition: Mapping[str, Any]) -> list[str]:
         f"  opening ACC 95 % interval {low:.3f} to {high:.3f};{lines[0][1:]}",
         *lines[1:],
         *_closing(condition),
-        f"  silence: opening {number(quiet['mean'], '.4f')} ± {number(quiet['std'], '.4f')} "
-        f"(original {number(original['mean'], '.4f')} ± {number(original['std'], '.4f')}, {quiet['frames']} frames)",
+        f"  silence: opening {figure_text(quiet['mean'], '.4f')} ± {figure_text(quiet['std'], '.4f')} "
+        f"(original {figure_text(original['mean'], '.4f')} ± {figure_text(original['std'], '.4f')}, {quiet['frames']} frames)",
         *_unpinned(condition),
     ]
 
@@ -66,12 +66,12 @@ def _rest(condition: Mapping[str, Any]) -> list[str]:
 def _closing(condition: Mapping[str, Any]) -> list[str]:
     closures, phones = condition["closures"], condition["closures_p_b_m"]
     return [
-        f"  closures: score {number(closures['score'], '.3f')} of {closures['original']}, precision "
-        f"{number(closures['precision'], '.3f')} of {closures['generated']}, timing "
-        f"{number(closures['timing_ms'], '+.0f')} ms",
-        f"  p b m: recall {number(phones['recall'], '.3f')} of {phones['intervals']}, false closures "
-        f"{number(phones['false_per_minute'], '.1f')} a minute (original "
-        f"{number(phones['original_per_minute'], '.1f')})",
+        f"  closures: score {figure_text(closures['score'], '.3f')} of {closures['original']}, precision "
+        f"{figure_text(closures['precision'], '.3f')} of {closures['generated']}, timing "
+        f"{figure_text(closures['timing_ms'], '+.0f')} ms",
+        f"  p b m: recall {figure_text(phones['recall'], '.3f')} of {phones['intervals']}, false closures "
+        f"{figure_text(phones['false_per_minute'], '.1f')} a minute (original "
+        f"{figure_text(phones['original_per_minute'], '.1f')})",
     ]
 
 
@@ -80,12 +80,12 @@ def _unpinned(condition: Mapping[str, Any]) -> list[str]:
     if free is None:
         return []
     low, high = free["opening_acc_95"]
-    acc = number(free["channels"]["opening"]["acc"], ".3f")
+    acc = figure_text(free["channels"]["opening"]["acc"], ".3f")
     head = f"  without pins: ACC of opening {acc} ({low:.3f} to {high:.3f}), mean ACC {free['acc']:.3f}"
     return [head, *(f"  {line}" for line in _closing(free))]
 
 
-def number(value: float | None, form: str) -> str:
+def figure_text(value: float | None, form: str) -> str:
     """Return a figure as text, a dash in the same width where there is none."""
     width = form.partition(".")[0].strip("+")
     return f"{'–':>{width or 0}}" if value is None else format(value, form)

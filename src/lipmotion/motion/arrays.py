@@ -1,4 +1,4 @@
-"""What every model of motion has beside its statistics: units, the space of the motion, and how lips close."""
+"""Serialisation of what every engine learns of motion: units, the space of the motion, closures."""
 
 from __future__ import annotations
 
@@ -7,24 +7,28 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.errors import ModelFormatError
 from lipmotion.motion.closure import OPENING, Closure
+from lipmotion.motion.generation import LearnedMotion
+from lipmotion.motion.limits import MotionLimits, check_poses
 from lipmotion.motion.space import MotionSpace
+from lipmotion.motion.variance_scaling import VarianceScaling
 from lipmotion.stats.pca import Pca, check_orthonormal
 from lipmotion.storage.schema import Arrays, ArraySpec, checked_arrays, refuse_undeclared
 from lipmotion.types import Channel
 from lipmotion.units import UNIT_SETS, UnitSet
 
-SINGLE = UNIT_SETS["phone"]
+PHONE_SET = UNIT_SETS["phone"]
 """Each phone its own unit: needs no table."""
 
 
 def motion_arrays(units: UnitSet, space: MotionSpace, closure: Closure | None) -> dict[str, NDArray[Any]]:
-    """Return them as arrays."""
+    """Serialise the mapping of phones to units, the motion space and the closure."""
     arrays: dict[str, NDArray[Any]] = {
         "channels": np.array([(channel.name, channel.unit) for channel in space.channels]),
         "direct": space.direct,
     }
-    if units != SINGLE:
+    if units != PHONE_SET:
         arrays["units"] = np.array(list(units.of.items()))
     if space.points is not None:
         arrays |= {"points_mean": space.points.mean, "points_basis": space.points.basis.astype(np.float32)}
@@ -33,8 +37,31 @@ def motion_arrays(units: UnitSet, space: MotionSpace, closure: Closure | None) -
     return arrays
 
 
+def learned_motion_arrays(motion: LearnedMotion) -> dict[str, NDArray[Any]]:
+    """Serialise learned motion with its limits and variance scaling: for engines that store nothing of it themselves."""
+    arrays = motion_arrays(PHONE_SET, motion.space, motion.closure) | {"limits": np.stack(motion.limits)}
+    return arrays | ({"scaling": np.stack(motion.scaling)} if motion.scaling is not None else {})
+
+
+def learned_motion_from_arrays(arrays: Arrays) -> LearnedMotion:
+    """Deserialise what ``learned_motion_arrays`` returned; other arrays are ignored.
+
+    Raises ModelFormatError: an array is missing, or has a wrong shape, type or range.
+    """
+    try:
+        _, space, closure = motion_from_arrays(arrays, PHONE_SET.name)
+        limits = MotionLimits(*checked_arrays(arrays, LIMITS, Q=space.dimensions)["limits"])
+        check_poses(limits, space, closure)
+        scaling = None
+        if "scaling" in arrays:
+            scaling = VarianceScaling(*checked_arrays(arrays, SCALING, Q=space.dimensions)["scaling"])
+        return LearnedMotion(space, closure, limits, scaling)
+    except (KeyError, ValueError, IndexError, TypeError) as error:
+        raise ModelFormatError(f"the learned motion is damaged ({error}); train or download it again") from error
+
+
 def motion_from_arrays(arrays: Arrays, units: str) -> tuple[UnitSet, MotionSpace, Closure | None]:
-    """Return them again.
+    """Deserialise the mapping of phones to units, the motion space and the closure.
 
     units : the name of the unit set; the set itself is in the arrays
     Raises KeyError, ValueError, IndexError, TypeError: something is missing, out of place or out of range.
@@ -47,7 +74,7 @@ def motion_from_arrays(arrays: Arrays, units: str) -> tuple[UnitSet, MotionSpace
         if column != space.direct_names.index(OPENING) or closed < 0:
             raise ValueError(f"closure of column {column:g} at {closed:g}, required that of {OPENING}, 0 or more")
         closure = Closure(int(column), float(closed), found["closure_follow"])
-    of = SINGLE if units == SINGLE.name else UnitSet(units, _mapping(checked_arrays(arrays, UNITS)["units"]))
+    of = PHONE_SET if units == PHONE_SET.name else UnitSet(units, _mapping(checked_arrays(arrays, UNITS)["units"]))
     return of, space, closure
 
 
@@ -58,6 +85,8 @@ POINTS = {
 }
 CLOSURE = {"closure": ArraySpec(np.float64, "2"), "closure_follow": ArraySpec(np.float64, "Q")}
 UNITS = {"units": ArraySpec(np.str_, "N 2")}
+LIMITS = {"limits": ArraySpec(np.float64, "2 Q")}
+SCALING = {"scaling": ArraySpec(np.float64, "2 Q")}
 MOTION_ARRAYS = (*CHANNELS, *POINTS, *CLOSURE, *UNITS)
 """How they are stored: P channels, of which R are reduced to K dimensions."""
 

@@ -90,25 +90,25 @@ def with_unit_names(spans: Timeline[Unit], units: UnitSet) -> Timeline[Unit]:
     return Timeline(tuple(found))
 
 
-def full_context_states(units: Timeline[Unit], frames: int, cut: StateLayout) -> list[FullContextState]:
+def full_context_states(units: Timeline[Unit], frames: int, layout: StateLayout) -> list[FullContextState]:
     """Return the place of every frame [length ``frames``].
 
-    Silence (the phone, whatever its unit) further than ``cut.rest_s`` from speech, and frames outside all units, are
-    ``cut.rest``.
+    Silence (the phone, whatever its unit) further than ``layout.rest_s`` from speech, and frames outside all units, are
+    ``layout.rest``.
     Raises InputError: a phone outside the inventory.
     """
     for span in units:
         if span.label.phone not in PHONES:
             raise InputError(unknown_phone_message(span.label.phone, f" at {span.start_s} s"))
-    result = [cut.rest] * frames
+    result = [layout.rest] * frames
     speech_s = speech_intervals(units)
     for left, span, right in with_neighbours(units):
         edges = np.ceil(np.array([span.start_s, span.end_s]) * FRAME_RATE_HZ - 1e-6)
         first, stop = np.clip(edges, 0, frames).astype(int).tolist()
         time_s = np.arange(first, stop) / FRAME_RATE_HZ
-        before, unit, after = map(cut.units.unit, (left, span.label.phone, right))
-        rests = is_silent(span.label.phone) & away_from_speech(time_s, speech_s, cut.rest_s)
-        part = _parts(time_s, span.start_s, span.end_s, cut.parts(unit), cut.edge_s)
+        before, unit, after = map(layout.units.unit, (left, span.label.phone, right))
+        rests = is_silent(span.label.phone) & away_from_speech(time_s, speech_s, layout.rest_s)
+        part = _parts(time_s, span.start_s, span.end_s, layout.parts(unit), layout.edge_s)
         for i in np.nonzero(~rests)[0]:
             result[first + i] = FullContextState(before, unit, after, int(part[i]))
     return result

@@ -1,8 +1,9 @@
-"""From means and precisions to the motion of all channels: stretch by stretch, through pins, lips closed."""
+"""From means and precisions to the motion of all channels, for all engines: scaling, pins, closures, limits."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,10 +11,21 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.kernels.banded import generate
-from lipmotion.motion.closure import OPENING, Closure, closing_frames
+from lipmotion.motion.closure import OPENING, Closure, closing_frames, closing_spans
 from lipmotion.motion.limits import MotionLimits
 from lipmotion.motion.space import MotionSpace
-from lipmotion.types import FRAME_RATE_HZ, WEIGHT, Constraints, ReducedVariance, check_magnitude, frame_of
+from lipmotion.motion.variance_scaling import VarianceScaling
+from lipmotion.types import (
+    FRAME_RATE_HZ,
+    WEIGHT,
+    Constraints,
+    Motion,
+    ReducedVariance,
+    Timeline,
+    Unit,
+    check_magnitude,
+    frame_of,
+)
 
 STRETCH, MARGIN = 6000, 500
 """Frames generated at a time, and those around them that are generated again and thrown away: what lies seconds off
@@ -27,44 +39,80 @@ Statistics = tuple[NDArray[np.float64], NDArray[np.float64]]
 """Means and precisions of successive frames [each shape=(T, 3, Q)], or values and variances [each shape=(T, Q)]."""
 
 
-def generated_motion(
-    statistics: Callable[[slice], Statistics],
-    frames: int,
-    space: MotionSpace,
-    reach: MotionLimits,
-    *,
-    closure: Closure | None,
-    closing: Sequence[slice],
-    pins: Pins,
-) -> tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]] | ReducedVariance]:
-    """Return the motion of all channels [shape=(T, P)] and its variance, by parameter generation.
+@dataclass(frozen=True, eq=False)
+class LearnedMotion:
+    """What every engine learns of motion beside its statistics: the end of the path from speech to motion.
 
-    statistics : gives means and precisions of some frames
-    reach      : between which values the model's poses lie
-    closure    : how the lips close (None: the motion has no opening);  closing : the frames in which they must
-    pins       : from ``resolved_pins``
-    Raises ModelFormatError: the motion leaves all that the model's poses, and the pins, span.
+    space   : the Q dimensions in which motion is modelled
+    closure : how the lips close (None: the motion has no channel ``opening``)
+    limits  : of plausible motion
+    scaling : variance scaling about the rest pose (None: movements stay as they are)
     """
-    is_long = frames > DOUBLE_FRAMES
-    precise = np.float32 if is_long else np.float64
-    motion = np.empty((frames, len(space.channels)), precise)
-    spread = np.empty((frames, space.dimensions if is_long else len(space.channels)), precise)
-    for inner, outer in generation_blocks(frames):
-        inside = {(frame - outer.start, c): v for (frame, c), v in pins.items() if outer.start <= frame < outer.stop}
-        spans = [
-            slice(span.start - outer.start, span.stop - outer.start)
-            for span in closing
-            if outer.start <= span.start and span.stop <= outer.stop
-        ]
-        result = _generated(closure, statistics(outer), inside, spans)
-        reach.check(result[0], closure, inside)
-        kept = slice(inner.start - outer.start, inner.stop - outer.start)
-        values, variance = (rows[kept] for rows in result)
-        motion[inner], restored = space.restore(values, variance)
-        spread[inner] = variance if is_long else restored
-    weights = [channel.unit == WEIGHT for channel in space.channels]
-    motion[:, weights] = np.maximum(motion[:, weights], 0)
-    return motion, ReducedVariance(spread, space.mixing.astype(precise)) if is_long else spread
+
+    space: MotionSpace
+    closure: Closure | None
+    limits: MotionLimits
+    scaling: VarianceScaling | None = None
+
+    def generate(
+        self,
+        statistics: Callable[[slice], Statistics],
+        frames: int,
+        units: Timeline[Unit],
+        constraints: Constraints | None = None,
+        *,
+        close: bool = True,
+        closing_units: Container[str] = (),
+    ) -> tuple[Motion, NDArray[np.floating[Any]] | ReducedVariance]:
+        """Return the motion of all channels, and its variance [shape=(T, P)], by parameter generation.
+
+        In this order: variance scaling, pins, parameter generation, closures in p, b and m, limits, all channels.
+        statistics    : returns means and precisions of a range of frames [each shape=(N, 3, Q)]
+        frames        : T, of the whole recording
+        units         : phones in time
+        close         : whether the lips are made to meet in every p, b and m
+        closing_units : units without a phone that close the lips as well
+        Raises InputError: a pin names no channel, lies outside the recording or is not finite.
+        Raises ModelFormatError: the motion leaves the limits, so that the model must be damaged.
+        """
+        pins = resolved_pins(constraints, self.space, frames)
+        closing = closing_spans(units, frames, closing_units) if close else []
+        values, variance = self._generated(statistics, frames, closing, pins)
+        return Motion(values, FRAME_RATE_HZ, self.space.channels), variance
+
+    def _generated(
+        self, statistics: Callable[[slice], Statistics], frames: int, closing: Sequence[slice], pins: Pins
+    ) -> tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]] | ReducedVariance]:
+        """Return values and variance of all channels [each shape=(T, P)], block by block.
+
+        closing : the frames of each phone in which the lips must close
+        """
+        space = self.space
+        is_long = frames > DOUBLE_FRAMES
+        precise = np.float32 if is_long else np.float64
+        motion = np.empty((frames, len(space.channels)), precise)
+        spread = np.empty((frames, space.dimensions if is_long else len(space.channels)), precise)
+        for inner, outer in generation_blocks(frames):
+            inside = {
+                (frame - outer.start, c): v for (frame, c), v in pins.items() if outer.start <= frame < outer.stop
+            }
+            spans = [
+                slice(span.start - outer.start, span.stop - outer.start)
+                for span in closing
+                if outer.start <= span.start and span.stop <= outer.stop
+            ]
+            predicted = statistics(outer)
+            if self.scaling is not None:
+                predicted = self.scaling.apply(*predicted)
+            result = _generated(self.closure, predicted, inside, spans)
+            self.limits.check(result[0], self.closure, inside)
+            kept = slice(inner.start - outer.start, inner.stop - outer.start)
+            values, variance = (rows[kept] for rows in result)
+            motion[inner], restored = space.restore(values, variance)
+            spread[inner] = variance if is_long else restored
+        weights = [channel.unit == WEIGHT for channel in space.channels]
+        motion[:, weights] = np.maximum(motion[:, weights], 0)
+        return motion, ReducedVariance(spread, space.mixing.astype(precise)) if is_long else spread
 
 
 def resolved_pins(constraints: Constraints | None, space: MotionSpace, frames: int) -> Pins:

@@ -7,6 +7,7 @@ a closed mouth stays closed.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,12 +28,20 @@ def scaling_factors(recorded: Sequence[Array], generated: Sequence[Array]) -> Ar
     return np.clip(ratio, 1.0, LARGEST_FACTOR)
 
 
-def scaled(means: Array, precisions: Array, factors: Array, rest: Array) -> tuple[Array, Array]:
-    """Return means and precisions of movements away from the rest pose that are larger by some factors.
+class VarianceScaling(NamedTuple):
+    """By how much movements away from the rest pose grow, dimension by dimension.
 
-    means, precisions : of static value, Δ and Δ² [shape=(T, 3, Q)]
-    factors, rest     : from ``scaling_factors``, and the rest pose [shape=(Q,)]
+    factors, rest : from ``scaling_factors``, and the rest pose [shape=(Q,)]
     """
-    grown = means * factors
-    grown[:, 0] += rest * (1 - factors)
-    return grown, precisions / (factors * factors)
+
+    factors: Array
+    rest: Array
+
+    def apply(self, means: Array, precisions: Array) -> tuple[Array, Array]:
+        """Return the means and precisions of the larger movements.
+
+        means, precisions : of static value, Δ and Δ² [shape=(T, 3, Q)]
+        """
+        grown = means * self.factors
+        grown[:, 0] += self.rest * (1 - self.factors)
+        return grown, precisions / (self.factors * self.factors)

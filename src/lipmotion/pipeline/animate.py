@@ -6,7 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.export.base import MOTION_SUFFIXES, check_motion, write_motion
+from lipmotion.export.base import check_motion, motion_suffixes, write_motion
+from lipmotion.faces.base import Face
+from lipmotion.faces.registry import face_named
 from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.request import SpeechInput, request_of
@@ -57,6 +59,7 @@ def write(
     channels: Sequence[str] | None = None,
     rate_hz: float | None = None,
     fps: float = 25.0,
+    face: str = "portrait",
 ) -> None:
     """Write one result to one or several files, each in the format of its suffix.
 
@@ -66,8 +69,9 @@ def write(
     channels : those to write to motion files, in this order; all by default
     rate_hz  : frames per second of motion files; the model's own 100 by default
     fps      : frames per second of videos
+    face     : which face videos show: ``portrait``, or one that an installed package adds
     Raises ExportError: unknown suffix, no such folder, or a file that cannot be written.
-    Raises InputError: a frame rate that is not from 1 to 1000, or an unknown channel.
+    Raises InputError: a frame rate that is not from 1 to 1000, or an unknown channel or face.
     All of that is checked before the first file is written.
     """
     paths = [Path(output) for output in ([outputs] if isinstance(outputs, str | Path) else outputs)]
@@ -75,6 +79,7 @@ def write(
     videos = [path for path in paths if path.suffix.lower() == VIDEO_SUFFIX]
     if videos and "opening" not in generation.motion.names:
         raise ExportError(f"{videos[0]}: the motion has no channel 'opening' to draw a face from; write motion files")
+    drawn = face_named(face)
     written = generation.selected(channels) if channels is not None else generation
     if rate_hz is not None:
         written = written.resampled(rate_hz)
@@ -83,7 +88,7 @@ def write(
             check_motion(path, written.motion)
     for path in paths:
         if path.suffix.lower() == VIDEO_SUFFIX:
-            _write_video(generation, path, Path(str(speech)), fps)
+            _write_video(generation, path, Path(str(speech)), fps, drawn)
         else:
             _write_motion(written, path, speech, model)
 
@@ -99,7 +104,7 @@ def check_outputs(
     for hertz in (fps, rate_hz):
         if hertz is not None and not SLOWEST_HZ <= hertz <= FASTEST_HZ:
             raise InputError(f"the frame rate is {hertz}, required {SLOWEST_HZ:.0f} to {FASTEST_HZ:.0f} a second")
-    suffixes = (*MOTION_SUFFIXES, VIDEO_SUFFIX)
+    suffixes = (*motion_suffixes(), VIDEO_SUFFIX)
     check_distinct([Path(path) for path in outputs])
     for path in map(Path, outputs):
         if path.suffix.lower() not in suffixes:
@@ -120,9 +125,8 @@ def _text(value: object) -> str:
     return as_text("; ".join(map(str, value)) if isinstance(value, list) else str(value))
 
 
-def _write_video(generation: Generation, path: Path, speech: Path, fps: float) -> None:
+def _write_video(generation: Generation, path: Path, speech: Path, fps: float, face: Face) -> None:
     from lipmotion.export.video import write_mp4
-    from lipmotion.faces.portrait import render
 
-    frames = render(generation.motion, generation.units, fps=fps)
+    frames = face.render(generation.motion, generation.units, fps=fps)
     write_mp4(path, frames, fps=fps, audio=read_audio(speech, SOUND_RATE_HZ))

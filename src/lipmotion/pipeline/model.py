@@ -12,7 +12,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from lipmotion.appearance.eigenlips import Eigenlips, eigenlips_arrays, eigenlips_from_arrays
-from lipmotion.engines import Engine, engine_named
+from lipmotion.engines import ENGINES, Engine, engine_named
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.hmm.model import HmmConfig, UnitHmm, hmm_arrays, hmm_from_arrays
 from lipmotion.pipeline.training.channels import EIGENLIPS, GEOMETRY
@@ -120,14 +120,19 @@ def _shipped() -> Model:
 
 def _read(path: Path) -> Model:
     header = read_header(path)
+    if header.get("engine") not in ENGINES.names:
+        raise ModelFormatError(
+            f"{path}: no engine {header.get('engine')!r}; there are: {', '.join(ENGINES.names)}; install the package "
+            "that adds it, or give another model"
+        )
     arrays: dict[str, dict[str, NDArray[Any]]] = {}
     try:
         stored = read_archive(path)
         for part in _PARTS:
             arrays[part] = arrays_under(stored, f"{part}/")
         refuse_undeclared(stored, (f"{part}/{key}" for part, own in arrays.items() for key in own))
-        engine = engine_named(header["engine"], header["configuration"])
-        config = HmmConfig.parsed(header["recogniser"])
+        engine = engine_named(header["engine"], _options(header, "configuration"))
+        config = HmmConfig.parsed(_options(header, "recogniser"))
         phones = hmm_from_arrays(arrays["phones"], config)
         if phones.mixtures.size[2] != FEATURES:
             raise ValueError(f"phone models of {phones.mixtures.size[2]} features, required {FEATURES}")
@@ -142,6 +147,14 @@ def _read(path: Path) -> Model:
     if (about.get("visual", GEOMETRY) != GEOMETRY) != (eigenlips is not None):
         raise ModelFormatError(f"{path}: the model says visual {about.get('visual')!r}, which its eigenlips do not fit")
     return Model(phones, engine, learned, about, adaptation, eigenlips)
+
+
+def _options(header: Mapping[str, Any], key: str) -> Mapping[str, Any]:
+    """Return a configuration in a header. Raises KeyError, TypeError: there is none."""
+    options: Any = header[key]
+    if not isinstance(options, dict):
+        raise TypeError(f"{key} is {options!r}, required options by name")
+    return options
 
 
 _PARTS = ("phones", "engine", "adaptation", "eigenlips")

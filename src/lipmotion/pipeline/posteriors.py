@@ -46,8 +46,8 @@ def write_posteriors(path: Path, generation: Generation, beliefs: tuple[ChainPos
 
     Raises ExportError: another suffix, or the file cannot be written.
     """
-    from lipmotion.export.plots import draw
+    from lipmotion.export.posterior_plot import draw_posteriors
 
     check_picture(path)
     with whole_file(path) as unfinished:
-        draw(generation, beliefs).save(unfinished, optimize=True)
+        draw_posteriors(generation, beliefs).save(unfinished, optimize=True)

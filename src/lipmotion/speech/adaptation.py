@@ -1,4 +1,4 @@
-"""How phone models hear a voice that they were not trained on."""
+"""Speaker adaptation of phone models: transforms of the acoustic features, as a value and as arrays."""
 
 from __future__ import annotations
 
@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import ModelFormatError
+from lipmotion.speech.analysed_audio import AnalysedAudio
 from lipmotion.speech.general.acoustic import STREAMS
-from lipmotion.speech.general.front_end import general_features
-from lipmotion.speech.mfcc import FEATURES, mfcc
+from lipmotion.speech.mfcc import FEATURES
 from lipmotion.stats.affine import identity, transformed
 from lipmotion.storage.schema import STANDARD, Arrays, ArraySpec, checked_arrays, refuse_undeclared
-from lipmotion.types import Audio, Features
 
 LARGEST_WARP = 2.0
 """Frequencies are not stretched by more, nor by less than its inverse."""
@@ -23,55 +22,51 @@ _GENERAL = (len(STREAMS), STREAMS[0].stop, STREAMS[0].stop + 1)
 
 @dataclass(frozen=True, eq=False)
 class Adaptation:
-    """What is done to the features of one voice before phone models hear them.
+    """Transforms that make the features of one speaker more probable under phone models trained on others.
 
-    warp    : factor by which its frequencies are stretched for the own models
-    trust   : what the log densities of these are multiplied by beside the general ones, 0 to 1
-    own     : affine transform of the features after the warp [shape=(39, 40)]
-    general : the same for each stream of the general models' features [shape=(3, 13, 14)]
+    warp       : factor by which the frequencies are stretched for the own models
+    own_weight : what the log densities of the own models are multiplied by beside the general ones, 0 to 1
+    own        : affine transform of the features for the own models, after the warp [shape=(39, 40)]
+    general    : affine transforms of each stream of the features for the general models [shape=(3, 13, 14)]
     """
 
     warp: float
-    trust: float
+    own_weight: float
     own: NDArray[np.float64]
     general: NDArray[np.float64]
 
-    def own_features(self, audio: Audio, features: Features) -> NDArray[np.float32]:
-        """Return what the own models hear [shape=(T, 39)].
+    def own_features(self, audio: AnalysedAudio) -> NDArray[np.float32]:
+        """Return the adapted features for the own models [shape=(T, 39)]."""
+        return transformed(audio.mfcc(self.warp).values, self.own)
 
-        features : of the audio, not warped
-        """
-        warped = features if self.warp == 1 else mfcc(audio, self.warp)
-        return transformed(warped.values, self.own)
-
-    def general_features(self, audio: Audio) -> NDArray[np.float32]:
-        """Return what the general models hear [shape=(T, 39)]."""
-        features = general_features(audio)
+    def general_features(self, audio: AnalysedAudio) -> NDArray[np.float32]:
+        """Return the adapted features for the general models [shape=(T, 39)]."""
+        features = audio.general_features
         streams = [transformed(features[:, s], matrix) for s, matrix in zip(STREAMS, self.general, strict=True)]
         return np.concatenate(streams, axis=1)
 
 
-def identity_adaptation(warp: float, trust: float) -> Adaptation:
-    """Return an adaptation whose transforms change nothing."""
+def identity_adaptation(warp: float, own_weight: float) -> Adaptation:
+    """Return an adaptation whose affine transforms are the identity."""
     streams, size, _ = _GENERAL
-    return Adaptation(warp, trust, identity(FEATURES), np.stack([identity(size)] * streams))
+    return Adaptation(warp, own_weight, identity(FEATURES), np.stack([identity(size)] * streams))
 
 
 def adaptation_arrays(adaptation: Adaptation) -> dict[str, NDArray[Any]]:
-    """Return an adaptation as arrays."""
-    numbers = np.array([adaptation.warp, adaptation.trust])
+    """Return an adaptation serialised as arrays (``ADAPTATION_MEMBERS``)."""
+    numbers = np.array([adaptation.warp, adaptation.own_weight])
     return {"numbers": numbers, "own": adaptation.own, "general": adaptation.general}
 
 
 def adaptation_from_arrays(arrays: Arrays) -> Adaptation:
-    """Return an adaptation again. Raises ModelFormatError: something is missing, or cannot be a transform."""
+    """Deserialise an adaptation. Raises ModelFormatError: an array is missing, or cannot be a transform."""
     try:
         refuse_undeclared(arrays, ADAPTATION_MEMBERS)
-        found = checked_arrays(arrays, ADAPTATION_MEMBERS)
-        warp, trust = found["numbers"].tolist()
-        if not 1 / LARGEST_WARP <= warp <= LARGEST_WARP or not 0 <= trust <= 1:
-            raise ValueError(f"a warp of {warp} and a trust of {trust}")
-        return Adaptation(warp, trust, found["own"], found["general"])
+        checked = checked_arrays(arrays, ADAPTATION_MEMBERS)
+        warp, own_weight = checked["numbers"].tolist()
+        if not 1 / LARGEST_WARP <= warp <= LARGEST_WARP or not 0 <= own_weight <= 1:
+            raise ValueError(f"a warp of {warp} and a weight of the own models of {own_weight}")
+        return Adaptation(warp, own_weight, checked["own"], checked["general"])
     except (KeyError, ValueError, TypeError) as error:
         raise ModelFormatError(f"the adaptation is damaged ({error}); adapt the model again") from error
 
@@ -81,4 +76,4 @@ ADAPTATION_MEMBERS = {
     "own": ArraySpec(np.float64, f"{FEATURES} {FEATURES + 1}", -STANDARD, STANDARD),
     "general": ArraySpec(np.float64, " ".join(map(str, _GENERAL)), -STANDARD, STANDARD),
 }
-"""How an adaptation is stored."""
+"""The arrays of an adaptation; ``numbers`` are the warp and the weight of the own models."""

@@ -1,4 +1,4 @@
-"""Learning to hear a voice from its recordings alone, without transcripts."""
+"""Unsupervised speaker adaptation: transforms estimated from recordings of a speaker, without transcripts."""
 
 from __future__ import annotations
 
@@ -12,59 +12,70 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.speech.adaptation import Adaptation, identity_adaptation
+from lipmotion.speech.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.combined_phones import NOISES
 from lipmotion.speech.general.acoustic import STREAMS, general_model
-from lipmotion.speech.general.front_end import general_features
 from lipmotion.speech.mfcc import FEATURES, mfcc
 from lipmotion.speech.recogniser import Recogniser, own_model_weight
-from lipmotion.speech.speaker_similarity import WARPS
+from lipmotion.speech.speaker_similarity import WARPS, SpeakerSimilarity, best_warp
 from lipmotion.stats.affine import AffineStatistics, Array, improved_transform, prior_statistics, transform_statistics
 from lipmotion.stats.mixture import Mixtures
-from lipmotion.types import FRAME_RATE_HZ, Audio
+from lipmotion.types import FRAME_RATE_HZ, Audio, Features
 from lipmotion.units import is_silent
 
 PASSES, ITERATIONS = 2, 4
-"""All is recognised anew in every pass; each improves the transforms so often."""
+"""In every pass all recordings are recognised anew, and every transform is improved this many times."""
 OWN_RELEVANCE, GENERAL_RELEVANCE = 300.0, 30.0
-"""Frames that the prior of a transform, no change at all, counts for (docs/adaptation.md says how they were chosen)."""
+"""Frames that the prior of a transform, the identity, counts for (docs/adaptation.md says how they were chosen)."""
 SHORT_S, SHORT_RELEVANCE = 10.0, 1000.0
-"""From less speech, features, Δ and ΔΔ are transformed for the own models each by themselves, and less."""
+"""From less speech than this, the own models' features, Δ and ΔΔ are transformed each by themselves, with a stronger
+prior."""
 LEAST_SPEECH_S = 1.0
 
 
 class EstimatedAdaptation(NamedTuple):
-    """How a voice is heard, and how much of its speech that was learned from."""
+    """An adaptation to a speaker, and the seconds of speech that it was estimated from."""
 
     adaptation: Adaptation
     speech_s: float
 
 
 def estimate_adaptation(own: UnitHmm, recordings: Sequence[Audio]) -> EstimatedAdaptation:
-    """Return how phone models should hear a voice, after recognising its recordings with all models.
+    """Return the adaptation of phone models to the speaker of some recordings.
 
-    own : not adapted
-    Both the own and the general models get the affine transform of the features that makes what they recognised most
-    probable, drawn towards no change. The frequencies are stretched first, by one factor for all recordings.
+    own        : the phone models of a corpus, not adapted
+    recordings : of one speaker
+    All recordings are recognised with the own and the general models. The features of both then get the affine
+    transform that makes the recognised states most probable, with the identity as prior mean. The frequencies are
+    stretched first, by one factor for all recordings.
     Raises InputError: less speech than ``LEAST_SPEECH_S``.
     Raises MissingDependencyError: pocketsphinx is not installed.
     Source: Gales 1998 (constrained MLLR); Lei, Hamaker & He 2006 (a prior for it; ours is the models' own statistics).
     """
-    warp, fit = _common_warp(own, recordings)
-    sound = np.concatenate([mfcc(audio, warp).values for audio in recordings])
-    general = np.concatenate([general_features(audio) for audio in recordings])
-    adaptation, speech_s = identity_adaptation(warp, own_model_weight(fit)), 0.0
+    audios = [analysed(audio) for audio in recordings]
+    similarity = _common_similarity(own, audios)
+    own_features = np.concatenate([audio.mfcc(similarity.warp).values for audio in audios])
+    general_features = np.concatenate([audio.general_features for audio in audios])
+    adaptation, speech_s = identity_adaptation(similarity.warp, own_model_weight(similarity.score)), 0.0
     for _ in range(PASSES):
-        hear = Recogniser(own, adaptation=adaptation)
-        densities = np.concatenate([hear.densities(audio, mfcc(audio)) for audio in recordings])
-        speech_s = _checked_speech_s(hear.joint.hmm.table.names, densities)
+        recogniser = Recogniser(own, adaptation=adaptation)
+        densities = np.concatenate([recogniser.best_path_densities(audio, audio.mfcc()) for audio in audios])
+        combined = recogniser.combined
+        speech_s = _checked_speech_s(combined.hmm.table.names, densities)
         prior, free = _own_prior(own, short=speech_s < SHORT_S)
-        matrix = _improved(hear.joint.hmm.mixtures, prior, sound, densities, adaptation.own, free)
-        streams = _general_improved(general, hear.joint.columns[densities], adaptation.general)
+        matrix = _improved(combined.hmm.mixtures, prior, own_features, densities, adaptation.own, free)
+        streams = _general_improved(general_features, combined.columns[densities], adaptation.general)
         adaptation = replace(adaptation, own=matrix, general=streams)
     return EstimatedAdaptation(adaptation, speech_s)
 
 
 def _checked_speech_s(names: Sequence[str], densities: NDArray[np.intp]) -> float:
+    """Return how many seconds of speech some frames hold.
+
+    names     : of all densities: unit, point, state
+    densities : of the frames [shape=(T,)]
+    Raises InputError: less than ``LEAST_SPEECH_S``.
+    """
     units = [name.partition(".")[0] for name in names]
     silent = np.array([is_silent(unit) or unit in NOISES for unit in units])
     speech_s = float((~silent[densities]).sum() / FRAME_RATE_HZ)
@@ -77,18 +88,23 @@ def _checked_speech_s(names: Sequence[str], densities: NDArray[np.intp]) -> floa
     return speech_s
 
 
-def _common_warp(own: UnitHmm, recordings: Sequence[Audio]) -> tuple[float, float]:
-    """Return the warp that fits the recordings best together, and how well it does (``Voice.fit``)."""
-    fits = {
-        warp: own.fit(np.concatenate([mfcc(audio, warp).values for audio in recordings])) - own.typical_fit
+def _common_similarity(own: UnitHmm, audios: Sequence[AnalysedAudio]) -> SpeakerSimilarity:
+    """Return the speaker similarity of all recordings together, at one warp for all of them."""
+    scores = {
+        warp: own.fit(np.concatenate([_features_once(audio, warp).values for audio in audios])) - own.typical_fit
         for warp in WARPS
     }
-    warp = max(fits, key=lambda warp: (fits[warp], -abs(warp - 1)))
-    return warp, fits[warp]
+    warp = best_warp(scores)
+    return SpeakerSimilarity(warp, scores[warp])
+
+
+def _features_once(audio: AnalysedAudio, warp: float) -> Features:
+    """Return the features at a warp; only those without one are needed again, others would fill the memory."""
+    return audio.mfcc() if warp == 1 else mfcc(audio, warp)
 
 
 def _own_prior(own: UnitHmm, *, short: bool) -> tuple[AffineStatistics, NDArray[np.bool_]]:
-    """Return what draws the own models' transform towards none, and its entries that may change [shape=(39, 40)]."""
+    """Return the prior statistics of the own models' transform, and its entries that may change [shape=(39, 40)]."""
     group = np.arange(FEATURES + 1) // (FEATURES // 3 if short else FEATURES)
     free = (group[:-1, None] == group) | (np.arange(FEATURES + 1) == FEATURES)
     plain = np.arange(len(own.log_stay), dtype=np.intp)
@@ -96,13 +112,18 @@ def _own_prior(own: UnitHmm, *, short: bool) -> tuple[AffineStatistics, NDArray[
 
 
 def _general_improved(features: NDArray[np.float32], densities: NDArray[np.intp], transforms: Array) -> Array:
-    found = []
+    """Return the transform of each stream of the general models [shape=(3, 13, 14)], improved.
+
+    features  : not transformed [shape=(T, 39)]
+    densities : the state of the general models in each frame [shape=(T,)]
+    """
+    streams = []
     for number, (stream, transform) in enumerate(zip(STREAMS, transforms, strict=True)):
         mixtures = general_model().mixtures(number)
         prior = prior_statistics(mixtures, np.arange(mixtures.size[0])).times(GENERAL_RELEVANCE)
         free = np.ones(transform.shape, bool)
-        found.append(_improved(mixtures, prior, features[:, stream], densities, transform, free))
-    return np.stack(found)
+        streams.append(_improved(mixtures, prior, features[:, stream], densities, transform, free))
+    return np.stack(streams)
 
 
 def _improved(
@@ -113,7 +134,14 @@ def _improved(
     transform: Array,
     free: NDArray[np.bool_],
 ) -> Array:
-    """Return a transform [shape=(D, D + 1)] that makes frames more probable under the density of each."""
+    """Return a transform [shape=(D, D + 1)] that makes frames more probable under the densities of their states.
+
+    prior     : statistics that are added to those of the frames
+    features  : not transformed [shape=(T, D)]
+    densities : of each frame [shape=(T,)]
+    transform : to begin with [shape=(D, D + 1)]
+    free      : its entries that may change [shape=(D, D + 1)]
+    """
     for _ in range(ITERATIONS):
         statistics, _ = transform_statistics(mixtures, features, densities, transform)
         transform = improved_transform(transform, statistics + prior, free)

@@ -1,4 +1,4 @@
-"""Any common container, or the sound track of a video, to one channel at 16 kHz."""
+"""Sound read from files: any common container, or the sound track of a video, to one channel at 16 kHz."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ LOG = logging.getLogger("lipmotion")
 
 SPEECH_RATE_HZ = 16_000
 SHORTEST_S = 0.1
-"""Recordings under this hold no sentence; the features need 25 ms around every frame."""
+"""Shorter recordings hold no sentence; the features need 25 ms around every frame."""
 CANCELLED = 0.05
-"""The mean of the channels must keep this share of the loudest channel's energy; else they cancel one another."""
+"""The mean of the channels must have this share of the loudest channel's energy; else they cancel one another."""
 USABLE = 0.5
 """A damaged recording is refused when less than this share of its sound can be decoded."""
 CUT_SHORT = 0.9
@@ -103,7 +103,7 @@ def _checked(path: Path, audio: Audio) -> Audio:
 
 
 def _is_finite(samples: NDArray[np.float32]) -> bool:
-    """Extremes show it, and need no array of their own."""
+    """Return whether all samples are finite; their extremes tell, and need no further array."""
     return bool(np.isfinite(samples.min()) and np.isfinite(samples.max()))
 
 

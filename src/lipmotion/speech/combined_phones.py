@@ -1,4 +1,4 @@
-"""Our own phone models and the general ones as one."""
+"""The own and the general phone models combined: their units, and the weighted sum of their log densities."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from lipmotion.stats.bigram import Bigram
 from lipmotion.units import PHONES, SILENCE, is_silent, most_similar_phone
 
 NOISES = ("+nsn+", "+spn+")
-"""Units of the general models alone: noise, and noise of the mouth (a breath, a cough)."""
+"""Units that only the general models have: noise, and noise of the mouth (a breath, a cough)."""
 ENGLISH_SHARE = 0.5
-"""Of the bigram; the rest is that of the own corpus."""
+"""Weight of the English bigram; the rest is the weight of the bigram of the own corpus."""
 BIGRAM_WEIGHT, INSERTION = 3.0, -4.0
 KEPT_FRAMES = 400_000
-"""Of a recording up to about an hour, general log densities are kept, for they are asked for twice: 500 bytes a frame.
-Those of a longer one are computed twice."""
+"""The general log densities of a recording of up to so many frames, about an hour, are kept: they are asked for twice
+and take 500 bytes a frame. Those of a longer recording are computed twice."""
 
 
 class CombinedPhones(NamedTuple):
     """Models of every phone of the inventory and of the noises.
 
-    hmm     : its own densities are those of the own models; a phone that these have never heard borrows the
-              density of the nearest one that they have (``units.RELATIVES``)
-    columns : the general density of each of them [shape=(G,)]
+    hmm     : the own models; a phone without an own model borrows that of the most similar phone with one
+              (``units.SIMILAR_PHONES``)
+    columns : the general density that goes with each of its densities [shape=(G,)]
     """
 
     hmm: UnitHmm
@@ -39,10 +39,10 @@ class CombinedPhones(NamedTuple):
 
 
 def combine_phones(own: UnitHmm) -> CombinedPhones:
-    """Return the own models with all phones. Raises MissingDependencyError: pocketsphinx is not installed."""
-    old, known = own.table, [unit for unit in own.table.units if not is_silent(unit)]
+    """Return the own models extended to all phones. Raises MissingDependencyError: pocketsphinx is not installed."""
+    old, modelled = own.table, [unit for unit in own.table.units if not is_silent(unit)]
     new = tuple(unit for unit in (*PHONES, *NOISES) if unit not in old.units)
-    borrowed = [SILENCE if unit in NOISES or is_silent(unit) else most_similar_phone(unit, known) for unit in new]
+    borrowed = [SILENCE if unit in NOISES or is_silent(unit) else most_similar_phone(unit, modelled) for unit in new]
     plain = len(own.log_stay)
     added = [(unit, state, old.density(source, state)) for unit, source in zip(new, borrowed, strict=True)
              for state in range(old.count(source))]  # fmt: skip
@@ -65,36 +65,37 @@ def combine_phones(own: UnitHmm) -> CombinedPhones:
 
 
 def _column(table: StateTable, name: str) -> int:
+    """Return the general density that goes with a density of the table, by its name."""
     unit, _, rest = name.partition(".")
     return density_column(unit, int(rest.partition("<")[0].partition(">")[0]), table.count(unit))
 
 
 def _bigram(own: Bigram, units: tuple[str, ...]) -> Bigram:
-    """Mix the own bigram with that of English; behind phones that the own corpus never says, English alone."""
+    """Return the own bigram mixed with that of English; after phones that are not in the own corpus, English alone."""
     english = english_bigram(units)
-    mixed, known = english.copy(), len(own.units)
-    mixed[:known] *= ENGLISH_SHARE
-    mixed[:known, :known] += (1 - ENGLISH_SHARE) * np.exp(own.log_probability.astype(float))
+    mixed, count = english.copy(), len(own.units)
+    mixed[:count] *= ENGLISH_SHARE
+    mixed[:count, :count] += (1 - ENGLISH_SHARE) * np.exp(own.log_probability.astype(float))
     return Bigram(units, np.log(np.maximum(mixed, 1e-9)).astype(np.float32))
 
 
 def combined_log_likelihoods(
-    joint: CombinedPhones, own_features: NDArray[np.float32], trust: float, general: NDArray[np.float32]
+    combined: CombinedPhones, own_features: NDArray[np.float32], own_weight: float, general: NDArray[np.float32]
 ) -> LogLikelihoods:
-    """Return what both models say about a recording: the sum of their log densities.
+    """Return the log likelihoods of a recording under both models: a weighted sum of their log densities.
 
     own_features : for the own models [shape=(T, 39)]
-    trust        : what their log densities are multiplied by, 0 to 1
-    general      : from ``general_features`` [shape=(T, 39)]
+    own_weight   : of the log densities of the own models, 0 to 1; those of the general ones have weight 1
+    general      : features for the general models [shape=(T, 39)]
     """
     model = general_model()
     kept = model.log_density(general) if len(general) <= KEPT_FRAMES else None
 
     def log_density(first: int, end: int, chosen: DensitySelection) -> NDArray[np.float32]:
-        heard = kept[first:end] if kept is not None else model.log_density(general[first:end])
-        values = heard[:, joint.columns if chosen is None else joint.columns[chosen]]
-        if trust > 0:
-            values += np.float32(trust) * joint.hmm.mixtures.log_likelihood(own_features[first:end], chosen)
+        of_general = kept[first:end] if kept is not None else model.log_density(general[first:end])
+        values = of_general[:, combined.columns if chosen is None else combined.columns[chosen]]
+        if own_weight > 0:
+            values += np.float32(own_weight) * combined.hmm.mixtures.log_likelihood(own_features[first:end], chosen)
         return values
 
     return LogLikelihoods(len(general), log_density)

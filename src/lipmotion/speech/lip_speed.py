@@ -1,4 +1,4 @@
-"""How fast the lips part, guessed from the sound alone by a linear map: enough to see whether the two are in step."""
+"""The opening speed of the lips, predicted from sound by linear regression: it tells the offset of sound and video."""
 
 from __future__ import annotations
 
@@ -16,36 +16,40 @@ from lipmotion.types import Features
 Array = NDArray[np.float64]
 
 STATIC_FEATURES = 13
-"""The columns used: c1-c12 and log energy; their surroundings hold the deltas."""
+"""The first columns of the features, which are used: c1–c12 and log energy; their context holds the deltas."""
 FRAME_OFFSETS = tuple(range(-15, 16, 3))
-"""Frames before and after that are looked at: 150 ms either way."""
+"""The context of a frame, in frames from it: 150 ms before and after."""
 RIDGE = 100.0
 WEIGHTS = "lip-speed.json"
 
 
 def predicted_opening_speed(features: Features) -> Array:
-    """Return how fast the lips are likely to part [shape=(T,)], in no particular unit.
+    """Return the predicted opening speed of the lips [shape=(T,)], in arbitrary units.
 
-    Of no use as lip motion; its maximum over shifts against tracked lips tells the offset of sound and video.
+    It is of no use as lip motion; the shift at which it correlates best with tracked lips is the offset of the video.
     """
-    return _surroundings(features) @ _weights()
+    return _context(features) @ _weights()
 
 
 def measured_opening_speed(opening: Array) -> Array:
-    """Return how fast measured lips part: the slope over ±2 frames [shape=(T,)]."""
+    """Return the opening speed of measured lips: the slope over ±2 frames [shape=(T,)].
+
+    opening : of the lips, frame by frame [shape=(T,)]
+    """
     return regression_delta(opening.astype(np.float32)[:, None])[:, 0].astype(float)
 
 
 def fit_opening_speed(examples: Iterable[tuple[Features, Array]]) -> Array:
-    """Return the weights [shape=(143,)] of the map, by ridge regression.
+    """Return the weights of the prediction [shape=(143,)], by ridge regression.
 
-    examples : features and ``measured_opening_speed`` of the lips [shape=(at most T,)], of clips where the two are in step
+    examples : features, and the ``measured_opening_speed`` of the lips [shape=(at most T,)], of clips where both are in
+               step
     """
     count = STATIC_FEATURES * len(FRAME_OFFSETS)
     products: Array = RIDGE * np.eye(count)
     targets: Array = np.zeros(count)
     for features, measured in examples:
-        inputs = _surroundings(features)[: len(measured)]
+        inputs = _context(features)[: len(measured)]
         inputs -= inputs.mean(axis=0)
         target = measured[: len(inputs)] / max(float(measured.std()), 1e-9)
         products += inputs.T @ inputs
@@ -53,7 +57,8 @@ def fit_opening_speed(examples: Iterable[tuple[Features, Array]]) -> Array:
     return np.asarray(np.linalg.solve(products, targets), float)
 
 
-def _surroundings(features: Features) -> Array:
+def _context(features: Features) -> Array:
+    """Return the static features of every frame and its context [shape=(T, 143)]; the ends are repeated."""
     static = features.values[:, :STATIC_FEATURES].astype(float)
     frames = np.arange(len(static))[:, None] + np.array(FRAME_OFFSETS)
     return static[np.clip(frames, 0, len(static) - 1)].reshape(len(static), -1)
@@ -61,5 +66,6 @@ def _surroundings(features: Features) -> Array:
 
 @cache
 def _weights() -> Array:
+    """Return the shipped weights of the prediction [shape=(143,)]."""
     content = json.loads((resources.files("lipmotion") / "models" / WEIGHTS).read_text(encoding="utf-8"))
     return np.array(content["weights"])

@@ -1,8 +1,8 @@
-"""The acoustic front end of the papers: MFCC, log energy, Δ and ΔΔ."""
+"""The acoustic front end of the papers: 12 MFCC and the log energy of every frame, their Δ and ΔΔ."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cache
 from typing import Any
 
@@ -39,7 +39,7 @@ BLOCK = 4096
 
 
 def mfcc(audio: Audio, warp: float = 1.0) -> Features:
-    """Return 39 normalised features a frame: c1–c12, log energy, their Δ and ΔΔ.
+    """Return 39 normalised features of every frame: c1–c12, log energy, their Δ and ΔΔ.
 
     warp : factor by which frequencies are stretched before the filters, to make vocal tracts of other lengths alike
     Frame n is centred at n · 10 ms, the signal reflected at both ends: T = floor(duration · 100) + 1.
@@ -48,17 +48,36 @@ def mfcc(audio: Audio, warp: float = 1.0) -> Features:
     finite samples.
     Source: Xie & Liu 2007, §5.1; details in the project's conventions.
     """
-    samples = checked_samples(audio)
-    log_powers = log_mel(samples, _filters(warp))
+    (features,) = mfcc_of_warps(audio, (warp,), log_energy(checked_samples(audio)))
+    return features
+
+
+def mfcc_of_warps(audio: Audio, warps: Sequence[float], energy: NDArray[np.float32]) -> list[Features]:
+    """Return the features of ``mfcc`` for every warp; the spectra are computed once for all of them.
+
+    energy : ``log_energy`` of the recording [shape=(T,)]
+    Raises InputError: as ``mfcc``.
+    """
+    log_powers = log_mels(checked_samples(audio), [_filters(warp) for warp in warps])
+    features = []
+    while log_powers:
+        cepstra, rounding = _cepstra(log_powers.pop(0))  # the log powers of a long recording are freed here
+        static = np.concatenate([cepstra, energy[:, None]], axis=1)
+        features.append(Features(normalised(_with_deltas(static), rounding), audio.duration_s))
+    return features
+
+
+def _cepstra(log_powers: NDArray[np.float32]) -> tuple[NDArray[np.float32], float]:
+    """Return c1–c12 [shape=(T, 12)] and the standard deviation up to which a feature is constant but for rounding.
+
+    log_powers : of the mel filters [shape=(T, 26)]
+    """
     rounding = ROUNDING * max(float(log_powers.max()), -float(log_powers.min()))
-    cepstra = log_powers @ liftered_cosine(FILTERS, 1, CEPSTRA + 1)
-    del log_powers  # of hours it is much
-    static = np.concatenate([cepstra, log_energy(samples)[:, None]], axis=1)
-    return Features(normalised(_with_deltas(static), rounding), audio.duration_s)
+    return log_powers @ liftered_cosine(FILTERS, 1, CEPSTRA + 1), rounding
 
 
 def checked_samples(audio: Audio) -> NDArray[np.float32]:
-    """Return samples that features can be computed of. Raises InputError: as ``mfcc`` says."""
+    """Return the samples of a recording [shape=(N,)]. Raises InputError: as ``mfcc`` says."""
     if audio.rate_hz != SPEECH_RATE_HZ:
         raise InputError(f"speech features need {SPEECH_RATE_HZ} Hz, found {audio.rate_hz} Hz; resample first")
     if audio.samples.ndim != 1 or len(audio.samples) < WINDOW:
@@ -70,6 +89,7 @@ def checked_samples(audio: Audio) -> NDArray[np.float32]:
 
 
 def _with_deltas(static: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return static features [shape=(T, D)] with their Δ and ΔΔ [shape=(T, 3·D)]."""
     width = static.shape[1]
     values = np.empty((len(static), 3 * width), np.float32)
     values[:, :width] = static
@@ -79,7 +99,10 @@ def _with_deltas(static: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def regression_delta(values: NDArray[np.float32], reach: int = 2) -> NDArray[np.float32]:
-    """Return the slope of a line through ±``reach`` frames, per frame [shape=(T, D)]; the ends repeat."""
+    """Return the slope of the regression line through ±``reach`` frames around every frame [shape=(T, D)].
+
+    values : [shape=(T, D)]; the first and the last frame are repeated beyond the ends
+    """
     padded = np.pad(values, ((reach, reach), (0, 0)), mode="edge")
     count = len(values)
     slope = np.zeros_like(values)
@@ -109,26 +132,34 @@ def log_mel(samples: NDArray[np.float32], filters: NDArray[np.float32]) -> NDArr
 
     filters : weights of the powers from 0 to 8 kHz [shape=(257, F)]
     """
+    (log_powers,) = log_mels(samples, [filters])
+    return log_powers
+
+
+def log_mels(samples: NDArray[np.float32], filter_banks: Sequence[NDArray[np.float32]]) -> list[NDArray[np.float32]]:
+    """Return ``log_mel`` of every filter bank [each shape=(T, F)]; the spectra are computed once for all of them."""
     window = np.hamming(WINDOW).astype(np.float32)
-    power = np.empty((frame_count(samples), filters.shape[1]), np.float32)
-    for block in _blocks(len(power)):
-        heard = _heard(samples, block)
-        emphasised = heard[1:] - np.float32(PRE_EMPHASIS) * heard[:-1]
+    powers = [np.empty((frame_count(samples), filters.shape[1]), np.float32) for filters in filter_banks]
+    for block in _blocks(frame_count(samples)):
+        padded = _padded(samples, block)
+        emphasised = padded[1:] - np.float32(PRE_EMPHASIS) * padded[:-1]
         spectrum = np.fft.rfft(_frames(emphasised) * window, FFT_SIZE)
-        power[block] = (np.square(spectrum.real) + np.square(spectrum.imag)) @ filters
-    return _log_power(power)
+        power_spectrum = np.square(spectrum.real) + np.square(spectrum.imag)
+        for power, filters in zip(powers, filter_banks, strict=True):
+            power[block] = power_spectrum @ filters
+    return [_log_power(power) for power in powers]
 
 
 def log_energy(samples: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return the logarithm of the energy around every frame, floored 80 dB under the loudest [shape=(T,)]."""
     energy = np.empty(frame_count(samples), np.float32)
     for block in _blocks(len(energy)):
-        energy[block] = np.square(_frames(_heard(samples, block)[1:])).sum(axis=1)
+        energy[block] = np.square(_frames(_padded(samples, block)[1:])).sum(axis=1)
     return _log_power(energy)
 
 
-def _heard(samples: NDArray[np.float32], block: slice) -> NDArray[np.float32]:
-    """Return the samples of a block of frames, and the one before; beyond both ends they are reflected."""
+def _padded(samples: NDArray[np.float32], block: slice) -> NDArray[np.float32]:
+    """Return the samples under a block of frames, and the one before; beyond both ends the signal is reflected."""
     half = WINDOW // 2
     first, last = block.start * HOP - half - 1, (block.stop - 1) * HOP + half
     inside = samples[max(first, 0) : min(last, len(samples))]
@@ -136,20 +167,22 @@ def _heard(samples: NDArray[np.float32], block: slice) -> NDArray[np.float32]:
 
 
 def frame_count(samples: NDArray[np.float32]) -> int:
-    """Return T = floor(duration · 100) + 1."""
+    """Return the number of frames of a recording: T = floor(duration · 100) + 1."""
     return int(len(samples) / SPEECH_RATE_HZ * FRAME_RATE_HZ + 1e-9) + 1
 
 
 def _blocks(frames: int) -> Iterator[slice]:
+    """Return slices of at most ``BLOCK`` frames that cover all frames in order."""
     return (slice(start, min(start + BLOCK, frames)) for start in range(0, frames, BLOCK))
 
 
 def _frames(samples: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return the windows of samples, one every 10 ms [shape=(n, 400)]; a view."""
     return sliding_window_view(samples, WINDOW)[::HOP]
 
 
 def _log_power(power: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return the logarithm, in the place of the powers."""
+    """Return the natural logarithm of powers, floored 80 dB under the largest; it overwrites them."""
     floor = np.float32(max(DYNAMIC_RANGE * float(power.max()), 1e-30))
     log_power: NDArray[np.float32] = np.log(np.maximum(power, floor, out=power), out=power)
     return log_power
@@ -157,7 +190,7 @@ def _log_power(power: NDArray[np.float32]) -> NDArray[np.float32]:
 
 @cache
 def _filters(warp: float) -> NDArray[np.float32]:
-    """Triangles, equally spaced in mel from 0 to 8 kHz, of warped frequencies [shape=(257, 26)]."""
+    """Return triangular filters, equally spaced in mel from 0 to 8 kHz, of warped frequencies [shape=(257, 26)]."""
     bins = _mel(_warped(np.arange(FFT_SIZE // 2 + 1) * SPEECH_RATE_HZ / FFT_SIZE, warp))
     edges = np.linspace(0, _mel(np.array(SPEECH_RATE_HZ / 2)), FILTERS + 2)
     return triangles(bins, edges).astype(np.float32)
@@ -179,6 +212,7 @@ def _warped(hertz: NDArray[np.float64], warp: float) -> NDArray[np.float64]:
 
 
 def _mel(hertz: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return frequencies in mel."""
     return 1127 * np.log1p(hertz / 700)
 
 

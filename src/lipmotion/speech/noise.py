@@ -1,4 +1,4 @@
-"""Recordings made harder to hear: white noise, or the babble of other talkers, at a stated signal-to-noise ratio."""
+"""Noise added to recordings: white noise, or the babble of other talkers, at a stated signal-to-noise ratio."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from lipmotion.types import Audio
 
 NOISE_KINDS = ("white", "babble")
 SMOOTHING = 11
-"""The energy is averaged over so many frames before speech is told from pauses."""
+"""The log energy is averaged over so many frames before it separates speech from pauses."""
 FEWEST_TALKERS = 2
-"""One other voice is an interruption, not a babble."""
+"""One other talker is an interruption, not a babble."""
 SILENT_RMS = 1e-6
 """Speech of a lower root mean square, full scale 1, is silence."""
 
@@ -28,7 +28,7 @@ def noisy_audio(audio: Audio, kind: str, snr_db: float, talkers: Sequence[Audio]
 
     kind    : one of ``NOISE_KINDS``
     snr_db  : as ``add_noise`` measures it
-    talkers : of the babble, other people than the one in ``audio``; white noise needs none, and takes no notice of them
+    talkers : recordings of the babble's talkers, other people than the one in ``audio``; white noise does not use them
     seed    : the same arguments give the same samples
     Raises InputError: another kind, a talker that is the recording itself, or as ``add_noise`` and ``babble_noise``.
     """
@@ -43,24 +43,24 @@ def noisy_audio(audio: Audio, kind: str, snr_db: float, talkers: Sequence[Audio]
 
 
 def add_noise(audio: Audio, noise: NDArray[np.floating], snr_db: float) -> Audio:
-    """Return the recording with noise, scaled to a signal-to-noise ratio, added from start to end.
+    """Return a recording with noise, scaled to a signal-to-noise ratio, added from start to end.
 
     noise  : as many samples as the recording has [shape=(N,)], of any level
-    snr_db : 10 · log10 of the mean power of the recording over that of the noise, both over the samples in which
-             something is said (``spoken_samples``); what is noise in the recording already counts as speech there
+    snr_db : 10 · log10 of the mean power of the recording over that of the noise, both over the samples of speech
+             (``spoken_samples``); noise that the recording already has counts as speech there
     The samples are not clipped: beyond full scale they are exact for features, not for sound files of integers.
-    Raises InputError: the ratio is not finite, the lengths differ, the noise is silent or not finite, or nothing is
-    said in the recording.
+    Raises InputError: the ratio is not finite, the lengths differ, the noise is silent or not finite, or there is no
+    speech in the recording.
     """
     if not np.isfinite(snr_db):
         raise InputError(f"the signal-to-noise ratio is {snr_db} dB, required a finite number")
     spoken = spoken_samples(audio)
     if noise.shape != audio.samples.shape:
         raise InputError(f"the noise has shape {noise.shape}, required that of the recording, {audio.samples.shape}")
-    hiss = float(np.square(noise[spoken], dtype=float).mean())
-    if not 0 < hiss < np.inf:
-        raise InputError(f"the noise has a mean power of {hiss} where something is said; required above 0 and finite")
-    gain = np.sqrt(_power(audio, spoken) / hiss) * 10 ** (-snr_db / 20)
+    noise_power = float(np.square(noise[spoken], dtype=float).mean())
+    if not 0 < noise_power < np.inf:
+        raise InputError(f"the noise has a mean power of {noise_power} in speech; required above 0 and finite")
+    gain = np.sqrt(_power(audio, spoken) / noise_power) * 10 ** (-snr_db / 20)
     return Audio((audio.samples + gain * noise).astype(np.float32), audio.rate_hz)
 
 
@@ -71,12 +71,12 @@ def white_noise(samples: int, seed: int = 0) -> Samples:
 
 
 def babble_noise(voices: Sequence[Audio], samples: int, seed: int = 0) -> Samples:
-    """Return several talkers at once, each as loud as the others [shape=(samples,)].
+    """Return the sum of several talkers, each with the same power [shape=(samples,)].
 
-    voices : at least ``FEWEST_TALKERS`` recordings at 16 kHz, none of them of the speaker whom they will disturb
-    Every talker starts somewhere in the recording, by chance, and begins it again at its end. All have mean power 1
-    over the samples in which they say something.
-    Raises InputError: too few voices, another rate, a recording too short or silent, or fewer than 1 sample.
+    voices : at least ``FEWEST_TALKERS`` recordings at 16 kHz, none of them of the speaker to whom they are added
+    Every recording begins at a random sample and is repeated from its start at its end. All have mean power 1 over
+    their samples of speech.
+    Raises InputError: too few recordings, another rate, a recording too short or silent, or fewer than 1 sample.
     """
     _check_length(samples)
     if len(voices) < FEWEST_TALKERS:
@@ -91,11 +91,11 @@ def babble_noise(voices: Sequence[Audio], samples: int, seed: int = 0) -> Sample
 
 
 def spoken_samples(audio: Audio) -> NDArray[np.bool_]:
-    """Return where something is said [shape=(N,)]: 10 ms around each frame that is loud for this recording.
+    """Return which samples are speech [shape=(N,)]: the 10 ms around each frame that is loud for this recording.
 
     A frame is loud where its log energy (25 ms), averaged over 11 frames, lies above the middle between the 10th and
-    the 95th percentile of the recording (``stats.hmm.loudness.loud_frames``). Pauses do not count, so that the
-    ratio does not depend on how long they are.
+    the 95th percentile of the recording (``hmm.loudness.loud_frames``). Pauses do not count, so that a
+    signal-to-noise ratio does not depend on how long they are.
     Raises InputError: not one channel of finite samples at 16 kHz, shorter than 25 ms, or silent.
     """
     samples = checked_samples(audio)
@@ -111,6 +111,7 @@ def spoken_samples(audio: Audio) -> NDArray[np.bool_]:
 
 
 def _power(audio: Audio, spoken: NDArray[np.bool_]) -> float:
+    """Return the mean power of some samples of a recording."""
     return float(np.square(audio.samples[spoken], dtype=float).mean())
 
 

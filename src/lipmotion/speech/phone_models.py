@@ -1,4 +1,4 @@
-"""The project's own acoustic phone models, trained from recordings and what is said in them."""
+"""Training of a corpus's own acoustic phone models, from recordings and their transcripts."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from lipmotion.types import Audio, Monitor, ParallelMap
 from lipmotion.units import PAUSE, SILENCE, Lexicon
 
 WARP_CYCLE = (1.0, 0.88, 1.0, 0.94, 1.12, 1.06)
-"""Warps of the recordings, in turns."""
+"""Warps of the frequencies, of one recording after the other."""
 FEWEST_WARPED = 60
-"""With fewer recordings than this there is too little to learn one voice from, let alone several."""
+"""Fewer recordings than this are not warped: they are too few to train models of one speaker on, let alone several."""
 
 
 def train_phone_models(
@@ -26,10 +26,11 @@ def train_phone_models(
     checkpoint: Checkpoint = NO_CHECKPOINT,
     each: ParallelMap = map,
 ) -> UnitHmm:
-    """Train phone models from recordings and the words said in them.
+    """Return phone models trained on recordings and their words.
 
-    Many recordings take turns in being warped, as if by vocal tracts of other lengths: one voice is then no longer
-    all that the models know.
+    spoken : recordings, each with its words, lower case
+    The frequencies of many recordings are warped as by vocal tracts of other lengths (``WARP_CYCLE``), so that the
+    models also fit other speakers.
     Raises CorpusError: no transcript fits into its recording.
     Source: Jaitly & Hinton 2013 (vocal tract length perturbation), without random draws or more data.
     """

@@ -1,4 +1,4 @@
-"""Phones in time out of sound."""
+"""Phone recognition and forced alignment of recordings."""
 
 from __future__ import annotations
 
@@ -17,22 +17,23 @@ from lipmotion.hmm.log_likelihoods import LogLikelihoods, log_likelihoods_of, pe
 from lipmotion.hmm.loudness import loud_frames, quiet_frames
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.speech.adaptation import Adaptation
+from lipmotion.speech.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.combined_phones import NOISES, CombinedPhones, combine_phones, combined_log_likelihoods
-from lipmotion.speech.general.front_end import general_features
-from lipmotion.speech.mfcc import LOG_ENERGY, log_energy
+from lipmotion.speech.mfcc import LOG_ENERGY
 from lipmotion.speech.speaker_similarity import speaker_similarity
 from lipmotion.types import FRAME_RATE_HZ, Audio, Features, Span, Timeline, Unit
 from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent, most_similar_phone
 
 RECOGNISER_KINDS = ("auto", "own", "general")
-"""Own models only, the general ones only, or both, the own ones as far as they know the voice."""
-FOREIGN, FAMILIAR = -9.0, -5.0
-"""Own models that explain a recording this much worse than their training data (``Voice.fit``) are not heard at all;
-up to this much worse, as much as the general ones. Another speaker in the same studio costs GRID's models 4 to 6, other
-voices in other rooms 7 to 15."""
+"""``own``: the model's own phone models alone; ``general``: those of many voices alone; ``auto``: both, the own ones
+weighted by how similar the speaker is to those of their training data."""
+NO_WEIGHT_SCORE, FULL_WEIGHT_SCORE = -9.0, -5.0
+"""Own models have no weight for recordings with the first speaker similarity score or less, and the weight of the
+general models from the second one on. The score of another speaker in the same studio is -4 to -6 for GRID's models, of
+other voices in other rooms -7 to -15."""
 FEW_GAUSSIANS = 2
-"""Own models of so few Gaussians a state learned from less than two minutes: forced alignment is left to the general
-ones then. With 20 clips of GRID that raises ACC of opening on the validation list from 0.767 to 0.786 (audio only),
+"""Own models of so few Gaussians a state were trained on less than two minutes: forced alignment uses the general ones
+alone then. With 20 clips of GRID that raises ACC of opening on the validation list from 0.767 to 0.786 (audio only),
 from 0.806 to 0.841 (transcripts)."""
 ENERGY_SMOOTHING_FRAMES = 11
 """The energy is averaged over so many frames before it rules silence out."""
@@ -45,7 +46,7 @@ class Recogniser:
 
     own        : the phone models of a corpus
     kind       : one of ``RECOGNISER_KINDS``
-    adaptation : how they hear the voice that they were adapted to, if they were
+    adaptation : to one speaker, or None; with one, the speaker similarity is not computed
     Raises InputError: another kind.
     """
 
@@ -57,125 +58,142 @@ class Recogniser:
         self.adaptation = adaptation
 
     def recognise(self, audio: Audio, features: Features) -> Timeline[Unit]:
-        """Return the phones that were most probably said, in time: Viterbi with a back-off bigram.
+        """Return the most probable phones of a recording in time: Viterbi with a back-off bigram.
 
-        features : of the audio, as ``mfcc`` gives them
-        Digital silence, of which all normalised features are 0, is silence.
+        audio    : an ``AnalysedAudio`` shares its features with what else is computed of it
+        features : of the audio, as ``mfcc`` returns them
+        Digital silence, of which all normalised features are 0, is recognised as silence.
         Raises MissingDependencyError: general models are wanted and pocketsphinx is not installed.
         Source: Hofer 2008, Eq. 5.
         """
         if not features.values.any():
             return _timeline([(SILENCE, "")], np.array([0, len(features.values)]), features.duration_s)
-        _, evidence = self._evidence(audio, features)
-        phones, bounds = decode_units(self._loop, evidence)
+        audio = analysed(audio, features)
+        _, log_likelihoods = self._log_likelihoods(audio)
+        phones, bounds = decode_units(self._loop, log_likelihoods)
         labels = [(SILENCE if phone in NOISES else phone, "") for phone in phones]
-        found = _timeline(labels, bounds, features.duration_s)
-        if self.kind != "auto" or not self._knows_little:
-            return found
+        recognised = _timeline(labels, bounds, features.duration_s)
+        if self.kind != "auto" or not self._has_few_gaussians:
+            return recognised
         try:
-            return self.place(audio, features, found)
+            return self.align_phones(audio, features, recognised)
         except AlignmentError:
-            return found
+            return recognised
 
     def align(self, audio: Audio, features: Features, words: Sequence[str], lexicon: Lexicon) -> Timeline[Unit]:
-        """Return the phones of a known transcript in time.
+        """Return the phones of a known transcript in time: forced alignment.
 
-        Which pronunciation was used, and where there were pauses, follows from the sound. A phone that the models
-        have never heard borrows the sound of the nearest one that they have (``units.RELATIVES``).
+        audio, features : as of ``recognise``
+        words           : of the transcript, lower case
+        The pronunciation of each word, and the pauses between words, are those with the most probable path. A phone
+        without a model borrows that of the most similar phone with one (``units.SIMILAR_PHONES``).
         Raises AlignmentError: the transcript does not fit into the recording.
         Raises MissingDependencyError: as ``recognise``.
         """
-        hmm, evidence = self._evidence(audio, features, aligning=True)
-        evidence = penalise_silence(hmm, evidence, loud_frames(features.values[:, LOG_ENERGY], ENERGY_SMOOTHING_FRAMES))
-        known_words = {word: lexicon.pronunciations(word) for word in set(words)}
-        variants = [known_words[word] for word in words]
-        known = [unit for unit in hmm.table.units if not is_silent(unit)]
-        sounds = {
-            word: [tuple(most_similar_phone(p, known) for p in variant) for variant in choices]
-            for word, choices in known_words.items()
+        hmm, log_likelihoods = self._log_likelihoods(analysed(audio, features), aligning=True)
+        loud = loud_frames(features.values[:, LOG_ENERGY], ENERGY_SMOOTHING_FRAMES)
+        log_likelihoods = penalise_silence(hmm, log_likelihoods, loud)
+        variants_of = {word: lexicon.pronunciations(word) for word in set(words)}
+        modelled = [unit for unit in hmm.table.units if not is_silent(unit)]
+        units_of = {
+            word: [tuple(most_similar_phone(phone, modelled) for phone in variant) for variant in variants]
+            for word, variants in variants_of.items()
         }
-        said = choose_pronunciations(hmm, evidence, [sounds[word] for word in words], PAUSE)
-        bounds = align_units(hmm, evidence, [unit for part in said for unit in part.units])
+        spoken = choose_pronunciations(hmm, log_likelihoods, [units_of[word] for word in words], PAUSE)
+        bounds = align_units(hmm, log_likelihoods, [unit for item in spoken for unit in item.units])
         labels = [
-            (phone, words[part.word] if part.word >= 0 else "")
-            for part in said
-            for phone in (variants[part.word][part.variant] if part.word >= 0 else part.units)
+            (phone, words[item.word] if item.word >= 0 else "")
+            for item in spoken
+            for phone in (variants_of[words[item.word]][item.variant] if item.word >= 0 else item.units)
         ]
         return _timeline(labels, bounds, features.duration_s)
 
-    def densities(self, audio: Audio, features: Features) -> NDArray[np.intp]:
-        """Return which density was most probably heard in each frame [shape=(T,)].
+    def best_path_densities(self, audio: Audio, features: Features) -> NDArray[np.intp]:
+        """Return the density of each frame's state on the most probable path [shape=(T,)].
 
-        They are those of ``joint``, of the kind ``own`` those of its own models. In digital silence it is silence.
+        They are numbered as in ``combined``, with the kind ``own`` as in the own models. Digital silence has that of
+        silence.
         Raises MissingDependencyError: as ``recognise``.
         """
         if not features.values.any():
             return np.full(len(features.values), self.own.table.density(SILENCE, 0), np.intp)
-        _, evidence = self._evidence(audio, features)
+        _, log_likelihoods = self._log_likelihoods(analysed(audio, features))
         network = self._loop.network
-        return network.emission[network.best_path(evidence)]
+        return network.emission[network.best_path(log_likelihoods)]
 
-    def place(self, audio: Audio, features: Features, phones: Timeline[Unit]) -> Timeline[Unit]:
-        """Return phones that others found where these models hear them; pauses between them may come and go.
+    def align_phones(self, audio: Audio, features: Features, phones: Timeline[Unit]) -> Timeline[Unit]:
+        """Return known phones in time: forced alignment, with optional pauses where ``phones`` has silence.
 
+        audio, features : as of ``recognise``
+        phones          : in order; their times are not used
         Raises AlignmentError: they do not fit into the recording.
         """
         names = (span.label.phone for span in phones)
         runs = [tuple(run) for silent, run in groupby(names, key=is_silent) if not silent]
         words = [" ".join(run) for run in runs]
         lexicon = Lexicon({word: (run,) for word, run in zip(words, runs, strict=True)})
-        placed = self.align(audio, features, words, lexicon)
-        return Timeline(tuple(replace(span, label=replace(span.label, word="")) for span in placed))
+        aligned = self.align(audio, features, words, lexicon)
+        return Timeline(tuple(replace(span, label=replace(span.label, word="")) for span in aligned))
 
     @cached_property
-    def joint(self) -> CombinedPhones:
-        """The own models with all phones. Raises MissingDependencyError: pocketsphinx is not installed."""
+    def combined(self) -> CombinedPhones:
+        """The own models extended to all phones. Raises MissingDependencyError: pocketsphinx is not installed."""
         return combine_phones(self.own)
 
     @cached_property
     def _loop(self) -> UnitLoop:
-        hmm = self.own if self.kind == "own" else self.joint.hmm
+        hmm = self.own if self.kind == "own" else self.combined.hmm
         return unit_loop(hmm, [unit for unit in hmm.table.units if unit != PAUSE])
 
     @property
-    def _knows_little(self) -> bool:
+    def _has_few_gaussians(self) -> bool:
         return self.own.mixtures.size[1] <= FEW_GAUSSIANS
 
-    def _evidence(self, audio: Audio, features: Features, aligning: bool = False) -> tuple[UnitHmm, LogLikelihoods]:
-        alone = self.kind == "general" or (aligning and self.kind == "auto" and self._knows_little)
-        hmm, evidence = self._said(audio, features, alone)
-        return hmm, penalise_speech(hmm, evidence, quiet_frames(log_energy(audio.samples)))
+    def _log_likelihoods(self, audio: AnalysedAudio, aligning: bool = False) -> tuple[UnitHmm, LogLikelihoods]:
+        """Return the models that are used, and the log likelihoods of a recording under them."""
+        hmm, log_likelihoods = self._unpenalised(audio, aligning)
+        return hmm, penalise_speech(hmm, log_likelihoods, quiet_frames(audio.log_energy))
 
-    def _said(self, audio: Audio, features: Features, general_alone: bool) -> tuple[UnitHmm, LogLikelihoods]:
+    def _unpenalised(self, audio: AnalysedAudio, aligning: bool) -> tuple[UnitHmm, LogLikelihoods]:
         if self.kind == "own":
-            return self.own, log_likelihoods_of(self.own, self._own_features(audio, features)[0])
-        own, trust = (features.values, 0.0) if general_alone else self._own_features(audio, features)
-        if trust == 0:  # they are not heard, and those of a long recording are large
-            own = features.values
-        general = general_features(audio) if self.adaptation is None else self.adaptation.general_features(audio)
-        return self.joint.hmm, combined_log_likelihoods(self.joint, own, trust, general)
+            return self.own, log_likelihoods_of(self.own, self._own_features(audio, self._own_transform(audio)[0]))
+        general_alone = self.kind == "general" or (aligning and self._has_few_gaussians)
+        warp, weight = (1.0, 0.0) if general_alone else self._own_transform(audio)
+        # own models without weight are not evaluated: any features will do, and those of a long recording are large
+        own = self._own_features(audio, warp) if weight > 0 else audio.mfcc().values
+        general = audio.general_features if self.adaptation is None else self.adaptation.general_features(audio)
+        return self.combined.hmm, combined_log_likelihoods(self.combined, own, weight, general)
 
-    def _own_features(self, audio: Audio, features: Features) -> tuple[NDArray[np.float32], float]:
-        """Return what the own models hear, and how far they know it, from 0 to 1."""
+    def _own_transform(self, audio: AnalysedAudio) -> tuple[float, float]:
+        """Return the warp of the frequencies for the own models, and the weight of these models, 0 to 1."""
         if self.adaptation is not None:
-            return self.adaptation.own_features(audio, features), self.adaptation.trust
-        voice = speaker_similarity(self.own, audio, features)
-        return voice.features.values, own_model_weight(voice.fit)
+            return self.adaptation.warp, self.adaptation.own_weight
+        similarity = speaker_similarity(self.own, audio)
+        return similarity.warp, own_model_weight(similarity.score)
+
+    def _own_features(self, audio: AnalysedAudio, warp: float) -> NDArray[np.float32]:
+        """Return the features for the own models, warped and, where there is an adaptation, transformed."""
+        return audio.mfcc(warp).values if self.adaptation is None else self.adaptation.own_features(audio)
 
 
 @lru_cache(maxsize=4)
 def cached_recogniser(own: UnitHmm, kind: str = "auto", adaptation: Adaptation | None = None) -> Recogniser:
-    """Return the recogniser of some models; the last few are kept with the networks that they search."""
+    """Return the recogniser of some models; the last four are kept, with the networks that they search."""
     return Recogniser(own, kind, adaptation)
 
 
-def own_model_weight(fit: float) -> float:
-    """Return how far own models that fit a recording so well (``Voice.fit``) are heard beside the general ones."""
-    return min(max((fit - FOREIGN) / (FAMILIAR - FOREIGN), 0.0), 1.0)
+def own_model_weight(score: float) -> float:
+    """Return the weight of own models beside the general ones, 0 to 1, at a speaker similarity score."""
+    return min(max((score - NO_WEIGHT_SCORE) / (FULL_WEIGHT_SCORE - NO_WEIGHT_SCORE), 0.0), 1.0)
 
 
 def _timeline(labels: list[tuple[str, str]], bounds: NDArray[np.intp], duration_s: float) -> Timeline[Unit]:
-    """Frame n covers (n ± ½) · 10 ms. Silence at both ends is silence however short, between words a pause."""
+    """Return phones in time, each with its word.
+
+    labels : phones and words
+    bounds : the first frame of each, and the frame count [shape=(len(labels) + 1,)]; frame n covers (n ± ½) · 10 ms
+    Silence at both ends stays silence however short; shorter than ``SHORT_PAUSE_S`` between words, it is a pause.
+    """
     labels, bounds = _one_silence(labels, bounds)
     edges = np.clip((bounds - 0.5) / FRAME_RATE_HZ, 0, duration_s)
     edges[-1] = duration_s
@@ -194,7 +212,7 @@ def _timeline(labels: list[tuple[str, str]], bounds: NDArray[np.intp], duration_
 def _one_silence(
     labels: list[tuple[str, str]], bounds: NDArray[np.intp]
 ) -> tuple[list[tuple[str, str]], NDArray[np.intp]]:
-    """Join silences that follow one another: noise beside silence is silence."""
+    """Return labels and bounds in which silences that follow one another, as noise beside silence, are one."""
     first = [
         i for i, (phone, _) in enumerate(labels) if i == 0 or not (is_silent(phone) and is_silent(labels[i - 1][0]))
     ]

@@ -61,7 +61,7 @@ def log_determinant(transform: Array) -> float:
     return float(np.linalg.slogdet(transform[:, :-1])[1])
 
 
-def heard_statistics(
+def transform_statistics(
     mixtures: Mixtures, features: NDArray[np.float32], densities: NDArray[np.intp], transform: Array
 ) -> tuple[AffineStatistics, float]:
     """Return what frames say whose densities are known, and their log likelihood under the transform so far.
@@ -85,7 +85,7 @@ def heard_statistics(
     return AffineStatistics(float(len(features)), quadratic, pull.T @ extended), log_likelihood
 
 
-def own_statistics(mixtures: Mixtures, densities: NDArray[np.intp]) -> AffineStatistics:
+def prior_statistics(mixtures: Mixtures, densities: NDArray[np.intp]) -> AffineStatistics:
     """Return what one frame drawn from the densities themselves [shape=(N,)], all as often, says on average.
 
     Nothing explains it better than the identity: as a prior it draws every transform there.
@@ -103,7 +103,9 @@ def own_statistics(mixtures: Mixtures, densities: NDArray[np.intp]) -> AffineSta
     return AffineStatistics(float(weights.sum()), quadratic, (precision * means).T @ extended)
 
 
-def improved(transform: Array, statistics: AffineStatistics, free: NDArray[np.bool_], sweeps: int = SWEEPS) -> Array:
+def improved_transform(
+    transform: Array, statistics: AffineStatistics, free: NDArray[np.bool_], sweeps: int = SWEEPS
+) -> Array:
     """Return a transform [shape=(D, D + 1)] with no less ``AffineStatistics.objective``, row after row the best.
 
     free : the entries that may change [shape=(D, D + 1)], the diagonal among them; others stay

@@ -10,10 +10,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.storage.schema import Member
+from lipmotion.storage.schema import ArraySpec
 
 DISCOUNT = 0.5
-BIGRAM = {"bigram": Member(np.float32, "U U", -1e4, 0.1)}
+BIGRAM = {"bigram": ArraySpec(np.float32, "U U", -1e4, 0.1)}
 """Log probabilities, stored."""
 ROW_TOLERANCE = 0.01
 
@@ -51,13 +51,13 @@ def estimate_bigram(units: Sequence[str], sentences: Iterable[Sequence[str]]) ->
     return Bigram(tuple(units), np.log([_row(row, unigram) for row in counts]).astype(np.float32))
 
 
-def bigram_from(units: Sequence[str], stored: NDArray[np.float32]) -> Bigram:
+def bigram_from_array(units: Sequence[str], stored: NDArray[np.float32]) -> Bigram:
     """Return a stored bigram, as ``BIGRAM`` says. Raises ValueError: a row whose probabilities do not sum to 1."""
-    check_sums("bigram", np.exp(stored.astype(float)).sum(axis=1))
+    check_sums_to_one("bigram", np.exp(stored.astype(float)).sum(axis=1))
     return Bigram(tuple(units), stored)
 
 
-def check_sums(name: str, totals: NDArray[np.float64]) -> None:
+def check_sums_to_one(name: str, totals: NDArray[np.float64]) -> None:
     """Raise ValueError unless probabilities sum to 1."""
     worst = float(np.abs(totals - 1).max())
     if worst > ROW_TOLERANCE:

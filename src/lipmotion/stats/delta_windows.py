@@ -20,7 +20,7 @@ def with_dynamics(values: NDArray[np.float64]) -> NDArray[np.float64]:
     return dynamics
 
 
-def within(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def dynamics_known(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Return which frames hold with both neighbours [shape=(T,)]: those whose dynamics are known."""
     inner = np.zeros_like(mask)
     inner[1:-1] = mask[:-2] & mask[1:-1] & mask[2:]

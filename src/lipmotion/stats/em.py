@@ -36,12 +36,16 @@ class EmResult(Generic[ModelT, StatisticsT]):
     log_likelihoods: tuple[float, ...]
 
 
+def no_report(step: int, model: object, statistics: object) -> None:
+    """Report nothing after a step."""
+
+
 def run_em(
     model: ModelT,
     expect: Callable[[ModelT], StatisticsT],
     maximise: Callable[[ModelT, StatisticsT], ModelT],
     most_steps: int,
-    after_step: Callable[[int, ModelT, StatisticsT], None] = lambda _step, _model, _statistics: None,
+    after_step: Callable[[int, ModelT, StatisticsT], None] = no_report,
     *,
     least_gain: float = -np.inf,
     maximise_converged: bool = True,
@@ -51,7 +55,7 @@ def run_em(
     expect     : the E-step: returns the sufficient statistics of the data under a model
     maximise   : the M-step: returns the model that the statistics make most likely
     most_steps : stop after so many steps, 1 or more
-    after_step : is called after every step with its number (from 1), the new model, and the statistics that it comes from
+    after_step : is called after every step with its number (from 1), the new model, and the statistics of the step
     least_gain : stop at the first step whose E-step finds a mean log likelihood per frame that is higher by less than
                  this than that of the step before; -inf: always take ``most_steps`` steps
     maximise_converged : whether the step at which EM stops for want of gain still has its M-step; without it, that step

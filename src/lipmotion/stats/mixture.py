@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.storage.schema import LARGEST_VARIANCE, POSITIVE, STANDARD, Checked, Member
+from lipmotion.storage.schema import LARGEST_VARIANCE, POSITIVE, STANDARD, ArraySpec, CheckedArrays
 
 SPLIT_STEP = 0.2
 """Halves of a split component move apart by this many standard deviations."""
@@ -17,9 +17,9 @@ BLOCK = 256
 LEAST_LOG_SHARE = np.float32(-50)
 LOG_2PI = float(np.log(2 * np.pi))
 MIXTURES = {
-    "log_weights": Member(np.float32, "G M", -np.inf, 0.1),
-    "means": Member(np.float32, "G M D", -STANDARD, STANDARD),
-    "variances": Member(np.float32, "G M D", POSITIVE, LARGEST_VARIANCE),
+    "log_weights": ArraySpec(np.float32, "G M", -np.inf, 0.1),
+    "means": ArraySpec(np.float32, "G M D", -STANDARD, STANDARD),
+    "variances": ArraySpec(np.float32, "G M D", POSITIVE, LARGEST_VARIANCE),
 }
 """Of standardised values; weights may be rounded to half precision."""
 LEAST_WEIGHT, MOST_WEIGHT = 0.5, 1.5
@@ -68,7 +68,7 @@ class Mixtures:
             result[start : start + BLOCK] = best + np.log(components.sum(axis=1))
         return result
 
-    def quadratic(self, chosen: NDArray[np.intp] | None = None) -> Quadratic:
+    def quadratic(self, chosen: NDArray[np.intp] | None = None) -> QuadraticForm:
         """Return the densities [shape=(G',)] as one matrix; all by default."""
         pick = slice(None) if chosen is None else chosen
         means, precision = self.means[pick], 1 / self.variances[pick]
@@ -76,7 +76,7 @@ class Mixtures:
             means.shape[2] * LOG_2PI - np.log(precision).sum(axis=2) + (means * means * precision).sum(axis=2)
         )
         form = np.concatenate([means * precision, precision / -2], axis=2).transpose(2, 1, 0)
-        return Quadratic(np.ascontiguousarray(form).reshape(len(form), -1), constant.T.astype(np.float32))
+        return QuadraticForm(np.ascontiguousarray(form).reshape(len(form), -1), constant.T.astype(np.float32))
 
     def split(self) -> Mixtures:
         """Return twice as many components, each half moved apart along all axes."""
@@ -178,7 +178,7 @@ class Mixtures:
 
 
 @dataclass(frozen=True, eq=False)
-class Quadratic:
+class QuadraticForm:
     """Mixtures as what features and their squares are multiplied by.
 
     form     : [shape=(2 D, M G)]
@@ -201,10 +201,10 @@ class Quadratic:
         """
         whole = np.concatenate([self.form, self.constant.reshape(1, -1)])
         shares = (features @ whole).reshape(len(features), *self.constant.shape)
-        return divided_components(shares)
+        return normalised_components(shares)
 
 
-def divided_components(
+def normalised_components(
     components: NDArray[np.float32],
 ) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
     """Return the log density of mixtures [shape=(T, G)], and their components' shares of it [shape=(T, M, G)].
@@ -228,7 +228,7 @@ def with_squares(x: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.concatenate([x, x * x, np.ones((len(x), 1), np.float32)], axis=1)
 
 
-def single_gaussian(x: NDArray[np.float32], count: int) -> Mixtures:
+def equal_gaussians(x: NDArray[np.float32], count: int) -> Mixtures:
     """Return ``count`` equal single Gaussians with the mean and variance of ``x`` (the flat start)."""
     mean, variance = x.mean(axis=0), np.maximum(x.var(axis=0), 1e-4)
     return Mixtures(
@@ -238,7 +238,7 @@ def single_gaussian(x: NDArray[np.float32], count: int) -> Mixtures:
     )
 
 
-def mixtures_from(found: Checked) -> Mixtures:
+def mixtures_from_arrays(found: CheckedArrays) -> Mixtures:
     """Return mixtures, stored as ``MIXTURES`` says. Raises ValueError: the weights of one do not sum to 1."""
     total = np.exp(found["log_weights"]).sum(axis=1)
     if not ((total > LEAST_WEIGHT) & (total < MOST_WEIGHT)).all():

@@ -98,7 +98,7 @@ def _leading(values: NDArray[Any], mean: NDArray[np.float64], components: int) -
     Source: Halko, Martinsson & Tropp 2011, §4.5 (subspace iteration) and §5.1; Rayleigh-Ritz at its end.
     """
     size = min(components + SPARE, *values.shape)
-    start = values[evenly(size, len(values))] - mean
+    start = values[evenly_spaced(size, len(values))] - mean
     directions = np.linalg.qr(start.T.astype(np.float32))[0]
     found = 0.0
     for _ in range(MOST_PASSES):
@@ -122,7 +122,7 @@ def _covariance_times(
     return total
 
 
-def evenly(count: int, total: int) -> NDArray[np.intp]:
+def evenly_spaced(count: int, total: int) -> NDArray[np.intp]:
     """Return ``count`` of ``total`` places, evenly spread [shape=(min(count, total),)]."""
     count = min(count, total)
     return ((np.arange(count) + 0.5) * total / max(count, 1)).astype(np.intp)

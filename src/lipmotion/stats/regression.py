@@ -50,12 +50,12 @@ def ridge(moments: RegressionStatistics, prior: Array, strength: float) -> Array
     return prior + np.linalg.solve(system, moments.targets - moments.products @ prior).astype(float)
 
 
-def owner(tree: Tree, path: list[int], least: float) -> int:
+def regression_node(tree: Tree, path: list[int], least: float) -> int:
     """Return the last node on the way to a leaf that has enough frames for a regression of its own, or the root."""
     return next((node for node in reversed(path) if tree.frames[node] >= least), 0)
 
 
-def fit_tree(
+def fit_tree_regressions(
     tree: Tree, moments: Mapping[int, RegressionStatistics], shared: Array, strength: float
 ) -> dict[int, Array]:
     """Return the coefficients of every owner [shape=(F, P)]: each node's are drawn towards those of the one above.

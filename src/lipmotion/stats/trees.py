@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.printable import printable
-from lipmotion.storage.schema import Arrays, Member, checked
+from lipmotion.storage.schema import Arrays, ArraySpec, checked_arrays
 
 Context = tuple[str, ...]
 """What a state depends on, one name a place (left neighbour, unit, right neighbour)."""
@@ -29,13 +29,13 @@ class Question(NamedTuple):
     place : 0 is the left neighbour, 1 the unit, 2 the right neighbour
     """
 
-    place: int
+    position: int
     name: str
     members: frozenset[str]
 
     def answer(self, context: Context) -> bool:
         """Return whether it is."""
-        return context[self.place] in self.members
+        return context[self.position] in self.members
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +80,7 @@ class Tree:
         answers = []
         for at, following in pairwise(path):
             asked = self.questions[self.asked[at]]
-            answers.append(f"{PLACES[asked.place]} {'is' if following == at + 1 else 'is not'} {asked.name}")
+            answers.append(f"{POSITIONS[asked.position]} {'is' if following == at + 1 else 'is not'} {asked.name}")
         return ", ".join(answers) or "any"
 
     def text(self) -> str:
@@ -90,7 +90,7 @@ class Tree:
         def write(node: int, depth: int, answer: str) -> None:
             asked = self.asked[node]
             question = self.questions[asked] if asked >= 0 else None
-            says = f"{PLACES[question.place]} is {question.name}?" if question else "leaf"
+            says = f"{POSITIONS[question.position]} is {question.name}?" if question else "leaf"
             lines.append(f"{'  ' * depth}{answer}{says} ({self.frames[node]:.0f} frames)")
             if question:
                 write(node + 1, depth + 1, "yes: ")
@@ -100,12 +100,12 @@ class Tree:
         return "\n".join(map(printable, lines))
 
 
-PLACES = ("left", "unit", "right")
-_PLACES = [str(place) for place in range(len(PLACES))]
+POSITIONS = ("left", "unit", "right")
+_PLACES = [str(place) for place in range(len(POSITIONS))]
 """As they are stored."""
 
 
-def gaussian_likelihood(statistics: Array, least_variance: float = LEAST_VARIANCE) -> Array:
+def gaussian_log_likelihood(statistics: Array, least_variance: float = LEAST_VARIANCE) -> Array:
     """Return the log likelihood of frames under the diagonal Gaussian that fits them best [shape=(N,)].
 
     statistics     : [shape=(N, 1 + 2·D)]: count, sums, sums of squares
@@ -119,17 +119,17 @@ def gaussian_likelihood(statistics: Array, least_variance: float = LEAST_VARIANC
     return likelihood
 
 
-def multispace_likelihood(statistics: Array, least_variance: float = LEAST_VARIANCE) -> Array:
+def multispace_log_likelihood(statistics: Array, least_variance: float = LEAST_VARIANCE) -> Array:
     """Return the log likelihood of frames, some without a value, under the density that fits them best [shape=(N,)].
 
     statistics : [shape=(N, 2 + 2·D)]: count, count of frames with a value, their sums, sums of squares
-    least_variance : as in ``gaussian_likelihood``
+    least_variance : as in ``gaussian_log_likelihood``
     The density is a Gaussian for frames with a value and a point mass for those without one.
     """
     count, voiced = statistics[:, 0], statistics[:, 1]
     whole = np.maximum(count, 1e-12)
     likelihood: Array = _share_likelihood(voiced, whole) + _share_likelihood(count - voiced, whole)
-    return likelihood + np.where(voiced > 0, gaussian_likelihood(statistics[:, 1:], least_variance), 0.0)
+    return likelihood + np.where(voiced > 0, gaussian_log_likelihood(statistics[:, 1:], least_variance), 0.0)
 
 
 def _share_likelihood(part: Array, whole: Array) -> Array:
@@ -138,7 +138,7 @@ def _share_likelihood(part: Array, whole: Array) -> Array:
     return part * np.log(np.where(part > 0, part, whole) / whole)
 
 
-def grow(
+def grow_tree(
     contexts: Sequence[Context],
     statistics: Array,
     questions: Sequence[Question],
@@ -202,7 +202,7 @@ def tree_arrays(trees: Mapping[str, Tree]) -> dict[str, NDArray[Any]]:
     used = np.unique(asked[asked >= 0])
     kept = [questions[number] for number in used]
     return {
-        "questions": np.array([(str(q.place), q.name, " ".join(sorted(q.members))) for q in kept], np.str_).reshape(
+        "questions": np.array([(str(q.position), q.name, " ".join(sorted(q.members))) for q in kept], np.str_).reshape(
             -1, 3
         ),
         "trees": np.array(list(trees)),
@@ -214,19 +214,19 @@ def tree_arrays(trees: Mapping[str, Tree]) -> dict[str, NDArray[Any]]:
 
 
 TREES = {
-    "questions": Member(np.str_, "q 3"),
-    "trees": Member(np.str_, "N"),
-    "sizes": Member(np.int32, "N", 1, 1e6),
-    "asked": Member(np.int32, "S", -1, 1e6),
-    "no": Member(np.int32, "S", -1, 1e6),
-    "frames": Member(np.float64, "S", 0, 1e12),
+    "questions": ArraySpec(np.str_, "q 3"),
+    "trees": ArraySpec(np.str_, "N"),
+    "sizes": ArraySpec(np.int32, "N", 1, 1e6),
+    "asked": ArraySpec(np.int32, "S", -1, 1e6),
+    "no": ArraySpec(np.int32, "S", -1, 1e6),
+    "frames": ArraySpec(np.float64, "S", 0, 1e12),
 }
 """How trees are stored: N of them with S nodes in all."""
 
 
 def trees_from_arrays(arrays: Arrays) -> dict[str, Tree]:
     """Return the trees again. Raises KeyError, ValueError: something is missing or inconsistent."""
-    found = checked(arrays, TREES)
+    found = checked_arrays(arrays, TREES)
     questions = tuple(
         Question(_PLACES.index(place), name, frozenset(members.split()))
         for place, name, members in found["questions"].tolist()

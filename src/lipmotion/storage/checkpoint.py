@@ -53,5 +53,5 @@ class Checkpoint:
         return folder / f"{stage}.checkpoint"
 
 
-NOTHING_KEPT = Checkpoint()
-"""For work that is not to be gone on with."""
+NO_CHECKPOINT = Checkpoint()
+"""Checkpointing disabled: nothing is stored and nothing found."""

@@ -71,7 +71,7 @@ def check_listable(folder: Path) -> None:
         raise InputError(f"{folder}: cannot be read: {error.strerror or error}; ask its owner, or copy it") from error
 
 
-def text_in(path: Path, kind: str, largest: int = LARGEST_TEXT) -> str:
+def read_text_file(path: Path, kind: str, largest: int = LARGEST_TEXT) -> str:
     """Return the text of a file, without a byte order mark.
 
     Raises InputError: no such file, not a file, larger than ``largest`` bytes, or not UTF-8.

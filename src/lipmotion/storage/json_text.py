@@ -15,7 +15,7 @@ HALF_CHARACTER = re.compile("[\ud800-\udfff]")
 def as_json(content: Any, **how: Any) -> str:
     """Return content as JSON that is UTF-8. ``how``: as ``json.dumps`` takes it; half a character is escaped anyway.
 
-    Raises ExportError: a number that is not finite; JSON has none (``defined`` takes them out of reports).
+    Raises ExportError: a number that is not finite; JSON has none (``nan_as_null`` takes them out of reports).
     """
     try:
         text = json.dumps(content, allow_nan=False, **how)
@@ -26,12 +26,12 @@ def as_json(content: Any, **how: Any) -> str:
         raise ExportError(f"cannot be written as JSON ({error}): every number must be finite") from error
 
 
-def defined(content: Any) -> Any:
+def nan_as_null(content: Any) -> Any:
     """Return content with null for every number that is not finite: a figure that nothing defines."""
     if isinstance(content, dict):
-        return {key: defined(value) for key, value in content.items()}
+        return {key: nan_as_null(value) for key, value in content.items()}
     if isinstance(content, list | tuple):
-        return type(content)(map(defined, content))
+        return type(content)(map(nan_as_null, content))
     return None if isinstance(content, float) and not math.isfinite(content) else content
 
 

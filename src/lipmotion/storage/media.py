@@ -59,7 +59,7 @@ def _bound_allocations() -> None:
         ctypes.CDLL(av._core.__file__).av_max_alloc(ctypes.c_size_t(LARGEST_BLOCK))
 
 
-def moving_pictures(container: Any) -> list[Any]:
+def video_streams(container: Any) -> list[Any]:
     """Return the video streams of an open container that are not the cover of an album."""
     import av
 

@@ -24,7 +24,7 @@ _SPELLED = {POSITIVE: "more than 0", NEGATIVE: "less than 0", BELOW_ONE: "less t
 
 
 @dataclass(frozen=True)
-class Member:
+class ArraySpec:
     """What one array must be.
 
     dtype : what it becomes; it may be stored in another precision, but not as another kind of number
@@ -55,7 +55,7 @@ class Member:
 
 
 @dataclass(frozen=True, eq=False)
-class Checked:
+class CheckedArrays:
     """Arrays that are as their table says, and the size of each letter in it."""
 
     arrays: dict[str, NDArray[Any]]
@@ -66,21 +66,21 @@ class Checked:
         return self.arrays[name]
 
 
-def checked(arrays: Arrays, table: Mapping[str, Member], **sizes: int) -> Checked:
-    """Return the arrays of a table, in the types it says; other arrays are let be (``only`` refuses them).
+def checked_arrays(arrays: Arrays, table: Mapping[str, ArraySpec], **sizes: int) -> CheckedArrays:
+    """Return the arrays of a table, in the types it says; other arrays are let be (``refuse_undeclared`` refuses them).
 
     sizes : of letters that are known
     Raises ValueError: an array of another kind of number, of another shape or out of its range. KeyError: one is
     missing.
     """
-    sizes = check(arrays, table, **sizes)
+    sizes = checked_sizes(arrays, table, **sizes)
     with np.errstate(over="ignore"):
         found = {name: arrays[name].astype(member.dtype) for name, member in table.items() if name in arrays}
-    return Checked(found, sizes)
+    return CheckedArrays(found, sizes)
 
 
-def check(arrays: Arrays, table: Mapping[str, Member], **sizes: int) -> dict[str, int]:
-    """Return the size of each letter of a table. Raises as ``checked``."""
+def checked_sizes(arrays: Arrays, table: Mapping[str, ArraySpec], **sizes: int) -> dict[str, int]:
+    """Return the size of each letter of a table. Raises as ``checked_arrays``."""
     for name, member in table.items():
         if name in arrays:
             _check_kind(name, arrays[name], member)
@@ -91,7 +91,7 @@ def check(arrays: Arrays, table: Mapping[str, Member], **sizes: int) -> dict[str
     return sizes
 
 
-def only(arrays: Iterable[str], *names: Iterable[str]) -> None:
+def refuse_undeclared(arrays: Iterable[str], *names: Iterable[str]) -> None:
     """Raise ValueError where there is an array that none of some tables, or lists of names, has."""
     unknown = sorted(set(arrays).difference(*names))
     if unknown:
@@ -104,18 +104,18 @@ def check_index(name: str, numbers: NDArray[Any], count: int) -> None:
         raise ValueError(f"{name} is {numbers.min()} to {numbers.max()}, required 0 to {count - 1}")
 
 
-def under(arrays: Arrays, prefix: str) -> dict[str, NDArray[Any]]:
+def arrays_under(arrays: Arrays, prefix: str) -> dict[str, NDArray[Any]]:
     """Return the arrays of a part, whose names begin with its prefix, under their own names."""
     return {name[len(prefix) :]: array for name, array in arrays.items() if name.startswith(prefix)}
 
 
-def _check_kind(name: str, array: NDArray[Any], member: Member) -> None:
+def _check_kind(name: str, array: NDArray[Any], member: ArraySpec) -> None:
     if array.dtype.kind not in member.kinds or (array.dtype.kind != "U" and array.dtype.itemsize > 8):
         required = _KINDS[np.dtype(member.dtype).kind]
         raise ValueError(f"{name} holds {array.dtype}, required {required}")
 
 
-def _check_shape(name: str, array: NDArray[Any], member: Member, sizes: dict[str, int]) -> None:
+def _check_shape(name: str, array: NDArray[Any], member: ArraySpec, sizes: dict[str, int]) -> None:
     letters = member.shape.split()
     known = dict(zip(letters, array.shape, strict=False))
     known |= {letter: size for letter, size in sizes.items() if letter in known}
@@ -133,7 +133,7 @@ def _spelled(letters: list[str], sizes: Mapping[str, int]) -> str:
     return f"({', '.join(spelled)}{',' if len(spelled) == 1 else ''})"
 
 
-def _check_range(name: str, array: NDArray[Any], member: Member) -> None:
+def _check_range(name: str, array: NDArray[Any], member: ArraySpec) -> None:
     if not array.size or array.dtype.kind in "Ub":
         return
     values = array.astype(np.float32) if array.dtype == np.float16 else array  # half precision is slow to compare

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export.video import write_mp4
 from lipmotion.faces.portrait import render
+from lipmotion.speech.formant_synthesiser import synthesise
 from lipmotion.speech.mfcc import mfcc
-from lipmotion.speech.synthesise import synthesise
 from lipmotion.storage.files import whole_file
 from lipmotion.testing.toy_mouth import toy_mouths
 from lipmotion.types import Audio, Channel, Motion, Timeline, Track, Unit, Utterance
@@ -38,7 +38,7 @@ WORDS: dict[str, tuple[str, ...]] = {
 }
 """All that is ever said, pronounced as in the CMU dictionary."""
 
-_SHAPES: tuple[tuple[str, tuple[tuple[float, float], ...]], ...] = (
+_LIP_TARGETS: tuple[tuple[str, tuple[tuple[float, float], ...]], ...] = (
     # phones, then opening and width (eye distances) at their start and, where they differ, at their end
     ("sil sp", ((0.00, 0.55),)),
     ("p b m", ((0.00, 0.54),)),
@@ -67,18 +67,18 @@ _SHAPES: tuple[tuple[str, tuple[tuple[float, float], ...]], ...] = (
     ("t d n en s z th dh", ((0.06, 0.57),)),
     ("em", ((0.10, 0.54), (0.00, 0.54))),
 )
-SHAPES = {phone: shapes for phones, shapes in _SHAPES for phone in phones.split()}
+LIP_TARGETS = {phone: shapes for phones, shapes in _LIP_TARGETS for phone in phones.split()}
 """Opening and width that the lips aim for in each phone of the inventory."""
 LIPS_TOUCH = frozenset({"p", "b", "m"})
 
 CHANNELS = (Channel("opening"), Channel("width"), Channel("outer"))
 LIP_THICKNESS = 0.22
 """``outer`` exceeds ``opening`` by this much."""
-LEAD_S = 0.03
+LIP_LEAD_S = 0.03
 """The lips are this far ahead of the sound."""
 BLEND_S = 0.12
 """Neighbouring targets run into one another over this long."""
-PART_S = 0.08
+CLOSING_S = 0.08
 """Touching lips come together, and part, in this time."""
 
 SPEECH_S = 1.27
@@ -119,7 +119,7 @@ def toy_sentences(count: int, seed: int = 0) -> list[ToySentence]:
     held_out = max(1, count // 6)
     splits = ["train"] * (count - 2 * held_out) + ["val"] * held_out + ["test"] * held_out
     rng = np.random.default_rng(seed)
-    deck = _deck(rng)
+    deck = _shuffled_words(rng)
     return [_sentence(f"toy{number:02d}", split, deck, rng) for number, split in enumerate(splits)]
 
 
@@ -128,17 +128,17 @@ def toy_motion(units: Timeline[Unit], rate_hz: float) -> Motion:
 
     units : phones of the inventory from 0 s on; gaps between them count as silence
     Returns Motion with T = floor(end of the last unit · rate_hz) + 1 frames; the opening is exactly 0 in p, b and m
-    (``LEAD_S`` early) and in silence more than 0.1 s away from speech.
+    (``LIP_LEAD_S`` early) and in silence more than 0.1 s away from speech.
     Raises InputError: no units, a phone that is not in the inventory, or a rate that is not positive.
     """
-    _check(units, rate_hz)
+    _check_units(units, rate_hz)
     end_s = units.spans[-1].end_s
-    margin_s = BLEND_S + LEAD_S
+    margin_s = BLEND_S + LIP_LEAD_S
     grid_s = np.arange(-margin_s, end_s + 2 * margin_s, 1 / _GRID_HZ)
     kernel = np.hanning(round(BLEND_S * _GRID_HZ) + 1)
     opening, width = (np.convolve(target, kernel / kernel.sum(), "same") for target in _targets(units, grid_s))
-    opening *= _parted(units, grid_s)
-    time_s = np.arange(int(end_s * rate_hz + 1e-9) + 1) / rate_hz + LEAD_S
+    opening *= _lip_separation(units, grid_s)
+    time_s = np.arange(int(end_s * rate_hz + 1e-9) + 1) / rate_hz + LIP_LEAD_S
     opening, width = np.interp(time_s, grid_s, opening), np.interp(time_s, grid_s, width)
     return Motion(np.stack([opening, width, LIP_THICKNESS + opening], axis=1), rate_hz, CHANNELS)
 
@@ -159,7 +159,7 @@ def write_toy_recordings(directory: Path, *, sentences: int = 12, seed: int = 0,
     Raises InputError: fewer than three sentences, or fps not positive; ExportError: a file cannot be written.
     """
     spoken = toy_sentences(sentences, seed)
-    _make(directory)
+    _make_folder(directory)
     videos = [directory / f"{sentence.name}.mp4" for sentence in spoken]
     for sentence, video in zip(spoken, videos, strict=True):
         motion = toy_motion(sentence.units, _MOTION_HZ)
@@ -170,7 +170,7 @@ def write_toy_recordings(directory: Path, *, sentences: int = 12, seed: int = 0,
     return videos
 
 
-def _deck(rng: np.random.Generator) -> Iterator[str]:
+def _shuffled_words(rng: np.random.Generator) -> Iterator[str]:
     """Yield the words for ever, shuffled anew each time that all have been said."""
     while True:
         yield from rng.permutation(sorted(WORDS)).tolist()
@@ -182,7 +182,7 @@ def _sentence(name: str, split: str, deck: Iterator[str], rng: np.random.Generat
     while sum(durations_s[1:]) < SPEECH_S:
         words.append(next(deck))
         labels += [Unit(phone, word=words[-1]) for phone in WORDS[words[-1]]]
-        durations_s += [_usual_s(phone) * rng.uniform(0.85, 1.15) for phone in WORDS[words[-1]]]
+        durations_s += [_typical_duration_s(phone) * rng.uniform(0.85, 1.15) for phone in WORDS[words[-1]]]
     labels, durations_s = [*labels, Unit("sil")], [*durations_s, rng.uniform(*SILENCE_S)]
     phones = [(label.phone, duration_s) for label, duration_s in zip(labels, durations_s, strict=True)]
     audio, units = synthesise(phones, pitch_hz=rng.uniform(*PITCH_HZ), seed=int(rng.integers(2**31)))
@@ -190,7 +190,7 @@ def _sentence(name: str, split: str, deck: Iterator[str], rng: np.random.Generat
     return ToySentence(name, tuple(words), audio, Timeline(spans), split)
 
 
-def _usual_s(phone: str) -> float:
+def _typical_duration_s(phone: str) -> float:
     return 0.17 if phone[0] in "aeiou" else 0.105
 
 
@@ -201,38 +201,38 @@ def _utterance(sentence: ToySentence) -> Utterance:
     return Utterance(sentence.name, sentence.audio, mfcc(sentence.audio), track, sentence.words, sentence.split, source)
 
 
-def _check(units: Timeline[Unit], rate_hz: float) -> None:
+def _check_units(units: Timeline[Unit], rate_hz: float) -> None:
     if not len(units):
         raise InputError("there are no phones to move the lips to; give at least one")
     if not rate_hz > 0:
         raise InputError(f"motion rate is {rate_hz} Hz, required more than 0")
     for span in units:
-        if span.label.phone not in SHAPES:
+        if span.label.phone not in LIP_TARGETS:
             raise InputError(f"phone {span.label.phone!r} is not in the inventory: {' '.join(sorted(SHAPES))}")
 
 
 def _targets(units: Timeline[Unit], grid_s: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return what opening and width aim for, in steps; at rest outside the units [shape=(2, len(grid_s))]."""
-    targets = np.repeat(np.array(SHAPES["sil"]).T, len(grid_s), axis=1)
+    targets = np.repeat(np.array(LIP_TARGETS["sil"]).T, len(grid_s), axis=1)
     for span in units:
-        shapes = SHAPES[span.label.phone]
+        shapes = LIP_TARGETS[span.label.phone]
         edges_s = np.linspace(span.start_s, span.end_s, len(shapes) + 1)
         for shape, start_s, end_s in zip(shapes, edges_s, edges_s[1:], strict=False):
             targets[:, (grid_s >= start_s) & (grid_s < end_s)] = np.array(shape)[:, None]
     return targets
 
 
-def _parted(units: Timeline[Unit], grid_s: NDArray[np.float64]) -> NDArray[np.float64]:
+def _lip_separation(units: Timeline[Unit], grid_s: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return 0 where the lips touch, 1 well away from it, a raised cosine between [shape=(len(grid_s),)]."""
     parted = np.ones(len(grid_s))
     for span in units:
         if span.label.phone in LIPS_TOUCH:
             away_s = np.maximum(0, np.maximum(span.start_s - grid_s, grid_s - span.end_s))
-            parted = np.minimum(parted, 0.5 - 0.5 * np.cos(np.pi * np.minimum(1, away_s / PART_S)))
+            parted = np.minimum(parted, 0.5 - 0.5 * np.cos(np.pi * np.minimum(1, away_s / CLOSING_S)))
     return parted
 
 
-def _make(directory: Path) -> None:
+def _make_folder(directory: Path) -> None:
     try:
         directory.mkdir(parents=True, exist_ok=True)
     except OSError as error:

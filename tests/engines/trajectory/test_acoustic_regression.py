@@ -121,7 +121,10 @@ def error(model, corpus):
     squares = []
     for one in corpus:
         rows = np.array(
-            [model.emission.row(p, HOW.cut) for p in full_context_states(one.speech.units, len(one.valid), HOW.cut)]
+            [
+                model.emission.row(p, HOW.layout)
+                for p in full_context_states(one.speech.units, len(one.valid), HOW.layout)
+            ]
         )
         means, _ = model.emission.statistics(rows, one.speech.features.values, slice(None))
         squares.append((means[:, 0, 0] - one.motion["opening"])[60:-60] ** 2)

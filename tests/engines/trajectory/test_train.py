@@ -10,7 +10,7 @@ from lipmotion.motion.frame_labels import FullContextState, StateLayout, full_co
 from lipmotion.types.progress import silent_monitor
 
 HOW = replace(TrajectoryConfig(states=3, silent_states=7, components=2, acoustic_regression=False).learning)
-CUT = HOW.cut
+CUT = HOW.layout
 
 
 def fit(corpus, **changes):
@@ -58,7 +58,7 @@ def test_trees_tell_apart_what_moves_apart():
     }
     assert middle["aa"] > middle["iy"] + 0.1
     assert middle["iy"] > middle["p"] + 0.05
-    assert {tree.questions[tree.asked[0]].place for tree in emission.forest.values() if tree.asked[0] >= 0} >= {1}
+    assert {tree.questions[tree.asked[0]].position for tree in emission.forest.values() if tree.asked[0] >= 0} >= {1}
 
 
 def test_what_the_mouth_does_in_silence_away_from_speech_is_not_learned():
@@ -99,5 +99,5 @@ def test_phones_never_heard_resolve_like_those_of_their_class():
 
 
 def test_silence_may_be_cut_finer_than_speech():
-    emission = fit(examples(4), cut=StateLayout(1, 3, 0.1)).emission
+    emission = fit(examples(4), layout=StateLayout(1, 3, 0.1)).emission
     assert list(emission.forest) == ["speech.0", "silence.0", "silence.1", "silence.2"]

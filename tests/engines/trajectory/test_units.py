@@ -107,18 +107,18 @@ def test_the_mouth_rests_in_silence_whatever_its_unit(name):
 
 
 def test_silence_that_is_a_closed_mouth_is_cut_as_speech():
-    cut = StateLayout(3, 7, 0.1, unit_set("2vis"))
-    where = full_context_states(timeline(("p", "aa")), 141, cut)
+    layout = StateLayout(3, 7, 0.1, unit_set("2vis"))
+    where = full_context_states(timeline(("p", "aa")), 141, layout)
     assert {place.unit for place in where} == {"open", "closed"}
-    assert {cut.name(place) for place in where if place != cut.rest} == {"speech.0", "speech.1", "speech.2"}
-    assert where[0] == where[-1] == cut.rest
-    assert cut.rest not in where[60:80]
+    assert {layout.name(place) for place in where if place != layout.rest} == {"speech.0", "speech.1", "speech.2"}
+    assert where[0] == where[-1] == layout.rest
+    assert layout.rest not in where[60:80]
 
 
 def test_lips_that_meet_between_others_do_not_rest():
     """All three are units of silence, too, and the part may have the number of silence's middle one."""
-    cut = StateLayout(5, 5, 0.1, unit_set("2vis"))
-    assert cut.rest not in full_context_states(timeline(("p", "b", "m")), 150, cut)[60:90]
+    layout = StateLayout(5, 5, 0.1, unit_set("2vis"))
+    assert layout.rest not in full_context_states(timeline(("p", "b", "m")), 150, layout)[60:90]
 
 
 def table_model(folder: Path) -> tuple[Engine, dict]:

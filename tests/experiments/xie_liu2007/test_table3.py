@@ -12,6 +12,7 @@ from experiments.copies import copied, renamed
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, ExportError, InputError, MissingDependencyError
+from lipmotion.experiments.runner import ExperimentSettings
 from lipmotion.experiments.xie_liu2007.plots import PLOT_FILES
 from lipmotion.experiments.xie_liu2007.systems import (
     BEST_PATH,
@@ -23,7 +24,6 @@ from lipmotion.experiments.xie_liu2007.systems import (
 )
 from lipmotion.experiments.xie_liu2007.table3 import ComparisonOptions, NoiseConditions, table3
 from lipmotion.experiments.xie_liu2007.table3_text import table
-from lipmotion.experiments.runner import ExperimentSettings
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.measures import curves
 from lipmotion.pipeline.evaluation.conditions import compared_clips, held_out_recordings

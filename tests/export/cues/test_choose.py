@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from export.cues.conftest import result, spoken, timeline
-from lipmotion.export.cues.choose import choose_cues, usual_hold
+from lipmotion.export.cues.choose import choose_cues, default_hold_frames
 from lipmotion.export.cues.sheet import CueSheet
 from lipmotion.testing.toy import ToySentence, toy_sentences
 from lipmotion.types import Channel, Generation, Motion, Timeline, Unit
@@ -85,7 +85,7 @@ def test_toy_sentences(sentences: list[ToySentence], fps: float) -> None:
     for sentence in sentences:
         generation = result(sentence.units)
         sheet = choose_cues(generation, fps)
-        check(sheet, sentence.units[-1].end_s, usual_hold(fps))
+        check(sheet, sentence.units[-1].end_s, default_hold_frames(fps))
         seen |= set(shapes(sheet))
         for span in sentence.units:
             for phones, shape in ((LIP_CLOSING, "A"), (VISEMES["ld"], "G")):
@@ -206,7 +206,7 @@ def test_less_time_than_the_hold(duration_s: float) -> None:
 
 
 def test_the_usual_hold_is_two_frames_at_24() -> None:
-    assert [usual_hold(fps) for fps in (1, 12, 24, 25, 30, 48, 60)] == [1, 1, 2, 2, 3, 4, 5]
+    assert [default_hold_frames(fps) for fps in (1, 12, 24, 25, 30, 48, 60)] == [1, 1, 2, 2, 3, 4, 5]
 
 
 def test_phones_outside_the_motion() -> None:

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from lipmotion.export.cues.shapes import ANY, ANY_OPEN, LOOKS, OPTIONAL, SHAPES, fallback, looks_of
+from lipmotion.export.cues.shapes import ANY_SHAPE, ANY_OPEN, PHONE_SHAPES, OPTIONAL, SHAPES, drawn_shape, shapes_of_phone
 from lipmotion.units import LIP_CLOSING, PHONES, VISEMES, is_silent
 
 BLAIR = "AI E O U FV L MBP WQ etc rest".split()
@@ -10,23 +10,23 @@ BLAIR = "AI E O U FV L MBP WQ etc rest".split()
 
 
 def test_every_phone_but_h_has_a_look() -> None:
-    assert set(PHONES) - set(LOOKS) == {"hh"}
-    assert set(LOOKS) <= set(PHONES)
-    assert looks_of("hh") == looks_of("a phone of another language") == ANY_OPEN
-    assert looks_of("") == ANY
+    assert set(PHONES) - set(PHONE_SHAPES) == {"hh"}
+    assert set(PHONE_SHAPES) <= set(PHONES)
+    assert shapes_of_phone("hh") == shapes_of_phone("a phone of another language") == ANY_OPEN
+    assert shapes_of_phone("") == ANY_SHAPE
 
 
 @pytest.mark.parametrize("phone", PHONES)
 def test_the_parts_of_a_phone_are_the_whole(phone: str) -> None:
-    assert sum(look.share for look in looks_of(phone)) == pytest.approx(1)
-    for look in looks_of(phone):
+    assert sum(look.share for look in shapes_of_phone(phone)) == pytest.approx(1)
+    for look in shapes_of_phone(phone):
         assert look.best
         assert set(look.best + look.allowed) <= set(SHAPES)
         assert not set(look.best) & set(look.allowed)
 
 
 def shown(name: str) -> set[str]:
-    return {phone for phone in PHONES if any(name in look.best for look in looks_of(phone))}
+    return {phone for phone in PHONES if any(name in look.best for look in shapes_of_phone(phone))}
 
 
 def test_the_special_shapes_belong_to_their_sounds() -> None:
@@ -45,5 +45,5 @@ def test_names_of_preston_blair() -> None:
 
 def test_optional_shapes_fall_back_as_rhubarb_does() -> None:
     assert OPTIONAL == "GHX"
-    assert [fallback(name, "ABCDEF") for name in "ABCDEFGHX"] == list("ABCDEFACA")
-    assert [fallback(name, "ABCDEFX") for name in "GHX"] == ["A", "C", "X"]
+    assert [drawn_shape(name, "ABCDEF") for name in "ABCDEFGHX"] == list("ABCDEFACA")
+    assert [drawn_shape(name, "ABCDEFX") for name in "GHX"] == ["A", "C", "X"]

@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import pytest
 
-from lipmotion.export.cues.sheet import drawn_shapes, frames_in, sheet_of, start_s
+from lipmotion.export.cues.sheet import drawn_shapes, frame_count, cue_sheet, start_s
 
 RATES = [1, 10, 12, 15, 23.976, 24, 25, 29.97, 30, 48, 50, 59.94, 60]
 
@@ -26,8 +26,8 @@ def test_who_rounds_gets_the_same_frames(fps: float) -> None:
 @pytest.mark.parametrize("fps", RATES)
 @pytest.mark.parametrize("duration_s", [0.0, 0.004, 0.01, 0.04, 0.0417, 0.05, 0.5, 1.0, 2.975, 3.0, 10.009, 60.0])
 def test_the_last_frame_begins_before_the_end(fps: float, duration_s: float) -> None:
-    frames = frames_in(duration_s, fps)
-    sheet = sheet_of([(frame, "BC"[frame % 2]) for frame in range(frames)], duration_s, fps, "ABCDEF")
+    frames = frame_count(duration_s, fps)
+    sheet = cue_sheet([(frame, "BC"[frame % 2]) for frame in range(frames)], duration_s, fps, "ABCDEF")
     assert duration_s - 0.01 < sheet.duration_s <= duration_s
     assert frames == pytest.approx(duration_s * fps, abs=1.7)
     assert all(cue.start_s < cue.end_s for cue in sheet.cues) or duration_s < 0.01
@@ -35,7 +35,7 @@ def test_the_last_frame_begins_before_the_end(fps: float, duration_s: float) -> 
 
 def test_no_segments_are_rest() -> None:
     for drawn, rest in (("ABCDEFX", "X"), ("ABCDEF", "A")):
-        (cue,) = sheet_of([], 0.0, 24, drawn).cues
+        (cue,) = cue_sheet([], 0.0, 24, drawn).cues
         assert (cue.start_s, cue.end_s, cue.label) == (0.0, 0.0, rest)
 
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import LONGEST_S, require
+from lipmotion.speech.audio_files import read_audio
 from lipmotion.speech.mfcc import mfcc
-from lipmotion.speech.read import read_audio
 from speech.sound import tone, write_sound
 
 SECONDS = 0.6

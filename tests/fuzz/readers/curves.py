@@ -12,8 +12,8 @@ import numpy as np
 
 from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import require, short_speech
-from lipmotion.corpora.base import Curves
-from lipmotion.corpora.facegood import channels_in
+from lipmotion.corpora.facegood import read_channels
+from lipmotion.corpora.source_recordings import MotionFile
 from lipmotion.corpora.store import Corpus
 from lipmotion.pipeline.corpus.supplied_motion import given_track
 from lipmotion.types import WEIGHT
@@ -45,7 +45,7 @@ def read(folder: Path, good: Good) -> None:
     """Read motion; keep it in a corpus, and read it back from there."""
     names = folder / NAMES
     path = folder / VALUES if names.exists() else next(folder.iterdir())
-    curves = Curves(path, RATE_HZ, channels_in(names)) if names.exists() else Curves(path)
+    curves = MotionFile(path, RATE_HZ, read_channels(names)) if names.exists() else MotionFile(path)
     track = given_track(curves, short_speech(good).duration_s)
     require(bool(np.isfinite(track.motion.values).all()), "values that are not finite")
     corpus = Corpus.open(good.corpus)

@@ -6,10 +6,10 @@ from pathlib import Path
 
 from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import require
-from lipmotion.corpora.base import Recording, Recordings
-from lipmotion.corpora.grid import aligned_words
+from lipmotion.corpora.grid import read_aligned_words
 from lipmotion.corpora.labels import read_labels
-from lipmotion.corpora.splits import LISTS, with_splits
+from lipmotion.corpora.source_recordings import RecordingFolder, SourceRecording
+from lipmotion.corpora.splits import LISTS, assign_splits
 from lipmotion.pipeline.corpus.supplied_motion import given_phones
 
 LONG = """File type = "ooTextFile"
@@ -66,18 +66,18 @@ def seeds(_: Good) -> list[Files]:
 def read(folder: Path, _: Good) -> None:
     """Read each file by its name."""
     if any((folder / name).exists() for name in LISTS):
-        recordings = tuple(Recording(name, Path(f"{name}.mp4"), None) for name in "abcd")
-        with_splits(Recordings("folder", recordings), folder)
+        recordings = tuple(SourceRecording(name, Path(f"{name}.mp4"), None) for name in "abcd")
+        assign_splits(RecordingFolder("folder", recordings), folder)
         return
     for path in folder.iterdir():
         if path.suffix == ".align":
-            require(bool(aligned_words(path)), "no word")
+            require(bool(read_aligned_words(path)), "no word")
         else:
             _read_labels(path)
 
 
 def _read_labels(path: Path) -> None:
     labels = read_labels(path)
-    phones = given_phones(Recording("a", path, labels.words, phones=labels.phones), LENGTH_S)
+    phones = given_phones(SourceRecording("a", path, labels.words, phones=labels.phones), LENGTH_S)
     for span in phones or ():
         require(0 <= span.start_s <= span.end_s <= LENGTH_S, "a phone outside of the sound")

@@ -8,6 +8,7 @@ from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import check_generation, short_speech
 from lipmotion.pipeline.animate import animate
 from lipmotion.pipeline.model import load_model
+from lipmotion.pipeline.request import SpeechRequest
 
 
 def seeds(good: Good) -> list[Files]:
@@ -19,4 +20,4 @@ def read(folder: Path, good: Good) -> None:
     """Load a model; animate a short sound, recognised and told."""
     model = load_model(folder / "a.lipmotion")
     for said in (None, "baby"):
-        check_generation(animate(short_speech(good), transcript=said, model=model, recogniser="own"))
+        check_generation(animate(SpeechRequest(short_speech(good), transcript=said, recogniser="own"), model=model))

@@ -7,6 +7,7 @@ from pathlib import Path
 from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import check_generation, good_model, short_speech
 from lipmotion.pipeline.animate import animate
+from lipmotion.pipeline.request import SpeechRequest
 
 TEXTS = (
     "baby",
@@ -28,4 +29,6 @@ def seeds(_: Good) -> list[Files]:
 def read(folder: Path, good: Good) -> None:
     """Animate a short sound that is told to say this."""
     path = folder / "said.txt"
-    check_generation(animate(short_speech(good), transcript=path, model=good_model(good), recogniser="own"))
+    check_generation(
+        animate(SpeechRequest(short_speech(good), transcript=path, recogniser="own"), model=good_model(good))
+    )

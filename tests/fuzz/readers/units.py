@@ -10,13 +10,14 @@ from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import check_generation, good_model, short_speech
 from lipmotion.export.base import read_motion
 from lipmotion.pipeline.animate import animate, write
+from lipmotion.pipeline.request import SpeechRequest
 from robustness.motion_cases import GOOD
 
 
 def seeds(good: Good) -> list[Files]:
     """Return what ``animate`` writes, and the least that can be written by hand."""
     found: list[Files] = [{"a.json": json.dumps(GOOD).encode()}]
-    result = animate(short_speech(good), model=good_model(good), recogniser="own")
+    result = animate(SpeechRequest(short_speech(good), recogniser="own"), model=good_model(good))
     with tempfile.TemporaryDirectory() as folder:
         paths = [Path(folder) / "a.json", Path(folder) / "a.npz"]
         write(result, paths, channels=["opening"])
@@ -27,4 +28,4 @@ def read(folder: Path, good: Good) -> None:
     """Animate a short sound with these phones."""
     (path,) = folder.iterdir()
     units = read_motion(path)[1]
-    check_generation(animate(short_speech(good), units=units, model=good_model(good), recogniser="own"))
+    check_generation(animate(SpeechRequest(short_speech(good), units=units, recogniser="own"), model=good_model(good)))

@@ -4,12 +4,20 @@ from itertools import product
 
 import numpy as np
 
-from lipmotion.hmm.multistream.densities import Scale, Sums, Tied
-from lipmotion.hmm.multistream.forest import grown, questions_about
+from lipmotion.hmm.multistream.densities import GaussianStatistics, StreamScale, TiedDensities
+from lipmotion.hmm.multistream.forest import TreeCosts, context_questions, grow_forest
 from lipmotion.hmm.multistream.inventory import Inventory
-from lipmotion.hmm.multistream.model import JointConfig, JointHmm, Part
-from lipmotion.hmm.multistream.streams import F0_STREAMS, MOTION, SPEECH, STREAMS, Observed, Stream, observe
-from lipmotion.hmm.multistream.train import Transcribed
+from lipmotion.hmm.multistream.model import JointConfig, JointHmm, StreamModel
+from lipmotion.hmm.multistream.streams import (
+    F0_STREAMS,
+    MOTION,
+    SPEECH,
+    STREAMS,
+    Stream,
+    StreamObservations,
+    stream_observations,
+)
+from lipmotion.hmm.multistream.train import TrainingUtterance
 from lipmotion.stats.bigram import Bigram
 from lipmotion.stats.mixture import Mixtures
 
@@ -29,13 +37,13 @@ def config(**changes) -> JointConfig:
     return JointConfig(**(usual | {"insertion": -0.4} | changes))
 
 
-def observed(draw: np.random.Generator, frames: int, streams=STREAMS) -> Observed:
+def observed(draw: np.random.Generator, frames: int, streams=STREAMS) -> StreamObservations:
     """Noise in all streams, some of it without a value."""
     found = {}
     for name in streams:
         known = draw.random(frames) < (1.0 if name == SPEECH else 0.7)
         found[name] = Stream(draw.normal(0, 1.5, (frames, DIMENSIONS[name])) * known[:, None], known)
-    return Observed(found)
+    return StreamObservations(found)
 
 
 def random_joint(
@@ -50,17 +58,15 @@ def random_joint(
         for left, unit, right in product(sides, known.names, sides)
         for state in range(known.count(unit))
     ]
-    questions = questions_about(known, CLASSES)
+    questions = context_questions(known, CLASSES)
     parts = {}
     for name in streams:
         D, has_spaces = DIMENSIONS[name], name in F0_STREAMS
-        sums = Sums.none(len(seen), 1, D)
+        sums = GaussianStatistics.zeros(len(seen), 1, D)
         effects = {place: draw.normal(0, 3, D) for place in product(range(3), (*known.names, ""))}
         means = np.array([sum(effects[i, context[i]] for i in range(3)) for context, _ in seen])
         sums.add(np.arange(len(seen)), 9.0 * np.concatenate([np.ones((len(seen), 2)), means, means**2 + 0.1], axis=1))
-        forest = grown(
-            name, known, questions, seen, sums, has_spaces=has_spaces, factor=1.0, least_frames=1.0, least_variance=0.02
-        )
+        forest = grow_forest(name, known, questions, seen, sums, has_spaces=has_spaces, costs=TreeCosts(1.0, 1.0, 0.02))
         shape = (forest.size, components, D)
         mixtures = Mixtures(
             np.log(draw.dirichlet(np.full(components, 2.0), forest.size)).astype(np.float32),
@@ -68,14 +74,16 @@ def random_joint(
             draw.uniform(0.3, 2, shape).astype(np.float32),
         )
         voiced = draw.uniform(0.1, 0.9, forest.size) if has_spaces else None
-        parts[name] = Part(Scale(draw.normal(0, 1, D), draw.uniform(0.5, 2, D)), forest, Tied(mixtures, voiced))
+        parts[name] = StreamModel(
+            StreamScale(draw.normal(0, 1, D), draw.uniform(0.5, 2, D)), forest, TiedDensities(mixtures, voiced)
+        )
     count = len(known.names)
     return JointHmm(
         config(states=states, **changes),
         known,
         parts,
-        np.log(draw.uniform(0.2, 0.9, len(known.rows))),
-        np.stack([draw.uniform(1, 4, len(known.rows)), draw.uniform(1, 3, len(known.rows))], axis=1),
+        np.log(draw.uniform(0.2, 0.9, len(known.monophones))),
+        np.stack([draw.uniform(1, 4, len(known.monophones)), draw.uniform(1, 3, len(known.monophones))], axis=1),
         known.names,
         Bigram(known.names, np.log(draw.dirichlet(np.ones(count), count)).astype(np.float32)),
     )
@@ -92,7 +100,7 @@ OPENINGS = {"sil": 0.0, "a": 1.0, "b": 0.1, "c": 0.6, "d": 0.3}
 VOICED = ("a", "b", "d")
 
 
-def say(draw: np.random.Generator, units, unseen: bool = True) -> Transcribed:
+def say(draw: np.random.Generator, units, unseen: bool = True) -> TrainingUtterance:
     """Return an utterance of some units, silence around them; each is coloured by its left neighbour."""
     said = ("sil", *units, "sil")
     speech, pitch, opening, edges = [], [], [], [0]
@@ -112,10 +120,10 @@ def say(draw: np.random.Generator, units, unseen: bool = True) -> Transcribed:
     if unseen and draw.random() < 0.3:
         seen[10:16] = False
         motion[10:16] = np.nan
-    streams = observe(np.concatenate(speech), np.concatenate(pitch), motion, seen)
-    return Transcribed(streams, said, np.array(edges))
+    streams = stream_observations(np.concatenate(speech), np.concatenate(pitch), motion, seen)
+    return TrainingUtterance(streams, said, np.array(edges))
 
 
-def utterances(count: int = 30, seed: int = 0, words: int = 6) -> list[Transcribed]:
+def utterances(count: int = 30, seed: int = 0, words: int = 6) -> list[TrainingUtterance]:
     draw = np.random.default_rng(seed)
     return [say(draw, [UNITS[i] for i in draw.integers(0, 4, words)]) for _ in range(count)]

@@ -4,8 +4,8 @@ import pytest
 from hmm.multistream.synthetic import CLASSES, config, inventory, observed, random_joint, utterances
 from lipmotion.errors import AlignmentError, InputError
 from lipmotion.hmm.multistream.align import align, align_by_durations, measured_durations
-from lipmotion.hmm.multistream.inventory import states_of
-from lipmotion.hmm.multistream.streams import Observed, StreamWeights
+from lipmotion.hmm.multistream.inventory import triphone_states
+from lipmotion.hmm.multistream.streams import StreamObservations, StreamWeights
 from lipmotion.hmm.multistream.train import train_joint
 from oracles import joint as slow
 from oracles.sequences import segmentations
@@ -15,12 +15,12 @@ WEIGHTS = StreamWeights(1, 0.5, 0.2, 1, 0.7)
 
 def slow_scores(hmm, data, units, weights):
     """Give the score of every segmentation: emissions and transitions."""
-    states = states_of(hmm.inventory, units)
+    states = triphone_states(hmm.inventory, units)
     density = np.array(
-        [[slow.log_density(hmm, data, place, t, weights) for place in states.places] for t in range(data.frames)]
+        [[slow.log_density(hmm, data, place, t, weights) for place in states.triphones] for t in range(data.frames)]
     )
-    stay = hmm.log_stay[states.rows]
-    for lengths in segmentations(data.frames, len(states.rows)):
+    stay = hmm.log_stay[states.monophones]
+    for lengths in segmentations(data.frames, len(states.monophones)):
         path = np.repeat(np.arange(len(lengths)), lengths)
         kept = ((np.array(lengths) - 1) * stay + np.log(1 - np.exp(stay))).sum()
         yield float(density[np.arange(data.frames), path].sum() + kept), lengths
@@ -61,7 +61,7 @@ def test_lengths_that_are_known_decide_where_nothing_else_does():
     hmm = random_joint(2, states=1)
     mean = np.array([2.0, 1.0, 5.0, 3.0])  # of sil, sp, a, b
     hmm = type(hmm)(**{**hmm.__dict__, "durations": np.stack([mean, np.full(4, 0.5)], axis=1)})
-    nothing = Observed({name: type(s)(s.values[:1].repeat(8, axis=0), s.known[:1].repeat(8)) for name, s in
+    nothing = StreamObservations({name: type(s)(s.values[:1].repeat(8, axis=0), s.known[:1].repeat(8)) for name, s in
                         observed(np.random.default_rng(3), 1).streams.items()})  # fmt: skip
     even = align_by_durations(hmm, nothing, ("a", "b"), weight=1e6)
     assert even.bounds(2).tolist() == [0, 5, 8]
@@ -80,7 +80,7 @@ def test_durations_are_those_of_the_alignment():
     hmm = train_joint(data, inventory(), CLASSES, config(mixtures=1))
     durations = measured_durations(hmm, [(u.observed, u.units) for u in data])
     assert np.array_equal(durations, hmm.durations)
-    rows = [hmm.inventory.rows["a", state] for state in range(3)]
+    rows = [hmm.inventory.monophones["a", state] for state in range(3)]
     assert 6 <= durations[rows, 0].sum() <= 12
     assert (durations[:, 1] >= 1).all()
     near = align_by_durations(hmm, data[0].observed, data[0].units).bounds(len(data[0].units))

@@ -5,7 +5,7 @@ from hmm.multistream.synthetic import observed, random_joint
 from lipmotion.errors import ModelFormatError
 from lipmotion.hmm.multistream.align import align
 from lipmotion.hmm.multistream.arrays import joint_arrays, joint_from_arrays
-from lipmotion.hmm.multistream.generate import densities_along, generate
+from lipmotion.hmm.multistream.generate import densities_of_path, generate
 from lipmotion.hmm.multistream.recognise import JointRecogniser
 
 HMM = random_joint(1, ("a", "b", "c"))
@@ -16,7 +16,7 @@ def test_a_model_comes_back_as_it_was():
     again = joint_from_arrays(arrays, HMM.config)
     data = observed(np.random.default_rng(2), 30)
     assert JointRecogniser(again).recognise(data) == JointRecogniser(HMM).recognise(data)
-    found, wanted = (generate(densities_along(m, align(m, data, ("sil", "a", "sil")))) for m in (again, HMM))
+    found, wanted = (generate(densities_of_path(m, align(m, data, ("sil", "a", "sil")))) for m in (again, HMM))
     assert np.array_equal(found.values, wanted.values)
     for key, array in joint_arrays(again, np.float32).items():
         assert array.dtype == arrays[key].dtype

@@ -2,7 +2,13 @@ import numpy as np
 import pytest
 
 from hmm.multistream.synthetic import observed, random_joint
-from lipmotion.hmm.multistream.densities import Scale, Sums, Tied, fit_scale, standard
+from lipmotion.hmm.multistream.densities import (
+    GaussianStatistics,
+    StreamScale,
+    TiedDensities,
+    fit_scale,
+    standard_normal_densities,
+)
 from lipmotion.hmm.multistream.streams import STREAMS, Stream, StreamWeights
 from lipmotion.stats.mixture import Mixtures
 from oracles import joint as slow
@@ -12,9 +18,9 @@ from oracles import joint as slow
 @pytest.mark.parametrize("name", STREAMS)
 def test_densities_are_those_of_the_formulas(name, components):
     hmm = random_joint(1, components=components)
-    part, data = hmm.parts[name], observed(np.random.default_rng(2), 12)
+    part, data = hmm.models[name], observed(np.random.default_rng(2), 12)
     leaves = np.array([2, 0, 2, 1])
-    found = part.tied.log_density(part.scale.inside(data.streams[name]), leaves, part.scale.log_volume)
+    found = part.tied.log_density(part.scale.standardise(data.streams[name]), leaves, part.scale.log_determinant)
     stream = data.streams[name]
     expected = [
         [slow.stream_density(part, leaf, stream.values[t], stream.known[t]) for leaf in leaves] for t in range(12)
@@ -25,13 +31,13 @@ def test_densities_are_those_of_the_formulas(name, components):
 @pytest.mark.parametrize("components", [1, 2])
 def test_voiced_and_unvoiced_together_are_everything(components):
     hmm = random_joint(3, components=components)
-    part = hmm.parts["f0"]
+    part = hmm.models["f0"]
     grid = np.linspace(-40, 40, 200_001)
     leaves = np.arange(part.forest.size)
 
     def density(values, known):
-        rows = part.scale.inside(Stream(values[:, None], np.full(len(values), known)))
-        return np.exp(part.tied.log_density(rows, leaves, part.scale.log_volume).astype(float))
+        rows = part.scale.standardise(Stream(values[:, None], np.full(len(values), known)))
+        return np.exp(part.tied.log_density(rows, leaves, part.scale.log_determinant).astype(float))
 
     voiced = density(grid, True).sum(axis=0) * (grid[1] - grid[0])
     unvoiced = density(np.zeros(1), False)[0]
@@ -44,44 +50,44 @@ def test_a_weight_of_nothing_is_a_stream_that_is_not_there():
     leaves = hmm.leaves([(("a", "b", "a"), state) for state in range(3)])
     without = StreamWeights(f0=0, motion=0)
     some = {name: stream for name, stream in data.streams.items() if name not in ("f0", "motion")}
-    found = hmm.log_density(hmm.inside(data, without), leaves, without)
-    alone = hmm.log_density(hmm.inside(type(data)(some), StreamWeights()), leaves, StreamWeights())
+    found = hmm.log_density(hmm.standardise(data, without), leaves, without)
+    alone = hmm.log_density(hmm.standardise(type(data)(some), StreamWeights()), leaves, StreamWeights())
     assert np.array_equal(found, alone)
-    assert not np.allclose(found, hmm.log_density(hmm.inside(data, StreamWeights()), leaves, StreamWeights()))
+    assert not np.allclose(found, hmm.log_density(hmm.standardise(data, StreamWeights()), leaves, StreamWeights()))
 
 
 def sums_of(values, share):
     rows = np.concatenate([np.ones((len(values), 2)), values, values**2], axis=1)
-    sums = Sums.none(1, 1, values.shape[1])
+    sums = GaussianStatistics.zeros(1, 1, values.shape[1])
     sums.add(np.array([0]), (share[:, None] * rows).sum(axis=0)[None])
     return sums
 
 
 def test_one_gaussian_takes_the_mean_and_variance_of_its_frames():
     values, share = np.random.default_rng(0).normal(1, 2, (50, 3)), np.random.default_rng(1).random(50)
-    better = standard(1, 3, False).maximised(sums_of(values, share), 1e-3).mixtures
+    better = standard_normal_densities(1, 3, False).reestimated(sums_of(values, share), 1e-3).mixtures
     mean = np.average(values, axis=0, weights=share)
     assert better.means[0, 0] == pytest.approx(mean, abs=1e-5)
     assert better.variances[0, 0] == pytest.approx(np.average((values - mean) ** 2, axis=0, weights=share), rel=1e-4)
 
 
 def test_what_has_too_little_data_stays_as_it_is():
-    before = standard(1, 2, True, 0.3)
-    after = before.maximised(sums_of(np.ones((1, 2)), np.ones(1)), 1e-3)
+    before = standard_normal_densities(1, 2, True, 0.3)
+    after = before.reestimated(sums_of(np.ones((1, 2)), np.ones(1)), 1e-3)
     assert np.array_equal(after.mixtures.means, before.mixtures.means)
     assert after.voiced == pytest.approx([0.3])
 
 
 def test_variances_have_a_floor_and_voicing_is_never_certain():
-    after = standard(1, 2, True).maximised(sums_of(np.ones((50, 2)), np.ones(50)), 0.02)
+    after = standard_normal_densities(1, 2, True).reestimated(sums_of(np.ones((50, 2)), np.ones(50)), 0.02)
     assert after.mixtures.variances[0, 0] == pytest.approx([0.02, 0.02])
     assert 0 < after.voiced[0] < 1
 
 
 def test_only_gaussians_with_data_are_split():
     mixtures = Mixtures(np.zeros((2, 1), np.float32), np.zeros((2, 1, 1), np.float32), np.ones((2, 1, 1), np.float32))
-    sums = Sums(np.array([100.0, 10.0]), np.array([[[100.0, 0, 100]], [[10.0, 0, 10]]]))
-    twice = Tied(mixtures, None).split(sums).mixtures
+    sums = GaussianStatistics(np.array([100.0, 10.0]), np.array([[[100.0, 0, 100]], [[10.0, 0, 10]]]))
+    twice = TiedDensities(mixtures, None).split(sums).mixtures
     assert np.exp(twice.log_weights) == pytest.approx(np.array([[0.5, 0.5], [1, 0]]))
     assert np.ptp(twice.means[0]) > 0
     assert twice.means[1, 0, 0] == 0
@@ -94,4 +100,4 @@ def test_the_scale_is_that_of_known_frames():
     assert scale.deviation[0] == 1
     assert 0 < scale.deviation[1] < 1e-3
     assert share == pytest.approx(2 / 3)
-    assert np.isfinite(Scale(scale.mean, scale.deviation).inside(Stream(values, np.ones(3, bool)))).all()
+    assert np.isfinite(StreamScale(scale.mean, scale.deviation).standardise(Stream(values, np.ones(3, bool)))).all()

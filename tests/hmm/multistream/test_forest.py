@@ -5,10 +5,10 @@ import pytest
 
 from hmm.multistream.synthetic import CLASSES, NAMES, inventory, random_joint
 from lipmotion.errors import InputError
-from lipmotion.hmm.multistream.densities import Sums
-from lipmotion.hmm.multistream.forest import grown, places_asked, questions_about, unit_forest
-from lipmotion.hmm.multistream.inventory import Inventory, states_of
-from lipmotion.hmm.multistream.streams import HEARD, STREAMS
+from lipmotion.hmm.multistream.densities import GaussianStatistics
+from lipmotion.hmm.multistream.forest import TreeCosts, context_questions, grow_forest, positions_asked, unit_forest
+from lipmotion.hmm.multistream.inventory import Inventory, triphone_states
+from lipmotion.hmm.multistream.streams import ACOUSTIC_STREAMS, STREAMS
 
 KNOWN = inventory()
 SIDES = [name for name in NAMES if name != "sp"]
@@ -29,11 +29,11 @@ def places(unit_names=NAMES):
 
 def tied(stream, mean_of, seen, classes=CLASSES, has_spaces=False):
     means = np.array([mean_of(*place) for place in seen])[:, None]
-    sums = Sums.none(len(seen), 1, 1)
+    sums = GaussianStatistics.zeros(len(seen), 1, 1)
     sums.add(np.arange(len(seen)), 20.0 * np.concatenate([np.ones((len(seen), 2)), means, means**2 + 0.1], axis=1))
-    return grown(
-        stream, KNOWN, questions_about(KNOWN, classes), seen, sums,
-        has_spaces=has_spaces, factor=1.0, least_frames=10.0, least_variance=0.02,
+    return grow_forest(
+        stream, KNOWN, context_questions(KNOWN, classes), seen, sums,
+        has_spaces=has_spaces, costs=TreeCosts(1.0, 10.0, 0.02),
     )  # fmt: skip
 
 
@@ -50,7 +50,7 @@ def test_units_and_contexts_that_were_never_seen_resolve_by_class():
 @pytest.mark.parametrize("stream", STREAMS)
 def test_what_is_heard_depends_on_one_neighbour_at_most(stream):
     hmm = random_joint(0, ("a", "b", "c"))
-    forest, units = hmm.parts[stream].forest, hmm.inventory.names
+    forest, units = hmm.models[stream].forest, hmm.inventory.names
     sides = [name for name in units if name != "sp"]
 
     def differs(unit, state, place):
@@ -61,24 +61,24 @@ def test_what_is_heard_depends_on_one_neighbour_at_most(stream):
             found.add(forest.leaf((tuple(context), state)))
         return len(found) > 1
 
-    left = {state for unit, state in hmm.inventory.rows if unit not in ("sil", "sp") and differs(unit, state, 0)}
-    right = {state for unit, state in hmm.inventory.rows if unit not in ("sil", "sp") and differs(unit, state, 2)}
+    left = {state for unit, state in hmm.inventory.monophones if unit not in ("sil", "sp") and differs(unit, state, 0)}
+    right = {state for unit, state in hmm.inventory.monophones if unit not in ("sil", "sp") and differs(unit, state, 2)}
     silent = any(differs("sil", state, place) for state in range(3) for place in (0, 2))
-    expected = ({0}, {2}, False) if stream in HEARD else ({0, 1, 2}, {0, 1, 2}, True)
+    expected = ({0}, {2}, False) if stream in ACOUSTIC_STREAMS else ({0, 1, 2}, {0, 1, 2}, True)
     assert (left, right, silent) == expected
 
 
 def test_an_even_count_has_no_middle():
     known = inventory(4)
-    assert [places_asked("f0", known, "a", state) for state in range(4)] == [(0, 1), (0, 1), (1, 2), (1, 2)]
+    assert [positions_asked("f0", known, "a", state) for state in range(4)] == [(0, 1), (0, 1), (1, 2), (1, 2)]
 
 
 def test_silence_stands_for_pauses_beside_other_units():
     contexts = KNOWN.contexts(("sil", "a", "sp", "b"))
     assert contexts == [("sil", "sil", "a"), ("sil", "a", "sil"), ("a", "sp", "b"), ("sil", "b", "sil")]
-    states = states_of(KNOWN, ("a", "sp"))
+    states = triphone_states(KNOWN, ("a", "sp"))
     assert states.positions.tolist() == [0, 0, 0, 1]
-    assert [KNOWN.rows[context[1], state] for context, state in states.places] == states.rows.tolist()
+    assert [KNOWN.monophones[context[1], state] for context, state in states.triphones] == states.monophones.tolist()
 
 
 @pytest.mark.parametrize(
@@ -92,9 +92,9 @@ def test_an_inventory_that_is_none_is_refused(given):
 
 def test_an_unknown_unit_is_refused():
     with pytest.raises(InputError, match="unknown unit 'q'"):
-        states_of(KNOWN, ("a", "q"))
+        triphone_states(KNOWN, ("a", "q"))
 
 
 def test_classes_of_other_units_are_left_out():
-    names = {question.name for question in questions_about(KNOWN, {"other": frozenset({"q"}), **CLASSES})}
+    names = {question.name for question in context_questions(KNOWN, {"other": frozenset({"q"}), **CLASSES})}
     assert names == {*CLASSES, *NAMES}

@@ -10,12 +10,12 @@ from lipmotion.errors import InputError
 from lipmotion.hmm.multistream.align import align
 from lipmotion.hmm.multistream.generate import (
     FrameDensities,
-    densities_along,
-    densities_of,
-    densities_over,
+    densities_of_path,
+    densities_of_paths,
+    densities_of_posterior,
     generate,
 )
-from lipmotion.hmm.multistream.model import HEARD_ONLY
+from lipmotion.hmm.multistream.model import ACOUSTIC_ONLY
 from lipmotion.hmm.multistream.streams import MOTION, SPEECH
 from lipmotion.hmm.multistream.train import train_joint
 from lipmotion.stats.delta_windows import with_dynamics
@@ -103,8 +103,8 @@ def test_mixtures_take_sides():
 def test_the_densities_are_those_of_the_leaves_in_units_of_the_motion(components):
     hmm = random_joint(1, components=components, states=2)
     path = align(hmm, observed(np.random.default_rng(2), 9), ("sil", "a", "b"))
-    found, part = densities_along(hmm, path), hmm.parts[MOTION]
-    leaves = part.forest.leaves(path.states.places)[path.frames]
+    found, part = densities_of_path(hmm, path), hmm.models[MOTION]
+    leaves = part.forest.leaves(path.states.triphones)[path.frames]
     middle = 4
     wanted = part.tied.mixtures.means[leaves[middle]] * part.scale.deviation + part.scale.mean
     assert found.means[middle] == pytest.approx(wanted.reshape(components, 3, 2))
@@ -116,10 +116,10 @@ def test_the_densities_are_those_of_the_leaves_in_units_of_the_motion(components
 def test_a_path_that_is_certain_is_that_path():
     hmm = random_joint(3, components=1)
     path = align(hmm, observed(np.random.default_rng(4), 20), ("sil", "a", "b", "sil"))
-    leaves = hmm.parts[MOTION].forest.leaves(path.states.places)
+    leaves = hmm.models[MOTION].forest.leaves(path.states.triphones)
     one = np.eye(len(leaves))[path.frames]
-    assert generate(densities_over(hmm, leaves, one)).values == pytest.approx(
-        generate(densities_along(hmm, path)).values, abs=1e-9
+    assert generate(densities_of_posterior(hmm, leaves, one)).values == pytest.approx(
+        generate(densities_of_path(hmm, path)).values, abs=1e-9
     )
 
 
@@ -128,8 +128,8 @@ def test_all_paths_together_maximise_the_expected_density():
     draw = np.random.default_rng(6)
     leaves = np.array([0, 1, 1, 2])
     posterior = draw.dirichlet(np.ones(4), 10)
-    found = generate(densities_over(hmm, leaves, posterior)).values
-    mixtures, scale = hmm.parts[MOTION].tied.mixtures, hmm.parts[MOTION].scale
+    found = generate(densities_of_posterior(hmm, leaves, posterior)).values
+    mixtures, scale = hmm.models[MOTION].tied.mixtures, hmm.models[MOTION].scale
     for channel in range(2):
         means = (mixtures.means[leaves, 0] * scale.deviation + scale.mean).reshape(4, 3, 2)[:, :, channel]
         precisions = 1 / (mixtures.variances[leaves, 0] * scale.deviation**2).reshape(4, 3, 2)[:, :, channel]
@@ -142,14 +142,14 @@ def test_several_paths_count_as_often_as_they_are_given():
     hmm = random_joint(3, components=1)
     data = observed(np.random.default_rng(4), 20)
     one, other = (align(hmm, data, units) for units in (("sil", "a", "b", "sil"), ("sil", "b", "sil")))
-    leaves = [hmm.parts[MOTION].forest.leaves(path.states.places) for path in (one, other)]
+    leaves = [hmm.models[MOTION].forest.leaves(path.states.triphones) for path in (one, other)]
     posterior = np.concatenate(
         [0.75 * np.eye(len(leaves[0]))[one.frames], 0.25 * np.eye(len(leaves[1]))[other.frames]], axis=1
     )
-    wanted = generate(densities_over(hmm, np.concatenate(leaves), posterior)).values
-    assert generate(densities_of(hmm, [one, other, one, one])).values == pytest.approx(wanted, abs=1e-9)
+    wanted = generate(densities_of_posterior(hmm, np.concatenate(leaves), posterior)).values
+    assert generate(densities_of_paths(hmm, [one, other, one, one])).values == pytest.approx(wanted, abs=1e-9)
     with pytest.raises(InputError, match="of the same length"):
-        densities_of(hmm, [])
+        densities_of_paths(hmm, [])
 
 
 def test_what_was_learned_comes_back():
@@ -157,19 +157,19 @@ def test_what_was_learned_comes_back():
     hmm = train_joint(data, inventory(), CLASSES, config())
     for utterance in utterances(4, seed=9):
         motion = utterance.observed.streams[MOTION]
-        found = generate(densities_along(hmm, align(hmm, utterance.observed, utterance.units, utterance.bounds)))
+        found = generate(densities_of_path(hmm, align(hmm, utterance.observed, utterance.units, utterance.bounds)))
         off = found.values - motion.values[:, :2]
         assert np.sqrt((off[motion.known] ** 2).mean(axis=0)) == pytest.approx([0.06, 0.03], abs=0.05)
 
 
 def test_what_cannot_be_generated():
-    deaf, hmm = random_joint(7, streams=(SPEECH,)), random_joint(8, synthesis=HEARD_ONLY)
+    deaf, hmm = random_joint(7, streams=(SPEECH,)), random_joint(8, synthesis=ACOUSTIC_ONLY)
     data = observed(np.random.default_rng(9), 9)
     for model in (deaf, hmm):
         with pytest.raises(InputError, match="no motion, or it is switched off"):
-            densities_along(model, align(model, data, ("a",)))
+            densities_of_path(model, align(model, data, ("a",)))
     hmm = replace(hmm, config=config())
     with pytest.raises(InputError, match="one of each state"):
-        densities_over(hmm, np.array([0, 1]), np.ones((9, 3)))
+        densities_of_posterior(hmm, np.array([0, 1]), np.ones((9, 3)))
     with pytest.raises(InputError, match="a pin at"):
         generate(random_densities(0, 5, 1), {(5, 0): 1.0})

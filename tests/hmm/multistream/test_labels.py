@@ -4,8 +4,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lipmotion.errors import InputError
-from lipmotion.hmm.multistream.labels import in_frames, in_time
-from lipmotion.hmm.multistream.recognise import Said
+from lipmotion.hmm.multistream.labels import units_in_frames, units_in_time
+from lipmotion.hmm.multistream.recognise import RecognisedUnit
 from lipmotion.types import Span, Timeline, Unit
 
 
@@ -15,17 +15,17 @@ def timeline(*spans):
 
 def test_every_frame_has_a_unit():
     spoken = timeline((0.015, 0.05, "a"), (0.05, 0.054, "t"), (0.07, 0.1, "b"))
-    units, bounds = in_frames(spoken, 13, "sil")
+    units, bounds = units_in_frames(spoken, 13, "sil")
     assert units == ("sil", "a", "t", "sil", "b", "sil")
     assert bounds.tolist() == [0, 2, 5, 6, 7, 10, 13]
-    assert in_frames(spoken, 4, "sil", lambda label: {"a": "open"}[label.phone])[0] == ("sil", "open")
-    assert in_frames(timeline(), 3, "sil")[0] == ("sil",)
+    assert units_in_frames(spoken, 4, "sil", lambda label: {"a": "open"}[label.phone])[0] == ("sil", "open")
+    assert units_in_frames(timeline(), 3, "sil")[0] == ("sil",)
     with pytest.raises(InputError):
-        in_frames(spoken, 0, "sil")
+        units_in_frames(spoken, 0, "sil")
 
 
 def test_a_unit_without_a_frame_is_left_out():
-    units, bounds = in_frames(timeline((0, 0.031, "a"), (0.031, 0.038, "t"), (0.038, 0.06, "b")), 6, "sil")
+    units, bounds = units_in_frames(timeline((0, 0.031, "a"), (0.031, 0.038, "t"), (0.038, 0.06, "b")), 6, "sil")
     assert units == ("a", "b")
     assert bounds.tolist() == [0, 4, 6]
 
@@ -34,8 +34,8 @@ def test_a_unit_without_a_frame_is_left_out():
 @given(lengths=st.lists(st.integers(1, 9), min_size=1, max_size=9))
 def test_there_and_back(lengths):
     firsts = np.cumsum([0, *lengths]).tolist()
-    said = [Said("ab"[i % 2], first) for i, first in enumerate(firsts[:-1])]
-    spoken = in_time(said, firsts[-1] / 100)
+    said = [RecognisedUnit("ab"[i % 2], first) for i, first in enumerate(firsts[:-1])]
+    spoken = units_in_time(said, firsts[-1] / 100)
     assert spoken[-1].end_s == firsts[-1] / 100
-    units, bounds = in_frames(spoken, firsts[-1], "sil")
-    assert [Said(unit, first) for unit, first in zip(units, bounds[:-1].tolist(), strict=True)] == said
+    units, bounds = units_in_frames(spoken, firsts[-1], "sil")
+    assert [RecognisedUnit(unit, first) for unit, first in zip(units, bounds[:-1].tolist(), strict=True)] == said

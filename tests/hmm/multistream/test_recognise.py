@@ -8,10 +8,10 @@ from lipmotion.errors import AlignmentError, InputError
 from lipmotion.hmm.decode import decode_units, unit_loop
 from lipmotion.hmm.log_likelihoods import log_likelihoods_of
 from lipmotion.hmm.model import HmmConfig, UnitHmm
-from lipmotion.hmm.multistream.inventory import states_of
-from lipmotion.hmm.multistream.model import HEARD_ONLY
+from lipmotion.hmm.multistream.inventory import triphone_states
+from lipmotion.hmm.multistream.model import ACOUSTIC_ONLY
 from lipmotion.hmm.multistream.recognise import JointRecogniser
-from lipmotion.hmm.multistream.streams import SPEECH, Observed, StreamWeights
+from lipmotion.hmm.multistream.streams import SPEECH, StreamObservations, StreamWeights
 from lipmotion.hmm.states import StateTable
 from oracles import joint as slow
 from oracles.sequences import sequences
@@ -72,9 +72,9 @@ def test_posteriors_are_the_shares_of_all_sequences():
     data, frames = observed(np.random.default_rng(4), 7), 7
     ways = list(slow.everything(hmm, slow_densities(hmm, data, SOFT), frames, candidates(hmm, frames)))
     shares = np.exp([score for score, _, _ in ways] - np.logaddexp.reduce([score for score, _, _ in ways]))
-    expected = np.zeros((frames, len(hmm.inventory.rows)))
+    expected = np.zeros((frames, len(hmm.inventory.monophones)))
     for share, (_, units, lengths) in zip(shares, ways, strict=True):
-        expected[np.arange(frames), np.repeat(states_of(hmm.inventory, units).rows, lengths)] += share
+        expected[np.arange(frames), np.repeat(triphone_states(hmm.inventory, units).monophones, lengths)] += share
     found = JointRecogniser(hmm, SOFT).posterior(data)
     assert found == pytest.approx(expected, abs=1e-4)
     assert found.sum(axis=1) == pytest.approx(np.ones(frames), abs=1e-5)
@@ -86,10 +86,12 @@ def test_paths_that_are_drawn_go_through_the_states_of_their_units():
     paths = recogniser.sampled_paths(data, 400, 6)
     for path, said in zip(paths, recogniser.sampled(data, 400, 6), strict=True):
         assert set(np.diff(path.frames).tolist()) <= {0, 1}
-        assert (path.frames[0], path.frames[-1]) == (0, len(path.states.rows) - 1)
-        assert [context[1] for context, state in path.states.places if state == 0] == [s.unit for s in said]
+        assert (path.frames[0], path.frames[-1]) == (0, len(path.states.monophones) - 1)
+        assert [context[1] for context, state in path.states.triphones if state == 0] == [s.unit for s in said]
         assert path.bounds(len(said))[:-1].tolist() == [s.first for s in said]
-    drawn = np.mean([np.eye(len(hmm.inventory.rows))[path.states.rows[path.frames]] for path in paths], axis=0)
+    drawn = np.mean(
+        [np.eye(len(hmm.inventory.monophones))[path.states.monophones[path.frames]] for path in paths], axis=0
+    )
     assert drawn == pytest.approx(recogniser.posterior(data), abs=0.13)
 
 
@@ -109,12 +111,12 @@ def test_the_same_seed_draws_the_same():
 def test_speech_alone_is_the_plain_model():
     """The densities of all contexts, written out by name, in the models that the project had before."""
     hmm = random_joint(8, streams=(SPEECH,))
-    known, part = hmm.inventory, hmm.parts[SPEECH]
+    known, part = hmm.inventory, hmm.models[SPEECH]
     names, leaves = [], []
-    for unit, state in known.rows:
+    for unit, state in known.monophones:
         names.append(f"{unit}.{state}")
         leaves.append(part.forest.leaf((("sil", unit, "sil"), state)))
-    for unit, state in known.rows:
+    for unit, state in known.monophones:
         side = known.side(unit, state)
         for neighbour in ("sil", "a", "b") if side else ():
             context = (neighbour, unit, "sil") if side < 0 else ("sil", unit, neighbour)
@@ -124,7 +126,7 @@ def test_speech_alone_is_the_plain_model():
     config = HmmConfig(bigram_weight=hmm.config.bigram_weight, insertion=hmm.config.insertion)
     plain = UnitHmm(config, table, part.tied.mixtures.picked(np.array(leaves)), hmm.log_stay, hmm.bigram)
     data = observed(np.random.default_rng(9), 60, (SPEECH,))
-    rows = part.scale.inside(data.streams[SPEECH])
+    rows = part.scale.standardise(data.streams[SPEECH])
     units, bounds = decode_units(unit_loop(plain, ["sil", "a", "b"]), log_likelihoods_of(plain, part.tied.values(rows)))
     said = JointRecogniser(hmm).recognise(data)
     assert tuple(s.unit for s in said) == units
@@ -133,8 +135,8 @@ def test_speech_alone_is_the_plain_model():
 
 def test_streams_that_are_missing_say_nothing():
     hmm, data = random_joint(10), observed(np.random.default_rng(11), 20)
-    only = Observed({SPEECH: data.streams[SPEECH]})
-    found = JointRecogniser(hmm, HEARD_ONLY).recognise(only)
+    only = StreamObservations({SPEECH: data.streams[SPEECH]})
+    found = JointRecogniser(hmm, ACOUSTIC_ONLY).recognise(only)
     assert found == JointRecogniser(hmm, StreamWeights(1, 0, 0, 0, 0)).recognise(data)
 
 
@@ -153,6 +155,6 @@ def test_what_cannot_be_recognised():
         JointRecogniser(hmm).sampled(observed(np.random.default_rng(0), 2), 1, 0)
     with pytest.raises(AlignmentError):
         JointRecogniser(hmm).posterior(observed(np.random.default_rng(0), 2))
-    wide = Observed({SPEECH: type(data.streams[SPEECH])(np.zeros((9, 4)), np.ones(9, bool))})
+    wide = StreamObservations({SPEECH: type(data.streams[SPEECH])(np.zeros((9, 4)), np.ones(9, bool))})
     with pytest.raises(InputError, match="has 4 dimensions"):
         JointRecogniser(hmm).recognise(wide)

@@ -8,12 +8,12 @@ from hmm.multistream.synthetic import observed as noise
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.multistream import densities
 from lipmotion.hmm.multistream.align import align
-from lipmotion.hmm.multistream.em import expect, maximised, posteriors, sentences_of
+from lipmotion.hmm.multistream.em import accumulate_statistics, prepare_utterances, reestimated_hmm, state_posteriors
 from lipmotion.hmm.multistream.inventory import Inventory
 from lipmotion.hmm.multistream.model import MOTION_ONLY
 from lipmotion.hmm.multistream.recognise import JointRecogniser
-from lipmotion.hmm.multistream.streams import STREAMS, Observed, StreamWeights
-from lipmotion.hmm.multistream.train import Transcribed, mean_log_likelihood, train_joint
+from lipmotion.hmm.multistream.streams import STREAMS, StreamObservations, StreamWeights
+from lipmotion.hmm.multistream.train import TrainingUtterance, mean_log_likelihood, train_joint
 from lipmotion.types import Progress
 from oracles import chains
 from oracles import joint as slow
@@ -58,11 +58,11 @@ def test_the_likelihood_never_falls_within_a_stage(weights, started):
 def test_posteriors_are_those_of_all_paths(components):
     hmm = random_joint(1, states=2, components=components, training=StreamWeights(0.7, 1.2, 0.4, 1, 0.9))
     draw = np.random.default_rng(0)
-    observed = Observed({name: s for name, s in noise(draw, 7).streams.items() if name != "f0_slope"})
+    observed = StreamObservations({name: s for name, s in noise(draw, 7).streams.items() if name != "f0_slope"})
     units = ("a", "sp", "b")
-    sentences = sentences_of(hmm, [(observed, units)])
-    (found,) = posteriors(hmm, sentences)
-    places = [sentences.places[i] for i in sentences.items[0].places]
+    sentences = prepare_utterances(hmm, [(observed, units)])
+    (found,) = state_posteriors(hmm, sentences)
+    places = [sentences.triphones[i] for i in sentences.items[0].triphones]
     density = [[slow.log_density(hmm, observed, place, t, hmm.config.training) for place in places] for t in range(7)]
     rows = sentences.items[0].states
     expected, stay, log_likelihood = chains.chain_posteriors(np.array(density), hmm.log_stay[rows], hmm.log_move[rows])
@@ -76,26 +76,28 @@ def test_a_stream_without_weight_is_as_good_as_absent():
     off = StreamWeights(motion=0, f0=0)
     hmm, events = trained(TRAIN[:12], training=off)
     without = [
-        replace(u, observed=Observed({n: s for n, s in u.observed.streams.items() if n not in ("motion", "f0")}))
+        replace(
+            u, observed=StreamObservations({n: s for n, s in u.observed.streams.items() if n not in ("motion", "f0")})
+        )
         for u in TRAIN[:12]
     ]
     alone, same = trained(without, training=off)
     assert [e.figure for e in events if e.stage in stages(same)] == pytest.approx(
         [e.figure for e in same if e.stage in stages(same)], abs=1e-9
     )
-    assert np.array_equal(hmm.parts["speech"].tied.mixtures.means, alone.parts["speech"].tied.mixtures.means)
-    assert "motion" in hmm.parts
-    assert "motion" not in alone.parts
+    assert np.array_equal(hmm.models["speech"].tied.mixtures.means, alone.models["speech"].tied.mixtures.means)
+    assert "motion" in hmm.models
+    assert "motion" not in alone.models
 
 
 def test_a_step_improves_on_what_was_found():
     hmm = random_joint(2, units=("a", "b", "c", "d"), components=1)
     data = [(noise(np.random.default_rng(i), 40), ("sil", "a", "c", "sil")) for i in range(4)]
-    sentences, figures = sentences_of(hmm, data), []
+    sentences, figures = prepare_utterances(hmm, data), []
     for _ in range(4):
-        expected = expect(hmm, sentences)
+        expected = accumulate_statistics(hmm, sentences)
         figures.append(expected.mean_log_likelihood)
-        hmm = maximised(hmm, expected)
+        hmm = reestimated_hmm(hmm, expected)
     assert (np.diff(figures) > 0).all()
 
 
@@ -117,7 +119,7 @@ def test_splitting_stops_where_held_out_utterances_are_no_better(monkeypatch):
     monkeypatch.setattr(densities, "SPLIT_FRAMES", 3.0)
     hmm, events = trained(validation=HELD_OUT, mixtures=64)
     free, _ = trained(mixtures=64)
-    assert hmm.parts["speech"].tied.mixtures.size[1] < free.parts["speech"].tied.mixtures.size[1]
+    assert hmm.models["speech"].tied.mixtures.size[1] < free.models["speech"].tied.mixtures.size[1]
     best = mean_log_likelihood(hmm, of_model(hmm, HELD_OUT))
     assert best > mean_log_likelihood(free, of_model(free, HELD_OUT))
     plain, _ = trained(mixtures=1)
@@ -126,21 +128,21 @@ def test_splitting_stops_where_held_out_utterances_are_no_better(monkeypatch):
 
 
 def of_model(hmm, data):
-    return sentences_of(hmm, [(utterance.observed, utterance.units) for utterance in data])
+    return prepare_utterances(hmm, [(utterance.observed, utterance.units) for utterance in data])
 
 
 def test_gaussians_without_enough_data_are_not_split():
     hmm, events = trained(mixtures=64)
-    assert hmm.parts["speech"].tied.mixtures.size[1] < 64
+    assert hmm.models["speech"].tied.mixtures.size[1] < 64
     assert len(stages(events)) < 5 + np.log2(64)
 
 
 def test_streams_and_units_that_are_missing_here_and_there():
     draw = np.random.default_rng(7)
-    deaf = replace(TRAIN[0], observed=Observed({"speech": TRAIN[0].observed.streams["speech"]}))
+    deaf = replace(TRAIN[0], observed=StreamObservations({"speech": TRAIN[0].observed.streams["speech"]}))
     pause = say(draw, ["a", "b"])
     hmm, _ = trained([deaf, pause, *TRAIN[1:8]])
-    assert set(hmm.parts) == set(STREAMS)
+    assert set(hmm.models) == set(STREAMS)
     assert hmm.spoken == ("sil", "a", "b", "c", "d")
     path = align(hmm, HELD_OUT[0].observed, ("sil", "x", "sil"))  # never heard
     assert len(path.frames) == HELD_OUT[0].observed.frames
@@ -155,7 +157,7 @@ def test_progress_ends_with_everything_done(usual):
 
 
 def test_nothing_that_is_switched_on_was_observed():
-    deaf = [replace(u, observed=Observed({"speech": u.observed.streams["speech"]})) for u in TRAIN[:3]]
+    deaf = [replace(u, observed=StreamObservations({"speech": u.observed.streams["speech"]})) for u in TRAIN[:3]]
     with pytest.raises(InputError, match="switched on are motion"):
         trained(deaf, training=MOTION_ONLY)
     hmm, _ = trained([*TRAIN[:6], deaf[0]], training=MOTION_ONLY)  # where some have it, the others do no harm
@@ -164,7 +166,7 @@ def test_nothing_that_is_switched_on_was_observed():
 
 def test_training_is_repeatable(usual):
     again, _ = trained()
-    assert np.array_equal(again.parts["speech"].tied.mixtures.means, usual[0].parts["speech"].tied.mixtures.means)
+    assert np.array_equal(again.models["speech"].tied.mixtures.means, usual[0].models["speech"].tied.mixtures.means)
     assert np.array_equal(again.log_stay, usual[0].log_stay)
 
 
@@ -179,7 +181,7 @@ def test_any_other_units_can_be_modelled():
 def test_too_short_for_its_units():
     observed = noise(np.random.default_rng(0), 5)
     with pytest.raises(CorpusError, match="room for the states"):
-        trained([Transcribed(observed, ("sil", "a", "sil"))])
+        trained([TrainingUtterance(observed, ("sil", "a", "sil"))])
     with pytest.raises(CorpusError, match="no utterances"):
         trained([])
 
@@ -187,7 +189,7 @@ def test_too_short_for_its_units():
 @pytest.mark.parametrize("bounds", [[0, 3], [0, 3, 4], [1, 3, 5], [0, 4, 3, 5]])
 def test_bounds_are_those_of_the_units(bounds):
     with pytest.raises(InputError, match="bounds"):
-        Transcribed(noise(np.random.default_rng(0), 5), ("a", "b"), np.array(bounds))
+        TrainingUtterance(noise(np.random.default_rng(0), 5), ("a", "b"), np.array(bounds))
 
 
 @pytest.mark.parametrize(

@@ -180,7 +180,7 @@ def test_the_times_of_real_voices_are_those_that_the_aligner_hears(real: Synthet
     recogniser, late_s = Recogniser(toy_model.phones, "general"), []
     for audio, units in speak_sentences(TEXTS, real):
         room = noisy_audio(audio, "white", 50)
-        placed = recogniser.place(room, mfcc(room), units)
+        placed = recogniser.align_phones(room, mfcc(room), units)
         said, heard = ([span for span in part if not is_silent(span.label.phone)] for part in (units, placed))
         late_s += [a.start_s - b.start_s for a, b in zip(said, heard, strict=True)]
     assert np.median(np.abs(late_s)) < 0.014

@@ -19,7 +19,7 @@ from lipmotion.engines.coupled.config import CoupledConfig
 from lipmotion.engines.coupled.conversion.regression import OFFSETS, Following, Surroundings
 from lipmotion.engines.coupled.model import CoupledModel
 from lipmotion.errors import InputError, ModelFormatError
-from lipmotion.motion.arrays import MOTION_ARRAYS, SINGLE, motion_arrays, motion_from_arrays
+from lipmotion.motion.arrays import MOTION_ARRAYS, PHONE_SET, motion_arrays, motion_from_arrays
 from lipmotion.motion.context_window import FEATURES, WINDOW, acoustic_context_from
 from lipmotion.motion.limits import check_poses, check_rest
 from lipmotion.stats.bigram import check_sums_to_one
@@ -43,7 +43,7 @@ def coupled_arrays(model: CoupledModel) -> dict[str, NDArray[Any]]:
     """Return a model as arrays; its configuration is not among them."""
     chains = model.chains
     product = chains.transitions.product
-    arrays = motion_arrays(SINGLE, model.space, model.closure) | {
+    arrays = motion_arrays(PHONE_SET, model.space, model.closure) | {
         "gain": model.gain,
         "rest": model.rest,
         "streams": np.array(chains.streams),
@@ -101,7 +101,7 @@ def _follow_arrays(model: CoupledModel) -> dict[str, NDArray[Any]]:
 def coupled_from_arrays(arrays: Arrays, config: CoupledConfig) -> CoupledModel:
     """Return the model again. Raises ModelFormatError: something is missing, out of place or out of range."""
     try:
-        _, space, closure = motion_from_arrays(arrays, SINGLE.name)
+        _, space, closure = motion_from_arrays(arrays, PHONE_SET.name)
         structure = _structure(arrays, config)
         poses = checked_arrays(arrays, POSES, Q=space.dimensions)
         streams = tuple(poses["streams"].tolist())

@@ -22,12 +22,9 @@ from lipmotion.engines.coupled.model import CoupledModel
 from lipmotion.engines.coupled.training.fit import fit_coupled
 from lipmotion.engines.coupled.training.train import allowed_units
 from lipmotion.kernels.banded import generate
-from lipmotion.motion.closure import closing_spans
-from lipmotion.motion.generation import Statistics, generated_motion, generation_blocks, resolved_pins
-from lipmotion.motion.variance_scaling import scaled
+from lipmotion.motion.generation import Statistics, generation_blocks
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import (
-    FRAME_RATE_HZ,
     ChainPosteriors,
     Configuration,
     Constraints,
@@ -35,7 +32,6 @@ from lipmotion.types import (
     Explanation,
     Generation,
     Monitor,
-    Motion,
     Span,
     Speech,
     Timeline,
@@ -84,21 +80,14 @@ class CoupledEngine(Engine[CoupledModel]):
         def statistics(wanted: slice) -> Statistics:
             lattice = self.lattice(model, speech, wanted)
             found, path[wanted] = self._statistics(model, features[wanted], lattice)
-            return scaled(*found, model.gain, model.rest) if self.config.variance_scaling else found
+            return found
 
-        motion, spread = generated_motion(
-            statistics,
-            frames,
-            model.space,
-            model.reach,
-            closure=model.closure,
-            closing=closing_spans(speech.units, frames) if self.config.closures else [],
-            pins=resolved_pins(constraints, model.space, frames),
-        )
+        learned = model.motion if self.config.variance_scaling else replace(model.motion, scaling=None)
+        motion, variance = learned.generate(statistics, frames, speech.units, constraints, close=self.config.closures)
         states, places = np.unique(path, return_inverse=True)
         return Generation(
-            Motion(motion, FRAME_RATE_HZ, model.space.channels),
-            spread,
+            motion,
+            variance,
             _named(model, speech.units),
             Trace(tuple(model.chains.transitions.product.name(int(state)) for state in states), places),
         )

@@ -15,8 +15,10 @@ from lipmotion.engines.coupled.chains.visual_streams import VisualStream, unseen
 from lipmotion.engines.coupled.conversion.em import statistics
 from lipmotion.engines.coupled.conversion.regression import Following, Surroundings
 from lipmotion.motion.closure import Closure
+from lipmotion.motion.generation import LearnedMotion
 from lipmotion.motion.limits import MotionLimits, limits_of
 from lipmotion.motion.space import MotionSpace
+from lipmotion.motion.variance_scaling import VarianceScaling
 from lipmotion.types import FRAME_RATE_HZ
 
 Array = NDArray[np.float64]
@@ -49,12 +51,17 @@ class CoupledModel:
     closure: Closure | None
 
     @cached_property
-    def reach(self) -> MotionLimits:
+    def limits(self) -> MotionLimits:
         """Between which values motion lies."""
         poses, deviation = self.poses, np.zeros(self.space.dimensions)
         for stream in self.visual:
             deviation[stream.columns] = stream.deviation[: len(stream.columns)]
         return MotionLimits(np.minimum(poses.low, self.rest), np.maximum(poses.high, self.rest)).widened(deviation)
+
+    @cached_property
+    def motion(self) -> LearnedMotion:
+        """The end of the path from speech to motion."""
+        return LearnedMotion(self.space, self.closure, self.limits, VarianceScaling(self.gain, self.rest))
 
     @property
     def poses(self) -> MotionLimits:

@@ -22,21 +22,19 @@ from lipmotion.hmm.multistream.recognise import joint_recogniser
 from lipmotion.hmm.multistream.streams import MOTION, StreamObservations, StreamWeights, stream_observations
 from lipmotion.hmm.multistream.train import TrainingUtterance, train_joint
 from lipmotion.motion.arrays import MOTION_ARRAYS, motion_arrays, motion_from_arrays
-from lipmotion.motion.closure import Closure, closing_spans, fit_closure_of
+from lipmotion.motion.closure import Closure, fit_closure_of
 from lipmotion.motion.frame_labels import with_unit_names
-from lipmotion.motion.generation import Statistics, generated_motion, resolved_pins
+from lipmotion.motion.generation import LearnedMotion, Statistics
 from lipmotion.motion.limits import MotionLimits, check_poses, limits_of
 from lipmotion.motion.space import MotionSpace, fit_reduced_motion
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
 from lipmotion.storage.schema import arrays_under, refuse_undeclared
 from lipmotion.types import (
-    FRAME_RATE_HZ,
     Configuration,
     Constraints,
     Example,
     Generation,
     Monitor,
-    Motion,
     Rule,
     Speech,
     Timeline,
@@ -122,9 +120,14 @@ class JointModel:
     closure: Closure | None
 
     @cached_property
-    def reach(self) -> MotionLimits:
+    def limits(self) -> MotionLimits:
         """Between which values motion lies."""
         return self.poses.widened(self.hmm.models[MOTION].scale.deviation[: self.space.dimensions])
+
+    @cached_property
+    def motion(self) -> LearnedMotion:
+        """The end of the path from speech to motion."""
+        return LearnedMotion(self.space, self.closure, self.limits)
 
     @property
     def poses(self) -> MotionLimits:
@@ -174,8 +177,6 @@ class JointEngine(Engine[JointModel]):
         return replace(self, config=replace(self.config, closures=False))
 
     def generate(self, model: JointModel, speech: Speech, constraints: Constraints | None = None) -> Generation:  # noqa: D102
-        frames = len(speech.features.values)
-        pins = resolved_pins(constraints, model.space, frames)
         observed = self._observed(speech)
         if self.config.recognise_units and not speech.said:
             spoken, paths = self._recognised(model, observed, speech.features.duration_s)
@@ -184,21 +185,20 @@ class JointEngine(Engine[JointModel]):
         densities = densities_of_path(model.hmm, paths[0]) if len(paths) == 1 else densities_of_paths(model.hmm, paths)
         means, precisions = single_gaussians(densities)
 
-        def statistics(wanted: slice) -> Statistics:
-            return means[wanted], precisions[wanted]
+        def statistics(frames: slice) -> Statistics:
+            return means[frames], precisions[frames]
 
-        motion, spread = generated_motion(
+        motion, variance = model.motion.generate(
             statistics,
-            frames,
-            model.space,
-            model.reach,
-            closure=model.closure,
-            closing=closing_spans(spoken, frames, model.units.within(LIP_CLOSING)) if self.config.closures else [],
-            pins=pins,
+            len(speech.features.values),
+            spoken,
+            constraints,
+            close=self.config.closures,
+            closing_units=model.units.within(LIP_CLOSING),
         )
         return Generation(
-            Motion(motion, FRAME_RATE_HZ, model.space.channels),
-            spread,
+            motion,
+            variance,
             with_unit_names(spoken, model.units),
             Trace(_sources(model.hmm, paths[0]), paths[0].frames),
         )

@@ -70,7 +70,7 @@ def _frames(
     keys, of_row = list(numbers), np.array([numbers[key] for key in owners])
     for start in range(0, len(observed), AT_A_TIME):
         block = observed[start : start + AT_A_TIME]
-        rows = np.concatenate([rows_of(emission, one.seen_places, how.cut) for one in block])
+        rows = np.concatenate([rows_of(emission, one.seen_places, how.layout) for one in block])
         z = np.concatenate([window(one.features, one.frames) for one in block])
         error = np.concatenate([one.rows for one in block]) - emission.means[rows]
         order = np.argsort(of_row[rows], kind="stable")
@@ -101,7 +101,7 @@ def _variances(
     """Return the variances around means that follow the sound, shrunk towards those of all frames together."""
     squares, counts = np.zeros(emission.means.shape), np.zeros(len(emission.means))
     for one in observed:
-        rows = rows_of(emission, one.seen_places, how.cut)
+        rows = rows_of(emission, one.seen_places, how.layout)
         means = emission.means[rows].astype(float)
         add_acoustic_regression(means, hearing, rows, hearing.window(one.features, one.frames))
         np.add.at(squares, rows, np.square(one.rows - means))

@@ -56,19 +56,19 @@ class Emission:
     def _rank(self) -> dict[str, NDArray[np.intp]]:
         return {name: np.cumsum(tree.asked < 0) - 1 for name, tree in self.forest.items()}
 
-    def row(self, place: FullContextState, cut: StateLayout) -> int:
+    def row(self, place: FullContextState, layout: StateLayout) -> int:
         """Return the density of a place."""
-        if place == cut.rest:
+        if place == layout.rest:
             return len(self.means) - 1
-        name = cut.name(place)
+        name = layout.name(place)
         leaf = self.forest[name].path(place.context)[-1]
         return self._first[name] + int(self._rank[name][leaf])
 
-    def source(self, place: FullContextState, cut: StateLayout) -> str:
+    def source(self, place: FullContextState, layout: StateLayout) -> str:
         """Return what the density of a place rests on, in words."""
-        if place == cut.rest:
+        if place == layout.rest:
             return "rest"
-        name = cut.name(place)
+        name = layout.name(place)
         tree = self.forest[name]
         leaf = tree.path(place.context)[-1]
         left, unit, right = place.context
@@ -113,11 +113,13 @@ def emission_arrays(emission: Emission) -> dict[str, NDArray[Any]]:
     return arrays
 
 
-def emission_from_arrays(arrays: Arrays, cut: StateLayout, dimensions: int) -> Emission:
+def emission_from_arrays(arrays: Arrays, layout: StateLayout, dimensions: int) -> Emission:
     """Return the densities again. Raises KeyError, ValueError: something is missing, out of place or out of range."""
     forest = trees_from_arrays(arrays)
-    if len(forest) != cut.speech + cut.silence or list(forest) != cut.names:
-        raise ValueError(f"trees for {len(forest)} parts, required {cut.speech} of speech and {cut.silence} of silence")
+    if len(forest) != layout.speech + layout.silence or list(forest) != layout.names:
+        raise ValueError(
+            f"trees for {len(forest)} parts, required {layout.speech} of speech and {layout.silence} of silence"
+        )
     leaves = sum(len(tree.leaves) for tree in forest.values()) + 1
     found = checked_arrays(arrays, DENSITIES, L=leaves, Q=dimensions)
     check_spread(found["means"][:, 0], found["variances"][:, 0])

@@ -13,20 +13,16 @@ from lipmotion.engines.base import Arrays, Engine, Fit
 from lipmotion.engines.trajectory.model import TrajectoryModel, model_arrays, model_from_arrays
 from lipmotion.engines.trajectory.train import fit_trajectory
 from lipmotion.engines.trajectory.training_data import TrainingOptions
-from lipmotion.motion.closure import closing_spans
 from lipmotion.motion.frame_labels import StateLayout, full_context_states, with_unit_names
-from lipmotion.motion.generation import Statistics, generated_motion, resolved_pins
-from lipmotion.motion.variance_scaling import scaled
+from lipmotion.motion.generation import Statistics
 from lipmotion.printable import printable
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import (
-    FRAME_RATE_HZ,
     Configuration,
     Constraints,
     Example,
     Generation,
     Monitor,
-    Motion,
     Rule,
     Speech,
     Timeline,
@@ -92,24 +88,24 @@ class TrajectoryConfig(Configuration):
     def check_files(self) -> None:  # noqa: D102
         unit_set(self.units)
 
-    def cut(self, units: UnitSet) -> StateLayout:
-        """Return how units are cut into parts."""
+    def layout(self, units: UnitSet) -> StateLayout:
+        """Return the states of phones and silences, for a unit set."""
         return StateLayout(self.states, self.silent_states, self.edge_s, units)
 
     @property
     def learning(self) -> TrainingOptions:
-        """What training needs of it. Raises InputError: no such unit set, or a table that is wrong."""
-        names = {field.name for field in fields(TrainingOptions)} - {"cut"}
-        return TrainingOptions(self.cut(unit_set(self.units)), **{name: getattr(self, name) for name in names})
+        """The options of training. Raises InputError: no such unit set, or a table that is wrong."""
+        names = {field.name for field in fields(TrainingOptions)} - {"layout"}
+        return TrainingOptions(self.layout(unit_set(self.units)), **{name: getattr(self, name) for name in names})
 
 
 @final
 @dataclass(frozen=True)
 class TrajectoryEngine(Engine[TrajectoryModel]):
-    """Hidden Markov models of context-dependent units, made a smooth trajectory by parameter generation.
+    """Full-context hidden Markov models of motion, and maximum-likelihood parameter generation from them.
 
-    Source: Hofer 2008, §5.  Deviation: the state of a frame is its part of the phone, whose times are known from
-    recognition or alignment; means follow the sound around the frame.
+    Source: Hofer 2008, §5.  Deviations: the state of a frame follows from the times of its phone, which are known from
+    recognition or forced alignment; means are regressed on the acoustic features around the frame.
     """
 
     config: TrajectoryConfig
@@ -128,39 +124,31 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
         return Fit(model, {"frames": frames, "leaves": len(model.emission.means)})
 
     def recognise(self, model: TrajectoryModel, speech: Speech) -> Timeline[Unit] | None:  # noqa: D102
-        return model.listener.phones(speech) if model.listener is not None else None
+        return model.phone_recogniser.phones(speech) if model.phone_recogniser is not None else None
 
     def without_closures(self) -> TrajectoryEngine:  # noqa: D102
         return replace(self, config=replace(self.config, closures=False))
 
     def generate(self, model: TrajectoryModel, speech: Speech, constraints: Constraints | None = None) -> Generation:  # noqa: D102
         features = np.asarray(speech.features.values)
-        frames, cut = len(features), self.config.cut(model.units)
-        where = full_context_states(speech.units, frames, cut)
-        distinct = {place: number for number, place in enumerate(dict.fromkeys(where))}
-        path = np.array([distinct[place] for place in where], np.intp)
-        rows = np.array([model.emission.row(place, cut) for place in distinct], np.intp)
+        layout = self.config.layout(model.units)
+        states = full_context_states(speech.units, len(features), layout)
+        distinct = {state: number for number, state in enumerate(dict.fromkeys(states))}
+        path = np.array([distinct[state] for state in states], np.intp)
+        rows = np.array([model.emission.row(state, layout) for state in distinct], np.intp)
 
-        def statistics(wanted: slice) -> Statistics:
-            found = model.emission.statistics(rows[path[wanted]], features, wanted)
-            if not self.config.variance_scaling:
-                return found
-            return scaled(*found, model.gain, model.emission.means[-1, 0])
+        def statistics(frames: slice) -> Statistics:
+            return model.emission.statistics(rows[path[frames]], features, frames)
 
-        motion, spread = generated_motion(
-            statistics,
-            frames,
-            model.space,
-            model.reach,
-            closure=model.closure,
-            closing=closing_spans(speech.units, frames) if self.config.closures else [],
-            pins=resolved_pins(constraints, model.space, frames),
+        learned = model.motion if self.config.variance_scaling else replace(model.motion, scaling=None)
+        motion, variance = learned.generate(
+            statistics, len(features), speech.units, constraints, close=self.config.closures
         )
         return Generation(
-            Motion(motion, FRAME_RATE_HZ, model.space.channels),
-            spread,
+            motion,
+            variance,
             with_unit_names(speech.units, model.units),
-            Trace(tuple(model.emission.source(place, cut) for place in distinct), path),
+            Trace(tuple(model.emission.source(state, layout) for state in distinct), path),
         )
 
     def describe(self, model: TrajectoryModel) -> str:  # noqa: D102
@@ -170,4 +158,4 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
         return model_arrays(model)
 
     def from_arrays(self, arrays: Arrays) -> TrajectoryModel:  # noqa: D102
-        return model_from_arrays(arrays, self.config.cut, self.config.units)
+        return model_from_arrays(arrays, self.config.layout, self.config.units)

@@ -1,4 +1,4 @@
-"""What the trajectory engine learns."""
+"""The model of the trajectory engine."""
 
 from __future__ import annotations
 
@@ -21,8 +21,10 @@ from lipmotion.errors import ModelFormatError
 from lipmotion.motion.arrays import MOTION_ARRAYS, motion_arrays, motion_from_arrays
 from lipmotion.motion.closure import Closure
 from lipmotion.motion.frame_labels import StateLayout
+from lipmotion.motion.generation import LearnedMotion
 from lipmotion.motion.limits import MotionLimits, check_poses, limits_of
 from lipmotion.motion.space import MotionSpace
+from lipmotion.motion.variance_scaling import VarianceScaling
 from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, checked_arrays, refuse_undeclared
 from lipmotion.units import UnitSet
 
@@ -34,47 +36,53 @@ class TrajectoryModel:
     units    : the unit of every phone
     space    : the Q dimensions in which motion is modelled
     emission : densities of all tied states
-    gain     : by how much movements away from rest are made larger [shape=(Q,)]
+    variance_factors : of variance scaling about the rest pose [shape=(Q,)]
     closure  : how the lips close (None: the motion has no opening)
-    listener : finds the phones of voices that it knows (None: there was too little speech to learn from)
+    phone_recogniser : recognises the phones of voices that it was trained on (None: there was too little speech)
     """
 
     units: UnitSet
     space: MotionSpace
     emission: Emission
-    gain: NDArray[np.float64]
+    variance_factors: NDArray[np.float64]
     closure: Closure | None
-    listener: OwnPhoneRecogniser | None = None
+    phone_recogniser: OwnPhoneRecogniser | None = None
 
     @cached_property
-    def reach(self) -> MotionLimits:
-        """Between which values motion lies."""
+    def limits(self) -> MotionLimits:
+        """Limits of plausible motion."""
         return self.poses.widened(np.sqrt(self.emission.variances[:, 0].max(axis=0)))
+
+    @cached_property
+    def motion(self) -> LearnedMotion:
+        """The end of the path from speech to motion."""
+        scaling = VarianceScaling(self.variance_factors, self.emission.means[-1, 0])
+        return LearnedMotion(self.space, self.closure, self.limits, scaling)
 
     @property
     def poses(self) -> MotionLimits:
-        """Between which values the means of all states lie."""
+        """Smallest and largest means of all states."""
         return limits_of(self.emission.means[:, 0])
 
 
 def model_arrays(model: TrajectoryModel) -> dict[str, NDArray[Any]]:
-    """Return the model as arrays."""
-    arrays = motion_arrays(model.units, model.space, model.closure) | {"gain": model.gain}
-    heard = recogniser_arrays(model.listener) if model.listener is not None else {}
+    """Serialise a model."""
+    arrays = motion_arrays(model.units, model.space, model.closure) | {"gain": model.variance_factors}
+    heard = recogniser_arrays(model.phone_recogniser) if model.phone_recogniser is not None else {}
     return arrays | emission_arrays(model.emission) | heard
 
 
-def model_from_arrays(arrays: Arrays, cut: Callable[[UnitSet], StateLayout], units: str) -> TrajectoryModel:
-    """Return the model again.
+def model_from_arrays(arrays: Arrays, layout: Callable[[UnitSet], StateLayout], units: str) -> TrajectoryModel:
+    """Deserialise a model.
 
-    cut   : how the parts of some units are cut
+    layout : returns the states of phones and silences, for a unit set
     units : the name of its unit set; the set itself is in the arrays
     Raises ModelFormatError: something is missing, undeclared, out of place or out of range.
     """
     try:
         refuse_undeclared(arrays, MOTION_ARRAYS, EMISSION, GAIN, (name for name in arrays if name.startswith(LISTENER)))
         of, space, closure = motion_from_arrays(arrays, units)
-        emission = emission_from_arrays(arrays, cut(of), space.dimensions)
+        emission = emission_from_arrays(arrays, layout(of), space.dimensions)
         gain = checked_arrays(arrays, GAIN, Q=space.dimensions)["gain"]
         model = TrajectoryModel(of, space, emission, gain, closure, recogniser_from_arrays(arrays))
         check_poses(model.poses, space, closure)

@@ -126,4 +126,4 @@ def _fit(hmm: JointHmm, observed: StreamObservations) -> float:
     rows = hmm.standardise(observed, hmm.config.recognition)[SPEECH]
     chosen = rows[np.linspace(0, len(rows) - 1, min(len(rows), HEARD_FRAMES)).astype(int)]
     leaves = np.arange(part.forest.size)
-    return float(part.tied.log_density(chosen, leaves, part.scale.log_volume).max(axis=1).mean())
+    return float(part.tied.log_density(chosen, leaves, part.scale.log_determinant).max(axis=1).mean())

@@ -40,12 +40,12 @@ def fit_trajectory(
     if how.joint_recogniser:
         listener = fit_phone_recogniser(examples, values, part_of(monitor, 0, 0.8), checkpoint)
     monitor = part_of(monitor, 0.8, 1)
-    observed = [training_clip(example, x, how.cut) for example, x in zip(examples, values, strict=True)]
-    quiet = how.cut.units.silence
-    covered = {how.cut.name(place) for one in observed for place in one.seen_places if place.unit not in quiet}
-    if len(covered) < how.cut.speech:
+    observed = [training_clip(example, x, how.layout) for example, x in zip(examples, values, strict=True)]
+    quiet = how.layout.units.silence
+    covered = {how.layout.name(place) for one in observed for place in one.seen_places if place.unit not in quiet}
+    if len(covered) < how.layout.speech:
         raise CorpusError(
-            f"motion was seen in {len(covered)} of {how.cut.speech} parts of a phone; learn from more speech"
+            f"motion was seen in {len(covered)} of {how.layout.speech} parts of a phone; learn from more speech"
         )
     monitor(Progress(_STAGE, 1, 3, 0.1))
     emission = _tied(observed, how)
@@ -55,7 +55,7 @@ def fit_trajectory(
     gain = _scaling(emission, observed, how)
     monitor(Progress(_STAGE, 3, 3, 1.0))
     closure = fit_closure_of(space.direct_names, values, examples)
-    return TrajectoryModel(how.cut.units, space, emission, gain, closure, listener)
+    return TrajectoryModel(how.layout.units, space, emission, gain, closure, listener)
 
 
 _STAGE = "trees"
@@ -67,16 +67,16 @@ def _scaling(emission: Emission, observed: Sequence[TrainingClip], how: Training
     for one in observed:
         if len(one.frames) < 2:
             continue
-        means, precisions = emission.statistics(rows_of(emission, one.places, how.cut), one.features, slice(None))
+        means, precisions = emission.statistics(rows_of(emission, one.places, how.layout), one.features, slice(None))
         recorded.append(one.rows[:, 0].std(axis=0))
         generated.append(generate(means, precisions)[0][one.frames].std(axis=0))
     return scaling_factors(recorded, generated) if recorded else np.ones(emission.means.shape[2])
 
 
-def training_clip(example: Example, values: Array, cut: StateLayout) -> TrainingClip:
+def training_clip(example: Example, values: Array, layout: StateLayout) -> TrainingClip:
     """Return what training needs of an example, whose motion in the model's space is ``values`` [shape=(T, Q)]."""
     frames = np.nonzero(dynamics_known(example.valid))[0]
-    where = full_context_states(example.speech.units, len(values), cut)
+    where = full_context_states(example.speech.units, len(values), layout)
     features = np.asarray(example.speech.features.values)
     dynamics = with_dynamics(values)[frames].astype(np.float32)
     return TrainingClip(features, where, frames, dynamics)
@@ -85,12 +85,12 @@ def training_clip(example: Example, values: Array, cut: StateLayout) -> Training
 def _tied(observed: Sequence[TrainingClip], how: TrainingOptions) -> Emission:
     """Return the Gaussians of all leaves: each mean and variance is drawn towards that of the node above it."""
     moving = np.concatenate(
-        [one.rows[[place != how.cut.rest for place in one.seen_places]] for one in observed], dtype=np.float64
+        [one.rows[[place != how.layout.rest for place in one.seen_places]] for one in observed], dtype=np.float64
     )
     centre, overall = moving.mean(axis=0), moving.var(axis=0)
     least = np.maximum(LEAST_VARIANCE_SHARE * overall, LEAST_VARIANCE)
     scale = np.sqrt(np.maximum(overall, least))
-    grouped = _grouped(observed, how.cut, centre, scale)
+    grouped = _grouped(observed, how.layout, centre, scale)
     forest = {name: _grown(contexts, 2 * overall.size, how) for name, contexts in grouped.items()}
     leaves = [
         gaussian
@@ -106,11 +106,11 @@ def _tied(observed: Sequence[TrainingClip], how: TrainingOptions) -> Emission:
 
 def _grown(contexts: _Contexts, parameters: int, how: TrainingOptions) -> Tree:
     """Return the tree of one part; a single leaf where the part was never seen."""
-    unseen = {how.cut.rest.context: np.zeros(1 + parameters)}
+    unseen = {how.layout.rest.context: np.zeros(1 + parameters)}
     return grow_tree(
         list(contexts or unseen),
         np.array(list((contexts or unseen).values())),
-        [Question(place, *named) for place in range(3) for named in how.cut.units.classes().items()],
+        [Question(place, *named) for place in range(3) for named in how.layout.units.classes().items()],
         gaussian_log_likelihood,
         parameters=parameters,
         factor=how.tree_factor,
@@ -122,19 +122,21 @@ _Contexts = dict[tuple[str, str, str], Array]
 """Count, sums and sums of squares of the frames of every context."""
 
 
-def _grouped(observed: Sequence[TrainingClip], cut: StateLayout, centre: Array, scale: Array) -> dict[str, _Contexts]:
+def _grouped(
+    observed: Sequence[TrainingClip], layout: StateLayout, centre: Array, scale: Array
+) -> dict[str, _Contexts]:
     """Return the moments of the standardised frames of every context, part by part."""
-    grouped: dict[str, _Contexts] = {name: {} for name in cut.names}
+    grouped: dict[str, _Contexts] = {name: {} for name in layout.names}
     for one in observed:
         index: dict[FullContextState, list[int]] = {}
         for number, place in enumerate(one.seen_places):
             index.setdefault(place, []).append(number)
         for place, numbers in index.items():
-            if place == cut.rest:
+            if place == layout.rest:
                 continue
             rows = ((one.rows[numbers] - centre) / scale).reshape(len(numbers), -1)
             moments = np.concatenate([[len(rows)], rows.sum(axis=0), (rows * rows).sum(axis=0)])
-            contexts = grouped[cut.name(place)]
+            contexts = grouped[layout.name(place)]
             contexts[place.context] = contexts.get(place.context, 0) + moments
     return grouped
 
@@ -164,7 +166,9 @@ def _rest(
 
     What the mouth did there (breath, a lick of the lips) is no speech.
     """
-    poses = [one.rows[number, 0] for one in observed for number, p in enumerate(one.seen_places) if p == how.cut.rest]
+    poses = [
+        one.rows[number, 0] for one in observed for number, p in enumerate(one.seen_places) if p == how.layout.rest
+    ]
     if not poses:
         return fallback, overall
     mean = np.zeros_like(overall)

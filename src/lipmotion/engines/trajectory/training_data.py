@@ -16,7 +16,7 @@ from lipmotion.motion.frame_labels import FullContextState, StateLayout
 class TrainingOptions:
     """How motion is learned.
 
-    cut        : how phones are cut into parts
+    layout     : the states of phones and silences
     components : dimensions that all point channels (``x_17``, ...) are reduced to
     tree_factor: what a split of a tree must gain, in units of its description length
     least_frames : frames that a leaf must have
@@ -28,7 +28,7 @@ class TrainingOptions:
     joint_recogniser : train the joint model as well
     """
 
-    cut: StateLayout
+    layout: StateLayout
     components: int
     tree_factor: float
     least_frames: float
@@ -63,7 +63,7 @@ class TrainingClip:
         return [self.places[frame] for frame in self.frames]
 
 
-def rows_of(emission: Emission, where: Sequence[FullContextState], cut: StateLayout) -> NDArray[np.intp]:
+def rows_of(emission: Emission, where: Sequence[FullContextState], layout: StateLayout) -> NDArray[np.intp]:
     """Return the density of each place [shape=(len(where),)]."""
-    distinct = {place: emission.row(place, cut) for place in dict.fromkeys(where)}
+    distinct = {place: emission.row(place, layout) for place in dict.fromkeys(where)}
     return np.array([distinct[place] for place in where], np.intp)

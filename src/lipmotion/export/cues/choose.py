@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.export.cues.evidence import frame_costs
-from lipmotion.export.cues.shapes import OPTIONAL, SHAPES, fallback
-from lipmotion.export.cues.sheet import CueSheet, drawn_shapes, frames_in, sheet_of
+from lipmotion.export.cues.costs import frame_costs
+from lipmotion.export.cues.shapes import OPTIONAL, SHAPES, drawn_shape
+from lipmotion.export.cues.sheet import CueSheet, drawn_shapes, frame_count, cue_sheet
 from lipmotion.kernels.segments import best_segments
 from lipmotion.types import Generation
 
@@ -16,7 +16,7 @@ CHANGE = 0.35
 HOLD_S = 2 / 24
 
 
-def usual_hold(fps: float) -> int:
+def default_hold_frames(fps: float) -> int:
     """Return the frames nearest to two at 24 a second, the least that an animator holds a mouth."""
     return max(1, int(HOLD_S * fps + 0.5))
 
@@ -34,14 +34,14 @@ def choose_cues(
     """
     motion, drawn = generation.motion, drawn_shapes(optional)
     duration_s = max(0.0, (len(motion.values) - 1) / motion.rate_hz, *(span.end_s for span in generation.units))
-    frames = frames_in(duration_s, fps)
-    cost = _of_drawn(frame_costs(generation, frames, fps), drawn) if frames else np.empty((0, len(drawn)))
-    segments = best_segments(cost, hold_frames or usual_hold(fps), CHANGE)
-    return sheet_of([(frame, drawn[label]) for frame, label in segments], duration_s, fps, drawn)
+    frames = frame_count(duration_s, fps)
+    cost = _costs_of_drawn_shapes(frame_costs(generation, frames, fps), drawn) if frames else np.empty((0, len(drawn)))
+    segments = best_segments(cost, hold_frames or default_hold_frames(fps), CHANGE)
+    return cue_sheet([(frame, drawn[label]) for frame, label in segments], duration_s, fps, drawn)
 
 
-def _of_drawn(cost: NDArray[np.float64], drawn: str) -> NDArray[np.float64]:
+def _costs_of_drawn_shapes(cost: NDArray[np.float64], drawn: str) -> NDArray[np.float64]:
     """Return the cost of the shapes that are drawn; one that stands for another costs what is cheaper."""
     names = list(SHAPES)
-    groups = [[column for column, other in enumerate(names) if fallback(other, drawn) == name] for name in drawn]
+    groups = [[column for column, other in enumerate(names) if drawn_shape(other, drawn) == name] for name in drawn]
     return np.stack([cost[:, group].min(axis=1) for group in groups], axis=1)

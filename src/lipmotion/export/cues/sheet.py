@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lipmotion.export.cues.shapes import REST, SHAPES, fallback
+from lipmotion.export.cues.shapes import REST, SHAPES, drawn_shape
 from lipmotion.types import Span, Timeline
 
 
@@ -27,7 +27,7 @@ class CueSheet:
     @property
     def rest(self) -> str:
         """The mouth before and after speech."""
-        return fallback(REST, self.drawn)
+        return drawn_shape(REST, self.drawn)
 
     @property
     def duration_s(self) -> float:
@@ -50,7 +50,7 @@ def start_s(frame: int, fps: float) -> float:
     return (hundredths + (int(fps * (hundredths / 100)) < frame)) / 100
 
 
-def frames_in(duration_s: float, fps: float) -> int:
+def frame_count(duration_s: float, fps: float) -> int:
     """Return how many frames begin before the end, which is cut to hundredths of a second."""
     end_s = whole_hundredths(duration_s)
     frames = int(np.ceil(end_s * fps))
@@ -64,9 +64,9 @@ def whole_hundredths(duration_s: float) -> float:
     return int(duration_s * 100 + 1e-6) / 100
 
 
-def sheet_of(segments: Sequence[tuple[int, str]], duration_s: float, fps: float, drawn: str) -> CueSheet:
+def cue_sheet(segments: Sequence[tuple[int, str]], duration_s: float, fps: float, drawn: str) -> CueSheet:
     """Return the cue sheet of segments (first frame, shape); without any, the mouth is at rest."""
     starts = [start_s(frame, fps) for frame, _ in segments] or [0.0]
-    shapes = [shape for _, shape in segments] or [fallback(REST, drawn)]
+    shapes = [shape for _, shape in segments] or [drawn_shape(REST, drawn)]
     ends = [*starts[1:], whole_hundredths(duration_s)]
     return CueSheet(Timeline(tuple(map(Span, starts, ends, shapes))), fps, drawn)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import ExportError, InputError, shortened
+from lipmotion.export.base import MotionFormat
 from lipmotion.export.motion.rounded import rows
 from lipmotion.types import Channel, Generation, Motion, Timeline, Unit
 
@@ -72,3 +73,6 @@ def _rate(time_s: NDArray[np.float64]) -> float:
     if time_s[0] != 0 or not step_s > 0 or np.abs(np.diff(time_s) - step_s).max() > 1e-6:
         raise InputError("the column time_s must begin at 0 and rise in even steps")
     return round(float(1 / step_s), 6)
+
+
+MOTION_FORMAT = MotionFormat(write, read, check)

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from lipmotion.errors import InputError
+from lipmotion.export.base import MotionFormat
 from lipmotion.export.motion.document import FORMAT, header, labels, parse
 from lipmotion.export.motion.json_stream import members
 from lipmotion.export.motion.rounded import rows
@@ -39,3 +40,6 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
     except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"the motion document is damaged ({error}); export it again") from error
     return parse(document, document.get("values"))
+
+
+MOTION_FORMAT = MotionFormat(write, read)

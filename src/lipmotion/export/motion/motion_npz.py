@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from lipmotion.errors import InputError
+from lipmotion.export.base import MotionFormat
 from lipmotion.export.motion.document import header, labels, parse
 from lipmotion.storage.archive import UNREADABLE, array_in, check_archive
 from lipmotion.storage.json_text import as_json
@@ -34,3 +35,6 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
     except UNREADABLE as error:
         raise InputError(f"not a motion file ({error}); export it again") from error
     return parse(document, values)
+
+
+MOTION_FORMAT = MotionFormat(write, read)

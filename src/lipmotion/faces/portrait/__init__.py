@@ -8,16 +8,26 @@ by ``portrait``, ``head`` and ``eyes`` on a ``layer``.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.faces.portrait.eyes import closure
+from lipmotion.faces.base import Face
+from lipmotion.faces.portrait.eyes import lid_closure
 from lipmotion.faces.portrait.pose import MouthPose, mouth_poses
 from lipmotion.types import Motion, Timeline, Unit
 
-__all__ = ["render"]
+__all__ = ["Portrait", "render"]
+
+
+@final
+class Portrait(Face):
+    """The drawn portrait, 640 × 640 pixels, as ``render`` draws it."""
+
+    def render(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> Iterator[NDArray[np.uint8]]:  # noqa: D102
+        return render(motion, units, fps=fps)
 
 
 def render(
@@ -36,7 +46,7 @@ def render(
     if height < 64 or height % 2:
         raise InputError(f"the height is {height} pixels, required an even number of at least 64")
     poses = mouth_poses(motion, units, fps)
-    return _frames(poses, closure(np.arange(len(poses)) / fps), height)
+    return _frames(poses, lid_closure(np.arange(len(poses)) / fps), height)
 
 
 def _frames(poses: list[MouthPose], shut: NDArray[np.float64], height: int) -> Iterator[NDArray[np.uint8]]:

@@ -20,7 +20,7 @@ TIP_RAISES: Mapping[str, float] = {"th": 1.0, "dh": 1.0, "l": 0.8, "el": 0.8, "t
 """The tip of the tongue: between the teeth, or behind the upper ones, where less of it shows."""
 
 
-def weight(units: Timeline[Unit], strengths: Mapping[str, float], time_s: NDArray[np.float64]) -> NDArray[np.float64]:
+def gesture_weight(units: Timeline[Unit], strengths: Mapping[str, float], time_s: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return how far a gesture is made at each time, 0..1 [shape=(T,)].
 
     Neighbouring phones of the same gesture run together: their slopes add up to 1.

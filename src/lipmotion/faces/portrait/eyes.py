@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from lipmotion.faces.portrait import palette
 from lipmotion.faces.portrait.layer import Glow, Layer, Rim
-from lipmotion.faces.portrait.outlines import Points, ellipse, mirrored, opened, stroke
+from lipmotion.faces.portrait.outlines import Points, ellipse, mirrored, open_curve, stroke
 from lipmotion.faces.portrait.view import Window
 
 BLINK_S = 0.2
@@ -17,7 +17,7 @@ LOWER_LID = ((0.175, 0.035), (0.26, 0.075), (0.37, 0.088), (0.465, 0.05), (0.51,
 UPPER_LID = ((0.175, 0.035), (0.245, -0.062), (0.35, -0.106), (0.455, -0.082), (0.51, -0.01))
 
 
-def closure(time_s: NDArray[np.float64]) -> NDArray[np.float64]:
+def lid_closure(time_s: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return how far the eyes are shut at each time, 0..1 [shape=(T,)].
 
     Always at the same times, about 2.9 to 4.5 s apart; the lids fall faster than they rise.
@@ -29,7 +29,7 @@ def closure(time_s: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(np.sin(np.clip(shut, 0, 1).max(axis=1) * np.pi / 2))
 
 
-def eyes(window: Window, shut: float) -> Layer:
+def paint_eyes(window: Window, shut: float) -> Layer:
     """Return both eyes, shut so far (0..1)."""
     layer = Layer(window)
     for side in (1, -1):
@@ -47,8 +47,8 @@ def _on(side: int, curve: Points) -> Points:
 
 
 def _lids(layer: Layer, shut: float, side: int) -> None:
-    top, bottom = _on(side, opened(_upper_lid(shut))), _on(side, opened(LOWER_LID))
-    skin = np.vstack([_on(side, opened(UPPER_LID)), bottom[::-1]])
+    top, bottom = _on(side, open_curve(_upper_lid(shut))), _on(side, open_curve(LOWER_LID))
+    skin = np.vstack([_on(side, open_curve(UPPER_LID)), bottom[::-1]])
     light = Glow(side * CENTRE_X, 0.0, 0.1, 0.05, palette.SKIN_LIGHT, 0.5)
     layer.fill(skin, palette.SKIN, Rim(0.03, palette.SKIN_SHADE, 0.6), light)
     if shut < 0.9:
@@ -56,15 +56,15 @@ def _lids(layer: Layer, shut: float, side: int) -> None:
     rim = stroke(bottom, [0.004, 0.01, 0.014, 0.012])
     layer.fill(rim, palette.SKIN_DEEP, opacity=0.5, blur=0.004)
     fold = [(x, min(y, -0.02) - 0.045 + 0.03 * shut) for x, y in (*UPPER_LID[1:-1], (0.53, -0.01))]
-    crease = stroke(_on(side, opened(fold)), [0, 0.014, 0.012, 0])
+    crease = stroke(_on(side, open_curve(fold)), [0, 0.014, 0.012, 0])
     layer.fill(crease, palette.SKIN_DEEP, opacity=0.55, blur=0.006)
 
 
 def _lashes(layer: Layer, shut: float, side: int) -> None:
     lid = _upper_lid(shut)
-    layer.fill(stroke(_on(side, opened(lid)), [0.012, 0.03, 0.036, 0.034, 0.02]), palette.HAIR_DARK)
+    layer.fill(stroke(_on(side, open_curve(lid)), [0.012, 0.03, 0.036, 0.034, 0.02]), palette.HAIR_DARK)
     root_y = lid[-1][1] + 0.35 * (lid[-2][1] - lid[-1][1])
-    wing = opened([(0.48, root_y), (0.525, -0.022), (0.556, -0.05)])
+    wing = open_curve([(0.48, root_y), (0.525, -0.022), (0.556, -0.05)])
     layer.fill(_on(side, stroke(wing, [0.03, 0.02, 0])), palette.HAIR_DARK)
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lipmotion.faces.portrait.outlines import opened
+from lipmotion.faces.portrait.outlines import open_curve
 from lipmotion.faces.portrait.pose import MouthPose, upper_share
 from lipmotion.faces.portrait.view import Pixels
 
@@ -25,11 +25,11 @@ LOWER_TEETH_EDGE = 0.01
 _LINE = [(0, 0.007), (0.14, 0.004), (0.38, -0.004), (0.7, -0.015), (1, -0.036)]
 _CUPIDS_BOW = [(0, 0.82), (0.08, 0.87), (0.22, 1.0), (0.36, 0.94), (0.62, 0.66), (0.85, 0.29), (1, 0)]
 _LOWER = [(0, 1), (0.25, 0.975), (0.5, 0.855), (0.72, 0.61), (0.89, 0.29), (1, 0)]
-_CURVES = {name: opened(knots).T for name, knots in (("line", _LINE), ("upper", _CUPIDS_BOW), ("lower", _LOWER))}
+_CURVES = {name: open_curve(knots).T for name, knots in (("line", _LINE), ("upper", _CUPIDS_BOW), ("lower", _LOWER))}
 
 
 @dataclass(frozen=True, eq=False)
-class Lips:
+class LipOutlines:
     """Heights of the lips' outlines over columns [shape=(C, ...)], top to bottom; all meet at the corners and beyond.
 
     seam : half the thickness of the line where the lips meet
@@ -45,7 +45,7 @@ class Lips:
 
 
 @dataclass(frozen=True, eq=False)
-class Inside:
+class MouthInterior:
     """Heights of the teeth and the tongue over columns [shape=(C, ...)], cut by the inner lips.
 
     Upper teeth reach down to ``teeth_upper``, lower teeth up to ``teeth_lower``.
@@ -57,7 +57,7 @@ class Inside:
     tongue_bottom: Pixels
 
 
-def lips(pose: MouthPose, x: Pixels) -> Lips:
+def lip_outlines(pose: MouthPose, x: Pixels) -> LipOutlines:
     """Return the lips of a pose over the columns ``x`` [shape=(C, ...)]."""
     half_width = HALF_WIDTH * pose.width
     u = np.minimum(np.abs(x) / half_width, 1)
@@ -73,7 +73,7 @@ def lips(pose: MouthPose, x: Pixels) -> Lips:
     lower_inner = line + drop * _arch(inner, 0.54 - 0.06 * round_)
     upper_lip = UPPER_LIP * pose.fullness * (1 - 0.15 * pose.tuck + 0.25 * round_) * _thickness("upper", u, round_)
     lower_lip = LOWER_LIP * pose.fullness * (1 - 0.35 * pose.tuck - 0.15 * round_) * _thickness("lower", u, round_)
-    return Lips(
+    return LipOutlines(
         half_width=half_width,
         corner_y=middle + _LINE[-1][1] + sag,
         upper_outer=np.minimum(line - rise * _arch(u, 0.85) - upper_lip, upper_inner),
@@ -84,13 +84,13 @@ def lips(pose: MouthPose, x: Pixels) -> Lips:
     )
 
 
-def inside(pose: MouthPose, x: Pixels, around: Lips) -> Inside:
+def mouth_interior(pose: MouthPose, x: Pixels, around: LipOutlines) -> MouthInterior:
     """Return what shows between the lips of a pose over the columns ``x`` [shape=(C, ...)]."""
     upper = LINE_Y + TEETH_EDGE - 0.03 * roundness(pose) - 0.5 * x * x
     lower = LINE_Y + LOWER_TEETH_EDGE + pose.jaw + 0.25 * x * x
     top, bottom = _tongue(pose, x)
     heights = (upper, lower, top, np.maximum(top, bottom))
-    return Inside(*(np.clip(height, around.upper_inner, around.lower_inner) for height in heights))
+    return MouthInterior(*(np.clip(height, around.upper_inner, around.lower_inner) for height in heights))
 
 
 def roundness(pose: MouthPose) -> float:

@@ -6,7 +6,7 @@ import numpy as np
 
 from lipmotion.faces.portrait import palette
 from lipmotion.faces.portrait.bands import COLUMNS, Bands
-from lipmotion.faces.portrait.geometry import Inside, Lips, inside, lips, roundness
+from lipmotion.faces.portrait.geometry import MouthInterior, LipOutlines, mouth_interior, lip_outlines, roundness
 from lipmotion.faces.portrait.palette import Colour
 from lipmotion.faces.portrait.pose import MouthPose
 from lipmotion.faces.portrait.view import Pixels, Window
@@ -19,15 +19,15 @@ LOWER_TOOTH_GAPS = (0.0, 0.034, 0.068, 0.105)
 def paint_mouth(picture: Pixels, window: Window, pose: MouthPose) -> None:
     """Paint a pose on the pixels of a window [shape=(h, w, 3)], in place."""
     x = window.columns(COLUMNS).reshape(-1, COLUMNS).T
-    shape = lips(pose, x)
+    shape = lip_outlines(pose, x)
     face = Bands.of(picture, window).between(float(shape.upper_outer.min()), float(shape.lower_outer.max()) + 0.12)
     _skin_shadows(face, shape)
     _upper_and_lower_lip(face, shape)
     if pose.gap > 0:
-        _teeth_and_tongue(face, shape, inside(pose, x, shape), pose)
+        _teeth_and_tongue(face, shape, mouth_interior(pose, x, shape), pose)
 
 
-def _skin_shadows(face: Bands, shape: Lips) -> None:
+def _skin_shadows(face: Bands, shape: LipOutlines) -> None:
     """Shade the skin under the lower lip and beside the corners."""
     under = ((face.y - shape.lower_outer.mean(axis=0) - 0.03) / 0.04) ** 2
     face.blend(0.4 * np.exp(-under - (face.x / (0.62 * shape.half_width)) ** 2), palette.MOUTH_SHADOW)
@@ -35,7 +35,7 @@ def _skin_shadows(face: Bands, shape: Lips) -> None:
     face.blend(0.3 * np.exp(-away - ((face.y - shape.corner_y) / 0.026) ** 2), palette.MOUTH_SHADOW)
 
 
-def _upper_and_lower_lip(face: Bands, shape: Lips) -> None:
+def _upper_and_lower_lip(face: Bands, shape: LipOutlines) -> None:
     x = face.x / shape.half_width
     lower = face.between(float(shape.lower_inner.min()), float(shape.lower_outer.max()))
     depth = lower.depth(shape.lower_inner, shape.lower_outer)
@@ -51,7 +51,7 @@ def _upper_and_lower_lip(face: Bands, shape: Lips) -> None:
     face.fill(shape.upper_inner - shape.seam, shape.lower_inner + shape.seam, palette.SEAM)
 
 
-def _teeth_and_tongue(face: Bands, shape: Lips, within: Inside, pose: MouthPose) -> None:
+def _teeth_and_tongue(face: Bands, shape: LipOutlines, within: MouthInterior, pose: MouthPose) -> None:
     top, bottom = shape.upper_inner, shape.lower_inner
     hole = face.between(float(top.min()), float(bottom.max()))
     hole.fill(top, bottom, palette.CAVITY)

@@ -17,22 +17,22 @@ STEPS = 16
 """Points drawn for each Bézier curve."""
 
 
-def corners(path: Path) -> Points:
+def path_points(path: Path) -> Points:
     """Return the points of a path themselves: as an outline, a polygon."""
     pairs = [pair.split() for pair in path.split(",")] if isinstance(path, str) else path
     return np.array(pairs, dtype=np.float64)
 
 
-def closed(path: Path) -> Points:
+def closed_curve(path: Path) -> Points:
     """Return the smooth closed curve through a path."""
-    start = corners(path)
+    start = path_points(path)
     before, end, beyond = (np.roll(start, shift, axis=0) for shift in (1, -1, -2))
     return _chain(start, before, end, beyond)
 
 
-def opened(path: Path) -> Points:
+def open_curve(path: Path) -> Points:
     """Return the smooth curve through a path, from its first point to its last."""
-    points = corners(path)
+    points = path_points(path)
     before = np.vstack([2 * points[0] - points[1], points[:-2]])
     beyond = np.vstack([points[2:], 2 * points[-1] - points[-2]])
     return np.vstack([_chain(points[:-1], before, points[1:], beyond), points[-1:]])
@@ -43,8 +43,8 @@ def symmetric(path: Path) -> Points:
 
     The path begins and ends on the axis x = 0.
     """
-    right = corners(path)
-    return closed([(x, y) for x, y in np.vstack([right, mirrored(right)[-2:0:-1]]).tolist()])
+    right = path_points(path)
+    return closed_curve([(x, y) for x, y in np.vstack([right, mirrored(right)[-2:0:-1]]).tolist()])
 
 
 def stroke(line: Points, widths: Sequence[float]) -> Points:

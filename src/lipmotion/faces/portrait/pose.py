@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.faces.portrait.articulation import CLOSURES, TIP_RAISES, TUCKS, weight
+from lipmotion.faces.portrait.articulation import CLOSURES, TIP_RAISES, TUCKS, gesture_weight
 from lipmotion.types import Motion, Timeline, Unit
 from lipmotion.units import is_silent
 
@@ -56,7 +56,7 @@ def mouth_poses(motion: Motion, units: Timeline[Unit], fps: float) -> list[Mouth
     _check(motion, fps)
     time_s = np.arange(int(np.floor((len(motion.values) - 1) / motion.rate_hz * fps + 1e-9)) + 1) / fps
     rest = _rest_frames(motion, units)
-    tuck = np.maximum(weight(units, TUCKS, time_s) - weight(units, CLOSURES, time_s), 0)
+    tuck = np.maximum(gesture_weight(units, TUCKS, time_s) - gesture_weight(units, CLOSURES, time_s), 0)
     gap = _gap(motion, time_s, fps)
     gap += tuck * (np.clip(gap, *TUCKED_GAP) - gap)
     curves = (
@@ -65,7 +65,7 @@ def mouth_poses(motion: Motion, units: Timeline[Unit], fps: float) -> list[Mouth
         _at(motion, _fullness(motion, rest), time_s),
         _jaw(motion, rest, gap, time_s),
         tuck,
-        weight(units, TIP_RAISES, time_s),
+        gesture_weight(units, TIP_RAISES, time_s),
     )
     return [MouthPose(*row) for row in np.stack(curves, axis=1).tolist()]
 

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.faces.portrait import surroundings
-from lipmotion.faces.portrait.eyes import eyes
-from lipmotion.faces.portrait.head import head
+from lipmotion.faces.portrait.eyes import paint_eyes
+from lipmotion.faces.portrait.head import paint_head
 from lipmotion.faces.portrait.mouth import paint_mouth
 from lipmotion.faces.portrait.pose import MouthPose
 from lipmotion.faces.portrait.view import Pixels, View
@@ -29,7 +29,7 @@ class Rasteriser:
         self._mouth = view.window(-0.46, JAW_TOP, 0.46, 1.6)
         self._mouth_in_jaw = self._mouth.area_in(self._jaw)
         self._eyes = view.window(-0.62, -0.2, 0.62, 0.14)
-        backdrop, skin = surroundings.backdrop(whole), head(whole)
+        backdrop, skin = surroundings.backdrop(whole), paint_head(whole)
         face = surroundings.hair(whole).over(skin.over(backdrop))
         self._still = _bytes(face)
         self._bare_eyes = face[self._eyes.area]
@@ -50,7 +50,7 @@ class Rasteriser:
         return frame
 
     def _painted_eyes(self, position: int) -> NDArray[np.uint8]:
-        return _bytes(eyes(self._eyes, position / LID_POSITIONS).over(self._bare_eyes))
+        return _bytes(paint_eyes(self._eyes, position / LID_POSITIONS).over(self._bare_eyes))
 
     def _dropped(self, jaw: float) -> Pixels:
         """Return the lower face with the chin dropped [shape=(h, w, 3)]: every row shows the skin it stretched."""

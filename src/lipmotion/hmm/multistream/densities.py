@@ -1,4 +1,4 @@
-"""The tied densities of one stream: mixtures of Gaussians, with or without a point mass for frames without a value."""
+"""The tied densities of one stream: mixtures of Gaussians, and a point mass where frames may be without a value."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from lipmotion.hmm.multistream.streams import Stream
 from lipmotion.stats.mixture import LOG_2PI, Mixtures
 
 LEAST_FRAMES = 2.0
-"""A Gaussian with less data than so many frames stays as it is."""
+"""A Gaussian with less data, in frames, is not re-estimated."""
 SPLIT_FRAMES = 40.0
-"""A Gaussian with less is not split."""
+"""A Gaussian with less data, in frames, is not split."""
 LEAST_VOICED = 1e-3
-"""No frame is voiced, or unvoiced, with less than this probability."""
-LEAST_SHARE = np.float32(1e-10)
-"""Posteriors under this are nothing; also, none is denormal, which is slow."""
+"""Least probability of a frame being voiced, and of its being unvoiced."""
+LEAST_POSTERIOR = np.float32(1e-10)
+"""Smaller posteriors are set to 0; so none is denormal, which would be slow."""
 LEAST_SCALE = 1e-6
-"""Dimensions that move less than this do not move."""
+"""Least standard deviation of a scale: a dimension that varies less is constant."""
 
 Floats = NDArray[np.float32]
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Scale:
-    """The mean and standard deviation of a stream's dimensions: inside, everything is counted from and in these.
+class StreamScale:
+    """Mean and standard deviation of a stream's dimensions, which standardise its values.
 
     mean, deviation : [shape=(D,)]
     """
@@ -36,10 +36,10 @@ class Scale:
     mean: Array
     deviation: Array
 
-    def inside(self, stream: Stream) -> Floats:
-        """Return a stream as its densities take it [shape=(T, 2 + 2·D)], a row a frame.
+    def standardise(self, stream: Stream) -> Floats:
+        """Return the frames of a stream in the form that its densities take [shape=(T, 2 + 2·D)].
 
-        Each is 1 and, where the frame has a value, 1, the value in this scale and its square, else all 0.
+        A row is 1 and, where the frame has a value, 1, the standardised value and its square, else all 0.
         """
         values = (stream.values - self.mean) / self.deviation
         known = stream.known[:, None]
@@ -47,49 +47,51 @@ class Scale:
         return np.concatenate([ones, known, values * known, values * values * known], axis=1).astype(np.float32)
 
     @property
-    def log_volume(self) -> float:
-        """What densities inside are more than outside, as a logarithm."""
+    def log_determinant(self) -> float:
+        """Log-determinant of the scale: log density of a standardised value minus that of the value itself."""
         return float(np.log(self.deviation).sum())
 
 
 @dataclass(frozen=True, eq=False)
-class Sums:
-    """What frames say about densities.
+class GaussianStatistics:
+    """Sufficient statistics of frames for G densities of M Gaussians each.
 
-    frames : [shape=(G,)], those without a value included
-    sums   : [shape=(G, M, 1 + 2·D)], of posteriors, values and squares, in frames with a value
+    frames  : [shape=(G,)], sums of posteriors over all frames
+    moments : [shape=(G, M, 1 + 2·D)], over the frames with a value, sums of posteriors, and of values and of squared
+              values weighted by them
     """
 
     frames: Array
-    sums: Array
+    moments: Array
 
     @classmethod
-    def none(cls, densities: int, components: int, dimensions: int) -> Sums:
-        """Return what nothing says."""
+    def zeros(cls, densities: int, components: int, dimensions: int) -> GaussianStatistics:
+        """Return zero statistics."""
         return cls(np.zeros(densities), np.zeros((densities, components, 1 + 2 * dimensions)))
 
     def add(self, densities: NDArray[np.intp], rows: Array) -> None:
-        """Add, in place, sums of posteriors and rows [shape=(len(densities), 2 + 2·D)] to single Gaussians.
+        """Accumulate, in place, statistics of single Gaussians.
 
-        Each density is named once.
+        densities : [shape=(N,)], each at most once
+        rows      : [shape=(N, 2 + 2·D)], sums of standardised frames weighted by posteriors
         """
         self.frames[densities] += rows[:, 0]
-        self.sums[densities, 0] += rows[:, 1:]
+        self.moments[densities, 0] += rows[:, 1:]
 
-    def of_groups(self, groups: NDArray[np.intp], count: int) -> Sums:
-        """Return what the frames say about groups of densities: ``groups`` [shape=(G,)] says which each is in."""
-        joined = Sums.none(count, self.sums.shape[1], self.sums.shape[2] // 2)
-        np.add.at(joined.frames, groups, self.frames)
-        np.add.at(joined.sums, groups, self.sums)
-        return joined
+    def pooled(self, groups: NDArray[np.intp], count: int) -> GaussianStatistics:
+        """Return the statistics of ``count`` groups of densities; ``groups`` is the group of each [shape=(G,)]."""
+        pooled = GaussianStatistics.zeros(count, self.moments.shape[1], self.moments.shape[2] // 2)
+        np.add.at(pooled.frames, groups, self.frames)
+        np.add.at(pooled.moments, groups, self.moments)
+        return pooled
 
 
 @dataclass(frozen=True, eq=False)
-class Tied:
-    """G densities.
+class TiedDensities:
+    """G densities of one stream.
 
-    mixtures : of what is known, in the stream's own scale
-    voiced   : [shape=(G,)], the probability that a frame has a value; None: a frame without one says nothing
+    mixtures : of standardised values
+    voiced   : [shape=(G,)], the probability that a frame has a value; None: a frame without one has log density 0
     Source: Tokuda, Masuko, Miyazaki & Kobayashi 1999 (multi-space distributions), with one space of D dimensions and
     one of none.
     """
@@ -97,29 +99,29 @@ class Tied:
     mixtures: Mixtures
     voiced: Array | None
 
-    def log_density(self, rows: Floats, leaves: NDArray[np.intp], log_volume: float = 0.0) -> Floats:
+    def log_density(self, rows: Floats, leaves: NDArray[np.intp], log_determinant: float = 0.0) -> Floats:
         """Return the log density of every frame under some of the densities [shape=(T, len(leaves))].
 
-        rows       : from ``Scale.inside``
-        log_volume : of the scale, so that densities are those of the values as they were observed
+        rows            : from ``StreamScale.standardise``
+        log_determinant : of the scale: then densities are those of values before they were standardised
         """
         if self.mixtures.size[1] == 1:
             values = rows @ self._linear[leaves].T
-            values -= np.float32(log_volume) * rows[:, 1:2]
+            values -= np.float32(log_determinant) * rows[:, 1:2]
             return values
         used, local = np.unique(leaves, return_inverse=True)
-        values = self.mixtures.log_likelihood(self.values(rows), used) - np.float32(log_volume)
+        values = self.mixtures.log_likelihood(self.values(rows), used) - np.float32(log_determinant)
         values *= rows[:, 1:2]
         values += rows[:, :2] @ self._linear[used].T
         return values[:, local]
 
     def values(self, rows: Floats) -> Floats:
-        """Return the values of frames, in the stream's own scale, 0 where there is none [shape=(T, D)]."""
+        """Return the standardised values of frames, 0 where there is none [shape=(T, D)]."""
         return rows[:, 2 : 2 + self.mixtures.size[2]]
 
     @cached_property
     def _linear(self) -> Floats:
-        """What rows are multiplied by in the log density [shape=(G, 2 + 2·D)]; of mixtures, the first two."""
+        """Coefficients of the columns of rows in the log density [shape=(G, 2 + 2·D)]; of mixtures, the first two."""
         constant = np.zeros((self.mixtures.size[0], 2))
         if self.voiced is not None:
             constant[:, 0] = np.log1p(-self.voiced)
@@ -130,28 +132,31 @@ class Tied:
         constant[:, 1] -= 0.5 * (LOG_2PI + np.log(variances) + means * means / variances).sum(axis=1)
         return np.concatenate([constant, means / variances, -0.5 / variances], axis=1).astype(np.float32)
 
-    def add_components(self, sums: Sums, rows: Floats, leaves: NDArray[np.intp], shares: Floats) -> None:
-        """Add, in place, what frames say about the Gaussians of mixtures.
+    def accumulate_components(
+        self, statistics: GaussianStatistics, rows: Floats, leaves: NDArray[np.intp], posteriors: Floats
+    ) -> None:
+        """Accumulate, in place, the statistics of frames for all Gaussians of mixtures.
 
-        rows   : of frames [shape=(N, 2 + 2·D)]; one may stand there more than once
-        leaves : the density that each has a share in [shape=(N,)];  shares : how much [shape=(N,)]
+        rows       : [shape=(N, 2 + 2·D)], one for each pair of a frame and a leaf
+        leaves     : [shape=(N,)], the leaf of each pair
+        posteriors : [shape=(N,)], of the leaf in the frame
         """
         order = np.argsort(leaves, kind="stable")
         visited, starts = np.unique(leaves[order], return_index=True)
-        for leaf, mine in zip(visited.tolist(), np.split(order, starts[1:]), strict=True):
-            x, known = rows[mine], shares[mine] * rows[mine, 1]
+        for leaf, pairs in zip(visited.tolist(), np.split(order, starts[1:]), strict=True):
+            x, known = rows[pairs], posteriors[pairs] * rows[pairs, 1]
             components = self.mixtures.responsibilities(leaf, self.values(x), known)
-            sums.sums[leaf] += components.T @ x[:, 1:]
-            sums.frames[leaf] += (known if self.voiced is None else shares[mine]).sum()
+            statistics.moments[leaf] += components.T @ x[:, 1:]
+            statistics.frames[leaf] += (known if self.voiced is None else posteriors[pairs]).sum()
 
-    def maximised(self, sums: Sums, floor: float) -> Tied:
-        """Return the densities that explain the sums best (the M-step).
+    def reestimated(self, statistics: GaussianStatistics, floor: float) -> TiedDensities:
+        """Return the densities re-estimated from sufficient statistics (the M-step).
 
-        floor : least variance, in the stream's own scale
-        What has too little data stays as it is, so the likelihood never falls.
+        floor : least variance of standardised values
+        Gaussians with less than ``LEAST_FRAMES`` of data stay as they are, so the likelihood never falls.
         """
-        count, first, second = np.split(sums.sums, [1, 1 + self.mixtures.size[2]], axis=2)
-        alive = count >= LEAST_FRAMES
+        count, first, second = np.split(statistics.moments, [1, 1 + self.mixtures.size[2]], axis=2)
+        enough = count >= LEAST_FRAMES
         safe = np.maximum(count, LEAST_FRAMES)
         mean = first / safe
         variance = np.maximum(second / safe - mean * mean, floor)
@@ -160,49 +165,53 @@ class Tied:
             log_weights = np.log(count[:, :, 0] / np.maximum(total, 1e-30))
         mixtures = Mixtures(
             np.where(total >= LEAST_FRAMES, log_weights, self.mixtures.log_weights).astype(np.float32),
-            np.where(alive, mean, self.mixtures.means).astype(np.float32),
-            np.where(alive, variance, self.mixtures.variances).astype(np.float32),
+            np.where(enough, mean, self.mixtures.means).astype(np.float32),
+            np.where(enough, variance, self.mixtures.variances).astype(np.float32),
         )
         if self.voiced is None:
             return replace(self, mixtures=mixtures)
-        voiced = np.clip(total[:, 0] / np.maximum(sums.frames, 1e-30), LEAST_VOICED, 1 - LEAST_VOICED)
-        return Tied(mixtures, np.where(sums.frames >= LEAST_FRAMES, voiced, self.voiced))
+        frames = statistics.frames
+        voiced = np.clip(total[:, 0] / np.maximum(frames, 1e-30), LEAST_VOICED, 1 - LEAST_VOICED)
+        return TiedDensities(mixtures, np.where(frames >= LEAST_FRAMES, voiced, self.voiced))
 
-    def splits(self, sums: Sums) -> bool:
+    def can_split(self, statistics: GaussianStatistics) -> bool:
         """Return whether any Gaussian has enough data to be split."""
-        return bool((sums.sums[:, :, 0] >= SPLIT_FRAMES).any())
+        return bool((statistics.moments[:, :, 0] >= SPLIT_FRAMES).any())
 
-    def split(self, sums: Sums) -> Tied:
+    def split(self, statistics: GaussianStatistics) -> TiedDensities:
         """Return mixtures of up to twice as many Gaussians; those with too little data are not split."""
         once, twice, M = self.mixtures, self.mixtures.split(), self.mixtures.size[1]
-        whole = sums.sums[:, :, 0] < SPLIT_FRAMES
-        twice.log_weights[:, :M] = np.where(whole, once.log_weights, twice.log_weights[:, :M])
-        twice.log_weights[:, M:] = np.where(whole, -np.inf, twice.log_weights[:, M:])
-        twice.means[:, :M] = np.where(whole[:, :, None], once.means, twice.means[:, :M])
+        unsplit = statistics.moments[:, :, 0] < SPLIT_FRAMES
+        twice.log_weights[:, :M] = np.where(unsplit, once.log_weights, twice.log_weights[:, :M])
+        twice.log_weights[:, M:] = np.where(unsplit, -np.inf, twice.log_weights[:, M:])
+        twice.means[:, :M] = np.where(unsplit[:, :, None], once.means, twice.means[:, :M])
         return replace(self, mixtures=_compact(twice))
 
 
 def _compact(mixtures: Mixtures) -> Mixtures:
-    """Return the same mixtures, Gaussians without weight last, and no more places for Gaussians than are used."""
+    """Return the mixtures with Gaussians of weight 0 last, and without the columns in which all have weight 0."""
     order = np.argsort(-mixtures.log_weights, axis=1, kind="stable")
     order = order[:, : np.isfinite(mixtures.log_weights).sum(axis=1).max()]
     means, variances = (np.take_along_axis(a, order[:, :, None], axis=1) for a in (mixtures.means, mixtures.variances))
     return Mixtures(np.take_along_axis(mixtures.log_weights, order, axis=1), means, variances)
 
 
-def standard(densities: int, dimensions: int, has_spaces: bool, voiced: float = 0.5) -> Tied:
-    """Return densities that are all as the whole stream is: mean 0, variance 1."""
+def standard_normal_densities(densities: int, dimensions: int, has_spaces: bool, voiced: float = 0.5) -> TiedDensities:
+    """Return equal densities of mean 0 and variance 1, those of the whole standardised stream.
+
+    has_spaces : whether frames may be without a value;  voiced : the share of frames with one
+    """
     shape = (densities, 1, dimensions)
     mixtures = Mixtures(np.zeros((densities, 1), np.float32), np.zeros(shape, np.float32), np.ones(shape, np.float32))
     share = float(np.clip(voiced, LEAST_VOICED, 1 - LEAST_VOICED))
-    return Tied(mixtures, np.full(densities, share) if has_spaces else None)
+    return TiedDensities(mixtures, np.full(densities, share) if has_spaces else None)
 
 
-def fit_scale(streams: list[Stream]) -> tuple[Scale, float]:
+def fit_scale(streams: list[Stream]) -> tuple[StreamScale, float]:
     """Return the scale of a stream over all utterances, and the share of its frames that have a value."""
     known = np.concatenate([stream.values[stream.known] for stream in streams]).astype(float)
     dimensions = known.shape[1]
     if not len(known):
-        return Scale(np.zeros(dimensions), np.ones(dimensions)), 0.0
-    scale = Scale(known.mean(axis=0), np.maximum(known.std(axis=0), LEAST_SCALE))
+        return StreamScale(np.zeros(dimensions), np.ones(dimensions)), 0.0
+    scale = StreamScale(known.mean(axis=0), np.maximum(known.std(axis=0), LEAST_SCALE))
     return scale, len(known) / sum(len(stream.known) for stream in streams)

@@ -1,4 +1,4 @@
-"""Embedded Baum–Welch over all streams: what utterances say about every state, and the models that follow from it."""
+"""Embedded Baum–Welch training over all streams: statistics of utterances, and the models re-estimated from them."""
 
 from __future__ import annotations
 
@@ -10,81 +10,83 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.hmm.em import LONGEST_SILENCE, LONGEST_STATE, batches
-from lipmotion.hmm.multistream.densities import LEAST_SHARE, Sums, Tied
-from lipmotion.hmm.multistream.inventory import Inventory, Place, states_of
+from lipmotion.hmm.multistream.densities import LEAST_POSTERIOR, GaussianStatistics, TiedDensities
+from lipmotion.hmm.multistream.inventory import Inventory, TriphoneState, triphone_states
 from lipmotion.hmm.multistream.model import JointHmm
-from lipmotion.hmm.multistream.streams import Observed
+from lipmotion.hmm.multistream.streams import StreamObservations
 from lipmotion.kernels.forward_backward import IMPOSSIBLE, chain_posteriors
 
 LEAST_STAY = 0.05
-LEAST_COUNTED = 1e-5
-"""State posteriors under this are left out of the statistics of mixtures: nearly all of them are."""
-GATHERED = 50_000
-"""Frames whose shares in mixtures are counted together."""
+"""Least probability of staying in a state."""
+LEAST_MIXTURE_POSTERIOR = 1e-5
+"""Smaller state posteriors are left out of the statistics of mixtures; nearly all posteriors are smaller."""
+FRAMES_AT_ONCE = 50_000
+"""Frames whose statistics for mixtures are accumulated together."""
 Rows = NDArray[np.float32]
 Leaves = Mapping[str, NDArray[np.intp]]
 
 
 @dataclass(frozen=True, eq=False)
-class Sentence:
-    """An utterance in the model's scale, and the states of its units.
+class PreparedUtterance:
+    """The standardised streams of an utterance, and the S states of its units.
 
-    streams  : from ``Scale.inside``
-    states   : [shape=(S,)], the number of each without context
-    places   : [shape=(S,)], of each in its context, in ``Sentences.places``
-    distinct : those places, each once;  member : [shape=(S, len(distinct))], 1 where a state is in a place, else 0
+    streams    : from ``StreamScale.standardise``, by name
+    monophones : [shape=(S,)], the number of each state without context
+    triphones  : [shape=(S,)], the number of each state in its context, in ``PreparedUtterances.triphones``
+    distinct   : [shape=(N,)], the numbers in ``triphones``, each once
+    member     : [shape=(S, N)], 1 where a state is the distinct one of the column, else 0
     """
 
     streams: Mapping[str, Rows]
-    states: NDArray[np.intp]
-    places: NDArray[np.intp]
+    monophones: NDArray[np.intp]
+    triphones: NDArray[np.intp]
     distinct: NDArray[np.intp]
     member: NDArray[np.float32]
     frames: int
 
     @property
     def fits(self) -> bool:
-        """Whether there is room for all states."""
-        return len(self.states) <= self.frames
+        """Whether there are at least as many frames as states."""
+        return len(self.monophones) <= self.frames
 
 
 @dataclass(frozen=True, eq=False)
-class Sentences:
-    """Utterances, and all different states in context that they have."""
+class PreparedUtterances:
+    """Utterances, and all distinct states in context that occur in them."""
 
-    items: tuple[Sentence, ...]
-    places: tuple[Place, ...]
+    items: tuple[PreparedUtterance, ...]
+    triphones: tuple[TriphoneState, ...]
 
     def leaves(self, hmm: JointHmm) -> Leaves:
-        """Return the leaves of all places, by stream."""
-        return hmm.leaves(self.places)
+        """Return the leaves of all states in context, by stream [shape=(len(triphones),)]."""
+        return hmm.leaves(self.triphones)
 
 
-class Posterior(NamedTuple):
-    """What one utterance says of the states of its units.
+class StatePosteriors(NamedTuple):
+    """The posteriors of the states of one utterance.
 
-    sentence : its number
-    states   : [shape=(T, S)], the probability of each in every frame
-    stay     : [shape=(S,)], how often each was kept
+    utterance : its number
+    states    : [shape=(T, S)], the posterior of each state in every frame
+    stay      : [shape=(S,)], expected number of transitions from each state to itself
     """
 
-    sentence: int
+    utterance: int
     states: NDArray[np.float64]
     stay: NDArray[np.float64]
     log_likelihood: float
 
 
 @dataclass(frozen=True, eq=False)
-class Expected:
-    """What utterances say about a model (the E-step).
+class StreamStatistics:
+    """The sufficient statistics of utterances for the models of all streams (the result of the E-step).
 
-    places         : by stream, about every state in context (``Sentences.places``), a Gaussian each
-    leaves         : by stream, about its leaves
-    stay, occupied : [shape=(R,)], how often each state without context was kept, and how many frames it had
+    triphones : by stream, of every state in context (``PreparedUtterances.triphones``), for one Gaussian each
+    leaves    : by stream, of its leaves, for all their Gaussians
+    stay, occupied : [shape=(R,)], of each state without context, expected number of transitions to itself, and of frames
     """
 
-    places: Mapping[str, Sums]
-    leaves: Mapping[str, Sums]
+    triphones: Mapping[str, GaussianStatistics]
+    leaves: Mapping[str, GaussianStatistics]
     stay: NDArray[np.float64]
     occupied: NDArray[np.float64]
     log_likelihood: float
@@ -92,121 +94,136 @@ class Expected:
 
     @property
     def mean_log_likelihood(self) -> float:
-        """Per frame."""
+        """Mean log likelihood per frame."""
         return self.log_likelihood / max(self.frames, 1)
 
 
-def sentences_of(hmm: JointHmm, utterances: Iterable[tuple[Observed, Sequence[str]]]) -> Sentences:
-    """Return utterances in the model's scale, and the states of their units. Raises InputError: an unknown unit."""
-    index: dict[Place, int] = {}
+def prepare_utterances(
+    hmm: JointHmm, utterances: Iterable[tuple[StreamObservations, Sequence[str]]]
+) -> PreparedUtterances:
+    """Return utterances, given as observations and units, in the model's scale and states.
+
+    Raises InputError: an unknown unit.
+    """
+    index: dict[TriphoneState, int] = {}
     items = []
     for observed, units in utterances:
-        states = states_of(hmm.inventory, units)
-        places = np.array([index.setdefault(place, len(index)) for place in states.places], np.intp)
-        distinct, local = np.unique(places, return_inverse=True)
+        states = triphone_states(hmm.inventory, units)
+        triphones = np.array([index.setdefault(state, len(index)) for state in states.triphones], np.intp)
+        distinct, local = np.unique(triphones, return_inverse=True)
         member = np.eye(len(distinct), dtype=np.float32)[local]
-        streams = {n: hmm.parts[n].scale.inside(stream) for n, stream in observed.streams.items() if n in hmm.parts}
-        items.append(Sentence(streams, states.rows, places, distinct, member, observed.frames))
-    return Sentences(tuple(items), tuple(index))
+        streams = {
+            name: hmm.models[name].scale.standardise(stream)
+            for name, stream in observed.streams.items()
+            if name in hmm.models
+        }
+        items.append(PreparedUtterance(streams, states.monophones, triphones, distinct, member, observed.frames))
+    return PreparedUtterances(tuple(items), tuple(index))
 
 
-def posteriors(hmm: JointHmm, sentences: Sentences) -> Iterator[Posterior]:
-    """Give the state posteriors of utterances, not in their order.
+def state_posteriors(hmm: JointHmm, utterances: PreparedUtterances) -> Iterator[StatePosteriors]:
+    """Give the state posteriors of utterances, in order of their lengths.
 
-    Those without room for their states, or without a stream that is switched on, are left out.
+    Utterances with fewer frames than states, or without a stream that is active in training, are left out.
     """
-    leaves, log_move, weights = sentences.leaves(hmm), hmm.log_move, hmm.config.training
-    usable = [
-        i for i, sentence in enumerate(sentences.items) if sentence.fits and set(weights.on) & set(sentence.streams)
-    ]
-    items = [sentences.items[i] for i in usable]
-    counts = [len(sentence.states) for sentence in items]
-    for batch in batches([sentence.frames for sentence in items], counts):
+    leaves, log_move, weights = utterances.leaves(hmm), hmm.log_move, hmm.config.training
+    usable = [i for i, item in enumerate(utterances.items) if item.fits and set(weights.active) & set(item.streams)]
+    items = [utterances.items[i] for i in usable]
+    counts = [len(item.monophones) for item in items]
+    for batch in batches([item.frames for item in items], counts):
         frames = np.array([items[i].frames for i in batch], np.intp)
         states = np.array([counts[i] for i in batch], np.intp)
         log_emission = np.zeros((frames.max(), len(batch), states.max()))
         log_keep, log_leave = np.full((2, len(batch), states.max()), -1.0)
         for u, i in enumerate(batch):
-            sentence, inside = items[i], (slice(frames[u]), u, slice(states[u]))
-            streams = {name: stream for name, stream in sentence.streams.items() if name in weights.on}
-            mine = {name: leaves[name][sentence.places] for name in streams}
-            log_emission[inside] = hmm.log_density(streams, mine, weights)
-            log_keep[inside[1:]], log_leave[inside[1:]] = hmm.log_stay[sentence.states], log_move[sentence.states]
+            item, inside = items[i], (slice(frames[u]), u, slice(states[u]))
+            streams = {name: stream for name, stream in item.streams.items() if name in weights.active}
+            item_leaves = {name: leaves[name][item.triphones] for name in streams}
+            log_emission[inside] = hmm.log_density(streams, item_leaves, weights)
+            log_keep[inside[1:]], log_leave[inside[1:]] = hmm.log_stay[item.monophones], log_move[item.monophones]
         posterior, stay, log_likelihood = chain_posteriors(log_emission, log_keep, log_leave, frames, states)
         for u, i in enumerate(batch):
             if log_likelihood[u] > IMPOSSIBLE / 2:
-                found = posterior[: frames[u], u, : states[u]]
-                yield Posterior(usable[i], found, stay[u, : states[u]], float(log_likelihood[u]))
+                of_item = posterior[: frames[u], u, : states[u]]
+                yield StatePosteriors(usable[i], of_item, stay[u, : states[u]], float(log_likelihood[u]))
 
 
-class _Mixed:
-    """What frames say about mixtures, gathered over many utterances: many frames of one mixture at a time are fast."""
+class _MixtureAccumulator:
+    """The statistics of frames for mixtures, accumulated over many utterances at once: that is faster."""
 
-    def __init__(self, tied: Tied) -> None:
-        self._tied, self._sums = tied, Sums.none(*tied.mixtures.size)
-        self._kept: list[tuple[Rows, NDArray[np.intp], Rows]] = []
+    def __init__(self, tied: TiedDensities) -> None:
+        self._tied, self._statistics = tied, GaussianStatistics.zeros(*tied.mixtures.size)
+        self._waiting: list[tuple[Rows, NDArray[np.intp], Rows]] = []
 
     def add(self, rows: Rows, leaves: NDArray[np.intp], posterior: Rows) -> None:
-        """Add an utterance; posterior of its states [shape=(T, S)]."""
-        frame, state = np.nonzero(posterior > LEAST_COUNTED)
-        self._kept.append((rows[frame], leaves[state], posterior[frame, state]))
-        if sum(len(kept) for _, kept, _ in self._kept) > GATHERED:
-            self.all()
+        """Add an utterance with the leaves [shape=(S,)] and posteriors [shape=(T, S)] of its states."""
+        frame, state = np.nonzero(posterior > LEAST_MIXTURE_POSTERIOR)
+        self._waiting.append((rows[frame], leaves[state], posterior[frame, state]))
+        if sum(len(leaves_of_frames) for _, leaves_of_frames, _ in self._waiting) > FRAMES_AT_ONCE:
+            self.statistics()
 
-    def all(self) -> Sums:
-        """Return what all frames so far say."""
-        if self._kept:
-            rows, leaves, shares = (np.concatenate(each) for each in zip(*self._kept, strict=True))
-            self._tied.add_components(self._sums, rows, leaves, shares)
-            self._kept.clear()
-        return self._sums
+    def statistics(self) -> GaussianStatistics:
+        """Return the statistics of all frames so far."""
+        if self._waiting:
+            rows, leaves, weights = (np.concatenate(arrays) for arrays in zip(*self._waiting, strict=True))
+            self._tied.accumulate_components(self._statistics, rows, leaves, weights)
+            self._waiting.clear()
+        return self._statistics
 
 
-def expect(hmm: JointHmm, sentences: Sentences, found: Iterator[Posterior] | None = None) -> Expected:
-    """Return what utterances say about every place, every leaf of mixtures, and every state.
+def accumulate_statistics(
+    hmm: JointHmm, utterances: PreparedUtterances, posteriors: Iterator[StatePosteriors] | None = None
+) -> StreamStatistics:
+    """Return the sufficient statistics of utterances (the E-step).
 
-    found : their posteriors, where they are not the model's own
+    posteriors : of the states of the utterances; None: those under the model
     """
-    places = {name: Sums.none(len(sentences.places), 1, len(part.scale.mean)) for name, part in hmm.parts.items()}
-    mixed = {name: _Mixed(part.tied) for name, part in hmm.parts.items() if part.tied.mixtures.size[1] > 1}
-    stay, occupied, which = np.zeros(len(hmm.log_stay)), np.zeros(len(hmm.log_stay)), sentences.leaves(hmm)
+    triphones = {
+        name: GaussianStatistics.zeros(len(utterances.triphones), 1, len(model.scale.mean))
+        for name, model in hmm.models.items()
+    }
+    mixed = {
+        name: _MixtureAccumulator(model.tied) for name, model in hmm.models.items() if model.tied.mixtures.size[1] > 1
+    }
+    stay, occupied, leaf_of = np.zeros(len(hmm.log_stay)), np.zeros(len(hmm.log_stay)), utterances.leaves(hmm)
     log_likelihood, frames = 0.0, 0
-    for posterior in posteriors(hmm, sentences) if found is None else found:
-        sentence = sentences.items[posterior.sentence]
+    for posterior in state_posteriors(hmm, utterances) if posteriors is None else posteriors:
+        item = utterances.items[posterior.utterance]
         states = posterior.states.astype(np.float32)
-        states[states < LEAST_SHARE] = 0
-        shares = (states @ sentence.member).T
-        for name, rows in sentence.streams.items():
-            places[name].add(sentence.distinct, shares @ rows)
+        states[states < LEAST_POSTERIOR] = 0
+        by_triphone = (states @ item.member).T
+        for name, rows in item.streams.items():
+            triphones[name].add(item.distinct, by_triphone @ rows)
             if name in mixed:
-                mixed[name].add(rows, which[name][sentence.places], states)
-        np.add.at(stay, sentence.states, posterior.stay)
-        np.add.at(occupied, sentence.states, posterior.states.sum(axis=0))
+                mixed[name].add(rows, leaf_of[name][item.triphones], states)
+        np.add.at(stay, item.monophones, posterior.stay)
+        np.add.at(occupied, item.monophones, posterior.states.sum(axis=0))
         log_likelihood += posterior.log_likelihood
-        frames += sentence.frames
+        frames += item.frames
     leaves = {
-        name: mixed[name].all() if name in mixed else places[name].of_groups(which[name], part.forest.size)
-        for name, part in hmm.parts.items()
+        name: mixed[name].statistics() if name in mixed else triphones[name].pooled(leaf_of[name], model.forest.size)
+        for name, model in hmm.models.items()
     }
-    return Expected(places, leaves, stay, occupied, log_likelihood, frames)
+    return StreamStatistics(triphones, leaves, stay, occupied, log_likelihood, frames)
 
 
-def maximised(hmm: JointHmm, expected: Expected) -> JointHmm:
-    """Return the models that explain what was found best (the M-step)."""
+def reestimated_hmm(hmm: JointHmm, statistics: StreamStatistics) -> JointHmm:
+    """Return the models re-estimated from sufficient statistics (the M-step)."""
     floor = hmm.config.variance_floor
-    parts = {
-        name: replace(part, tied=part.tied.maximised(expected.leaves[name], floor)) for name, part in hmm.parts.items()
+    models = {
+        name: replace(model, tied=model.tied.reestimated(statistics.leaves[name], floor))
+        for name, model in hmm.models.items()
     }
-    return replace(hmm, parts=parts, log_stay=_log_stay(hmm, expected))
+    return replace(hmm, models=models, log_stay=_log_stay(hmm, statistics))
 
 
-def _log_stay(hmm: JointHmm, expected: Expected) -> NDArray[np.float64]:
-    kept = expected.stay / np.maximum(expected.occupied, 1e-9)
-    keep = np.where(expected.occupied > 1, kept, np.exp(hmm.log_stay))
-    return np.log(np.clip(keep, LEAST_STAY, most_stay(hmm.inventory)))
+def _log_stay(hmm: JointHmm, statistics: StreamStatistics) -> NDArray[np.float64]:
+    kept = statistics.stay / np.maximum(statistics.occupied, 1e-9)
+    keep = np.where(statistics.occupied > 1, kept, np.exp(hmm.log_stay))
+    return np.log(np.clip(keep, LEAST_STAY, max_stay_probability(hmm.inventory)))
 
 
-def most_stay(inventory: Inventory) -> NDArray[np.float64]:
-    """Return the highest probability that each state without context may be kept with [shape=(R,)]."""
-    longest = [LONGEST_SILENCE if unit in inventory.free else LONGEST_STATE for unit, _ in inventory.rows]
+def max_stay_probability(inventory: Inventory) -> NDArray[np.float64]:
+    """Return the largest probability of staying allowed for each state without context [shape=(R,)]."""
+    longest = [LONGEST_SILENCE if unit in inventory.free else LONGEST_STATE for unit, _ in inventory.monophones]
     return 1 - 1 / np.array(longest)

@@ -1,4 +1,4 @@
-"""The decision trees of one stream: which states in which contexts share a density."""
+"""The decision trees of one stream, which tie states in context: they share densities."""
 
 from __future__ import annotations
 
@@ -9,72 +9,79 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.hmm.multistream.densities import Sums
-from lipmotion.hmm.multistream.inventory import Inventory, Place
+from lipmotion.hmm.multistream.densities import GaussianStatistics
+from lipmotion.hmm.multistream.inventory import Inventory, TriphoneState
 from lipmotion.hmm.multistream.streams import MOTION
 from lipmotion.printable import printable
-from lipmotion.stats.trees import Context, Question, Tree, gaussian_likelihood, grow, multispace_likelihood
+from lipmotion.stats.trees import (
+    Context,
+    Question,
+    Tree,
+    gaussian_log_likelihood,
+    grow_tree,
+    multispace_log_likelihood,
+)
 
 
 @dataclass(frozen=True, eq=False)
 class Forest:
-    """Trees by the names of ``Inventory.trees``; their leaves are numbered through, tree after tree."""
+    """Trees by the names of ``Inventory.trees``; their leaves are numbered consecutively, tree after tree."""
 
     inventory: Inventory
     trees: Mapping[str, Tree]
 
     @cached_property
-    def _first(self) -> dict[str, int]:
+    def _first_leaf(self) -> dict[str, int]:
         ends = np.cumsum([0, *(len(tree.leaves) for tree in self.trees.values())])
         return dict(zip(self.trees, ends.tolist(), strict=False))
 
     @cached_property
-    def _found(self) -> dict[Place, int]:
+    def _leaf_cache(self) -> dict[TriphoneState, int]:
         return {}
 
     @property
     def size(self) -> int:
-        """How many leaves there are."""
+        """The number of leaves."""
         return sum(len(tree.leaves) for tree in self.trees.values())
 
-    def leaf(self, place: Place) -> int:
-        """Return the leaf of a state in a context, seen in training or not."""
-        number = self._found.get(place)
+    def leaf(self, state: TriphoneState) -> int:
+        """Return the leaf of a state in context, whether or not the context occurred in training."""
+        number = self._leaf_cache.get(state)
         if number is None:
-            context, state = place
-            name = self.inventory.tree(context[1], state)
+            context, position = state
+            name = self.inventory.tree(context[1], position)
             tree = self.trees[name]
-            number = self._first[name] + int(np.searchsorted(tree.leaves, tree.path(context)[-1]))
-            self._found[place] = number
+            number = self._first_leaf[name] + int(np.searchsorted(tree.leaves, tree.path(context)[-1]))
+            self._leaf_cache[state] = number
         return number
 
-    def leaves(self, places: Iterable[Place]) -> NDArray[np.intp]:
-        """Return the leaves of states in their contexts [shape=(S,)]."""
-        return np.array([self.leaf(place) for place in places], np.intp)
+    def leaves(self, states: Iterable[TriphoneState]) -> NDArray[np.intp]:
+        """Return the leaves of states in context [shape=(S,)]."""
+        return np.array([self.leaf(state) for state in states], np.intp)
 
     def name(self, leaf: int) -> str:
         """Return the tree of a leaf and the answers that lead to it, in words."""
-        tree = next(name for name in reversed(self._first) if self._first[name] <= leaf)
-        return f"state {tree}: {self.trees[tree].name(int(self.trees[tree].leaves[leaf - self._first[tree]]))}"
+        tree = next(name for name in reversed(self._first_leaf) if self._first_leaf[name] <= leaf)
+        return f"state {tree}: {self.trees[tree].name(int(self.trees[tree].leaves[leaf - self._first_leaf[tree]]))}"
 
     def text(self) -> str:
-        """Return all trees for people to read."""
+        """Return all trees as readable text."""
         return "\n".join(f"state {printable(name)}\n{tree.text()}" for name, tree in self.trees.items())
 
 
 def unit_forest(inventory: Inventory, spoken: Sequence[str]) -> Forest:
-    """Return the trees that give each unit that is spoken a density of its own, and all others one together."""
+    """Return trees with one leaf for each unit in ``spoken``, and one for all other units together."""
     questions = tuple(Question(1, unit, frozenset([unit])) for unit in inventory.names)
     number = {unit: i for i, unit in enumerate(inventory.names)}
     trees = {}
     for name, (unit, _) in inventory.trees.items():
         asked = [] if unit else [number[spoken_unit] for spoken_unit in spoken if spoken_unit not in inventory.free]
-        trees[name] = _list(questions, asked)
+        trees[name] = _question_list(questions, asked)
     return Forest(inventory, trees)
 
 
-def _list(questions: tuple[Question, ...], order: Sequence[int]) -> Tree:
-    """Return the tree that asks some questions one after another, as long as the answer is no."""
+def _question_list(questions: tuple[Question, ...], order: Sequence[int]) -> Tree:
+    """Return the tree that asks the questions of some numbers in order, until one is answered with yes."""
     nodes = 2 * len(order) + 1
     asked, no = np.full(nodes, -1, np.int32), np.full(nodes, -1, np.int32)
     asked[:-1:2] = order
@@ -82,24 +89,27 @@ def _list(questions: tuple[Question, ...], order: Sequence[int]) -> Tree:
     return Tree(questions, asked, no, np.zeros(nodes))
 
 
-def questions_about(inventory: Inventory, classes: Mapping[str, frozenset[str]]) -> tuple[Question, ...]:
-    """Return all questions about the left neighbour, the unit, and the right one: whether it is in one of the classes,
-    and whether it is one of the units.
+def context_questions(inventory: Inventory, classes: Mapping[str, frozenset[str]]) -> tuple[Question, ...]:
+    """Return all questions about the left neighbour, the unit, and the right neighbour.
+
+    classes : sets of units, by name
+    Each question asks whether the name is in one of the classes, or whether it is one of the units.
     """
     known = set(inventory.names)
     distinct: dict[frozenset[str], str] = {}
     for name, members in [*classes.items(), *((unit, frozenset([unit])) for unit in inventory.names)]:
-        inside = frozenset(members & known)
-        if inside and inside != known:
-            distinct.setdefault(inside, name)
-    return tuple(Question(place, name, members) for place in range(3) for members, name in distinct.items())
+        in_inventory = frozenset(members & known)
+        if in_inventory and in_inventory != known:
+            distinct.setdefault(in_inventory, name)
+    return tuple(Question(position, name, members) for position in range(3) for members, name in distinct.items())
 
 
-def places_asked(stream: str, inventory: Inventory, unit: str, state: int) -> tuple[int, ...]:
-    """Return which places of the context the tree of a state may ask for.
+def positions_asked(stream: str, inventory: Inventory, unit: str, state: int) -> tuple[int, ...]:
+    """Return the positions of the context that the tree of a state may ask about (``Question.position``).
 
-    Of what is heard, states before the middle ask for the left neighbour, those after it for the right one: so whole
-    sequences of units in context can be searched exactly. Motion, which is not searched, may ask for both.
+    In acoustic streams, states before a unit's middle ask about the left neighbour, those after it about the right
+    one: so whole sequences of units in context can be searched exactly. Motion, which is not searched, may ask about
+    both.
     """
     if stream == MOTION:
         return (0, 2) if unit in inventory.free else (0, 1, 2)
@@ -108,61 +118,75 @@ def places_asked(stream: str, inventory: Inventory, unit: str, state: int) -> tu
     return {-1: (0, 1), 0: (1,), 1: (1, 2)}[inventory.side(unit, state)]
 
 
-def grown(
+@dataclass(frozen=True)
+class TreeCosts:
+    """What limits the growth of trees.
+
+    factor         : price of a leaf, in units of its description length
+    least_frames   : frames that a leaf must have
+    least_variance : of a leaf's Gaussian, in the scale of the stream
+    """
+
+    factor: float
+    least_frames: float
+    least_variance: float
+
+
+def grow_forest(
     stream: str,
     inventory: Inventory,
     questions: tuple[Question, ...],
-    seen: Sequence[Place],
-    sums: Sums,
+    triphones: Sequence[TriphoneState],
+    statistics: GaussianStatistics,
     *,
     has_spaces: bool,
-    factor: float,
-    least_frames: float,
-    least_variance: float,
+    costs: TreeCosts,
 ) -> Forest:
-    """Return the trees that tie the contexts of one stream.
+    """Return the trees that tie the states in context of one stream.
 
-    seen  : every state in every context that was seen
-    sums  : what the frames say about each, a Gaussian each
-    Source: ``stats.trees.grow``; a leaf costs what its mean, variance and, where there is one, point mass cost.
+    triphones  : every state in context that occurred
+    statistics : of the frames of each, for one Gaussian each
+    has_spaces : whether frames may be without a value: densities then have a point mass
+    Source: ``stats.trees.grow_tree``; a leaf costs its mean, its variance and, where there is one, its point mass.
     """
-    statistics = sums.sums[:, 0]
+    values = statistics.moments[:, 0]
     if has_spaces:
-        statistics = np.concatenate([sums.frames[:, None], statistics], axis=1)
-    likelihood = multispace_likelihood if has_spaces else gaussian_likelihood
-    names = np.array([inventory.tree(context[1], state) for context, state in seen])
+        values = np.concatenate([statistics.frames[:, None], values], axis=1)
+    likelihood = multispace_log_likelihood if has_spaces else gaussian_log_likelihood
+    names = np.array([inventory.tree(context[1], state) for context, state in triphones])
     trees = {}
     for name, (unit, state) in inventory.trees.items():
-        asked = places_asked(stream, inventory, unit, state)
-        mine = np.flatnonzero(names == name)
-        contexts, pooled = _pooled([seen[i][0] for i in mine.tolist()], statistics[mine], asked)
-        trees[name] = grow(
+        asked = positions_asked(stream, inventory, unit, state)
+        in_tree = np.flatnonzero(names == name)
+        contexts, pooled = _pooled([triphones[i][0] for i in in_tree.tolist()], values[in_tree], asked)
+        trees[name] = grow_tree(
             contexts,
             pooled,
-            [question if question.place in asked else _never(question) for question in questions],
-            partial(likelihood, least_variance=least_variance),
-            parameters=statistics.shape[1] - 1,
-            factor=factor,
-            least=least_frames,
+            [question if question.position in asked else _never_true(question) for question in questions],
+            partial(likelihood, least_variance=costs.least_variance),
+            parameters=values.shape[1] - 1,
+            factor=costs.factor,
+            least=costs.least_frames,
         )
     return Forest(inventory, {name: Tree(questions, tree.asked, tree.no, tree.frames) for name, tree in trees.items()})
 
 
-def _never(question: Question) -> Question:
-    return Question(question.place, question.name, frozenset())
+def _never_true(question: Question) -> Question:
+    """Return a question of the same name that is always answered with no."""
+    return Question(question.position, question.name, frozenset())
 
 
 def _pooled(
     contexts: Sequence[Context], statistics: NDArray[np.float64], asked: Sequence[int]
 ) -> tuple[list[Context], NDArray[np.float64]]:
-    """Return contexts without the places that are not asked for, and the sums of those that are alike then."""
-    alike: dict[Context, int] = {}
+    """Return the contexts reduced to the positions asked about, each once, and the summed statistics of each."""
+    index: dict[Context, int] = {}
     groups = [
-        alike.setdefault(tuple(name if place in asked else "" for place, name in enumerate(context)), len(alike))
+        index.setdefault(tuple(name if position in asked else "" for position, name in enumerate(context)), len(index))
         for context in contexts
     ]
-    if not alike:
+    if not index:
         return [("", "", "")], np.zeros((1, statistics.shape[1]))
-    pooled = np.zeros((len(alike), statistics.shape[1]))
+    pooled = np.zeros((len(index), statistics.shape[1]))
     np.add.at(pooled, groups, statistics)
-    return list(alike), pooled
+    return list(index), pooled

@@ -1,4 +1,4 @@
-"""From states to motion: means and precisions of every frame, and the most probable trajectory behind them."""
+"""Generation of motion from states: Gaussians of every frame, and the most probable trajectory."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.hmm.multistream.align import StatePath
-from lipmotion.hmm.multistream.model import JointHmm, Part
+from lipmotion.hmm.multistream.model import JointHmm, StreamModel
 from lipmotion.hmm.multistream.streams import MOTION
 from lipmotion.kernels.banded import normal_equations, pin, solve
 from lipmotion.stats.delta_windows import with_dynamics
@@ -19,17 +19,17 @@ Array = NDArray[np.float64]
 ITERATIONS = 20
 """Most steps of EM; a dozen are enough nearly always."""
 LEAST_GAIN = 1e-4
-"""Log likelihood a frame that a step of EM must gain for another one."""
+"""EM ends when a step raises the log likelihood per frame by less."""
 LOG_2PI = float(np.log(2 * np.pi))
 
 
 @dataclass(frozen=True, eq=False)
 class FrameDensities:
-    """A mixture of M diagonal Gaussians for every frame, of static value, Δ and Δ².
+    """A mixture of M diagonal Gaussians for every frame, of static values, Δ and Δ².
 
     log_weights : [shape=(T, M)]
     means, precisions : [shape=(T, M, 3, Q)], in units of the motion
-    Rows of dynamics that stick out at the ends have no precision.
+    Δ and Δ² of the first and last frame, which need frames outside, have precision 0.
     """
 
     log_weights: Array
@@ -48,8 +48,8 @@ class FrameDensities:
 class Trajectory:
     """A generated trajectory.
 
-    values, variance : [shape=(T, Q)], in units of the motion; the variance is the model's own, given its Gaussians
-    log_likelihoods  : of the trajectory with its dynamics, after every step of EM; it never falls
+    values, variance : [shape=(T, Q)], in units of the motion; the variance follows from the Gaussians
+    log_likelihoods  : of the trajectory with its dynamics, after every step of EM; they never fall
     """
 
     values: Array
@@ -57,57 +57,57 @@ class Trajectory:
     log_likelihoods: tuple[float, ...]
 
 
-def densities_along(hmm: JointHmm, path: StatePath) -> FrameDensities:
-    """Return what the motion stream says along a path of states.
+def densities_of_path(hmm: JointHmm, path: StatePath) -> FrameDensities:
+    """Return the densities of motion in every frame along a path of states.
 
-    Raises InputError: the model has no motion, or it is switched off in synthesis.
+    Raises InputError: the model has no motion, or motion has weight 0 in synthesis.
     """
-    part, weight = _motion(hmm)
-    leaves = part.forest.leaves(path.states.places)
-    means, precisions = _in_units(part, weight)
-    log_weights = part.tied.mixtures.log_weights.astype(float)
+    model, weight = _motion_model(hmm)
+    leaves = model.forest.leaves(path.states.triphones)
+    means, precisions = _in_units(model, weight)
+    log_weights = model.tied.mixtures.log_weights.astype(float)
     chosen = leaves[path.frames]
-    return _without_ends(FrameDensities(log_weights[chosen], means[chosen], precisions[chosen]))
+    return _without_end_dynamics(FrameDensities(log_weights[chosen], means[chosen], precisions[chosen]))
 
 
-def densities_over(hmm: JointHmm, leaves: NDArray[np.intp], posterior: Array) -> FrameDensities:
-    """Return what the motion stream says of all paths: in every frame, one Gaussian of all states together.
+def densities_of_posterior(hmm: JointHmm, leaves: NDArray[np.intp], posterior: Array) -> FrameDensities:
+    """Return one Gaussian for every frame, that of all states together, given their posteriors.
 
-    leaves    : of the motion stream, of S states
-    posterior : [shape=(T, S)], how probable each state is in each frame
-    The trajectory that maximises the expected log density has, in every frame, the sum of the precisions, and the mean
-    weighted by them. Those of a mixture count as its weights say.
-    Raises InputError: as ``densities_along``, or the shapes do not fit.
+    leaves    : of S states in the motion stream [shape=(S,)]
+    posterior : of the states in every frame [shape=(T, S)]
+    A trajectory that maximises the expected log density needs, in every frame, the expected precision, and the mean
+    weighted by precision. The Gaussians of a mixture count by their weights.
+    Raises InputError: as ``densities_of_path``, or the shapes do not fit.
     """
-    part, weight = _motion(hmm)
+    model, weight = _motion_model(hmm)
     if posterior.ndim != 2 or posterior.shape[1] != len(leaves):
         raise InputError(f"posteriors of shape {posterior.shape}, required (T, {len(leaves)}): one of each state")
     used, local = np.unique(leaves, return_inverse=True)
     by_leaf = np.zeros((len(used), len(posterior)))
     np.add.at(by_leaf, local, posterior.T)
-    means, precisions = _in_units(part, weight)
-    shares = np.exp(part.tied.mixtures.log_weights[used].astype(float))[:, :, None, None]
-    precision = (shares * precisions[used]).sum(axis=1)
-    weighted = (shares * precisions[used] * means[used]).sum(axis=1)
+    means, precisions = _in_units(model, weight)
+    weights = np.exp(model.tied.mixtures.log_weights[used].astype(float))[:, :, None, None]
+    precision = (weights * precisions[used]).sum(axis=1)
+    weighted = (weights * precisions[used] * means[used]).sum(axis=1)
     shape = (len(posterior), 1, *precision.shape[1:])
     total = (by_leaf.T @ precision.reshape(len(used), -1)).reshape(shape)
     mean = (by_leaf.T @ weighted.reshape(len(used), -1)).reshape(shape) / np.maximum(total, np.finfo(float).tiny)
-    return _without_ends(FrameDensities(np.zeros((len(posterior), 1)), mean, total))
+    return _without_end_dynamics(FrameDensities(np.zeros((len(posterior), 1)), mean, total))
 
 
-def densities_of(hmm: JointHmm, paths: Sequence[StatePath]) -> FrameDensities:
-    """Return what the motion stream says of several paths that are as probable (``JointRecogniser.sampled_paths``).
+def densities_of_paths(hmm: JointHmm, paths: Sequence[StatePath]) -> FrameDensities:
+    """Return one Gaussian for every frame, that of several equally probable paths (``JointRecogniser.sampled_paths``).
 
-    Raises InputError: as ``densities_over``, or no paths, or of different lengths.
+    Raises InputError: as ``densities_of_posterior``, or no paths, or of different lengths.
     """
-    part, _ = _motion(hmm)
+    model, _ = _motion_model(hmm)
     if not paths or len({len(path.frames) for path in paths}) > 1:
         raise InputError(f"{len(paths)} paths, required one or more of the same length")
-    chosen = np.stack([part.forest.leaves(path.states.places)[path.frames] for path in paths])
+    chosen = np.stack([model.forest.leaves(path.states.triphones)[path.frames] for path in paths])
     leaves, local = np.unique(chosen, return_inverse=True)
     posterior = np.zeros((len(paths[0].frames), len(leaves)))
     np.add.at(posterior, (np.arange(len(posterior)), local.reshape(chosen.shape)), 1 / len(paths))
-    return densities_over(hmm, leaves, posterior)
+    return densities_of_posterior(hmm, leaves, posterior)
 
 
 def generate(
@@ -128,23 +128,27 @@ def generate(
             raise InputError(f"a pin at {(frame, dimension)}, required within {frames} frames, {dimensions} dimensions")
     share = np.exp(densities.log_weights)
     values, variance = _solved(densities, share, pins or {})
-    found: list[float] = []
+    log_likelihoods: list[float] = []
     for _ in range(iterations):
         components = densities.log_components(values)
         best = components.max(axis=1, keepdims=True)
         share = np.exp(components - best)
-        found.append(float((best[:, 0] + np.log(share.sum(axis=1))).sum()))
-        done = share.shape[1] == 1 or (len(found) > 1 and found[-1] - found[-2] < LEAST_GAIN * frames)
-        if done or len(found) == iterations:
+        log_likelihoods.append(float((best[:, 0] + np.log(share.sum(axis=1))).sum()))
+        done = share.shape[1] == 1 or _converged(log_likelihoods, frames)
+        if done or len(log_likelihoods) == iterations:
             break
         values, variance = _solved(densities, share / share.sum(axis=1, keepdims=True), pins or {})
-    return Trajectory(values, variance, tuple(found))
+    return Trajectory(values, variance, tuple(log_likelihoods))
 
 
-def settled(densities: FrameDensities) -> tuple[Array, Array]:
-    """Return one Gaussian a frame: mean and precision [each shape=(T, 3, Q)].
+def _converged(log_likelihoods: Sequence[float], frames: int) -> bool:
+    return len(log_likelihoods) > 1 and log_likelihoods[-1] - log_likelihoods[-2] < LEAST_GAIN * frames
 
-    Those of mixtures count as much as EM over the components finds that they stand behind the most probable trajectory.
+
+def single_gaussians(densities: FrameDensities) -> tuple[Array, Array]:
+    """Return one Gaussian for every frame: mean and precision [each shape=(T, 3, Q)].
+
+    The Gaussians of a mixture are merged by their posteriors given the most probable trajectory, which EM finds.
     """
     if densities.log_weights.shape[1] == 1:
         return densities.means[:, 0], densities.precisions[:, 0]
@@ -154,13 +158,14 @@ def settled(densities: FrameDensities) -> tuple[Array, Array]:
 
 
 def _merged(densities: FrameDensities, share: Array) -> tuple[Array, Array]:
+    """Return mean and precision of every frame [each shape=(T, 3, Q)], given posteriors of the Gaussians (T, M)."""
     shared = densities.precisions * share[:, :, None, None]
     precision = shared.sum(axis=1)
     return (shared * densities.means).sum(axis=1) / np.maximum(precision, np.finfo(float).tiny), precision
 
 
 def _solved(densities: FrameDensities, share: Array, pins: Mapping[tuple[int, int], float]) -> tuple[Array, Array]:
-    """Return the trajectory and its variance, each Gaussian with its share in its frame [shape=(T, M)]."""
+    """Return the trajectory and its variance [each shape=(T, Q)], given posteriors of the Gaussians [shape=(T, M)]."""
     bands = normal_equations(*_merged(densities, share))
     for (frame, dimension), value in pins.items():
         pin(bands, frame, dimension, value)
@@ -170,23 +175,24 @@ def _solved(densities: FrameDensities, share: Array, pins: Mapping[tuple[int, in
     return values, variance
 
 
-def _motion(hmm: JointHmm) -> tuple[Part, float]:
+def _motion_model(hmm: JointHmm) -> tuple[StreamModel, float]:
+    """Return the model of the motion stream, and its weight in synthesis. Raises InputError: it has none."""
     weight = hmm.config.synthesis.motion
-    if MOTION not in hmm.parts or not weight:
+    if MOTION not in hmm.models or not weight:
         raise InputError("the model has no motion, or it is switched off in synthesis; train on recordings with a face")
-    return hmm.parts[MOTION], weight
+    return hmm.models[MOTION], weight
 
 
-def _in_units(part: Part, weight: float) -> tuple[Array, Array]:
+def _in_units(model: StreamModel, weight: float) -> tuple[Array, Array]:
     """Return means and weighted precisions of all leaves in units of the motion [shape=(G, M, 3, Q)]."""
-    mixtures, deviation = part.tied.mixtures, part.scale.deviation
+    mixtures, deviation = model.tied.mixtures, model.scale.deviation
     G, M, D = mixtures.size
-    means = mixtures.means * deviation + part.scale.mean
+    means = mixtures.means * deviation + model.scale.mean
     precisions = weight / (mixtures.variances * deviation**2)
     return means.reshape(G, M, 3, D // 3), precisions.reshape(G, M, 3, D // 3)
 
 
-def _without_ends(densities: FrameDensities) -> FrameDensities:
+def _without_end_dynamics(densities: FrameDensities) -> FrameDensities:
     precisions = densities.precisions.copy()
     precisions[[0, -1], :, 1:] = 0
     return FrameDensities(densities.log_weights, densities.means, precisions)

@@ -1,4 +1,4 @@
-"""The units of a model, their states, and the chain of states that a sequence of units is."""
+"""The units of a multi-stream model, and the states that a sequence of units consists of."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError
 from lipmotion.stats.trees import Context
 
-Place = tuple[Context, int]
-"""A state in its context: (left, unit, right), and which state of the unit."""
+TriphoneState = tuple[Context, int]
+"""A state in context: (left neighbour, unit, right neighbour), and the state's position in the unit."""
 
 
 @dataclass(frozen=True)
 class Inventory:
-    """All units that a model knows of, heard in training or not.
+    """All units that a model can have, whether or not they occurred in training.
 
     names  : of the units
-    free   : silent ones, whose sound depends on no neighbour; the first stands for all of them beside other units
-    states : of every unit, left to right without skips; silent units but the first have one
+    free   : the silent ones, whose sound depends on no neighbour; as neighbours, all are represented by the first
+    states : number of states of a unit, left to right without skips; silent units but the first have one
     Raises InputError: no silent unit, one that is no unit, a unit named twice or with a space, or no state.
     """
 
@@ -48,56 +48,58 @@ class Inventory:
         return 1 if unit in self.free[1:] else self.states
 
     @cached_property
-    def rows(self) -> dict[tuple[str, int], int]:
-        """The number of every state of every unit, without context."""
+    def monophones(self) -> dict[tuple[str, int], int]:
+        """The number of every state without context: of (unit, position in the unit)."""
         states = [(unit, state) for unit in self.names for state in range(self.count(unit))]
         return {state: row for row, state in enumerate(states)}
 
     @cached_property
     def trees(self) -> dict[str, tuple[str, int]]:
-        """The name of every tree, and a state that is in it: one a position, for silent units of their own."""
+        """The name of every tree, and a state that it is for: one tree for each position; silent units have their own."""
         positions = {str(state): ("", state) for state in range(self.states)}
-        return positions | {f"{unit}.{state}": (unit, state) for unit, state in self.rows if unit in self.free}
+        return positions | {f"{unit}.{state}": (unit, state) for unit, state in self.monophones if unit in self.free}
 
     def tree(self, unit: str, state: int) -> str:
         """Return the name of the tree of a state."""
         return f"{unit}.{state}" if unit in self.free else str(state)
 
     def side(self, unit: str, state: int) -> int:
-        """Return -1 where a state is before its unit's middle, 1 after it, 0 in it and in silence."""
+        """Return -1 for a state before its unit's middle, 1 after it, 0 in the middle and in silence."""
         middle = 2 * state + 1 - self.count(unit)
         return 0 if unit in self.free else (middle > 0) - (middle < 0)
 
     def contexts(self, units: Sequence[str]) -> list[Context]:
-        """Return every unit of a sequence between its neighbours; beyond the ends lies silence.
+        """Return the context of every unit of a sequence: (left, unit, right); beyond the ends lies silence.
 
         Raises InputError: a unit that is not in the inventory.
         """
         unknown = sorted(set(units) - set(self.names))
         if unknown:
             raise InputError(f"unknown unit {unknown[0]!r}; the model's units: {' '.join(self.names)}")
-        beside = [self.silence, *(self.silence if unit in self.free else unit for unit in units), self.silence]
-        return list(zip(beside, units, beside[2:], strict=False))
+        neighbours = [self.silence, *(self.silence if unit in self.free else unit for unit in units), self.silence]
+        return list(zip(neighbours, units, neighbours[2:], strict=False))
 
 
 @dataclass(frozen=True, eq=False)
-class States:
+class TriphoneStates:
     """The states of a sequence of units, one after another.
 
-    places    : every state in its context
-    positions : [shape=(S,)], which unit of the sequence it belongs to
-    rows      : [shape=(S,)], the state without context, which carries its duration
+    triphones  : every state in its context
+    positions  : [shape=(S,)], the unit of the sequence that it belongs to
+    monophones : [shape=(S,)], the number of the state without context, which has its duration
     """
 
-    places: tuple[Place, ...]
+    triphones: tuple[TriphoneState, ...]
     positions: NDArray[np.intp]
-    rows: NDArray[np.intp]
+    monophones: NDArray[np.intp]
 
 
-def states_of(inventory: Inventory, units: Sequence[str]) -> States:
+def triphone_states(inventory: Inventory, units: Sequence[str]) -> TriphoneStates:
     """Return the states of a sequence of units. Raises InputError: an unknown unit."""
     contexts = inventory.contexts(units)
     counts = [inventory.count(unit) for unit in units]
-    places = tuple((context, state) for context, count in zip(contexts, counts, strict=True) for state in range(count))
-    rows = np.array([inventory.rows[context[1], state] for context, state in places], np.intp)
-    return States(places, np.repeat(np.arange(len(units)), counts), rows)
+    triphones = tuple(
+        (context, state) for context, count in zip(contexts, counts, strict=True) for state in range(count)
+    )
+    monophones = np.array([inventory.monophones[context[1], state] for context, state in triphones], np.intp)
+    return TriphoneStates(triphones, np.repeat(np.arange(len(units)), counts), monophones)

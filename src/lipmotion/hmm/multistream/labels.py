@@ -1,4 +1,4 @@
-"""Units in time as the joint model takes them, and back."""
+"""Conversion between units in time and units in frames."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.hmm.multistream.recognise import Said
+from lipmotion.hmm.multistream.recognise import RecognisedUnit
 from lipmotion.types import FRAME_RATE_HZ, Span, Timeline, Unit
 
 
-def in_frames(
+def units_in_frames(
     units: Timeline[Unit], frames: int, silence: str, unit_of: Callable[[Unit], str] = attrgetter("phone")
 ) -> tuple[tuple[str, ...], NDArray[np.intp]]:
-    """Return the units of a recording, and the first frame of each with the frame count at the end.
+    """Return the units of a recording, and the first frame of each, with the frame count at the end.
 
-    frames  : T > 0; frame n belongs to the unit that holds at n · 10 ms
-    silence : the unit in gaps
-    unit_of : gives the unit of what is spoken; by default the phone itself
+    frames  : T > 0; frame n belongs to the unit at n · 10 ms
+    silence : the unit for gaps between the given ones
+    unit_of : gives the name of a unit; by default its phone
     A unit without a frame of its own is left out.
     Raises InputError: no frames.
     """
@@ -45,11 +45,13 @@ def in_frames(
     return tuple(names), np.array([*firsts, frames], np.intp)
 
 
-def in_time(said: Sequence[Said], duration_s: float, label_of: Callable[[str], Unit] = Unit) -> Timeline[Unit]:
-    """Return recognised units in time: frame n covers (n ± ½) · 10 ms, from 0 s to the end of the recording.
+def units_in_time(
+    recognised: Sequence[RecognisedUnit], duration_s: float, label_of: Callable[[str], Unit] = Unit
+) -> Timeline[Unit]:
+    """Return recognised units in time: frame n covers (n ± ½) · 10 ms; together they last from 0 s to ``duration_s``.
 
-    label_of : gives what is known to be spoken in a unit; by default the unit is the phone
+    label_of : gives the label of a unit's name; by default the name is the phone
     """
-    edges = np.clip((np.array([unit.first for unit in said]) - 0.5) / FRAME_RATE_HZ, 0, duration_s).tolist()
-    spans = zip(edges, [*edges[1:], duration_s], said, strict=True)
+    edges = np.clip((np.array([unit.first for unit in recognised]) - 0.5) / FRAME_RATE_HZ, 0, duration_s).tolist()
+    spans = zip(edges, [*edges[1:], duration_s], recognised, strict=True)
     return Timeline(tuple(Span(start_s, end_s, label_of(unit.unit)) for start_s, end_s, unit in spans))

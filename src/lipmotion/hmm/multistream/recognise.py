@@ -1,4 +1,4 @@
-"""Recognition over a model's own units: the most probable sequence, or sequences drawn from all."""
+"""Recognition with multi-stream models: the most probable unit sequence, or paths drawn from the posterior."""
 
 from __future__ import annotations
 
@@ -14,19 +14,18 @@ from lipmotion.hmm.decode import UnitLoop, decode_units, unit_loop
 from lipmotion.hmm.log_likelihoods import LogLikelihoods
 from lipmotion.hmm.model import HmmConfig, UnitHmm
 from lipmotion.hmm.multistream.align import StatePath
-from lipmotion.hmm.multistream.inventory import Place, states_of
+from lipmotion.hmm.multistream.inventory import TriphoneState, triphone_states
 from lipmotion.hmm.multistream.model import JointHmm
-from lipmotion.hmm.multistream.streams import HEARD, MOTION, SPEECH, Observed, StreamWeights
+from lipmotion.hmm.multistream.streams import ACOUSTIC_STREAMS, MOTION, SPEECH, StreamObservations, StreamWeights
 from lipmotion.hmm.network import Network
 from lipmotion.hmm.states import StateTable, plain_states
-from lipmotion.kernels.network import network_posteriors
 from lipmotion.kernels.sampling import sample_paths
 from lipmotion.stats.bigram import Bigram
 from lipmotion.stats.trees import Context
 
 
-class Said(NamedTuple):
-    """A unit, and the frame it begins with."""
+class RecognisedUnit(NamedTuple):
+    """A recognised unit, and its first frame."""
 
     unit: str
     first: int
@@ -34,13 +33,13 @@ class Said(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class JointRecogniser:
-    """Searches the loop of all units that were heard in training, in their contexts, with the back-off bigram.
+    """Recogniser that searches the loop of all units that occurred in training, in context, with the back-off bigram.
 
     hmm     : the models
-    weights : of the streams; those of recognition by default
-    Exact: trees of what is heard ask for one neighbour only. Where units have one state, one said twice in a row is
-    heard as said once.
-    Raises InputError: motion is not switched off: its trees ask for both neighbours.
+    weights : of the streams; None: those of recognition
+    The search is exact, as trees of acoustic streams ask about one neighbour only. Where units have one state, a unit
+    spoken twice in a row is recognised once.
+    Raises InputError: the weight of motion is not 0; its trees ask about both neighbours.
     Source: Hofer 2008, Eq. 5.
     """
 
@@ -48,87 +47,63 @@ class JointRecogniser:
     weights: StreamWeights | None = None
 
     def __post_init__(self) -> None:
-        if MOTION in self._weights.on:
-            raise InputError("recognition hears, and does not see: give the stream motion the weight 0")
+        if MOTION in self._weights.active:
+            raise InputError("recognition uses no motion: give the stream motion the weight 0")
 
-    def recognise(self, observed: Observed, beam: float | None = None) -> list[Said]:
-        """Return the units that were most probably said.
+    def recognise(self, observed: StreamObservations, beam: float | None = None) -> list[RecognisedUnit]:
+        """Return the most probable sequence of units, in order.
 
-        beam : as in ``stats.hmm.decode.decode_units``; None: exact
-        Raises InputError: no stream that is switched on was observed. Raises AlignmentError: too few frames.
+        beam : as in ``hmm.decode.decode_units``; None: exact
+        Raises InputError: no active stream was observed. Raises AlignmentError: too few frames.
         """
-        units, starts = decode_units(self._loop, self._evidence(observed), beam)
-        return [Said(unit, int(first)) for unit, first in zip(units, starts[:-1], strict=True)]
+        units, starts = decode_units(self._loop, self._log_likelihoods(observed), beam)
+        return [RecognisedUnit(unit, int(first)) for unit, first in zip(units, starts[:-1], strict=True)]
 
-    def posterior(self, observed: Observed) -> NDArray[np.float64]:
-        """Return how probable each state without context is in every frame [shape=(T, R)] (``Inventory.rows``).
+    def sampled_paths(self, observed: StreamObservations, count: int, seed: int) -> list[StatePath]:
+        """Return ``count`` paths of states, drawn independently from the posterior of all paths.
 
-        All sequences of units count, each as it is probable. Memory grows with the frames: 20 kB each, in GRID.
-        Raises as ``recognise``.
-        """
-        network = self._loop.network
-        found, _, log_likelihood = network_posteriors(self._all_evidence(observed), *_arrays(network))
-        _check_found(log_likelihood, observed.frames)
-        rows = self._states.rows[network.emission]
-        result = np.zeros((observed.frames, len(self.hmm.inventory.rows)))
-        np.add.at(result.T, rows, found.T.astype(float))
-        return result
-
-    def sampled_paths(self, observed: Observed, count: int, seed: int) -> list[StatePath]:
-        """Return paths of states, drawn from all that there may have been, each as often as it is probable.
-
-        Memory grows with the frames, as in ``posterior``. Raises as ``recognise``.
+        Memory grows with the frames: 20 kB each, in GRID. Raises as ``recognise``.
         """
         if count < 1:
             raise InputError(f"{count} paths, required one or more")
         uniform = np.random.default_rng(seed).random((count, observed.frames))
         network = self._loop.network
-        paths, log_likelihood = sample_paths(self._all_evidence(observed), *_arrays(network), uniform)
-        _check_found(log_likelihood, observed.frames)
+        log_density = self._log_likelihoods(observed).log_density(0, observed.frames, None)
+        paths, log_likelihood = sample_paths(log_density, *_arrays(network), uniform)
+        if not np.isfinite(log_likelihood):
+            raise AlignmentError(f"no units fit into {observed.frames} frames of 10 ms; give a longer recording")
         return [self._path(nodes) for nodes in paths]
 
-    def sampled(self, observed: Observed, count: int, seed: int) -> list[list[Said]]:
-        """Return sequences of units, those of ``sampled_paths``."""
-        found = []
-        for path in self.sampled_paths(observed, count, seed):
-            units = [context[1] for (context, state) in path.states.places if state == 0]
-            firsts = path.bounds(len(units))[:-1].tolist()
-            found.append([Said(unit, first) for unit, first in zip(units, firsts, strict=True)])
-        return found
-
     def _path(self, nodes: NDArray[np.intp]) -> StatePath:
-        """Return a path through the loop as one through the states of its units: every new node is the next state."""
+        """Return a path through the nodes of the loop as a path through the states of its units, one state a node."""
         changes = np.append(True, np.diff(nodes) != 0)
         entered = [int(node) for node in nodes[changes] if int(node) in self._loop.entries]
         units = [self._loop.owners[node] for node in entered]
-        return StatePath(states_of(self.hmm.inventory, units), np.cumsum(changes) - 1)
+        return StatePath(triphone_states(self.hmm.inventory, units), np.cumsum(changes) - 1)
 
     @property
     def _weights(self) -> StreamWeights:
         return self.weights or self.hmm.config.recognition
 
     @cached_property
-    def _states(self) -> _States:
-        return _states(self.hmm)
+    def _states(self) -> _LoopStates:
+        return _loop_states(self.hmm)
 
     @cached_property
     def _loop(self) -> UnitLoop:
         inventory = self.hmm.inventory
-        heard = [unit for unit in self.hmm.spoken if unit not in inventory.free[1:]]
-        return unit_loop(_as_plain(self.hmm, self._states), heard)
+        units = [unit for unit in self.hmm.spoken if unit not in inventory.free[1:]]
+        return unit_loop(_unit_hmm(self.hmm, self._states), units)
 
-    def _evidence(self, observed: Observed) -> LogLikelihoods:
-        inside = self.hmm.inside(observed, self._weights)
+    def _log_likelihoods(self, observed: StreamObservations) -> LogLikelihoods:
+        streams = self.hmm.standardise(observed, self._weights)
 
         def log_density(first: int, end: int, chosen: NDArray[np.intp] | None) -> NDArray[np.float32]:
-            rows = {name: stream[first:end] for name, stream in inside.items()}
+            rows = {name: stream[first:end] for name, stream in streams.items()}
             values = self.hmm.log_density(rows, self._states.leaves, self._weights).astype(np.float32)
             return values[:, self._states.column if chosen is None else self._states.column[chosen]]
 
         return LogLikelihoods(observed.frames, log_density)
-
-    def _all_evidence(self, observed: Observed) -> NDArray[np.float32]:
-        return self._evidence(observed).log_density(0, observed.frames, None)
 
 
 _Arrays = tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]
@@ -139,65 +114,61 @@ def _arrays(network: Network) -> _Arrays:
     return network.emission, *arcs, network.log_initial, network.log_final
 
 
-def _check_found(log_likelihood: float, frames: int) -> None:
-    if not np.isfinite(log_likelihood):
-        raise AlignmentError(f"no units fit into {frames} frames of 10 ms; give a longer recording")
-
-
 @dataclass(frozen=True, eq=False)
-class _States:
-    """The states of all units beside all neighbours that recognition knows.
+class _LoopStates:
+    """The states of all units in all contexts that recognition searches.
 
-    table  : names of states in context that differ in any stream from the same state in silence
-    leaves : by stream [shape=(C,)], of each different combination
-    column : [shape=(len(table.names),)], the combination behind each name
-    rows   : [shape=(len(table.names),)], the state without context behind it
+    table  : G states: all without context, then those in context whose leaves differ from those of the same state
+             beside silence in any stream
+    leaves : by stream, the leaves of each distinct combination [shape=(C,)]
+    column : [shape=(G,)], the number of each state's combination of leaves
     """
 
     table: StateTable
     leaves: dict[str, NDArray[np.intp]]
     column: NDArray[np.intp]
-    rows: NDArray[np.intp]
 
 
-def _states(hmm: JointHmm) -> _States:
+def _loop_states(hmm: JointHmm) -> _LoopStates:
+    """Return the states that the loop of a model's units consists of."""
     inventory = hmm.inventory
-    plain: list[Place] = [((inventory.silence, unit, inventory.silence), state) for unit, state in inventory.rows]
+    plain: list[TriphoneState] = [
+        ((inventory.silence, unit, inventory.silence), state) for unit, state in inventory.monophones
+    ]
     counts = tuple(inventory.count(unit) for unit in inventory.names)
     table = plain_states(inventory.names, counts, inventory.free)
     names: list[str] = []
-    places: list[Place] = []
-    for unit, state in inventory.rows:
+    triphones: list[TriphoneState] = []
+    for unit, state in inventory.monophones:
         side = inventory.side(unit, state)
         for neighbour in hmm.spoken if side else ():
             if neighbour not in inventory.free:
                 names.append(f"{unit}.{state}{'<' if side < 0 else '>'}{neighbour}")
-                places.append((_beside(inventory.silence, unit, neighbour, side), state))
-    heard = [name for name in HEARD if name in hmm.parts]
-    found = hmm.leaves([*plain, *places])
-    rows = np.stack([found[name] for name in heard], axis=1)
-    first = np.array([inventory.rows[context[1], state] for context, state in places], np.intp)
-    differ = np.flatnonzero((rows[len(plain) :] != rows[first]).any(axis=1))
-    kept = np.concatenate([rows[: len(plain)], rows[len(plain) + differ]])
+                triphones.append((_context(inventory.silence, unit, neighbour, side), state))
+    acoustic = [name for name in ACOUSTIC_STREAMS if name in hmm.models]
+    leaves_of_all = hmm.leaves([*plain, *triphones])
+    rows = np.stack([leaves_of_all[name] for name in acoustic], axis=1)
+    monophones = np.array([inventory.monophones[context[1], state] for context, state in triphones], np.intp)
+    different = np.flatnonzero((rows[len(plain) :] != rows[monophones]).any(axis=1))
+    kept = np.concatenate([rows[: len(plain)], rows[len(plain) + different]])
     distinct, column = np.unique(kept, axis=0, return_inverse=True)
-    leaves = {name: distinct[:, number] for number, name in enumerate(heard)}
-    extended = table.extended(tuple(names[i] for i in differ))
-    return _States(extended, leaves, column.reshape(-1), np.concatenate([np.arange(len(plain)), first[differ]]))
+    leaves = {name: distinct[:, number] for number, name in enumerate(acoustic)}
+    return _LoopStates(table.extended(tuple(names[i] for i in different)), leaves, column.reshape(-1))
 
 
-def _beside(silence: str, unit: str, neighbour: str, side: int) -> Context:
+def _context(silence: str, unit: str, neighbour: str, side: int) -> Context:
     return (neighbour, unit, silence) if side < 0 else (silence, unit, neighbour)
 
 
-def _as_plain(hmm: JointHmm, states: _States) -> UnitHmm:
-    """Return the speech stream alone, as models of units that the loop can be built from."""
+def _unit_hmm(hmm: JointHmm, states: _LoopStates) -> UnitHmm:
+    """Return unit models with the densities of the speech stream, from which the loop is built."""
     config = HmmConfig(states=hmm.config.states, bigram_weight=hmm.config.bigram_weight, insertion=hmm.config.insertion)
-    mixtures = hmm.parts[SPEECH].tied.mixtures.picked(states.leaves[SPEECH][states.column])
+    mixtures = hmm.models[SPEECH].tied.mixtures.picked(states.leaves[SPEECH][states.column])
     bigram = Bigram(hmm.inventory.names, hmm.bigram.log_probability)
     return UnitHmm(config, states.table, mixtures, hmm.log_stay.astype(np.float32), bigram)
 
 
 @lru_cache(maxsize=4)
 def joint_recogniser(hmm: JointHmm) -> JointRecogniser:
-    """Return the recogniser of a model; the last few are kept with the networks that they search."""
+    """Return the recogniser of a model; the last few recognisers, with their networks, are cached."""
     return JointRecogniser(hmm)

@@ -1,4 +1,4 @@
-"""What is observed in an utterance: speech, F0 in three parts, and motion."""
+"""The streams of data of an utterance: speech, F0 with slope and curvature, and motion."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.stats.delta_windows import with_dynamics, within
+from lipmotion.stats.delta_windows import dynamics_known, with_dynamics
 
 SPEECH, MOTION = "speech", "motion"
 F0_STREAMS = ("f0", "f0_slope", "f0_curvature")
 STREAMS = (SPEECH, *F0_STREAMS, MOTION)
-HEARD = (SPEECH, *F0_STREAMS)
-"""The streams that recognition has."""
+ACOUSTIC_STREAMS = (SPEECH, *F0_STREAMS)
+"""The streams that are computed from sound."""
 
 
 @dataclass(frozen=True)
 class StreamWeights:
-    """What the log density of each stream is multiplied by; 0 switches it off.
+    """Factors of the streams' log densities; 0 switches a stream off.
 
     Raises InputError: a weight is negative or not finite.
     """
@@ -41,8 +41,8 @@ class StreamWeights:
         return ((field.name, getattr(self, field.name)) for field in fields(self))
 
     @property
-    def on(self) -> dict[str, float]:
-        """The streams that are switched on, and their weights."""
+    def active(self) -> dict[str, float]:
+        """The streams whose weight is not 0, and their weights."""
         return {name: weight for name, weight in self if weight}
 
 
@@ -50,8 +50,8 @@ class StreamWeights:
 class Stream:
     """One kind of data of an utterance.
 
-    values  : float array [shape=(T, D)], anything finite where it is not known
-    known   : bool array [shape=(T,)]; of F0, where there is voice
+    values : [shape=(T, D)], any finite number where they are not known
+    known  : [shape=(T,)], whether a frame has a value; for F0, whether it is voiced
     """
 
     values: NDArray[np.floating[Any]]
@@ -59,8 +59,8 @@ class Stream:
 
 
 @dataclass(frozen=True, eq=False)
-class Observed:
-    """An utterance: its streams by name. Recordings without a face have no motion, or none of it known.
+class StreamObservations:
+    """The streams of an utterance, by name. Recordings without a face have no motion, or motion that is nowhere known.
 
     Raises InputError: no speech, an unknown stream, streams of different lengths, or known values that are not finite.
     """
@@ -81,23 +81,23 @@ class Observed:
 
     @property
     def frames(self) -> int:
-        """T."""
+        """The number of frames, T."""
         return len(self.streams[SPEECH].values)
 
 
-def observe(
+def stream_observations(
     speech: NDArray[np.floating[Any]],
     log_f0: NDArray[np.floating[Any]] | None = None,
     motion: NDArray[np.floating[Any]] | None = None,
-    seen: NDArray[np.bool_] | None = None,
-) -> Observed:
-    """Return an utterance.
+    measured: NDArray[np.bool_] | None = None,
+) -> StreamObservations:
+    """Return the streams of an utterance.
 
     speech : features [shape=(T, 39)]
     log_f0 : natural logarithm of F0 in Hz, NaN where there is no voice [shape=(T,)]
-    motion : [shape=(T, Q)], static; its Δ and Δ² come from here
-    seen   : where motion was measured [shape=(T,)]; everywhere by default
-    Raises InputError: as ``Observed``.
+    motion : static values [shape=(T, Q)]; their Δ and Δ² are computed here
+    measured : where motion was measured [shape=(T,)]; None: everywhere
+    Raises InputError: as ``StreamObservations``.
     """
     speech = np.asarray(speech)
     streams = {SPEECH: Stream(speech, np.ones(len(speech), bool))}
@@ -105,12 +105,12 @@ def observe(
         streams |= f0_streams(np.asarray(log_f0, float))
     if motion is not None:
         values: NDArray[np.float64] = np.asarray(motion, np.float64)
-        streams[MOTION] = motion_stream(values, np.ones(len(values), bool) if seen is None else seen)
-    return Observed(streams)
+        streams[MOTION] = motion_stream(values, np.ones(len(values), bool) if measured is None else measured)
+    return StreamObservations(streams)
 
 
 def f0_streams(log_f0: NDArray[np.float64]) -> dict[str, Stream]:
-    """Return static, Δ and Δ² of log F0 [shape=(T,)], a stream each; known where all frames of the window are voiced.
+    """Return static values, Δ and Δ² of log F0 [shape=(T,)] as three streams, known where the whole window is voiced.
 
     Source: Hofer 2008, §4; the windows as for motion.
     Raises InputError: not one value a frame, or infinite ones.
@@ -119,22 +119,25 @@ def f0_streams(log_f0: NDArray[np.float64]) -> dict[str, Stream]:
         raise InputError(f"log F0 has shape {log_f0.shape}, required (T,), NaN where there is no voice, never infinite")
     voiced = ~np.isnan(log_f0)
     dynamics = with_dynamics(np.where(voiced, log_f0, 0.0)[:, None])
-    known = (voiced, *[within(voiced)] * 2)
+    known = (voiced, *[dynamics_known(voiced)] * 2)
     return {
         name: Stream(np.where(mask[:, None], dynamics[:, window], 0.0), mask)
         for window, (name, mask) in enumerate(zip(F0_STREAMS, known, strict=True))
     }
 
 
-def motion_stream(motion: NDArray[np.float64], seen: NDArray[np.bool_]) -> Stream:
-    """Return static, Δ and Δ² of motion [shape=(T, Q)] side by side [shape=(T, 3·Q)], known where all three are.
+def motion_stream(motion: NDArray[np.float64], measured: NDArray[np.bool_]) -> Stream:
+    """Return static values, Δ and Δ² of motion side by side [shape=(T, 3·Q)], known where all three are.
 
-    Raises InputError: the mask is not that of the frames, or a seen value is not finite.
+    motion   : [shape=(T, Q)];  measured : where it was measured [shape=(T,)]
+    Raises InputError: the mask is not that of the frames, or a measured value is not finite.
     """
-    if motion.ndim != 2 or seen.shape != motion.shape[:1]:
-        raise InputError(f"motion has shape {motion.shape}, seen {seen.shape}; required (T, Q) and (T,)")
-    if not np.isfinite(motion[seen]).all():
-        raise InputError("motion holds values that are not finite where it was seen; mark these frames as not seen")
-    known = within(np.asarray(seen, bool))
-    dynamics = with_dynamics(np.where(seen[:, None], motion, 0.0)).reshape(len(motion), -1)
+    if motion.ndim != 2 or measured.shape != motion.shape[:1]:
+        raise InputError(f"motion has shape {motion.shape}, its mask {measured.shape}; required (T, Q) and (T,)")
+    if not np.isfinite(motion[measured]).all():
+        raise InputError(
+            "motion holds values that are not finite where it was measured; mark these frames as not measured"
+        )
+    known = dynamics_known(np.asarray(measured, bool))
+    dynamics = with_dynamics(np.where(measured[:, None], motion, 0.0)).reshape(len(motion), -1)
     return Stream(np.where(known[:, None], dynamics, 0.0), known)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.export.cues.shapes import SHAPES, Look, looks_of
+from lipmotion.export.cues.shapes import SHAPES, PhoneShapes, shapes_of_phone
 from lipmotion.types import Generation, Motion, Span, Timeline, Unit
 from lipmotion.units import LIP_CLOSING, SILENCE, VISEMES, is_silent
 
@@ -39,36 +39,36 @@ def frame_costs(generation: Generation, frames: int, fps: float) -> Array:
     Where the motion has no channel ``opening`` or ``width``, the phones decide without it.
     """
     edges_s = np.arange(frames + 1) / fps
-    facts = _facts_of_frames(generation.units, edges_s)
+    facts = _phone_values_of_frames(generation.units, edges_s)
     cost, voiced, textbook = facts[:, : len(_NAMES)].copy(), facts[:, -3], facts[:, -2:]
     if "opening" in generation.motion.names:
-        opening = _opening(_means(generation.motion, "opening", edges_s), textbook[:, 0], voiced)
+        opening = _relative_opening(_means(generation.motion, "opening", edges_s), textbook[:, 0], voiced)
         cost += OPENING_WEIGHT * voiced[:, None] * (opening[:, None] - _POSES[:, 0]) ** 2
     if "width" in generation.motion.names:
-        spread = _spread(_means(generation.motion, "width", edges_s), textbook[:, 1], voiced)
+        spread = _relative_spread(_means(generation.motion, "width", edges_s), textbook[:, 1], voiced)
         cost += SPREAD_WEIGHT * voiced[:, None] * (spread[:, None] - _POSES[:, 1]) ** 2
     cost *= COST_RATE_HZ / fps
-    for frame, shape, price in _demands(generation, frames, fps):
+    for frame, shape, price in _required_shapes(generation, frames, fps):
         cost[frame] += price
         cost[frame, _NAMES.index(shape)] -= price
     return cost
 
 
-def _facts_of_frames(units: Timeline[Unit], edges_s: Array) -> Array:
+def _phone_values_of_frames(units: Timeline[Unit], edges_s: Array) -> Array:
     """Return what is known of each frame from what is said in it; where nothing is said, it is silent."""
-    silence = _facts(looks_of(SILENCE)[0], silent=True)
+    silence = _phone_values(shapes_of_phone(SILENCE)[0], silent=True)
     bounds_s, sums = [-LEAD_S], [np.zeros_like(silence)]
     for span in units:
         start_s = span.start_s - LEAD_S
-        for look in looks_of(span.label.phone):
+        for look in shapes_of_phone(span.label.phone):
             duration_s = look.share * span.duration_s
             bounds_s += [start_s, start_s + duration_s]
-            sums += [sums[-1], sums[-1] + duration_s * (_facts(look, is_silent(span.label.phone)) - silence)]
+            sums += [sums[-1], sums[-1] + duration_s * (_phone_values(look, is_silent(span.label.phone)) - silence)]
             start_s += duration_s
     return silence + _integrals(np.array(bounds_s), np.array(sums), edges_s)
 
 
-def _facts(look: Look, silent: bool) -> Array:
+def _phone_values(look: PhoneShapes, silent: bool) -> Array:
     """Return the cost of every shape, whether there is a voice, and opening and spread as in the textbook."""
     cost = [
         0.0 if name in look.best else ALLOWED if name in look.allowed else MISPLACED if name in SPECIAL else OTHER
@@ -94,7 +94,7 @@ def _integrals(time_s: Array, sums: Array, edges_s: Array) -> Array:
     return means
 
 
-def _opening(opening: Array, textbook: Array, voiced: Array) -> Array:
+def _relative_opening(opening: Array, textbook: Array, voiced: Array) -> Array:
     """Return the opening in units of this mouth's own range: least squares onto what its phones are in the textbook.
 
     A scale without offset, for shut lips have none: so "boo" alone is not taken for a mouth wide open.
@@ -104,7 +104,7 @@ def _opening(opening: Array, textbook: Array, voiced: Array) -> Array:
     return np.clip(opening * (wanted @ wanted) / max(float(wanted @ opening), least), 0.0, WIDEST)
 
 
-def _spread(width: Array, textbook: Array, voiced: Array) -> Array:
+def _relative_spread(width: Array, textbook: Array, voiced: Array) -> Array:
     """Return the spread that the width speaks for: the regression of the textbook's on it, or else the mean."""
     total = max(float(voiced.sum()), 1e-9)
     mean = float(voiced @ textbook) / total
@@ -114,16 +114,16 @@ def _spread(width: Array, textbook: Array, voiced: Array) -> Array:
     return np.asarray(np.clip(mean + max(slope, 0.0) * centred, _POSES[:, 1].min(), _POSES[:, 1].max()))
 
 
-def _demands(generation: Generation, frames: int, fps: float) -> Iterator[tuple[int, str, float]]:
+def _required_shapes(generation: Generation, frames: int, fps: float) -> Iterator[tuple[int, str, float]]:
     """Yield the frame in which each p b m and f v must be seen, and in which shape."""
     for span in generation.units:
         if span.label.phone in LIP_CLOSING:
-            yield min(int(_tightest_s(span, generation.motion) * fps), frames - 1), "A", MUST_CLOSE
+            yield min(int(_least_open_s(span, generation.motion) * fps), frames - 1), "A", MUST_CLOSE
         elif span.label.phone in LIP_BITING:
-            yield min(int(_tightest_s(span, generation.motion) * fps), frames - 1), "G", MUST_BITE
+            yield min(int(_least_open_s(span, generation.motion) * fps), frames - 1), "G", MUST_BITE
 
 
-def _tightest_s(span: Span[Unit], motion: Motion) -> float:
+def _least_open_s(span: Span[Unit], motion: Motion) -> float:
     """Return when in a phone the mouth is least open; its middle, where the motion does not tell."""
     first, last = np.ceil(span.start_s * motion.rate_hz - 1e-6), np.floor(span.end_s * motion.rate_hz + 1e-6)
     first, stop = int(max(first, 0)), int(min(last + 1, len(motion.values)))

@@ -1,4 +1,4 @@
-"""Expectation–maximisation of mixtures and arcs over a network: models of which nothing is known but recordings."""
+"""One step of expectation–maximisation of mixtures and arcs over any network, as the benchmark of forward–backward."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.hmm.network import Network
-from lipmotion.kernels.network import Expectation
-from lipmotion.stats.mixture import Mixtures, Quadratic, with_squares
+from lipmotion.kernels.network import ForwardBackwardNetwork
+from lipmotion.stats.mixture import Mixtures, QuadraticForm, with_squares
 from lipmotion.types import ParallelMap
 
 CELLS = 1_000_000
 """Frames × components whose posteriors are computed together: 4 MB an array, a few of them."""
 LEAST_FRAMES = 1.0
-"""A density, or the arcs out of a state, with less data than so many frames stay as they are."""
+"""A density, or the arcs out of a state, with less data, in frames, are not re-estimated."""
 
 
 def em_step(
@@ -39,13 +39,13 @@ def em_step(
     Source: Baum et al. 1970.  Cost: O(T·(G·M·D + E)), the first as matrix products.
     """
     _check(mixtures, data, floor)
-    expectation = network.expectation()
-    used, columns = _in_order(network.emission[expectation.layout.order])
-    model = _Model(mixtures.quadratic(used), columns, expectation)
+    prepared = _prepared(network)
+    used, columns = _in_order(network.emission[prepared.layout.order])
+    model = _Model(mixtures.quadratic(used), columns, prepared)
     jobs = ((model, [data[i] for i in batch]) for batch in _batches([len(x) for x in data], model.form.constant.size))
-    total: _Sums | None = None
-    for sums in each(_expected, jobs):
-        total = sums if total is None else total.plus(sums)
+    total: _Statistics | None = None
+    for statistics in each(_accumulated, jobs):
+        total = statistics if total is None else total.plus(statistics)
     if total is None or not total.frames:
         raise InputError(f"none of {len(data)} recordings has a path through the network; check its arcs and ends")
     better = mixtures.copy()
@@ -53,29 +53,29 @@ def em_step(
     known = products[:, :, -1].sum(axis=1) >= LEAST_FRAMES
     first, second = np.split(products[known, :, :-1], 2, axis=2)
     better.estimate(used[known], products[known, :, -1], first, second, floor)
-    return better, _relearned(network, total), total.log_likelihood / total.frames
+    return better, _reestimated(network, total), total.log_likelihood / total.frames
 
 
 @dataclass(frozen=True, eq=False)
 class _Model:
-    """Densities and arcs, ready.
+    """Densities and a network, prepared for the kernels.
 
     form    : of the densities that are used
-    columns : which of them that of the state at each place is [shape=(S,)]
+    columns : [shape=(S,)], the number among them of the density of the state at each place
     """
 
-    form: Quadratic
+    form: QuadraticForm
     columns: NDArray[np.intp]
-    expectation: Expectation
+    network: ForwardBackwardNetwork
 
 
 @dataclass(frozen=True, eq=False)
-class _Sums:
-    """What recordings say.
+class _Statistics:
+    """Sufficient statistics of recordings.
 
-    products : [shape=(M, G, 2 D + 1)], of posteriors and features, their squares, and 1
-    arcs     : [shape=(E,)], how often each was followed
-    begun    : [shape=(S,)], how often a recording began in the state at each place
+    products : [shape=(M, G, 2 D + 1)], sums of posteriors times features, their squares, and 1
+    arcs     : [shape=(E,)], expected number of times that each was followed
+    begun    : [shape=(S,)], expected number of recordings that begin in the state at each place
     """
 
     products: NDArray[np.float64]
@@ -84,14 +84,20 @@ class _Sums:
     log_likelihood: float
     frames: int
 
-    def plus(self, other: _Sums) -> _Sums:
-        return _Sums(
+    def plus(self, other: _Statistics) -> _Statistics:
+        return _Statistics(
             self.products + other.products,
             self.arcs + other.arcs,
             self.begun + other.begun,
             self.log_likelihood + other.log_likelihood,
             self.frames + other.frames,
         )
+
+
+def _prepared(network: Network) -> ForwardBackwardNetwork:
+    return ForwardBackwardNetwork.of(
+        network.arc_from, network.arc_log, network.arc_start, network.log_initial, network.log_final
+    )
 
 
 def _check(mixtures: Mixtures, data: Sequence[NDArray[np.float32]], floor: NDArray[np.float32]) -> None:
@@ -117,12 +123,12 @@ def _batches(frames: Sequence[int], components: int) -> Iterator[list[int]]:
         yield batch
 
 
-def _expected(job: tuple[_Model, list[NDArray[np.float32]]]) -> _Sums:
+def _accumulated(job: tuple[_Model, list[NDArray[np.float32]]]) -> _Statistics:
     model, data = job
     frames = np.array([len(x) for x in data])
     features = with_squares(np.concatenate(data))
     log_density, shares = model.form.divided(features)
-    expected = model.expectation.over(log_density, model.columns, frames)
+    expected = model.network.over(log_density, model.columns, frames)
     possible = np.isfinite(expected.log_likelihood)
     begins = np.append(0, np.cumsum(frames[:-1]))
     begun = expected.posterior[begins].sum(axis=0, dtype=np.float64)
@@ -130,7 +136,7 @@ def _expected(job: tuple[_Model, list[NDArray[np.float32]]]) -> _Sums:
     if shares is not None:
         shares *= weights[:, None]
         weights = shares.reshape(len(features), -1)
-    return _Sums(
+    return _Statistics(
         (weights.T @ features).reshape(*model.form.constant.shape, -1).astype(np.float64),
         expected.counts,
         begun,
@@ -154,12 +160,12 @@ def _by_density(posterior: NDArray[np.float32], columns: NDArray[np.intp]) -> ND
     return np.add.reduceat(posterior[:, by_density], np.unique(columns[by_density], return_index=True)[1], axis=1)
 
 
-def _relearned(network: Network, sums: _Sums) -> Network:
-    """Return the network with arcs and beginnings as often as they were followed; impossible ones stay so."""
+def _reestimated(network: Network, sums: _Statistics) -> Network:
+    """Return the network with re-estimated probabilities of arcs and beginnings; impossible ones stay impossible."""
     left = np.bincount(network.arc_from, sums.arcs, len(network.emission))[network.arc_from]
     old_left = np.bincount(network.arc_from, np.exp(network.arc_log.astype(float)), len(network.emission))
     begun = np.empty(len(sums.begun))
-    begun[network.expectation().layout.order] = sums.begun
+    begun[_prepared(network).layout.order] = sums.begun
     with np.errstate(divide="ignore", invalid="ignore"):
         arc_log = np.log(sums.arcs / left * old_left[network.arc_from])
         log_initial = np.log(begun / begun.sum())

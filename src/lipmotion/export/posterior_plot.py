@@ -19,12 +19,12 @@ NARROWEST = 600
 ROW, GAP, LEFT, RIGHT, TITLE = 16, 14, 120, 16, 20
 CURVE = 90
 """Height of the plot of the opening."""
-LEAST = 0.05
+LEAST_PROBABILITY = 0.05
 """Units that never are this probable have no row."""
 STEPS_S = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 60, 120, 300, 600, 1800)
-LEAST_ROOM = 8
+LEAST_PHONE_WIDTH = 8
 """Pixels a phone, on average."""
-TICK = 80
+LEAST_TICK_DISTANCE = 80
 """Least pixels between two times on the axis."""
 WHITE, INK, GREY, PALE = (255, 255, 255), (30, 34, 42), (120, 126, 136), (228, 231, 236)
 COLOURS = ((23, 92, 166), (176, 62, 24), (38, 122, 62))
@@ -32,7 +32,7 @@ COLOURS = ((23, 92, 166), (176, 62, 24), (38, 122, 62))
 
 
 @dataclass(frozen=True)
-class Axis:
+class TimeAxis:
     """Time from left to right.
 
     frames  : of the recording;  rate_hz : their rate
@@ -57,15 +57,15 @@ class Axis:
         return values[first].astype(float)
 
 
-def draw(generation: Generation, beliefs: Sequence[ChainPosteriors]) -> Image.Image:
+def draw_posteriors(generation: Generation, beliefs: Sequence[ChainPosteriors]) -> Image.Image:
     """Return the picture. Its rows, from above: phones, units of each chain, asynchrony, opening, time."""
     frames, rate_hz = len(generation.motion.values), generation.motion.rate_hz
-    axis = Axis(frames, rate_hz, int(np.clip(2 * frames, NARROWEST, WIDEST)))
+    axis = TimeAxis(frames, rate_hz, int(np.clip(2 * frames, NARROWEST, WIDEST)))
     panels = [panel for number, one in enumerate(beliefs) for panel in _panels(axis, one, beliefs[0].name, number)]
     curve = _curve_name(generation)
     height = TITLE + sum(TITLE + ROW * len(names) + GAP for _, names, _ in panels) + TITLE + CURVE + 2 * TITLE
     picture = Image.new("RGB", (LEFT + axis.columns + RIGHT, height), WHITE)
-    pen = Pen(ImageDraw.Draw(picture), axis)
+    pen = PlotPainter(ImageDraw.Draw(picture), axis)
     pen.phones(generation, height - 2 * TITLE)
     y = TITLE
     for title, names, colours in panels:
@@ -83,12 +83,12 @@ def draw(generation: Generation, beliefs: Sequence[ChainPosteriors]) -> Image.Im
 
 
 def _panels(
-    axis: Axis, belief: ChainPosteriors, leader: str, number: int
+    axis: TimeAxis, belief: ChainPosteriors, leader: str, number: int
 ) -> list[tuple[str, list[str], NDArray[np.uint8]]]:
     """Return title, names of rows and colours [shape=(columns, rows, 3)] of what is shown of a chain."""
     colour = COLOURS[number % len(COLOURS)]
     most = belief.probability.max(axis=0)
-    shown = np.flatnonzero(most >= min(LEAST, most.max()))
+    shown = np.flatnonzero(most >= min(LEAST_PROBABILITY, most.max()))
     first = (belief.probability[:, shown] >= most[shown] / 2).argmax(axis=0)
     shown = shown[np.argsort(first, kind="stable")]
     names = [belief.units[unit] for unit in shown]
@@ -100,7 +100,7 @@ def _panels(
     return panels
 
 
-def _shaded(axis: Axis, probability: NDArray[Any], colour: tuple[int, int, int]) -> NDArray[np.uint8]:
+def _shaded(axis: TimeAxis, probability: NDArray[Any], colour: tuple[int, int, int]) -> NDArray[np.uint8]:
     share = np.clip(axis.averaged(probability), 0, 1)[:, :, None]
     return np.round(255 + share * (np.array(colour, float) - 255)).astype(np.uint8)
 
@@ -111,11 +111,11 @@ def _curve_name(generation: Generation) -> str:
 
 
 @dataclass(frozen=True)
-class Pen:
+class PlotPainter:
     """Draws what is not shaded."""
 
     on: ImageDraw.ImageDraw
-    axis: Axis
+    axis: TimeAxis
 
     def text(self, x: float, y: float, text: str, colour: tuple[int, int, int], anchor: str = "la") -> None:
         """Write at a place."""
@@ -142,7 +142,7 @@ class Pen:
 
     def phones(self, generation: Generation, bottom: float) -> None:
         """Write the phones on top and rule lines where they begin, if there is room for them."""
-        if len(generation.units) * LEAST_ROOM > self.axis.columns:
+        if len(generation.units) * LEAST_PHONE_WIDTH > self.axis.columns:
             return
         free = 0.0
         for span in generation.units:
@@ -157,7 +157,7 @@ class Pen:
     def times(self, y: float) -> None:
         """Draw the axis of time."""
         length_s = self.axis.frames / self.axis.rate_hz
-        step_s = next((s for s in STEPS_S if s / length_s * self.axis.columns >= TICK), STEPS_S[-1])
+        step_s = next((s for s in STEPS_S if s / length_s * self.axis.columns >= LEAST_TICK_DISTANCE), STEPS_S[-1])
         for number in range(int(length_s / step_s) + 1):
             x = self.axis.x(number * step_s)
             self.on.line([(x, y), (x, y + 5)], fill=INK)
