@@ -104,17 +104,9 @@ def test_each_kind_is_computed_once_for_all_that_is_done_with_a_recording(
     aligned = recogniser.align(audio, audio.mfcc(), sentence.words, Lexicon())
     agreement_score(audio, aligned)
     assert set(computed.values()) == {1}
-    assert (
-        sum(kind == "filters" for kind, *_ in computed)
-        == {
-            ("own", False): 6,  # five warps, one of which is none; the score needs the general features
-            ("own", True): 8,  # none and the one chosen of the recording; five of its loudest stretch
-            ("general", False): 2,
-            ("general", True): 2,
-            ("auto", False): 6,
-            ("auto", True): 7,  # the own models have no weight for this voice
-        }[kind, is_long]
-    )
+    kinds = {"general": 2, "own": 8, "auto": 8} if is_long else {"general": 2, "own": 6, "auto": 6}
+    # Features at no warp and general ones; at the other warps of the recording, or of its loudest stretch and the best.
+    assert sum(what == "filters" for what, *_ in computed) == kinds[kind]
 
 
 @pytest.mark.parametrize("with_transcript", [False, True])
