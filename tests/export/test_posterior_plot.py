@@ -1,4 +1,4 @@
-"""Pictures of what chains believe: what is where, and how large they are."""
+"""Pictures of posterior probabilities: their rows, their size, and where things are drawn."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from lipmotion.types import ChainPosteriors, Channel, Generation, Motion, Span, 
 FRAMES = 400
 
 
-def belief(name: str, believed: np.ndarray, lead: np.ndarray | None = None) -> ChainPosteriors:
-    units = tuple(f"u{number}" for number in range(believed.shape[1]))
+def posteriors(name: str, probability: np.ndarray, lead: np.ndarray | None = None) -> ChainPosteriors:
+    units = tuple(f"u{number}" for number in range(probability.shape[1]))
     leads = () if lead is None else (-1, 0, 1)
-    given = np.zeros((len(believed), 0)) if lead is None else lead
-    return ChainPosteriors(name, units, believed.astype(np.float32), leads, given.astype(np.float32))
+    given = np.zeros((len(probability), 0)) if lead is None else lead
+    return ChainPosteriors(name, units, probability.astype(np.float32), leads, given.astype(np.float32))
 
 
 def generated(frames: int = FRAMES, name: str = "opening") -> Generation:
@@ -30,7 +30,7 @@ def generated(frames: int = FRAMES, name: str = "opening") -> Generation:
 
 
 def halves(frames: int = FRAMES) -> np.ndarray:
-    """The first unit in the first half, the second in the other; the third now and then, the fourth hardly ever."""
+    """Probabilities of four units: the first in the first half, the second in the other, the third and fourth seldom."""
     early = (np.arange(frames) < frames // 2).astype(float)
     sometimes = np.where(np.arange(frames) == frames - 1, 0.5, 0.2)
     return np.stack([1 - early, early, sometimes, np.full(frames, 0.04)], axis=1)
@@ -41,7 +41,7 @@ def pixels(picture: Image.Image) -> np.ndarray:
 
 
 def test_units_have_a_row_each_in_the_order_of_their_time() -> None:
-    shown = pixels(draw_posteriors(generated(), [belief("phone", halves())]))
+    shown = pixels(draw_posteriors(generated(), [posteriors("phone", halves())]))
     rows = [2 * TITLE + ROW * number + ROW // 2 for number in range(3)]
     early, late = LEFT + 100, LEFT + 2 * FRAMES - 100
     full, white = list(COLOURS[0]), [255, 255, 255]
@@ -56,20 +56,20 @@ def test_units_have_a_row_each_in_the_order_of_their_time() -> None:
 def test_units_that_are_never_likely_have_no_row() -> None:
     three, four = halves(), halves()
     four[9, 3] = 0.06
-    heights = [draw_posteriors(generated(), [belief("phone", believed)]).height for believed in (three, four)]
+    heights = [draw_posteriors(generated(), [posteriors("phone", probability)]).height for probability in (three, four)]
     assert heights[1] - heights[0] == ROW
 
 
 def test_where_nothing_is_likely_there_is_a_picture_all_the_same() -> None:
-    few = draw_posteriors(generated(), [belief("phone", np.full((FRAMES, 30), 1 / 30))])
-    assert few.height > draw_posteriors(generated(), [belief("phone", halves())]).height
-    assert draw_posteriors(generated(), [belief("phone", np.zeros((FRAMES, 3)))]).height > 0
+    few = draw_posteriors(generated(), [posteriors("phone", np.full((FRAMES, 30), 1 / 30))])
+    assert few.height > draw_posteriors(generated(), [posteriors("phone", halves())]).height
+    assert draw_posteriors(generated(), [posteriors("phone", np.zeros((FRAMES, 3)))]).height > 0
 
 
 def test_the_asynchrony_is_a_panel_of_its_own() -> None:
     lead = np.tile([0.1, 0.3, 0.6], (FRAMES, 1))
-    alone = draw_posteriors(generated(), [belief("phone", halves())])
-    both = draw_posteriors(generated(), [belief("phone", halves()), belief("viseme", halves(), lead)])
+    alone = draw_posteriors(generated(), [posteriors("phone", halves())])
+    both = draw_posteriors(generated(), [posteriors("phone", halves()), posteriors("viseme", halves(), lead)])
     assert both.height > alone.height + 6 * ROW
     shown = pixels(both)
     column = shown[:, LEFT + 300].sum(axis=1)
@@ -80,13 +80,13 @@ def test_the_asynchrony_is_a_panel_of_its_own() -> None:
     ("frames", "columns"), [(1, NARROWEST), (2, NARROWEST), (400, 800), (1000, WIDEST), (12_345, WIDEST)]
 )
 def test_recordings_of_any_length(frames: int, columns: int) -> None:
-    assert draw_posteriors(generated(frames), [belief("phone", halves(frames))]).width == LEFT + columns + RIGHT
+    assert draw_posteriors(generated(frames), [posteriors("phone", halves(frames))]).width == LEFT + columns + RIGHT
 
 
 def test_a_column_of_a_long_recording_is_the_mean_of_its_frames() -> None:
-    believed = np.zeros((8 * WIDEST, 1))
-    believed[::4] = 1
-    shown = pixels(draw_posteriors(generated(8 * WIDEST), [belief("phone", believed)]))
+    probability = np.zeros((8 * WIDEST, 1))
+    probability[::4] = 1
+    shown = pixels(draw_posteriors(generated(8 * WIDEST), [posteriors("phone", probability)]))
     row = shown[2 * TITLE + ROW // 2, LEFT + 10 : LEFT + WIDEST // 2 - 10]
     assert (row == [round(255 + 0.25 * (part - 255)) for part in COLOURS[0]]).all()
 
@@ -95,20 +95,22 @@ def test_phones_are_written_where_there_is_room() -> None:
     dense = Timeline(tuple(Span(s / 100, (s + 1) / 100, Unit("aa", "aa")) for s in range(FRAMES)))
     strips = []
     for units in (Timeline(()), dense, generated().units):
-        picture = draw_posteriors(replace(generated(), units=units), [belief("phone", halves())])
+        picture = draw_posteriors(replace(generated(), units=units), [posteriors("phone", halves())])
         strips.append(pixels(picture.crop((LEFT, 0, picture.width, TITLE - 4))).min())
     assert strips[:2] == [255, 255]
     assert strips[2] < 200
 
 
 def test_motion_without_an_opening_shows_its_first_channel() -> None:
-    smile, opening = (draw_posteriors(generated(name=name), [belief("phone", halves())]) for name in ("smile", "opening"))
+    smile, opening = (
+        draw_posteriors(generated(name=name), [posteriors("phone", halves())]) for name in ("smile", "opening")
+    )
     assert smile.size == opening.size
     assert smile.tobytes() != opening.tobytes()
 
 
-def test_the_same_beliefs_give_the_same_picture() -> None:
-    one, other = (draw_posteriors(generated(), [belief("phone", halves())]) for _ in range(2))
+def test_the_same_posteriors_give_the_same_picture() -> None:
+    one, other = (draw_posteriors(generated(), [posteriors("phone", halves())]) for _ in range(2))
     assert one.tobytes() == other.tobytes()
     none = replace(generated(), units=Timeline(()))
-    assert draw_posteriors(none, [belief("phone", halves())]).size == one.size
+    assert draw_posteriors(none, [posteriors("phone", halves())]).size == one.size

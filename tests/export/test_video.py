@@ -22,14 +22,14 @@ def silence(duration_s: float, rate_hz: int = 16_000) -> Audio:
 
 
 def pictures(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Time and mean brightness of every frame, as a player shows them."""
+    """Return time and mean brightness of every frame, as a player shows them."""
     with av.open(str(path)) as container:
         shown = [(frame.time, frame.to_ndarray(format="gray").mean()) for frame in container.decode(video=0)]
     return np.array([s[0] for s in shown]), np.array([s[1] for s in shown])
 
 
 def sound(path: Path) -> tuple[float, np.ndarray, int]:
-    """Time of the first sample that is heard, the samples and their rate."""
+    """Return the time of the first sample that is played, the samples, and their rate."""
     with av.open(str(path)) as container:
         frames = list(container.decode(audio=0))
     return float(frames[0].time), np.concatenate([f.to_ndarray()[0] for f in frames]), frames[0].sample_rate

@@ -12,7 +12,7 @@ def canvas(size: int = 64) -> tuple[Bands, np.ndarray, np.ndarray]:
 
 
 def naive_cover(bands: Bands, top: np.ndarray, bottom: np.ndarray, fine: int = 200) -> np.ndarray:
-    """The same by counting points: ``fine`` down each pixel in every column."""
+    """Return the coverage by counting points: ``fine`` points down each pixel in every column."""
     cover = np.zeros((len(bands.y), len(bands.x)))
     steps = (np.arange(fine) + 0.5) / fine - 0.5
     for row, y in enumerate(bands.y[:, 0]):

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lipmotion.faces.portrait.geometry import HALF_WIDTH, LINE_Y, TEETH_EDGE, mouth_interior, lip_outlines, roundness
+from lipmotion.faces.portrait.geometry import HALF_WIDTH, LINE_Y, TEETH_EDGE, lip_outlines, mouth_interior, roundness
 from lipmotion.faces.portrait.pose import TUCKED_GAP, WIDEST, MouthPose, jaw_drop
 
 X = np.linspace(-0.5, 0.5, 1001)

@@ -1,7 +1,16 @@
 import numpy as np
 import pytest
 
-from lipmotion.faces.portrait.outlines import STEPS, closed_curve, path_points, ellipse, lowered, open_curve, stroke, symmetric
+from lipmotion.faces.portrait.outlines import (
+    STEPS,
+    closed_curve,
+    ellipse,
+    lowered,
+    open_curve,
+    path_points,
+    stroke,
+    symmetric,
+)
 
 PATH = "0 0, 1 0.5, 2 -0.5, 3 0"
 

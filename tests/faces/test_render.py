@@ -15,7 +15,7 @@ def opening(*values: float, rate_hz: float = 25.0) -> Motion:
 
 
 def hole(frame: np.ndarray) -> int:
-    """The number of pixels between the lips that are as dark as a mouth."""
+    """Return the number of pixels between the lips that are as dark as the inside of a mouth."""
     area = View(len(frame)).window(-0.25, 0.75, 0.25, 1.3).area
     return int((frame[area].sum(axis=2) < 150).sum())
 

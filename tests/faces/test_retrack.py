@@ -1,4 +1,4 @@
-"""The drawn face, seen by a face tracker that knows nothing of it, moves as it was told to."""
+"""A face tracker measures on the drawn face the motion that was drawn."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def syllables() -> tuple[Motion, Timeline[Unit]]:
 
 
 def tracked(frames: list[np.ndarray]) -> np.ndarray:
-    """Opening, width and outer of each frame [shape=(T, 3)]; NaN where no face was found."""
+    """Return opening, width and outer of each frame [shape=(T, 3)]; NaN where no face was found."""
     rows = []
     with mediapipe.solutions.face_mesh.FaceMesh(max_num_faces=1, refine_landmarks=True) as mesh:
         for frame in frames:
@@ -39,22 +39,22 @@ def tracked(frames: list[np.ndarray]) -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def told_and_seen() -> tuple[np.ndarray, np.ndarray]:
+def drawn_and_tracked() -> tuple[np.ndarray, np.ndarray]:
     motion, units = syllables()
     return motion.resampled(25.0).values, tracked(list(render(motion, units, fps=25.0, height=480)))
 
 
-def test_the_face_is_found_in_every_frame(told_and_seen):
-    assert np.isfinite(told_and_seen[1]).all()
+def test_the_face_is_found_in_every_frame(drawn_and_tracked):
+    assert np.isfinite(drawn_and_tracked[1]).all()
 
 
 @pytest.mark.parametrize(("column", "least"), [(0, 0.95), (1, 0.8), (2, 0.9)], ids=["opening", "width", "outer"])
-def test_what_was_told_is_seen(told_and_seen, column, least):
-    told, seen = told_and_seen
-    assert np.corrcoef(told[:, column], seen[:, column])[0, 1] >= least
+def test_the_drawn_motion_is_tracked(drawn_and_tracked, column, least):
+    drawn, measured = drawn_and_tracked
+    assert np.corrcoef(drawn[:, column], measured[:, column])[0, 1] >= least
 
 
-def test_the_opening_is_seen_at_its_size(told_and_seen):
-    told, seen = told_and_seen[0][:, 0], told_and_seen[1][:, 0]
-    assert 0.8 < np.polyfit(told, seen, 1)[0] < 1.2
-    assert seen[told < 0.01].max() < 0.02
+def test_the_opening_is_tracked_at_its_size(drawn_and_tracked):
+    drawn, measured = drawn_and_tracked[0][:, 0], drawn_and_tracked[1][:, 0]
+    assert 0.8 < np.polyfit(drawn, measured, 1)[0] < 1.2
+    assert measured[drawn < 0.01].max() < 0.02

@@ -15,8 +15,8 @@ from lipmotion.errors import ExportError, InputError
 from lipmotion.speech.audio_files import read_audio
 from lipmotion.testing.toy import (
     LIP_LEAD_S,
-    LIPS_TOUCH,
     LIP_TARGETS,
+    LIPS_TOUCH,
     WORDS,
     ToySentence,
     toy_motion,
@@ -49,7 +49,7 @@ def test_words_are_pronounced_as_in_the_dictionary(word: str) -> None:
     assert WORDS[word] in Lexicon().pronunciations(word)
 
 
-def test_the_lips_know_the_inventory() -> None:
+def test_every_phone_of_the_inventory_has_targets() -> None:
     assert sorted(LIP_TARGETS) == sorted(PHONES)
 
 
@@ -170,8 +170,8 @@ def test_utterances_are_the_sentences_perfectly_tracked(sentences: list[ToySente
         assert utterance.track.seen.all()
 
 
-def test_every_phone_can_be_heard_in_the_features(sentences: list[ToySentence]) -> None:
-    """A frame's nearest phone mean is mostly its own phone's: there is something to learn."""
+def test_phones_differ_in_their_features(sentences: list[ToySentence]) -> None:
+    """The phone whose mean features are nearest to a frame is mostly the phone of this frame."""
     labels, rows = [], []
     for utterance, sentence in zip(toy_utterances(12), sentences, strict=True):
         for span in sentence.units:

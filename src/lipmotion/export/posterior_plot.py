@@ -1,4 +1,4 @@
-"""A picture of what chains believe over time: phones, units of each chain, asynchrony, opening."""
+"""Picture of posterior probabilities over time: phones, units of each chain, asynchrony, and the opening."""
 
 from __future__ import annotations
 
@@ -14,29 +14,30 @@ from lipmotion.types import ChainPosteriors, Generation
 from lipmotion.units import is_silent
 
 WIDEST = 2000
-"""Columns of a plot; of a longer recording each is the mean of several frames."""
+"""Most columns of a plot; in a longer recording, each column is the mean of several frames."""
 NARROWEST = 600
 ROW, GAP, LEFT, RIGHT, TITLE = 16, 14, 120, 16, 20
 CURVE = 90
 """Height of the plot of the opening."""
 LEAST_PROBABILITY = 0.05
-"""Units that never are this probable have no row."""
+"""Units whose posterior probability never reaches this have no row."""
 STEPS_S = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 60, 120, 300, 600, 1800)
 LEAST_PHONE_WIDTH = 8
-"""Pixels a phone, on average."""
+"""Mean pixels per phone that are needed to write the phones."""
 LEAST_TICK_DISTANCE = 80
-"""Least pixels between two times on the axis."""
+"""Least distance between two times on the axis, in pixels."""
 WHITE, INK, GREY, PALE = (255, 255, 255), (30, 34, 42), (120, 126, 136), (228, 231, 236)
 COLOURS = ((23, 92, 166), (176, 62, 24), (38, 122, 62))
-"""One a chain."""
+"""Of the chains, in their order."""
 
 
 @dataclass(frozen=True)
 class TimeAxis:
-    """Time from left to right.
+    """The time axis, from left to right.
 
-    frames  : of the recording;  rate_hz : their rate
-    columns : pixels that they take
+    frames  : number of frames of the recording
+    rate_hz : their rate
+    columns : width of the plot in pixels
     """
 
     frames: int
@@ -44,11 +45,11 @@ class TimeAxis:
     columns: int
 
     def x(self, time_s: float) -> float:
-        """Return where a time is."""
+        """Return the horizontal position of a time, in pixels."""
         return LEFT + float(np.clip(time_s * self.rate_hz / self.frames, 0, 1)) * self.columns
 
     def averaged(self, values: NDArray[Any]) -> NDArray[np.float64]:
-        """Return values of frames [shape=(T, K)] as those of columns [shape=(columns, K)]."""
+        """Return values of frames [shape=(T, K)] averaged over each column [shape=(columns, K)]."""
         edges = np.linspace(0, self.frames, self.columns + 1)
         first = np.minimum(edges[:-1].astype(int), self.frames - 1)
         if self.columns < self.frames:
@@ -57,11 +58,12 @@ class TimeAxis:
         return values[first].astype(float)
 
 
-def draw_posteriors(generation: Generation, beliefs: Sequence[ChainPosteriors]) -> Image.Image:
-    """Return the picture. Its rows, from above: phones, units of each chain, asynchrony, opening, time."""
+def draw_posteriors(generation: Generation, posteriors: Sequence[ChainPosteriors]) -> Image.Image:
+    """Return a picture of posteriors; from top to bottom: phones, units of each chain, asynchrony, opening, time."""
     frames, rate_hz = len(generation.motion.values), generation.motion.rate_hz
     axis = TimeAxis(frames, rate_hz, int(np.clip(2 * frames, NARROWEST, WIDEST)))
-    panels = [panel for number, one in enumerate(beliefs) for panel in _panels(axis, one, beliefs[0].name, number)]
+    leader = posteriors[0].name if posteriors else ""
+    panels = [panel for number, chain in enumerate(posteriors) for panel in _panels(axis, chain, leader, number)]
     curve = _curve_name(generation)
     height = TITLE + sum(TITLE + ROW * len(names) + GAP for _, names, _ in panels) + TITLE + CURVE + 2 * TITLE
     picture = Image.new("RGB", (LEFT + axis.columns + RIGHT, height), WHITE)
@@ -83,20 +85,20 @@ def draw_posteriors(generation: Generation, beliefs: Sequence[ChainPosteriors]) 
 
 
 def _panels(
-    axis: TimeAxis, belief: ChainPosteriors, leader: str, number: int
+    axis: TimeAxis, chain: ChainPosteriors, leader: str, number: int
 ) -> list[tuple[str, list[str], NDArray[np.uint8]]]:
-    """Return title, names of rows and colours [shape=(columns, rows, 3)] of what is shown of a chain."""
+    """Return title, names of the rows and colours [shape=(columns, rows, 3)] of each panel of a chain."""
     colour = COLOURS[number % len(COLOURS)]
-    most = belief.probability.max(axis=0)
+    most = chain.probability.max(axis=0)
     shown = np.flatnonzero(most >= min(LEAST_PROBABILITY, most.max()))
-    first = (belief.probability[:, shown] >= most[shown] / 2).argmax(axis=0)
+    first = (chain.probability[:, shown] >= most[shown] / 2).argmax(axis=0)
     shown = shown[np.argsort(first, kind="stable")]
-    names = [belief.units[unit] for unit in shown]
-    panels = [(f"chain {number + 1}: {belief.name}", names, _shaded(axis, belief.probability[:, shown], colour))]
-    if belief.leads:
-        named = [f"{lead:+d}" if lead else "0" for lead in belief.leads]
-        title = f"asynchrony: states that {belief.name} is ahead of {leader}"
-        panels.append((title, named, _shaded(axis, belief.lead, INK)))
+    names = [chain.units[unit] for unit in shown]
+    panels = [(f"chain {number + 1}: {chain.name}", names, _shaded(axis, chain.probability[:, shown], colour))]
+    if chain.leads:
+        named = [f"{lead:+d}" if lead else "0" for lead in chain.leads]
+        title = f"asynchrony: states that {chain.name} is ahead of {leader}"
+        panels.append((title, named, _shaded(axis, chain.lead, INK)))
     return panels
 
 
@@ -112,17 +114,17 @@ def _curve_name(generation: Generation) -> str:
 
 @dataclass(frozen=True)
 class PlotPainter:
-    """Draws what is not shaded."""
+    """Draws texts, lines and curves."""
 
     on: ImageDraw.ImageDraw
     axis: TimeAxis
 
     def text(self, x: float, y: float, text: str, colour: tuple[int, int, int], anchor: str = "la") -> None:
-        """Write at a place."""
+        """Write a text at a position."""
         self.on.text((x, y), text, fill=colour, font=ImageFont.load_default(12), anchor=anchor)
 
     def rows(self, y: float, names: Sequence[str]) -> None:
-        """Name rows and rule lines between them."""
+        """Write the names of rows, and draw lines between them."""
         right = LEFT + self.axis.columns
         for number, name in enumerate(names):
             self.on.line([(LEFT, y + ROW * number), (right, y + ROW * number)], fill=PALE)
@@ -134,14 +136,14 @@ class PlotPainter:
         shown = values if len(values) < self.axis.columns else self.axis.averaged(values[:, None])[:, 0]
         low, high = float(min(shown.min(), 0)), float(shown.max())
         heights = y + CURVE - (shown - low) / max(high - low, 1e-9) * (CURVE - 8)
-        places = LEFT + (np.arange(len(shown)) + 0.5) / len(shown) * self.axis.columns
+        positions = LEFT + (np.arange(len(shown)) + 0.5) / len(shown) * self.axis.columns
         self.on.rectangle([LEFT, y, LEFT + self.axis.columns, y + CURVE], outline=GREY)
-        self.on.line(list(zip(places.tolist(), heights.tolist(), strict=True)), fill=INK, width=2)
+        self.on.line(list(zip(positions.tolist(), heights.tolist(), strict=True)), fill=INK, width=2)
         self.text(LEFT - 6, y + 8, f"{high:.2f}", INK, "rm")
         self.text(LEFT - 6, y + CURVE, f"{low:.2f}", INK, "rm")
 
     def phones(self, generation: Generation, bottom: float) -> None:
-        """Write the phones on top and rule lines where they begin, if there is room for them."""
+        """Write the phones at the top, and draw lines where they begin, if there is room for them."""
         if len(generation.units) * LEAST_PHONE_WIDTH > self.axis.columns:
             return
         free = 0.0
@@ -155,7 +157,7 @@ class PlotPainter:
                 free = start + width + 2
 
     def times(self, y: float) -> None:
-        """Draw the axis of time."""
+        """Draw the time axis."""
         length_s = self.axis.frames / self.axis.rate_hz
         step_s = next((s for s in STEPS_S if s / length_s * self.axis.columns >= LEAST_TICK_DISTANCE), STEPS_S[-1])
         for number in range(int(length_s / step_s) + 1):

@@ -1,4 +1,4 @@
-"""``.mp4``: frames and sound as a video that plays everywhere: H.264 and AAC, index first."""
+"""``.mp4``: frames and sound as a video of H.264 and AAC with the index first, which all players can play."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from lipmotion.types import Audio
 Frame = NDArray[np.uint8]
 
 SOUND_HZ = 48_000
-"""AAC begins with 1,024 samples of silence: for players that do not skip them, 21 ms at this rate, 64 at 16 kHz."""
+"""Sampling rate. AAC begins with 1,024 samples of silence, which some players do not skip: 21 ms at this rate."""
 _BT601, _BT709, _LIMITED = 6, 1, 1
 
 
 def write_mp4(path: Path, frames: Iterable[Frame], *, fps: float, audio: Audio) -> None:
-    """Write a video with sound, whole or not at all; frame n is shown at ``n / fps`` seconds, sound starts at 0.
+    """Write a video with sound; frame n is shown at ``n / fps`` seconds, the sound starts at 0.
 
     frames : RGB [shape=(H, W, 3)], even sizes, at least one; taken one at a time
-    fps    : 23.976, 29.97 and 59.94 mean thousands over 1,001
-    Neither stream is cut to the other's length.
+    fps    : 23.976, 29.97 and 59.94 stand for 24000/1001, 30000/1001 and 60000/1001
+    Neither stream is cut to the length of the other. After a failure there is no partial file.
     Raises ExportError: no frames, frames of odd or different sizes, no sound, fps not positive, or the file cannot be
     written.
     """
@@ -42,7 +42,7 @@ def write_mp4(path: Path, frames: Iterable[Frame], *, fps: float, audio: Audio) 
 
 
 def frame_rate(fps: float) -> Fraction:
-    """Return the exact rate that is meant: 29.97 is 30000/1001."""
+    """Return the exact frame rate that a decimal number stands for: 29.97 is 30000/1001."""
     for whole in (24, 30, 48, 60, 120):
         if abs(fps - whole / 1.001) < 0.005:
             return Fraction(whole * 1000, 1001)
@@ -50,7 +50,7 @@ def frame_rate(fps: float) -> Fraction:
 
 
 def _checked(frames: Iterable[Frame], path: Path) -> Iterator[Frame]:
-    """Yield the frames. Raises ExportError: none, or one that does not fit."""
+    """Yield the frames. Raises ExportError: there are none, or one has another type or size than required."""
     shape: tuple[int, ...] | None = None
     for n, frame in enumerate(frames):
         shape = shape or frame.shape
@@ -73,8 +73,8 @@ def _encode(temporary: Path, path: Path, frames: Iterator[Frame], rate: Fraction
             video = _video_stream(container, first, rate)
             sound = container.add_stream("aac", rate=SOUND_HZ, layout="mono", bit_rate=128_000)
             pictures = ((n / rate, video, _picture(frame, n, rate)) for n, frame in enumerate(chain([first], frames)))
-            heard = ((part.pts * part.time_base, sound, part) for part in _sound_parts(audio))
-            for _, stream, part in merge(pictures, heard, key=itemgetter(0)):
+            sounds = ((part.pts * part.time_base, sound, part) for part in _sound_parts(audio))
+            for _, stream, part in merge(pictures, sounds, key=itemgetter(0)):
                 container.mux(stream.encode(part))
             for stream in (video, sound):
                 container.mux(stream.encode(None))
@@ -105,7 +105,7 @@ def _picture(frame: Frame, n: int, rate: Fraction) -> Any:
 
 
 def _sound_parts(audio: Audio) -> Iterator[Any]:
-    """Yield the sound in tenths of a second, so that it lies in the file beside its frames."""
+    """Yield the sound in parts of a tenth of a second, so that it is stored in the file near its frames."""
     from av import AudioFrame
 
     length = max(1, audio.rate_hz // 10)

@@ -1,1 +1,20 @@
-"""For whoever tests or extends lipmotion: the toy corpus."""
+"""For whoever tests or extends lipmotion: checks of the contracts, synthetic examples, the toy corpus."""
+
+from lipmotion.testing.check_engine import ENGINE_CHECKS, TrainedEngine, check_engine
+from lipmotion.testing.check_exporter import check_exporter
+from lipmotion.testing.check_face import check_face
+from lipmotion.testing.contract import ContractError
+from lipmotion.testing.toy import toy_motion, toy_sentences, toy_utterances, write_toy_recordings
+
+__all__ = [
+    "ENGINE_CHECKS",
+    "ContractError",
+    "TrainedEngine",
+    "check_engine",
+    "check_exporter",
+    "check_face",
+    "toy_motion",
+    "toy_sentences",
+    "toy_utterances",
+    "write_toy_recordings",
+]

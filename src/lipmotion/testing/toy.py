@@ -1,7 +1,7 @@
-"""A tiny corpus of our own making: spoken by the synthesiser, by a drawn face whose mouth follows known motion.
+"""The toy corpus: sentences of a speech synthesiser, and a drawn face whose mouth follows known motion.
 
-It is small enough for every test, it is nobody's face or voice, and all that a model should find in it is known: the
-words, the time of every phone, and the motion.
+It is small enough for every test, it shows no person's face or voice, and everything that a model should learn from it
+is known: the words, the time of every phone, and the motion.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ WORDS: dict[str, tuple[str, ...]] = {
     "tea": ("t", "iy"),
     "two": ("t", "uw"),
 }
-"""All that is ever said, pronounced as in the CMU dictionary."""
+"""The vocabulary, pronounced as in the CMU dictionary."""
 
 _LIP_TARGETS: tuple[tuple[str, tuple[tuple[float, float], ...]], ...] = (
     # phones, then opening and width (eye distances) at their start and, where they differ, at their end
@@ -68,18 +68,18 @@ _LIP_TARGETS: tuple[tuple[str, tuple[tuple[float, float], ...]], ...] = (
     ("em", ((0.10, 0.54), (0.00, 0.54))),
 )
 LIP_TARGETS = {phone: shapes for phones, shapes in _LIP_TARGETS for phone in phones.split()}
-"""Opening and width that the lips aim for in each phone of the inventory."""
+"""Target opening and width of the lips in each phone of the inventory."""
 LIPS_TOUCH = frozenset({"p", "b", "m"})
 
 CHANNELS = (Channel("opening"), Channel("width"), Channel("outer"))
 LIP_THICKNESS = 0.22
 """``outer`` exceeds ``opening`` by this much."""
 LIP_LEAD_S = 0.03
-"""The lips are this far ahead of the sound."""
+"""Time by which the lips are ahead of the sound."""
 BLEND_S = 0.12
-"""Neighbouring targets run into one another over this long."""
+"""Time over which neighbouring targets are blended."""
 CLOSING_S = 0.08
-"""Touching lips come together, and part, in this time."""
+"""Time in which the lips close before p b m, and open after."""
 
 SPEECH_S = 1.27
 """A sentence ends with the word that makes its speech at least this long."""
@@ -95,7 +95,7 @@ _MOTION_HZ = 100.0
 class ToySentence:
     """One spoken sentence.
 
-    units : the exact times of its phones, each with its word; silence has none
+    units : the exact times of its phones, each with its word; silence has no word
     split : ``train``, ``val`` or ``test``
     """
 
@@ -107,24 +107,24 @@ class ToySentence:
 
 
 def toy_sentences(count: int, seed: int = 0) -> list[ToySentence]:
-    """Speak ``count`` sentences of two to three seconds, 0.4–0.6 s of silence at both ends of each.
+    """Return ``count`` sentences of two to three seconds, with 0.4–0.6 s of silence at both ends of each.
 
-    Every word comes up before any comes again. The last sixth (at least one) is ``test``, the sixth before it ``val``;
-    from six sentences on, ``train`` says every word. The same seed gives the same sentences, and asking for more of
-    them gives the same ones first.
+    All words are used before any is used again. The last sixth (at least one) is ``test``, the sixth before it ``val``;
+    from six sentences on, ``train`` has every word. The same seed gives the same sentences, and a larger count the
+    same ones first.
     Raises InputError: fewer than three, so that a split would be empty.
     """
     if count < 3:
-        raise InputError(f"{count} toy sentences asked for, required at least 3: one each to train, choose and test")
+        raise InputError(f"{count} toy sentences asked for, required at least 3: one each to train, validate and test")
     held_out = max(1, count // 6)
     splits = ["train"] * (count - 2 * held_out) + ["val"] * held_out + ["test"] * held_out
     rng = np.random.default_rng(seed)
-    deck = _shuffled_words(rng)
-    return [_sentence(f"toy{number:02d}", split, deck, rng) for number, split in enumerate(splits)]
+    vocabulary = _shuffled_words(rng)
+    return [_sentence(f"toy{number:02d}", split, vocabulary, rng) for number, split in enumerate(splits)]
 
 
 def toy_motion(units: Timeline[Unit], rate_hz: float) -> Motion:
-    """Return how the toy face's lips move: ``opening``, ``width`` and ``outer``, frame n at ``n / rate_hz`` seconds.
+    """Return the lip motion of the toy face: ``opening``, ``width`` and ``outer``, frame n at ``n / rate_hz`` seconds.
 
     units : phones of the inventory from 0 s on; gaps between them count as silence
     Returns Motion with T = floor(end of the last unit · rate_hz) + 1 frames; the opening is exactly 0 in p, b and m
@@ -144,7 +144,7 @@ def toy_motion(units: Timeline[Unit], rate_hz: float) -> Motion:
 
 
 def toy_utterances(count: int, seed: int = 0) -> list[Utterance]:
-    """Return the toy corpus as it would be if every video had been tracked without error, at 25 frames a second.
+    """Return the toy corpus with exact motion, as if every video had been tracked without error at 25 frames a second.
 
     Raises InputError: fewer than three.
     """
@@ -152,10 +152,10 @@ def toy_utterances(count: int, seed: int = 0) -> list[Utterance]:
 
 
 def write_toy_recordings(directory: Path, *, sentences: int = 12, seed: int = 0, fps: float = CAMERA_HZ) -> list[Path]:
-    """Write the toy corpus as recordings: ``toy00.mp4``, ``toy00.txt``, ..., and the lists of the three splits.
+    """Write the toy corpus as recordings: ``toy00.mp4``, ``toy00.txt``, ..., and the three lists; return the videos.
 
-    directory : made where it does not exist; files of the same names are replaced
-    Returns the videos. About half a second of computing for each.
+    directory : made if it does not exist; files of the same names are replaced
+    Each video takes about half a second.
     Raises InputError: fewer than three sentences, or fps not positive; ExportError: a file cannot be written.
     """
     spoken = toy_sentences(sentences, seed)
@@ -171,16 +171,16 @@ def write_toy_recordings(directory: Path, *, sentences: int = 12, seed: int = 0,
 
 
 def _shuffled_words(rng: np.random.Generator) -> Iterator[str]:
-    """Yield the words for ever, shuffled anew each time that all have been said."""
+    """Yield the words endlessly, shuffled again each time that all have been used."""
     while True:
         yield from rng.permutation(sorted(WORDS)).tolist()
 
 
-def _sentence(name: str, split: str, deck: Iterator[str], rng: np.random.Generator) -> ToySentence:
+def _sentence(name: str, split: str, vocabulary: Iterator[str], rng: np.random.Generator) -> ToySentence:
     words: list[str] = []
     labels, durations_s = [Unit("sil")], [rng.uniform(*SILENCE_S)]
     while sum(durations_s[1:]) < SPEECH_S:
-        words.append(next(deck))
+        words.append(next(vocabulary))
         labels += [Unit(phone, word=words[-1]) for phone in WORDS[words[-1]]]
         durations_s += [_typical_duration_s(phone) * rng.uniform(0.85, 1.15) for phone in WORDS[words[-1]]]
     labels, durations_s = [*labels, Unit("sil")], [*durations_s, rng.uniform(*SILENCE_S)]
@@ -208,11 +208,11 @@ def _check_units(units: Timeline[Unit], rate_hz: float) -> None:
         raise InputError(f"motion rate is {rate_hz} Hz, required more than 0")
     for span in units:
         if span.label.phone not in LIP_TARGETS:
-            raise InputError(f"phone {span.label.phone!r} is not in the inventory: {' '.join(sorted(SHAPES))}")
+            raise InputError(f"phone {span.label.phone!r} is not in the inventory: {' '.join(sorted(LIP_TARGETS))}")
 
 
 def _targets(units: Timeline[Unit], grid_s: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return what opening and width aim for, in steps; at rest outside the units [shape=(2, len(grid_s))]."""
+    """Return target opening and width, constant within phones; at rest outside the units [shape=(2, len(grid_s))]."""
     targets = np.repeat(np.array(LIP_TARGETS["sil"]).T, len(grid_s), axis=1)
     for span in units:
         shapes = LIP_TARGETS[span.label.phone]
@@ -223,13 +223,13 @@ def _targets(units: Timeline[Unit], grid_s: NDArray[np.float64]) -> NDArray[np.f
 
 
 def _lip_separation(units: Timeline[Unit], grid_s: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return 0 where the lips touch, 1 well away from it, a raised cosine between [shape=(len(grid_s),)]."""
-    parted = np.ones(len(grid_s))
+    """Return 0 where the lips touch, 1 far from there, a raised cosine between [shape=(len(grid_s),)]."""
+    separation = np.ones(len(grid_s))
     for span in units:
         if span.label.phone in LIPS_TOUCH:
             away_s = np.maximum(0, np.maximum(span.start_s - grid_s, grid_s - span.end_s))
-            parted = np.minimum(parted, 0.5 - 0.5 * np.cos(np.pi * np.minimum(1, away_s / CLOSING_S)))
-    return parted
+            separation = np.minimum(separation, 0.5 - 0.5 * np.cos(np.pi * np.minimum(1, away_s / CLOSING_S)))
+    return separation
 
 
 def _make_folder(directory: Path) -> None:

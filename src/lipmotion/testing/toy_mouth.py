@@ -1,4 +1,4 @@
-"""Mouth pictures of the toy corpus: lips drawn at a known opening and width."""
+"""Mouth pictures of the toy corpus: drawn lips of known opening and width."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from lipmotion.vision.mouth import EYE_DISTANCE_PX, HEIGHT, WIDTH
 SKIN, LIPS, INSIDE = (206.0, 160.0, 141.0), (172.0, 84.0, 88.0), (58.0, 24.0, 30.0)
 """Colours, RGB."""
 INNER_WIDTH = 0.8
-"""Width of the inner lips, in widths of the mouth."""
+"""Width of the inner lips, relative to the width of the mouth."""
 SHADE = 0.15
-"""The skin is darker by this share at the lower edge of the picture."""
+"""Share by which the skin is darker at the lower edge of the picture."""
 THINNEST_PX = 0.2
 
 
@@ -31,7 +31,7 @@ def toy_mouths(motion: Motion) -> NDArray[np.uint8]:
 
 
 def _ellipse(across: NDArray[np.float64], down: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return how much of each pixel lies in the middle ellipse [shape=(T, 56, 72)] of half axes [shape=(T, 1, 1)]."""
+    """Return the share of each pixel inside a centred ellipse [shape=(T, 56, 72)] of half axes [shape=(T, 1, 1)]."""
     x = np.arange(WIDTH)[None, None, :] + 0.5 - WIDTH / 2
     y = np.arange(HEIGHT)[None, :, None] + 0.5 - HEIGHT / 2
     across, down = np.maximum(across, THINNEST_PX), np.maximum(down, THINNEST_PX)

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from engines.synthetic import CHANNELS
-from engines.synthetic import examples as sentences
+from lipmotion.testing.examples import CHANNELS
+from lipmotion.testing.examples import examples as sentences
 from lipmotion.errors import CorpusError
 from lipmotion.experiments.baselines.regression import REACH, ContextRidge, LoudnessRegression, MeanPose
 from lipmotion.speech.mfcc import LOG_ENERGY

@@ -185,7 +185,7 @@ def test_every_set_of_the_table_is_known() -> None:
 
 
 def test_the_document_shows_the_figures_beside_it() -> None:
-    results = Path(__file__).parents[2] / "docs" / "results"
+    results = Path(__file__).parents[3] / "docs" / "results"
     figures = json.loads((results / "unit-sets.json").read_text(encoding="utf-8"))
     text = (results / "unit-sets.md").read_text(encoding="utf-8")
     assert f"```text\n{table(figures)}\n```" in text

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from engines.synthetic import examples
+from lipmotion.testing.examples import examples
 from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines.coupled.config import CoupledConfig
 from lipmotion.engines.coupled.engine import CoupledEngine

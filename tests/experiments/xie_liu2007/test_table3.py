@@ -261,7 +261,7 @@ def test_corpora_that_cannot_be_used(toy_corpus: Corpus, tmp_path: Path) -> None
 
 
 def test_the_document_shows_the_figures_beside_it() -> None:
-    results = Path(__file__).parents[2] / "docs" / "results"
+    results = Path(__file__).parents[3] / "docs" / "results"
     text = (results / "table3.md").read_text(encoding="utf-8")
     for name in ("table3", "table3-noise"):
         figures = json.loads((results / f"{name}.json").read_text(encoding="utf-8"))

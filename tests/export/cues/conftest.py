@@ -10,20 +10,20 @@ from lipmotion.types import Generation, Motion, Span, Timeline, Trace, Unit
 
 
 def timeline(phones: Sequence[tuple[str, float]]) -> Timeline[Unit]:
-    """Phones one after the other, each with its duration in seconds."""
+    """Return a timeline of phones, each with its duration in seconds."""
     ends = list(accumulate(duration_s for _, duration_s in phones))
     starts = [0.0, *ends[:-1]]
     return Timeline(tuple(Span(*times, Unit(phone)) for *times, (phone, _) in zip(starts, ends, phones, strict=True)))
 
 
 def result(units: Timeline[Unit], motion: Motion | None = None) -> Generation:
-    """A result with these phones; its motion is the toy face's, unless another is given."""
+    """Return a generation with these phones; its motion is that of the toy face, unless another is given."""
     motion = motion or toy_motion(units, 100.0)
     trace = Trace(("a",), np.zeros(len(motion.values), np.intp))
     return Generation(motion, np.ones_like(motion.values), units, trace)
 
 
 def spoken(text: str, duration_s: float = 0.1, silence_s: float = 0.3) -> Generation:
-    """Phones of equal length between silences, as the toy face says them."""
+    """Return a generation of phones of equal length between silences, with the motion of the toy face."""
     said = [(phone, duration_s) for phone in text.split()]
     return result(timeline([("sil", silence_s), *said, ("sil", silence_s)]))

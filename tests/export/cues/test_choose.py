@@ -28,7 +28,7 @@ def shapes(sheet: CueSheet) -> str:
 
 
 def is_seen(sheet: CueSheet, shape: str, start_s: float, end_s: float) -> bool:
-    """Whether a shape is seen in a phone, or one frame before or after it."""
+    """Return whether a shape is shown during a phone, or one frame before or after it."""
     reach_s = 1 / sheet.fps
     return any(
         cue.label == shape and cue.start_s < end_s + reach_s and cue.end_s > start_s - reach_s for cue in sheet.cues
@@ -36,7 +36,7 @@ def is_seen(sheet: CueSheet, shape: str, start_s: float, end_s: float) -> bool:
 
 
 def check(sheet: CueSheet, duration_s: float, hold: int) -> None:
-    """What holds for all cues: no gaps, no neighbours alike, the whole recording, the hold."""
+    """Check all cues: no gaps, no equal neighbours, the whole recording, the hold."""
     cues = sheet.cues.spans
     assert cues[0].start_s == 0
     assert duration_s - 0.0101 < cues[-1].end_s <= duration_s + 1e-9
@@ -68,9 +68,7 @@ def random_result(seed: int, phones: int, channels: str) -> Generation:
     optional=st.sampled_from(["GHX", "", "G", "HX"]),
     channels=st.sampled_from(["opening width", "opening", "width opening jaw", "jaw"]),
 )
-def test_whatever_is_said_and_moves(
-    seed: int, phones: int, fps: float, hold: int, optional: str, channels: str
-) -> None:
+def test_random_phones_and_motion(seed: int, phones: int, fps: float, hold: int, optional: str, channels: str) -> None:
     generation = random_result(seed, phones, channels)
     sheet = choose_cues(generation, fps, hold, optional)
     check(sheet, generation.units[-1].end_s, hold)
@@ -119,7 +117,7 @@ def test_where_no_phone_is_known_the_motion_decides_whether_lips_meet() -> None:
         ("l aa", "XHDX"),
     ],
 )
-def test_what_an_animator_would_draw(said: str, wanted: str) -> None:
+def test_shapes_of_words(said: str, wanted: str) -> None:
     assert shapes(choose_cues(spoken(said, 0.17))) == wanted
 
 
@@ -162,7 +160,7 @@ def test_a_shape_is_there_with_its_sound_or_a_frame_before() -> None:
 
 @pytest.mark.parametrize(("vowel", "wide", "narrow"), [("ah", "D", "C"), ("ix", "C", "B")])
 def test_the_mouth_opens_as_far_as_the_motion_does(vowel: str, wide: str, narrow: str) -> None:
-    """The phones are the same; the second vowel is said with a mouth that hardly opens."""
+    """The phones are the same; in the second vowel the mouth hardly opens."""
     generation = spoken(f"s {vowel} s {vowel} s", 0.2)
     values = generation.motion.values.copy()
     time_s = generation.motion.time_s

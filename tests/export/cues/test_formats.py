@@ -1,4 +1,4 @@
-"""Each format read by a small parser of our own that does what its consumers do."""
+"""Each format is read by a small parser that reads it as its consumers do."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def read_tsv(text: str) -> list[Row]:
 
 
 def read_json(text: str) -> list[Row]:
-    """As the Blender add-ons do."""
+    """Read it as the Blender add-ons do."""
     return [(cue["start"], cue["end"], cue["value"]) for cue in json.loads(text)["mouthCues"]]
 
 

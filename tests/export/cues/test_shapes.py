@@ -2,14 +2,22 @@ from __future__ import annotations
 
 import pytest
 
-from lipmotion.export.cues.shapes import ANY_SHAPE, ANY_OPEN, PHONE_SHAPES, OPTIONAL, SHAPES, drawn_shape, shapes_of_phone
+from lipmotion.export.cues.shapes import (
+    ANY_OPEN,
+    ANY_SHAPE,
+    OPTIONAL,
+    PHONE_SHAPES,
+    SHAPES,
+    drawn_shape,
+    shapes_of_phone,
+)
 from lipmotion.units import LIP_CLOSING, PHONES, VISEMES, is_silent
 
 BLAIR = "AI E O U FV L MBP WQ etc rest".split()
 """The names that OpenToonz knows."""
 
 
-def test_every_phone_but_h_has_a_look() -> None:
+def test_every_phone_but_h_has_shapes() -> None:
     assert set(PHONES) - set(PHONE_SHAPES) == {"hh"}
     assert set(PHONE_SHAPES) <= set(PHONES)
     assert shapes_of_phone("hh") == shapes_of_phone("a phone of another language") == ANY_OPEN

@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import pytest
 
-from lipmotion.export.cues.sheet import drawn_shapes, frame_count, cue_sheet, start_s
+from lipmotion.export.cues.sheet import cue_sheet, drawn_shapes, frame_count, start_s
 
 RATES = [1, 10, 12, 15, 23.976, 24, 25, 29.97, 30, 48, 50, 59.94, 60]
 
@@ -18,8 +18,8 @@ def test_times_in_hundredths_lead_back_to_their_frames(fps: float) -> None:
 
 
 @pytest.mark.parametrize("fps", [rate for rate in RATES if rate < 50])
-def test_who_rounds_gets_the_same_frames(fps: float) -> None:
-    """As the Blender add-ons do."""
+def test_rounding_gives_the_same_frames(fps: float) -> None:
+    """As in the Blender add-ons."""
     assert [round(fps * start_s(frame, fps)) for frame in range(5_000)] == list(range(5_000))
 
 

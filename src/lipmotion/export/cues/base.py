@@ -20,7 +20,7 @@ CUE_FORMATS: dict[str, Callable[[CueSheet, str], str]] = {
 
 
 def format_of(path: Path) -> str:
-    """Return the format that a file's suffix names. Raises ExportError: none."""
+    """Return the format of a file's suffix. Raises ExportError: no format has this suffix."""
     name = path.suffix.lower().removeprefix(".")
     if name not in CUE_FORMATS:
         known = " ".join(f".{known}" for known in CUE_FORMATS)
@@ -29,6 +29,6 @@ def format_of(path: Path) -> str:
 
 
 def write_cue_file(path: Path, sheet: CueSheet, sound_file: str, form: str) -> None:
-    """Write cues to a file, whole or not at all. Raises ExportError: the file cannot be written."""
+    """Write cues to a file; after a failure there is no partial file. Raises ExportError: it cannot be written."""
     with whole_file(path) as temporary:
         temporary.write_text(CUE_FORMATS[form](sheet, sound_file), encoding="utf-8", newline="\n")

@@ -1,4 +1,4 @@
-"""``dat``: switch data of Moho, which OpenToonz reads, too: frames and Preston Blair's names of the shapes."""
+"""``dat``: switch data of Moho, also read by OpenToonz: frames and Preston Blair's names of the shapes."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from lipmotion.export.cues.sheet import CueSheet
 
 
 def text(sheet: CueSheet, _sound_file: str) -> str:
-    """Return the file's text: the first frame is 1, the last line is the frame after the end, at rest."""
+    """Return the content of the file: the first frame is 1, the last line is the frame after the end, at rest."""
     frames = {1 + int(sheet.fps * cue.start_s): cue.label for cue in reversed(sheet.cues.spans)}
     end = max(1 + int(sheet.fps * sheet.duration_s), max(frames) + 1)
     rows = [*sorted(frames.items()), (end, sheet.rest)]

@@ -7,7 +7,7 @@ from lipmotion.storage.json_text import as_json
 
 
 def text(sheet: CueSheet, sound_file: str) -> str:
-    """Return the file's text: one line a cue, all of it ASCII."""
+    """Return the content of the file: one line per cue, in ASCII."""
     cues = ",\n".join(
         f'    {{ "start": {cue.start_s:.2f}, "end": {cue.end_s:.2f}, "value": "{cue.label}" }}' for cue in sheet.cues
     )

@@ -1,4 +1,4 @@
-"""``xml``: metadata and cues, each an element with its start and end."""
+"""``xml``: metadata, and one element per cue with its start and end."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from lipmotion.export.cues.sheet import CueSheet
 
 _NOT_XML = re.compile("[^\t\n\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 _CONTROL = re.compile("[\t\n\x7f]")
-"""Characters that XML 1.0 cannot say, in any spelling."""
+"""Characters that XML 1.0 cannot hold, and those that it would change."""
 
 
 def text(sheet: CueSheet, sound_file: str) -> str:
-    """Return the file's text, all of it ASCII; what XML cannot say of a file's name is written as in Python."""
-    name = _NOT_XML.sub(lambda found: found[0].encode("unicode_escape").decode(), sound_file)
-    name = _CONTROL.sub(lambda found: f"&#{ord(found[0])};", escape(name, quote=False))
+    """Return the content of the file, in ASCII; characters that XML cannot hold are escaped as in Python."""
+    name = _NOT_XML.sub(lambda match: match[0].encode("unicode_escape").decode(), sound_file)
+    name = _CONTROL.sub(lambda match: f"&#{ord(match[0])};", escape(name, quote=False))
     cues = "".join(
         f'    <mouthCue start="{cue.start_s:.2f}" end="{cue.end_s:.2f}">{cue.label}</mouthCue>\n' for cue in sheet.cues
     )

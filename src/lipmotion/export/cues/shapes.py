@@ -1,4 +1,4 @@
-"""The mouth shapes of 2D animation, and which of them each phone may look like.
+"""The mouth shapes of 2D animation, and the shapes that suit each phone.
 
 Nine drawings: six that every character has, A to F (they go back to Hanna-Barbera), and three that are optional.
 Letters, meanings, fallbacks and the other names are those of Rhubarb Lip Sync's documentation, so that characters
@@ -15,17 +15,17 @@ class MouthShape:
     """One drawing of the mouth.
 
     meaning  : what is drawn
-    opening  : between the lips on an average day, 0 shut, 1 as far as they go
-    spread   : of the mouth's corners, 1 a smile, -1 puckered
+    opening  : between the lips, 0 closed, 1 as wide as in speech
+    spread   : of the corners of the mouth, 1 a smile, -1 puckered
     blair    : its name among Preston Blair's shapes
-    fallback : the basic shape that takes its place where it is not drawn; empty: it is a basic shape
+    fallback : the basic shape that is shown where this one is not drawn; empty: it is a basic shape itself
     """
 
     meaning: str
     opening: float
     spread: float
     blair: str
-    drawn_shape: str = ""
+    fallback: str = ""
 
 
 SHAPES: dict[str, MouthShape] = {
@@ -45,11 +45,11 @@ REST = "X"
 
 @dataclass(frozen=True)
 class PhoneShapes:
-    """What one part of a phone looks like.
+    """The shapes that suit one part of a phone.
 
     share   : of the phone's duration
-    best    : shapes that show it as it should be
-    allowed : shapes that pass
+    best    : shapes that suit it best
+    allowed : shapes that are acceptable
     """
 
     share: float
@@ -80,18 +80,20 @@ _PHONE_SHAPES: tuple[tuple[str, tuple[PhoneShapes, ...]], ...] = (
     ("s z t d th dh", (PhoneShapes(1, "B", "CEF"),)),
     ("n en k g ng", (PhoneShapes(1, "B", "CEF"),)),
 )
-PHONE_SHAPES: dict[str, tuple[PhoneShapes, ...]] = {phone: looks for phones, looks in _PHONE_SHAPES for phone in phones.split()}
+PHONE_SHAPES: dict[str, tuple[PhoneShapes, ...]] = {
+    phone: looks for phones, looks in _PHONE_SHAPES for phone in phones.split()
+}
 ANY_OPEN: tuple[PhoneShapes, ...] = (PhoneShapes(1, "BCDEF"),)
-"""hh, and phones of another inventory: the motion alone decides."""
+"""For hh and phones of another inventory: the motion alone decides, the lips stay open."""
 ANY_SHAPE: tuple[PhoneShapes, ...] = (PhoneShapes(1, "ABCDEF"),)
-"""Speech of which no phone is known: the motion alone decides whether the lips are open, too."""
+"""For speech without known phones: the motion alone decides, also whether the lips are open."""
 
 
 def shapes_of_phone(phone: str) -> tuple[PhoneShapes, ...]:
-    """Return what a phone (empty: an unknown one) looks like, part by part."""
+    """Return the shapes that suit each part of a phone; an empty text stands for an unknown phone."""
     return PHONE_SHAPES.get(phone, ANY_OPEN) if phone else ANY_SHAPE
 
 
 def drawn_shape(shape: str, drawn: str) -> str:
-    """Return the shape itself if it is drawn, else the one that takes its place."""
+    """Return the shape itself if it is drawn, else its fallback."""
     return shape if shape in drawn else SHAPES[shape].fallback

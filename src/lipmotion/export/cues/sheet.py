@@ -1,4 +1,4 @@
-"""Cues: which shape the mouth has from when to when."""
+"""Cue sheets: the mouth shape of every span of time."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class CueSheet:
 
     @property
     def rest(self) -> str:
-        """The mouth before and after speech."""
+        """The shape before and after speech."""
         return drawn_shape(REST, self.drawn)
 
     @property
@@ -36,22 +36,22 @@ class CueSheet:
 
 
 def drawn_shapes(optional: str) -> str:
-    """Return the basic shapes and these optional ones."""
+    """Return the basic shapes and the given optional ones."""
     return "".join(name for name, shape in SHAPES.items() if not shape.fallback or name in optional)
 
 
 def start_s(frame: int, fps: float) -> float:
     """Return the first hundredth of a second in which a frame is shown.
 
-    Rounded up, not to the nearest: who computes ``int(fps * start)``, as Rhubarb and Moho's files do, gets the
-    frame back. Frame 1 at 24 a second, 0.0417 s, is 0.05 s; rounded to 0.04 s it would be in frame 0.
+    Rounded up, so that ``int(fps * start)``, which readers of Rhubarb's and Moho's files compute, is the frame again.
+    Frame 1 at 24 fps, 0.0417 s, becomes 0.05 s; rounded to 0.04 s it would be in frame 0.
     """
     hundredths = int(np.ceil(frame / fps * 100 - 1e-6))
     return (hundredths + (int(fps * (hundredths / 100)) < frame)) / 100
 
 
 def frame_count(duration_s: float, fps: float) -> int:
-    """Return how many frames begin before the end, which is cut to hundredths of a second."""
+    """Return the number of frames that begin before the end, which is cut to hundredths of a second."""
     end_s = whole_hundredths(duration_s)
     frames = int(np.ceil(end_s * fps))
     while frames and start_s(frames - 1, fps) >= end_s:
@@ -65,7 +65,7 @@ def whole_hundredths(duration_s: float) -> float:
 
 
 def cue_sheet(segments: Sequence[tuple[int, str]], duration_s: float, fps: float, drawn: str) -> CueSheet:
-    """Return the cue sheet of segments (first frame, shape); without any, the mouth is at rest."""
+    """Return the cue sheet of segments (first frame, shape); without segments, the mouth is at rest."""
     starts = [start_s(frame, fps) for frame, _ in segments] or [0.0]
     shapes = [shape for _, shape in segments] or [drawn_shape(REST, drawn)]
     ends = [*starts[1:], whole_hundredths(duration_s)]

@@ -1,4 +1,4 @@
-"""What every motion file says besides its values, and what must hold for it to be read."""
+"""The document of a motion file: everything besides the values, and the checks when it is read."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ VERSION = 1
 
 
 def header(generation: Generation) -> dict[str, Any]:
-    """Return format, version, rate and channels."""
+    """Return the members ``format``, ``version``, ``rate_hz`` and ``channels``."""
     motion = generation.motion
     return {
         "format": FORMAT,
@@ -27,7 +27,7 @@ def header(generation: Generation) -> dict[str, Any]:
 
 
 def labels(generation: Generation, source: Mapping[str, str], model: Mapping[str, str]) -> dict[str, Any]:
-    """Return units, source and model."""
+    """Return the members ``units``, ``source`` and ``model``."""
     units = [
         {"start_s": span.start_s, "end_s": span.end_s, "phone": span.label.phone, "unit": span.label.unit}
         for span in generation.units
@@ -36,9 +36,9 @@ def labels(generation: Generation, source: Mapping[str, str], model: Mapping[str
 
 
 def parse(document: Any, values: Any) -> tuple[Motion, Timeline[Unit]]:
-    """Return what a document and its values describe.
+    """Return the motion and the units of a document and its values.
 
-    Raises InputError: not a motion document, a version from the future, or parts that are missing or do not fit.
+    Raises InputError: not a motion document, a newer version, or members that are missing or do not fit.
     """
     _check(document)
     try:

@@ -1,4 +1,4 @@
-"""A JSON object whose lists are read item by item: rows of numbers take no more room than an array."""
+"""Reading a JSON object item by item: rows of numbers need no more memory than an array."""
 
 from __future__ import annotations
 
@@ -12,41 +12,41 @@ import numpy as np
 from numpy.typing import NDArray
 
 MOST_ITEMS = 1 << 20
-"""Items of a list that is not rows of numbers."""
+"""Most items of a list that is not rows of numbers."""
 MOST_ROWS = 1 << 22
-"""Rows of numbers: eleven hours of frames of 10 ms."""
+"""Most rows of numbers: eleven hours of frames of 10 ms."""
 _BLANK = re.compile(r"[ \t\n\r]*")
 _DECODER = json.JSONDecoder()
 
 
 def members(text: str, rows_of: str) -> dict[str, Any]:
-    """Return the members of an object; a list called ``rows_of`` as an array of numbers [shape=(T, P)].
+    """Return the members of a JSON object; the list called ``rows_of`` becomes an array of numbers [shape=(T, P)].
 
     Raises json.JSONDecodeError, RecursionError: not one object.
     Raises ValueError, TypeError, OverflowError: a list that is too long, or rows that are uneven or no numbers.
     """
-    found: dict[str, Any] = {}
+    members_by_name: dict[str, Any] = {}
 
     def member(at: int) -> int:
         key, at = _DECODER.raw_decode(text, at)
         at = _next(text, _passed(text, _next(text, at), ":"))
         is_list = text[at : at + 1] == "["
         if is_list and key == rows_of:
-            found[key], at = _rows(text, at)
+            members_by_name[key], at = _rows(text, at)
         elif is_list:
-            found[key], at = _items(text, at)
+            members_by_name[key], at = _items(text, at)
         else:
-            found[key], at = _DECODER.raw_decode(text, at)
+            members_by_name[key], at = _DECODER.raw_decode(text, at)
         return at
 
     end = _next(text, _each(text, _next(text, 0), "{}", member))
     if end < len(text):
         raise json.JSONDecodeError("Extra data", text, end)
-    return found
+    return members_by_name
 
 
 def _items(text: str, at: int) -> tuple[list[Any], int]:
-    """Return the items of a list, and where it ends."""
+    """Return the items of a list, and the position of its end."""
     items: list[Any] = []
 
     def item(at: int) -> int:
@@ -60,7 +60,7 @@ def _items(text: str, at: int) -> tuple[list[Any], int]:
 
 
 def _rows(text: str, at: int) -> tuple[NDArray[np.float64], int]:
-    """Return the rows of a list of lists of numbers, and where it ends."""
+    """Return the rows of a list of lists of numbers [shape=(T, P)], and the position of its end."""
     numbers = array("d")
     widths = array("q")
 
@@ -82,7 +82,7 @@ def _rows(text: str, at: int) -> tuple[NDArray[np.float64], int]:
 
 
 def _each(text: str, at: int, brackets: str, take: Callable[[int], int]) -> int:
-    """Let ``take`` read all that stands between brackets, parted by commas; return where the brackets end."""
+    """Let ``take`` read each item between brackets; return the position after the closing bracket."""
     at = _next(text, _passed(text, at, brackets[0]))
     if text[at : at + 1] == brackets[1]:
         return at + 1
@@ -94,12 +94,13 @@ def _each(text: str, at: int, brackets: str, take: Callable[[int], int]) -> int:
 
 
 def _next(text: str, at: int) -> int:
-    """Return where the next character stands that is no blank."""
+    """Return the position of the next character that is not blank."""
     match = _BLANK.match(text, at)
     return match.end() if match else at
 
 
 def _passed(text: str, at: int, character: str) -> int:
+    """Return the position after a required character. Raises JSONDecodeError: another character is there."""
     if text[at : at + 1] != character:
         raise json.JSONDecodeError(f"Expecting {character!r}", text, at)
     return at + 1

@@ -1,4 +1,4 @@
-"""Many numbers as text, fast."""
+"""Fast formatting of many numbers as text."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ DECIMALS = 5
 
 
 BLOCK = 2000
-"""Rows formatted at a time: as text, an hour of all channels would fill the memory."""
+"""Rows that are formatted at a time: the text of an hour of all channels would not fit in memory."""
 
 
 def rows(values: NDArray[np.floating[Any]]) -> Iterator[str]:
-    """Give each row of values [shape=(T, P)] as text, numbers parted by commas, rounded to ``DECIMALS``.
+    """Yield each row of values [shape=(T, P)] as text: numbers with commas between them, rounded to ``DECIMALS``.
 
-    Raises ExportError: one that is not finite.
-    Cost: one formatting call a row, a fifth of a microsecond a number; half of what ``json.dumps`` takes.
+    Raises ExportError: a value is not finite.
+    Cost: one formatting call per row, a fifth of a microsecond per number; half the time of ``json.dumps``.
     """
     form = ",".join([f"%.{DECIMALS}f"] * values.shape[1])
     for start in range(0, len(values), BLOCK):

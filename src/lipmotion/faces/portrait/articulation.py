@@ -1,4 +1,4 @@
-"""What the phones add that lip measures do not show: the lip on the teeth, the tip of the tongue."""
+"""Articulatory gestures that follow from the phones, not from lip motion: lip on the teeth, tip of the tongue."""
 
 from __future__ import annotations
 
@@ -15,15 +15,18 @@ BLEND_S = 0.06
 TUCKS: Mapping[str, float] = {"f": 1.0, "v": 1.0}
 """The lower lip touches the upper teeth."""
 CLOSURES: Mapping[str, float] = dict.fromkeys(LIP_CLOSING, 1.0)
-"""The lips touch; a tuck next to one of these is over before it begins."""
+"""The lips touch; a tuck next to one of these ends before it begins."""
 TIP_RAISES: Mapping[str, float] = {"th": 1.0, "dh": 1.0, "l": 0.8, "el": 0.8, "t": 0.4, "d": 0.4, "n": 0.4, "en": 0.4}
-"""The tip of the tongue: between the teeth, or behind the upper ones, where less of it shows."""
+"""The tip of the tongue is between the teeth, or behind the upper ones, where less of it is visible."""
 
 
-def gesture_weight(units: Timeline[Unit], strengths: Mapping[str, float], time_s: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return how far a gesture is made at each time, 0..1 [shape=(T,)].
+def gesture_weight(
+    units: Timeline[Unit], strengths: Mapping[str, float], time_s: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the weight of a gesture at each time, 0..1 [shape=(T,)].
 
-    Neighbouring phones of the same gesture run together: their slopes add up to 1.
+    strengths : of the gesture, by phone
+    Between neighbouring phones of the same gesture the weight stays the same: their slopes add up to 1.
     """
     total = np.zeros(len(time_s))
     for span in units:
@@ -34,7 +37,7 @@ def gesture_weight(units: Timeline[Unit], strengths: Mapping[str, float], time_s
 
 
 def _risen(after_s: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return a smooth step from 0 to 1, half way at 0 seconds."""
+    """Return a smooth step from 0 to 1 that is 0.5 at 0 seconds."""
     share = np.clip(after_s / BLEND_S + 0.5, 0, 1)
     rise: NDArray[np.float64] = share * share * (3 - 2 * share)
     return rise

@@ -1,7 +1,7 @@
-"""Paint what lies between two heights over the columns of a picture: exact cover, no supersampled bitmap.
+"""Painting between two heights over the columns of a picture, with exact coverage and without a supersampled bitmap.
 
-Heights are sampled at ``COLUMNS`` columns a pixel [shape=(COLUMNS, W)]; along each of them the covered
-part of a pixel is exact. A shape that changes with every frame costs its own few pixels only.
+Heights are sampled at ``COLUMNS`` columns per pixel [shape=(COLUMNS, W)]; along each of them the covered
+part of a pixel is exact. The cost is that of the painted pixels only.
 """
 
 from __future__ import annotations
@@ -18,8 +18,9 @@ class Bands:
     """A picture to paint bands on, in place.
 
     picture : float array [shape=(H, W, 3)], 0..255
-    x       : of the pixel centres [shape=(W,)]
-    y       : of the pixel centres [shape=(H, 1)]
+    x       : positions of the pixel centres [shape=(W,)]
+    y       : positions of the pixel centres [shape=(H, 1)]
+    pixel   : size of a pixel
     """
 
     def __init__(self, picture: Pixels, x: Pixels, y: Pixels, pixel: float) -> None:
@@ -27,11 +28,11 @@ class Bands:
 
     @classmethod
     def of(cls, picture: Pixels, window: Window) -> Bands:
-        """Return the bands' canvas for the pixels of a window."""
+        """Return the canvas for the pixels of a window."""
         return cls(picture, window.columns(), window.rows()[:, None], 1 / window.view.scale)
 
     def between(self, top: float, bottom: float) -> Bands:
-        """Return the rows that touch the heights ``top`` to ``bottom``; painting there paints here."""
+        """Return the canvas of the rows between two heights; it shares its pixels with this one."""
         first, last = np.searchsorted(self.y[:, 0], (top - self.pixel, bottom + self.pixel))
         return Bands(self.picture[first:last], self.x, self.y[first:last], self.pixel)
 
@@ -47,13 +48,13 @@ class Bands:
         self.blend(lower.sum(axis=0) * (opacity / COLUMNS), colour)
 
     def blend(self, cover: Pixels, colour: Colour | Pixels) -> None:
-        """Mix a colour into every pixel by its cover, 0..1 [shape=(H, W)]."""
+        """Mix a colour into every pixel by its coverage, 0..1 [shape=(H, W)]."""
         difference = np.asarray(colour, dtype=np.float32) - self.picture
         difference *= cover[..., None]
         self.picture += difference
 
     def depth(self, top: Pixels, bottom: Pixels) -> Pixels:
-        """Return how far down between two heights every pixel lies, 0..1 [shape=(H, W)]."""
+        """Return the position of every pixel between two heights, 0 at the top, 1 at the bottom [shape=(H, W)]."""
         first, last = top.mean(axis=0), bottom.mean(axis=0)
         share: Pixels = np.clip((self.y - first) / np.maximum(last - first, self.pixel), 0, 1)
         return share

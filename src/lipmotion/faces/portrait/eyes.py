@@ -1,4 +1,4 @@
-"""The eyes, and when they blink."""
+"""The eyes, and the times at which they blink."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from lipmotion.faces.portrait.outlines import Points, ellipse, mirrored, open_cu
 from lipmotion.faces.portrait.view import Window
 
 BLINK_S = 0.2
-"""From the first movement of the lids to their rest."""
+"""Duration of a blink."""
 CENTRE_X, CENTRE_Y = 0.345, -0.014
 LOWER_LID = ((0.175, 0.035), (0.26, 0.075), (0.37, 0.088), (0.465, 0.05), (0.51, -0.01))
 UPPER_LID = ((0.175, 0.035), (0.245, -0.062), (0.35, -0.106), (0.455, -0.082), (0.51, -0.01))
 
 
 def lid_closure(time_s: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return how far the eyes are shut at each time, 0..1 [shape=(T,)].
+    """Return how far the eyes are closed at each time, 0..1 [shape=(T,)].
 
-    Always at the same times, about 2.9 to 4.5 s apart; the lids fall faster than they rise.
+    Blinks are always at the same times, about 2.9 to 4.5 s apart; the lids fall faster than they rise.
     """
     number = np.arange(1, int(np.max(time_s, initial=0) / 2.8) + 3)
     blink_s = 3.7 * number - 1.6 + 0.45 * np.sin(2.4 * number)
@@ -30,7 +30,10 @@ def lid_closure(time_s: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def paint_eyes(window: Window, shut: float) -> Layer:
-    """Return both eyes, shut so far (0..1)."""
+    """Return a layer with both eyes.
+
+    shut : how far they are closed, 0..1
+    """
     layer = Layer(window)
     for side in (1, -1):
         _lids(layer, shut, side)

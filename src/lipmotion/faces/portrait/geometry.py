@@ -1,7 +1,7 @@
-"""The mouth's outlines for one pose, as heights over columns.
+"""Outlines of the mouth for one pose, as heights over columns.
 
-Every outline is a function y(x), built outwards from the line where the lips meet, so that they
-cannot cross: lips enclose the opening, teeth and tongue stay inside it. Eye distances, y down.
+Every outline is a function y(x), constructed outwards from the line where the lips meet, so that outlines
+cannot cross: lips enclose the opening, teeth and tongue stay inside it. Unit: eye distances, y downwards.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ UPPER_LIP, LOWER_LIP = 0.085, 0.135
 TEETH_EDGE = 0.028
 """The upper incisors end this far below the line of the closed lips; they belong to the skull."""
 LOWER_TEETH_EDGE = 0.01
-"""The lower incisors begin here when the jaw is shut, behind the upper ones; they go with the jaw."""
+"""The lower incisors begin here when the jaw is closed, behind the upper ones; they move with the jaw."""
 
 _LINE = [(0, 0.007), (0.14, 0.004), (0.38, -0.004), (0.7, -0.015), (1, -0.036)]
 _CUPIDS_BOW = [(0, 0.82), (0.08, 0.87), (0.22, 1.0), (0.36, 0.94), (0.62, 0.66), (0.85, 0.29), (1, 0)]
@@ -58,7 +58,7 @@ class MouthInterior:
 
 
 def lip_outlines(pose: MouthPose, x: Pixels) -> LipOutlines:
-    """Return the lips of a pose over the columns ``x`` [shape=(C, ...)]."""
+    """Return the outlines of the lips of a pose over the columns ``x`` [shape=(C, ...)]."""
     half_width = HALF_WIDTH * pose.width
     u = np.minimum(np.abs(x) / half_width, 1)
     round_ = roundness(pose)
@@ -84,17 +84,20 @@ def lip_outlines(pose: MouthPose, x: Pixels) -> LipOutlines:
     )
 
 
-def mouth_interior(pose: MouthPose, x: Pixels, around: LipOutlines) -> MouthInterior:
-    """Return what shows between the lips of a pose over the columns ``x`` [shape=(C, ...)]."""
+def mouth_interior(pose: MouthPose, x: Pixels, outlines: LipOutlines) -> MouthInterior:
+    """Return teeth and tongue of a pose between the lips, over the columns ``x`` [shape=(C, ...)].
+
+    outlines : of the lips of this pose
+    """
     upper = LINE_Y + TEETH_EDGE - 0.03 * roundness(pose) - 0.5 * x * x
     lower = LINE_Y + LOWER_TEETH_EDGE + pose.jaw + 0.25 * x * x
     top, bottom = _tongue(pose, x)
     heights = (upper, lower, top, np.maximum(top, bottom))
-    return MouthInterior(*(np.clip(height, around.upper_inner, around.lower_inner) for height in heights))
+    return MouthInterior(*(np.clip(height, outlines.upper_inner, outlines.lower_inner) for height in heights))
 
 
 def roundness(pose: MouthPose) -> float:
-    """Return how rounded the lips are, 0..1: 1 when drawn in to 70 % of their rest width."""
+    """Return how rounded the lips are, 0..1: 1 at 70 % of their rest width."""
     return min(max((0.97 - pose.width) / 0.27, 0), 1)
 
 
@@ -113,12 +116,12 @@ def _arch(u: Pixels, power: float) -> Pixels:
 
 
 def _inner_width(gap: float, round_: float) -> float:
-    """Return the share of the mouth's width along which the lips part: more of it the wider they open."""
+    """Return the share of the mouth's width along which the lips are apart; it grows with the gap."""
     return (0.74 + 0.18 * min(gap / 0.12, 1)) * (1 - 0.32 * round_)
 
 
 def _tongue(pose: MouthPose, x: Pixels) -> tuple[Pixels, Pixels]:
-    """Return top and bottom of what shows of the tongue: its back behind the lower teeth, or its tip between both."""
+    """Return top and bottom of the visible tongue: its back behind the lower teeth, or its tip between the teeth."""
     teeth = LINE_Y + LOWER_TEETH_EDGE + pose.jaw
     upper_teeth = LINE_Y + TEETH_EDGE
     back = max(teeth - min(0.08, 0.32 * pose.gap), upper_teeth)

@@ -13,7 +13,7 @@ HEAD: Points = symmetric(
 
 
 def paint_head(window: Window) -> Layer:
-    """Return the bald head without eyes and mouth."""
+    """Return a layer with the bald head without eyes and mouth."""
     layer = Layer(window)
     layer.fill(HEAD, palette.SKIN, Rim(0.16, palette.SKIN_SHADE, 0.62), *_light_and_shade())
     _nose(layer)

@@ -1,4 +1,4 @@
-"""A transparent sheet to paint smooth shapes on. Used once per picture; nothing here runs per frame."""
+"""A transparent layer on which smooth shapes are painted. Used once per face; nothing here runs per frame."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Rim:
 
 
 class Layer:
-    """The pixels of a window: premultiplied colour 0..255 and cover 0..1 [shape=(h, w, 4)]."""
+    """The pixels of a window: premultiplied colour 0..255 and coverage 0..1 [shape=(h, w, 4)]."""
 
     def __init__(self, window: Window) -> None:
         self.window = window
@@ -75,11 +75,12 @@ class Layer:
         self.pixels *= 1 - _mask(self.window, outline)[..., None]
 
     def over(self, below: Pixels) -> Pixels:
-        """Return this layer upon opaque pixels [shape=(h, w, 3)]."""
+        """Return the pixels [shape=(h, w, 3)] with this layer over them."""
         return below * (1 - self.pixels[..., 3:]) + self.pixels[..., :3]
 
 
 def _strength(window: Window, shade: Glow | Rim, outline: Points) -> Pixels:
+    """Return the weight of a shade in every pixel, 0..1 [shape=(h, w)]."""
     if isinstance(shade, Rim):
         return shade.strength * (1 - _mask(window, outline, shade.radius))
     x = (window.columns() - shade.x) / shade.radius_x
@@ -88,7 +89,7 @@ def _strength(window: Window, shade: Glow | Rim, outline: Points) -> Pixels:
 
 
 def _mask(window: Window, outline: Points, blur: float = 0) -> Pixels:
-    """Return how much of every pixel the outline covers, 0..1 [shape=(h, w)]."""
+    """Return the share of every pixel that is inside the outline, 0..1 [shape=(h, w)]."""
     from PIL import Image, ImageDraw, ImageFilter
 
     points = outline * window.view.scale + window.view.origin - (window.x0, window.y0)

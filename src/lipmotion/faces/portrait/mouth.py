@@ -1,4 +1,4 @@
-"""Paint the mouth of one pose. Runs for every frame."""
+"""Painting of the mouth of one pose. Runs for every frame."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from lipmotion.faces.portrait import palette
 from lipmotion.faces.portrait.bands import COLUMNS, Bands
-from lipmotion.faces.portrait.geometry import MouthInterior, LipOutlines, mouth_interior, lip_outlines, roundness
+from lipmotion.faces.portrait.geometry import LipOutlines, MouthInterior, lip_outlines, mouth_interior, roundness
 from lipmotion.faces.portrait.palette import Colour
 from lipmotion.faces.portrait.pose import MouthPose
 from lipmotion.faces.portrait.view import Pixels, Window
@@ -17,7 +17,7 @@ LOWER_TOOTH_GAPS = (0.0, 0.034, 0.068, 0.105)
 
 
 def paint_mouth(picture: Pixels, window: Window, pose: MouthPose) -> None:
-    """Paint a pose on the pixels of a window [shape=(h, w, 3)], in place."""
+    """Paint the mouth of a pose into the pixels of a window [shape=(h, w, 3)], in place."""
     x = window.columns(COLUMNS).reshape(-1, COLUMNS).T
     shape = lip_outlines(pose, x)
     face = Bands.of(picture, window).between(float(shape.upper_outer.min()), float(shape.lower_outer.max()) + 0.12)
@@ -69,7 +69,7 @@ def _teeth_and_tongue(face: Bands, shape: LipOutlines, within: MouthInterior, po
 
 
 def _lines(hole: Bands, distances: tuple[float, ...]) -> Pixels:
-    """Return thin vertical lines at these distances on both sides, 0..1 [shape=(W,)]."""
+    """Return the coverage by thin vertical lines at these distances on both sides, 0..1 [shape=(W,)]."""
     away = np.abs(np.abs(hole.x) - np.array(distances, dtype=np.float32)[:, None]).min(axis=0)
     return np.exp(-((away / max(0.0035, 0.6 * hole.pixel)) ** 2))
 

@@ -1,6 +1,6 @@
-"""Smooth outlines from few points: chains of cubic Bézier curves, as arrays of points [shape=(N, 2)].
+"""Smooth outlines through few points: sequences of cubic Bézier curves, as arrays of points [shape=(N, 2)].
 
-A path names the points that a curve goes through: pairs of numbers, or the same as text, ``"x y, x y, ..."``.
+A path is the list of points that a curve goes through: pairs of numbers, or a text ``"x y, x y, ..."``.
 """
 
 from __future__ import annotations
@@ -18,20 +18,20 @@ STEPS = 16
 
 
 def path_points(path: Path) -> Points:
-    """Return the points of a path themselves: as an outline, a polygon."""
+    """Return the points of a path [shape=(N, 2)]: the corners of a polygon."""
     pairs = [pair.split() for pair in path.split(",")] if isinstance(path, str) else path
     return np.array(pairs, dtype=np.float64)
 
 
 def closed_curve(path: Path) -> Points:
-    """Return the smooth closed curve through a path."""
+    """Return the smooth closed curve through the points of a path."""
     start = path_points(path)
     before, end, beyond = (np.roll(start, shift, axis=0) for shift in (1, -1, -2))
     return _chain(start, before, end, beyond)
 
 
 def open_curve(path: Path) -> Points:
-    """Return the smooth curve through a path, from its first point to its last."""
+    """Return the smooth curve through the points of a path, from the first to the last."""
     points = path_points(path)
     before = np.vstack([2 * points[0] - points[1], points[:-2]])
     beyond = np.vstack([points[2:], 2 * points[-1] - points[-2]])
@@ -48,7 +48,7 @@ def symmetric(path: Path) -> Points:
 
 
 def stroke(line: Points, widths: Sequence[float]) -> Points:
-    """Return the outline of a line [shape=(N, 2)]; ``widths`` are spread evenly along it."""
+    """Return the outline of a stroke along a line [shape=(N, 2)], with ``widths`` at even distances along it."""
     along = np.gradient(line, axis=0)
     normal = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.maximum(np.hypot(*along.T), 1e-9)[:, None]
     share = np.linspace(0, len(widths) - 1, len(line))
@@ -63,7 +63,7 @@ def ellipse(x: float, y: float, radius_x: float, radius_y: float) -> Points:
 
 
 def mirrored(points: Points) -> Points:
-    """Return the same outline on the other side of the face."""
+    """Return the outline mirrored to the other side of the face."""
     return points * np.array([-1.0, 1.0])
 
 
@@ -73,7 +73,7 @@ def both_sides(right: Points) -> tuple[Points, Points]:
 
 
 def lowered(points: Points, distance: float) -> Points:
-    """Return the same outline further down."""
+    """Return the outline moved down by a distance."""
     return points + np.array([0.0, distance])
 
 

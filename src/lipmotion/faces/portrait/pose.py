@@ -1,4 +1,4 @@
-"""Motion and phones → one mouth pose a video frame. Pure numpy; lengths in eye distances."""
+"""Mouth poses of video frames from motion and phones. Lengths are in eye distances."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from lipmotion.units import is_silent
 Curve = NDArray[np.float64]
 
 CLOSED_BELOW = 0.012
-"""Tracked lips that touch still read up to this much; narrower than this is drawn shut."""
+"""Tracked lips that touch have openings up to this; smaller openings are drawn closed."""
 FAITHFUL_ABOVE = 0.03
-"""From here on the drawn gap equals the opening; in between it catches up."""
+"""From here on the drawn gap equals the opening; between the two limits it rises linearly."""
 WIDEST = 0.4
-"""No mouth is drawn open further than this; speech stays below 0.35."""
+"""Largest drawn gap; openings of speech stay below 0.35."""
 WIDTH_GAIN, WIDTH_REACH = 1.5, 0.3
-"""A drawing needs broader strokes: small departures from the rest width are drawn larger, none beyond the reach."""
+"""Changes of width are exaggerated: small ones by the factor, none beyond the reach."""
 TUCKED_GAP = (0.03, 0.055)
-"""Between the upper lip and a lower lip on the teeth: enough to show them."""
+"""Range of the gap while the lower lip is on the teeth: enough to show them."""
 DRAWN = ("opening", "width", "outer", "y_152")
 """The channels that are drawn."""
 
@@ -31,12 +31,12 @@ DRAWN = ("opening", "width", "outer", "y_152")
 class MouthPose(NamedTuple):
     """The mouth in one frame.
 
-    gap      : between the inner lips, eye distances; 0 means that they touch
-    width    : corner to corner, 1 = the character at rest
-    fullness : thickness of the lips, 1 = at rest
-    jaw      : how far the chin has dropped, eye distances
-    tuck     : 0..1, the lower lip drawn in against the upper teeth (f v)
-    tip      : 0..1, the tip of the tongue raised to the upper teeth (th dh l; less for t d n)
+    gap      : distance of the inner lips, in eye distances; 0: they touch
+    width    : distance of the lip corners relative to the rest pose
+    fullness : thickness of the lips relative to the rest pose
+    jaw      : drop of the chin, in eye distances
+    tuck     : 0..1, how far the lower lip is against the upper teeth (f v)
+    tip      : 0..1, how far the tip of the tongue is raised to the upper teeth (th dh l; less for t d n)
     """
 
     gap: float
@@ -50,7 +50,7 @@ class MouthPose(NamedTuple):
 def mouth_poses(motion: Motion, units: Timeline[Unit], fps: float) -> list[MouthPose]:
     """Return the pose of every video frame, frame n at ``n / fps`` seconds, to the end of the motion.
 
-    Lips that close between two video frames are shown closed in the nearer one.
+    Lips that close between two video frames are drawn closed in the nearer one.
     Raises InputError: no channel ``opening``, no frames, a value that is not finite, or fps not positive.
     """
     _check(motion, fps)
@@ -71,13 +71,13 @@ def mouth_poses(motion: Motion, units: Timeline[Unit], fps: float) -> list[Mouth
 
 
 def drawn_gap(opening: Curve) -> Curve:
-    """Return the gap to draw for a measured opening [shape=(T,)]: truly 0 where the lips touch."""
-    catching_up = (opening - CLOSED_BELOW) * (FAITHFUL_ABOVE / (FAITHFUL_ABOVE - CLOSED_BELOW))
-    return np.clip(np.minimum(opening, catching_up), 0, WIDEST)
+    """Return the gap to draw for a measured opening [shape=(T,)]; exactly 0 where the lips touch."""
+    rising = (opening - CLOSED_BELOW) * (FAITHFUL_ABOVE / (FAITHFUL_ABOVE - CLOSED_BELOW))
+    return np.clip(np.minimum(opening, rising), 0, WIDEST)
 
 
 def upper_share(gap: Curve | float) -> Curve:
-    """Return how far the upper lip rises for a gap; it stops at about 5 mm, the rest is the jaw's.
+    """Return how far the upper lip rises for a gap: at most about 5 mm; the rest of the gap is the lower lip's.
 
     Near 0 the share is 0.3, as tracked on GRID speaker 1.
     """
@@ -85,7 +85,7 @@ def upper_share(gap: Curve | float) -> Curve:
 
 
 def jaw_drop(gap: Curve | float) -> Curve:
-    """Return how far the chin drops for a gap: a little less than the lower lip, which also rolls out."""
+    """Return how far the chin drops for a gap: a little less than the lower lip, which also turns outwards."""
     return 0.85 * (np.asarray(gap) - upper_share(gap))
 
 
@@ -110,14 +110,14 @@ def _at(motion: Motion, curve: Curve, time_s: Curve) -> Curve:
 
 def _gap(motion: Motion, time_s: Curve, fps: float) -> Curve:
     gap = drawn_gap(motion["opening"].astype(float))
-    then = _at(motion, gap, time_s)
+    gap_at_frames = _at(motion, gap, time_s)
     nearest = np.rint(motion.time_s[gap == 0] * fps).astype(int)
-    then[nearest[nearest < len(then)]] = 0
-    return then
+    gap_at_frames[nearest[nearest < len(gap_at_frames)]] = 0
+    return gap_at_frames
 
 
 def _rest_frames(motion: Motion, units: Timeline[Unit]) -> NDArray[np.bool_]:
-    """Return where the mouth rests: in silence, or else the tenth of the frames that is most closed."""
+    """Return the frames of the rest pose [shape=(T,)]: silence, or else the tenth of the frames that is most closed."""
     time_s = motion.time_s
     rest = np.zeros(len(time_s), dtype=bool)
     for span in units:
@@ -131,7 +131,7 @@ def _rest_frames(motion: Motion, units: Timeline[Unit]) -> NDArray[np.bool_]:
 
 
 def _against_rest(name: str, curve: Curve, rest: NDArray[np.bool_]) -> Curve:
-    """Return the curve in units of its value at rest."""
+    """Return the curve relative to its median at rest."""
     value = float(np.median(curve[rest]))
     if not value > 0:
         raise InputError(f"the {name} is {value:g} at rest, required more than 0")
@@ -153,7 +153,7 @@ def _fullness(motion: Motion, rest: NDArray[np.bool_]) -> Curve:
 
 
 def _jaw(motion: Motion, rest: NDArray[np.bool_], gap: Curve, time_s: Curve) -> Curve:
-    """Return how far the chin drops: as tracked (point 152, y up), as far as that suits the gap."""
+    """Return how far the chin drops: as tracked (point 152, y upwards), within limits that suit the gap."""
     usual = jaw_drop(gap)
     if "y_152" not in motion.names:
         return usual

@@ -1,4 +1,4 @@
-"""Poses → pictures. The portrait is painted once; a frame repaints the jaw, the mouth and the eyes that moved."""
+"""Pictures of poses. The portrait is painted once; for each frame only jaw, mouth and eyes are painted again."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from lipmotion.faces.portrait.pose import MouthPose
 from lipmotion.faces.portrait.view import Pixels, View
 
 JAW_TOP, CHIN = 0.66, 1.3
-"""Between these heights the skin stretches when the jaw drops; below it moves with the chin."""
+"""Between these heights the skin is stretched when the jaw drops; below, it moves with the chin."""
 LID_POSITIONS = 12
 
 
 class Rasteriser:
-    """Draws the character at one size."""
+    """Draws the face at one size."""
 
     def __init__(self, size: int) -> None:
         view = View(size)
@@ -41,7 +41,10 @@ class Rasteriser:
         self._lids = lru_cache(maxsize=LID_POSITIONS + 1)(self._painted_eyes)
 
     def picture(self, pose: MouthPose, shut: float) -> NDArray[np.uint8]:
-        """Return one RGB frame [shape=(size, size, 3)]; ``shut`` is how far the eyes are closed, 0..1."""
+        """Return one RGB frame [shape=(size, size, 3)].
+
+        shut : how far the eyes are closed, 0..1
+        """
         frame = self._still.copy()
         frame[self._eyes.area] = self._lids(round(shut * LID_POSITIONS))
         skin = self._dropped(pose.jaw)
@@ -53,7 +56,7 @@ class Rasteriser:
         return _bytes(paint_eyes(self._eyes, position / LID_POSITIONS).over(self._bare_eyes))
 
     def _dropped(self, jaw: float) -> Pixels:
-        """Return the lower face with the chin dropped [shape=(h, w, 3)]: every row shows the skin it stretched."""
+        """Return the lower face with the chin lowered by ``jaw`` [shape=(h, w, 3)]; the skin above is stretched."""
         y = self._jaw.rows()
         share = np.clip((y - JAW_TOP) / (CHIN - JAW_TOP), 0, 1)
         row = np.interp(y, y + jaw * share * share * (3 - 2 * share), np.arange(len(y)))

@@ -1,11 +1,20 @@
-"""What stands still around the face: the room, hair, ears, neck and shoulders."""
+"""The still parts around the face: background, hair, ears, neck and shoulders."""
 
 from __future__ import annotations
 
 from lipmotion.faces.portrait import palette
 from lipmotion.faces.portrait.head import HEAD
 from lipmotion.faces.portrait.layer import Glow, Layer, Rim
-from lipmotion.faces.portrait.outlines import Points, both_sides, closed_curve, path_points, lowered, open_curve, stroke, symmetric
+from lipmotion.faces.portrait.outlines import (
+    Points,
+    both_sides,
+    closed_curve,
+    lowered,
+    open_curve,
+    path_points,
+    stroke,
+    symmetric,
+)
 from lipmotion.faces.portrait.view import Pixels, Window
 
 NECK: Points = closed_curve(
@@ -41,7 +50,7 @@ def backdrop(window: Window) -> Pixels:
 
 
 def hair(window: Window) -> Layer:
-    """Return the hair in front of the forehead."""
+    """Return a layer with the hair in front of the forehead."""
     layer = Layer(window)
     for part, light_x in ((HAIR_LEFT, -0.52), (HAIR_RIGHT, 0.3)):
         layer.fill(lowered(part, 0.035), palette.SKIN_DEEP, opacity=0.4, blur=0.03, within=HEAD)
@@ -57,14 +66,14 @@ def hair(window: Window) -> Layer:
 
 
 def chin_shadow(window: Window) -> Pixels:
-    """Return how much the resting head shades what is behind it, 0..1 [shape=(h, w)]."""
+    """Return the shadow of the head on what is behind it, 0..1 [shape=(h, w)]; the jaw is at rest."""
     layer = Layer(window)
     layer.fill(lowered(HEAD, 0.12), palette.SKIN_DEEP, opacity=0.55, blur=0.045)
     return layer.pixels[..., 3]
 
 
 def shaded_neck(window: Window) -> Layer:
-    """Return the neck as it is in full shadow."""
+    """Return a layer with the neck in full shadow."""
     layer = Layer(window)
     layer.fill(NECK, palette.SKIN_DEEP)
     layer.cut(SHOULDERS)

@@ -1,4 +1,4 @@
-"""Where the face stands in the picture."""
+"""Coordinates of the face in the picture."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ Pixels = NDArray[np.floating[Any]]
 
 @dataclass(frozen=True)
 class View:
-    """A square picture of ``size`` pixels and the drawing's frame in it.
+    """A square picture of ``size`` pixels with the coordinates of the drawing.
 
-    Everything is drawn in eye distances: origin between the eyes, x to the right, y down.
+    Coordinates are in eye distances: origin between the eyes, x to the right, y downwards.
     """
 
     size: int
@@ -53,12 +53,12 @@ class Window:
         return slice(self.y0, self.y1), slice(self.x0, self.x1)
 
     def area_in(self, outer: Window) -> tuple[slice, slice]:
-        """Return the index of these pixels in those of a window around it."""
+        """Return the index of these pixels in the array of an enclosing window."""
         x, y = outer.x0, outer.y0
         return slice(self.y0 - y, self.y1 - y), slice(self.x0 - x, self.x1 - x)
 
     def around(self, points: NDArray[np.float64], margin: float) -> Window:
-        """Return those of these pixels that lie within ``margin`` of the box around points, eye distances."""
+        """Return the part of this window within ``margin`` of the bounding box of points; unit: eye distances."""
         first = np.floor((points.min(axis=0) - margin) * self.view.scale + self.view.origin).astype(int)
         last = np.ceil((points.max(axis=0) + margin) * self.view.scale + self.view.origin).astype(int)
         x0, y0 = np.clip(first, (self.x0, self.y0), (self.x1 - 1, self.y1 - 1)).tolist()
@@ -66,11 +66,11 @@ class Window:
         return Window(self.view, x0, y0, x1, y1)
 
     def columns(self, per_pixel: int = 1) -> Pixels:
-        """Return the x of ``per_pixel`` evenly spaced columns in every pixel, eye distances."""
+        """Return the x of ``per_pixel`` evenly spaced columns in every pixel, in eye distances."""
         steps = (np.arange((self.x1 - self.x0) * per_pixel) + 0.5) / per_pixel + self.x0
         return ((steps - self.view.origin[0]) / self.view.scale).astype(np.float32)
 
     def rows(self) -> Pixels:
-        """Return the y of the pixel centres, eye distances."""
+        """Return the y of the pixel centres, in eye distances."""
         steps = np.arange(self.y0, self.y1) + 0.5
         return ((steps - self.view.origin[1]) / self.view.scale).astype(np.float32)
