@@ -77,15 +77,13 @@ def viterbi(options: Any, beam: float | None = None) -> Work:
     from lipmotion.kernels.viterbi import best_path
 
     mixtures, network, data = _loop(options)
-    arcs = (network.emission, network.arc_from, network.arc_log, network.arc_start)
-    ends = (network.log_initial, network.log_final)
 
     def decode() -> tuple[float]:
         total = 0.0
         for x in data:
             density = mixtures.log_likelihood(x)
             total += best_path(
-                lambda a, b, density=density: density[a:b], len(x), *arcs, *ends, beam, lambda: network.layout
+                lambda a, b, density=density: density[a:b], len(x), network.arrays, beam, lambda: network.layout
             )[1]
         return (total,)
 

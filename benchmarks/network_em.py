@@ -128,7 +128,7 @@ def _accumulated(job: tuple[_Model, list[NDArray[np.float32]]]) -> _Statistics:
     frames = np.array([len(x) for x in data])
     features = with_squares(np.concatenate(data))
     log_density, shares = model.form.divided(features)
-    expected = model.network.over(log_density, model.columns, frames)
+    expected = model.network.posteriors(log_density, model.columns, frames)
     possible = np.isfinite(expected.log_likelihood)
     begins = np.append(0, np.cumsum(frames[:-1]))
     begun = expected.posterior[begins].sum(axis=0, dtype=np.float64)

@@ -5,11 +5,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from kernels.networks import network_posteriors
 from lipmotion.kernels import factorial
 from lipmotion.kernels.factorial import factorial_posteriors
 from lipmotion.kernels.factorial_path import factorial_best_path
 from lipmotion.kernels.loops import FactorialLogLikelihoods, Loop
-from lipmotion.kernels.network import network_posteriors
 from oracles import factorial as oracle
 from oracles.paths import path_score
 

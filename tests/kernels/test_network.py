@@ -3,9 +3,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from kernels.networks import arrays_of, phone_loop, random_network
+from kernels.networks import arrays_of, network_posteriors, phone_loop, random_network
 from lipmotion.kernels import network
-from lipmotion.kernels.network import ForwardBackwardNetwork, network_posteriors
+from lipmotion.kernels.network import ForwardBackwardNetwork
 from oracles import networks
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -97,7 +97,7 @@ def test_many_recordings_are_as_each_alone(frames):
     emission = arrays.pop("emission")
     expectation = ForwardBackwardNetwork.of(**arrays)
     log_emission = random_emission(3, sum(frames), len(emission))
-    together = expectation.over(log_emission, emission[expectation.layout.order], np.array(frames))
+    together = expectation.posteriors(log_emission, emission[expectation.layout.order], np.array(frames))
     counts, start = np.zeros(len(arrays["arc_log"])), 0
     for number, count in enumerate(frames):
         mine = slice(start, start + count)
@@ -138,9 +138,9 @@ def test_densities_of_chains_are_as_their_products(seed, chains, spread):
     masked = np.random.default_rng(seed).random(factors[0].shape) < 0.1
     factors[0][masked] = -np.inf
     frames = np.array([12, 18])
-    found = expectation.over_chains(factors, columns, frames)
+    found = expectation.product_posteriors(factors, columns, frames)
     log_emission = joint_of(factors, columns)
-    wanted = expectation.over(log_emission, np.arange(log_emission.shape[1]), frames)
+    wanted = expectation.posteriors(log_emission, np.arange(log_emission.shape[1]), frames)
     tolerance = 1e-10 if spread < 1e4 else 1e-7
     assert found.posterior == pytest.approx(wanted.posterior, abs=tolerance)
     assert found.counts == pytest.approx(wanted.counts, abs=30 * tolerance)
@@ -154,7 +154,7 @@ def test_densities_of_chains_agree_with_the_enumeration_of_all_paths():
     draw = np.random.default_rng(5)
     factors, columns = [draw.normal(0, 3, (5, n)) for n in (3, 2)], [np.array([0, 1, 2, 0]), np.array([1, 0, 0, 1])]
     order, place = expectation.layout.order, expectation.layout.place
-    found = expectation.over_chains(factors, [column[order] for column in columns], np.array([5]))
+    found = expectation.product_posteriors(factors, [column[order] for column in columns], np.array([5]))
     ends = arrays["log_initial"].astype(float), arrays["log_final"].astype(float)
     exact = {arc: float(log) for arc, log in arcs.items()}
     wanted, counts, log_likelihood = networks.posteriors(joint_of(factors, columns), np.arange(4), exact, *ends)
@@ -167,8 +167,8 @@ def test_densities_of_chains_agree_with_the_enumeration_of_all_paths():
 def test_single_precision_of_chains_is_close(spread):
     expectation, factors, columns = chained(7, 60, spread)
     factors = [factor.astype(np.float32) for factor in factors]
-    found = expectation.over_chains(factors, columns, np.array([60]))
-    exact = expectation.over_chains([factor.astype(float) for factor in factors], columns, np.array([60]))
+    found = expectation.product_posteriors(factors, columns, np.array([60]))
+    exact = expectation.product_posteriors([factor.astype(float) for factor in factors], columns, np.array([60]))
     assert found.posterior.dtype == np.float32
     assert found.posterior == pytest.approx(exact.posterior, abs=1e-4)
     assert found.log_likelihood == pytest.approx(exact.log_likelihood, rel=1e-6)
@@ -178,7 +178,7 @@ def test_chains_that_allow_nothing_together_have_no_path():
     expectation, factors, columns = chained(8, 5, 1.0)
     for factor in factors:
         factor[2] = -np.inf
-    found = expectation.over_chains(factors, columns, np.array([5]))
+    found = expectation.product_posteriors(factors, columns, np.array([5]))
     assert found.log_likelihood[0] == -np.inf
     assert not found.posterior.any()
     assert not found.counts.any()
@@ -191,7 +191,7 @@ def test_a_state_far_behind_comes_back_in_single_precision(against, frames):
     expectation = ForwardBackwardNetwork.of(**arrays_of(arcs, 2), log_initial=np.log([0.5, 0.5]), log_final=np.zeros(2))
     log_emission = np.zeros((3 * frames, 2), np.float32)
     log_emission[:frames, 0], log_emission[frames:, 1] = -against, -against
-    found = expectation.over_chains([log_emission], [expectation.layout.order], np.array([3 * frames]))
+    found = expectation.product_posteriors([log_emission], [expectation.layout.order], np.array([3 * frames]))
     posterior = found.posterior[:, expectation.layout.place]
     assert posterior[:, 0] == pytest.approx(np.ones(3 * frames), abs=1e-5)
     assert found.log_likelihood[0] == pytest.approx(np.log(0.5) - frames * against, rel=1e-6)
@@ -203,8 +203,8 @@ def test_recordings_left_by_single_precision_spoil_no_others():
     factors = [factor.astype(np.float32) for factor in factors]
     factors[0][40:50] *= 300
     frames = np.array([30, 30, 30])
-    found = expectation.over_chains(factors, columns, frames)
-    exact = expectation.over_chains([factor.astype(float) for factor in factors], columns, frames)
+    found = expectation.product_posteriors(factors, columns, frames)
+    exact = expectation.product_posteriors([factor.astype(float) for factor in factors], columns, frames)
     assert found.posterior == pytest.approx(exact.posterior, abs=1e-4)
     assert found.counts == pytest.approx(exact.counts, abs=1e-3)
     assert found.log_likelihood == pytest.approx(exact.log_likelihood, rel=1e-6)
@@ -220,6 +220,6 @@ def test_other_probabilities_on_the_same_arcs(seed):
     initial = np.random.default_rng(seed).normal(-3, 1, len(columns))
     changed = ForwardBackwardNetwork.of(*(old[name] for name in arrays)).with_arcs(new["arc_log"], initial)
     fresh = ForwardBackwardNetwork.of(*((new | {"log_initial": initial})[name] for name in arrays))
-    one, other = (network.over(log_emission, columns, frames) for network in (changed, fresh))
+    one, other = (network.posteriors(log_emission, columns, frames) for network in (changed, fresh))
     for found, expected in zip(one, other, strict=True):
         np.testing.assert_array_equal(found, expected)

@@ -3,6 +3,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
+from lipmotion.kernels.arcs import NetworkArrays
 from lipmotion.kernels.sampling import sample_paths
 from oracles.sampling import path_posterior
 
@@ -29,7 +30,9 @@ def test_paths_come_as_often_as_they_are_probable():
     log_emission = np.random.default_rng(0).normal(0, 1.2, (5, 3))
     expected, total = path_posterior(log_emission, EMISSION, ARCS, INITIAL, FINAL)
     count = 20_000
-    paths, log_likelihood = sample_paths(log_emission, *arrays(), np.random.default_rng(1).random((count, 5)))
+    paths, log_likelihood = sample_paths(
+        log_emission, NetworkArrays(*arrays()), np.random.default_rng(1).random((count, 5))
+    )
     assert log_likelihood == pytest.approx(total, abs=1e-9)
     found = Counter(map(tuple, paths.tolist()))
     assert set(found) <= set(expected)
@@ -42,7 +45,7 @@ def test_paths_come_as_often_as_they_are_probable():
 def test_what_is_far_from_probable_on_the_way_may_be_all_that_is_left():
     log_emission = np.zeros((4, 3))
     log_emission[0, 0] = log_emission[1, 1] = -5000.0
-    paths, log_likelihood = sample_paths(log_emission, *arrays(), np.full((3, 4), 0.999))
+    paths, log_likelihood = sample_paths(log_emission, NetworkArrays(*arrays()), np.full((3, 4), 0.999))
     assert np.isfinite(log_likelihood)
     assert (paths >= 0).all()
 
@@ -51,6 +54,6 @@ def test_no_path():
     log_emission = np.zeros((3, 3))
     log_emission[1] = -np.inf
     with np.errstate(invalid="raise"):
-        paths, log_likelihood = sample_paths(log_emission, *arrays(), np.zeros((2, 3)))
+        paths, log_likelihood = sample_paths(log_emission, NetworkArrays(*arrays()), np.zeros((2, 3)))
     assert log_likelihood == -np.inf
     assert (paths == -1).all()

@@ -5,6 +5,7 @@ from hypothesis import strategies as st
 
 from kernels.networks import phone_loop, random_network
 from lipmotion.kernels import viterbi
+from lipmotion.kernels.arcs import NetworkArrays
 from oracles import paths
 
 
@@ -37,7 +38,7 @@ def block(request, monkeypatch) -> int:
 def test_agrees_with_the_enumeration_of_all_paths(seed, frames):
     arrays, arcs = random_network(seed, states=3 + seed % 2, densities=3, density_of_arcs=0.5)
     log_emission = random_emission(seed, frames, 3)
-    path, score = viterbi.best_path(*asked(log_emission), **arrays)
+    path, score = viterbi.best_path(*asked(log_emission), NetworkArrays(**arrays))
     ends = arrays["log_initial"], arrays["log_final"]
     wanted, best = paths.best_path(log_emission, arrays["emission"], arcs, *ends)
     if np.isinf(best):
@@ -54,9 +55,9 @@ def test_blocks_change_nothing(seed, frames, block):
     log_emission = random_emission(seed, frames, 4)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(viterbi, "BLOCK", 1000)
-        whole, score = viterbi.best_path(*asked(log_emission), **arrays)
+        whole, score = viterbi.best_path(*asked(log_emission), NetworkArrays(**arrays))
         patch.setattr(viterbi, "BLOCK", block)
-        path, in_blocks = viterbi.best_path(*asked(log_emission), **arrays)
+        path, in_blocks = viterbi.best_path(*asked(log_emission), NetworkArrays(**arrays))
     assert np.array_equal(path, whole)
     assert in_blocks == pytest.approx(score, abs=1e-3)
     if np.isfinite(score):  # and the score is that of the path
@@ -84,13 +85,13 @@ def left_to_right(states: int) -> dict:
 @pytest.mark.usefixtures("block")
 @pytest.mark.parametrize("frames", [1, 2, 3, 4, 6, 7])
 def test_a_network_longer_than_the_recording_is_impossible(frames):
-    _, score = viterbi.best_path(*asked(np.zeros((frames, 8), np.float32)), **left_to_right(8))
+    _, score = viterbi.best_path(*asked(np.zeros((frames, 8), np.float32)), NetworkArrays(**left_to_right(8)))
     assert score == -np.inf
 
 
 @pytest.mark.usefixtures("block")
 def test_the_only_path_is_found():
-    path, score = viterbi.best_path(*asked(np.zeros((8, 8), np.float32)), **left_to_right(8))
+    path, score = viterbi.best_path(*asked(np.zeros((8, 8), np.float32)), NetworkArrays(**left_to_right(8)))
     assert path.tolist() == list(range(8))
     assert score == pytest.approx(-3.5)
 
@@ -100,7 +101,7 @@ def test_hours_lose_no_precision():
     log_emission = np.full((30_000, 2), -80.0, np.float32)
     log_emission[:17_000, 0] += 0.25
     log_emission[17_000:, 1] += 0.25
-    path, score = viterbi.best_path(*asked(log_emission), **chain)
+    path, score = viterbi.best_path(*asked(log_emission), NetworkArrays(**chain))
     assert path.argmax() == 17_000
     assert score == pytest.approx(30_000 * -79.75 - 29_999 * 0.5, rel=1e-6)
 
@@ -111,7 +112,7 @@ def both(monkeypatch, log_emission: np.ndarray, arrays: dict, beam: float | None
     found = []
     for compiled in (False, True):
         monkeypatch.setattr(viterbi, "compiled_pays", lambda _, compiled=compiled: compiled)
-        found.append(viterbi.best_path(*asked(log_emission), **arrays, beam=beam))
+        found.append(viterbi.best_path(*asked(log_emission), NetworkArrays(**arrays), beam=beam))
     return found
 
 
@@ -145,8 +146,8 @@ def test_a_wide_beam_drops_nothing_and_a_narrow_one_the_better_late_path():
     )  # two loops, no way over
     chain["arc_log"] = np.zeros(2, np.float32)
     log_emission = np.array([[0, -10], [0, 0], [-30, 0]], np.float32)
-    assert viterbi.best_path(*asked(log_emission), **chain)[0].tolist() == [1, 1, 1]
-    assert viterbi.best_path(*asked(log_emission), **chain, beam=50.0)[0].tolist() == [1, 1, 1]
-    path, score = viterbi.best_path(*asked(log_emission), **chain, beam=5.0)
+    assert viterbi.best_path(*asked(log_emission), NetworkArrays(**chain))[0].tolist() == [1, 1, 1]
+    assert viterbi.best_path(*asked(log_emission), NetworkArrays(**chain), beam=50.0)[0].tolist() == [1, 1, 1]
+    path, score = viterbi.best_path(*asked(log_emission), NetworkArrays(**chain), beam=5.0)
     assert path.tolist() == [0, 0, 0]
     assert score == -30

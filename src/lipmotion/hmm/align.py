@@ -52,7 +52,7 @@ def state_sequence(hmm: UnitHmm, units: Sequence[str]) -> StateSequence:
 def state_path(
     hmm: UnitHmm, log_likelihoods: LogLikelihoods, units: Sequence[str]
 ) -> tuple[tuple[tuple[str, int], ...], NDArray[np.intp]]:
-    """Return the states of a unit sequence (``StateSequence.names``) and which of them holds in each frame [shape=(T,)].
+    """Return the states of a unit sequence (``StateSequence.names``), and the state of every frame [shape=(T,)].
 
     Raises AlignmentError: fewer frames than states.
     """
@@ -73,6 +73,7 @@ def align_units(hmm: UnitHmm, log_likelihoods: LogLikelihoods, units: Sequence[s
 
 
 def _chain_network(hmm: UnitHmm, chain: StateSequence, emission: NDArray[np.intp]) -> Network:
+    """Return the left-to-right network of a state sequence; ``emission`` numbers the density of each [shape=(S,)]."""
     builder = NetworkBuilder()
     stay = hmm.log_stay[chain.plain].astype(float)
     move = np.log(-np.expm1(stay))
@@ -86,7 +87,12 @@ def _chain_network(hmm: UnitHmm, chain: StateSequence, emission: NDArray[np.intp
 
 
 class SpokenWord(NamedTuple):
-    """One part of an utterance: the word's position (-1: no word), which of its pronunciations, its units."""
+    """A word as it was pronounced, or a silence.
+
+    word    : its position in the transcript; -1 for silence and pauses
+    variant : the number of the pronunciation
+    units   : those of the pronunciation; none where a possible pause was not made
+    """
 
     word: int
     variant: int
@@ -96,11 +102,11 @@ class SpokenWord(NamedTuple):
 def choose_pronunciations(
     hmm: UnitHmm, log_likelihoods: LogLikelihoods, words: Sequence[Sequence[Sequence[str]]], pause: str
 ) -> list[SpokenWord]:
-    """Choose how each word was choice, and where there was a pause.
+    """Return the most probable pronunciation of each word, with silence and the pauses between words, in order.
 
     words : for each word, its possible pronunciations
     pause : the unit that may stand between words; silence (the first free unit) surrounds them all
-    The states without context decide, so that a pronunciation's ends need not know its neighbours.
+    Only states without context are used: then the states of a pronunciation do not depend on the words beside it.
     Raises AlignmentError: the words do not fit into the frames.
     """
     _check_room(hmm, log_likelihoods, words)
@@ -131,13 +137,13 @@ def choose_pronunciations(
 
 
 def _check_room(hmm: UnitHmm, log_likelihoods: LogLikelihoods, words: Sequence[Sequence[Sequence[str]]]) -> None:
-    """Raise AlignmentError before a network is built that no path fits through, or that may fill the memory."""
-    states = _states_of(hmm, words)
+    """Raise AlignmentError if no path fits into the frames, or if the network might fill the memory."""
+    states = _state_counts(hmm, words)
     least = sum(min(states[id(variants)]) for variants in words)
     if least > log_likelihoods.frames:
         raise AlignmentError(
-            f"{len(words)} words take at least {least} frames of 10 ms, found {log_likelihoods.frames}: the recording is too "
-            "short for what should be choice in it; give its own transcript"
+            f"{len(words)} words take at least {least} frames of 10 ms, found {log_likelihoods.frames}: the recording "
+            "is too short for what should be said in it; give its own transcript"
         )
     ends = [1, *(len(variants) + 1 for variants in words)]  # of the word before, and of the pause
     arcs = sum(2 * sum(states[id(v)]) + len(v) * before for v, before in zip(words, ends, strict=False))
@@ -149,8 +155,11 @@ def _check_room(hmm: UnitHmm, log_likelihoods: LogLikelihoods, words: Sequence[S
         )
 
 
-def _states_of(hmm: UnitHmm, words: Sequence[Sequence[Sequence[str]]]) -> dict[int, list[int]]:
-    """Return how many states each pronunciation of a word has, by the word's identity: few of many words differ."""
+def _state_counts(hmm: UnitHmm, words: Sequence[Sequence[Sequence[str]]]) -> dict[int, list[int]]:
+    """Return the number of states of each pronunciation, by the ``id`` of the word's pronunciations.
+
+    Equal words share one object, so few of many words are counted.
+    """
     counts = dict(zip(hmm.table.units, hmm.table.counts, strict=True))
     different = {id(variants): variants for variants in words}
     return {
@@ -162,7 +171,10 @@ def _states_of(hmm: UnitHmm, words: Sequence[Sequence[Sequence[str]]]) -> dict[i
 def _append(
     builder: NetworkBuilder, hmm: UnitHmm, units: Sequence[str], open_ends: list[tuple[int, float]]
 ) -> list[tuple[int, float]]:
-    """Add the states of some units behind all open ends; return the new open ends (the old ones if no units)."""
+    """Add the states of some units, joined to all open ends; return the new open ends: states and log P(leave).
+
+    Without units the open ends stay as they are.
+    """
     ends = open_ends
     for unit in units:
         for state in range(hmm.table.count(unit)):

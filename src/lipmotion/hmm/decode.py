@@ -13,16 +13,16 @@ from lipmotion.hmm.model import UnitHmm
 from lipmotion.hmm.network import Network, NetworkBuilder
 from lipmotion.hmm.states import Neighbour
 
-Row = dict[Neighbour, int]
-"""One state of a unit: its node for each neighbour that has one of its own, under None that for all others."""
+StateNodes = dict[Neighbour, int]
+"""The nodes of one state of a unit: by neighbour, and under None the node for all other neighbours."""
 
 
 @dataclass(frozen=True, eq=False)
 class UnitLoop:
-    """Every unit behind every other: what recognition searches.
+    """The network in which every unit may follow every other, which recognition searches.
 
     owners  : the unit of each node
-    entries : the nodes of first states
+    entries : the nodes of the units' first states
     """
 
     network: Network
@@ -31,9 +31,9 @@ class UnitLoop:
 
 
 def unit_loop(hmm: UnitHmm, inventory: Sequence[str]) -> UnitLoop:
-    """Return the loop over an inventory, silence (the first free unit) among it.
+    """Return the loop over an inventory, which includes silence (the first free unit).
 
-    A recording begins and ends in silence, which costs nothing there, or in a unit beside it.
+    A recording begins and ends in silence, without a bigram there, or in any other unit, as if silence were beside it.
     """
     silence = hmm.table.free[0]
     builder = NetworkBuilder()
@@ -52,33 +52,34 @@ def unit_loop(hmm: UnitHmm, inventory: Sequence[str]) -> UnitLoop:
 
 
 def decode_units(
-    loop: UnitLoop, evidence: LogLikelihoods, beam: float | None = None
+    loop: UnitLoop, log_likelihoods: LogLikelihoods, beam: float | None = None
 ) -> tuple[tuple[str, ...], NDArray[np.intp]]:
-    """Return the units said, and the first frame of each with the frame count at the end.
+    """Return the most probable units, and the first frame of each, with the frame count at the end.
 
     beam : as in ``Network.best_path``; None: exact
     Viterbi over context-dependent states with the bigram (Hofer 2008, Eq. 5).
     """
-    path = loop.network.best_path(evidence, beam=beam)
+    path = loop.network.best_path(log_likelihoods, beam=beam)
     starts = [t for t in range(len(path)) if t == 0 or (path[t] != path[t - 1] and path[t] in loop.entries)]
     return tuple(loop.owners[path[t]] for t in starts), np.array([*starts, len(path)], np.intp)
 
 
 def _language(hmm: UnitHmm, unit: str, following: str) -> float:
+    """Return the score of the language model: weighted log bigram plus insertion penalty."""
     return hmm.config.bigram_weight * hmm.bigram(unit, following) + hmm.config.insertion
 
 
-def _node(row: Row, neighbour: str) -> int:
+def _node(row: StateNodes, neighbour: str) -> int:
     return row[neighbour] if neighbour in row else row[None]
 
 
 def _unit_rows(
     builder: NetworkBuilder, owners: list[str], hmm: UnitHmm, unit: str, inventory: Sequence[str]
-) -> list[Row]:
-    """Add the states of one unit in all contexts, and the arcs between them."""
-    rows: list[Row] = []
+) -> list[StateNodes]:
+    """Add the states of one unit in all contexts, and the arcs between them; return the nodes of each state."""
+    rows: list[StateNodes] = []
     for state in range(hmm.table.count(unit)):
-        row: Row = {}
+        row: StateNodes = {}
         for context in _contexts(hmm, unit, state, inventory):
             row[context] = builder.state(hmm.table.density(unit, state, context), hmm.stay(unit, state))
             owners.append(unit)
@@ -89,10 +90,10 @@ def _unit_rows(
 
 
 def _contexts(hmm: UnitHmm, unit: str, state: int, inventory: Sequence[str]) -> list[Neighbour]:
-    """Return the neighbours that need a node of their own; all others share one, whose densities are the same.
+    """Return the neighbours that need a node of their own; all others (None) share a node, as they share densities.
 
-    A neighbour known to any state on one side of the unit counts for all states on that side: so a path never
-    has to remember more than its node says, and the search stays exact.
+    A neighbour that any state on one side of the unit depends on has nodes for all states on that side: so a node
+    tells all that a path must know, and the search stays exact.
     """
     side = hmm.table.side(unit, state)
     alike = [k for k in range(hmm.table.count(unit)) if hmm.table.side(unit, k) == side] if side else []
@@ -104,28 +105,33 @@ def _contexts(hmm: UnitHmm, unit: str, state: int, inventory: Sequence[str]) -> 
     return own if len(own) == len(inventory) else [*own, None]
 
 
-def _advance(builder: NetworkBuilder, hmm: UnitHmm, unit: str, state: int, sources: Row, targets: Row) -> None:
-    """Join two successive states of a unit; a node that fixes the right neighbour is paid for on the way in."""
+def _advance(
+    builder: NetworkBuilder, hmm: UnitHmm, unit: str, state: int, sources: StateNodes, targets: StateNodes
+) -> None:
+    """Join two successive states of a unit.
+
+    The arc into the first node that fixes the right neighbour has the score of the language model.
+    """
     move = hmm.move(unit, state - 1)
     same_side = hmm.table.side(unit, state - 1) == hmm.table.side(unit, state)
-    pays = hmm.table.side(unit, state) == ">" and not same_side
-    for met, source in sources.items():
-        for wanted, target in targets.items():
-            if not same_side or met == wanted:
-                price = _language(hmm, unit, wanted) if pays and wanted is not None else 0.0
-                builder.arc(source, target, move + price)
+    chooses = hmm.table.side(unit, state) == ">" and not same_side
+    for source_neighbour, source in sources.items():
+        for neighbour, target in targets.items():
+            if not same_side or source_neighbour == neighbour:
+                score = _language(hmm, unit, neighbour) if chooses and neighbour is not None else 0.0
+                builder.arc(source, target, move + score)
 
 
 def _join(
-    builder: NetworkBuilder, hmm: UnitHmm, unit: str, inventory: Sequence[str], rows: dict[str, list[Row]]
+    builder: NetworkBuilder, hmm: UnitHmm, unit: str, inventory: Sequence[str], rows: dict[str, list[StateNodes]]
 ) -> None:
-    """Join the end of a unit to every unit that may follow."""
+    """Join the last state of a unit to the first state of every unit."""
     for following in inventory:
         entry = _node(rows[following][0], unit)
         builder.arc(_node(rows[unit][-1], following), entry, _leave(hmm, unit, following, rows))
 
 
-def _leave(hmm: UnitHmm, unit: str, following: str, rows: dict[str, list[Row]]) -> float:
-    """Return the price of going from a unit to another: the bigram, unless the node that is left has paid it."""
-    price = 0.0 if following in rows[unit][-1] else _language(hmm, unit, following)
-    return hmm.move(unit, len(rows[unit]) - 1) + price
+def _leave(hmm: UnitHmm, unit: str, following: str, rows: dict[str, list[StateNodes]]) -> float:
+    """Return the score of the arc from a unit to another: with the language model's, unless an earlier arc has it."""
+    score = 0.0 if following in rows[unit][-1] else _language(hmm, unit, following)
+    return hmm.move(unit, len(rows[unit]) - 1) + score

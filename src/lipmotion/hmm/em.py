@@ -1,4 +1,4 @@
-"""Embedded Baum–Welch training of unit models: statistics of whole utterances, and the models re-estimated from them."""
+"""Embedded Baum–Welch training of unit models: statistics of utterances, and the models re-estimated from them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a recording says about the states of unit models."""
+"""Log likelihoods of recordings under the densities of unit models."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from numpy.typing import NDArray
 from lipmotion.hmm.model import UnitHmm
 
 LOUD_SILENCE = 8.0
-"""What the log density of silence loses in a loud frame."""
+"""Penalty of silence in a loud frame, subtracted from its log density."""
 QUIET_SPEECH = 1000.0
-"""What the log densities of all else lose in a quiet one."""
+"""Penalty of everything but silence in a quiet frame."""
 
 DensitySelection = NDArray[np.intp] | None
-"""The densities wanted; None: all."""
+"""The numbers of the densities to compute; None: all."""
 
 
 @dataclass(frozen=True, eq=False)
 class LogLikelihoods:
-    """Log densities, computed when they are asked for: those of an hour do not fit into the memory.
+    """Log densities of the frames of a recording, computed on demand: those of an hour do not fit into the memory.
 
     frames      : T
     log_density : (first frame, end, densities) -> [shape=(end - first, G')]
@@ -32,23 +32,23 @@ class LogLikelihoods:
 
 
 def log_likelihoods_of(hmm: UnitHmm, features: NDArray[np.float32]) -> LogLikelihoods:
-    """Return what features [shape=(T, D)] say to the models they were made for."""
+    """Return the log likelihoods of features [shape=(T, D)] under models of the same features."""
     return LogLikelihoods(
         len(features), lambda first, end, chosen: hmm.mixtures.log_likelihood(features[first:end], chosen)
     )
 
 
-def penalise_silence(hmm: UnitHmm, evidence: LogLikelihoods, loud: NDArray[np.bool_]) -> LogLikelihoods:
-    """Return evidence that makes silence improbable in loud frames [shape=(T,)], for forced alignment.
+def penalise_silence(hmm: UnitHmm, log_likelihoods: LogLikelihoods, loud: NDArray[np.bool_]) -> LogLikelihoods:
+    """Return log likelihoods that makes silence improbable in loud frames [shape=(T,)], for forced alignment.
 
-    A voice that the models do not know is, to them, hardly more like speech than like silence; its energy says which.
+    For a voice unlike those of the training, the densities hardly tell speech from silence; the energy does.
     """
-    return _without(evidence, loud, _silent_densities(hmm), LOUD_SILENCE)
+    return _penalised(log_likelihoods, loud, _silent_densities(hmm), LOUD_SILENCE)
 
 
-def penalise_speech(hmm: UnitHmm, evidence: LogLikelihoods, quiet: NDArray[np.bool_]) -> LogLikelihoods:
-    """Return evidence that makes all but silence improbable in quiet frames [shape=(T,)]."""
-    return _without(evidence, quiet, ~_silent_densities(hmm), QUIET_SPEECH)
+def penalise_speech(hmm: UnitHmm, log_likelihoods: LogLikelihoods, quiet: NDArray[np.bool_]) -> LogLikelihoods:
+    """Return log likelihoods that makes all but silence improbable in quiet frames [shape=(T,)]."""
+    return _penalised(log_likelihoods, quiet, ~_silent_densities(hmm), QUIET_SPEECH)
 
 
 def _silent_densities(hmm: UnitHmm) -> NDArray[np.bool_]:
@@ -56,15 +56,15 @@ def _silent_densities(hmm: UnitHmm) -> NDArray[np.bool_]:
     return np.isin(np.arange(len(hmm.table.names)), free)
 
 
-def _without(
-    evidence: LogLikelihoods, frames: NDArray[np.bool_], densities: NDArray[np.bool_], loss: float
+def _penalised(
+    log_likelihoods: LogLikelihoods, frames: NDArray[np.bool_], densities: NDArray[np.bool_], loss: float
 ) -> LogLikelihoods:
-    """Return evidence in which some densities lose something in some frames."""
+    """Return log likelihoods reduced by ``loss``, for some densities in some frames."""
 
     def log_density(first: int, end: int, chosen: DensitySelection) -> NDArray[np.float32]:
-        values = evidence.log_density(first, end, chosen)
+        values = log_likelihoods.log_density(first, end, chosen)
         lost = densities if chosen is None else densities[chosen]
         values[np.ix_(frames[first:end], lost)] -= loss
         return values
 
-    return LogLikelihoods(evidence.frames, log_density)
+    return LogLikelihoods(log_likelihoods.frames, log_density)

@@ -1,4 +1,4 @@
-"""Where a recording is too loud for silence, or too quiet for speech."""
+"""Frames of a recording that are too loud for silence, or too quiet for speech."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 LOUD_SHARE = 0.5
-"""A frame is loud where the smoothed log energy has risen this far from its 10th to its 95th percentile."""
+"""A frame is loud where the smoothed log energy exceeds this share of the way from its 10th to its 95th percentile."""
 
 LEAST_RISE = 1e-3
-"""Energy that rises by less, in natural logarithms or in standard deviations, is constant but for rounding."""
+"""Energy with less between these percentiles, as natural logarithm or standardised, is constant but for rounding."""
 
 
 def loud_frames(log_energy: NDArray[np.float32], smoothing: int) -> NDArray[np.bool_]:
-    """Return which frames are loud for this recording: none where the energy is constant but for rounding.
+    """Return which frames are loud [shape=(T,)]; none where the energy is constant but for rounding.
 
     log_energy : [shape=(T,)], of any scale
     smoothing  : frames averaged over, an odd number
@@ -27,9 +27,9 @@ def loud_frames(log_energy: NDArray[np.float32], smoothing: int) -> NDArray[np.b
 
 
 QUIET = 35 * np.log(10) / 10
-"""Speech is not heard this far under the loud frames of a recording: 35 dB, as a logarithm of energy."""
+"""Frames this far below the 95th percentile of log energy contain no speech: 35 dB, as natural logarithm of energy."""
 QUIET_REACH = 10
-"""A frame is quiet only if all frames this near are: the closure of a stop is part of speech."""
+"""A frame is quiet only if all frames within so many are: the closure of a stop is part of speech."""
 
 
 def quiet_frames(log_energy: NDArray[np.float32]) -> NDArray[np.bool_]:
@@ -38,5 +38,5 @@ def quiet_frames(log_energy: NDArray[np.float32]) -> NDArray[np.bool_]:
     log_energy : [shape=(T,)], natural logarithm
     """
     padded = np.pad(log_energy, QUIET_REACH, "edge")
-    around = sliding_window_view(padded, 2 * QUIET_REACH + 1).max(axis=1)
-    return around < np.quantile(log_energy, 0.95) - QUIET
+    loudest = sliding_window_view(padded, 2 * QUIET_REACH + 1).max(axis=1)
+    return loudest < np.quantile(log_energy, 0.95) - QUIET

@@ -1,4 +1,4 @@
-"""A trained set of unit models."""
+"""Trained unit models, and their serialisation as arrays."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ class HmmConfig(Configuration):
     """How unit models are built and trained.
 
     states       : states per unit, left to right, no skips
-    mixtures     : most Gaussians per state (a power of two); with little speech there are fewer
-    context_frames : least frames of data for a state in context to get a density of its own
-    relevance    : frames that the density without context counts for, per Gaussian, in one with context
+    mixtures     : most Gaussians per state (a power of two); fewer are used with little speech
+    context_frames : frames of data that a state in context needs for a density of its own
+    relevance    : weight of the density without context as a prior, in frames per Gaussian
     iterations   : embedded Baum–Welch iterations per stage
-    variance_floor   : share of a feature's overall variance
-    bigram_weight, insertion : scale of the log bigram, and log price of every unit, when decoding
+    variance_floor   : least variance, as a share of a feature's overall variance
+    bigram_weight, insertion : scale of the log bigram, and log insertion penalty of every unit, in decoding
     """
 
     states: int = 3
@@ -43,7 +43,7 @@ class HmmConfig(Configuration):
 class UnitHmm:
     """Models of all units: tied states, their densities, how long each lasts, and which unit follows which.
 
-    log_stay    : float32 array [shape=(G,)], of the densities without context; log P(keep the state)
+    log_stay    : float32 array [shape=(G,)], log P(stay in the state), of the states without context
     typical_fit : mean ``fit`` of the recordings that the models were trained on
     """
 
@@ -55,7 +55,7 @@ class UnitHmm:
     typical_fit: float = 0.0
 
     def stay(self, unit: str, state: int) -> float:
-        """Return log P(keep this state one frame longer)."""
+        """Return log P(stay in this state)."""
         return float(self.log_stay[self.table.density(unit, state)])
 
     def move(self, unit: str, state: int) -> float:
@@ -63,15 +63,15 @@ class UnitHmm:
         return float(np.log(-np.expm1(self.stay(unit, state))))
 
     def fit(self, features: NDArray[np.float32]) -> float:
-        """Return the mean log density of frames [shape=(T, D)], each under what fits it best, without context."""
+        """Return the mean over frames [shape=(T, D)] of the highest log density of any state without context."""
         plain = np.arange(len(self.log_stay), dtype=np.intp)
         return float(self.mixtures.log_likelihood(features, plain).max(axis=1).mean())
 
 
 def hmm_arrays(hmm: UnitHmm, precision: type[np.floating[Any]] = np.float16) -> dict[str, NDArray[Any]]:
-    """Return the models as arrays; the configuration is not among them.
+    """Serialise the models; the configuration is not included.
 
-    precision : of the Gaussians: half is enough to recognise with, float32 is all there is
+    precision : of the Gaussians: half precision suffices for recognition, float32 keeps them exactly
     """
     return {
         "units": np.array(hmm.table.units),
@@ -88,7 +88,7 @@ def hmm_arrays(hmm: UnitHmm, precision: type[np.floating[Any]] = np.float16) -> 
 
 
 def hmm_from_arrays(arrays: Arrays, config: HmmConfig) -> UnitHmm:
-    """Return the models again. Raises ModelFormatError: something is missing, out of place or out of range."""
+    """Deserialise models. Raises ModelFormatError: an array is missing, undeclared, inconsistent or out of range."""
     try:
         refuse_undeclared(arrays, NAMES, MODELS)
         named = checked_arrays(arrays, NAMES)
@@ -116,7 +116,7 @@ MODELS = {
     "log_stay": ArraySpec(np.float32, "R", -1e4, NEGATIVE),
     "typical_fit": ArraySpec(np.float64, "1", -1e6, 1e6),
 }
-"""How unit models are stored; R states have no context."""
+"""How unit models are stored: G states, R of them without context."""
 
 
 def _check_names(

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError
 from lipmotion.hmm.log_likelihoods import LogLikelihoods
-from lipmotion.kernels.arcs import ArcLayout, arc_layout
+from lipmotion.kernels.arcs import ArcLayout, NetworkArrays, arc_layout
 from lipmotion.kernels.viterbi import best_path
 
 KEPT_FRAMES = 12_000
-"""Up to so many frames (two minutes), log densities are computed once and kept; for longer recordings twice, in blocks."""
+"""Up to so many frames (two minutes), log densities are computed once and kept; those of longer recordings twice."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +27,13 @@ class Network:
     arc_start: NDArray[np.intp]
     log_initial: NDArray[np.float32]
     log_final: NDArray[np.float32]
+
+    @property
+    def arrays(self) -> NetworkArrays:
+        """The network as kernels take it."""
+        return NetworkArrays(
+            self.emission, self.arc_from, self.arc_log, self.arc_start, self.log_initial, self.log_final
+        )
 
     @cached_property
     def layout(self) -> ArcLayout:
@@ -42,7 +49,11 @@ class Network:
         beam   : states with a score lower than the best of the frame by more than this are dropped; None: exact
         Raises AlignmentError: no path reaches the end.
         """
-        kept = log_likelihoods.log_density(0, log_likelihoods.frames, chosen) if log_likelihoods.frames <= KEPT_FRAMES else None
+        kept = (
+            log_likelihoods.log_density(0, log_likelihoods.frames, chosen)
+            if log_likelihoods.frames <= KEPT_FRAMES
+            else None
+        )
 
         def log_emission(first: int, end: int) -> NDArray[np.float32]:
             return log_likelihoods.log_density(first, end, chosen) if kept is None else kept[first:end]
@@ -50,12 +61,7 @@ class Network:
         path, score = best_path(
             log_emission,
             log_likelihoods.frames,
-            self.emission,
-            self.arc_from,
-            self.arc_log,
-            self.arc_start,
-            self.log_initial,
-            self.log_final,
+            self.arrays,
             beam,
             lambda: self.layout,
         )

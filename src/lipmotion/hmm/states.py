@@ -1,4 +1,4 @@
-"""Which density stands behind which state of which unit in which context."""
+"""The table of tied states: the density of each state of each unit in each context."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Neighbour = str | None
-"""The neighbouring unit a state depends on; None: it depends on none."""
+"""The neighbouring unit that a state depends on; None: none."""
 
 
 @dataclass(frozen=True)
@@ -19,11 +19,11 @@ class StateTable:
 
     States before a unit's middle depend on the unit to the left, those after it on the one to the right, and
     the middle one (of an odd count) on neither: so whole sequences of context-dependent units can be searched
-    exactly with units² nodes instead of units³. A context seen too rarely resolves to the state without one.
+    exactly with units² nodes instead of units³. A state in a context too rare to be modelled is that without context.
 
     units    : the inventory
-    counts   : states per unit
-    names    : one name a density: ``b.0`` (no context), ``b.0<ih`` (left), ``b.2>ih`` (right)
+    counts   : number of states of each unit
+    names    : of all densities: ``b.0`` (no context), ``b.0<ih`` (left), ``b.2>ih`` (right)
     free     : units whose states depend on no neighbour (silence)
     """
 
@@ -37,11 +37,11 @@ class StateTable:
         return {name: index for index, name in enumerate(self.names)}
 
     def count(self, unit: str) -> int:
-        """Return how many states a unit has."""
+        """Return the number of states of a unit."""
         return self.counts[self.units.index(unit)]
 
     def side(self, unit: str, state: int) -> str:
-        """Return ``<`` or ``>`` where the state depends on the left or right neighbour, else nothing."""
+        """Return ``<`` for a state that depends on the left neighbour, ``>`` on the right one, "" on none."""
         count = self.count(unit)
         if unit in self.free or 2 * state + 1 == count:
             return ""
@@ -53,11 +53,11 @@ class StateTable:
         return f"{unit}.{state}" + (side + {"<": left, ">": right}[side] if side else "")
 
     def density(self, unit: str, state: int, neighbour: Neighbour = None) -> int:
-        """Return the density of a state; without one for this neighbour, the one without context."""
+        """Return the density of a state beside a neighbour, or the one without context where there is none for it."""
         if neighbour is not None:
-            found = self._index.get(f"{unit}.{state}{self.side(unit, state)}{neighbour}")
-            if found is not None:
-                return found
+            density = self._index.get(f"{unit}.{state}{self.side(unit, state)}{neighbour}")
+            if density is not None:
+                return density
         return self._index[f"{unit}.{state}"]
 
     def neighbour(self, left: str, unit: str, right: str, state: int) -> Neighbour:
@@ -65,11 +65,11 @@ class StateTable:
         return {"<": left, ">": right, "": None}[self.side(unit, state)]
 
     def parents(self) -> NDArray[np.intp]:
-        """Return, for every density, the one without context that stands behind it [shape=(G,)]."""
+        """Return the density without context of the same state, for every density [shape=(G,)]."""
         return np.array([self._index[re.split("[<>]", name)[0]] for name in self.names], np.intp)
 
     def extended(self, names: tuple[str, ...]) -> StateTable:
-        """Return the table with more densities at its end."""
+        """Return the table with more densities, of these names, at its end."""
         return StateTable(self.units, self.counts, self.names + names, self.free)
 
 

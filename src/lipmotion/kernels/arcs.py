@@ -1,8 +1,8 @@
-"""How the arcs of a network lie in memory, so that many are followed at once.
+"""The arrays that describe a network of states, and the layout of its arcs in memory for vectorised kernels.
 
-States are put into an order in which arcs come in **runs**: neighbouring sources lead to neighbouring targets, and a
-run is followed as one vector. Where many states share the same many sources, as the first states of all phones in a
-loop do, their arcs are a **block**, a dense matrix. Loops of states (arcs to themselves) are always in runs.
+States are put into an order in which arcs come in **runs**: consecutive sources lead to consecutive targets, and a
+run is processed as one vector. Where many states share the same many sources, as the first states of all phones in a
+loop do, their arcs are a **block**, a dense matrix. Arcs from a state to itself are always in runs.
 """
 
 from __future__ import annotations
@@ -16,19 +16,38 @@ from numpy.typing import NDArray
 Index = NDArray[np.intp]
 
 LEAST_BLOCK = 8
-"""Sources and targets that a block has at least."""
+"""Least number of sources, and of targets, of a block."""
 PADDED = 16
 """Rows of a block are padded to a multiple of this."""
 
 
+class NetworkArrays(NamedTuple):
+    """A network of S states and E arcs; logarithms are of probabilities.
+
+    emission    : [shape=(S,)], the density of each state
+    arc_from    : [shape=(E,)], the source states of all arcs, sorted by target
+    arc_log     : [shape=(E,)], of the arcs
+    arc_start   : [shape=(S,)], the first arc of each target; every state has at least one
+    log_initial, log_final : [shape=(S,)], of beginning and ending in each state
+    """
+
+    emission: Index
+    arc_from: Index
+    arc_log: NDArray[np.floating[Any]]
+    arc_start: Index
+    log_initial: NDArray[np.floating[Any]]
+    log_final: NDArray[np.floating[Any]]
+
+
 class ArcLayout(NamedTuple):
-    """Where everything of a network lies. A place is the position of a state in the new order.
+    """The layout of a network's arcs. A place is the position of a state in the new order.
 
     order, place : [shape=(S,)], the state at each place, and the place of each state
     runs         : [shape=(R, 4)], first target's place, first source's place, length, position in ``run_arcs``
-    run_arcs     : [shape=(N,)], arcs by run
-    blocks       : [shape=(B, 4)], first target's place, targets, position of its first source in what follows, sources
-    block_sources : [shape=(X,)], the places of sources
+    run_arcs     : [shape=(N,)], the numbers of arcs, run after run
+    blocks       : [shape=(B, 4)], first target's place, number of targets, position of the first source in
+        ``block_sources``, number of sources
+    block_sources : [shape=(X,)], the places of sources, block after block
     block_arcs   : [shape=(X, Y)], the arc from each source to each target of its block, padded with -1
     """
 
@@ -42,7 +61,7 @@ class ArcLayout(NamedTuple):
 
 
 class ArcWeights(NamedTuple):
-    """Values of arcs, laid out."""
+    """Values of arcs, in a layout: by run [shape=(N,)] and by block [shape=(X, Y)]."""
 
     runs: NDArray[Any]
     blocks: NDArray[Any]
@@ -51,8 +70,7 @@ class ArcWeights(NamedTuple):
 def arc_layout(arc_from: Index, arc_start: Index) -> ArcLayout:
     """Return the layout of a network whose arcs are sorted by target.
 
-    arc_from  : [shape=(E,)], the source states of all arcs
-    arc_start : [shape=(S,)], where each target's arcs begin; every state has at least one
+    arc_from, arc_start : as in ``NetworkArrays``
     """
     states = len(arc_start)
     arc_to = np.repeat(np.arange(states), np.diff(arc_start, append=len(arc_from)))
@@ -68,18 +86,19 @@ def arc_layout(arc_from: Index, arc_start: Index) -> ArcLayout:
     return ArcLayout(order, place, runs, rest[positions], *_blocks(groups, arc_from, place))
 
 
-def arc_weights(layout: ArcLayout, values: NDArray[Any], nothing: float) -> ArcWeights:
-    """Return the values of arcs [shape=(E,)] by run and by block; ``nothing`` where a block is padded."""
+def arc_weights(layout: ArcLayout, values: NDArray[Any], padding: float) -> ArcWeights:
+    """Return the values of arcs [shape=(E,)] by run and by block; ``padding`` where a block is padded."""
     blocks = values[layout.block_arcs]
-    blocks[layout.block_arcs < 0] = nothing
+    blocks[layout.block_arcs < 0] = padding
     return ArcWeights(values[layout.run_arcs], blocks)
 
 
 _Groups = list[tuple[Index, Index]]
-"""States with the same sources, and their arcs [shape=(sources, targets)]."""
+"""Of each block: states with the same sources, and their arcs [shape=(sources, targets)]."""
 
 
 def _groups(arc_from: Index, arc_start: Index) -> _Groups:
+    """Return the states and arcs of all blocks."""
     members: dict[bytes, list[tuple[int, Index]]] = defaultdict(list)
     stops = np.append(arc_start[1:], len(arc_from))
     for state in np.flatnonzero(stops - arc_start >= LEAST_BLOCK):
@@ -96,7 +115,10 @@ def _groups(arc_from: Index, arc_start: Index) -> _Groups:
 
 
 def _order(states: int, groups: _Groups, source: Index, target: Index) -> Index:
-    """Return the states: the targets of each block side by side, then those one arc behind them, and so on."""
+    """Return the states in their new order: the targets of each block, then the states one arc after them, and so on.
+
+    source, target : of the arcs outside blocks
+    """
     if not groups:
         return np.arange(states)
     group, depth = np.full(states, len(groups)), np.zeros(states, np.intp)
@@ -110,7 +132,7 @@ def _order(states: int, groups: _Groups, source: Index, target: Index) -> Index:
 
 
 def _runs(source: Index, target: Index) -> tuple[Index, Index]:
-    """Return the runs, and the arcs in their order."""
+    """Return the runs, and the positions of arcs in order of the runs; sources and targets are places."""
     positions = np.lexsort((target, target - source))
     source, target = source[positions], target[positions]
     broken = (np.diff(target) != 1) | (np.diff(source) != 1)
@@ -120,6 +142,7 @@ def _runs(source: Index, target: Index) -> tuple[Index, Index]:
 
 
 def _blocks(groups: _Groups, arc_from: Index, place: Index) -> tuple[Index, Index, Index]:
+    """Return ``blocks``, ``block_sources`` and ``block_arcs`` of ``ArcLayout``."""
     total = sum(len(arcs) for _, arcs in groups)
     widest = max((-(-len(targets) // PADDED) * PADDED for targets, _ in groups), default=PADDED)
     blocks, sources, matrix = (

@@ -1,4 +1,4 @@
-"""State posteriors and expected arc counts of networks, by forward–backward."""
+"""State posteriors and expected arc counts of networks of states, by forward–backward."""
 
 from __future__ import annotations
 
@@ -14,48 +14,19 @@ from lipmotion.kernels.choice import numba_works
 Index = NDArray[np.intp]
 Array = NDArray[np.float64]
 CHUNK = 16
-"""Arcs of a run are followed so many at once."""
+"""Runs of arcs are padded to multiples of this."""
 FRAMES_AT_ONCE = 256
-"""Of which roots are taken: they stay near the processor."""
+"""Frames whose roots are taken at once: they stay in the cache."""
 LOWEST_ROOT = -80.0
-"""Of the logarithm of a density's eighth root: exp of less is denormal in single precision, and slow."""
-
-
-def network_posteriors(
-    log_emission: NDArray[np.floating[Any]],
-    emission: Index,
-    arc_from: Index,
-    arc_log: NDArray[np.floating[Any]],
-    arc_start: Index,
-    log_initial: NDArray[np.floating[Any]],
-    log_final: NDArray[np.floating[Any]],
-) -> tuple[Array, Array, float]:
-    """Return the probability of every state in every frame, how often each arc is expected to be followed, and the
-    log likelihood.
-
-    log_emission : [shape=(T, G)], finite or -inf
-    emission     : [shape=(S,)], the density of each state
-    arc_from     : [shape=(E,)], the source states of all arcs, sorted by target
-    arc_log      : [shape=(E,)], log probabilities
-    arc_start    : [shape=(S,)], where each target's arcs begin; every state has at least one
-    log_initial, log_final : [shape=(S,)], of beginning and ending in each state
-    Returns posterior [shape=(T, S)], counts [shape=(E,)], log likelihood; where there is no path 0, 0 and -inf.
-    Source: the standard recursions.  Compiled, paths 320 nats under a frame's best are left out, unless none is left
-    then; posteriors under 1e-12 are 0; and what is given in single precision comes back as precise.
-    Cost: O(T·E), by NumPy some fifty times slower.
-    """
-    expectation = ForwardBackwardNetwork.of(arc_from, arc_log, arc_start, log_initial, log_final)
-    order, place = expectation.layout.order, expectation.layout.place
-    found = expectation.over(log_emission, emission[order], np.array([len(log_emission)]))
-    return found.posterior[:, place], found.counts, float(found.log_likelihood[0])
+"""Least logarithm of a density's eighth root: exp of less is denormal in single precision, which is slow."""
 
 
 class NetworkPosteriors(NamedTuple):
-    """What recordings say about a network.
+    """Posteriors of recordings in a network.
 
-    posterior      : [shape=(T, S)], by place (``kernels.arcs``), of all recordings one after the other
-    counts         : [shape=(E,)], how often each arc is expected to be followed, over all recordings
-    log_likelihood : [shape=(U,)], of each; -inf where there is no path, and then it adds nothing to the other two
+    posterior      : [shape=(T, S)], of the states by place (``kernels.arcs``), all recordings concatenated
+    counts         : [shape=(E,)], expected number of times that each arc is followed, over all recordings
+    log_likelihood : [shape=(U,)], of each recording; -inf where there is no path: then its posteriors are 0
     """
 
     posterior: NDArray[Any]
@@ -64,11 +35,11 @@ class NetworkPosteriors(NamedTuple):
 
 
 class Chunks(NamedTuple):
-    """Runs of arcs, each padded to whole chunks.
+    """Runs of arcs, each padded to a multiple of ``CHUNK``.
 
-    runs   : [shape=(R, 4)], first target's place, first source's place, chunks, position in ``weight``
-    weight : [shape=(M,)], 0 for what pads
-    arcs   : [shape=(N,)], the positions of arcs of runs
+    runs   : [shape=(R, 4)], first target's place, first source's place, padded length, position in ``weight``
+    weight : [shape=(M,)], the probabilities of arcs, 0 for padding
+    arcs   : [shape=(N,)], the positions in ``weight`` of the arcs that are no padding
     """
 
     runs: NDArray[np.uintp]
@@ -77,7 +48,7 @@ class Chunks(NamedTuple):
 
     @classmethod
     def of(cls, layout: ArcLayout, weights: ArcWeights) -> Chunks:
-        """Return the runs of a layout."""
+        """Return the padded runs of a layout."""
         runs = layout.runs.copy()
         runs[:, 2] = -(-runs[:, 2] // CHUNK) * CHUNK
         runs[:, 3] = np.cumsum(runs[:, 2]) - runs[:, 2]
@@ -88,12 +59,13 @@ class Chunks(NamedTuple):
 
 
 class ForwardBackwardNetwork(NamedTuple):
-    """A network ready for forward–backward; arrays as in ``network_posteriors``.
+    """A network prepared for forward–backward.
 
-    layout  : of the arcs
-    weights : their probabilities, laid out
-    turned  : those of blocks, targets as rows, sources as columns
-    chunks  : those of runs
+    arc_from, arc_log, arc_start, log_initial, log_final : as in ``kernels.arcs.NetworkArrays``
+    layout     : of the arcs
+    weights    : the probabilities of arcs, in the layout
+    transposed : those of blocks, targets as rows, sources as columns
+    chunks     : those of runs
     """
 
     arc_from: Index
@@ -103,7 +75,7 @@ class ForwardBackwardNetwork(NamedTuple):
     log_final: Array
     layout: ArcLayout
     weights: ArcWeights
-    turned: Array
+    transposed: Array
     chunks: Chunks
 
     @classmethod
@@ -115,88 +87,94 @@ class ForwardBackwardNetwork(NamedTuple):
         log_initial: NDArray[np.floating[Any]],
         log_final: NDArray[np.floating[Any]],
     ) -> ForwardBackwardNetwork:
-        """Return a network ready."""
+        """Return a network prepared for forward–backward; parameters as in ``kernels.arcs.NetworkArrays``."""
         layout = arc_layout(arc_from, arc_start)
-        weights, turned, chunks = _weighted(layout, arc_log)
+        weights, transposed, chunks = _weighted(layout, arc_log)
         arc_log, log_initial, log_final = (log.astype(np.float64) for log in (arc_log, log_initial, log_final))
-        return cls(arc_from, arc_log, arc_start, log_initial, log_final, layout, weights, turned, chunks)
+        return cls(arc_from, arc_log, arc_start, log_initial, log_final, layout, weights, transposed, chunks)
 
     def with_arcs(
         self, arc_log: NDArray[np.floating[Any]], log_initial: NDArray[np.floating[Any]]
     ) -> ForwardBackwardNetwork:
-        """Return the network with other probabilities [shapes=(E,), (S,)]; nothing is laid out anew."""
-        weights, turned, chunks = _weighted(self.layout, arc_log)
-        changed = self._replace(weights=weights, turned=turned, chunks=chunks)
+        """Return the network in the same layout, with other probabilities of arcs [shape=(E,)] and beginnings [shape=(S,)]."""
+        weights, transposed, chunks = _weighted(self.layout, arc_log)
+        changed = self._replace(weights=weights, transposed=transposed, chunks=chunks)
         return changed._replace(arc_log=arc_log.astype(np.float64), log_initial=log_initial.astype(np.float64))
 
-    def over(self, log_emission: NDArray[np.floating[Any]], columns: Index, frames: Index) -> NetworkPosteriors:
-        """Return what recordings say, one after the other in ``log_emission``.
+    def posteriors(self, log_emission: NDArray[np.floating[Any]], columns: Index, frames: Index) -> NetworkPosteriors:
+        """Return the posteriors of recordings, which are concatenated in ``log_emission``.
 
-        log_emission : [shape=(T, G)]; the result's posteriors are as precise as these
+        log_emission : [shape=(T, G)], finite or -inf; the posteriors have the same precision
         columns      : [shape=(S,)], the density of the state at each place
-        frames       : [shape=(U,)], of each recording
+        frames       : [shape=(U,)], number of frames of each recording
+        Source: the standard recursions.  Compiled, paths 320 nats below a frame's best are left out, unless none is
+        left then, and posteriors under 1e-12 are 0.
+        Cost: O(T·E); in NumPy some fifty times slower.
         """
         if not numba_works():
-            return self._over([log_emission], [columns], frames, None)
+            return self._completed([log_emission], [columns], frames, None)
         root, best = _roots(log_emission)
         if not np.array_equal(columns, np.arange(root.shape[1])):
             root = root.take(columns, axis=1)
-        return self._over([log_emission], [columns], frames, self._compiled(root, best, frames))
+        return self._completed([log_emission], [columns], frames, self._compiled(root, best, frames))
 
-    def over_chains(
+    def product_posteriors(
         self, log_emissions: Sequence[NDArray[np.floating[Any]]], columns: Sequence[Index], frames: Index
     ) -> NetworkPosteriors:
-        """Return what recordings say whose densities are products, one factor from each of some chains.
+        """Return the posteriors of recordings whose densities are products of one factor from each chain.
 
-        log_emissions : one or more [shape=(T, G_c)], all as precise; the log density of the state at place s is the
-            sum over chains of ``log_emissions[c][:, columns[c][s]]``
+        log_emissions : one or more [shape=(T, G_c)], all of one precision; the log density of the state at place s is
+            the sum over chains of ``log_emissions[c][:, columns[c][s]]``
         columns       : of each chain [shape=(S,)]
-        frames        : [shape=(U,)], of each recording
-        Cost: as ``over``, but exponentials are taken of the chains' densities only.
+        frames        : [shape=(U,)], number of frames of each recording
+        Cost: as ``posteriors``, but exponentials are taken of the chains' densities only.
         """
         if not numba_works():
-            return self._over(log_emissions, columns, frames, None)
+            return self._completed(log_emissions, columns, frames, None)
         single = log_emissions[0].dtype == np.float32
         expected = self._compiled(*_products(log_emissions, columns), frames, single)
         edges = np.append(0, np.cumsum(frames))
         for u in np.flatnonzero(np.isneginf(expected.log_likelihood)) if single else []:
-            mine = slice(edges[u], edges[u + 1])
-            again = self._compiled(*_products([log[mine] for log in log_emissions], columns), frames[u : u + 1])
-            expected.posterior[mine], expected.log_likelihood[u] = again.posterior, again.log_likelihood[0]
+            of_recording = slice(edges[u], edges[u + 1])
+            again = self._compiled(*_products([log[of_recording] for log in log_emissions], columns), frames[u : u + 1])
+            expected.posterior[of_recording], expected.log_likelihood[u] = again.posterior, again.log_likelihood[0]
             expected.counts[:] += again.counts
-        return self._over(log_emissions, columns, frames, expected)
+        return self._completed(log_emissions, columns, frames, expected)
 
-    def _over(
+    def _completed(
         self,
         log_emissions: Sequence[NDArray[np.floating[Any]]],
         columns: Sequence[Index],
         frames: Index,
         expected: NetworkPosteriors | None,
     ) -> NetworkPosteriors:
-        """Return what was found, what has no path yet in logarithms."""
+        """Return the posteriors; those of recordings without a path in ``expected`` are computed in logarithms.
+
+        expected : the compiled result; None: there is none, all are computed in logarithms
+        """
         if expected is None:
             posterior = np.zeros((len(log_emissions[0]), len(columns[0])), log_emissions[0].dtype)
             expected = NetworkPosteriors(posterior, np.zeros(len(self.arc_log)), np.full(len(frames), -np.inf))
         edges = np.append(0, np.cumsum(frames))
         for u in np.flatnonzero(np.isneginf(expected.log_likelihood)):
-            mine = slice(edges[u], edges[u + 1])
+            of_recording = slice(edges[u], edges[u + 1])
             log_emission = sum(
-                log[mine, column[self.layout.place]].astype(np.float64)
+                log[of_recording, column[self.layout.place]].astype(np.float64)
                 for log, column in zip(log_emissions, columns, strict=True)
             )
             posterior, counts, expected.log_likelihood[u] = self._in_logs(np.asarray(log_emission))
-            expected.posterior[mine] = posterior[:, self.layout.order]
+            expected.posterior[of_recording] = posterior[:, self.layout.order]
             expected.counts[:] += counts
         return expected
 
     def _compiled(
         self, root: NDArray[Any], best: NDArray[Any], frames: Index, single: bool = False
     ) -> NetworkPosteriors:
-        """Return what recordings say, where there are paths within reach.
+        """Return the posteriors of recordings by the compiled kernels; without a path in their range, 0 and -inf.
 
-        root : [shape=(T, S)], by place, the eighth roots of densities relative to ``best``; becomes the posteriors
+        root : [shape=(T, S)], by place, the eighth roots of densities relative to ``best``; overwritten by posteriors
         best : [shape=(T,)], logarithms
-        single : whether states may be in single precision (0 and -inf for a recording for which that is not enough)
+        single : whether probabilities may be in single precision; a recording for which that is not enough gets 0, -inf
         """
         from lipmotion.kernels.compiled import network
 
@@ -209,7 +187,7 @@ class ForwardBackwardNetwork(NamedTuple):
         run_counts, leaving, entering, scales, ends = kernel(
             root, edges, initial, final, self.chunks.runs, run_weight,
             layout.blocks.astype(np.uintp), layout.block_sources.astype(np.uintp),
-            self.weights.blocks.astype(root.dtype), self.turned.astype(root.dtype),
+            self.weights.blocks.astype(root.dtype), self.transposed.astype(root.dtype),
         )  # fmt: skip
         counts = np.zeros(len(self.arc_log))
         counts[layout.run_arcs] = run_counts[self.chunks.arcs] * self.weights.runs
@@ -219,9 +197,9 @@ class ForwardBackwardNetwork(NamedTuple):
         return NetworkPosteriors(root, counts, log_likelihood)
 
     def _in_logs(self, log_emission: Array) -> tuple[Array, Array, float]:
-        """Return posteriors, counts and log likelihood of one recording by NumPy, in logarithms: none is too small.
+        """Return posteriors, counts and log likelihood of one recording by NumPy, in logarithms, without underflow.
 
-        log_emission : [shape=(T, S)], of the states as they are
+        log_emission : [shape=(T, S)], of the states in their own order
         """
         (T, states), arc_from = log_emission.shape, self.arc_from
         arc_to = np.repeat(np.arange(states), np.diff(self.arc_start, append=len(arc_from)))
@@ -243,9 +221,9 @@ class ForwardBackwardNetwork(NamedTuple):
 
 
 def _roots(log_density: NDArray[np.floating[Any]]) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Return the eighth roots of densities relative to the best of each frame, and its logarithm.
+    """Return the eighth roots of densities relative to the best of each frame, and the logarithm of the best.
 
-    Those of all densities above e⁻⁶⁴⁰ are single-precision numbers; others become that.
+    Roots of densities above e⁻⁶⁴⁰ are normal numbers in single precision; lower densities are raised to that.
     """
     best = log_density.max(axis=1)
     best[~np.isfinite(best)] = 0
@@ -257,7 +235,7 @@ def _roots(log_density: NDArray[np.floating[Any]]) -> tuple[NDArray[Any], NDArra
 def _products(
     log_densities: Sequence[NDArray[np.floating[Any]]], columns: Sequence[Index]
 ) -> tuple[NDArray[Any], Array]:
-    """Return the roots of joint densities, by place, relative to the best of each frame, and its logarithm."""
+    """Return the roots of joint densities, by place, relative to each frame's best, and the logarithm of the best."""
     from lipmotion.kernels.compiled import network
 
     firsts = np.cumsum([0, *(log.shape[1] for log in log_densities[:-1])])
@@ -265,42 +243,42 @@ def _products(
     frames = len(log_densities[0])
     joint, best = np.empty((frames, shifted.shape[1]), log_densities[0].dtype), np.empty(frames)
     for start in range(0, frames, FRAMES_AT_ONCE):
-        mine = slice(start, start + FRAMES_AT_ONCE)
-        roots, bests = zip(*(_roots(log[mine]) for log in log_densities), strict=True)
-        network.products(np.hstack(roots), shifted, joint[mine], best[mine])
+        of_recording = slice(start, start + FRAMES_AT_ONCE)
+        roots, bests = zip(*(_roots(log[of_recording]) for log in log_densities), strict=True)
+        network.products(np.hstack(roots), shifted, joint[of_recording], best[of_recording])
         with np.errstate(divide="ignore"):
-            best[mine] = 8 * np.log(best[mine]) + np.sum(bests, axis=0, dtype=np.float64)
+            best[of_recording] = 8 * np.log(best[of_recording]) + np.sum(bests, axis=0, dtype=np.float64)
     return joint, best
 
 
 def _probabilities(log: Array) -> tuple[Array, float]:
-    """Return probabilities relative to the greatest, and its logarithm."""
+    """Return probabilities relative to the greatest, and the logarithm of the greatest."""
     best = float(log.max())
     best = best if np.isfinite(best) else 0.0
     return np.exp(log - best), best
 
 
 def _weighted(layout: ArcLayout, arc_log: NDArray[np.floating[Any]]) -> tuple[ArcWeights, Array, Chunks]:
-    """Return the probabilities of arcs, given by their logarithms [shape=(E,)], in all forms that kernels take."""
+    """Return the probabilities of arcs, given as logarithms [shape=(E,)], in all forms that the kernels take."""
     weights = arc_weights(layout, np.exp(arc_log.astype(np.float64)), 0.0)
-    return weights, _turned(layout, weights), Chunks.of(layout, weights)
+    return weights, _transposed(layout, weights), Chunks.of(layout, weights)
 
 
-def _turned(layout: ArcLayout, weights: ArcWeights) -> Array:
+def _transposed(layout: ArcLayout, weights: ArcWeights) -> Array:
     """Return the weights of all blocks, targets as rows, sources as columns, padded."""
-    turned = [np.empty((0, -(-layout.blocks[:, 3].max(initial=0) // PADDED) * PADDED))]
+    transposed = [np.empty((0, -(-layout.blocks[:, 3].max(initial=0) // PADDED) * PADDED))]
     for _, targets, first, sources in layout.blocks:
-        matrix = np.zeros((targets, turned[0].shape[1]))
+        matrix = np.zeros((targets, transposed[0].shape[1]))
         matrix[:, :sources] = weights.blocks[first : first + sources, :targets].T
-        turned.append(matrix)
-    return np.concatenate(turned)
+        transposed.append(matrix)
+    return np.concatenate(transposed)
 
 
 def _count_blocks(counts: Array, layout: ArcLayout, weights: ArcWeights, leaving: Array, entering: Array) -> None:
     """Fill in the expected counts of the arcs of all blocks: one matrix product each."""
     start = 0
     for _, targets, first, sources in layout.blocks:
-        mine = slice(first, first + sources), slice(0, targets)
-        pairs = leaving[:, mine[0]].T @ entering[:, start : start + targets]
-        counts[layout.block_arcs[mine]] = pairs * weights.blocks[mine]
+        of_recording = slice(first, first + sources), slice(0, targets)
+        pairs = leaving[:, of_recording[0]].T @ entering[:, start : start + targets]
+        counts[layout.block_arcs[of_recording]] = pairs * weights.blocks[of_recording]
         start += targets

@@ -1,4 +1,4 @@
-"""Paths through a network drawn at random, each as often as it is probable."""
+"""Random sampling of paths through a network from their posterior."""
 
 from __future__ import annotations
 
@@ -7,34 +7,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.kernels.arcs import NetworkArrays
+
 Index = NDArray[np.intp]
 Array = NDArray[np.float64]
 
 
 def sample_paths(
-    log_emission: NDArray[np.floating[Any]],
-    emission: Index,
-    arc_from: Index,
-    arc_log: NDArray[np.floating[Any]],
-    arc_start: Index,
-    log_initial: NDArray[np.floating[Any]],
-    log_final: NDArray[np.floating[Any]],
-    uniform: Array,
+    log_emission: NDArray[np.floating[Any]], network: NetworkArrays, uniform: Array
 ) -> tuple[Index, float]:
-    """Return independent paths, each drawn with its posterior probability.
+    """Return paths drawn independently from the posterior of all paths.
 
     log_emission : [shape=(T, G)], finite or -inf
-    emission     : [shape=(S,)], the density of each state
-    arc_from     : [shape=(E,)], the source states of all arcs, sorted by target
-    arc_log      : [shape=(E,)], log probabilities
-    arc_start    : [shape=(S,)], where each target's arcs begin; every state has at least one
-    log_initial, log_final : [shape=(S,)], of beginning and ending in each state
-    uniform      : [shape=(N, T)], random numbers from 0 up to 1, a row a path
-    Returns paths [shape=(N, T)] and the log likelihood; where there is no path, -inf and paths of -1.
+    uniform      : [shape=(N, T)], random numbers from 0 up to 1, one row for each path
+    Returns the states of the paths [shape=(N, T)] and the log likelihood; where there is no path, -1 and -inf.
     Source: forward filtering, backward sampling (Carter & Kohn 1994), in the log domain.
     Cost: O(T·E) for the filter, O(T·S) memory; O(T·E / S) a path.
     """
-    alpha = _filtered(log_emission, emission, arc_from, arc_log, arc_start, log_initial)
+    _, arc_from, arc_log, arc_start, _, log_final = network
+    alpha = _forward(log_emission, network)
     last = alpha[-1] + log_final
     log_likelihood = float(np.logaddexp.reduce(last))
     paths = np.full((len(uniform), len(alpha)), -1, np.intp)
@@ -50,15 +41,9 @@ def sample_paths(
     return paths, log_likelihood
 
 
-def _filtered(
-    log_emission: NDArray[np.floating[Any]],
-    emission: Index,
-    arc_from: Index,
-    arc_log: NDArray[np.floating[Any]],
-    arc_start: Index,
-    log_initial: NDArray[np.floating[Any]],
-) -> Array:
-    """Return the log probability of being in each state, and of all frames so far [shape=(T, S)]."""
+def _forward(log_emission: NDArray[np.floating[Any]], network: NetworkArrays) -> Array:
+    """Return the joint log probability of each state and all frames up to each frame [shape=(T, S)]."""
+    emission, arc_from, arc_log, arc_start, log_initial, _ = network
     alpha = np.empty((len(log_emission), len(emission)))
     alpha[0] = log_initial + log_emission[0, emission]
     for frame in range(1, len(alpha)):
@@ -68,6 +53,6 @@ def _filtered(
 
 
 def _drawn(log_weights: Array, uniform: float) -> int:
-    """Return the number of the weight that a random number falls into."""
+    """Return a number drawn with probabilities proportional to the weights; ``uniform`` is from 0 up to 1."""
     sums = np.cumsum(np.exp(log_weights - log_weights.max()))
     return int(np.searchsorted(sums, uniform * sums[-1], side="right").clip(max=len(sums) - 1))

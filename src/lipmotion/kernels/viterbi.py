@@ -8,53 +8,47 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.kernels.arcs import ArcLayout, ArcWeights, arc_layout, arc_weights
+from lipmotion.kernels.arcs import ArcLayout, ArcWeights, NetworkArrays, arc_layout, arc_weights
 from lipmotion.kernels.choice import compiled_pays
 
 Index = NDArray[np.intp]
 Scores = NDArray[np.float32]
 LogEmission = Callable[[int, int], NDArray[np.float32]]
-"""Gives the log densities of the frames from one up to another [shape=(frames, G)], the same at every call."""
+"""Function of a first frame and an end: returns the log densities of these frames [shape=(end - first, G)]."""
 BLOCK = 2048
-"""Frames whose scores are kept at a time; earlier ones are computed again from checkpoints."""
+"""Frames whose scores are in memory at a time; earlier scores are computed again from checkpoints."""
 FRAME_S, ARC_S = 10e-6, 15e-9
-"""What NumPy takes for a frame, and for every arc in it (docs/results/kernels.md)."""
+"""Time that NumPy takes for a frame, and for every arc in it (docs/results/kernels.md)."""
 
 
 def best_path(
     log_emission: LogEmission,
     count: int,
-    emission: NDArray[np.intp],
-    arc_from: NDArray[np.intp],
-    arc_log: NDArray[np.float32],
-    arc_start: NDArray[np.intp],
-    log_initial: NDArray[np.float32],
-    log_final: NDArray[np.float32],
+    network: NetworkArrays,
     beam: float | None = None,
     layout: Callable[[], ArcLayout] | None = None,
 ) -> tuple[NDArray[np.intp], float]:
     """Return the most probable path and its log probability (-inf: no path).
 
-    log_emission : of G emission densities; asked for at most ``BLOCK`` + 1 frames at a time, for each at most twice
+    log_emission : of G emission densities; called for at most ``BLOCK`` + 1 frames, and for each frame at most twice,
+                   with the same result
     count        : frames, T
-    emission     : [shape=(S,)], the density of each of S states
-    arc_from     : [shape=(E,)], the source states of all arcs, sorted by target
-    arc_log      : [shape=(E,)]
-    arc_start    : [shape=(S,)], where each target's arcs begin; every state has at least one
-    log_initial, log_final : [shape=(S,)]
-    beam         : states whose score falls more than this under the frame's best are dropped: faster, and no longer
-                   sure to find the best path, or one at all; None: exact
-    layout       : gives that of the arcs (``kernels.arcs``), where it is kept from search to search
-    Returns path [shape=(T,)], score.
+    network      : logarithms in single precision
+    beam         : states with a score lower than the best of the frame by more than this are dropped: that is faster,
+                   but may miss the best path, or every path; None: exact
+    layout       : returns the layout of the arcs, where it is kept from search to search
+    Returns the states of the path [shape=(T,)], and its score.
     Cost: O(T·E) time, O((T / BLOCK + BLOCK)·(S + G)) memory.
     """
-    arcs = (emission, arc_from, arc_log, arc_start, np.inf if beam is None else beam)
-    if compiled_pays(count * (FRAME_S + ARC_S * len(arc_from))):
-        search = _laid_out(arcs, layout() if layout else arc_layout(arc_from, arc_start))
+    emission, widest = network.emission, np.inf if beam is None else beam
+    if compiled_pays(count * (FRAME_S + ARC_S * len(network.arc_from))):
+        search = _compiled_search(
+            network, widest, layout() if layout else arc_layout(network.arc_from, network.arc_start)
+        )
     else:
-        search = _Search(*arcs, order=np.arange(len(emission)), place=np.arange(len(emission)))
+        search = _Search(network, widest, order=np.arange(len(emission)), place=np.arange(len(emission)))
     starts = range(0, count, BLOCK)
-    first = (log_initial + log_emission(0, 1)[0, emission])[None]
+    first = (network.log_initial + log_emission(0, 1)[0, emission])[None]
     checkpoints, score = [first[0, search.order]], 0.0
     for start in starts[1:]:
         delta, shift = search.scores(checkpoints[-1], log_emission(start - BLOCK, start + 1))
@@ -66,7 +60,7 @@ def best_path(
         stop = min(start + BLOCK + 1, count)
         delta, shift = search.scores(checkpoint, log_emission(start, stop))
         if state < 0:
-            last = delta[-1, search.place] + log_final
+            last = delta[-1, search.place] + network.log_final
             state = int(last.argmax())
             score += shift + float(last[state])
             path[-1] = state
@@ -77,16 +71,13 @@ def best_path(
 
 @dataclass(frozen=True, eq=False)
 class _Search:
-    """A network, and how its scores are computed; rows of scores are by place.
+    """The search for the best path through a network. Rows of scores are by place.
 
-    order, place    : of the layout; without one, of the states as they are
-    layout, weights : for the compiled form
+    order, place    : of the layout, or without one those of the states' own order
+    layout, weights : for the compiled form; None: NumPy computes
     """
 
-    emission: Index
-    arc_from: Index
-    arc_log: Scores
-    arc_start: Index
+    network: NetworkArrays
     beam: float
     order: Index
     place: Index
@@ -94,28 +85,33 @@ class _Search:
     weights: ArcWeights | None = None
 
     def scores(self, first: Scores, log_emission: Scores) -> tuple[Scores, float]:
-        """Return the best scores into every state, frame by frame, each frame's best taken off, and their sum."""
-        delta = np.empty((len(log_emission), len(self.emission)), np.float32)
+        """Return the scores of the best path to every state, relative to each frame's best, and the sum of these best.
+
+        first        : the scores in the first frame [shape=(S,)]
+        log_emission : [shape=(T, G)]
+        """
+        delta = np.empty((len(log_emission), len(self.network.emission)), np.float32)
         delta[0] = first
         if self.layout is None or self.weights is None:
             return delta, self._fill(delta, log_emission)
         from lipmotion.kernels.compiled import viterbi
 
         _, _, runs, _, blocks, block_sources, _ = self.layout
-        columns = self.emission[self.order].astype(np.uintp)  # signed ones might count from the end, and no vectors
+        columns = self.network.emission[self.order].astype(np.uintp)  # indices that may be negative are not vectorised
         log_emission = np.ascontiguousarray(log_emission, np.float32)
         arcs = (runs, self.weights.runs, blocks, block_sources, self.weights.blocks)
         return delta, float(viterbi.scores(delta, log_emission, columns, *arcs, np.float32(-self.beam)))
 
     def _fill(self, delta: Scores, log_emission: Scores) -> float:
-        """Compute all rows but the first, by NumPy."""
-        arrivals = np.empty(len(self.arc_from), np.float32)
+        """Compute all rows but the first, by NumPy; return the sum of the frames' best scores."""
+        emission, arc_from, arc_log, arc_start, _, _ = self.network
+        arrivals = np.empty(len(arc_from), np.float32)
         shift = 0.0
         for frame in range(1, len(delta)):
-            np.take(delta[frame - 1], self.arc_from, out=arrivals)
-            arrivals += self.arc_log
-            row = np.maximum.reduceat(arrivals, self.arc_start, out=delta[frame])
-            row += log_emission[frame, self.emission]
+            np.take(delta[frame - 1], arc_from, out=arrivals)
+            arrivals += arc_log
+            row = np.maximum.reduceat(arrivals, arc_start, out=delta[frame])
+            row += log_emission[frame, emission]
             best = row.max()
             if best > -np.inf:
                 row -= best
@@ -124,19 +120,20 @@ class _Search:
         return shift
 
     def trace(self, path: Index, delta: Scores, state: int) -> None:
-        """Fill in the states before ``state`` in the last frame: recomputed, so that no back-pointers are stored."""
+        """Fill in the path before ``state`` in the last frame of ``delta``: without back-pointers, from the scores."""
+        _, arc_from, arc_log, arc_start, _, _ = self.network
         if self.layout is not None:
             from lipmotion.kernels.compiled import viterbi
 
-            viterbi.trace(path, delta, state, self.place, self.arc_from, self.arc_log, self.arc_start)
+            viterbi.trace(path, delta, state, self.place, arc_from, arc_log, arc_start)
             return
-        stops = np.append(self.arc_start[1:], len(self.arc_from))
+        stops = np.append(arc_start[1:], len(arc_from))
         for frame in range(len(path) - 1, -1, -1):
-            arcs = slice(self.arc_start[state], stops[state])
-            sources = self.arc_from[arcs]
-            state = int(sources[(delta[frame, sources] + self.arc_log[arcs]).argmax()])
+            arcs = slice(arc_start[state], stops[state])
+            sources = arc_from[arcs]
+            state = int(sources[(delta[frame, sources] + arc_log[arcs]).argmax()])
             path[frame] = state
 
 
-def _laid_out(arcs: tuple[Index, Index, Scores, Index, float], layout: ArcLayout) -> _Search:
-    return _Search(*arcs, layout.order, layout.place, layout, arc_weights(layout, arcs[2], -np.inf))
+def _compiled_search(network: NetworkArrays, beam: float, layout: ArcLayout) -> _Search:
+    return _Search(network, beam, layout.order, layout.place, layout, arc_weights(layout, network.arc_log, -np.inf))

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from lipmotion.errors import ModelFormatError
 
 Arrays = Mapping[str, NDArray[Any]]
 POSITIVE, NEGATIVE, BELOW_ONE = 5e-324, -5e-324, math.nextafter(1, 0)
@@ -64,6 +67,18 @@ class CheckedArrays:
     def __getitem__(self, name: str) -> NDArray[Any]:
         """Return one array. Raises KeyError: an optional one that is not there."""
         return self.arrays[name]
+
+
+@contextmanager
+def format_errors(what: str, remedy: str = "train or download it again") -> Iterator[None]:
+    """Turn the errors of damaged arrays that are raised inside into a ModelFormatError.
+
+    what, remedy : what is damaged, as ``the joint model``, and what its user can do
+    """
+    try:
+        yield
+    except (KeyError, ValueError, IndexError, TypeError) as error:
+        raise ModelFormatError(f"{what} is damaged ({error}); {remedy}") from error
 
 
 def checked_arrays(arrays: Arrays, table: Mapping[str, ArraySpec], **sizes: int) -> CheckedArrays:

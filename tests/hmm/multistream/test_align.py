@@ -3,9 +3,9 @@ import pytest
 
 from hmm.multistream.synthetic import CLASSES, config, inventory, observed, random_joint, utterances
 from lipmotion.errors import AlignmentError, InputError
-from lipmotion.hmm.multistream.align import align, align_by_durations, measured_durations
+from lipmotion.hmm.multistream.align import align, measured_durations
 from lipmotion.hmm.multistream.inventory import triphone_states
-from lipmotion.hmm.multistream.streams import StreamObservations, StreamWeights
+from lipmotion.hmm.multistream.streams import StreamWeights
 from lipmotion.hmm.multistream.train import train_joint
 from oracles import joint as slow
 from oracles.sequences import segmentations
@@ -17,7 +17,7 @@ def slow_scores(hmm, data, units, weights):
     """Give the score of every segmentation: emissions and transitions."""
     states = triphone_states(hmm.inventory, units)
     density = np.array(
-        [[slow.log_density(hmm, data, place, t, weights) for place in states.triphones] for t in range(data.frames)]
+        [[slow.log_density(hmm, data, state, t, weights) for state in states.triphones] for t in range(data.frames)]
     )
     stay = hmm.log_stay[states.monophones]
     for lengths in segmentations(data.frames, len(states.monophones)):
@@ -57,24 +57,6 @@ def test_short_units_have_some_of_their_states():
     assert path.bounds(5).tolist() == [0, 3, 5, 6, 6, 10]
 
 
-def test_lengths_that_are_known_decide_where_nothing_else_does():
-    hmm = random_joint(2, states=1)
-    mean = np.array([2.0, 1.0, 5.0, 3.0])  # of sil, sp, a, b
-    hmm = type(hmm)(**{**hmm.__dict__, "durations": np.stack([mean, np.full(4, 0.5)], axis=1)})
-    nothing = StreamObservations({name: type(s)(s.values[:1].repeat(8, axis=0), s.known[:1].repeat(8)) for name, s in
-                        observed(np.random.default_rng(3), 1).streams.items()})  # fmt: skip
-    even = align_by_durations(hmm, nothing, ("a", "b"), weight=1e6)
-    assert even.bounds(2).tolist() == [0, 5, 8]
-    with pytest.raises(AlignmentError):
-        align_by_durations(hmm, nothing, ("a",) * 9)
-
-
-def test_silence_may_last_as_long_as_it_likes():
-    hmm = random_joint(4, states=1)
-    data = observed(np.random.default_rng(5), 300)
-    assert len(align_by_durations(hmm, data, ("sil", "a", "sil")).frames) == 300
-
-
 def test_durations_are_those_of_the_alignment():
     data = utterances(12)
     hmm = train_joint(data, inventory(), CLASSES, config(mixtures=1))
@@ -83,8 +65,6 @@ def test_durations_are_those_of_the_alignment():
     rows = [hmm.inventory.monophones["a", state] for state in range(3)]
     assert 6 <= durations[rows, 0].sum() <= 12
     assert (durations[:, 1] >= 1).all()
-    near = align_by_durations(hmm, data[0].observed, data[0].units).bounds(len(data[0].units))
-    assert np.abs(near - data[0].bounds).max() <= 4
 
 
 def test_what_does_not_fit_is_refused():

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from hmm.multistream.synthetic import observed, random_joint, utterances
+from kernels.networks import network_posteriors
 from lipmotion.errors import AlignmentError, InputError
 from lipmotion.hmm.decode import decode_units, unit_loop
 from lipmotion.hmm.log_likelihoods import log_likelihoods_of
@@ -27,6 +28,25 @@ def slow_densities(hmm, data, weights):
         return slow.log_density(hmm, data, place, frame, weights)
 
     return density
+
+
+def state_posteriors(recogniser, data):
+    """Return the posterior of every state without context in every frame [shape=(T, R)]."""
+    network, table = recogniser._loop.network, recogniser._states.table
+    log_density = recogniser._log_likelihoods(data).log_density(0, data.frames, None)
+    posteriors, _, _ = network_posteriors(log_density, *network.arrays)
+    result = np.zeros((data.frames, len(recogniser.hmm.inventory.monophones)))
+    np.add.at(result.T, table.parents()[network.emission], posteriors.T.astype(float))
+    return result
+
+
+def sampled_units(recogniser, data, count, seed):
+    """Return the units of sampled paths, each with its first frame."""
+    sequences = []
+    for path in recogniser.sampled_paths(data, count, seed):
+        units = [context[1] for (context, state) in path.states.triphones if state == 0]
+        sequences.append(tuple(zip(units, path.bounds(len(units))[:-1].tolist(), strict=True)))
+    return sequences
 
 
 def candidates(hmm, frames):
@@ -59,7 +79,7 @@ def test_sequences_are_drawn_as_often_as_they_are_probable():
     for share, (_, units, lengths) in zip(shares, ways, strict=True):
         key = tuple(zip(units, np.cumsum([0, *lengths])[:-1:2].tolist(), strict=True))
         expected[key] = expected.get(key, 0) + share
-    drawn = [tuple(map(tuple, said)) for said in JointRecogniser(hmm, SOFT).sampled(data, count, seed=5)]
+    drawn = sampled_units(JointRecogniser(hmm, SOFT), data, count, 5)
     assert set(drawn) <= set(expected)
     likely = {key: share for key, share in expected.items() if share > 0.02}
     assert len(likely) > 2
@@ -75,7 +95,7 @@ def test_posteriors_are_the_shares_of_all_sequences():
     expected = np.zeros((frames, len(hmm.inventory.monophones)))
     for share, (_, units, lengths) in zip(shares, ways, strict=True):
         expected[np.arange(frames), np.repeat(triphone_states(hmm.inventory, units).monophones, lengths)] += share
-    found = JointRecogniser(hmm, SOFT).posterior(data)
+    found = state_posteriors(JointRecogniser(hmm, SOFT), data)
     assert found == pytest.approx(expected, abs=1e-4)
     assert found.sum(axis=1) == pytest.approx(np.ones(frames), abs=1e-5)
 
@@ -84,15 +104,15 @@ def test_paths_that_are_drawn_go_through_the_states_of_their_units():
     hmm, data = random_joint(3, bigram_weight=0.3, insertion=2.0), observed(np.random.default_rng(5), 40)
     recogniser = JointRecogniser(hmm, SOFT)
     paths = recogniser.sampled_paths(data, 400, 6)
-    for path, said in zip(paths, recogniser.sampled(data, 400, 6), strict=True):
+    for path, said in zip(paths, sampled_units(recogniser, data, 400, 6), strict=True):
         assert set(np.diff(path.frames).tolist()) <= {0, 1}
         assert (path.frames[0], path.frames[-1]) == (0, len(path.states.monophones) - 1)
-        assert [context[1] for context, state in path.states.triphones if state == 0] == [s.unit for s in said]
-        assert path.bounds(len(said))[:-1].tolist() == [s.first for s in said]
+        assert [context[1] for context, state in path.states.triphones if state == 0] == [unit for unit, _ in said]
+        assert path.bounds(len(said))[:-1].tolist() == [first for _, first in said]
     drawn = np.mean(
         [np.eye(len(hmm.inventory.monophones))[path.states.monophones[path.frames]] for path in paths], axis=0
     )
-    assert drawn == pytest.approx(recogniser.posterior(data), abs=0.13)
+    assert drawn == pytest.approx(state_posteriors(recogniser, data), abs=0.13)
 
 
 def test_a_wide_beam_changes_nothing():
@@ -105,7 +125,8 @@ def test_the_same_seed_draws_the_same():
     hmm = random_joint(6, bigram_weight=0.3, insertion=2.0)
     data = observed(np.random.default_rng(7), 20)
     recogniser = JointRecogniser(hmm, SOFT)
-    assert recogniser.sampled(data, 5, 1) == recogniser.sampled(data, 5, 1) != recogniser.sampled(data, 5, 2)
+    assert sampled_units(recogniser, data, 5, 1) == sampled_units(recogniser, data, 5, 1)
+    assert sampled_units(recogniser, data, 5, 1) != sampled_units(recogniser, data, 5, 2)
 
 
 def test_speech_alone_is_the_plain_model():
@@ -148,13 +169,11 @@ def test_what_cannot_be_recognised():
     with pytest.raises(InputError, match="switched on are"):
         JointRecogniser(hmm, StreamWeights(0, 0, 0, 0, 0)).recognise(data)
     with pytest.raises(InputError, match="required one or more"):
-        JointRecogniser(hmm).sampled(data, 0, 0)
+        JointRecogniser(hmm).sampled_paths(data, 0, 0)
     with pytest.raises(AlignmentError):
         JointRecogniser(hmm).recognise(observed(np.random.default_rng(0), 2))
     with pytest.raises(AlignmentError):
-        JointRecogniser(hmm).sampled(observed(np.random.default_rng(0), 2), 1, 0)
-    with pytest.raises(AlignmentError):
-        JointRecogniser(hmm).posterior(observed(np.random.default_rng(0), 2))
+        JointRecogniser(hmm).sampled_paths(observed(np.random.default_rng(0), 2), 1, 0)
     wide = StreamObservations({SPEECH: type(data.streams[SPEECH])(np.zeros((9, 4)), np.ones(9, bool))})
     with pytest.raises(InputError, match="has 4 dimensions"):
         JointRecogniser(hmm).recognise(wide)

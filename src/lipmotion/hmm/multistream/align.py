@@ -79,7 +79,7 @@ def _check_bounds(bounds: NDArray[np.intp], units: int, frames: int) -> None:
 
 
 def _states_that_fit(states: TriphoneStates, lengths: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return the numbers of the states on the path: of a unit with fewer frames than states, as many as it has frames."""
+    """Return the numbers of the states on the path: of a unit with fewer frames than states, one for each frame."""
     kept = []
     for position, length in enumerate(lengths.tolist()):
         of_unit = np.flatnonzero(states.positions == position)

@@ -93,7 +93,7 @@ TIMES = {
     "durations": ArraySpec(np.float64, "R 2", POSITIVE, 1e9),
 }
 LEAST_STORED_SCALE = LEAST_SCALE / 10
-"""Below ``LEAST_SCALE``, for rounding to half precision; values divided by less have squares beyond single precision."""
+"""Below ``LEAST_SCALE``, for rounding to half precision; squares of values divided by less overflow in float32."""
 STREAM = {
     **MIXTURES,
     "mean": ArraySpec(np.float64, "D", -1e6, 1e6),

@@ -82,7 +82,7 @@ class StreamStatistics:
 
     triphones : by stream, of every state in context (``PreparedUtterances.triphones``), for one Gaussian each
     leaves    : by stream, of its leaves, for all their Gaussians
-    stay, occupied : [shape=(R,)], of each state without context, expected number of transitions to itself, and of frames
+    stay, occupied : [shape=(R,)], expected transitions of each state without context to itself, and its frames
     """
 
     triphones: Mapping[str, GaussianStatistics]

@@ -55,7 +55,7 @@ class Inventory:
 
     @cached_property
     def trees(self) -> dict[str, tuple[str, int]]:
-        """The name of every tree, and a state that it is for: one tree for each position; silent units have their own."""
+        """The name and one state of every tree: one tree for each position, and others for silent units."""
         positions = {str(state): ("", state) for state in range(self.states)}
         return positions | {f"{unit}.{state}": (unit, state) for unit, state in self.monophones if unit in self.free}
 

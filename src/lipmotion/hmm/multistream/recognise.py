@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,6 @@ from lipmotion.hmm.multistream.align import StatePath
 from lipmotion.hmm.multistream.inventory import TriphoneState, triphone_states
 from lipmotion.hmm.multistream.model import JointHmm
 from lipmotion.hmm.multistream.streams import ACOUSTIC_STREAMS, MOTION, SPEECH, StreamObservations, StreamWeights
-from lipmotion.hmm.network import Network
 from lipmotion.hmm.states import StateTable, plain_states
 from lipmotion.kernels.sampling import sample_paths
 from lipmotion.stats.bigram import Bigram
@@ -67,9 +66,8 @@ class JointRecogniser:
         if count < 1:
             raise InputError(f"{count} paths, required one or more")
         uniform = np.random.default_rng(seed).random((count, observed.frames))
-        network = self._loop.network
         log_density = self._log_likelihoods(observed).log_density(0, observed.frames, None)
-        paths, log_likelihood = sample_paths(log_density, *_arrays(network), uniform)
+        paths, log_likelihood = sample_paths(log_density, self._loop.network.arrays, uniform)
         if not np.isfinite(log_likelihood):
             raise AlignmentError(f"no units fit into {observed.frames} frames of 10 ms; give a longer recording")
         return [self._path(nodes) for nodes in paths]
@@ -104,14 +102,6 @@ class JointRecogniser:
             return values[:, self._states.column if chosen is None else self._states.column[chosen]]
 
         return LogLikelihoods(observed.frames, log_density)
-
-
-_Arrays = tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]
-
-
-def _arrays(network: Network) -> _Arrays:
-    arcs = network.arc_from, network.arc_log, network.arc_start
-    return network.emission, *arcs, network.log_initial, network.log_final
 
 
 @dataclass(frozen=True, eq=False)
