@@ -54,7 +54,7 @@ def constrained(options: Any, kind: type = np.float32) -> Work:
     columns = [column[expectation.layout.order] for column in (audio, visual)]
     logs = [np.log(part).reshape(-1, part.shape[-1]).astype(kind) for part in harness.lik(options)]
     frames = np.full(options.utts, options.T)
-    return lambda: float(expectation.over_chains(logs, columns, frames).log_likelihood.sum())
+    return lambda: float(expectation.product_posteriors(logs, columns, frames).log_likelihood.sum())
 
 
 def constrained_double(options: Any) -> Work:

@@ -19,7 +19,7 @@ import lipmotion
 from lipmotion.export.cues.choose import choose_cues, default_hold_frames
 from lipmotion.export.cues.costs import frame_costs
 from lipmotion.export.cues.shapes import SHAPES
-from lipmotion.export.cues.sheet import CueSheet, frame_count, cue_sheet
+from lipmotion.export.cues.sheet import CueSheet, cue_sheet, frame_count
 from lipmotion.pipeline.training.train import labels_of
 from lipmotion.speech.phone_models import recognise
 from lipmotion.types import Generation, Motion, Speech, Timeline, Trace

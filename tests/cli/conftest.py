@@ -18,7 +18,7 @@ from lipmotion.storage.archive import HEADER
 
 
 class Done(NamedTuple):
-    """What a command left: its exit code, and the lines that it printed."""
+    """The outcome of a command: its exit code, and the lines that it printed."""
 
     code: int
     out: list[str]
@@ -71,7 +71,7 @@ def run_outside() -> Run:
 
 @pytest.fixture(scope="session")
 def newer_model(toy_model_file: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A model that a later lipmotion wrote."""
+    """A model file of a later version."""
     path = tmp_path_factory.mktemp("newer") / "newer.lipmotion"
     with zipfile.ZipFile(toy_model_file) as old, zipfile.ZipFile(path, "w") as new:
         for name in old.namelist():
@@ -84,7 +84,7 @@ def newer_model(toy_model_file: Path, tmp_path_factory: pytest.TempPathFactory) 
 
 @pytest.fixture
 def bad_speech(here: Path) -> dict[str, Path]:
-    """Recordings that cannot be used, by what is wrong with them."""
+    """Unusable recordings, by their defect."""
     from speech.sound import write_pictures
 
     folder = here.parent / "bad"
@@ -103,5 +103,5 @@ def bad_speech(here: Path) -> dict[str, Path]:
 
 
 def is_one_error(done: Done, code: int) -> bool:
-    """Whether a command said what was wrong in one line, and nothing else."""
+    """Return whether a command printed one error line, and nothing else."""
     return done.code == code and done.out == [] and len(done.err) == 1 and done.err[0].startswith("lipmotion: error: ")

@@ -1,8 +1,9 @@
 """A command that sends itself a signal at a chosen step of its work.
 
-``python signalled.py NUMBER STEP ARGUMENT ...``: the signal, after how many calls of functions since signals are
-listened to (0: never; -1: when ``main`` has returned; -2: when Python clears its modules, at the very end), and the
-arguments of ``lipmotion``. Without a signal it writes to ``steps`` how many calls there were.
+``python signalled.py NUMBER STEP ARGUMENT ...``: the number of the signal; the number of function calls after which it
+is sent, counted from the installation of the handlers (0: never; -1: after ``main``; -2: when Python clears its
+modules, at the very end); and the arguments of ``lipmotion``. Without a signal it writes the number of calls to the
+file ``steps``.
 """
 
 from __future__ import annotations

@@ -19,10 +19,10 @@ from lipmotion.types import Audio, Item, Progress
 def test_info(run: Run, toy_corpus: Corpus) -> None:
     done = run("corpus", "info", toy_corpus.path)
     assert (done.code, done.err) == (0, [])
-    said = dict(line.split(maxsplit=1) for line in done.out)
-    assert said["utterances"] == "12 (8 train, 2 val, 2 test)"
-    assert said["transcribed"] == "12"
-    assert said["offset"].startswith("toy: ") or said["offset"].startswith("corpus: ")
+    summary = dict(line.split(maxsplit=1) for line in done.out)
+    assert summary["utterances"] == "12 (8 train, 2 val, 2 test)"
+    assert summary["transcribed"] == "12"
+    assert summary["offset"].startswith("toy: ") or summary["offset"].startswith("corpus: ")
 
 
 def test_sync(run: Run, toy_corpus: Corpus, here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -39,7 +39,7 @@ def test_sync(run: Run, toy_corpus: Corpus, here: Path, monkeypatch: pytest.Monk
 EVENTS = (Item("a", "prepared"), Progress("preparing recordings", 1, 2, 0.5), Item("d", "skipped", "no face"))
 
 
-def test_prepare_says_what_was_done(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_prepare_prints_the_counts(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: dict[str, object] = {}
 
     def done(directory: Path, output: Path, **options: object) -> PrepareReport:
@@ -98,7 +98,7 @@ def faceless(path: Path) -> None:
 
 @pytest.mark.video
 def test_videos_that_cannot_be_used(run_outside: Run, here: Path, bad_speech: dict[str, Path]) -> None:
-    """No face, no sound, nothing in it: each is named, and where nothing is left, so is no corpus."""
+    """Videos without a face, without sound, or empty: each is named, and no corpus is made of them."""
     pytest.importorskip("mediapipe")
     (here / "videos").mkdir()
     faceless(here / "videos" / "faceless.mp4")

@@ -136,7 +136,7 @@ def test_warnings_are_status_lines_too(run: Run, basics: tuple[object, ...]) -> 
 
 
 def test_other_processes_can_read_it(run_outside: Run, basics: tuple[object, ...]) -> None:
-    """As an add-on runs it: ASCII only, whatever the terminal's letters are."""
+    """As an add-on runs it: the output is ASCII, whatever the encoding of the terminal."""
     done = run_outside(*basics, "-f", "json", "--machineReadable", encoding="ascii")
     assert done.code == 0
     assert json.loads("\n".join(done.out))["metadata"]["soundFile"] == str(basics[1])

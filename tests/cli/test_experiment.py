@@ -20,7 +20,9 @@ def few_draws(monkeypatch: pytest.MonkeyPatch) -> None:
     """Few draws of the bootstrap intervals, and only three of the paper's unit sets."""
     for module in (comparison, evaluation_figures):
         monkeypatch.setattr(module, "bootstrap_interval", partial(bootstrap_interval, draws=20))
-    monkeypatch.setattr(unit_sets, "PAPER", {name: unit_sets.PAPER_SCORES[name] for name in ("2vis", "pbVis", "phone")})
+    monkeypatch.setattr(
+        unit_sets, "PAPER_SCORES", {name: unit_sets.PAPER_SCORES[name] for name in ("2vis", "pbVis", "phone")}
+    )
 
 
 def test_the_table_is_that_of_the_figures(run: Run, toy_corpus: Corpus, here: Path) -> None:

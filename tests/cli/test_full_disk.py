@@ -1,4 +1,4 @@
-"""A disk that is full, played by a limit on the size of files: one clear line, and nothing half written."""
+"""A full disk, simulated by a limit on the size of files: one error line, and no partial file."""
 
 from __future__ import annotations
 

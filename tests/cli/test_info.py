@@ -12,23 +12,28 @@ def test_a_model_says_whose_recordings_it_comes_from(run: Run, toy_model_file: P
     done = run("info", toy_model_file)
     assert (done.code, done.err) == (0, [])
     assert done.out[0].split() == ["file", str(toy_model_file), "(0.2", "MB)"]
-    said = dict(line.split(maxsplit=1) for line in done.out if len(line.split()) > 1)
-    assert said["licence"] == "synthesised by lipmotion"
-    assert said["engine"] == "trajectory"
-    assert said["utterances"] == "8"
-    assert "states=5" in said["configuration"]
+    header = dict(line.split(maxsplit=1) for line in done.out if len(line.split()) > 1)
+    assert header["licence"] == "synthesised by lipmotion"
+    assert header["engine"] == "trajectory"
+    assert header["utterances"] == "8"
+    assert "states=5" in header["configuration"]
     assert [line.split()[0] for line in done.out[1:]] == list(read_header(toy_model_file))
 
 
 def test_its_trees_can_be_printed(run: Run, toy_model_file: Path) -> None:
-    done = run("info", toy_model_file, "--trees")
+    done = run("info", toy_model_file, "--structure")
     assert (done.code, done.err) == (0, [])
     assert done.out[0] == "speech.0"
     assert sum("leaf (" in line for line in done.out) >= 18
 
 
+def test_the_former_name_of_the_option_still_works(run: Run, toy_model_file: Path) -> None:
+    assert run("info", toy_model_file, "--trees") == run("info", toy_model_file, "--structure")
+    assert not any("--trees" in line for line in run("info", "--help").out)
+
+
 def test_the_chains_of_a_coupled_model(run: Run, coupled_model_file: Path) -> None:
-    done = run("info", coupled_model_file, "--trees")
+    done = run("info", coupled_model_file, "--structure")
     assert (done.code, done.err) == (0, [])
     assert done.out[0].startswith("coupled: chains whose moves depend on all chains")
     assert "  asynchrony: up to 1 state(s) apart" in done.out

@@ -1,4 +1,4 @@
-"""Nothing that a file, its name or an argument says reaches a terminal as anything but text."""
+"""Contents and names of files, and arguments, reach a terminal as printable text only."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ OBEYED = re.compile(
 
 @pytest.fixture
 def poisoned(here: Path, toy_corpus: Corpus, toy_model_file: Path, toy_speech: Path) -> Path:
-    """One of everything, with what a terminal would obey in it, in the current folder."""
+    """Inputs of every kind, with control characters in contents and names, in the current folder."""
     shutil.copy(toy_speech, here / f"{EVIL}.wav")
     shutil.copy(toy_speech, here / "a.wav")
     shutil.copy(toy_model_file, here / EVIL)
@@ -67,7 +67,7 @@ def poisoned(here: Path, toy_corpus: Corpus, toy_model_file: Path, toy_speech: P
 
 
 def _changed(document: dict[str, Any]) -> dict[str, Any]:
-    """Return a manifest, or an utterance's description, with another speaker, another channel and other rights."""
+    """Return a manifest, or the description of an utterance, with control characters in its values."""
     for entry in document.get("utterances", {}).values():
         entry["speaker"] = EVIL
     if "channels" in document:
@@ -79,7 +79,7 @@ def _changed(document: dict[str, Any]) -> dict[str, Any]:
 
 @contextmanager
 def logged() -> Iterator[None]:
-    """Have warnings on standard error, where pytest would take them."""
+    """Write warnings to standard error, from where pytest would take them."""
     root = logging.getLogger()
     handlers, root.handlers = root.handlers, []
     yield
@@ -93,7 +93,7 @@ LINES = [
     "info other.lipmotion",
     "info EVIL.wav",
     "info none-EVIL",
-    "info --trees EVIL.wav",
+    "info --structure EVIL.wav",
     "info m.lipmotion EVIL",
     "EVIL",
     "animate EVIL.wav --model m.lipmotion --recogniser own -o EVIL.json",
@@ -147,7 +147,7 @@ NOT_SHOWN = {
     "cues EVIL.wav --model m.lipmotion --recogniser own -f xml",
     "animate a.wav --model m.lipmotion -o a.json --transcript words.txt",
 }
-"""Here it is written in another way, or not at all."""
+"""Commands that print the name in another form, or not at all."""
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="names that Windows does not allow")

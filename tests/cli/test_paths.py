@@ -24,7 +24,7 @@ from lipmotion.pipeline.training.train import train
 TALKING = "a.wav --transcript t.txt --lexicon l.txt --units u.json --model m.lipmotion"
 FIGURES = "c --lexicon l.txt"
 REFUSED = [
-    # what is read under the name that is written, and the command line
+    # the input that has the name of the output, and the command line
     ("the recording itself", f"animate {TALKING} -o a.wav"),
     ("the transcript itself", f"animate {TALKING} -o b.json t.txt"),
     ("the lexicon itself", f"animate {TALKING} -o b.json -o l.txt"),
@@ -62,7 +62,7 @@ REFUSED = [
 
 @pytest.fixture
 def laid(here: Path, toy_corpus: Corpus) -> Path:
-    """One file of each kind, a corpus, and a folder of recordings; what is in the files does not matter."""
+    """One file of each kind, a corpus, and a folder of recordings; the contents of the files do not matter."""
     for name in ("a.wav", "b.wav", "t.txt", "l.txt", "u.json", "m.lipmotion"):
         (here / name).write_text(f"what is in {name}")
     shutil.copytree(toy_corpus.path, here / "c")
@@ -158,7 +158,7 @@ def test_a_link_is_written_through(run: Run, here: Path, toy_speech: Path, toy_m
 
 
 def test_every_path_is_declared() -> None:
-    """A verb that adds an argument of the type Path without saying whether it is read or written is found here."""
+    """Every argument of the type Path is declared as input or as output."""
     seen = 0
     for verb in _verbs(parser()):
         declared = {one.name for kind in ("reads", "writes") for one in verb.get_default(kind) or ()}

@@ -1,4 +1,4 @@
-"""Commands as a shell runs them: what the same calls in this process cannot show."""
+"""Commands in processes of their own: behaviour that calls in this process cannot show."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def test_an_unknown_word_is_one_warning(run_outside: Run, toy_speech: Path, toy_
 def test_bad_speech_is_one_line(
     run_outside: Run, toy_model_file: Path, bad_speech: dict[str, Path], here: Path, what: str
 ) -> None:
-    """FFmpeg would like to say something, too."""
+    """FFmpeg's own messages are not printed."""
     assert is_one_error(run_outside("animate", bad_speech[what], "--model", toy_model_file, "-o", "a.json"), 3)
     assert list(here.iterdir()) == []
 

@@ -1,4 +1,4 @@
-"""Long work as a program and as a terminal see it."""
+"""Progress of long work for a program and on a terminal."""
 
 from __future__ import annotations
 
@@ -166,7 +166,7 @@ def test_output_that_is_full(toy_corpus: Corpus, here: Path, arguments: list[str
 
 
 def test_what_is_swallowed_stops_at_the_next_event(monkeypatch: pytest.MonkeyPatch, run: Run) -> None:
-    """As when the signal comes in the middle of an import that takes any exception for a missing package."""
+    """As when the signal comes during an import that treats any exception as a missing package."""
 
     def swallows(given: Namespace) -> None:
         with reporting(given) as report:

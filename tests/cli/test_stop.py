@@ -86,7 +86,7 @@ def test_without_a_signal_nothing_is_raised() -> None:
 
 @BOTH
 def test_while_packages_are_imported(number: signal.Signals, toy_speech: Path, here: Path) -> None:
-    """The signal comes when the program has said nothing yet: it is sent by the first package that is imported."""
+    """The first package that is imported sends the signal, before the program has printed anything."""
     (here / "numpy.py").write_text(f"import os\nos.kill(os.getpid(), {int(number)})\nwhile True: pass\n")
     done = subprocess.run(
         [sys.executable, "-m", "lipmotion.cli.main", "animate", str(toy_speech), "-o", "a.json"],
@@ -113,7 +113,7 @@ def pausing(self, kind, /, emit=JsonLines.emit, **fields):
 JsonLines.emit = pausing
 sys.exit(main())
 """
-"""Training that waits, once it has something to go on from."""
+"""A training run that pauses once it has written a checkpoint."""
 
 
 @BOTH
@@ -145,8 +145,8 @@ def test_training_stopped_in_the_middle_goes_on(
     assert sorted(path.name for path in here.iterdir()) == ["m.lipmotion", "whole.lipmotion"]
 
 
-def test_impatience_ends_it() -> None:
-    """A second signal, later: at once, even where the first one is taken for nothing."""
+def test_a_second_signal_later_ends_the_program() -> None:
+    """A second signal ends the program at once, even where the first one was swallowed."""
     program = (
         "import time\n"
         "from lipmotion.cli.stop import Stopper\n"
@@ -172,14 +172,14 @@ def signalled_at(step: int, number: int, arguments: Sequence[object]) -> subproc
     return subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
 
 
-def is_told(done: subprocess.CompletedProcess[str], number: int, alone: bool) -> bool:
-    """Whether a program was told, last and once, how it ended: stopped, or done, as the exit code says."""
-    events = [json.loads(line) for line in (done.stderr if alone else done.stdout).splitlines()]
+def ends_with_one_final_event(done: subprocess.CompletedProcess[str], number: int, events_only: bool) -> bool:
+    """Return whether the last event, and only that, says how the command ended, in agreement with the exit code."""
+    events = [json.loads(line) for line in (done.stderr if events_only else done.stdout).splitlines()]
     ends = [event for event in events if event["type"] in ("success", "failure")]
     stopped = done.returncode == 128 + number
     good = ends == events[-1:] and (ends[0]["type"] == "success") == (done.returncode == 0)
     if stopped:
-        good &= ends[0]["reason"] == LINE.removeprefix("lipmotion: ") and (alone or done.stderr == f"{LINE}\n")
+        good &= ends[0]["reason"] == LINE.removeprefix("lipmotion: ") and (events_only or done.stderr == f"{LINE}\n")
     return good
 
 
@@ -187,7 +187,7 @@ def is_told(done: subprocess.CompletedProcess[str], number: int, alone: bool) ->
 def lines(
     toy_speech: Path, toy_model_file: Path, toy_corpus: Corpus, here: Path
 ) -> dict[str, tuple[list[object], bool, int]]:
-    """Commands; whether standard error is for events alone; the exit code of what comes to its end."""
+    """Commands; whether standard error holds events only; and the exit code of an undisturbed run."""
     own = ["--model", toy_model_file, "--recogniser", "own"]
     return {
         "cues": (["cues", toy_speech, *own, "-o", here / "a.tsv", "--machine-readable"], True, 0),
@@ -199,8 +199,8 @@ def lines(
 
 @pytest.mark.parametrize("name", ["cues", "cues of nothing", "evaluate", "train"])
 def test_whenever_the_signal_comes(name: str, lines: dict[str, tuple[list[object], bool, int]], here: Path) -> None:
-    """From the first call to the last moment of Python, a program is told once how it ended, and nothing is left."""
-    arguments, alone, code = lines[name]
+    """From the first call to the end of Python: one final event says how the command ended, and no file is left."""
+    arguments, events_only, code = lines[name]
     assert signalled_at(0, signal.SIGTERM, arguments).returncode == code
     steps = int((here / "steps").read_text())
     (here / "steps").unlink()
@@ -212,7 +212,7 @@ def test_whenever_the_signal_comes(name: str, lines: dict[str, tuple[list[object
         done = signalled_at(step, number, arguments)
         assert done.returncode in (code, 128 + number), (step, done)
         assert (done.returncode == code) or step in range(1, steps), (step, done)
-        assert is_told(done, number, alone), (step, done)
+        assert ends_with_one_final_event(done, number, events_only), (step, done)
         assert {path.name for path in here.iterdir()} <= {"a.tsv"}
         codes.add(done.returncode)
     assert codes == {code, 130, 143}
@@ -254,7 +254,7 @@ def test_what_was_swallowed_is_not_settled() -> None:
 
 
 def test_little_is_loaded_before_signals_are_listened_to() -> None:
-    """Until then Python itself answers, with a traceback."""
+    """Before the handlers are installed, Python answers a signal with a traceback."""
     program = (
         "import sys; before = set(sys.modules); import lipmotion.cli.main; print(*sorted({*sys.modules} - before))"
     )

@@ -64,7 +64,7 @@ def test_the_joint_engine(run: Run, toy_corpus: Corpus, here: Path) -> None:
     assert run("train", toy_corpus.path, "-o", "joint", "--engine", "joint").code == 0
     assert load_model(here / "joint").engine.name == "joint"
     assert run("evaluate", "joint", toy_corpus.path).code == 0
-    assert "motion: " in "\n".join(run("info", "joint", "--trees").out)
+    assert "motion: " in "\n".join(run("info", "joint", "--structure").out)
 
 
 def test_what_is_given_wins_over_what_the_joint_engine_recognises(
@@ -90,7 +90,7 @@ def test_a_system_of_the_coupled_engine(run: Run, toy_corpus: Corpus, here: Path
     assert run("train", toy_corpus.path, "-o", "m", *wanted).code == 0
     config = load_model(here / "m").engine.config
     assert (config.structure, config.chains, config.acoustic_regression) == ("multistream", "2vis", False)
-    said = run("info", "m", "--trees").out
+    said = run("info", "m", "--structure").out
     assert said[0].startswith("multistream: one chain")
     assert "chain 1: 2vis, 2 units of 3 states" in said
 
@@ -111,7 +111,7 @@ def test_units_of_a_table_that_is_not_needed_again(run: Run, toy_corpus: Corpus,
 def test_other_voices_are_learned_from_but_those_for_judging(
     run: Run, toy_model: Model, toy_corpus: Corpus, toy_speech: Path, here: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Of two installed voices, slt judges; and a friend was recorded."""
+    """Of two installed voices, slt is held out; one friend was recorded."""
     speakers: list[list[str]] = []
 
     def say(*, voices: list[SyntheticVoice], **_: object) -> Iterator[SpokenSentence]:

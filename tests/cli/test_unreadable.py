@@ -1,4 +1,4 @@
-"""What an ordinary user may not read or write: one line, the exit code of its kind, and nothing left behind."""
+"""Files without permission: one error line, the exit code of its kind, and no file left behind."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from lipmotion.corpora.store import Corpus
 
 MODEL = "--model m.lipmotion --recogniser own"
 LINES = [
-    # what may not be read or written, the exit code, and the command line
+    # the path without permission, the exit code, and the command line
     ("a.wav", 3, f"animate a.wav {MODEL} -o a.json"),
     ("m.lipmotion", 6, f"animate a.wav {MODEL} -o a.json"),
     ("words.txt", 3, f"animate a.wav {MODEL} -o a.json --transcript words.txt"),
@@ -75,7 +75,7 @@ LINES = [
 
 
 def ordinary() -> list[str]:
-    """Return what a command begins with so that modes hold for it; root's do not."""
+    """Return the prefix of a command that makes file modes apply to it, also if the tests run as root."""
     if os.geteuid():
         return []
     rights = "-dac_override,-dac_read_search"
@@ -92,7 +92,7 @@ pytestmark = [
 
 @pytest.fixture
 def laid(here: Path, toy_corpus: Corpus, toy_model_file: Path, toy_speech: Path) -> Iterator[Path]:
-    """One of everything; readable again afterwards, so that it can be deleted."""
+    """Inputs of every kind; made readable again afterwards, so that they can be deleted."""
     for folder in (here / "out", here / "in", here / "r"):
         folder.mkdir()
         shutil.copy(toy_speech, folder / "a.wav")

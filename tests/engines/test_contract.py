@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from engines.synthetic import CHANNELS, RATE_HZ, example, examples, motion, speech, timeline
 from lipmotion.engines import ENGINES, engine_named
 from lipmotion.engines.base import Explains, HasPosteriors, explain_by_trace
 from lipmotion.errors import CorpusError, InputError, ModelFormatError
+from lipmotion.testing.examples import CHANNELS, RATE_HZ, example, examples, motion, speech, timeline
 from lipmotion.types import Constraints, Features, Pin, Span, Speech, Timeline, Unit
 from lipmotion.types.progress import silent_monitor
 from lipmotion.units import PHONES, UNIT_SETS

@@ -3,9 +3,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from engines.synthetic import PHONES, examples, speech
 from lipmotion.engines import engine_named
 from lipmotion.motion.closure import Closure, closing_frames, closing_spans, fit_closure
+from lipmotion.testing.examples import PHONES, examples, speech
 from lipmotion.types import Constraints, Pin, Span, Timeline, Unit
 from lipmotion.types.progress import silent_monitor
 

@@ -3,9 +3,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from engines.synthetic import timeline
 from lipmotion.errors import InputError
 from lipmotion.motion.frame_labels import FullContextState, StateLayout, full_context_states, with_neighbours
+from lipmotion.testing.examples import timeline
 from lipmotion.types import Span, Timeline, Unit
 
 CUT = StateLayout(5, 7, 0.1)

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from engines.synthetic import PHONES, examples, speech, timeline
 from lipmotion.engines import engine_named
 from lipmotion.motion import generation as module
+from lipmotion.testing.examples import PHONES, examples, speech, timeline
 from lipmotion.types import Constraints, Pin
 from lipmotion.types.progress import silent_monitor
 

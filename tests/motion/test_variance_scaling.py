@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from engines.synthetic import examples, speech, timeline
 from lipmotion.engines import engine_named
 from lipmotion.kernels.banded import generate
 from lipmotion.motion.variance_scaling import LARGEST_FACTOR, VarianceScaling
+from lipmotion.testing.examples import examples, speech, timeline
 from lipmotion.types import Constraints, Pin
 from lipmotion.types.progress import silent_monitor
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from lipmotion.engines import Engine
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.understand import speech_of, recognised_speech
+from lipmotion.pipeline.understand import recognised_speech, speech_of
 from lipmotion.speech.f0 import log_f0
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.recogniser import Recogniser
@@ -19,20 +19,19 @@ from lipmotion.types import Speech, Timeline, Unit
 
 @dataclass(frozen=True)
 class Listening(Engine[Any]):
-    """Hears what it is told to speech_of."""
+    """Recognises the phones that it is given."""
 
     config: Any = None
     found: Timeline[Unit] | None = None
     name: ClassVar[str] = "listening"
     wants_f0: ClassVar[bool] = True  # type: ignore[misc]
 
-    def listen(self, model: object, speech: Speech) -> Timeline[Unit] | None:  # noqa: ARG002
+    def recognise(self, model: object, speech: Speech) -> Timeline[Unit] | None:  # noqa: ARG002
         assert len(speech.units) == 0
         return self.found
 
     def fit(self, examples: object, monitor: object) -> Any: ...
     def generate(self, model: object, speech: object, constraints: object = None) -> Any: ...
-    def trees(self, model: object) -> Any: ...
     def to_arrays(self, model: object) -> Any: ...
     def from_arrays(self, arrays: object) -> Any: ...
 

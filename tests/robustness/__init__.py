@@ -1,1 +1,1 @@
-"""Bad input: a table of it, and mutations of good input."""
+"""Bad input: a table of cases, each of which is a test."""

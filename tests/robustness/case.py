@@ -1,4 +1,4 @@
-"""What a case of bad input is, and what cases are made of."""
+"""Cases of bad input, and the good inputs from which they are made."""
 
 from __future__ import annotations
 
@@ -18,10 +18,12 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True)
 class Bench:
-    """Good input, and a folder for the bad.
+    """Good inputs, and a folder in which bad ones are written.
 
-    folder : beside the current one, which a command must leave empty
-    coupled, pictured : models of another engine, and of eigenlips
+    folder   : beside the current folder, which a failing command must leave empty
+    model    : of the default engine
+    coupled  : a model of the coupled engine
+    pictured : a model with eigenlips
     """
 
     folder: Path
@@ -32,17 +34,18 @@ class Bench:
     pictured: Path
 
     def file(self, name: str, content: bytes | str) -> Path:
+        """Write a file; return its path."""
         path = self.folder / name
         path.write_bytes(content.encode() if isinstance(content, str) else content)
         return path
 
     def samples(self) -> NDArray[np.float32]:
-        """Return the good sentence."""
+        """Return the samples of the good sentence [shape=(N,)]."""
         with wave.open(str(self.speech)) as file:
             return np.frombuffer(file.readframes(file.getnframes()), "<i2").astype(np.float32) / 32_768
 
     def sound(self, samples: NDArray[Any], rate_hz: int = 16_000) -> Path:
-        """Write samples as they are, float or whole [shape=(N,) or (N, channels)]."""
+        """Write samples without conversion, floats or integers [shape=(N,) or (N, channels)]; return the file."""
         from scipy.io import wavfile
 
         path = self.folder / "sound.wav"
@@ -50,7 +53,7 @@ class Bench:
         return path
 
     def animate(self, speech: object = None, *more: object, output: object = "a.json") -> list[object]:
-        """Return a command line; what is not said is good."""
+        """Return the command line of ``animate``, with good inputs by default."""
         model = [] if "--model" in more else ["--model", self.model]
         whose = [] if "--recogniser" in more else ["--recogniser", "own"]
         return ["animate", self.speech if speech is None else speech, *model, *whose, "-o", output, *more]
@@ -83,14 +86,14 @@ class Bench:
 
 
 def npy(array: NDArray[Any]) -> bytes:
-    """Return an array as a file's content."""
+    """Return the content of an ``.npy`` file with an array."""
     stream = io.BytesIO()
     np.save(stream, array, allow_pickle=True)
     return stream.getvalue()
 
 
 def declared(shape: str, descr: str = "<f8", content: bytes = b"") -> bytes:
-    """Return an array's file whose header says what it likes."""
+    """Return the content of an ``.npy`` file with any header."""
     header = f"{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}, }}".encode().ljust(117) + b"\n"
     return b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header + content
 
@@ -102,28 +105,28 @@ Make = Callable[[Bench], "list[object]"]
 class Case:
     """One bad input.
 
-    group  : the class that it belongs to
-    name   : what is bad, in words
-    code   : the exit code
-    says   : words of the message, or of the warning where the code is 0
-    make   : lays it out, and returns the command line
+    group    : the group of cases that it belongs to
+    name     : description of the defect
+    code     : the exit code
+    messages : parts of the error message, or of the warning where the code is 0
+    make     : writes the input, and returns the command line
     """
 
     group: str
     name: str
     code: int
-    says: tuple[str, ...]
+    messages: tuple[str, ...]
     make: Make
 
 
 CASES: list[Case] = []
 
 
-def case(group: str, name: str, code: int, *says: str) -> Callable[[Make], Make]:
-    """Put what makes a bad input into the table."""
+def case(group: str, name: str, code: int, *messages: str) -> Callable[[Make], Make]:
+    """Return a decorator that adds a case to the table; the decorated function writes its input."""
 
     def keep(make: Make) -> Make:
-        CASES.append(Case(group, name, code, says, make))
+        CASES.append(Case(group, name, code, messages, make))
         return make
 
     return keep

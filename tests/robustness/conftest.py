@@ -25,7 +25,7 @@ def bench(
     coupled_model_file: Path,
     pictured_model_file: Path,
 ) -> Bench:
-    """Good input, and a folder for the bad."""
+    """Good inputs, and a folder in which bad ones are written."""
     folder = tmp_path / "bad"
     folder.mkdir()
     return Bench(folder, toy_speech, toy_model_file, toy_corpus.path, coupled_model_file, pictured_model_file)
@@ -33,7 +33,7 @@ def bench(
 
 @pytest.fixture(autouse=True)
 def watched() -> Iterator[None]:
-    """Ends what hangs: an error in Python, the process where nothing else reaches it."""
+    """Stop a test that hangs: by an exception, or by ending the process where no exception is possible."""
 
     def stop(*_: object) -> None:
         raise TimeoutError(f"still not done after {HANGS_S} s")

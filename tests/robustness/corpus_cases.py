@@ -1,4 +1,4 @@
-"""Corpora, and recordings to make them of: videos, labels, arrays."""
+"""Damaged corpora, and recordings to prepare with bad labels, motion or lists."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ GROUP = "corpora"
 AGAIN = ("not a whole utterance", "delete this folder and prepare again")
 
 
-def _damaged(name: str, code: int, *says: str, verb: str = "train") -> Callable[[Callable[[Path], object]], None]:
-    """Put a copy of the corpus, damaged, into the table.
+def _damaged(name: str, code: int, *messages: str, verb: str = "train") -> Callable[[Callable[[Path], object]], None]:
+    """Return a decorator that adds a case with a damaged copy of the corpus.
 
     verb : what is done with it, and options
     """
 
     def keep(damage: Callable[[Path], object]) -> None:
-        @case(GROUP, name, code, *says)
+        @case(GROUP, name, code, *messages)
         def _(bench: Bench) -> list[object]:
             path = bench.copied_corpus()
             damage(path)
@@ -171,8 +171,8 @@ for _array in ("features", "motion"):
         np.save(path, values)
 
 
-def _remade(name: str, array: str, remake: Callable[[NDArray[Any]], NDArray[Any]], *says: str, verb: str) -> None:
-    @_damaged(f"{array} {name}: {verb}", 4, *AGAIN, *says, verb=verb)
+def _remade(name: str, array: str, remake: Callable[[NDArray[Any]], NDArray[Any]], *messages: str, verb: str) -> None:
+    @_damaged(f"{array} {name}: {verb}", 4, *AGAIN, *messages, verb=verb)
     def _(corpus: Path) -> None:
         for folder in (corpus / "utterances").iterdir():
             path = folder / f"{array}.npy"
@@ -226,11 +226,11 @@ def _(corpus: Path) -> None:
 RECORDINGS = "recordings of a corpus"
 
 
-def _prepared(name: str, code: int, *says: str) -> Callable[[Callable[[Bench], object]], None]:
-    """Put a folder of one recording into the table."""
+def _recordings_case(name: str, code: int, *messages: str) -> Callable[[Callable[[Bench], object]], None]:
+    """Return a decorator that adds a case with a folder of one recording."""
 
     def keep(lay_out: Callable[[Bench], object]) -> None:
-        @case(RECORDINGS, name, code, *says)
+        @case(RECORDINGS, name, code, *messages)
         def _(bench: Bench) -> list[object]:
             lay_out(bench)
             return ["corpus", "prepare", bench.folder, "-o", "corpus", "--workers", "1"]
@@ -238,84 +238,84 @@ def _prepared(name: str, code: int, *says: str) -> Callable[[Callable[[Bench], o
     return keep
 
 
-def _spoken(bench: Bench, name: str = "a") -> None:
-    """Lay out the good sentence with motion beside it."""
+def _write_sentence_with_motion(bench: Bench, name: str = "a") -> None:
+    """Write the good sentence with motion beside it."""
     (bench.folder / f"{name}.wav").write_bytes(bench.speech.read_bytes())
     frames = len(bench.samples()) // 160 + 1
     bench.file(f"{name}.json", json.dumps(GOOD | {"values": [[0.1]] * frames}))
 
 
 NONE = "none of 1 recordings is usable; the first, a:"
-_prepared("an empty folder", 4, "no videos in it, and no sounds with motion")(lambda bench: bench)
-_prepared("an empty video", 4, NONE, "the file is empty")(lambda bench: (bench.folder / "a.mp4").touch())
-_prepared("a text named .mp4", 4, NONE, "not a readable")(lambda bench: bench.file("a.mp4", "hello " * 500))
+_recordings_case("an empty folder", 4, "no videos in it, and no sounds with motion")(lambda bench: bench)
+_recordings_case("an empty video", 4, NONE, "the file is empty")(lambda bench: (bench.folder / "a.mp4").touch())
+_recordings_case("a text named .mp4", 4, NONE, "not a readable")(lambda bench: bench.file("a.mp4", "hello " * 500))
 
 
-def _labelled(name: str, suffix: str, content: bytes | str, *says: str) -> None:
-    @_prepared(f"{suffix}: {name}", 4, *says)
+def _label_file(name: str, suffix: str, content: bytes | str, *messages: str) -> None:
+    @_recordings_case(f"{suffix}: {name}", 4, *messages)
     def _(bench: Bench) -> None:
-        _spoken(bench)
+        _write_sentence_with_motion(bench)
         bench.file(f"a{suffix}", content)
 
 
 ONE_TIER = '"ooTextFile"\n"TextGrid"\n0 1 <exists> 1\n"IntervalTier" "a" 0 1'
-_labelled("binary", ".TextGrid", b"ooBinaryFile\x08TextGrid\x00\xff", "binary TextGrid; save it as a text file")
-_labelled("cut off", ".TextGrid", 'File type = "ooTextFile"\n"TextGrid"\n0\n1\n<exists>\n1\n', "is damaged")
-_labelled("a billion tiers", ".TextGrid", '"ooTextFile"\n"TextGrid"\n0 1 <exists> 1000000000\n', "tier 1 is damaged")
-_labelled("a tier of a billion labels", ".TextGrid", '"ooTextFile"\n"TextGrid"\n0 1 <exists> 1\n"IntervalTier" "a" 0 1 '
+_label_file("binary", ".TextGrid", b"ooBinaryFile\x08TextGrid\x00\xff", "binary TextGrid; save it as a text file")
+_label_file("cut off", ".TextGrid", 'File type = "ooTextFile"\n"TextGrid"\n0\n1\n<exists>\n1\n', "is damaged")
+_label_file("a billion tiers", ".TextGrid", '"ooTextFile"\n"TextGrid"\n0 1 <exists> 1000000000\n', "tier 1 is damaged")
+_label_file("a tier of a billion labels", ".TextGrid", '"ooTextFile"\n"TextGrid"\n0 1 <exists> 1\n"IntervalTier" "a" 0 1 '
           "1000000000\n0 1 \"b\"\n", "more than 250000 labels; give those of one recording")  # fmt: skip
-_labelled("half a tier", ".TextGrid", '"ooTextFile"\n"TextGrid"\n0 1 <exists> 0.5\n', "is damaged")
-_labelled("times of NaN", ".TextGrid", '"ooTextFile"\n"TextGrid"\n0 nan <exists> 1\n', "is damaged")
-_labelled("times of 1e999", ".TextGrid", '"ooTextFile"\n"TextGrid"\n0 1 <exists> 1e999\n', "is damaged")
-_labelled("phones that overlap", ".lab", "0 2000000 p\n1000000 3000000 aa\n", "before the one ahead of it ends")
-_labelled("phones with a gap", ".lab", "0 1000000 p\n2000000 3000000 aa\n", "without a gap: label silence as sil")
-_labelled("an unknown phone", ".lab", "0 1000000 p\n1000000 2000000 aa\n2000000 3000000 b\n3000000 4000000 qq\n",
+_label_file("half a tier", ".TextGrid", '"ooTextFile"\n"TextGrid"\n0 1 <exists> 0.5\n', "is damaged")
+_label_file("times of NaN", ".TextGrid", '"ooTextFile"\n"TextGrid"\n0 nan <exists> 1\n', "is damaged")
+_label_file("times of 1e999", ".TextGrid", '"ooTextFile"\n"TextGrid"\n0 1 <exists> 1e999\n', "is damaged")
+_label_file("phones that overlap", ".lab", "0 2000000 p\n1000000 3000000 aa\n", "before the one ahead of it ends")
+_label_file("phones with a gap", ".lab", "0 1000000 p\n2000000 3000000 aa\n", "without a gap: label silence as sil")
+_label_file("an unknown phone", ".lab", "0 1000000 p\n1000000 2000000 aa\n2000000 3000000 b\n3000000 4000000 qq\n",
           "line 4 is 'qq', which is no phone")  # fmt: skip
-_labelled("a line of another form", ".lab", "0 1000000 p\nhello\n", "line 2 is 'hello'; required, as in line 1")
-_labelled("phones of another recording", ".lab", "0 900000000 p\n", "the sound lasts")
-_labelled("a backward label of Audacity", ".txt", "1.5\t0.5\tp\n", "before its start")
-_labelled("no UTF-8", ".txt", b"\xff\xfeh", "a.txt")
-_labelled("an end of 5,000 digits", ".lab", f"0 {'9' * 5000} p\n", "line 1 has the time 999", "required a finite one")
-_labelled("an infinite time", ".TextGrid", f'{ONE_TIER} 1\n0 1e999 "p"\n',
+_label_file("a line of another form", ".lab", "0 1000000 p\nhello\n", "line 2 is 'hello'; required, as in line 1")
+_label_file("phones of another recording", ".lab", "0 900000000 p\n", "the sound lasts")
+_label_file("a backward label of Audacity", ".txt", "1.5\t0.5\tp\n", "before its start")
+_label_file("no UTF-8", ".txt", b"\xff\xfeh", "a.txt")
+_label_file("an end of 5,000 digits", ".lab", f"0 {'9' * 5000} p\n", "line 1 has the time 999", "required a finite one")
+_label_file("an infinite time", ".TextGrid", f'{ONE_TIER} 1\n0 1e999 "p"\n',
           "has the time 1e999, required a finite one")  # fmt: skip
-_labelled("more labels than its counts say", ".TextGrid", f'{ONE_TIER} 1\n'
+_label_file("more labels than its counts say", ".TextGrid", f'{ONE_TIER} 1\n'
           '0 1 "p"\n1 2 "aa"\n', "more is there than the counts say")  # fmt: skip
-_labelled("250,001 labels", ".lab", "0 1000000 p\n" * 250_001, "more than 250000 labels; give those of one recording")
-_labelled("more phones than frames", ".lab", "".join(f"{i}0000 {i + 1}0000 p\n" for i in range(2000)),
+_label_file("250,001 labels", ".lab", "0 1000000 p\n" * 250_001, "more than 250000 labels; give those of one recording")
+_label_file("more phones than frames", ".lab", "".join(f"{i}0000 {i + 1}0000 p\n" for i in range(2000)),
           "2000 units in time, required at most 1276")  # fmt: skip
-_labelled(
+_label_file(
     "labels in seconds without decimals in the first line", ".txt", "0 0.5 p\n0.5 1.5 aa\n", "its lines hold times"
 )
-_labelled("many recordings in one", ".lab", '#!MLF!#\n"*/a.lab"\n0 1000000 p\n', "is a master label file")
-_labelled("subtitles", ".txt", "1\n00:00:01,000 --> 00:00:02,000\nhello\n", "is a file of subtitles")
-_labelled("a word processor's file", ".txt", "{\\rtf1\\ansi hello}", "required the words alone; save it as text")
-_labelled("UTF-16 without its mark", ".txt", "hello".encode("utf-16-le"), "holds NUL characters: is it UTF-16")
-_labelled(
+_label_file("many recordings in one", ".lab", '#!MLF!#\n"*/a.lab"\n0 1000000 p\n', "is a master label file")
+_label_file("subtitles", ".txt", "1\n00:00:01,000 --> 00:00:02,000\nhello\n", "is a file of subtitles")
+_label_file("a word processor's file", ".txt", "{\\rtf1\\ansi hello}", "required the words alone; save it as text")
+_label_file("UTF-16 without its mark", ".txt", "hello".encode("utf-16-le"), "holds NUL characters: is it UTF-16")
+_label_file(
     "two million words", ".txt", "a " * 2_000_000, "the transcript has 4000000 characters, required at most 10552"
 )
-_labelled(
+_label_file(
     "a file of 5 MB", ".txt", "a" * 5_000_000, "5000000 characters, required at most 4194304: is it a transcript?"
 )
-_labelled("a file of 20 MB", ".TextGrid", b" " * 20_000_000, "20000000 bytes, required at most 16777216")
+_label_file("a file of 20 MB", ".TextGrid", b" " * 20_000_000, "20000000 bytes, required at most 16777216")
 
 
-def _moved(name: str, content: str, *says: str) -> None:
-    @_prepared(f"motion: {name}", 4, NONE, *says)
+def _motion_file(name: str, content: str, *messages: str) -> None:
+    @_recordings_case(f"motion: {name}", 4, NONE, *messages)
     def _(bench: Bench) -> None:
-        _spoken(bench)
+        _write_sentence_with_motion(bench)
         bench.file("a.json", content)
 
 
-_moved("of another length", json.dumps(GOOD), "the sound lasts", "required: the same time")
-_moved("NaN", json.dumps(GOOD | {"values": [[float("nan")]]}), "not finite")
-_moved("no JSON", "{", "not JSON")
-_moved("a channel that is a spreadsheet's formula",
+_motion_file("of another length", json.dumps(GOOD), "the sound lasts", "required: the same time")
+_motion_file("NaN", json.dumps(GOOD | {"values": [[float("nan")]]}), "not finite")
+_motion_file("no JSON", "{", "not JSON")
+_motion_file("a channel that is a spreadsheet's formula",
        json.dumps(GOOD | {"channels": [{"name": "=1+1", "unit": "weight"}]}),
        "begins as a spreadsheet's formula")  # fmt: skip
 
 
-def _weights(name: str, values: bytes, *says: str, names: bytes | None = None, code: int = 4) -> None:
-    @_prepared(f"FACEGOOD: {name}", code, *says)
+def _weights(name: str, values: bytes, *messages: str, names: bytes | None = None, code: int = 4) -> None:
+    @_recordings_case(f"FACEGOOD: {name}", code, *messages)
     def _(bench: Bench) -> None:
         (bench.folder / "a.wav").write_bytes(bench.speech.read_bytes())
         bench.file("bs_value_a.npy", values)
@@ -331,15 +331,17 @@ _weights("names that are numbers", npy(np.zeros((9, 2))), "required one row of d
          code=3)  # fmt: skip
 
 
-@_prepared("a list of 50,000 other names", 4, "name 50000 recordings that are not in it", "those of another folder?")
+@_recordings_case(
+    "a list of 50,000 other names", 4, "name 50000 recordings that are not in it", "those of another folder?"
+)
 def _(bench: Bench) -> None:
-    _spoken(bench)
+    _write_sentence_with_motion(bench)
     bench.file("train.txt", "".join(f"name{i}\n" for i in range(50_000)))
 
 
-@_prepared("a name in two lists", 4, "a is in train.txt and in test.txt", "keep one")
+@_recordings_case("a name in two lists", 4, "a is in train.txt and in test.txt", "keep one")
 def _(bench: Bench) -> None:
-    _spoken(bench)
+    _write_sentence_with_motion(bench)
     bench.file("train.txt", "a\n")
     bench.file("test.txt", "a\n")
 
@@ -347,13 +349,13 @@ def _(bench: Bench) -> None:
 @case(RECORDINGS, "a corpus where a file is", 7, "is a file; give the name of a new or an empty folder")
 def _(bench: Bench) -> list[object]:
     (bench.folder / "recordings").mkdir()
-    _spoken(bench, "recordings/a")
+    _write_sentence_with_motion(bench, "recordings/a")
     return ["corpus", "prepare", bench.folder / "recordings", "-o", bench.file("taken", "")]
 
 
 @case(RECORDINGS, "a corpus in the place of a recording", 7, "lies in the folder of recordings")
 def _(bench: Bench) -> list[object]:
-    _spoken(bench)
+    _write_sentence_with_motion(bench)
     return ["corpus", "prepare", bench.folder, "-o", bench.folder / "a.wav"]
 
 

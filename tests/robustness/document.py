@@ -1,4 +1,4 @@
-"""The table of bad input, written by ``PYTHONPATH=tests python -m robustness.document``."""
+"""The table of all bad inputs as Markdown, written by ``PYTHONPATH=tests python -m robustness.document``."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ DOCUMENT = Path(__file__).parent / "table.md"
 HEAD = """# Bad input, row by row
 
 Every row is a test: one command line in an empty folder. Written by `PYTHONPATH=tests python -m robustness.document`.
-Codes: 0 done, 3 unusable input, 4 corpus, 5 alignment, 6 model file, 7 output. What they have in common stands in
+Codes: 0 done, 3 unusable input, 4 corpus, 5 alignment, 6 model file, 7 output. General rules:
 [docs/robustness.md](../../docs/robustness.md).
 """
 
 
 def rendered() -> str:
-    """Return the document: a table for each class."""
+    """Return the document: one table for each group of cases."""
     lines = [HEAD]
     for group, cases in groupby(sorted(CASES, key=lambda case: case.group), key=lambda case: case.group):
         lines += [f"### {group.capitalize()}", "", "| input | exit code | words of the message |", "|---|---|---|"]
         for case in cases:
-            said = " … ".join(case.says).replace("|", "\\|") or "(accepted)"
-            lines.append(f"| {case.name.replace('|', chr(92) + '|')} | {case.code} | {said} |")
+            words = " … ".join(case.messages).replace("|", "\\|") or "(accepted)"
+            lines.append(f"| {case.name.replace('|', chr(92) + '|')} | {case.code} | {words} |")
         lines.append("")
     return "\n".join(lines)
 

@@ -1,4 +1,4 @@
-"""Models."""
+"""Damaged model files."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ NO_MODEL = ("not a lipmotion model", "give a file that `lipmotion train` wrote")
 DAMAGED = ("damaged", "train or download")
 
 
-def _file(name: str, content: bytes, *says: str) -> None:
-    @case(GROUP, name, 6, *says)
+def _file(name: str, content: bytes, *messages: str) -> None:
+    @case(GROUP, name, 6, *messages)
     def _(bench: Bench) -> list[object]:
         return bench.animate(None, "--model", bench.file("m.lipmotion", content))
 
@@ -50,8 +50,8 @@ def _(bench: Bench) -> list[object]:
     return bench.animate(None, "--model", bench.file("m.lipmotion", bytes(content)))
 
 
-def _header(name: str, *says: str, **header: object) -> None:
-    @case(GROUP, name, 6, *says)
+def _header(name: str, *messages: str, **header: object) -> None:
+    @case(GROUP, name, 6, *messages)
     def _(bench: Bench) -> list[object]:
         return bench.animate(None, "--model", bench.changed_model({}, **header))
 
@@ -67,8 +67,8 @@ _header("more parts than were learned", *DAMAGED, configuration={"states": 9})
 _header("a recogniser's option that is a text", *DAMAGED, recogniser={"bigram_weight": "much"})
 
 
-def _changed(name: str, member: str, content: bytes | None, *says: str) -> None:
-    @case(GROUP, name, 6, *says)
+def _changed(name: str, member: str, content: bytes | None, *messages: str) -> None:
+    @case(GROUP, name, 6, *messages)
     def _(bench: Bench) -> list[object]:
         return bench.animate(None, "--model", bench.changed_model({member: content}))
 
@@ -87,8 +87,8 @@ _changed("units that are numbers", "phones/units.npy", npy(np.zeros(3)), *DAMAGE
 _changed("no silent unit", "phones/free.npy", npy(np.array([], "<U3")), *DAMAGED)
 
 
-def _array(name: str, member: str, value: float, *says: str) -> None:
-    @case(GROUP, name, 6, *DAMAGED, *says)
+def _array(name: str, member: str, value: float, *messages: str) -> None:
+    @case(GROUP, name, 6, *DAMAGED, *messages)
     def _(bench: Bench) -> list[object]:
         array = bench.array(member)
         array.reshape(-1)[0] = value
@@ -108,8 +108,8 @@ _array("a negative variance of the engine", "engine/variances", -1, "required mo
 _array("a channel that is not there", "engine/direct", 10**6, "direct channels")
 
 
-def _remade(name: str, member: str, remake: Remake, *says: str, of: str = "model") -> None:
-    @case(GROUP, name, 6, *(says or DAMAGED))
+def _remade(name: str, member: str, remake: Remake, *messages: str, of: str = "model") -> None:
+    @case(GROUP, name, 6, *(messages or DAMAGED))
     def _(bench: Bench) -> list[object]:
         whole = getattr(bench, of)
         content = npy(remake(bench.array(member, whole)))
@@ -136,7 +136,7 @@ _remade("coupled: a scale times 1000", "engine/visual_0/scale", lambda a: a * 10
 _remade("coupled: NaN in rest", "engine/rest", lambda a: a * np.nan, of="coupled")
 _remade("coupled: rest times 1000", "engine/rest", lambda a: a * 1000, *DAMAGED, "rest of", of="coupled")
 _remade("coupled: one state less", "engine/chain_0/advance", lambda a: a[:1], of="coupled")
-_remade("coupled: what is believed, turned over", "engine/around/basis", lambda a: a.T, of="coupled")
+_remade("coupled: a transposed basis", "engine/around/basis", lambda a: a.T, of="coupled")
 _remade("coupled: what is followed, times 1000", "engine/following_0/coefficients", lambda a: a.astype(float) * 1000,
         *FAR, of="coupled")  # fmt: skip
 LIPS = ("the eigenlips are damaged", "train the model again")

@@ -1,4 +1,4 @@
-"""Motion files: their units edited, their values damaged."""
+"""Motion files with bad units or bad values."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ def _unit(start_s: object, end_s: object, phone: object = "p") -> dict[str, obje
     return {"start_s": start_s, "end_s": end_s, "phone": phone, "unit": ""}
 
 
-def _json(name: str, text: str | dict[str, object], code: int, *says: str) -> None:
+def _json(name: str, text: str | dict[str, object], code: int, *messages: str) -> None:
     content = text if isinstance(text, str) else json.dumps(GOOD | text)
 
-    @case(GROUP, f"json: {name}", code, *says)
+    @case(GROUP, f"json: {name}", code, *messages)
     def _(bench: Bench) -> list[object]:
         return bench.animate(None, "--units", bench.file("units.json", content))
 
@@ -77,8 +77,8 @@ _json("100,000 brackets", '{"values": ' + "[" * 100_000, 3, "not JSON", "export 
 _json("a list", "[1, 2]", 3, "not a motion document")
 
 
-def _csv(name: str, content: str, *says: str) -> None:
-    @case(GROUP, f"csv: {name}", 3, *says)
+def _csv(name: str, content: str, *messages: str) -> None:
+    @case(GROUP, f"csv: {name}", 3, *messages)
     def _(bench: Bench) -> list[object]:
         return bench.animate(None, "--units", bench.file("units.csv", content))
 
@@ -88,14 +88,14 @@ _csv("an empty file", "", "not a table of numbers")
 _csv("words", "hello\nworld\n", "not a table of numbers", "export it again")
 _csv("rows of different lengths", "time_s,a\n0,1\n1\n", "not a table of numbers")
 _csv("uneven times", "time_s,a\n0,1\n1,1\n3,1\n", "must begin at 0 and rise in even steps")
-_csv("infinite times", "time_s,a\n0,1\ninf,1\n", "times that are none, required seconds up to")
+_csv("infinite times", "time_s,a\n0,1\ninf,1\n", "values that are no times, required seconds up to")
 _csv("a channel that is a spreadsheet's formula", "time_s,@SUM(A1)\n0,1\n1,1\n", "begins as a spreadsheet's formula")
 _csv("a line of a million fields", "time_s,a\n0,1\n" + "1," * 1_000_000, "not a table of numbers")
 _csv("NaN", "time_s,a\n0,1\n1,nan\n", "not finite; interpolate them first")
 
 
-def _npz(name: str, values: bytes, *says: str, document: bytes | None = None) -> None:
-    @case(GROUP, f"npz: {name}", 3, *says)
+def _npz(name: str, values: bytes, *messages: str, document: bytes | None = None) -> None:
+    @case(GROUP, f"npz: {name}", 3, *messages)
     def _(bench: Bench) -> list[object]:
         content = io.BytesIO()
         with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as file:

@@ -1,4 +1,4 @@
-"""Options and outputs."""
+"""Bad values of options, and outputs that cannot be written."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ GROUP = "options"
 RATE = "required 1 to 1000 a second"
 
 
-def _option(name: str, code: int, says: tuple[str, ...], *more: object) -> None:
-    @case(GROUP, name, code, *says)
+def _option(name: str, code: int, messages: tuple[str, ...], *more: object) -> None:
+    @case(GROUP, name, code, *messages)
     def _(bench: Bench) -> list[object]:
         return bench.animate(None, *more)
 
@@ -26,8 +26,8 @@ _option("--channels of one name twice", 3, ("channel names repeat",), "--channel
 _option("an unknown --recogniser", 3, ("unknown recogniser 'best'; required one of: auto",), "--recogniser", "best")
 
 
-def _cues(name: str, code: int, says: tuple[str, ...], *more: object) -> None:
-    @case(GROUP, f"cues {name}", code, *says)
+def _cues(name: str, code: int, messages: tuple[str, ...], *more: object) -> None:
+    @case(GROUP, f"cues {name}", code, *messages)
     def _(bench: Bench) -> list[object]:
         return ["cues", bench.speech, "--model", bench.model, "--recogniser", "own", *more]
 
@@ -101,8 +101,8 @@ def _(bench: Bench) -> list[object]:
 OUTPUTS = "outputs"
 
 
-def _output(name: str, output: str, *says: str) -> None:
-    @case(OUTPUTS, name, 7, *says)
+def _output(name: str, output: str, *messages: str) -> None:
+    @case(OUTPUTS, name, 7, *messages)
     def _(bench: Bench) -> list[object]:
         return bench.animate(output=output)
 
@@ -143,8 +143,8 @@ def _(bench: Bench) -> list[object]:
     return bench.animate(output=os.fsdecode(b"a\xff.json"))
 
 
-def _input(name: str, says: str, *line: str) -> None:
-    @case(OUTPUTS, name, 7, says)
+def _input(name: str, messages: str, *line: str) -> None:
+    @case(OUTPUTS, name, 7, messages)
     def _(bench: Bench) -> list[object]:
         bench.file("words.txt", "papa mama")
         (bench.folder / "link.json").symlink_to(bench.speech)

@@ -1,4 +1,4 @@
-"""Recordings."""
+"""Unusable and damaged recordings."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ CONTAINERS = {
 
 
 def _cut(suffix: str, codec: str, share: float) -> None:
-    code, *says = CONTAINERS[suffix][1][share]
+    code, *messages = CONTAINERS[suffix][1][share]
 
-    @case(GROUP, f"{suffix} cut off at {share:.1%}", code, *says)
+    @case(GROUP, f"{suffix} cut off at {share:.1%}", code, *messages)
     def _(bench: Bench) -> list[object]:
         rate_hz = 48_000 if codec == "libopus" else 16_000
         path = write_sound(bench.folder / f"a.{suffix}", tone(rate_hz, 3.0), rate_hz, codec)

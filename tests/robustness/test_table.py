@@ -20,11 +20,11 @@ def test_bad_input(case: Case, bench: Bench, run: Run, here: Path, caplog: pytes
     if case.group == "videos":
         pytest.importorskip("mediapipe")
     done = run(*case.make(bench))
-    told = " ".join([*done.err, *(record.getMessage() for record in caplog.records)])
+    printed = " ".join([*done.err, *(record.getMessage() for record in caplog.records)])
     assert done.code == case.code, done
-    assert "Traceback" not in told
-    for words in case.says:
-        assert words in told
+    assert "Traceback" not in printed
+    for words in case.messages:
+        assert words in printed
     if case.code:
         assert done.out == []
         *before, last = done.err
@@ -34,7 +34,7 @@ def test_bad_input(case: Case, bench: Bench, run: Run, here: Path, caplog: pytes
         assert list(here.iterdir()) == []
     else:
         assert done.err == []
-        assert bool(caplog.records) == bool(case.says), told
+        assert bool(caplog.records) == bool(case.messages), printed
         for path in here.glob("*.json"):
             json.loads(path.read_text(encoding="utf-8"), parse_constant=pytest.fail)
 
@@ -67,5 +67,5 @@ def test_there_are_many_and_none_twice() -> None:
 
 
 def test_the_document_has_all_of_them() -> None:
-    """Renew it: python -m robustness.document, in the folder of the tests."""
+    """To update it, run ``python -m robustness.document`` with the folder ``tests`` in PYTHONPATH."""
     assert rendered() == DOCUMENT.read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Transcripts and lexicons."""
+"""Unusual and unusable transcripts and lexicons."""
 
 from __future__ import annotations
 
@@ -13,55 +13,63 @@ TOO_LONG = ("the transcript has", "characters, required at most 10552 for 2.76 s
 TOO_MUCH = ("words take at least", "frames of 10 ms, found", "too short for what should be said")
 
 
-def _said(name: str, text: str, code: int, *says: str) -> None:
-    @case(GROUP, name, code, *says)
+def _transcript(name: str, text: str, code: int, *messages: str) -> None:
+    @case(GROUP, name, code, *messages)
     def _(bench: Bench) -> list[object]:
         return bench.animate(None, "--transcript", text)
 
 
-_said("an empty one", "", 3, *NO_WORD)
-_said("only punctuation", "... --- !?!", 3, *NO_WORD)
-_said("emoji", "😀 🎉", 3, *NO_WORD)
-_said("control characters among words", "papa\x07\x1b[31m \x9d mama", 0)
-_said("NUL bytes among words", "papa\0 mama", 0)
-_said("lone surrogates", "\udcff\udcfe", 3, *NO_WORD)
-_said("another script", "真っ昼間なのに", 3, "cannot guess how", "add it to a lexicon file")
-_said("right to left among left to right", "papa \u202eשלום\u202c mama", 3, "cannot guess how 'שלום' is said")
-_said("accents", "näh", 3, "cannot guess how 'näh' is said", "add it to a lexicon file")
-_said("a number of thirty digits", "9" * 30, 0)
-_said("numbers of other scripts", "٣", 0)
-_said("a number of 1,000 digits", "7" * 1000, 5, *TOO_MUCH)
-_said("2,000 words", "papa " * 2000, 5, *TOO_MUCH)
-_said("a number of 20 million digits", "7" * 20_000_000, 5, *TOO_LONG)
-_said("15 million words", "a " * 15_000_000, 5, *TOO_LONG)
-_said("one word of 60 million letters", "b" * 60_000_000, 5, *TOO_LONG)
-_said("one word of 10,000 letters", "ab" * 5000, 5, *TOO_MUCH)
-_said("a name of a file that is not there", "words.txt", 3, "no such transcript file")
-_said("a device", "/dev/zero", 3, "is a pipe or a device, required a file")
-_said("more than fits in a name", "papa mama " * 40 + "/", 5, *TOO_MUCH)
+_transcript("an empty one", "", 3, *NO_WORD)
+_transcript("only punctuation", "... --- !?!", 3, *NO_WORD)
+_transcript("emoji", "😀 🎉", 3, *NO_WORD)
+_transcript("control characters among words", "papa\x07\x1b[31m \x9d mama", 0)
+_transcript("NUL bytes among words", "papa\0 mama", 0)
+_transcript("lone surrogates", "\udcff\udcfe", 3, *NO_WORD)
+_transcript("another script", "真っ昼間なのに", 3, "cannot guess how", "add it to a lexicon file")
+_transcript("right to left among left to right", "papa \u202eשלום\u202c mama", 3, "cannot guess how 'שלום' is said")
+_transcript("accents", "näh", 3, "cannot guess how 'näh' is said", "add it to a lexicon file")
+_transcript("a number of thirty digits", "9" * 30, 0)
+_transcript("numbers of other scripts", "٣", 0)
+_transcript("a number of 1,000 digits", "7" * 1000, 5, *TOO_MUCH)
+_transcript("2,000 words", "papa " * 2000, 5, *TOO_MUCH)
+_transcript("a number of 20 million digits", "7" * 20_000_000, 5, *TOO_LONG)
+_transcript("15 million words", "a " * 15_000_000, 5, *TOO_LONG)
+_transcript("one word of 60 million letters", "b" * 60_000_000, 5, *TOO_LONG)
+_transcript("one word of 10,000 letters", "ab" * 5000, 5, *TOO_MUCH)
+_transcript("a name of a file that is not there", "words.txt", 3, "no such transcript file")
+_transcript("a device", "/dev/zero", 3, "is a pipe or a device, required a file")
+_transcript("more than fits in a name", "papa mama " * 40 + "/", 5, *TOO_MUCH)
 
 
-def _written(name: str, content: bytes, code: int, *says: str) -> None:
-    @case(GROUP, name, code, *says)
+def _transcript_file(name: str, content: bytes, code: int, *messages: str) -> None:
+    @case(GROUP, name, code, *messages)
     def _(bench: Bench) -> list[object]:
         return bench.animate(None, "--transcript", bench.file("words.txt", content))
 
 
-_written("an empty file", b"", 3, *NO_WORD)
-_written("a file in Latin-1", "Bübchen".encode("latin-1"), 3, "not a readable UTF-8 transcript", "save it as UTF-8")
-_written("a file in UTF-16", "papa".encode("utf-16"), 3, "not a readable UTF-8 transcript", "save it as UTF-8")
-_written("a file with a byte order mark", b"\xef\xbb\xbfpapa mama", 0)
-_written("30 million bytes of words", b"a " * 15_000_000, 3, "30000000 bytes, required at most 4194304: is it a")
-_written("a million accents on one letter", b"b" + "\u0316\u0301".encode() * 500_000, 5, *TOO_LONG)
-_written(
+_transcript_file("an empty file", b"", 3, *NO_WORD)
+_transcript_file(
+    "a file in Latin-1", "Bübchen".encode("latin-1"), 3, "not a readable UTF-8 transcript", "save it as UTF-8"
+)
+_transcript_file("a file in UTF-16", "papa".encode("utf-16"), 3, "not a readable UTF-8 transcript", "save it as UTF-8")
+_transcript_file("a file with a byte order mark", b"\xef\xbb\xbfpapa mama", 0)
+_transcript_file(
+    "30 million bytes of words", b"a " * 15_000_000, 3, "30000000 bytes, required at most 4194304: is it a"
+)
+_transcript_file("a million accents on one letter", b"b" + "\u0316\u0301".encode() * 500_000, 5, *TOO_LONG)
+_transcript_file(
     "a TextGrid", b'"ooTextFile"\n"TextGrid"\n0 1 <exists> 0\n', 3, "holds labels in time, required the words alone"
 )
-_written("HTK's labels", b"0 1000000 p\n1000000 2000000 aa\n", 3, "holds labels in time, required the words alone")
-_written("subtitles", b"1\n00:00:01,000 --> 00:00:02,000\npapa\n", 3, "is a file of subtitles, required the words")
-_written(
+_transcript_file(
+    "HTK's labels", b"0 1000000 p\n1000000 2000000 aa\n", 3, "holds labels in time, required the words alone"
+)
+_transcript_file(
+    "subtitles", b"1\n00:00:01,000 --> 00:00:02,000\npapa\n", 3, "is a file of subtitles, required the words"
+)
+_transcript_file(
     "UTF-16 without its mark", "papa".encode("utf-16-le"), 3, "holds NUL characters: is it UTF-16 without its mark?"
 )
-_written("a sound as a transcript", b"RIFF\x80\x81\x82", 3, "not a readable UTF-8 transcript")
+_transcript_file("a sound as a transcript", b"RIFF\x80\x81\x82", 3, "not a readable UTF-8 transcript")
 
 
 @case(GROUP, "a pipe as a transcript", 3, "is a pipe or a device, required a file")
@@ -85,8 +93,8 @@ def _(bench: Bench) -> list[object]:
 LEXICONS = "lexicons"
 
 
-def _lexicon(name: str, content: bytes, code: int, *says: str) -> None:
-    @case(LEXICONS, name, code, *says)
+def _lexicon(name: str, content: bytes, code: int, *messages: str) -> None:
+    @case(LEXICONS, name, code, *messages)
     def _(bench: Bench) -> list[object]:
         return bench.animate(None, "--transcript", "papa", "--lexicon", bench.file("lexicon.txt", content))
 

@@ -1,4 +1,4 @@
-"""Videos, with sound, that are to become a corpus."""
+"""Videos from which no corpus can be prepared."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ NONE = "none of 1 recordings is usable; the first, a:"
 
 
 def _video(bench: Bench, size: tuple[int, int], packets: list[bytes], every: int = 1) -> None:
-    """Write uncompressed pictures, whose content is what it likes, ``every`` 40 ms, and a second of sound."""
+    """Write packets of uncompressed pictures, one in ``every`` 40 ms, and a second of sound."""
     with av.open(str(bench.folder / "a.mkv"), "w") as container:
         stream: Any = container.add_stream("rawvideo", rate=25)
         stream.width, stream.height, stream.pix_fmt = *size, "yuv420p"
@@ -34,8 +34,8 @@ def _video(bench: Bench, size: tuple[int, int], packets: list[bytes], every: int
         container.mux(sound.encode(None))
 
 
-def _pictures(name: str, size: tuple[int, int], packets: list[bytes], *says: str) -> None:
-    @case(GROUP, name, 4, NONE, *says)
+def _pictures(name: str, size: tuple[int, int], packets: list[bytes], *messages: str) -> None:
+    @case(GROUP, name, 4, NONE, *messages)
     def _(bench: Bench) -> list[object]:
         _video(bench, size, packets)
         return ["corpus", "prepare", bench.folder, "-o", "corpus"]

@@ -392,5 +392,6 @@ def test_memory_is_that_of_the_result(tmp_path: Path, suffix: str, codec: str) -
 
 def test_eight_channels_do_not_crash_a_process(tmp_path: Path) -> None:
     path = write_sound(tmp_path / "a.flac", np.tile(babble(48_000), (8, 1)), 48_000, "flac")
-    code = f"from pathlib import Path; from lipmotion.speech.audio_files import read_audio; read_audio(Path({str(path)!r}))"
+    call = f"read_audio(Path({str(path)!r}))"
+    code = f"from pathlib import Path; from lipmotion.speech.audio_files import read_audio; {call}"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

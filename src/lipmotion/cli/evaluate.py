@@ -25,14 +25,23 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Call ``lipmotion.evaluate`` and print its figures."""
-    from lipmotion.corpora.store import Corpus
+    from lipmotion.corpora.store import Corpus, Selection
     from lipmotion.measures.report import figures_table
     from lipmotion.pipeline.evaluation.evaluate import evaluate
     from lipmotion.pipeline.model import load_model
+    from lipmotion.types import Monitor
+    from lipmotion.units import Lexicon
 
-    chosen = {"split": list_or_all(options.split), "speakers": options.speaker, "recogniser": options.recogniser}
+    selection = Selection(list_or_all(options.split), tuple(options.speaker))
 
-    def compute(**given: Any) -> dict[str, Any]:
-        return evaluate(load_model(options.model), Corpus.open(options.corpus), **chosen, **given)
+    def compute(lexicon: Lexicon | None, monitor: Monitor) -> dict[str, Any]:
+        return evaluate(
+            load_model(options.model),
+            Corpus.open(options.corpus),
+            selection=selection,
+            lexicon=lexicon,
+            recogniser=options.recogniser,
+            monitor=monitor,
+        )
 
     report_figures(options, compute, figures_table)

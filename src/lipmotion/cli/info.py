@@ -13,21 +13,22 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = verbs.add_parser("info", help="print what a model is, and whose recordings it was trained on")
     shipped = "default: the model that ships with the package"
     add_input(parser, "model", what="model", nargs="?", help=shipped)
-    parser.add_argument("--trees", action="store_true", help="print only its decision trees, or its chains")
+    parser.add_argument("--structure", action="store_true", help="print only its decision trees, or its chains")
+    parser.add_argument("--trees", action="store_true", dest="structure", help=argparse.SUPPRESS)  # its former name
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:
-    """Print the header of the model, or its trees."""
+    """Print the header of the model, or its structure."""
     from lipmotion.engines.base import Describes
     from lipmotion.errors import InputError
     from lipmotion.pipeline.model import load_model, read_header, shipped_path
 
     path = options.model or shipped_path()
-    if options.trees:
+    if options.structure:
         model = load_model(path)
         if not isinstance(model.engine, Describes):
-            raise InputError(f"models of the engine {model.engine.name!r} cannot be printed; leave --trees out")
+            raise InputError(f"models of the engine {model.engine.name!r} cannot be printed; leave --structure out")
         print_lines(model.engine.describe(model.learned))
         return
     header = read_header(path)
@@ -37,6 +38,7 @@ def run(options: argparse.Namespace) -> None:
 
 
 def _plain(value: object) -> str:
+    """Return a value of the header as text."""
     if isinstance(value, dict):
         return ", ".join(f"{key}={item}" for key, item in value.items())
     return "; ".join(map(str, value)) if isinstance(value, list) else str(value)

@@ -52,7 +52,7 @@ def _shipped() -> Path:
 def add_recogniser_argument(parser: argparse.ArgumentParser) -> None:
     """Add ``--recogniser``: the choice of phone models."""
     models = "phone models: auto, own (those of the model) or general (those of many voices) (default: auto)"
-    parser.add_argument("--recogniser", default="auto", metavar="WHOSE", help=models)
+    parser.add_argument("--recogniser", default="auto", metavar="KIND", help=models)
 
 
 def request_and_model(options: argparse.Namespace) -> tuple[SpeechRequest, Model]:

@@ -8,7 +8,6 @@ import os
 from lipmotion.cli.options import add_machine_readable, list_or_all
 from lipmotion.cli.paths import add_input, add_output
 from lipmotion.cli.speech import add_lexicon_argument
-from lipmotion.pipeline.training.train import Run
 
 ENGINE = "trajectory (default), coupled (chains of states for speech and for lips) or joint (one model, five streams)"
 SYSTEM = "structure of the coupled engine: ph-HMM, ph-MSHMM, ph-FHMM, ph-vi-FHMM, ph-CHMM or ph-vi-CHMM (default)"
@@ -29,7 +28,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser.add_argument("--system", metavar="NAME", help=SYSTEM)
     add_input(parser, "--units", what="table of units", replaceable=True, type=str, metavar="SET", help=UNITS)
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="engine option (repeatable)")
-    parser.add_argument("--visual", default="geometry", metavar="WHAT", help=VISUAL)
+    parser.add_argument("--visual", default="geometry", metavar="KIND", help=VISUAL)
     parser.add_argument("--voices", action="store_true", help="also train on synthetic voices (coupled)")
     add_input(parser, "--recordings", what="folder of recordings", metavar="FOLDER", help=OTHERS)
     parser.add_argument("--workers", type=int, help="number of processes (default: one per core)")
@@ -40,23 +39,31 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 def run(options: argparse.Namespace) -> None:
     """Call ``lipmotion.train`` and ``lipmotion.save_model``; report what was used."""
     from lipmotion.cli.progress import reporting
-    from lipmotion.corpora.store import Corpus
+    from lipmotion.corpora.store import Corpus, Selection
     from lipmotion.engines import engine_from_settings
     from lipmotion.pipeline.model import save_model
-    from lipmotion.pipeline.training.train import train
+    from lipmotion.pipeline.training.train import Run, train
     from lipmotion.pipeline.training.voices import other_voices
     from lipmotion.storage.files import unfinished_work
     from lipmotion.units import Lexicon
 
-    split, workers = list_or_all(options.split), options.workers or os.cpu_count() or 1
+    workers = options.workers or os.cpu_count() or 1
     with reporting(options) as report:
         lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
         engine = engine_from_settings(options.engine, preset=options.system, units=options.units, settings=options.set)
-        chosen = {"engine": engine, "split": split, "speakers": options.speaker, "lexicon": lexicon, "workers": workers}
-        more = {"recordings": options.recordings, "lexicon": lexicon, "monitor": report.receive}
-        chosen |= {"visual": options.visual, "voices": other_voices(synthetic=options.voices, **more)}
+        voices = other_voices(
+            synthetic=options.voices, recordings=options.recordings, lexicon=lexicon, monitor=report.receive
+        )
         with unfinished_work(options.output) as work:
-            model, result = train(Corpus.open(options.corpus), **chosen, run=Run(monitor=report.receive, work=work))
+            model, result = train(
+                Corpus.open(options.corpus),
+                selection=Selection(list_or_all(options.split), tuple(options.speaker)),
+                engine=engine,
+                lexicon=lexicon,
+                visual=options.visual,
+                voices=voices,
+                run=Run(report.receive, work, workers),
+            )
             save_model(model, options.output)
         figures = {"used": len(result.used), "minutes": model.about["minutes"], "skipped": len(result.skipped)}
         text = ", ".join(f"{value} {name}" for name, value in figures.items())

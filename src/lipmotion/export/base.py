@@ -15,15 +15,15 @@ from lipmotion.types import Generation, Motion, Timeline, Unit
 
 About = Mapping[str, str]
 LARGEST_MOTION = 1 << 31
-"""Bytes of a motion file: four hours of a hundred channels."""
+"""Most bytes of a motion file: four hours of a hundred channels."""
 
 
 @dataclass(frozen=True)
 class MotionFormat:
     """How one kind of motion file is written and read.
 
-    write : writes a result to a path; the mappings say where its speech and its model came from
-    read  : returns motion and units of a file, and raises InputError; None: the format is only written
+    write : writes a generation to a path; the mappings describe the origin of its speech and of its model
+    read  : returns motion and units of a file, or raises InputError; None: the format cannot be read
     check : raises ExportError for motion that does not fit into such a file
     """
 
@@ -50,9 +50,9 @@ def motion_suffixes() -> tuple[str, ...]:
 
 
 def write_motion(path: Path, generation: Generation, *, source: dict[str, str], model: dict[str, str]) -> None:
-    """Write motion and units to a file, whole or not at all; the format is that of the suffix.
+    """Write motion and units to a file in the format of its suffix; after a failure there is no partial file.
 
-    source, model : what the file says of the speech and of the model (``.csv`` has no room for it, nor for units)
+    source, model : description of the speech and of the model (``.csv`` stores neither these nor units)
     Raises ExportError: unknown suffix, values that are not finite, or the file cannot be written.
     """
     check_motion(path, generation.motion)
@@ -61,7 +61,7 @@ def write_motion(path: Path, generation: Generation, *, source: dict[str, str], 
 
 
 def check_motion(path: Path, motion: Motion) -> None:
-    """Raise ExportError if motion cannot be written to a file of that name: unknown suffix, or it does not fit."""
+    """Raise ExportError if motion cannot be written to a file of that name: unknown suffix, or unsuitable motion."""
     try:
         chosen = _format_of(path)
     except InputError as error:
@@ -72,7 +72,7 @@ def check_motion(path: Path, motion: Motion) -> None:
 
 
 def read_motion(path: str | Path) -> tuple[Motion, Timeline[Unit]]:
-    """Read what ``write_motion`` wrote; a ``.csv`` has no units, so its timeline is empty.
+    """Return the motion and the units of a motion file; a ``.csv`` has no units, so its timeline is empty.
 
     Raises InputError: unknown suffix, no such file, or not a motion file.
     """

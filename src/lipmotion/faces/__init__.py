@@ -1,4 +1,4 @@
-"""Motion to pictures."""
+"""Faces: from motion to pictures."""
 
 from lipmotion.faces.base import Face
 from lipmotion.faces.registry import FACES, face_named

@@ -22,7 +22,7 @@ class Face(ABC):
     def render(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> Iterator[NDArray[np.uint8]]:
         """Return RGB frames [shape=(H, W, 3)] of even height and width; frame n shows the time ``n / fps`` seconds.
 
-        The last frame is at or before the last of the motion. The same input gives the same pixels.
-        units : phones in time, which may be empty
+        The last frame is at or before the last frame of the motion. The same input gives the same pixels.
+        units : phones in time; may be empty
         Raises InputError: a channel that the face needs is missing, values are not finite, or fps is not positive.
         """

@@ -1,4 +1,4 @@
-"""State posteriors of left-to-right chains, many utterances at a time."""
+"""State posteriors of left-to-right chains by forward–backward, for many utterances at a time."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ from lipmotion.kernels.choice import compiled_pays
 
 Array = NDArray[np.float64]
 IMPOSSIBLE = -1e30
-"""A log probability of nothing that still adds up without NaN."""
+"""Stands for the log probability -inf: sums and differences of it are no NaN."""
 LEAST_LOG = -700.0
+"""Probabilities with smaller logarithms are set to 0."""
 CELL_S = 60e-9
-"""What NumPy takes for one state of one utterance in one frame (docs/results/kernels.md)."""
+"""Time that NumPy takes for one state of one utterance in one frame (docs/results/kernels.md)."""
 
 
 def chain_posteriors(
@@ -24,11 +25,11 @@ def chain_posteriors(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Return posteriors of chains without skips, each entered in its first state and left from its last.
 
-    log_emission : [shape=(T, U, S)], U utterances padded to T frames and S states (padding: anything finite)
-    log_stay, log_move : [shape=(U, S)], to the same and to the next state
-    frames, states     : [shape=(U,)], the true lengths
-    Returns posterior [shape=(T, U, S)] of each state, 0 in the padding; stay [shape=(U, S)], the expected
-    number of times each state was kept; log likelihood [shape=(U,)]. Where it is <= IMPOSSIBLE / 2 there is
+    log_emission : [shape=(T, U, S)], U utterances padded to T frames and S states, with any finite number
+    log_stay, log_move : [shape=(U, S)], of transitions to the same and to the next state
+    frames, states     : [shape=(U,)], of each utterance without padding
+    Returns the posterior of each state [shape=(T, U, S)], 0 in the padding; the expected number of transitions of each
+    state to itself [shape=(U, S)]; and the log likelihood [shape=(U,)]. Where it is <= IMPOSSIBLE / 2 there is
     no path (fewer frames than states), and the other two are 0.
     Source: the standard recursions, in the log domain.  Cost: O(T·U·S).
     """
@@ -47,15 +48,15 @@ def chain_posteriors(
 
 
 def _probabilities(log: Array) -> Array:
-    """Return exp of logarithms of at most 0; those that are nearly nothing are slow, and nothing here."""
+    """Return exp of logarithms, which are at most 0 but for rounding; 0 under ``LEAST_LOG``, as denormals are slow."""
     return np.exp(np.minimum(log, 0, out=log), out=np.zeros_like(log), where=log > LEAST_LOG)
 
 
 def _chains(
     log_emission: Array, log_stay: Array, log_move: Array, frames: NDArray[np.intp], states: NDArray[np.intp]
 ) -> tuple[Array, Array, Array]:
-    """Return log posteriors of being in each state, and of keeping it for the next frame, both [shape=(T, U, S)], and
-    log likelihoods [shape=(U,)]; in the padding, the first is anything.
+    """Return log posteriors of each state, and of staying in it for the next frame [shapes=(T, U, S)], and log
+    likelihoods [shape=(U,)]. In the padding, posteriors have no meaning.
     """
     T, U, S = log_emission.shape
     alpha = np.full((T, U, S), IMPOSSIBLE)

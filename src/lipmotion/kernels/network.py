@@ -96,7 +96,7 @@ class ForwardBackwardNetwork(NamedTuple):
     def with_arcs(
         self, arc_log: NDArray[np.floating[Any]], log_initial: NDArray[np.floating[Any]]
     ) -> ForwardBackwardNetwork:
-        """Return the network in the same layout, with other probabilities of arcs [shape=(E,)] and beginnings [shape=(S,)]."""
+        """Return the network with other probabilities of arcs [shape=(E,)] and of beginnings [shape=(S,)]."""
         weights, transposed, chunks = _weighted(self.layout, arc_log)
         changed = self._replace(weights=weights, transposed=transposed, chunks=chunks)
         return changed._replace(arc_log=arc_log.astype(np.float64), log_initial=log_initial.astype(np.float64))

@@ -7,14 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import ModelFormatError
 from lipmotion.motion.closure import OPENING, Closure
 from lipmotion.motion.generation import LearnedMotion
 from lipmotion.motion.limits import MotionLimits, check_poses
 from lipmotion.motion.space import MotionSpace
 from lipmotion.motion.variance_scaling import VarianceScaling
 from lipmotion.stats.pca import Pca, check_orthonormal
-from lipmotion.storage.schema import Arrays, ArraySpec, checked_arrays, refuse_undeclared
+from lipmotion.storage.schema import Arrays, ArraySpec, checked_arrays, format_errors, refuse_undeclared
 from lipmotion.types import Channel
 from lipmotion.units import UNIT_SETS, UnitSet
 
@@ -48,7 +47,7 @@ def learned_motion_from_arrays(arrays: Arrays) -> LearnedMotion:
 
     Raises ModelFormatError: an array is missing, or has a wrong shape, type or range.
     """
-    try:
+    with format_errors("the learned motion"):
         _, space, closure = motion_from_arrays(arrays, PHONE_SET.name)
         limits = MotionLimits(*checked_arrays(arrays, LIMITS, Q=space.dimensions)["limits"])
         check_poses(limits, space, closure)
@@ -56,8 +55,6 @@ def learned_motion_from_arrays(arrays: Arrays) -> LearnedMotion:
         if "scaling" in arrays:
             scaling = VarianceScaling(*checked_arrays(arrays, SCALING, Q=space.dimensions)["scaling"])
         return LearnedMotion(space, closure, limits, scaling)
-    except (KeyError, ValueError, IndexError, TypeError) as error:
-        raise ModelFormatError(f"the learned motion is damaged ({error}); train or download it again") from error
 
 
 def motion_from_arrays(arrays: Arrays, units: str) -> tuple[UnitSet, MotionSpace, Closure | None]:
@@ -88,7 +85,9 @@ UNITS = {"units": ArraySpec(np.str_, "N 2")}
 LIMITS = {"limits": ArraySpec(np.float64, "2 Q")}
 SCALING = {"scaling": ArraySpec(np.float64, "2 Q")}
 MOTION_ARRAYS = (*CHANNELS, *POINTS, *CLOSURE, *UNITS)
-"""How they are stored: P channels, of which R are reduced to K dimensions."""
+"""The names of the arrays: P channels, of which R are reduced to K dimensions."""
+LEARNED_MOTION_ARRAYS = (*CHANNELS, *POINTS, *CLOSURE, *LIMITS, *SCALING)
+"""The names of the arrays of ``learned_motion_arrays``."""
 
 
 def _space(arrays: Arrays) -> MotionSpace:

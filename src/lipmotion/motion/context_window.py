@@ -1,9 +1,10 @@
-"""The sound around a frame, in few numbers."""
+"""Acoustic context: the features around a frame, reduced to their principal components."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,10 +12,10 @@ from numpy.typing import NDArray
 from lipmotion.storage.schema import STANDARD, ArraySpec, CheckedArrays
 
 OFFSETS = (-24, -18, -12, -8, -4, 0, 4, 8, 12, 18, 24)
-"""Frames whose features are heard, relative to the one whose motion is wanted: dense near it, a quarter of a second
-to both sides."""
+"""Frames whose features are used, relative to the frame whose motion is predicted: dense near it, 240 ms to both
+sides."""
 SCALE = 12.0
-"""Length of a typical row: what the ridge of the regression is relative to."""
+"""Root mean square length of a row: ridge parameters are relative to it."""
 LEAST_DEVIATION = 1e-3
 FEATURES = 39
 INPUTS = FEATURES * len(OFFSETS)
@@ -22,12 +23,12 @@ WINDOW = {
     "window": ArraySpec(np.float32, f"2 {INPUTS}", -STANDARD, STANDARD),
     "window_basis": ArraySpec(np.float32, f"{INPUTS} A", -STANDARD, STANDARD),
 }
-"""How a window is stored: means above scales, and the basis."""
+"""How a context is stored: means above scales, and the basis."""
 
 
 @dataclass(frozen=True, eq=False)
 class AcousticContext:
-    """Standardised features at ``OFFSETS`` around a frame, projected on their F main axes.
+    """Standardised features at ``OFFSETS`` around a frame, projected on their first F principal components.
 
     mean, scale : float32 arrays [shape=(D·len(OFFSETS),)]
     basis       : float32 array [shape=(D·len(OFFSETS), F)]
@@ -38,16 +39,16 @@ class AcousticContext:
     basis: NDArray[np.float32]
 
     def __call__(self, features: NDArray[np.float32], frames: NDArray[np.intp] | slice) -> NDArray[np.float32]:
-        """Return what is heard around some frames of a recording [shape=(N, F)].
+        """Return the reduced features around some frames of a recording [shape=(N, F)].
 
-        features : of the whole recording [shape=(T, D)]; beyond its ends, the first and last frame go on
+        features : of the whole recording [shape=(T, D)]; beyond its ends, the first and last frame are repeated
         """
         inputs = (_surroundings(features, frames) - self.mean) / self.scale
         return np.asarray(inputs @ self.basis, np.float32)
 
 
 def fit_acoustic_context(recordings: Iterable[NDArray[np.float32]], size: int) -> AcousticContext:
-    """Return the window of some recordings' features [each shape=(T, D)] with ``size`` axes at most."""
+    """Return the acoustic context of some recordings' features [each shape=(T, D)], of ``size`` components at most."""
     count, total, products = 0, np.zeros(0), np.zeros(0)
     for features in recordings:
         rows = _surroundings(features, slice(None)).astype(float)
@@ -66,11 +67,16 @@ def fit_acoustic_context(recordings: Iterable[NDArray[np.float32]], size: int) -
     return AcousticContext(*(array.astype(np.float32) for array in (mean, scale, basis * factor)))
 
 
+def acoustic_context_arrays(context: AcousticContext) -> dict[str, NDArray[Any]]:
+    """Serialise a context; its basis at half precision."""
+    return {"window": np.stack([context.mean, context.scale]), "window_basis": context.basis.astype(np.float16)}
+
+
 def acoustic_context_from(found: CheckedArrays) -> AcousticContext:
-    """Return a stored window, as ``WINDOW`` says. Raises ValueError: a scale that is not more than 0."""
+    """Deserialise a context from arrays as ``WINDOW`` declares them. Raises ValueError: a scale that is not positive."""
     mean, scale = found["window"]
     if not (scale > 0).all():
-        raise ValueError("window of features of no spread")
+        raise ValueError("window with a scale that is not more than 0")
     if not found["window_basis"].any(axis=0).all():
         raise ValueError("window_basis with an axis of zeros")
     return AcousticContext(mean, scale, found["window_basis"])

@@ -79,7 +79,7 @@ def with_neighbours(units: Timeline[Unit]) -> Iterator[tuple[str, Span[Unit], st
     return zip(phones, units, phones[2:], strict=False)
 
 
-def with_unit_names(spans: Timeline[Unit], units: UnitSet) -> Timeline[Unit]:
+def with_unit_names(spans: Timeline[Unit], units: UnitSet = UNIT_SETS["phone"]) -> Timeline[Unit]:
     """Return the timeline with the unit of each phone named, between its neighbours; units without phones stay."""
     quiet = units.unit(SILENCE)
     said = [quiet, *(units.unit_of(span.label) for span in spans), quiet]

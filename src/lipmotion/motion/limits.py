@@ -1,4 +1,4 @@
-"""How far motion may go: what a model's own poses tell of it, and what no face does."""
+"""Limits of plausible motion, from the poses of a model and from what faces can do."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from lipmotion.types import check_magnitude
 
 Array = NDArray[np.float64]
 WIDEST = 20.0
-"""Motion stays within so many times the span of a model's poses: with sound that was never heard, about three."""
+"""Motion stays within so many times the span of a model's poses; features unlike any of the training give about 3."""
 DEVIATIONS = 3.0
-"""Motion lies around its poses."""
+"""Standard deviations by which motion may leave the poses."""
 LARGEST_SPREAD = 1000.0
 """The poses of half of the dimensions span fewer of their own deviations than this: about ten in our models."""
 LARGEST_OFFSET = 1000.0
 """The mean of points lies fewer of the largest span of a dimension away from 0."""
 WIDE_OPEN = 5.0
-"""Eye distances: more than this, a mouth is not open, and other things must fit as well."""
+"""Eye distances: a larger opening is implausible unless the other poses fit to it."""
 NEGATIVE_SHARE = 0.05
 FAR_REST = 3.0
-"""The pose at rest lies fewer spans of the poses away from these."""
+"""The rest pose lies fewer spans of the poses away from them."""
 LEAST_SPAN = 1e-3
 
 
 class MotionLimits(NamedTuple):
-    """Between which values poses, or motion, of a model lie.
+    """The smallest and largest values of the poses, or of the motion, of a model.
 
     low, high : [shape=(Q,)]
     """
@@ -41,15 +41,15 @@ class MotionLimits(NamedTuple):
 
     @property
     def span(self) -> Array:
-        """How far apart they are."""
+        """The difference of both [shape=(Q,)]."""
         return self.high - self.low
 
     def widened(self, deviation: NDArray[np.floating]) -> MotionLimits:
-        """Return a reach of ``DEVIATIONS`` more to both sides."""
+        """Return limits that are farther out by ``DEVIATIONS`` standard deviations on both sides."""
         return MotionLimits(self.low - DEVIATIONS * deviation, self.high + DEVIATIONS * deviation)
 
     def check(self, values: Array, closure: Closure | None, pins: Mapping[tuple[int, int], float]) -> None:
-        """Raise ModelFormatError where motion [shape=(T, Q)] goes that the model, and pins, do not lead to."""
+        """Raise ModelFormatError where motion [shape=(T, Q)] leaves the limits, widened by pins, by ``WIDEST`` spans."""
         low, high = self.low.copy(), self.high.copy()
         for (_, column), value in pins.items():
             low[column], high[column] = min(low[column], value), max(high[column], value)
@@ -67,36 +67,36 @@ class MotionLimits(NamedTuple):
 
 
 def limits_of(poses: NDArray[np.floating]) -> MotionLimits:
-    """Return between which values poses [shape=(N, Q)] lie."""
+    """Return the smallest and largest values of poses [shape=(N, Q)]."""
     return MotionLimits(poses.min(axis=0).astype(float), poses.max(axis=0).astype(float))
 
 
-def check_poses(reach: MotionLimits, space: MotionSpace, closure: Closure | None) -> None:
-    """Raise ValueError where a model's poses are none of a face, or do not fit the other things it knows."""
+def check_poses(limits: MotionLimits, space: MotionSpace, closure: Closure | None) -> None:
+    """Raise ValueError where the poses of a model cannot be those of a face, or contradict its space or closure."""
     count = len(space.direct)
     for column, channel in enumerate(space.direct):
-        check_magnitude(space.channels[channel], float(reach.low[column]), float(reach.high[column]))
+        check_magnitude(space.channels[channel], float(limits.low[column]), float(limits.high[column]))
     if space.points is not None:
-        largest, moves = float(np.abs(space.points.mean).max()), float(reach.span[count:].max(initial=0.0))
+        largest, moves = float(np.abs(space.points.mean).max()), float(limits.span[count:].max(initial=0.0))
         if largest > max(WIDE_OPEN, LARGEST_OFFSET * moves):
             raise ValueError(f"points_mean as large as {largest:g} of points that move by {moves:g}")
     if closure is not None:
-        _check_opening(float(reach.low[closure.column]), float(reach.high[closure.column]), closure.closed)
+        _check_opening(float(limits.low[closure.column]), float(limits.high[closure.column]), closure.closed)
 
 
-def check_rest(rest: Array, reach: MotionLimits) -> None:
-    """Raise ValueError where the pose at rest [shape=(Q,)] is far from all other poses."""
-    away = np.maximum(reach.low - rest, rest - reach.high) / _span(reach.low, reach.high)
+def check_rest(rest: Array, limits: MotionLimits) -> None:
+    """Raise ValueError where the rest pose [shape=(Q,)] is far from all other poses."""
+    away = np.maximum(limits.low - rest, rest - limits.high) / _span(limits.low, limits.high)
     column = int(away.argmax())
     if away[column] > FAR_REST:
         raise ValueError(
-            f"rest of {rest[column]:g} in dimension {column}, whose poses are {reach.low[column]:g} to "
-            f"{reach.high[column]:g}"
+            f"rest of {rest[column]:g} in dimension {column}, whose poses are {limits.low[column]:g} to "
+            f"{limits.high[column]:g}"
         )
 
 
 def _span(low: Array, high: Array) -> Array:
-    """Return how far apart values are; those that hardly differ, a thousandth of what they are, or of 1."""
+    """Return ``high - low``; at least a thousandth of the largest magnitude, or of 1."""
     return np.maximum(high - low, LEAST_SPAN * np.maximum(np.maximum(np.abs(low), np.abs(high)), 1))
 
 
@@ -109,7 +109,7 @@ def _check_opening(low: float, high: float, closed: float) -> None:
 
 
 def check_spread(poses: NDArray[np.floating], variances: NDArray[np.floating]) -> None:
-    """Raise ValueError where poses [shape=(N, Q)] lie much farther apart than their own deviations let them."""
+    """Raise ValueError where poses [shape=(N, Q)] span many more of their standard deviations than models do."""
     deviation = np.sqrt(variances.mean(axis=0, dtype=float))
     spread = float(np.median(np.ptp(poses, axis=0) / deviation))
     if spread > LARGEST_SPREAD:

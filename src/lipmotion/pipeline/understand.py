@@ -15,9 +15,9 @@ from lipmotion.errors import AlignmentError, InputError
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import SpeechRequest
 from lipmotion.pipeline.transcribe import read_transcript, transcribe
+from lipmotion.speech.analysed_audio import analysed
 from lipmotion.speech.audio_files import read_audio
 from lipmotion.speech.f0 import log_f0
-from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.recogniser import Recogniser, cached_recogniser
 from lipmotion.types import Audio, Features, Speech, Timeline, Unit
 from lipmotion.units import Lexicon, check_phones, check_text, words_of
@@ -33,13 +33,13 @@ def understand(model: Model, request: SpeechRequest) -> Speech:
     Raises InputError: the recording, the transcript or the units are not usable, or there is no such recogniser.
     Raises AlignmentError: the transcript does not fit into the recording.
     """
-    audio = audio_of(request)
+    audio = analysed(audio_of(request))
     phones = cached_recogniser(model.phones, request.recogniser, model.adaptation)
     if request.units is not None:
         _check_units(request.units, audio.duration_s)
-        return speech_of(model.engine, audio, mfcc(audio), request.units)
+        return speech_of(model.engine, audio, audio.mfcc(), request.units)
     words = _words(request.transcript, audio.duration_s)
-    features = mfcc(audio)
+    features = audio.mfcc()
     transcribed = partial(transcribe, phones, audio, features, words, request.lexicon or Lexicon())
     if words is not None:
         return speech_of(model.engine, audio, features, transcribed())

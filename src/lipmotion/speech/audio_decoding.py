@@ -1,4 +1,4 @@
-"""One sound track of an open container to one channel, every sample at its time."""
+"""Decoding of a container's sound track to one channel, with every sample at its time."""
 
 from __future__ import annotations
 
@@ -15,29 +15,29 @@ from lipmotion.storage.media import stated_duration_s, video_streams
 HOLE_S = 0.04
 """A frame this much later than the end of the one before leaves a hole; time stamps are rounded to 1 ms or better."""
 LONGEST_HOLE_S = 600.0
-"""Time stamps that jump further are wrong."""
+"""A hole longer than this means that the time stamps are wrong."""
 MOST_SILENCE = 20.0
-"""All holes together may last as long as one, and this many times the sound: a codec that falls silent with the speaker
-still sends 20 ms of every 400. More silence than that is no recording, but would fill the memory."""
+"""All holes together may last as long as the longest one allowed, and this many times the sound: a codec that sends
+nothing in pauses still sends 20 ms of every 400. More silence than that is no recording, but would fill the memory."""
 LEAST_BYTES_PER_S = 20.0
-"""A second of the time line takes at least this much of the file, after as long as one hole: no codec for speech needs
-less than 56, digital silence in FLAC 27. Sound out of nothing would fill the memory as well."""
+"""Bytes of the file that every second takes at least, not counting as long as the longest hole allowed: no codec for
+speech needs less than 56, digital silence in FLAC 27. A small file must not fill the memory with sound."""
 LOWEST_HZ, HIGHEST_HZ = 4000, 1_000_000
-"""Sampled less often, speech cannot be understood; no recorder samples more often."""
+"""Lowest and highest sampling rate: below, speech is not intelligible; no recorder samples at a higher one."""
 MOST_CHANNELS = 64
 
 
 @dataclass(frozen=True, eq=False)
 class DecodedAudio:
-    """What a sound track holds.
+    """A decoded sound track.
 
     samples     : float32 array [shape=(N,)]
-    rate_hz     : of the samples
-    energies    : of every channel
-    mean_energy : of the channels' mean
-    packets     : of the track
-    damaged     : packets that could not be decoded
-    silence_s   : put in for holes
+    rate_hz     : sampling rate
+    energies    : energy of every channel
+    mean_energy : energy of the channels' mean
+    packets     : how many packets the track has
+    damaged     : how many of them could not be decoded
+    silence_s   : duration of the silence that fills holes
     stated_s    : duration that the container states, 0 if none
     """
 
@@ -52,19 +52,25 @@ class DecodedAudio:
 
 
 def decode_audio(container: Any, rate_hz: int, channel: int | None = None) -> DecodedAudio:
-    """Return the first sound track of an open container.
+    """Return the decoded first sound track of an open container.
 
-    channel : the one to take; None: the mean of all
+    rate_hz : sampling rate to convert to
+    channel : number of the channel to take; None: the mean of all channels
     Time 0 is the container's start; in a file without moving pictures, the first sample.
+    The silence that fills holes is allocated at the end, when its length is known and allowed.
     Raises InputError: time stamps that jump by more than ``LONGEST_HOLE_S``, or leave more silence than
-    ``MOST_SILENCE`` allows; more sound than the bytes of the track can hold; a rate or channels that no recorder has.
-    Silence is allocated when all of it is known and allowed.
+    ``MOST_SILENCE`` allows; more sound than the bytes of the track can hold; a rate or a number of channels that no
+    recorder has.
     """
-    return _Track(container, rate_hz, channel).decoded()
+    return _TrackDecoder(container, rate_hz, channel).decoded()
 
 
 def check_sound_format(name: str, rate_hz: int, channels: int) -> None:
-    """Raise InputError before a mistaken header fills the memory: a rate of 1 Hz makes 16,000 samples out of one."""
+    """Raise InputError for a sampling rate or a number of channels that no recorder has.
+
+    name : of the file, for the message
+    A wrong header could fill the memory: at a rate of 1 Hz, 16,000 samples are made out of one.
+    """
     if not LOWEST_HZ <= rate_hz <= HIGHEST_HZ:
         raise InputError(
             f"{name}: sampled at {rate_hz} Hz, required {LOWEST_HZ} to {HIGHEST_HZ}; export the recording again"
@@ -73,8 +79,8 @@ def check_sound_format(name: str, rate_hz: int, channels: int) -> None:
         raise InputError(f"{name}: has {channels} channels, required 1 to {MOST_CHANNELS}; export the recording again")
 
 
-class _Track:
-    """The decoding of one track; what came out so far is in ``_bytes``, which grows in place."""
+class _TrackDecoder:
+    """Decodes one track; the samples so far are in ``_bytes``, which grows in place."""
 
     def __init__(self, container: Any, rate_hz: int, channel: int | None) -> None:
         self._container = container
@@ -90,10 +96,11 @@ class _Track:
         self._energies: NDArray[np.float64] | float = 0.0
         self._mean_energy = 0.0
         self._silence_s = self._sound_s = 0.0
-        self._holes: list[tuple[int, int]] = []  # where in the bytes, and how many
+        self._holes: list[tuple[int, int]] = []  # position and number of bytes of each
         self._packets = self._damaged = self._size = 0
 
     def decoded(self) -> DecodedAudio:
+        """Return the decoded track; can be called once."""
         for frame in self._frames():
             check_sound_format(self._name, frame.sample_rate, frame.layout.nb_channels)
             self._sound_s += frame.samples / frame.sample_rate
@@ -120,7 +127,7 @@ class _Track:
         return stated_duration_s(self._container, self._stream)
 
     def _frames(self) -> Iterator[Any]:
-        """Yield what can be decoded; damaged packets are counted."""
+        """Yield the frames that can be decoded; damaged packets are counted."""
         import av
 
         for packet in self._container.demux(self._stream):
@@ -132,7 +139,7 @@ class _Track:
                 self._damaged += 1
 
     def _place(self, frame: Any) -> None:
-        """Put silence where no sound was decoded."""
+        """Note a hole before a frame that starts later than the one before it ended."""
         if frame.pts is not None:
             time_s = float(frame.pts * frame.time_base)
             if self._clock_s is None:
@@ -153,7 +160,7 @@ class _Track:
         self._cut = max(round(-offset_s * self._rate_hz), 0)
 
     def _silence(self, duration_s: float) -> int:
-        """Return how many bytes of silence bridge a hole."""
+        """Return the number of bytes of a hole's silence. Raises InputError: the hole is too long."""
         if duration_s > LONGEST_HOLE_S:
             raise InputError(
                 f"{self._name}: the time stamps of its sound jump by {duration_s:.0f} s, at most "
@@ -179,7 +186,7 @@ class _Track:
             )
 
     def _fill_holes(self) -> None:
-        """Make room for the silence, in place, from the last hole to the first."""
+        """Insert the silence of all holes into the bytes, in place, from the last hole to the first."""
         end, moved = len(self._bytes), sum(count for _, count in self._holes)
         self._bytes += bytes(moved)
         view = memoryview(self._bytes)
@@ -209,7 +216,7 @@ class _Track:
         for frame in frames:
             # packed, not planar: PyAV reads beyond the planes of eight channels
             channels = frame.to_ndarray().reshape(frame.samples, -1)
-            with np.errstate(all="ignore"):  # what is not finite, or beyond all bounds, is refused when all is decoded
+            with np.errstate(all="ignore"):  # samples that are not finite are refused when all is decoded
                 mean = channels.mean(axis=1)
                 self._energies = self._energies + np.square(channels, dtype=np.float64).sum(axis=0)
                 self._mean_energy += float(np.square(mean, dtype=np.float64).sum())

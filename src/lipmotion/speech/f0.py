@@ -1,7 +1,8 @@
-"""The fundamental frequency of a voice, and where there is none.
+"""The fundamental frequency (F0) of voiced speech, frame by frame.
 
-Three steps: the signal is low-passed to 4 kHz; in every frame it is correlated with itself at all lags of the range;
-of the few best lags of every frame, or none, dynamic programming chooses the cheapest sequence.
+Three steps: the signal is low-passed and sampled at 4 kHz; around every frame its autocorrelation is computed at all
+lags of the range; dynamic programming chooses one of the few best lags of every frame, or unvoiced, so that the
+sequence costs least.
 Source: the candidates, costs and search of D. Talkin, "A robust algorithm for pitch tracking (RAPT)", in Kleijn and
 Paliwal (eds.), Speech Coding and Synthesis, 1995. Deviations: one correlation, weighted around the centre of the frame
 and computed from its power spectrum, at half samples; silence is relative to the recording; no cost of the spectrum.
@@ -22,43 +23,43 @@ from lipmotion.speech.mfcc import HOP, checked_samples, frame_count
 from lipmotion.types import Audio
 
 LOWEST_HZ, HIGHEST_HZ = 60.0, 400.0
-"""Voices are looked for from here to there."""
+"""The range of F0 that is searched."""
 BLOCK = 1024
 """Frames searched at a time: memory stays bounded for any length."""
 
 UNVOICED = 0.52
-"""Cost of a frame without voice; one with voice costs 1 − its correlation, weighted."""
+"""Cost of an unvoiced frame; a voiced one costs 1 − its correlation, weighted."""
 VOICING_CHANGE = 0.25
-"""Cost of voice beginning or ending."""
+"""Cost of a change from voiced to unvoiced, or back."""
 JUMP = 0.4
-"""Cost of a change of the frequency by a factor of e; an octave costs 0.28."""
+"""Cost of a change of F0 by a factor of e; an octave costs 0.28."""
 LONG_LAG = 0.2
-"""The longest lag loses this share of its correlation: a period is as alike to the second next as to the next."""
+"""The correlation of the longest lag is reduced by this share: that of two periods is as high as that of one."""
 SILENCE = 2e-4
-"""Power, of that of loud frames (−37 dB), which is added to every frame's: silence is like nothing, itself included."""
-HISS = 1e-3
-"""Share of the power of the slope of the full signal that is added too: what little of s is low may seem to hum."""
+"""Power that is added to every frame's, as a share of that of loud frames (−37 dB): it makes silence uncorrelated."""
+FRICATION_SHARE = 1e-3
+"""Share of the power of the full signal's slope that is added too: the low frequencies of an s may seem periodic."""
 ROUNDING = 1e-10
-"""Power, of that of the highest sample, which is added too: what rounding leaves of a constant has a period."""
+"""Power that is added too, as a share of that of the highest sample: a constant's rounding error has a period."""
 CANDIDATES = 4
 """Lags considered in a frame."""
 
 _STEP = 4  # samples at 16 kHz for one of the low-passed signal
 _RATE_HZ = SPEECH_RATE_HZ // _STEP
 _HOP = HOP // _STEP
-_PASSED_HZ = (50.0, 1200.0)  # rumble is below; above, harmonics are as noisy as they are useful
+_PASSED_HZ = (50.0, 1200.0)  # below is rumble; above, harmonics carry as much noise as information
 _TAPS = 255
 _WINDOW = 160  # 40 ms, Hann: half of the weight lies within ±5.3 ms
-_REACH = _STEP * (_WINDOW - 1) // 2 + _TAPS // 2  # samples at 16 kHz before the centre of a frame that it hears
+_REACH = _STEP * (_WINDOW - 1) // 2 + _TAPS // 2  # samples at 16 kHz before the centre of a frame that it depends on
 
 Floats = NDArray[np.float32]
 
 
 def log_f0(audio: Audio) -> Floats:
-    """Return the natural logarithm of F0 in Hz, NaN where there is no voice [shape=(T,)].
+    """Return the natural logarithm of F0 in Hz, NaN in unvoiced frames [shape=(T,)].
 
-    Frame n is centred at n · 10 ms, the signal reflected at both ends; T is that of ``speech.mfcc``. Voices are looked
-    for from ``LOWEST_HZ`` to ``HIGHEST_HZ``. Loudness changes nothing.
+    Frame n is centred at n · 10 ms, the signal reflected at both ends; T is that of ``speech.mfcc``. F0 is searched
+    from ``LOWEST_HZ`` to ``HIGHEST_HZ``. The level of the recording changes nothing.
     Memory: under 5 MB, and 55 bytes a frame: 20 MB for an hour.
     Raises InputError: as ``speech.mfcc`` says.
     """
@@ -77,10 +78,10 @@ def log_f0(audio: Audio) -> Floats:
 
 
 def correlations(samples: Floats, block: slice, silence: float) -> Floats:
-    """Return how alike the signal is to itself, at lags of ``lags()``, around every frame of a block [shape=(n, L)].
+    """Return the normalised autocorrelation around every frame of a block, at the lags of ``lags()`` [shape=(n, L)].
 
-    silence : power below which likeness counts less and less
-    With x the low-passed signal, w the window, both around the frame, and s = ``silence`` + the frame's hiss:
+    silence : power below which correlations become smaller
+    With x the low-passed signal, w the window, both around the frame, and s = ``silence`` + the frame's ``_frication``:
     Σ w(t) x(t) w(t+k) x(t+k) / (√(Σ w(t) w(t+k) x²(t) · Σ w(t) w(t+k) x²(t+k)) + s · Σ w(t) w(t+k)), at most 1.
     """
     tables = _tables()
@@ -88,51 +89,56 @@ def correlations(samples: Floats, block: slice, silence: float) -> Floats:
     x = sliding_window_view(low, _WINDOW)[: len(low) - _WINDOW : _HOP].copy()
     spectrum = x @ tables.fourier
     bins = spectrum.shape[1] // 2
-    likeness = (np.square(spectrum[:, :bins]) + np.square(spectrum[:, bins:])) @ tables.inverse
+    correlation = (np.square(spectrum[:, :bins]) + np.square(spectrum[:, bins:])) @ tables.inverse
     np.square(x, out=x)
     energy = np.sqrt(x @ tables.early)
     energy *= np.sqrt(x @ tables.late)
-    energy += tables.mass * (_hiss(samples, block) + np.float32(silence))[:, None] + np.finfo(np.float32).tiny
-    likeness /= energy
-    return likeness
+    energy += tables.mass * (_frication(samples, block) + np.float32(silence))[:, None] + np.finfo(np.float32).tiny
+    correlation /= energy
+    return correlation
 
 
-def candidates(likeness: Floats) -> tuple[Floats, Floats]:
-    """Return the logarithm of F0 at the best peaks of every frame [shape=(CANDIDATES, n)], and what they cost.
+def candidates(correlation: Floats) -> tuple[Floats, Floats]:
+    """Return the logarithm of F0 at the best peaks of every frame, and their costs [shapes=(CANDIDATES, n)].
 
-    likeness : correlations [shape=(n, L)]
-    A frame with fewer peaks has others of infinite cost.
+    correlation : from ``correlations`` [shape=(n, L)]
+    In a frame with fewer peaks the others have infinite cost.
     """
-    middle = likeness[:, 1:-1]
-    is_peak = (middle > likeness[:, :-2]) & (middle >= likeness[:, 2:]) & (middle > 0)
-    worth = np.where(is_peak, middle * _trust(lags()[1:-1]), 0).astype(np.float32)
-    rows = np.arange(len(worth))
-    peaks = np.empty((CANDIDATES, len(worth)), np.intp)
-    found = np.empty((CANDIDATES, len(worth)), bool)
-    for peak, is_found in zip(peaks, found, strict=True):
-        worth.argmax(axis=1, out=peak)
-        np.greater(worth[rows, peak], 0, out=is_found)
-        worth[rows, peak] = 0
-    return _refined(likeness, peaks + 1, found)
+    middle = correlation[:, 1:-1]
+    is_maximum = (middle > correlation[:, :-2]) & (middle >= correlation[:, 2:]) & (middle > 0)
+    weighted = np.where(is_maximum, middle * _lag_weight(lags()[1:-1]), 0).astype(np.float32)
+    rows = np.arange(len(weighted))
+    peaks = np.empty((CANDIDATES, len(weighted)), np.intp)
+    is_peak = np.empty((CANDIDATES, len(weighted)), bool)
+    for peak, exists in zip(peaks, is_peak, strict=True):
+        weighted.argmax(axis=1, out=peak)
+        np.greater(weighted[rows, peak], 0, out=exists)
+        weighted[rows, peak] = 0
+    return _refined(correlation, peaks + 1, is_peak)
 
 
-def _refined(likeness: Floats, peaks: NDArray[np.intp], found: NDArray[np.bool_]) -> tuple[Floats, Floats]:
-    """Return log F0 and cost at the tops of parabolas through three values."""
-    rows = np.arange(len(likeness))
-    left, top, right = (likeness[rows, peaks + side] for side in (-1, 0, 1))
-    bend = np.where(found, 2 * top - left - right, 1)
-    offset = np.where(found, (right - left) / (2 * bend), 0)
+def _refined(correlation: Floats, peaks: NDArray[np.intp], is_peak: NDArray[np.bool_]) -> tuple[Floats, Floats]:
+    """Return log F0 and cost at the tops of parabolas through three correlations [shapes=(CANDIDATES, n)].
+
+    peaks   : lag of the middle one [shape=(CANDIDATES, n)]
+    is_peak : False where a frame has fewer peaks [shape=(CANDIDATES, n)]
+    """
+    rows = np.arange(len(correlation))
+    left, top, right = (correlation[rows, peaks + side] for side in (-1, 0, 1))
+    bend = np.where(is_peak, 2 * top - left - right, 1)
+    offset = np.where(is_peak, (right - left) / (2 * bend), 0)
     lag = np.clip(lags()[peaks] + 0.5 * offset, _RATE_HZ / HIGHEST_HZ, _RATE_HZ / LOWEST_HZ)
-    height = (top + (right - left) * offset / 4) * _trust(lag)
-    return np.log(_RATE_HZ / lag).astype(np.float32), np.where(found, 1 - height, np.inf).astype(np.float32)
+    height = (top + (right - left) * offset / 4) * _lag_weight(lag)
+    return np.log(_RATE_HZ / lag).astype(np.float32), np.where(is_peak, 1 - height, np.inf).astype(np.float32)
 
 
-def _trust(lag: NDArray[np.float64]) -> NDArray[np.float64]:
+def _lag_weight(lag: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the weight of the correlation at a lag (``LONG_LAG``)."""
     return 1 - LONG_LAG * lag * LOWEST_HZ / _RATE_HZ
 
 
 def _steps(before: Floats, pitch: Floats, cost: Floats) -> NDArray[np.float64]:
-    """Return the costs from every candidate, the last is no voice, to every one of the next frame [shape=(C, C, n)].
+    """Return the costs from every candidate, the last being unvoiced, to those of the next frame [shape=(C, C, n)].
 
     before : log F0 of the frame before the first [shape=(CANDIDATES,)]
     """
@@ -145,16 +151,16 @@ def _steps(before: Floats, pitch: Floats, cost: Floats) -> NDArray[np.float64]:
     return steps
 
 
-def _hiss(samples: Floats, block: slice) -> Floats:
-    """Return the power to add for what lies above the low-passed signal, around every frame [shape=(n,)]."""
+def _frication(samples: Floats, block: slice) -> Floats:
+    """Return the power to add for the frequencies above the low-passed signal, around every frame [shape=(n,)]."""
     slope = np.diff(_reflected(samples, (block.start - 1) * HOP - 1, block.stop * HOP))
     np.square(slope, out=slope)
     power = slope.reshape(-1, HOP).mean(axis=1)
-    return np.float32(HISS / 2) * (power[1:] + power[:-1])
+    return np.float32(FRICATION_SHARE / 2) * (power[1:] + power[:-1])
 
 
 def _loudness(samples: Floats) -> float:
-    """Return the mean power of frames, each weighted by its power: pauses count little, a click not much."""
+    """Return the mean power of frames, each weighted by its power: pauses count little, a click does not count much."""
     power, square = 0.0, 0.0
     for start in range(0, len(samples) // HOP + 1, BLOCK):
         low = _low_passed(samples, start * HOP, min(BLOCK, len(samples) // HOP + 1 - start))
@@ -167,16 +173,16 @@ def _low_passed(samples: Floats, first: int, hops: int) -> Floats:
     """Return ``hops`` · 10 ms at 4 kHz, the first sample centred ``_TAPS // 2`` after sample ``first``."""
     low_pass = _tables().low_pass
     parts = low_pass.shape[1] // _HOP
-    heard = _reflected(samples, first, first + (hops + parts - 1) * HOP)
-    each = heard.reshape(-1, HOP) @ low_pass  # what 10 ms add to the 10 ms at their place and before
-    low = each[:hops, :_HOP].copy()
+    padded = _reflected(samples, first, first + (hops + parts - 1) * HOP)
+    products = padded.reshape(-1, HOP) @ low_pass  # what every 10 ms add to the same 10 ms and to those before
+    low = products[:hops, :_HOP].copy()
     for part in range(1, parts):
-        low += each[part : part + hops, part * _HOP : (part + 1) * _HOP]
+        low += products[part : part + hops, part * _HOP : (part + 1) * _HOP]
     return low.reshape(-1)
 
 
 def _reflected(samples: Floats, first: int, end: int) -> Floats:
-    """Return samples ``first``..``end`` - 1 of the signal reflected at both ends, as often as it takes."""
+    """Return samples ``first``..``end`` - 1 of the signal, reflected at both ends as often as needed."""
     count = len(samples)
     if first >= 0 and end <= count:
         return samples[first:end]
@@ -187,14 +193,15 @@ def _reflected(samples: Floats, first: int, end: int) -> Floats:
 
 
 def lags() -> NDArray[np.float64]:
-    """Return the lags tried, in samples at 4 kHz, half samples apart; one more at either end than the range has."""
+    """Return the lags in samples at 4 kHz, half samples apart, one more at either end than the range [shape=(L,)]."""
     return np.arange(2 * _RATE_HZ / HIGHEST_HZ - 1, 2 * _RATE_HZ / LOWEST_HZ + 2) // 1 / 2
 
 
 class _Tables(NamedTuple):
-    """What signals are multiplied with.
+    """Matrices that signals are multiplied by.
 
-    low_pass    : 10 ms → their part of 10 ms at 4 kHz, and of those one and two before [shape=(160, 3 · 40)]
+    low_pass    : 10 ms → what they add to the same 10 ms at 4 kHz, and to those one and two before
+                  [shape=(160, 3 · 40)]
     fourier     : a frame → its windowed spectrum, real parts and then imaginary ones [shape=(_WINDOW, 2 · bins)]
     inverse     : powers of the spectrum → Σ w(t) x(t) w(t+k) x(t+k) [shape=(bins, L)]
     early, late : squares of a frame → Σ w(t) w(t+k) x²(t), and of x²(t+k) [shape=(_WINDOW, L)]
@@ -226,7 +233,7 @@ def _window(time: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _low_pass() -> NDArray[np.float64]:
-    """Return a windowed-sinc band pass that stops 0 Hz, once for every output [shape=(HOP, 3 · _HOP)]."""
+    """Return a windowed-sinc band pass with no gain at 0 Hz, once for every output [shape=(HOP, 3 · _HOP)]."""
     time = np.arange(_TAPS) - _TAPS // 2
     low, high = (2 * hertz / SPEECH_RATE_HZ * np.sinc(2 * hertz / SPEECH_RATE_HZ * time) for hertz in _PASSED_HZ)
     taps = (high - low) * np.hamming(_TAPS)

@@ -1,11 +1,12 @@
-"""Phones and durations → sound: a small source–filter formant synthesiser.
+"""A small source–filter formant synthesiser: phones and durations to sound.
 
 A glottal pulse train and noise excite five resonances in cascade; a second noise goes through one resonance beside them
-(frication). Every phone is one to three *parts*, each a share of its duration with fixed targets; the targets become
-smooth tracks. It speaks without any recording, so tests have speech whose phone times are exactly known.
+(frication). Every phone is one to three segments, each a share of its duration with fixed targets; the targets become
+smooth tracks. It needs no recordings, so tests have speech whose phone times are exactly known.
 
 Source: D. H. Klatt, "Software for a cascade/parallel formant synthesizer", JASA 67 (1980): resonators, and most figures
-of the table. D. H. and L. C. Klatt, JASA 87 (1990): the glottal pulse. Deviations: no nasal zero, one hiss resonance.
+of the table. D. H. and L. C. Klatt, JASA 87 (1990): the glottal pulse. Deviations: no nasal zero; one resonance of
+frication.
 """
 
 from __future__ import annotations
@@ -26,14 +27,14 @@ Array = NDArray[np.float64]
 Formants = tuple[float, float, float]
 
 CONTROL_HZ = 320
-"""Tracks are updated this often."""
+"""Rate at which tracks are updated."""
 LOWEST_RATE_HZ = 16000
-"""Below it the frication of s does not fit."""
+"""A lower sampling rate has no room for the frication of s."""
 FLOOR_DB = -70.0
-"""Level of the noise under everything, in dB of full scale (root mean square)."""
+"""Level of the background noise, in dB of full scale (root mean square)."""
 
 SHORTEST_S = 0.001
-"""No phone may be shorter."""
+"""The shortest duration of a phone."""
 
 _FORMANT_SMOOTHING_S, _LEVEL_SMOOTHING_S = 0.016, 0.004  # standard deviations
 _HIGH_HZ, _HIGH_WIDTHS_HZ = (4500.0, 3500.0), (280.0, 220.0)  # F5 and F4, the same for all phones
@@ -45,20 +46,21 @@ _GAIN = 0.12
 class TargetSegment:
     """A stretch of a phone with fixed targets.
 
-    share              : of the phone's duration; the shares of one phone sum to 1
-    formants, widths   : F1–F3 and their bandwidths, Hz; no formants: those of what follows
-    voice, breath      : levels of the glottal pulses and of the noise through the formants
-    hiss               : level of the noise beside them, around ``hiss_hz``, ``hiss_width`` Hz wide
+    share            : of the phone's duration; the shares of one phone sum to 1
+    formants, widths : F1–F3 and their bandwidths, Hz; None: the formants of the next segment that has some
+    voicing          : level of the glottal pulses, through the formants
+    aspiration       : level of the noise through the formants
+    frication        : level of the noise beside them, around ``frication_hz``, ``frication_width`` Hz wide
     """
 
     share: float = 1.0
     formants: Formants | None = None
     widths: Formants = (70.0, 100.0, 160.0)
-    voice: float = 0.0
-    breath: float = 0.0
-    hiss: float = 0.0
-    hiss_hz: float = 4000.0
-    hiss_width: float = 2000.0
+    voicing: float = 0.0
+    aspiration: float = 0.0
+    frication: float = 0.0
+    frication_hz: float = 4000.0
+    frication_width: float = 2000.0
 
 
 PhoneTargets = tuple[TargetSegment, ...]
@@ -66,43 +68,57 @@ PhoneTargets = tuple[TargetSegment, ...]
 
 def _vowel(start: Formants, end: Formants | None = None) -> PhoneTargets:
     if end is None:
-        return (TargetSegment(1.0, start, voice=1.0, breath=0.01),)
-    return TargetSegment(0.5, start, voice=1.0, breath=0.01), TargetSegment(0.5, end, voice=0.9, breath=0.01)
+        return (TargetSegment(1.0, start, voicing=1.0, aspiration=0.01),)
+    return TargetSegment(0.5, start, voicing=1.0, aspiration=0.01), TargetSegment(
+        0.5, end, voicing=0.9, aspiration=0.01
+    )
 
 
 def _glide(formants: Formants) -> PhoneTargets:
-    return (TargetSegment(1.0, formants, (60.0, 110.0, 180.0), voice=0.6),)
+    return (TargetSegment(1.0, formants, (60.0, 110.0, 180.0), voicing=0.6),)
 
 
 def _nasal(formants: Formants) -> PhoneTargets:
-    return (TargetSegment(1.0, formants, (70.0, 300.0, 350.0), voice=0.45),)
+    return (TargetSegment(1.0, formants, (70.0, 300.0, 350.0), voicing=0.45),)
 
 
-def _fricative(formants: Formants, hiss: float, hiss_hz: float, hiss_width: float, voice: float = 0.0) -> PhoneTargets:
-    return (TargetSegment(1.0, formants, (120.0, 150.0, 200.0), voice, 0.0, hiss, hiss_hz, hiss_width),)
+def _fricative(
+    formants: Formants, frication: float, frication_hz: float, frication_width: float, voicing: float = 0.0
+) -> PhoneTargets:
+    return (
+        TargetSegment(1.0, formants, (120.0, 150.0, 200.0), voicing, 0.0, frication, frication_hz, frication_width),
+    )
 
 
-def _stop(formants: Formants, hiss: float, hiss_hz: float, hiss_width: float, voiced: bool) -> PhoneTargets:
-    """Closure, burst, release; a voiced one murmurs in its closure, an unvoiced one is aspirated."""
-    closure = TargetSegment(0.6, formants, (150.0, 300.0, 400.0), voice=0.12 if voiced else 0.0)
-    burst = TargetSegment(0.14, formants, hiss=hiss, hiss_hz=hiss_hz, hiss_width=hiss_width)
+def _stop(
+    formants: Formants, frication: float, frication_hz: float, frication_width: float, voiced: bool
+) -> PhoneTargets:
+    """Return closure, burst and release; a voiced stop has voicing in its closure, an unvoiced one is aspirated."""
+    closure = TargetSegment(0.6, formants, (150.0, 300.0, 400.0), voicing=0.12 if voiced else 0.0)
+    burst = TargetSegment(
+        0.14, formants, frication=frication, frication_hz=frication_hz, frication_width=frication_width
+    )
     release = (
-        TargetSegment(0.26, formants, voice=0.6)
+        TargetSegment(0.26, formants, voicing=0.6)
         if voiced
-        else TargetSegment(0.26, formants, (200.0, 150.0, 200.0), breath=0.12)
+        else TargetSegment(0.26, formants, (200.0, 150.0, 200.0), aspiration=0.12)
     )
     return closure, burst, release
 
 
-def _affricate(formants: Formants, hiss: float, hiss_hz: float, hiss_width: float, voice: float = 0.0) -> PhoneTargets:
-    """Closure, then a fricative."""
-    (release,) = _fricative(formants, hiss, hiss_hz, hiss_width, voice)
-    return TargetSegment(0.4, formants, (150.0, 300.0, 400.0), voice=voice / 2), replace(release, share=0.6)
+def _affricate(
+    formants: Formants, frication: float, frication_hz: float, frication_width: float, voicing: float = 0.0
+) -> PhoneTargets:
+    """Return a closure, then a fricative."""
+    (release,) = _fricative(formants, frication, frication_hz, frication_width, voicing)
+    return TargetSegment(0.4, formants, (150.0, 300.0, 400.0), voicing=voicing / 2), replace(release, share=0.6)
 
 
-def _syllabic(sound: PhoneTargets) -> PhoneTargets:
-    """A schwa that runs into a consonant."""
-    return replace(_vowel(SCHWA)[0], share=0.35), *(replace(part, share=0.65 * part.share) for part in sound)
+def _syllabic(consonant: PhoneTargets) -> PhoneTargets:
+    """Return a schwa that runs into a consonant."""
+    return replace(_vowel(SCHWA)[0], share=0.35), *(
+        replace(segment, share=0.65 * segment.share) for segment in consonant
+    )
 
 
 SCHWA: Formants = (500, 1400, 2450)
@@ -140,15 +156,15 @@ PHONE_TARGETS: dict[str, PhoneTargets] = {
     "n": _N,
     "en": _syllabic(_N),
     "ng": _nasal((280, 2100, 2600)),
-    "hh": (TargetSegment(widths=(200.0, 150.0, 200.0), breath=0.12),),
+    "hh": (TargetSegment(widths=(200.0, 150.0, 200.0), aspiration=0.12),),
     "f": _fricative((300, 1050, 2200), 0.10, 5000, 5000),
-    "v": _fricative((280, 1050, 2200), 0.05, 5000, 5000, voice=0.35),
+    "v": _fricative((280, 1050, 2200), 0.05, 5000, 5000, voicing=0.35),
     "th": _fricative((300, 1350, 2550), 0.08, 6500, 2500),
-    "dh": _fricative((280, 1350, 2550), 0.04, 6500, 2500, voice=0.35),
+    "dh": _fricative((280, 1350, 2550), 0.04, 6500, 2500, voicing=0.35),
     "s": _fricative((300, 1650, 2600), 0.40, 5800, 1800),
-    "z": _fricative((270, 1650, 2600), 0.22, 5800, 1800, voice=0.3),
+    "z": _fricative((270, 1650, 2600), 0.22, 5800, 1800, voicing=0.3),
     "sh": _fricative((300, 1850, 2450), 0.45, 2900, 1300),
-    "zh": _fricative((270, 1850, 2450), 0.25, 2900, 1300, voice=0.3),
+    "zh": _fricative((270, 1850, 2450), 0.25, 2900, 1300, voicing=0.3),
     "p": _stop(_LABIAL, 0.25, 900, 1200, voiced=False),
     "b": _stop(_LABIAL, 0.18, 800, 1200, voiced=True),
     "t": _stop(_ALVEOLAR, 0.45, 4500, 2500, voiced=False),
@@ -156,15 +172,15 @@ PHONE_TARGETS: dict[str, PhoneTargets] = {
     "k": _stop(_VELAR, 0.45, 1950, 500, voiced=False),
     "g": _stop(_VELAR, 0.30, 1900, 500, voiced=True),
     "ch": _affricate(_PALATAL, 0.45, 3000, 1400),
-    "jh": _affricate(_PALATAL, 0.28, 3000, 1400, voice=0.3),
+    "jh": _affricate(_PALATAL, 0.28, 3000, 1400, voicing=0.3),
 }
-"""The phones of the inventory (conventions: Phones), their parts in order."""
+"""The segments of every phone of the inventory, in order."""
 
 
 def synthesise(
     phones: Sequence[tuple[str, float]], *, pitch_hz: float = 120.0, rate_hz: int = 16000, seed: int = 0
 ) -> tuple[Audio, Timeline[Unit]]:
-    """Speak ``phones``, and return the sound with the exact time of each of them.
+    """Return synthetic speech, and the exact time of each of its phones.
 
     phones   : names and durations (seconds, ≥ 0.001), in order; at least one
     pitch_hz : mean pitch, 50–500 Hz; it falls by 12 % from start to end
@@ -197,39 +213,44 @@ def _check(phones: Sequence[tuple[str, float]], pitch_hz: float, rate_hz: int) -
 
 
 class _Tracks(NamedTuple):
-    """Smooth targets, one row a frame: F1–F3 and widths; voice, breath, hiss; the hiss's centre and width (all Hz)."""
+    """Smooth targets, one row a frame.
+
+    formants, widths : F1–F3 and their bandwidths, Hz
+    levels           : of voicing, aspiration and frication
+    frication        : its centre and width, Hz
+    """
 
     formants: Array
     widths: Array
     levels: Array
-    hiss: Array
+    frication: Array
 
 
 def _tracks(sounds: Sequence[PhoneTargets], edges_s: Array, rate_hz: int) -> _Tracks:
     hop_s = (rate_hz // CONTROL_HZ) / rate_hz
     time_s = (np.arange(int(edges_s[-1] / hop_s) + 1) + 0.5) * hop_s
-    parts = _with_formants([part for sound in sounds for part in sound])
-    part_s = [part.share * d for sound, d in zip(sounds, np.diff(edges_s), strict=True) for part in sound]
-    which = np.minimum(np.searchsorted(np.cumsum(part_s), time_s, side="right"), len(parts) - 1)
-    formants = np.array([(part.formants, part.widths) for part in parts])[which]
-    levels = np.array([(part.voice, part.breath, part.hiss) for part in parts])[which]
-    hiss = np.array([(part.hiss_hz, part.hiss_width) for part in parts])[which]
-    loudness = levels[:, 2:] + 1e-9  # the hiss's place is the mean over what hisses nearby
+    segments = _with_formants([segment for sound in sounds for segment in sound])
+    segment_s = [segment.share * d for sound, d in zip(sounds, np.diff(edges_s), strict=True) for segment in sound]
+    which = np.minimum(np.searchsorted(np.cumsum(segment_s), time_s, side="right"), len(segments) - 1)
+    formants = np.array([(segment.formants, segment.widths) for segment in segments])[which]
+    levels = np.array([(segment.voicing, segment.aspiration, segment.frication) for segment in segments])[which]
+    frication = np.array([(segment.frication_hz, segment.frication_width) for segment in segments])[which]
+    loudness = levels[:, 2:] + 1e-9  # centre and width are means, weighted by the level, over the frication nearby
     return _Tracks(
         _smooth(formants[:, 0], _FORMANT_SMOOTHING_S),
         _smooth(formants[:, 1], _FORMANT_SMOOTHING_S),
         _smooth(levels, _LEVEL_SMOOTHING_S),
-        _smooth(hiss * loudness, _LEVEL_SMOOTHING_S) / _smooth(loudness, _LEVEL_SMOOTHING_S),
+        _smooth(frication * loudness, _LEVEL_SMOOTHING_S) / _smooth(loudness, _LEVEL_SMOOTHING_S),
     )
 
 
-def _with_formants(parts: Sequence[TargetSegment]) -> list[TargetSegment]:
-    """Give the parts without formants those of the next that has some, at the end those of the last."""
-    following: Formants = next((part.formants for part in reversed(parts) if part.formants), SCHWA)
+def _with_formants(segments: Sequence[TargetSegment]) -> list[TargetSegment]:
+    """Return segments of which those without formants get those of the next that has some, at the end of the last."""
+    following: Formants = next((segment.formants for segment in reversed(segments) if segment.formants), SCHWA)
     filled = []
-    for part in reversed(parts):
-        following = part.formants or following
-        filled.append(replace(part, formants=following))
+    for segment in reversed(segments):
+        following = segment.formants or following
+        filled.append(replace(segment, formants=following))
     return filled[::-1]
 
 
@@ -239,13 +260,16 @@ def _smooth(frames: Array, deviation_s: float) -> Array:
 
 
 def _speech(tracks: _Tracks, noise: Array, pitch_hz: float, rate_hz: int) -> Array:
-    """Return what comes out of the mouth; ``noise`` [shape=(≥ 2, samples)] excites breath and hiss."""
+    """Return the speech signal [shape=(samples,)].
+
+    noise : excites aspiration and frication [shape=(≥ 2, samples)]
+    """
     count, hop = noise.shape[1], rate_hz // CONTROL_HZ
     centres = (np.arange(len(tracks.levels)) + 0.5) * hop
-    voice, breath, hiss = (np.interp(np.arange(count), centres, level) for level in tracks.levels.T)
-    source = voice * _pulses(count, pitch_hz, rate_hz) + breath * noise[0]
+    voicing, aspiration, frication = (np.interp(np.arange(count), centres, level) for level in tracks.levels.T)
+    source = voicing * _pulses(count, pitch_hz, rate_hz) + aspiration * noise[0]
     voiced = _filtered(source, _formant_sections(tracks, rate_hz), hop)
-    return voiced + _filtered(hiss * noise[1], _hiss_sections(tracks, rate_hz), hop)
+    return voiced + _filtered(frication * noise[1], _frication_sections(tracks, rate_hz), hop)
 
 
 def _pulses(count: int, pitch_hz: float, rate_hz: int) -> Array:
@@ -269,9 +293,9 @@ def _formant_sections(tracks: _Tracks, rate_hz: int) -> Array:
     return np.stack([1 + a1 + a2, zero, zero, one, a1, a2], axis=-1)
 
 
-def _hiss_sections(tracks: _Tracks, rate_hz: int) -> Array:
+def _frication_sections(tracks: _Tracks, rate_hz: int) -> Array:
     """Return one band pass of unit gain at its centre, zero at 0 Hz [shape=(frames, 1, 6)]."""
-    a1, a2 = _poles(tracks.hiss[:, :1], tracks.hiss[:, 1:], rate_hz)
+    a1, a2 = _poles(tracks.frication[:, :1], tracks.frication[:, 1:], rate_hz)
     gain, zero, one = (1 - a2) / 2, np.zeros_like(a1), np.ones_like(a1)
     return np.stack([gain, zero, -gain, one, a1, a2], axis=-1)
 
@@ -282,7 +306,7 @@ def _poles(centre_hz: Array, width_hz: Array, rate_hz: int) -> tuple[Array, Arra
 
 
 def _filtered(samples: Array, sections: Array, hop: int) -> Array:
-    """Filter ``samples``, ``hop`` at a time with the sections of that frame; the state is carried over."""
+    """Return filtered samples: ``hop`` at a time with the sections of their frame; the filter state is carried over."""
     filtered, state = np.empty_like(samples), np.zeros((sections.shape[1], 2))
     for start, frame_sections in zip(range(0, len(samples), hop), sections, strict=False):
         filtered[start : start + hop], state = sosfilt(frame_sections, samples[start : start + hop], zi=state)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -103,7 +103,7 @@ def every_frame_has_a_state(trained: TrainedEngine) -> None:
     result = trained.generate(speech(timeline(SENTENCE)))
     frames, states = np.asarray(result.trace.frames), result.trace.states
     require(len(frames) == len(result.motion.values), f"a trace of {len(frames)} frames")
-    require(bool(0 <= frames.min() and frames.max() < len(states)), "the trace points outside its states")
+    require(bool(frames.min() >= 0 and frames.max() < len(states)), "the trace points outside its states")
     require(all(states), "a state without a name")
 
 
@@ -111,9 +111,7 @@ def units_keep_their_times(trained: TrainedEngine) -> None:
     """The units of a result are those of the speech, each with a model unit, and may be passed back."""
     spoken = speech(timeline(SENTENCE))
     result = trained.generate(spoken)
-    before, after = (
-        [(s.start_s, s.end_s, s.label.phone) for s in units] for units in (spoken.units, result.units)
-    )
+    before, after = ([(s.start_s, s.end_s, s.label.phone) for s in units] for units in (spoken.units, result.units))
     require(before == after, f"units {after}, required {before}")
     require(all(span.label.unit for span in result.units), "a unit without a name")
     _require_same(trained.generate(replace(spoken, units=result.units)), result, "the units passed back")
@@ -145,7 +143,7 @@ def wrong_pins_are_input_errors(trained: TrainedEngine) -> None:
         *((nan, "opening", 0.1), (infinite, "opening", 0.1), (0.5, "opening", nan), (0.5, "opening", -infinite)),
     ):
         pin = Pin(time_s, channel, value)
-        require_error(InputError, lambda pin=pin: trained.generate(spoken, pin), f"{pin}")
+        require_error(InputError, partial(trained.generate, spoken, pin), f"{pin}")
 
 
 def the_same_input_gives_the_same_bytes(trained: TrainedEngine) -> None:
@@ -177,9 +175,9 @@ def damaged_arrays_are_format_errors(trained: TrainedEngine) -> None:
     engine, arrays = trained.engine, trained.engine.to_arrays(trained.model)
     for name in arrays:
         missing: Mapping[str, Any] = {key: array for key, array in arrays.items() if key != name}
-        require_error(ModelFormatError, lambda missing=missing: engine.from_arrays(missing), f"{name!r} missing")
+        require_error(ModelFormatError, partial(engine.from_arrays, missing), f"{name!r} missing")
         short = arrays | {name: arrays[name][:-1]}
-        require_error(ModelFormatError, lambda short=short: engine.from_arrays(short), f"{name!r} cut short")
+        require_error(ModelFormatError, partial(engine.from_arrays, short), f"{name!r} cut short")
 
 
 def every_phone_can_be_said(trained: TrainedEngine) -> None:
@@ -214,7 +212,7 @@ def nothing_to_learn_from_is_a_corpus_error(trained: TrainedEngine) -> None:
     fewer = replace(two.motion, values=two.motion.values[:, :2], channels=two.motion.channels[:2])
     different = [one, replace(two, motion=fewer)]
     for useless, name in (([], "no example"), (unseen, "no valid frame"), (different, "different channels")):
-        require_error(CorpusError, lambda useless=useless: engine.fit(useless, silent_monitor), name)
+        require_error(CorpusError, partial(engine.fit, useless, silent_monitor), name)
 
 
 def frames_that_are_not_valid_teach_nothing(trained: TrainedEngine) -> None:

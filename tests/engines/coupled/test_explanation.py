@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from engines.coupled.tiny import THREE, TWO, chains, observed, structure
-from engines.synthetic import CHANNELS, examples, speech, timeline
 from lipmotion.engines import engine_named
 from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, MULTISTREAM, SYSTEMS
 from lipmotion.engines.coupled.explanation import (
@@ -19,6 +18,7 @@ from lipmotion.engines.coupled.explanation import (
     units_believed,
 )
 from lipmotion.motion import generation
+from lipmotion.testing.examples import CHANNELS, examples, speech, timeline
 from lipmotion.types import Explanation, NamedProbability
 from lipmotion.types.progress import silent_monitor
 from lipmotion.units import VISEME_OF

@@ -6,10 +6,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from engines.synthetic import examples, speech, timeline
 from lipmotion.engines import engine_named
 from lipmotion.engines.joint.engine import JointEngine, JointModel
 from lipmotion.errors import InputError
+from lipmotion.testing.examples import examples, speech, timeline
 from lipmotion.types import Generation, Span, Speech, Timeline, Unit
 from lipmotion.types.progress import silent_monitor
 from lipmotion.units import UNIT_SETS

@@ -3,10 +3,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from engines.synthetic import CHANNELS, OPENINGS, examples, speech, timeline
 from lipmotion.engines import engine_named
 from lipmotion.engines.trajectory.engine import TrajectoryConfig
 from lipmotion.errors import InputError
+from lipmotion.testing.examples import CHANNELS, OPENINGS, examples, speech, timeline
 from lipmotion.types import WEIGHT, Channel, Constraints, Pin
 from lipmotion.types.progress import silent_monitor
 

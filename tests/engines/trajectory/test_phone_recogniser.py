@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from engines.synthetic import example, examples, speech, timeline
 from lipmotion.engines import engine_named
 from lipmotion.engines.trajectory import phone_recogniser as module
 from lipmotion.errors import ModelFormatError
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
+from lipmotion.testing.examples import example, examples, speech, timeline
 from lipmotion.types import Features, Timeline
 from lipmotion.types.progress import silent_monitor
 

@@ -3,10 +3,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from engines.synthetic import examples
 from lipmotion.engines.trajectory.engine import TrajectoryConfig
 from lipmotion.engines.trajectory.train import LEAST_VARIANCE, fit_trajectory
 from lipmotion.motion.frame_labels import FullContextState, StateLayout, full_context_states
+from lipmotion.testing.examples import examples
 from lipmotion.types.progress import silent_monitor
 
 HOW = replace(TrajectoryConfig(states=3, silent_states=7, components=2, acoustic_regression=False).learning)

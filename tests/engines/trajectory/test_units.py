@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from engines.synthetic import OPENINGS, examples, speech, timeline
 from lipmotion.engines import Engine, engine_named
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.motion.closure import closing_spans
 from lipmotion.motion.frame_labels import StateLayout, full_context_states
+from lipmotion.testing.examples import OPENINGS, examples, speech, timeline
 from lipmotion.types import Generation
 from lipmotion.types.progress import silent_monitor
 from lipmotion.units import LIP_CLOSING, PHONES, UNIT_SETS, unit_set

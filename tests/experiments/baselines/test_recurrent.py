@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lipmotion.testing.examples import CHANNELS
-from lipmotion.testing.examples import examples as sentences
 from lipmotion.experiments.baselines import recurrent as network
 from lipmotion.experiments.baselines.recurrent import BlstmBaseline
 from lipmotion.experiments.baselines.regression import FrameRegressionModel
+from lipmotion.testing.examples import CHANNELS
+from lipmotion.testing.examples import examples as sentences
 from lipmotion.types import Example, Progress
 
 pytest.importorskip("torch", reason="the extra 'network' is not installed")

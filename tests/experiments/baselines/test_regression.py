@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lipmotion.testing.examples import CHANNELS
-from lipmotion.testing.examples import examples as sentences
 from lipmotion.errors import CorpusError
 from lipmotion.experiments.baselines.regression import REACH, ContextRidge, LoudnessRegression, MeanPose
 from lipmotion.speech.mfcc import LOG_ENERGY
+from lipmotion.testing.examples import CHANNELS
+from lipmotion.testing.examples import examples as sentences
 from lipmotion.types import Example, silent_monitor
 
 BASELINES = [MeanPose, LoudnessRegression, ContextRidge]

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lipmotion.testing.examples import examples
 from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines.coupled.config import CoupledConfig
 from lipmotion.engines.coupled.engine import CoupledEngine
@@ -17,6 +16,7 @@ from lipmotion.pipeline.evaluation.conditions import HeldOutRecordings, compared
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.training.train import model_motion
 from lipmotion.speech.recogniser import cached_recogniser
+from lipmotion.testing.examples import examples
 from lipmotion.testing.toy import toy_sentences
 from lipmotion.types import Example, Progress, Speech, silent_monitor
 

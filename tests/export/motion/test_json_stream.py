@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lipmotion.export.motion import json_stream
-from lipmotion.export.motion.json_stream import members
+from lipmotion.export.motion.json_stream import read_members
 
 PLAIN = st.recursive(
     st.one_of(st.none(), st.booleans(), st.integers(-(10**9), 10**9), st.floats(allow_nan=False), st.text(max_size=5)),
@@ -21,12 +21,12 @@ PLAIN = st.recursive(
 @given(document=st.dictionaries(st.text(max_size=4), PLAIN, max_size=5), indent=st.sampled_from([None, 1, "\t"]))
 def test_what_is_no_row_is_read_as_json_reads_it(document: dict[str, Any], indent: Any) -> None:
     text = json.dumps(document, indent=indent, ensure_ascii=False)
-    assert members(f" {text}\n", "the rows") == json.loads(text)
+    assert read_members(f" {text}\n", "the rows") == json.loads(text)
 
 
 @given(st.lists(st.lists(st.floats(allow_nan=False), min_size=2, max_size=2), max_size=5), st.sampled_from([None, 1]))
 def test_rows_become_an_array(rows: list[list[float]], indent: int | None) -> None:
-    found = members(json.dumps({"a": 1, "values": rows, "b": []}, indent=indent), "values")
+    found = read_members(json.dumps({"a": 1, "values": rows, "b": []}, indent=indent), "values")
     assert (found["a"], found["b"]) == (1, [])
     assert found["values"].dtype == np.float64
     assert found["values"].tolist() == rows
@@ -37,7 +37,7 @@ def test_rows_become_an_array(rows: list[list[float]], indent: int | None) -> No
 )
 def test_what_is_no_json_is_refused_as_json_refuses_it(text: str) -> None:
     with pytest.raises(json.JSONDecodeError):
-        members(text, "values")
+        read_members(text, "values")
 
 
 @pytest.mark.parametrize(
@@ -45,15 +45,15 @@ def test_what_is_no_json_is_refused_as_json_refuses_it(text: str) -> None:
 )
 def test_rows_of_other_things_are_refused(rows: str) -> None:
     with pytest.raises((ValueError, TypeError, OverflowError)) as caught:
-        members(f'{{"values": {rows}}}', "values")
+        read_members(f'{{"values": {rows}}}', "values")
     assert not isinstance(caught.value, json.JSONDecodeError)
 
 
 def test_lists_have_an_end(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(json_stream, "MOST_ITEMS", 3)
     monkeypatch.setattr(json_stream, "MOST_ROWS", 3)
-    assert members('{"units": [1, 2, 3], "values": [[1], [2], [3]]}', "values")["units"] == [1, 2, 3]
+    assert read_members('{"units": [1, 2, 3], "values": [[1], [2], [3]]}', "values")["units"] == [1, 2, 3]
     with pytest.raises(ValueError, match="a list of more than 3 items"):
-        members('{"units": [1, 2, 3, 4]}', "values")
+        read_members('{"units": [1, 2, 3, 4]}', "values")
     with pytest.raises(ValueError, match="more than 3 rows of values"):
-        members('{"values": [[1], [2], [3], [4]]}', "values")
+        read_members('{"values": [[1], [2], [3], [4]]}', "values")

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from lipmotion.export.motion import rounded
-from lipmotion.export.motion.rounded import rows
+from lipmotion.export.motion.rounded import formatted_rows
 
 
 @pytest.mark.parametrize("block", [1, 7, 50, 2000])
@@ -10,12 +10,12 @@ from lipmotion.export.motion.rounded import rows
 def test_rows_are_the_rounded_values(block, precision, monkeypatch):
     monkeypatch.setattr(rounded, "BLOCK", block)
     values = np.random.default_rng(0).normal(0, 3, (50, 7)).astype(precision)
-    parsed = np.array([[float(number) for number in row.split(",")] for row in rows(values)])
+    parsed = np.array([[float(number) for number in row.split(",")] for row in formatted_rows(values)])
     assert (parsed == np.round(values.astype(float), 5)).all()
 
 
 def test_numbers_are_plain():
-    assert list(rows(np.array([[0.0, -0.0, -1e-7, 1e-5, 123456.0]]))) == [
+    assert list(formatted_rows(np.array([[0.0, -0.0, -1e-7, 1e-5, 123456.0]]))) == [
         "0.00000,0.00000,0.00000,0.00001,123456.00000"
     ]
-    assert list(rows(np.zeros((0, 3)))) == []
+    assert list(formatted_rows(np.zeros((0, 3)))) == []

@@ -64,7 +64,7 @@ def test_posteriors_are_those_of_all_paths(components):
     (found,) = state_posteriors(hmm, sentences)
     places = [sentences.triphones[i] for i in sentences.items[0].triphones]
     density = [[slow.log_density(hmm, observed, place, t, hmm.config.training) for place in places] for t in range(7)]
-    rows = sentences.items[0].states
+    rows = sentences.items[0].monophones
     expected, stay, log_likelihood = chains.chain_posteriors(np.array(density), hmm.log_stay[rows], hmm.log_move[rows])
     assert found.states == pytest.approx(expected, abs=1e-4)
     assert found.states.sum(axis=1) == pytest.approx(np.ones(7), abs=1e-9)

@@ -238,7 +238,7 @@ def test_voices_of_others_teach_engines_that_have_a_use_for_them(toy_corpus: Cor
     stages: list[str] = []
     plain = {"states": 1, "asynchrony": 0, "mixtures": 1, "acoustic_regression": False, "variance_scaling": False}
     engine = engine_named("coupled", plain | {"speech_only_mixtures": 1})
-    chosen = {"names": TRAINED[:4], "recogniser": SMALL, "engine": engine}
+    chosen = {"selection": Selection(names=TRAINED[:4]), "recogniser": SMALL, "engine": engine}
     model, report = train(
         toy_corpus, **chosen, voices=others(), run=Run(monitor=lambda event: stages.append(event.stage))
     )
@@ -255,5 +255,5 @@ def test_voices_of_others_teach_engines_that_have_a_use_for_them(toy_corpus: Cor
 
 @pytest.mark.parametrize("name", ["trajectory", "joint"])
 def test_other_engines_have_no_use_for_voices(toy_corpus: Corpus, name: str) -> None:
-    with pytest.raises(InputError, match=f"the {name} engine cannot learn from other voices"):
+    with pytest.raises(InputError, match=f"the engine {name!r} does not learn from other voices"):
         train(toy_corpus, engine=engine_named(name, {}), voices=others())

@@ -13,7 +13,7 @@ from lipmotion.pipeline.model import Model
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.noise import noisy_audio
 from lipmotion.speech.recogniser import Recogniser
-from lipmotion.speech.voices import base, espeak_events
+from lipmotion.speech.voices import espeak_events, synthesiser
 from lipmotion.speech.voices.flite import parse_phone_ends
 from lipmotion.speech.voices.installed import SYNTHESISERS, installed_voices, speak_sentence, speak_sentences
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
@@ -91,8 +91,8 @@ def test_a_sentence_that_festival_leaves_out_is_missed(faked: Path) -> None:
 
 @pytest.mark.parametrize("voice", EACH)
 def test_a_program_that_hangs_is_stopped(faked: Path, voice: SyntheticVoice, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(base, "START_S", 1.0)
-    monkeypatch.setattr(base, "EACH_S", 0.0)
+    monkeypatch.setattr(synthesiser, "START_S", 1.0)
+    monkeypatch.setattr(synthesiser, "EACH_S", 0.0)
     with pytest.raises(InputError, match="did not end within 1 s"):
         speak_sentence("hang", voice)
     assert list(faked.iterdir()) == []

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.base import Arrays, Engine, Fit
-from lipmotion.errors import CorpusError, InputError, ModelFormatError
+from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.multistream.align import StatePath, align
 from lipmotion.hmm.multistream.arrays import joint_arrays, joint_from_arrays
 from lipmotion.hmm.multistream.generate import densities_of_path, densities_of_paths, single_gaussians
@@ -28,7 +28,7 @@ from lipmotion.motion.generation import LearnedMotion, Statistics
 from lipmotion.motion.limits import MotionLimits, check_poses, limits_of
 from lipmotion.motion.space import MotionSpace, fit_reduced_motion
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
-from lipmotion.storage.schema import arrays_under, refuse_undeclared
+from lipmotion.storage.schema import arrays_under, format_errors, refuse_undeclared
 from lipmotion.types import (
     Configuration,
     Constraints,
@@ -211,7 +211,7 @@ class JointEngine(Engine[JointModel]):
         return motion_arrays(model.units, model.space, model.closure) | joint
 
     def from_arrays(self, arrays: Arrays) -> JointModel:  # noqa: D102
-        try:
+        with format_errors("the joint model"):
             refuse_undeclared(arrays, MOTION_ARRAYS, (name for name in arrays if name.startswith(PREFIX)))
             units, space, closure = motion_from_arrays(arrays, self.config.units)
             hmm = joint_from_arrays(arrays_under(arrays, PREFIX), self.config.joint)
@@ -222,8 +222,6 @@ class JointEngine(Engine[JointModel]):
             model = JointModel(units, space, hmm, closure)
             check_poses(model.poses, space, closure)
             return model
-        except (KeyError, ValueError, IndexError, TypeError) as error:
-            raise ModelFormatError(f"the joint model is damaged ({error}); train or download it again") from error
 
     def _observed(
         self, speech: Speech, motion: NDArray[np.float64] | None = None, seen: NDArray[np.bool_] | None = None

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.motion.context_window import WINDOW, AcousticContext, acoustic_context_from
+from lipmotion.motion.context_window import WINDOW, AcousticContext, acoustic_context_arrays, acoustic_context_from
 from lipmotion.motion.frame_labels import FullContextState, StateLayout
 from lipmotion.motion.limits import check_spread
 from lipmotion.stats.trees import TREES, Tree, tree_arrays, trees_from_arrays
@@ -105,8 +105,7 @@ def emission_arrays(emission: Emission) -> dict[str, NDArray[Any]]:
     if emission.hearing is not None:
         window = emission.hearing.window
         arrays |= {
-            "window": np.stack([window.mean, window.scale]),
-            "window_basis": window.basis.astype(np.float16),
+            **acoustic_context_arrays(window),
             "coefficients": emission.hearing.coefficients.astype(np.float16),
             "coefficient_rows": emission.hearing.rows,
         }

@@ -17,7 +17,6 @@ from lipmotion.engines.trajectory.phone_recogniser import (
     recogniser_arrays,
     recogniser_from_arrays,
 )
-from lipmotion.errors import ModelFormatError
 from lipmotion.motion.arrays import MOTION_ARRAYS, motion_arrays, motion_from_arrays
 from lipmotion.motion.closure import Closure
 from lipmotion.motion.frame_labels import StateLayout
@@ -25,7 +24,7 @@ from lipmotion.motion.generation import LearnedMotion
 from lipmotion.motion.limits import MotionLimits, check_poses, limits_of
 from lipmotion.motion.space import MotionSpace
 from lipmotion.motion.variance_scaling import VarianceScaling
-from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, checked_arrays, refuse_undeclared
+from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, checked_arrays, format_errors, refuse_undeclared
 from lipmotion.units import UnitSet
 
 
@@ -79,7 +78,7 @@ def model_from_arrays(arrays: Arrays, layout: Callable[[UnitSet], StateLayout], 
     units : the name of its unit set; the set itself is in the arrays
     Raises ModelFormatError: something is missing, undeclared, out of place or out of range.
     """
-    try:
+    with format_errors("the trajectory model"):
         refuse_undeclared(arrays, MOTION_ARRAYS, EMISSION, GAIN, (name for name in arrays if name.startswith(LISTENER)))
         of, space, closure = motion_from_arrays(arrays, units)
         emission = emission_from_arrays(arrays, layout(of), space.dimensions)
@@ -87,8 +86,6 @@ def model_from_arrays(arrays: Arrays, layout: Callable[[UnitSet], StateLayout], 
         model = TrajectoryModel(of, space, emission, gain, closure, recogniser_from_arrays(arrays))
         check_poses(model.poses, space, closure)
         return model
-    except (KeyError, ValueError, IndexError, TypeError) as error:
-        raise ModelFormatError(f"the trajectory model is damaged ({error}); train or download it again") from error
 
 
 GAIN = {"gain": ArraySpec(np.float64, "Q", POSITIVE, 10)}

@@ -1,1 +1,1 @@
-"""Motion files: one module a format."""
+"""Motion files: one module per format."""

@@ -26,7 +26,7 @@ def header(generation: Generation) -> dict[str, Any]:
     }
 
 
-def labels(generation: Generation, source: Mapping[str, str], model: Mapping[str, str]) -> dict[str, Any]:
+def units_and_origin(generation: Generation, source: Mapping[str, str], model: Mapping[str, str]) -> dict[str, Any]:
     """Return the members ``units``, ``source`` and ``model``."""
     units = [
         {"start_s": span.start_s, "end_s": span.end_s, "phone": span.label.phone, "unit": span.label.unit}

@@ -19,7 +19,7 @@ _BLANK = re.compile(r"[ \t\n\r]*")
 _DECODER = json.JSONDecoder()
 
 
-def members(text: str, rows_of: str) -> dict[str, Any]:
+def read_members(text: str, rows_of: str) -> dict[str, Any]:
     """Return the members of a JSON object; the list called ``rows_of`` becomes an array of numbers [shape=(T, P)].
 
     Raises json.JSONDecodeError, RecursionError: not one object.

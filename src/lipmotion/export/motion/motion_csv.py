@@ -1,4 +1,4 @@
-"""``.csv``: a table for spreadsheets and scripts, ``time_s`` and one column a channel. It has no units."""
+"""``.csv``: a table for spreadsheets and scripts: ``time_s`` and one column per channel, without units."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import ExportError, InputError, shortened
 from lipmotion.export.base import MotionFormat
-from lipmotion.export.motion.rounded import rows
+from lipmotion.export.motion.rounded import formatted_rows
 from lipmotion.types import Channel, Generation, Motion, Timeline, Unit
 
 LONGEST_HEAD = 1 << 20
-"""Characters of a line."""
+"""Most characters of a line."""
 LONGEST_S = 1e6
-"""More than eleven days of motion are a mistake."""
+"""Largest time that is accepted: more than eleven days."""
 
 
 def check(motion: Motion) -> None:
@@ -30,17 +30,20 @@ def check(motion: Motion) -> None:
 
 
 def write(path: Path, generation: Generation, _source: Mapping[str, str], _model: Mapping[str, str]) -> None:
-    """Write a header and one line a frame."""
+    """Write a header and one line per frame."""
     motion = generation.motion
     with path.open("w", encoding="utf-8") as file:
         file.write(",".join(["time_s", *motion.names]) + "\n")
-        for time_s, row in zip(motion.time_s.tolist(), rows(motion.values), strict=True):
+        for time_s, row in zip(motion.time_s.tolist(), formatted_rows(motion.values), strict=True):
             shortest = f"{time_s:.9f}".rstrip("0").rstrip(".")
             file.write(f"{shortest},{row}\n")
 
 
 def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
-    """Read it back; all channels count as eye distances. Raises InputError: not such a table, or uneven times."""
+    """Return the motion of a table, all channels in eye distances, and an empty timeline.
+
+    Raises InputError: not a table of numbers with a header, or times that are not even.
+    """
     try:
         with path.open(encoding="utf-8-sig") as file:
             head = file.readline(LONGEST_HEAD).rstrip("\n")
@@ -54,7 +57,7 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
 
 
 def _numbers(file: TextIO, columns: int) -> NDArray[np.float64]:
-    """Return the rows of a table [shape=(T, columns)]. Raises ValueError: a field that is no number, or uneven rows."""
+    """Return the rows of a table [shape=(T, columns)]. Raises ValueError: a field is no number, or rows are uneven."""
     numbers = array("d")
     for number, line in enumerate(iter(partial(file.readline, LONGEST_HEAD), ""), 2):
         row = line.rstrip("\n")
@@ -65,10 +68,11 @@ def _numbers(file: TextIO, columns: int) -> NDArray[np.float64]:
 
 
 def _rate(time_s: NDArray[np.float64]) -> float:
+    """Return the frame rate in hertz. Raises InputError: too few rows, or times that are not even from 0."""
     if len(time_s) < 2:
         raise InputError("the table has fewer than two rows, so its frame rate is unknown; use .json or .npz")
     if not np.abs(time_s).max() < LONGEST_S:
-        raise InputError(f"the column time_s holds times that are none, required seconds up to {LONGEST_S:.0f}")
+        raise InputError(f"the column time_s holds values that are no times, required seconds up to {LONGEST_S:.0f}")
     step_s = (time_s[-1] - time_s[0]) / (len(time_s) - 1)
     if time_s[0] != 0 or not step_s > 0 or np.abs(np.diff(time_s) - step_s).max() > 1e-6:
         raise InputError("the column time_s must begin at 0 and rise in even steps")

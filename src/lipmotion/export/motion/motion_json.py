@@ -1,4 +1,4 @@
-"""``.json``: the whole document; one row of values a line."""
+"""``.json``: the document with its values, one row of values per line."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from pathlib import Path
 
 from lipmotion.errors import InputError
 from lipmotion.export.base import MotionFormat
-from lipmotion.export.motion.document import FORMAT, header, labels, parse
-from lipmotion.export.motion.json_stream import members
-from lipmotion.export.motion.rounded import rows
+from lipmotion.export.motion.document import FORMAT, header, parse, units_and_origin
+from lipmotion.export.motion.json_stream import read_members
+from lipmotion.export.motion.rounded import formatted_rows
 from lipmotion.storage.json_text import as_json
 from lipmotion.types import Generation, Motion, Timeline, Unit
 
@@ -18,21 +18,21 @@ from lipmotion.types import Generation, Motion, Timeline, Unit
 def write(path: Path, generation: Generation, source: Mapping[str, str], model: Mapping[str, str]) -> None:
     """Write one JSON object: format, version, rate_hz, channels, values, units, source, model."""
     before = as_json(header(generation), ensure_ascii=False)
-    after = as_json(labels(generation, source, model), ensure_ascii=False)
+    after = as_json(units_and_origin(generation, source, model), ensure_ascii=False)
     with path.open("w", encoding="utf-8") as file:
         file.write(f'{before[:-1]}, "values": [\n')
-        for number, row in enumerate(rows(generation.motion.values)):
+        for number, row in enumerate(formatted_rows(generation.motion.values)):
             file.write(f",\n[{row}]" if number else f"[{row}]")
         file.write(f"\n], {after[1:]}\n")
 
 
 def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
-    """Read it back. Raises InputError: not JSON, or not a motion document."""
+    """Return motion and units of a file. Raises InputError: not JSON, or not a motion document."""
     try:
         text = path.read_text(encoding="utf-8")
         if text.lstrip().startswith("["):
             raise InputError(f"not a motion document: its 'format' must be {FORMAT!r}")
-        document = members(text, "values")
+        document = read_members(text, "values")
     except InputError:
         raise
     except (json.JSONDecodeError, UnicodeDecodeError, RecursionError) as error:

@@ -1,4 +1,4 @@
-"""``.npz``: the values unrounded, and all else as JSON in a string array. Never pickled."""
+"""``.npz``: the values without rounding, and the rest as JSON in a string array. Nothing is pickled."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ import numpy as np
 
 from lipmotion.errors import InputError
 from lipmotion.export.base import MotionFormat
-from lipmotion.export.motion.document import header, labels, parse
+from lipmotion.export.motion.document import header, parse, units_and_origin
 from lipmotion.storage.archive import UNREADABLE, array_in, check_archive
 from lipmotion.storage.json_text import as_json
 from lipmotion.types import Generation, Motion, Timeline, Unit
 
 
 def write(path: Path, generation: Generation, source: Mapping[str, str], model: Mapping[str, str]) -> None:
-    """Write the arrays ``values`` [shape=(T, P)] and ``document``, the JSON format's text without its values."""
-    document = as_json({**header(generation), **labels(generation, source, model)}, ensure_ascii=False)
+    """Write the arrays ``values`` [shape=(T, P)] and ``document``, the JSON document without its values."""
+    document = as_json({**header(generation), **units_and_origin(generation, source, model)}, ensure_ascii=False)
     np.savez(path, values=generation.motion.values, document=np.array(document))
 
 
 def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
-    """Read it back. Raises InputError: not an .npz file, or not a motion document."""
+    """Return motion and units of a file. Raises InputError: not an .npz file, or not a motion document."""
     try:
         with zipfile.ZipFile(path) as file:
             check_archive(file)

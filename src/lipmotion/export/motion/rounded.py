@@ -18,7 +18,7 @@ BLOCK = 2000
 """Rows that are formatted at a time: the text of an hour of all channels would not fit in memory."""
 
 
-def rows(values: NDArray[np.floating[Any]]) -> Iterator[str]:
+def formatted_rows(values: NDArray[np.floating[Any]]) -> Iterator[str]:
     """Yield each row of values [shape=(T, P)] as text: numbers with commas between them, rounded to ``DECIMALS``.
 
     Raises ExportError: a value is not finite.

@@ -1,8 +1,8 @@
-"""A drawn face that speaks: a flat portrait whose mouth follows the motion. Needs numpy and Pillow only.
+"""A drawn face: a flat portrait whose mouth is drawn from the motion. It needs numpy and Pillow only.
 
-The way of a frame: ``pose`` (motion and phones → numbers) → ``geometry`` (numbers → outlines) → ``mouth``
-(outlines → pixels, with ``bands``) → ``rasteriser`` (pixels → picture). What stands still is painted once,
-by ``portrait``, ``head`` and ``eyes`` on a ``layer``.
+The stages of a frame: ``pose`` (motion and phones → numbers) → ``geometry`` (numbers → outlines) → ``mouth``
+(outlines → pixels, with ``bands``) → ``rasteriser`` (pixels → picture). The still parts are painted once, by
+``surroundings``, ``head`` and ``eyes`` on a ``layer``.
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ class Portrait(Face):
 def render(
     motion: Motion, units: Timeline[Unit], *, fps: float = 25.0, height: int = 640
 ) -> Iterator[NDArray[np.uint8]]:
-    """Draw a motion as RGB frames [shape=(height, height, 3)], frame n at ``n / fps`` seconds, to the motion's end.
+    """Yield RGB frames [shape=(height, height, 3)] of a motion to its end, frame n at ``n / fps`` seconds.
 
     motion : needs ``opening``; ``width``, ``outer`` and the chin ``y_152`` are used where they exist.
-             ``width`` and ``outer`` count relative to their rest in silence, so any speaker will do.
+             ``width`` and ``outer`` are taken relative to the rest pose in silence, so they suit any speaker.
     units  : the phones, for the lip on the teeth (f v) and the tongue (th dh l t d n); may be empty
-    height : pixels, even
+    height : even number of pixels
     Raises InputError: no ``opening``, no frames, values that are not finite, a size that is odd or under 64,
     or fps not positive.
     The same input gives the same pixels, blinks included.

@@ -1,10 +1,12 @@
-"""The inner loops, compiled: the same arrays in and out as in ``kernels``, which decides when these are imported.
+"""The inner loops of kernels, compiled by numba; ``kernels`` decides when these modules are imported.
 
-Nothing here may use fast-math where a NumPy form should give the same bits.
+Functions here take many arrays as separate arguments: numba compiles them to the fastest code, and ``kernels`` offers
+forms with few arguments. Nothing here may use fast-math where a NumPy form should give the same bits.
 """
 
 import numpy as np
 
 np.empty(31 << 20, np.uint8)  # freed at once
-# Once so many bytes were asked for and freed, glibc keeps what is freed for the next array. Else every array of some
-# size is returned to the system and asked for again, which takes as long as some kernels do (docs/results/kernels.md).
+# After so many bytes were allocated and freed at once, glibc keeps freed memory for the next array. Otherwise it gives
+# every larger array back to the system and asks for it again: that takes as long as some kernels
+# (docs/results/kernels.md).

@@ -1,6 +1,7 @@
-"""Parameter generation, compiled: across channels with the processor's vectors, the system never stored.
+"""Parameter generation, compiled: vectorised over channels, without storing the system.
 
-The same operations in the same order as in ``kernels.banded``, and so the same bits.
+The operations and their order are those of ``kernels.banded``, and so the results are the same to the bit. Functions
+take their arrays as separate arguments, more than eight in places: numba compiles that to the fastest code.
 """
 
 from __future__ import annotations
@@ -40,8 +41,10 @@ def solve(main: Array, first: Array, second: Array, right: Array) -> tuple[Array
 
 @compiled
 def _room(T: int, P: int) -> tuple[Array, Array, Array, Array, Array]:
-    """Return room for solution, variance and both diagonals of L, row t at t + 2 between rows of zeros, and for what
-    is held between rows. Until the end, L⁻¹ times the right-hand side stands for the solution, 1 / D for the variance.
+    """Return empty arrays for the solution, the variance and both diagonals of L [shapes=(T + 4, P)], with row t at
+    t + 2 between rows of zeros, and zeros for values of the rows before [shape=(3, P)].
+
+    Until ``_substitute``, the solution holds L⁻¹ times the right-hand side, and the variance 1 / D.
     """
     values, variance, lower1, lower2 = (
         np.empty((T + 4, P)),
@@ -56,7 +59,7 @@ def _room(T: int, P: int) -> tuple[Array, Array, Array, Array, Array]:
 
 @compiled
 def _assemble(mean: Array, precision: Array, t: int, bands: Array) -> None:
-    """Fill in one row of the normal equations; dynamic rows that stick out at the ends count for nothing."""
+    """Fill in one row of the normal equations; Δ and Δ² of the first and last frame have no weight."""
     T = len(mean)
     before, behind = max(t - 1, 0), min(t + 1, T - 1)
     here = 1.0 if 0 < t < T - 1 else 0.0
@@ -80,9 +83,9 @@ def _eliminate(
     main: Array, first: Array, second: Array, right: Array, row: int,
     t: int, x: Array, inverse: Array, lower1: Array, lower2: Array, held: Array,
 ) -> None:  # fmt: skip
-    """Factorise one row and take it out of its right-hand side.
+    """Factorise one row, and eliminate it from its right-hand side.
 
-    held : what is held from the row before: coupling, second diagonal, and that of the row before that
+    held : of the row before its coupling and second diagonal, and the second diagonal of the row before that
     """
     for c in range(x.shape[1]):
         pivot = main[row, c] - held[0, c] * lower1[t + 1, c] - held[2, c] * lower2[t, c]
@@ -97,7 +100,7 @@ def _eliminate(
 
 @compiled
 def _substitute(x: Array, variance: Array, lower1: Array, lower2: Array, held: Array) -> None:
-    """Make the solution and the diagonal of the inverse of what stands for them."""
+    """Substitute backwards: replace the arrays of ``_room`` by the solution and the diagonal of the inverse."""
     held[0] = 0  # the inverse between the next row and the one behind it
     for t in range(len(x) - 3, 1, -1):
         for c in range(x.shape[1]):

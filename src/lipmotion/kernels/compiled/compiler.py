@@ -1,4 +1,4 @@
-"""How all kernels are compiled."""
+"""The decorators that compile all kernels."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ FunctionT = TypeVar("FunctionT", bound=Callable[..., Any])
 
 
 def compiled(function: FunctionT) -> FunctionT:
-    """Compile a function when it is first called, without the interpreter's lock; keep the result on disk if possible.
+    """Compile a function at its first call; the result is cached on disk if possible.
 
-    Divisions by zero give infinities, as in NumPy.
+    It runs without the interpreter's lock. Divisions by zero give infinities, as in NumPy.
     """
     return _compiled(function, False)
 
 
 def compiled_to_rounding(function: FunctionT) -> FunctionT:
-    """Compile likewise, sums in any order: results differ from NumPy's by rounding."""
+    """Compile a function as ``compiled`` does, but with sums in any order: results differ from NumPy's by rounding."""
     return _compiled(function, {"nnan", "nsz", "reassoc", "contract", "arcp"})
 
 

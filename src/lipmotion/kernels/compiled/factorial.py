@@ -1,7 +1,9 @@
 """Steps of factorial hidden Markov models, compiled: few passes over the joint states.
 
-Densities multiply in double precision, and nothing under a least value is kept: no product is denormal, which would be
-many times slower.  Weights are of axis 0 or 1, ``_0`` or ``_1``; U is the number of units of an axis.
+Densities are multiplied in double precision, and products under a least value are set to 0: none is denormal, which
+would be many times slower.  Arrays with suffix ``_0`` or ``_1`` belong to that axis; U is the number of units of an
+axis. Functions take their arrays as separate arguments, more than eight in places: numba compiles that to the fastest
+code.
 """
 
 from __future__ import annotations
@@ -16,14 +18,14 @@ from lipmotion.kernels.compiled.compiler import compiled_to_rounding
 Array = NDArray[Any]
 Index = NDArray[np.intp]
 LEAST_TOTAL = 1e-7
-"""Of products that are kept as they are: when they sum to less, they are made greater first."""
+"""Least sum of the products of a frame: with a smaller sum they are computed again from larger densities."""
 
 
 @compiled_to_rounding
 def moved_to_last(before: Array, stay: Array, onward: Array, entering: Array, count: int) -> Array:
-    """Return the last ``count`` columns of joint states, moved one frame on along axis 0.
+    """Return the last ``count`` columns of joint probabilities, moved one frame on along axis 0.
 
-    entering : [shape=(U, M)], what enters the first states
+    entering : [shape=(U, M)], probabilities of entering the first states
     """
     last, into_last = before[:, before.shape[1] - count :], entering[:, before.shape[1] - count :]
     after = np.empty((len(before), count), before.dtype)
@@ -34,9 +36,9 @@ def moved_to_last(before: Array, stay: Array, onward: Array, entering: Array, co
 
 @compiled_to_rounding
 def moved_back(after: Array, stay: Array, onward: Array, left: Array) -> Array:
-    """Return joint states moved one frame back along axis 1.
+    """Return joint backward probabilities, moved one frame back along axis 1.
 
-    left : [shape=(N, U)], what last states hand on
+    left : [shape=(N, U)], those of leaving the last states
     """
     before, units = np.empty_like(after), left.shape[1]
     inner = after.shape[1] - units
@@ -57,11 +59,11 @@ def forward(
     density_0: Array, density_1: Array, pair_0: Index, pair_1: Index, pair: Array, least: float, kept: float,
     after: Array,
 ) -> float:  # fmt: skip
-    """Fill in joint states moved one frame on along both axes, times densities, sum 1; return what the sum was.
+    """Fill in joint probabilities one frame on along both axes, times densities, normalised; return their sum before.
 
-    entering_0, entering_1 : [shapes=(U, M), (N, U)], what enters first states
-    pair_0 ... pair : states of pairs, sorted by the first, and their densities
-    least, kept : products of less are 0, as are shares of the sum
+    entering_0, entering_1 : [shapes=(U, M), (N, U)], probabilities of entering the first states
+    pair_0 ... pair : the two states of each pair, sorted by the first, and the densities of pairs
+    least, kept : smaller products, and smaller shares of the sum, are set to 0
     """
     moved, prior = np.empty(before.shape[1], before.dtype), np.empty(before.shape[1], before.dtype)
     boost, total = 1.0, 0.0
@@ -86,12 +88,12 @@ def backward(
     density_0: Array, density_1: Array, pair_0: Index, pair_1: Index, pair: Array, least: float, kept: float,
     after: Array, posterior_0: Array, posterior_1: Array, posterior_pair: Array,
 ) -> float:  # fmt: skip
-    """Fill in backward probabilities times densities, sum 1, and posteriors times their sum; return what the sum of the
-    former was.
+    """Fill in backward probabilities times densities, normalised, and posteriors, not normalised; return the sum of the
+    former before.
 
     before : forward probabilities
-    moved  : backward probabilities that have moved back along axis 1, and are to move along axis 0
-    left   : [shape=(U, M)], what last states hand on
+    moved  : backward probabilities that were moved back along axis 1; they are moved along axis 0 here
+    left   : [shape=(U, M)], those of leaving the last states
     """
     beta = np.empty(before.shape[1], before.dtype)
     units, boost, total = len(left), 1.0, 0.0
@@ -159,7 +161,7 @@ def _emit(prior: Array, own: float, density: Array, least: float, into: Array) -
 def _emit_pairs(
     prior: Array, i: int, p: int, pair_0: Index, pair_1: Index, pair: Array, boost: float, least: float, into: Array
 ) -> int:
-    """Give row i's pairs, the first of which is at p, their own densities; return where the next row's begin."""
+    """Multiply the pairs of row i, from pair p on, by their own densities; return the first pair of the next row."""
     while p < len(pair_0) and pair_0[p] == i:
         product = np.float64(prior[pair_1[p]]) * (pair[p] * boost)
         into[pair_1[p]] = product if product > least else 0.0
@@ -177,7 +179,7 @@ def _sum(row: Array) -> float:
 
 @compiled_to_rounding
 def _meet(one: Array, other: Array, sums: Array) -> float:
-    """Add products to ``sums`` and return what they sum to."""
+    """Add the products of two rows to ``sums``, and return their sum."""
     total = 0.0
     for j in range(len(one)):
         product = np.float64(one[j]) * other[j]
@@ -188,7 +190,7 @@ def _meet(one: Array, other: Array, sums: Array) -> float:
 
 @compiled_to_rounding
 def _share(joint: Array, total: float, kept: float) -> None:
-    """Make the sum 1."""
+    """Divide joint probabilities by their sum; set shares of less than ``kept`` to 0."""
     flat = joint.reshape(joint.size)
     scale = 1 / total if total > 0 else 0.0
     for j in range(len(flat)):

@@ -22,21 +22,22 @@ LOG_2 = math.log(2)
 def chains(
     log_emission: Array, log_stay: Array, log_move: Array, frames: Index, states: Index
 ) -> tuple[Array, Array, Array]:
-    """Return log posteriors, those of keeping a state, and log likelihoods; ``kernels.forward_backward._chains``."""
+    """Return log posteriors of states and of staying in them, and log likelihoods (as NumPy's form, ``_chains``)."""
     posterior, kept = np.full(log_emission.shape, IMPOSSIBLE), np.full(log_emission.shape, IMPOSSIBLE)
     log_likelihood = np.empty(len(frames))
     for u in range(len(frames)):
         T, S = frames[u], states[u]
-        mine = log_emission[:T, u, :S]
-        alpha, kept_mine = posterior[:T, u, :S], kept[:T, u, :S]
-        _forward(mine, log_stay[u], log_move[u], alpha)
+        emission = log_emission[:T, u, :S]
+        alpha, log_kept = posterior[:T, u, :S], kept[:T, u, :S]
+        _forward(emission, log_stay[u], log_move[u], alpha)
         log_likelihood[u] = alpha[T - 1, S - 1] + log_move[u, S - 1]
-        _backward(mine, log_stay[u], log_move[u], alpha, kept_mine, log_likelihood[u])
+        _backward(emission, log_stay[u], log_move[u], alpha, log_kept, log_likelihood[u])
     return posterior, kept, log_likelihood
 
 
 @compiled
 def _forward(log_emission: Array, log_stay: Array, log_move: Array, alpha: Array) -> None:
+    """Fill in the forward scores [shape=(T, S)]."""
     alpha[0, 0] = log_emission[0, 0]
     for t in range(1, len(alpha)):
         alpha[t, 0] = max(alpha[t - 1, 0] + log_stay[0] + log_emission[t, 0], IMPOSSIBLE)
@@ -49,7 +50,7 @@ def _forward(log_emission: Array, log_stay: Array, log_move: Array, alpha: Array
 def _backward(
     log_emission: Array, log_stay: Array, log_move: Array, alpha: Array, kept: Array, log_likelihood: float
 ) -> None:
-    """Make posteriors of the forward scores."""
+    """Replace the forward scores ``alpha`` by log posteriors, and fill in those of staying in a state."""
     T, S = alpha.shape
     beta = np.full(S, IMPOSSIBLE)
     beta[S - 1] = log_move[S - 1]
@@ -69,10 +70,10 @@ def _backward(
 
 @compiled
 def _log_sum(x: float, y: float) -> float:
-    """Return the logarithm of the sum of two exponentials."""
+    """Return log(exp(x) + exp(y))."""
     if x == y:
         return x + LOG_2
     high, low = max(x, y), min(x, y)
     if high - low > 40 and abs(high) > 1:
-        return high  # what is added is less than a quarter of the last bit
+        return high  # the lower one adds less than a quarter of the last bit
     return high + math.log1p(math.exp(low - high))

@@ -1,12 +1,14 @@
 """Forward–backward through networks, compiled, with scaled probabilities.
 
-They are in double precision; products with blocks, whose terms are made alike first, in the evidence's own. Nothing
-under ``LEAST`` is kept, so no product is denormal, which would be many times slower; and a state without forward
-probability gets no backward one, which else might grow without limit.
+Probabilities are in double precision; products with blocks, whose terms are normalised first, in the precision of the
+log densities. Smaller numbers than ``LEAST`` are set to 0, so no product is denormal, which would be many times slower;
+and a state without forward probability gets no backward one, which otherwise might grow without limit.
 
-In single precision, half the memory, what cannot be held is made ``TINY``, and never less. Forward and backward
-probabilities of every frame would multiply to 1 in sum; where something that matters was lost or made up on the way,
-they do not, and the recording is left to double precision.
+In single precision, which needs half the memory, smaller numbers are set to ``TINY``. The sum over states of forward
+times backward probabilities is 1 in every frame; where a number that matters was lost or replaced, it is not, and the
+recording is left to double precision.
+
+Functions take their arrays as separate arguments, more than eight in places: numba compiles that to the fastest code.
 """
 
 from __future__ import annotations
@@ -22,29 +24,29 @@ Array = NDArray[Any]
 """float64, or float32 where states are in single precision."""
 Index = NDArray[np.intp]
 Unsigned = NDArray[np.uintp]
-"""Signed indices might count from the end, which keeps loops from being vectors."""
+"""Unsigned, as loops over indices that may be negative are not vectorised."""
 CHUNK = 16
-"""Runs are padded to multiples of this, so that loops over them, made of vectors, have no remainder."""
+"""Runs are padded to multiples of this, so that vectorised loops over them have no remainder."""
 LEAST, LEAST_POSTERIOR, LEAST_SHARE = 1e-140, 1e-12, 1e-25
-
+"""Smaller probabilities, posteriors, and shares of a block's sources are set to 0."""
 
 LEAST_ROOT = 1.9e-35
-"""exp(-80): a density not above its eighth power counts as none."""
+"""exp(-80): densities up to its eighth power are set to 0."""
 
 TINY, LEAST_SCALE, OFF = 1e-24, 1e-12, 1e-4
-"""The least of all probabilities; of a frame's scale; and how far from 1 the sum of posteriors may be."""
+"""In single precision: least probability, least scale of a frame, and largest error of a sum of posteriors."""
 FRAMES_SUMMED = 256
-"""Of which single-precision sums are made."""
+"""Frames that are summed in single precision, before they are added in double precision."""
 
 
 @compiled_to_rounding
 def products(roots: Array, columns: NDArray[np.uint32], joint: Array, best: Array) -> None:
-    """Fill in the roots of joint densities relative to the best of each frame, and its root.
+    """Fill in the roots of joint densities relative to the best of each frame, and the root of the best.
 
-    roots   : float32 or float64 [shape=(T, G)], of all chains side by side, each relative to its own best
-    columns : [shape=(C, S)], by place, those of each chain
-    joint   : [shape=(T, S)], as precise as ``roots``
-    best    : [shape=(T,)]; where all are nothing, 0
+    roots   : float32 or float64 [shape=(T, G)], of all chains side by side, each relative to the chain's best
+    columns : [shape=(C, S)], for each chain, the column of the state at each place
+    joint   : [shape=(T, S)], of the precision of ``roots``
+    best    : [shape=(T,)]; 0 where all are 0
     """
     states = columns.shape[1]
     factor, product, tops = np.empty(roots.shape[1], roots.dtype), np.empty(states), np.empty(8)
@@ -74,20 +76,20 @@ def products(roots: Array, columns: NDArray[np.uint32], joint: Array, best: Arra
 @compiled_to_rounding
 def forward_backward(
     emission: Array, edges: Index, initial: Array, final: Array, runs: Unsigned, run_weight: Array,
-    blocks: Unsigned, block_sources: Unsigned, block_weight: Array, turned: Array,
+    blocks: Unsigned, block_sources: Unsigned, block_weight: Array, transposed: Array,
 ) -> tuple[Array, Array, Array, Array, Array]:  # fmt: skip
-    """Return what recordings say about a network; ``emission`` becomes the posteriors.
+    """Return the expected counts of recordings in a network; ``emission`` is overwritten by the posteriors.
 
-    emission     : float32 or float64 [shape=(T, S)], by place, one recording after the other: the eighth roots of
+    emission     : float32 or float64 [shape=(T, S)], by place, all recordings concatenated: the eighth roots of
                    densities relative to the best of each frame
-    edges        : [shape=(U + 1,)], where each begins, and T
-    runs, run_weight : of the layout and its weights (``kernels.arcs``), lengths in chunks, padded with arcs of weight 0
-    blocks ... block_weight : likewise
-    turned       : the weights of blocks, targets as rows
-    Returns how often each run arc is followed, divided by its weight [shape=(N,)]; the forward probabilities of all
-    blocks' sources and, of the next frame, backward ones of their targets, whose products over time count block arcs
-    [shapes=(T, ...)]; the scale of each frame [shape=(T,)] and of each end [shape=(U,)], 0 where there is no path:
-    their product is the likelihood.
+    edges        : [shape=(U + 1,)], the first frame of each recording, and T
+    runs, run_weight : of the layout and its weights (``kernels.arcs``), padded with arcs of weight 0
+    blocks ... block_weight : of the layout and its weights
+    transposed   : the weights of blocks, targets as rows
+    Returns the expected count of each run arc divided by its weight [shape=(N,)]; the forward probabilities of all
+    blocks' sources and the backward ones of their targets in the next frame, whose products summed over time give the
+    counts of block arcs [shapes=(T, ...)]; the scale of each frame [shape=(T,)] and of each end [shape=(U,)], 0 where
+    there is no path: the product of all scales is the likelihood.
     """
     T, S = emission.shape
     targets = 0
@@ -99,8 +101,8 @@ def forward_backward(
     for u in range(len(ends)):
         longest = max(longest, edges[u + 1] - edges[u])
     forward, beta, onward = np.zeros((longest, S + CHUNK)), np.zeros(S + CHUNK), np.zeros(S + CHUNK)
-    room = np.empty(max(block_weight.shape[1], turned.shape[1]), block_weight.dtype)
-    share = np.empty(max(len(block_weight), len(turned)), block_weight.dtype)
+    room = np.empty(max(block_weight.shape[1], transposed.shape[1]), block_weight.dtype)
+    share = np.empty(max(len(block_weight), len(transposed)), block_weight.dtype)
     for u in range(len(ends)):
         frames = slice(edges[u], edges[u + 1])
         density, scale, leave, enter = emission[frames], scales[frames], leaving[frames], entering[frames]
@@ -126,7 +128,7 @@ def forward_backward(
             if t > 0:
                 beta[:] = 0
                 _backward_runs(alpha, t - 1, onward, beta, runs, run_weight, counts)
-                _backward_blocks(onward, beta, blocks, block_sources, turned, enter, t - 1, room, share)
+                _backward_blocks(onward, beta, blocks, block_sources, transposed, enter, t - 1, room, share)
     return counts, leaving, entering, scales, ends
 
 
@@ -154,14 +156,14 @@ def _forward_blocks(
 
 @compiled_to_rounding
 def _density(root: float) -> float:
-    """Return the eighth power, in double precision whatever the root's."""
+    """Return the eighth power of a root, in double precision."""
     square = np.float64(root) * np.float64(root)
     return square * square * (square * square)
 
 
 @compiled_to_rounding
 def _emit(alpha: Array, emission: Array, t: int) -> float:
-    """Multiply by the densities, make the sum 1; return what it was."""
+    """Multiply the forward probabilities of a frame by its densities, and normalise them; return their sum before."""
     total = 0.0
     for i in range(emission.shape[1]):
         density = _density(emission[t, i])
@@ -175,11 +177,11 @@ def _emit(alpha: Array, emission: Array, t: int) -> float:
 
 @compiled_to_rounding
 def _close(emission: Array, alpha: Array, t: int, beta: Array, onward: Array, scale: float) -> None:
-    """Fill in what is handed back from this frame; make of its densities its posteriors."""
+    """Replace the densities of a frame by its posteriors; fill in backward probabilities times densities."""
     for i in range(emission.shape[1]):
         back = beta[i] if alpha[t, i] > 0 and beta[i] > LEAST else 0.0
-        handed = back * _density(emission[t, i]) * scale
-        onward[i] = handed if handed > LEAST else 0.0
+        product = back * _density(emission[t, i]) * scale
+        onward[i] = product if product > LEAST else 0.0
         posterior = alpha[t, i] * back
         emission[t, i] = posterior if posterior > LEAST_POSTERIOR else 0.0
 
@@ -198,7 +200,7 @@ def _backward_runs(
 
 @compiled_to_rounding
 def _backward_blocks(
-    onward: Array, beta: Array, blocks: Unsigned, sources: Unsigned, turned: Array, entering: Array, t: int,
+    onward: Array, beta: Array, blocks: Unsigned, sources: Unsigned, transposed: Array, entering: Array, t: int,
     room: Array, share: Array,
 ) -> None:  # fmt: skip
     start = np.uintp(0)
@@ -207,7 +209,7 @@ def _backward_blocks(
         for i in range(targets):
             entering[t, start + i] = onward[target + i]
         total = _shares(entering, t, start, targets, share)
-        _times(share, targets, turned, start, room)
+        _times(share, targets, transposed, start, room)
         for s in range(count):
             beta[sources[first + s]] += total * room[s]
         start += targets
@@ -215,7 +217,7 @@ def _backward_blocks(
 
 @compiled_to_rounding
 def _shares(values: Array, t: int, first: Any, count: Any, share: Array) -> float:
-    """Fill in what some values of a row are relative to their sum; return that."""
+    """Fill in values of a row divided by their sum; return the sum."""
     total = 0.0
     for i in range(count):
         total += values[t, first + i]
@@ -228,7 +230,7 @@ def _shares(values: Array, t: int, first: Any, count: Any, share: Array) -> floa
 
 @compiled_to_rounding
 def _times(row: Array, count: Any, matrix: Array, first: Any, product: Array) -> None:
-    """Multiply a row by as many rows of a matrix, four of them at a time."""
+    """Fill in the product of a row with as many rows of a matrix, four of them at a time."""
     wide = matrix.shape[1]
     product[:] = 0
     for r in range(0, count // 4 * 4, 4):
@@ -244,11 +246,11 @@ def _times(row: Array, count: Any, matrix: Array, first: Any, product: Array) ->
 @compiled_to_rounding
 def forward_backward_single(
     emission: Array, edges: Index, initial: Array, final: Array, runs: Unsigned, run_weight: Array,
-    blocks: Unsigned, block_sources: Unsigned, block_weight: Array, turned: Array,
+    blocks: Unsigned, block_sources: Unsigned, block_weight: Array, transposed: Array,
 ) -> tuple[Array, Array, Array, Array, Array]:  # fmt: skip
-    """Return what ``forward_backward`` does, in single precision, but an end's scale is 0 where the recording is left.
+    """Return the result of ``forward_backward``, in single precision.
 
-    What is in ``emission`` there then has no meaning.
+    For a recording that needs double precision the scale of the end is 0, and ``emission`` has no meaning.
     """
     T, S = emission.shape
     targets, longest = 0, 0
@@ -260,27 +262,27 @@ def forward_backward_single(
         longest = max(longest, edges[u + 1] - edges[u])
     forward, few = np.empty((longest, S + CHUNK), np.float32), np.empty(len(counts), np.float32)
     beta, onward = np.zeros(S + CHUNK, np.float32), np.zeros(S + CHUNK, np.float32)
-    mine = np.zeros(len(counts))
-    room = np.empty(max(block_weight.shape[1], turned.shape[1]), np.float32)
-    share = np.empty(max(len(block_weight), len(turned)), np.float32)
+    of_recording = np.zeros(len(counts))
+    room = np.empty(max(block_weight.shape[1], transposed.shape[1]), np.float32)
+    share = np.empty(max(len(block_weight), len(transposed)), np.float32)
     for u in range(len(ends)):
         frames = slice(edges[u], edges[u + 1])
         density, scale, leave, enter = emission[frames], scales[frames], leaving[frames], entering[frames]
         alpha = forward[: len(density)]
-        sure = _forward_single(
+        valid = _forward_single(
             alpha, density, scale, initial, runs, run_weight, blocks, block_sources, block_weight, leave, room, share
         )
-        met = (alpha[-1, :S] * final).sum() if sure else 0.0
-        if met > LEAST_SCALE * scale[-1]:
-            beta[:S] = final / met
-            mine[:] = 0
-            sure = _backward_single(
-                alpha, density, scale, beta, onward, runs, run_weight, mine, few,
-                blocks, block_sources, turned, enter, room, share,
+        end = (alpha[-1, :S] * final).sum() if valid else 0.0
+        if end > LEAST_SCALE * scale[-1]:
+            beta[:S] = final / end
+            of_recording[:] = 0
+            valid = _backward_single(
+                alpha, density, scale, beta, onward, runs, run_weight, of_recording, few,
+                blocks, block_sources, transposed, enter, room, share,
             )  # fmt: skip
-            ends[u] = met / scale[-1] if sure else 0.0
+            ends[u] = end / scale[-1] if valid else 0.0
         if ends[u] > 0:
-            counts += mine
+            counts += of_recording
         else:
             leave[:] = 0
     return counts, leaving, entering, scales, ends
@@ -291,7 +293,7 @@ def _forward_single(
     alpha: Array, density: Array, scale: Array, initial: Array, runs: Unsigned, run_weight: Array,
     blocks: Unsigned, sources: Unsigned, block_weight: Array, leave: Array, room: Array, share: Array,
 ) -> bool:  # fmt: skip
-    """Fill in forward probabilities, each frame's relative to the one before, and what they sum to; whether sure."""
+    """Fill in forward probabilities, scaled by the sum of the frame before, and their sums; return whether valid."""
     for t in range(len(alpha)):
         alpha[t] = TINY
         if t == 0:
@@ -308,10 +310,10 @@ def _forward_single(
 @compiled_to_rounding
 def _backward_single(
     alpha: Array, density: Array, scale: Array, beta: Array, onward: Array, runs: Unsigned, run_weight: Array,
-    counts: Array, few: Array, blocks: Unsigned, sources: Unsigned, turned: Array, enter: Array,
+    counts: Array, few: Array, blocks: Unsigned, sources: Unsigned, transposed: Array, enter: Array,
     room: Array, share: Array,
 ) -> bool:  # fmt: skip
-    """Make posteriors of densities, and add to counts; return whether they are sure."""
+    """Replace densities by posteriors, and add to the counts; return whether all are valid."""
     few[:] = TINY
     for t in range(len(alpha) - 1, -1, -1):
         total = _close_single(density, alpha, t, beta, onward, 1 / scale[t - 1] if t > 0 else 1.0)
@@ -320,7 +322,7 @@ def _backward_single(
         if t > 0:
             beta[:] = TINY
             _backward_runs(alpha, t - 1, onward, beta, runs, run_weight, few)
-            _backward_blocks(onward, beta, blocks, sources, turned, enter, t - 1, room, share)
+            _backward_blocks(onward, beta, blocks, sources, transposed, enter, t - 1, room, share)
         if t % FRAMES_SUMMED == 0:
             counts += few
             few[:] = TINY
@@ -329,7 +331,7 @@ def _backward_single(
 
 @compiled_to_rounding
 def _emit_single(alpha: Array, emission: Array, t: int, scale: float) -> float:
-    """Multiply by the densities and a scale; return the sum."""
+    """Multiply the forward probabilities of a frame by its densities and a scale; return their sum."""
     total = 0.0
     for i in range(emission.shape[1]):
         product = np.float64(alpha[t, i]) * (_density(emission[t, i]) * scale)
@@ -341,12 +343,12 @@ def _emit_single(alpha: Array, emission: Array, t: int, scale: float) -> float:
 
 @compiled_to_rounding
 def _close_single(emission: Array, alpha: Array, t: int, beta: Array, onward: Array, scale: float) -> float:
-    """Fill in what is handed back from this frame; make of its densities its posteriors; return their sum."""
+    """Replace the densities of a frame by its posteriors, and fill in ``onward``; return the sum of the posteriors."""
     total = 0.0
     for i in range(emission.shape[1]):
         back = np.float64(beta[i])
-        handed = back * (_density(emission[t, i]) * scale)
-        onward[i] = handed if handed > TINY else TINY
+        product = back * (_density(emission[t, i]) * scale)
+        onward[i] = product if product > TINY else TINY
         posterior = alpha[t, i] * back
         total += posterior
         emission[t, i] = posterior if posterior > LEAST_POSTERIOR else 0.0

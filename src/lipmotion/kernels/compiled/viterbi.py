@@ -1,4 +1,6 @@
-"""The scores of the best paths, compiled: the same bits as in ``kernels.viterbi``."""
+"""The scores of best paths, compiled: the results are those of ``kernels.viterbi`` to the bit."""
+
+# Functions take their arrays as separate arguments, more than eight in places: numba compiles that to the fastest code.
 
 from __future__ import annotations
 
@@ -9,7 +11,7 @@ from lipmotion.kernels.compiled.compiler import compiled
 
 Index = NDArray[np.intp]
 Row = NDArray[np.float32]
-NOTHING = np.float32(-np.inf)
+IMPOSSIBLE = np.float32(-np.inf)
 
 
 @compiled
@@ -17,16 +19,17 @@ def scores(
     delta: Row, log_emission: Row, columns: NDArray[np.uintp],
     runs: Index, run_log: Row, blocks: Index, block_sources: Index, block_log: Row, least: np.float32,
 ) -> float:  # fmt: skip
-    """Fill in the scores by place [shape=(T, S)], whose first row is given; return the sum of what was taken off.
+    """Fill in the scores by place [shape=(T, S)] from the first row on; return the sum of the frames' best scores.
 
-    log_emission, columns : [shape=(T, G)], and which of them is that of each place [shape=(S,)]
-    runs ... block_log    : of the layout and its weights (``kernels.arcs``)
-    least                 : what is lower under the frame's best is dropped
+    delta        : scores relative to the best of each frame
+    log_emission : [shape=(T, G)];  columns : [shape=(S,)], the column of the state at each place
+    runs ... block_log : of the layout and its weights (``kernels.arcs``)
+    least        : relative scores under this become -inf
     """
     shift = 0.0
     enter = np.empty(block_log.shape[1], np.float32)
     for t in range(1, len(delta)):
-        delta[t] = NOTHING
+        delta[t] = IMPOSSIBLE
         _follow_runs(delta[t - 1], delta[t], runs, run_log)
         for b in range(len(blocks)):
             target, targets, first, sources = blocks[b]
@@ -34,8 +37,8 @@ def scores(
             _follow_block(delta[t - 1], into, block_sources[first:], matrix, enter)
         _emit(delta[t], log_emission[t], columns)
         best = _greatest(delta[t])
-        if best > NOTHING:
-            _lower(delta[t], best, least)
+        if best > IMPOSSIBLE:
+            _relative(delta[t], best, least)
             shift += float(best)
     return shift
 
@@ -52,10 +55,10 @@ def _follow_runs(before: Row, after: Row, runs: Index, run_log: Row) -> None:
 
 @compiled
 def _follow_block(before: Row, after: Row, sources: Index, log_weight: Row, enter: Row) -> None:
-    enter[:] = NOTHING
+    enter[:] = IMPOSSIBLE
     for s in range(len(log_weight)):
         score = before[sources[s]]
-        if score > NOTHING:
+        if score > IMPOSSIBLE:
             for i in range(len(enter)):
                 arriving = score + log_weight[s, i]
                 enter[i] = arriving if arriving > enter[i] else enter[i]
@@ -71,8 +74,8 @@ def _emit(row: Row, log_emission: Row, columns: NDArray[np.uintp]) -> None:
 
 @compiled
 def _greatest(row: Row) -> np.float32:
-    """Return the greatest value: eight at a time, for one running maximum is no work for vectors."""
-    a = b = c = d = e = f = g = h = NOTHING
+    """Return the greatest value, by eight running maxima: a single one is not vectorised."""
+    a = b = c = d = e = f = g = h = IMPOSSIBLE
     whole = len(row) // 8 * 8
     for i in range(0, whole, 8):
         a, b = max(row[i], a), max(row[i + 1], b)
@@ -85,18 +88,18 @@ def _greatest(row: Row) -> np.float32:
 
 
 @compiled
-def _lower(row: Row, best: np.float32, least: np.float32) -> None:
+def _relative(row: Row, best: np.float32, least: np.float32) -> None:
     for i in range(len(row)):
         score = row[i] - best
-        row[i] = score if score >= least else NOTHING
+        row[i] = score if score >= least else IMPOSSIBLE
 
 
 @compiled
 def trace(path: Index, delta: Row, state: int, place: Index, arc_from: Index, arc_log: Row, arc_start: Index) -> None:
-    """Fill in the states [shape=(T - 1,)] before ``state`` in the last of T frames."""
+    """Fill in the path [shape=(T - 1,)] before ``state`` in the last of T frames."""
     for t in range(len(path) - 1, -1, -1):
         stop = arc_start[state + 1] if state + 1 < len(arc_start) else len(arc_from)
-        best, source = NOTHING, arc_from[arc_start[state]]
+        best, source = IMPOSSIBLE, arc_from[arc_start[state]]
         for arc in range(arc_start[state], stop):
             score = delta[t, place[arc_from[arc]]] + arc_log[arc]
             if score > best:

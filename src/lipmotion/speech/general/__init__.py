@@ -1,1 +1,1 @@
-"""The phone models of many voices that come with pocketsphinx, behind our own decoder."""
+"""The general models: speaker-independent English phone models that come with pocketsphinx, for our own decoder."""

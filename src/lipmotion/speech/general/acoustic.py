@@ -1,4 +1,4 @@
-"""Acoustic models of 40 English phones and two kinds of noise, trained on many voices."""
+"""Acoustic models of 40 English phones and two kinds of noise, trained on many speakers."""
 
 from __future__ import annotations
 
@@ -16,24 +16,25 @@ PHONES = (
     "+NSN+ +SPN+ AA AE AH AO AW AY B CH D DH EH ER EY F G HH IH IY JH K L M N NG OW OY P R S SH SIL T TH UH UW V W Y Z"
     " ZH"
 ).split()
-"""In the order of the files; the first two are noise and noise of the mouth."""
+"""Names in the order of the files; the first two are noise and noise of the mouth."""
 STATES = 3
 STREAMS = (slice(0, 13), slice(13, 26), slice(26, 39))
-"""Cepstra, Δ and ΔΔ have codebooks of their own."""
+"""Cepstra, Δ and ΔΔ have separate codebooks."""
 GAUSSIANS = 128
 WEIGHT_STEP = 1024 * float(np.log(1.0001))
-"""Mixture weights are kept as bytes: negative logarithms in such steps."""
+"""Step of the negative logarithms by which the mixture weights are stored, as bytes."""
 BLOCK = 128
-"""Frames computed at a time: their 5,376 Gaussians fit into the cache."""
+"""Frames computed at a time: the values of their 5,376 Gaussians fit into the cache."""
 LEAST_VARIANCE = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
 class GeneralModel:
-    """Phone-tied mixtures: every phone has 128 Gaussians a stream, every state weights of its own.
+    """Phone-tied mixtures: every phone has 128 Gaussians a stream, every state its own mixture weights.
 
-    forms, constants : what x, x² are multiplied by, and what is added, per stream [shapes=(26, P·128), (P·128,)]
-    weights          : [shape=(P, 128, 3)] per stream
+    forms     : coefficients of x and x² in every Gaussian's log density, per stream [each shape=(26, P·128)]
+    constants : of these log densities, per stream [each shape=(P·128,)]
+    weights   : mixture weights of the states, per stream [each shape=(P, 128, 3)]
     """
 
     forms: tuple[NDArray[np.float32], ...]
@@ -41,7 +42,7 @@ class GeneralModel:
     weights: tuple[NDArray[np.float32], ...]
 
     def log_density(self, features: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return the log density of every frame under every state, its best one taken off [shape=(T, P·3)].
+        """Return the log density of every frame under every state, less that of the best state [shape=(T, P·3)].
 
         features : from ``general_features`` [shape=(T, 39)]
         """
@@ -62,6 +63,7 @@ class GeneralModel:
         return Mixtures(np.log(np.maximum(weights, np.float32(1e-30))), means, variances)
 
     def _stream(self, number: int, x: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return the log densities of frames in one stream [shape=(n, P·3)]."""
         logs = np.concatenate([x, x * x], axis=1) @ self.forms[number] + self.constants[number]
         logs = logs.reshape(len(x), len(PHONES), GAUSSIANS)
         best = logs.max(axis=2, keepdims=True)
@@ -70,9 +72,11 @@ class GeneralModel:
 
 
 def density_column(phone: str, state: int, states: int) -> int:
-    """Return where the density of a phone's state is found; phones with other counts of states share theirs.
+    """Return the column of ``log_density`` for a state of a phone.
 
-    phone : of our inventory, or one of the two noises
+    phone  : of our inventory, or one of the two noises
+    state  : from 0
+    states : how many states our model of the phone has; where it is not 3, the general state at the same share is used
     """
     return PHONES.index(GENERAL_PHONE_NAMES.get(phone, phone.upper())) * STATES + (2 * state + 1) * STATES // (
         2 * states
@@ -84,7 +88,7 @@ GENERAL_PHONE_NAMES = {"ax": "AH", "axr": "ER", "ix": "IH", "el": "L", "em": "M"
 
 @cache
 def general_model() -> GeneralModel:
-    """Return the models, read once. Raises MissingDependencyError: they are not installed, or are not these."""
+    """Return the models; they are read once. Raises MissingDependencyError: not installed, or of another version."""
     folder = english_data() / "en-us"
     try:
         means, variances = (_gaussians((folder / name).read_bytes()) for name in ("means", "variances"))

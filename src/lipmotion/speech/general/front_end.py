@@ -1,4 +1,4 @@
-"""The features that pocketsphinx's English models were trained on."""
+"""Acoustic features as pocketsphinx's English models were trained on."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ CEPSTRA = 13
 
 
 def general_features(audio: Audio) -> NDArray[np.float32]:
-    """Return c0–c12 with their mean taken off, Δ over ±2 frames, and Δ of Δ [shape=(T, 39)], frames as in ``mfcc``.
+    """Return c0–c12 less their mean, Δ over ±2 frames, and Δ of Δ [shape=(T, 39)], frames as in ``mfcc``.
 
     Raises InputError: as ``mfcc``.
     Source: the model's own feat.params and CMU Sphinx's ``1s_c_d_dd``. Deviations: windows of 25 instead of
@@ -42,7 +42,7 @@ def general_features(audio: Audio) -> NDArray[np.float32]:
 
 @cache
 def _filters() -> NDArray[np.float32]:
-    """Triangles of equal area, equally spaced in mel, their corners on the spectrum's bins [shape=(257, 25)]."""
+    """Return triangular filters of equal area, equally spaced in mel, with corners on the bins [shape=(257, 25)]."""
     bin_hz = SPEECH_RATE_HZ / FFT_SIZE
     mel = np.linspace(2595 * np.log10(1 + LOWEST_HZ / 700), 2595 * np.log10(1 + HIGHEST_HZ / 700), FILTERS + 2)
     edges = (np.round(700 * (10 ** (mel / 2595) - 1) / bin_hz) * bin_hz).astype(np.float64)

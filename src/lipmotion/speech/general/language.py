@@ -1,4 +1,4 @@
-"""Which phone follows which in English."""
+"""A bigram of English phones."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ PROBABILITY_SHARE = {
     "ah": 0.3, "ax": 0.7, "er": 0.4, "axr": 0.6, "ih": 0.55, "ix": 0.45,
     "l": 0.93, "el": 0.07, "m": 0.99, "em": 0.01, "n": 0.96, "en": 0.04, "sp": 1e-4, "+nsn+": 0.05, "+spn+": 0.05,
 }  # fmt: skip
-"""How the probability of a phone of theirs is shared among those of ours; all others have one each."""
+"""The share of each of our phones in the probability of the general phone that it is a form of; all others: 1."""
 
 
 def english_bigram(units: Sequence[str]) -> NDArray[np.float64]:
-    """Return P(next | unit) among some phones of ours and the noises [shape=(V, V)]; the noises are silence.
+    """Return P(next | unit) among some of our phones and the noises [shape=(V, V)]; the noises count as silence.
 
     Raises MissingDependencyError: pocketsphinx is not installed.
     """

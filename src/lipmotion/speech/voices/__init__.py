@@ -1,1 +1,1 @@
-"""Sentences in the voices of speech synthesisers that are installed, with the time of every phone."""
+"""Speech of installed synthesisers, with the time of every phone."""

@@ -1,7 +1,7 @@
 """espeak-ng: American English by formants, in the variants that sound like people; one program run for all sentences.
 
-Its library alone knows when each phone begins. It is asked in a program of its own (``espeak_events``), so that its
-state, its crashes and its licence (GPL) stay there.
+Only its library tells when each phone begins. The library is called in a process of its own (``espeak_events``), so
+that its state, its crashes and its licence (GPL) stay there.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from lipmotion.speech.voices.synthesiser import SynthesisedSentence, Synthesiser
 PACKAGE = "espeak-ng"
 LANGUAGE = "en-us"
 VARIANTS = ("f1", "f2", "f3", "f4", "m1", "m2", "m3", "m4", "m7", "m8")
-"""Those with the vocal tract, pitch and breath of a person; not the robots, whispers, echoes and growls."""
+"""The variants with the vocal tract, pitch and breath of a person; not the robots, whispers, echoes and growls."""
 PROGRAM = [sys.executable, "-I", str(Path(__file__).with_name("espeak_events.py"))]
 
 
@@ -34,7 +34,7 @@ def _voices() -> tuple[SyntheticVoice, ...]:
     return tuple(SyntheticVoice(f"{LANGUAGE}+{name}", "espeak-ng", f"espeak-{name}") for name in names)
 
 
-def _say(voice: str, texts: Sequence[str], folder: Path) -> Iterator[SynthesisedSentence]:
+def _synthesise(voice: str, texts: Sequence[str], folder: Path) -> Iterator[SynthesisedSentence]:
     task = json.dumps({"voice": voice, "texts": list(texts), "folder": str(folder)})
     sentences = _answer(program_output(PROGRAM, PACKAGE, len(texts), task))
     for number, sentence in enumerate(sentences):
@@ -45,10 +45,11 @@ def _say(voice: str, texts: Sequence[str], folder: Path) -> Iterator[Synthesised
 
 
 def _answer(printed: str) -> Any:
+    """Return the parsed output of ``espeak_events``. Raises InputError: it is no JSON."""
     try:
         return json.loads(printed)
     except ValueError as error:
         raise InputError(f"espeak-ng's library answers {printed[:40]!r}; install it again: {PACKAGE}") from error
 
 
-ESPEAK_NG = Synthesiser("espeak-ng", PACKAGE, _voices, _say, ESPEAK_PHONES)
+ESPEAK_NG = Synthesiser("espeak-ng", PACKAGE, _voices, _synthesise, ESPEAK_PHONES)

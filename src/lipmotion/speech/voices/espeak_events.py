@@ -1,7 +1,7 @@
-"""A program of its own: texts to wav files and the starts of their phones, by the library of espeak-ng.
+"""A stand-alone program: texts to wav files and the start times of their phones, by the library of espeak-ng.
 
-It reads ``{"voice", "texts", "folder"}`` and writes a list of ``[label, start_s]`` for every text, as JSON, and the
-sound of text n to ``folder/n.wav``. It imports nothing of this package: it runs without its start-up time.
+It reads ``{"voice", "texts", "folder"}`` as JSON, and writes a list of ``[label, start_s]`` for every text as JSON and
+the sound of text n to ``folder/n.wav``. It imports nothing of this package, so that it starts fast.
 """
 
 from __future__ import annotations
@@ -46,16 +46,17 @@ def _library() -> Any:
 
 
 def _speak(library: Any, rate_hz: int, text: str, path: Path) -> list[tuple[str, float]]:
+    """Write the sound of a text, and return its phones with their start times, s."""
     sound, starts = bytearray(), []
 
     def collect(samples: int | None, count: int, events: Any) -> int:
         if samples and count > 0:
             sound.extend(ctypes.string_at(samples, 2 * count))
-        place = 0
-        while events[place].type != END:
-            if events[place].type == PHONEME and events[place].label:
-                starts.append((events[place].label.decode(), events[place].sample / rate_hz))
-            place += 1
+        index = 0
+        while events[index].type != END:
+            if events[index].type == PHONEME and events[index].label:
+                starts.append((events[index].label.decode(), events[index].sample / rate_hz))
+            index += 1
         return 0
 
     callback = _Callback(collect)
@@ -73,7 +74,7 @@ def _speak(library: Any, rate_hz: int, text: str, path: Path) -> list[tuple[str,
 
 
 def main() -> None:
-    """Speak what is asked for on the standard input."""
+    """Synthesise the texts of the task on the standard input."""
     task = json.load(sys.stdin)
     library = _library()
     rate_hz = library.espeak_Initialize(SYNCHRONOUS, 0, None, PHONEME_EVENTS)
@@ -82,8 +83,8 @@ def main() -> None:
     if library.espeak_SetVoiceByName(task["voice"].encode()):
         sys.exit(f"no voice {task['voice']!r}")
     folder = Path(task["folder"])
-    said = [_speak(library, rate_hz, text, folder / f"{number}.wav") for number, text in enumerate(task["texts"])]
-    json.dump(said, sys.stdout)
+    starts = [_speak(library, rate_hz, text, folder / f"{number}.wav") for number, text in enumerate(task["texts"])]
+    json.dump(starts, sys.stdout)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
-"""When a phone of espeak-ng begins, other than its library says.
+"""Corrections of the start times that espeak-ng's library reports.
 
-Two things that it says are not so. Stops are reported at their burst: the silence of the closure, 40 to 50 ms of it,
-comes before. An l at the end of a syllable is spoken with its vowel, and reported in its last 0 to 45 ms.
+It reports two kinds of phones too late. A stop is reported at its burst, after the 40 to 50 ms of silence of its
+closure. An l at the end of a syllable is spoken with its vowel, and reported in its last 0 to 45 ms.
 """
 
 from __future__ import annotations
@@ -18,38 +18,41 @@ from lipmotion.units import SILENCE, phone_classes
 CLOSING = phone_classes()["stop"] | phone_classes()["affricate"]
 VOWELS = phone_classes()["vowel"]
 CLOSED = 0.005
-"""Of the largest sample: nothing louder is heard in a closure."""
+"""Share of the largest sample that no sample of a closure exceeds."""
 LONGEST_CLOSURE_S = 0.06
 LATE_L_S, SHARE_OF_L = 0.045, 0.45
-"""An l that begins so shortly before it ends is late; this share of vowel and l together is its own, as the project's
-aligner hears it."""
+"""An l that is reported so shortly before its end is late; it then gets this share of the vowel and l together, as in
+the project's own alignments."""
 
 Starts = Sequence[tuple[str, float]]
 
 
 def corrected_phone_times(starts: Starts, audio: Audio) -> Timeline[str]:
-    """Return phones in time: each from its start on, put right, until the next or the end of the sound."""
+    """Return phones in time: each from its corrected start to that of the next, or to the end of the sound."""
     labels = [label for label, _ in starts]
     edges_s = [*(start_s for _, start_s in starts), audio.duration_s]
     closed = np.abs(audio.samples) < CLOSED * np.abs(audio.samples).max(initial=0)
-    for place in range(1, len(labels)):
-        before, here = _sound(labels[place - 1]), _sound(labels[place])
+    for index in range(1, len(labels)):
+        before, here = _phone(labels[index - 1]), _phone(labels[index])
         if here in CLOSING and before != SILENCE:
-            edges_s[place] = max(_closure_s(closed, edges_s[place], audio.rate_hz), edges_s[place - 1])
-        elif here == "l" and before in VOWELS and edges_s[place + 1] - edges_s[place] < LATE_L_S:
-            length_s = edges_s[place + 1] - edges_s[place - 1]
-            edges_s[place] = min(edges_s[place], edges_s[place + 1] - SHARE_OF_L * length_s)
+            edges_s[index] = max(_closure_s(closed, edges_s[index], audio.rate_hz), edges_s[index - 1])
+        elif here == "l" and before in VOWELS and edges_s[index + 1] - edges_s[index] < LATE_L_S:
+            length_s = edges_s[index + 1] - edges_s[index - 1]
+            edges_s[index] = min(edges_s[index], edges_s[index + 1] - SHARE_OF_L * length_s)
     spans = zip(edges_s, edges_s[1:], labels, strict=False)
     return Timeline(tuple(Span(start_s, max(start_s, end_s), label) for start_s, end_s, label in spans))
 
 
-def _sound(label: str) -> str:
-    """Return the last phone of a label; nothing for parts of others, and for what is not known."""
+def _phone(label: str) -> str:
+    """Return the last phone of a label; empty for a label that is part of another phone or unknown."""
     return (ESPEAK_PHONES.get(label) or ("",))[-1]
 
 
 def _closure_s(closed: NDArray[np.bool_], burst_s: float, rate_hz: int) -> float:
-    """Return when the silence before a burst began."""
+    """Return the start of the silence before a burst, s.
+
+    closed : whether each sample is silent
+    """
     burst = round(burst_s * rate_hz)
     first = max(burst - round(LONGEST_CLOSURE_S * rate_hz), 0)
     loud = np.flatnonzero(~closed[first:burst])

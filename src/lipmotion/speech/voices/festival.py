@@ -1,4 +1,4 @@
-"""Festival: any English voice that is installed, one program run for all sentences."""
+"""Festival: all installed American English voices; one run of the program for all sentences."""
 
 from __future__ import annotations
 
@@ -38,11 +38,11 @@ def _voices() -> tuple[SyntheticVoice, ...]:
 
 
 def _speaker(name: str) -> str:
-    """Return ``slt`` for ``cmu_us_slt_arctic_hts``, ``kal`` for ``kal_diphone``."""
+    """Return the speaker of a voice: ``slt`` for ``cmu_us_slt_arctic_hts``, ``kal`` for ``kal_diphone``."""
     return re.sub(r"^cmu_us_|_.*", "", re.sub(r"^cmu_us_", "", name))
 
 
-def _say(voice: str, texts: Sequence[str], folder: Path) -> Iterator[SynthesisedSentence]:
+def _synthesise(voice: str, texts: Sequence[str], folder: Path) -> Iterator[SynthesisedSentence]:
     paths = [folder / f"{number}.wav" for number in range(len(texts))]
     script = folder / "say.scm"
     calls = [f"(say {_quoted(text)} {_quoted(str(path))})" for text, path in zip(texts, paths, strict=True)]
@@ -72,4 +72,4 @@ def _quoted(text: str) -> str:
     return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
-FESTIVAL = Synthesiser("festival", PACKAGE, _voices, _say, ARPABET_PHONES)
+FESTIVAL = Synthesiser("festival", PACKAGE, _voices, _synthesise, ARPABET_PHONES)

@@ -1,4 +1,4 @@
-"""Flite: four voices of 16 kHz, one program run a sentence."""
+"""Flite: four voices at 16 kHz; one run of the program for each sentence."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from lipmotion.types import Span, Timeline
 
 PACKAGE = "flite"
 UNUSED = frozenset({"kal", "awb_time"})
-"""kal is kal16 at 8 kHz; awb_time knows the words of the time of day alone."""
+"""kal is kal16 at 8 kHz; awb_time can only say the time of day."""
 SPEAKERS = {"kal16": "kal"}
 
 
@@ -25,7 +25,7 @@ def _voices() -> tuple[SyntheticVoice, ...]:
     return tuple(SyntheticVoice(name, "flite", SPEAKERS.get(name, name)) for name in names if name not in UNUSED)
 
 
-def _say(voice: str, texts: Sequence[str], folder: Path) -> Iterator[SynthesisedSentence]:
+def _synthesise(voice: str, texts: Sequence[str], folder: Path) -> Iterator[SynthesisedSentence]:
     path = folder / "flite.wav"
     for text in texts:
         printed = program_output(["flite", "-voice", voice, "-psdur", "-o", str(path), "-t", text], PACKAGE)
@@ -52,4 +52,4 @@ def parse_phone_ends(printed: str) -> Timeline[str]:
     return Timeline(tuple(spans))
 
 
-FLITE = Synthesiser("flite", PACKAGE, _voices, _say, ARPABET_PHONES)
+FLITE = Synthesiser("flite", PACKAGE, _voices, _synthesise, ARPABET_PHONES)

@@ -1,4 +1,4 @@
-"""The voices that are installed here, and sentences in them."""
+"""The installed synthetic voices, and sentences spoken by them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from lipmotion.speech.voices.synthesiser import Synthesiser, SyntheticVoice
 from lipmotion.types import Audio, Timeline, Unit
 from lipmotion.units import Lexicon, words_of
 
-SYNTHESISERS: dict[str, Synthesiser] = {each.name: each for each in (FLITE, FESTIVAL, ESPEAK_NG)}
+SYNTHESISERS: dict[str, Synthesiser] = {synthesiser.name: synthesiser for synthesiser in (FLITE, FESTIVAL, ESPEAK_NG)}
 
 
 def installed_voices() -> tuple[SyntheticVoice, ...]:
@@ -25,19 +25,19 @@ def installed_voices() -> tuple[SyntheticVoice, ...]:
 
 
 def speak_sentence(text: str, voice: SyntheticVoice, lexicon: Lexicon | None = None) -> tuple[Audio, Timeline[Unit]]:
-    """Return a sentence in a voice: the sound at 16 kHz, and the phones that are in it, in time, from 0 s to its end.
+    """Return a sentence in a voice: the sound at 16 kHz, and its phones in time, from 0 s to its end.
 
-    lexicon : whose words tell which vowels are unstressed; the built-in one by default
-    Raises as ``speak_sentences``.
+    lexicon : its pronunciations tell which vowels are unstressed; the built-in one by default
+    Raises the errors of ``speak_sentences``.
     """
-    with closing(speak_sentences([text], voice, lexicon)) as said:
-        return next(said)
+    with closing(speak_sentences([text], voice, lexicon)) as sentences:
+        return next(sentences)
 
 
 def speak_sentences(
     texts: Sequence[str], voice: SyntheticVoice, lexicon: Lexicon | None = None
 ) -> Generator[tuple[Audio, Timeline[Unit]], None, None]:
-    """Give several sentences in a voice, as ``speak_sentence``; the program is started once for all of them where it can be.
+    """Yield several sentences in a voice, as of ``speak_sentence``; where possible, one run of the program makes all.
 
     Raises MissingDependencyError: the synthesiser is not installed (the message names the package).
     Raises InputError: no such synthesiser or voice, a text without a word, or one that the synthesiser cannot say.
@@ -47,10 +47,10 @@ def speak_sentences(
     words = [words_of(text) for text in texts]
     with tempfile.TemporaryDirectory(prefix="lipmotion-voices-") as folder:
         plain = [" ".join(text.split()) for text in texts]
-        said = synthesiser.say(voice.name, plain, Path(folder)) if plain else iter(())
-        for one, said_words in zip(said, words, strict=True):
-            audio = one.audio
-            yield audio, inventory_timeline(one.phones, synthesiser.labels, said_words, lexicon, audio.duration_s)
+        sentences = synthesiser.synthesise(voice.name, plain, Path(folder)) if plain else iter(())
+        for sentence, its_words in zip(sentences, words, strict=True):
+            audio, phone_map = sentence.audio, synthesiser.phone_map
+            yield audio, inventory_timeline(sentence.phones, phone_map, its_words, lexicon, audio.duration_s)
 
 
 def _synthesiser(voice: SyntheticVoice) -> Synthesiser:

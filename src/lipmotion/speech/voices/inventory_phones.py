@@ -1,4 +1,4 @@
-"""A synthesiser's phones to those of the inventory, each with its word, pauses as the project's aligner names them."""
+"""A synthesiser's phones in time to those of the inventory, with words, and pauses as in forced alignment."""
 
 from __future__ import annotations
 
@@ -13,23 +13,24 @@ from lipmotion.units import PAUSE, SILENCE, VISEME_OF, Lexicon, is_silent, phone
 from lipmotion.units.lexicon import REDUCED_VOWELS
 
 GAP, ALIKE, OTHER, UNLIKE = 0.7, 0.3, 0.8, 1.5
-"""What it costs to match a phone with none, with a form of itself, with another of its kind (vowel, consonant), or with
+"""Costs of matching a phone with none, with a form of itself, with another of its kind (vowel or consonant), and with
 one of the other kind."""
 VOWELS = phone_classes()["vowel"]
 Phones = Sequence[tuple[str, float, float]]
 
 
 def inventory_timeline(
-    said: Timeline[str], table: PhoneMap, words: Sequence[str], lexicon: Lexicon, duration_s: float
+    labels: Timeline[str], phone_map: PhoneMap, words: Sequence[str], lexicon: Lexicon, duration_s: float
 ) -> Timeline[Unit]:
-    """Return what a synthesiser says of its phones as the project's own aligner would.
+    """Return the phones of a synthesised sentence in time, as forced alignment would label them.
 
-    said       : its labels in time
-    table      : labels to phones (``sounds``)
-    duration_s : of the sound: what no label covers, before, between and after them, is silent
-    Raises InputError: a label that is not in the table, or no phone at all.
+    labels     : of the synthesiser, in time
+    phone_map  : labels to phones (``phone_maps``)
+    words      : of the sentence
+    duration_s : of the sound; what no label covers is silence
+    Raises InputError: a label that is not in the map, or no phone at all.
     """
-    phones = _joined(_covered(_translated(said, table), duration_s))
+    phones = _joined(_covered(_translated(labels, phone_map), duration_s))
     spoken = [phone for phone, _, _ in phones if not is_silent(phone)]
     if not spoken:
         raise InputError("the synthesiser says no phone; give another text")
@@ -45,34 +46,34 @@ def inventory_timeline(
 
 
 def with_words(phones: Sequence[str], words: Sequence[str], lexicon: Lexicon) -> list[Unit]:
-    """Return phones with their words, AH, ER and IH reduced where the dictionary reduces them.
+    """Return phones with their words; AH, ER and IH are reduced where the dictionary reduces them.
 
-    Both follow from the cheapest match with the words' first pronunciations; a phone that matches none is part of the
+    Both follow from the cheapest match with the words' first pronunciations; a phone that matches none belongs to the
     word before it.
     """
-    wanted = [(phone, word) for word in words for phone in lexicon.pronunciations(word)[0]]
-    units, word = [], wanted[0][1]
-    for phone, match in zip(phones, matches(phones, [phone for phone, _ in wanted]), strict=True):
-        meant, word = wanted[match] if match >= 0 else ("", word)
-        units.append(Unit(meant if REDUCED_VOWELS.get(phone) == meant else phone, word=word))
+    expected = [(phone, word) for word in words for phone in lexicon.pronunciations(word)[0]]
+    units, word = [], expected[0][1]
+    for phone, match in zip(phones, matches(phones, [phone for phone, _ in expected]), strict=True):
+        in_lexicon, word = expected[match] if match >= 0 else ("", word)
+        units.append(Unit(in_lexicon if REDUCED_VOWELS.get(phone) == in_lexicon else phone, word=word))
     return units
 
 
-def matches(found: Sequence[str], wanted: Sequence[str]) -> list[int]:
-    """Return which of the wanted phones each of those found stands for, -1 for none: least cost in all.
+def matches(spoken: Sequence[str], expected: Sequence[str]) -> list[int]:
+    """Return for each spoken phone the index of the expected one that it matches, -1 for none: least total cost.
 
     Source: Wagner & Fischer 1974 (edit distance).
     """
-    costs = [[GAP * column for column in range(len(wanted) + 1)]]
-    for row, phone in enumerate(found):
+    costs = [[GAP * column for column in range(len(expected) + 1)]]
+    for row, phone in enumerate(spoken):
         above, line = costs[-1], [GAP * (row + 1)]
-        for column, other in enumerate(wanted):
+        for column, other in enumerate(expected):
             same = above[column] + _cost(phone, other)
             line.append(min(same, above[column + 1] + GAP, line[column] + GAP))
         costs.append(line)
-    matched, row, column = [-1] * len(found), len(found), len(wanted)
+    matched, row, column = [-1] * len(spoken), len(spoken), len(expected)
     while row and column:
-        if costs[row][column] == costs[row - 1][column - 1] + _cost(found[row - 1], wanted[column - 1]):
+        if costs[row][column] == costs[row - 1][column - 1] + _cost(spoken[row - 1], expected[column - 1]):
             row, column = row - 1, column - 1
             matched[row] = column
         elif costs[row][column] == costs[row - 1][column] + GAP:
@@ -83,6 +84,7 @@ def matches(found: Sequence[str], wanted: Sequence[str]) -> list[int]:
 
 
 def _cost(phone: str, other: str) -> float:
+    """Return the cost of matching two phones."""
     if phone == other:
         return 0.0
     if REDUCED_VOWELS.get(phone, phone) == REDUCED_VOWELS.get(other, other) or VISEME_OF[phone] == VISEME_OF[other]:
@@ -90,12 +92,15 @@ def _cost(phone: str, other: str) -> float:
     return OTHER if (phone in VOWELS) == (other in VOWELS) else UNLIKE
 
 
-def _translated(said: Timeline[str], table: PhoneMap) -> list[tuple[str, float, float]]:
+def _translated(labels: Timeline[str], phone_map: PhoneMap) -> list[tuple[str, float, float]]:
+    """Return the phones of the labels, with start and end, s. Raises InputError: a label that is not in the map."""
     phones: list[tuple[str, float, float]] = []
-    for span in said:
-        if span.label not in table:
-            raise InputError(f"the synthesiser says {span.label!r}, which is no phone; known are: {' '.join(table)}")
-        names = table[span.label]
+    for span in labels:
+        if span.label not in phone_map:
+            raise InputError(
+                f"the synthesiser says {span.label!r}, which is no phone; known are: {' '.join(phone_map)}"
+            )
+        names = phone_map[span.label]
         if not names and phones:
             phones[-1] = (*phones[-1][:2], span.end_s)
         each_s = span.duration_s / max(len(names), 1)
@@ -104,7 +109,7 @@ def _translated(said: Timeline[str], table: PhoneMap) -> list[tuple[str, float, 
 
 
 def _covered(phones: Phones, duration_s: float) -> list[tuple[str, float, float]]:
-    """Fill what is not covered with silence, and cut what is past the end of the sound."""
+    """Return phones with silence where none was, cut at the end of the sound."""
     covered: list[tuple[str, float, float]] = []
     now = 0.0
     for phone, start, end in phones:
@@ -115,7 +120,7 @@ def _covered(phones: Phones, duration_s: float) -> list[tuple[str, float, float]
 
 
 def _joined(phones: Phones) -> list[tuple[str, float, float]]:
-    """Return neighbouring silences as one."""
+    """Return phones in which neighbouring silences are one."""
     joined: list[tuple[str, float, float]] = []
     for silent, run in groupby(phones, key=lambda phone: is_silent(phone[0])):
         part = list(run)

@@ -1,7 +1,7 @@
-"""The phones of the synthesisers, and what they are in the inventory of 47.
+"""Maps from the phones of the synthesisers to those of the inventory of 47.
 
-Several phones share the time of a label equally; a label without any is part of the phone before it. Unstressed AH, ER
-and IH become ax, axr and ix where the dictionary says so (``labels``).
+A label that maps to several phones is divided into equal times; a label that maps to none is part of the phone before
+it. Unstressed AH, ER and IH become ax, axr and ix where the dictionary says so (``inventory_phones``).
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from lipmotion.units import PHONES, SILENCE
 
 PhoneMap = Mapping[str, tuple[str, ...]]
-"""The phones of the inventory that a label means."""
+"""A synthesiser's label to phones of the inventory."""
 
 ARPABET_PHONES: PhoneMap = {phone: (phone,) for phone in PHONES} | {"pau": (SILENCE,)}
 """Flite and Festival (phone set ``radio``). They have their own ax; their er and ih are stressed and unstressed."""

@@ -1,4 +1,4 @@
-"""What all synthesisers have in common: voices, what they say, and programs that are run to have it said."""
+"""The interface to speech synthesisers: voices, synthesised sentences, and running their programs."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from lipmotion.speech.voices.phone_maps import PhoneMap
 from lipmotion.types import Audio, Timeline
 
 START_S, EACH_S = 30.0, 5.0
-"""How long a program may take to start, and for each sentence: a hundred times what they need."""
+"""The time limit of a program: to start, and for each sentence; both are a hundred times what it needs."""
 SHOWN = 200
-"""Letters of a program's complaint that an error repeats."""
+"""Characters of a program's error message that ours repeats."""
 
 
 @dataclass(frozen=True)
 class SyntheticVoice:
     """A voice of an installed synthesiser.
 
-    name        : to the synthesiser
+    name        : by which the synthesiser knows it
     synthesiser : ``flite``, ``festival`` or ``espeak-ng``
-    speaker     : who is heard: voices of two synthesisers that were made from one person's recordings share it
+    speaker     : whose voice it is: two voices made from recordings of one person have the same speaker
     """
 
     name: str
@@ -34,10 +34,10 @@ class SyntheticVoice:
 
 @dataclass(frozen=True, eq=False)
 class SynthesisedSentence:
-    """One sentence as a synthesiser says it.
+    """One sentence from a synthesiser.
 
-    audio  : 16 kHz
-    phones : in time, by the names that the synthesiser has for them
+    audio  : at 16 kHz
+    phones : in time, by the synthesiser's own names
     """
 
     audio: Audio
@@ -46,26 +46,27 @@ class SynthesisedSentence:
 
 @dataclass(frozen=True)
 class Synthesiser:
-    """A program that speaks.
+    """A speech synthesis program.
 
-    package : of Debian, that brings it
-    voices  : returns those of it that are installed; none where it is not
-    say     : gives the texts in a voice (name, texts, a folder for its files), one after the other
-    labels  : its phones to those of the inventory (``sounds``)
+    package    : the Debian package with it
+    voices     : returns its installed voices; none where it is not installed
+    synthesise : yields the sentences of some texts in a voice (name, texts, a folder for temporary files), in order
+    phone_map  : its phones to those of the inventory (``phone_maps``)
     """
 
     name: str
     package: str
     voices: Callable[[], tuple[SyntheticVoice, ...]]
-    say: Callable[[str, Sequence[str], Path], Iterator[SynthesisedSentence]]
-    labels: PhoneMap
+    synthesise: Callable[[str, Sequence[str], Path], Iterator[SynthesisedSentence]]
+    phone_map: PhoneMap
 
 
 def program_output(command: Sequence[str], package: str, sentences: int = 1, given: str = "") -> str:
-    """Return what a program writes.
+    """Return the standard output of a program.
 
-    package : of Debian, that brings it
-    given   : what it reads
+    package   : the Debian package with it
+    sentences : how many it synthesises, which sets its time limit
+    given     : its standard input
     Raises MissingDependencyError: there is no such program. Raises InputError: it fails, or takes too long.
     """
     program = shutil.which(command[0])
@@ -81,6 +82,6 @@ def program_output(command: Sequence[str], package: str, sentences: int = 1, giv
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{command[0]} cannot be run ({error}); install it again: apt install {package}") from error
     if done.returncode:
-        complaint = " ".join(done.stderr.split())[:SHOWN] or "no message"
-        raise InputError(f"{command[0]} failed with {done.returncode} ({complaint}); try another text or voice")
+        message = " ".join(done.stderr.split())[:SHOWN] or "no message"
+        raise InputError(f"{command[0]} failed with {done.returncode} ({message}); try another text or voice")
     return done.stdout

@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 
 from engines.coupled.tiny import TWO, structure
-from engines.synthetic import example, examples, speech, timeline
 from lipmotion.engines.coupled.config import CoupledConfig
 from lipmotion.engines.coupled.conversion.regression import (
     CONSTANT,
@@ -17,6 +16,7 @@ from lipmotion.engines.coupled.conversion.regression import (
 )
 from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.engines.coupled.training.fit import _kinds, fit_coupled
+from lipmotion.testing.examples import example, examples, speech, timeline
 from lipmotion.types.progress import silent_monitor
 
 

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from engines.coupled.tiny import THREE, TWO, chains, observed, structure
-from engines.synthetic import examples
 from lipmotion.engines.coupled.chains.densities import Observed
 from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, MULTISTREAM
 from lipmotion.engines.coupled.config import CoupledConfig
@@ -21,6 +20,7 @@ from lipmotion.engines.coupled.training.train import (
     variance_floors,
 )
 from lipmotion.errors import InputError
+from lipmotion.testing.examples import examples
 from lipmotion.types import GREY, Channel, Example, Span, Timeline, Unit
 from lipmotion.types.progress import silent_monitor
 from oracles import coupled as oracle

@@ -8,7 +8,6 @@ from itertools import groupby
 import numpy as np
 import pytest
 
-from engines.synthetic import RATE_HZ, examples
 from lipmotion.engines.coupled.chains.densities import LEAST_COMPONENT_FRAMES, Observed
 from lipmotion.engines.coupled.chains.model import Chains
 from lipmotion.engines.coupled.chains.structures import structure_of
@@ -19,6 +18,7 @@ from lipmotion.engines.coupled.training.expectation import expected
 from lipmotion.engines.coupled.training.speech_only import MoreSpeech, with_more_speech
 from lipmotion.engines.coupled.training.train import Labelled, Schedule, Step, recording, train_chains, variance_floors
 from lipmotion.stats.mixture import Mixtures
+from lipmotion.testing.examples import RATE_HZ, examples
 from lipmotion.types import Example, Motion, Span, Timeline, Unit, silent_monitor
 from oracles.joint import mixture
 from oracles.networks import posteriors

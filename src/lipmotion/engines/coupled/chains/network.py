@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from lipmotion.engines.coupled.chains.densities import Single
 from lipmotion.engines.coupled.chains.lattice import Joint, Lattice, Posteriors, summed
 from lipmotion.engines.coupled.chains.transitions import Transitions
+from lipmotion.kernels.arcs import NetworkArrays
 from lipmotion.kernels.network import ForwardBackwardNetwork
 from lipmotion.kernels.viterbi import best_path
 
@@ -34,7 +35,7 @@ class NetworkLattice(Lattice):
         ready = self.network.with_arcs(transitions.arc_log[self.counts], transitions.log_initial[self.states])
         order = ready.layout.order
         columns = [tie[order] for tie in self.ties]
-        found = ready.over_chains(logs, columns, np.array([len(logs[0])]))
+        found = ready.product_posteriors(logs, columns, np.array([len(logs[0])]))
         structure = transitions.product.structure
         return Posteriors(
             tuple(
@@ -61,12 +62,14 @@ class NetworkLattice(Lattice):
         path, score = best_path(
             log_emission,
             len(logs[0]),
-            np.arange(count),
-            self.network.arc_from,
-            transitions.arc_log[self.counts].astype(np.float32),
-            self.network.arc_start,
-            transitions.log_initial[self.states].astype(np.float32),
-            np.zeros(count, np.float32),
+            NetworkArrays(
+                np.arange(count),
+                self.network.arc_from,
+                transitions.arc_log[self.counts].astype(np.float32),
+                self.network.arc_start,
+                transitions.log_initial[self.states].astype(np.float32),
+                np.zeros(count, np.float32),
+            ),
             layout=lambda: self.network.layout,
         )
         return self.states[path], score

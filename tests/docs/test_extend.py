@@ -1,0 +1,114 @@
+"""The pages of docs/extend: their code is written to files, installed as packages, checked and used."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import wave
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lipmotion.corpora.store import Corpus
+from lipmotion.testing.toy import ToySentence
+
+PAGES = Path(__file__).parents[2] / "docs" / "extend"
+PROJECT = """[build-system]
+requires = ["hatchling"]
+build-backend = "hatchling.build"
+[project]
+name = "{name}"
+version = "1.0"
+{entry}
+[tool.hatch.build.targets.wheel]
+only-include = ["{module}.py"]
+"""
+
+
+class Package:
+    """What a page describes, installed in a folder of its own."""
+
+    def __init__(self, page: str, folder: Path) -> None:
+        text = (PAGES / page).read_text(encoding="utf-8")
+        blocks = dict(enumerate(re.findall(r"^```(?:python|toml)\n(.*?)^```", text, re.MULTILINE | re.DOTALL)))
+        self.check = blocks[1]
+        (module,) = set(re.findall(r"^`(\w+)\.py`", text, re.MULTILINE))
+        self.sources, self.installed = folder / "sources", folder / "installed"
+        self.sources.mkdir(parents=True)
+        (self.sources / f"{module}.py").write_text(blocks[0], encoding="utf-8")
+        project = blocks[2]
+        if "[project]" not in project:
+            project = PROJECT.format(name=module, entry=project, module=module)
+        (self.sources / "pyproject.toml").write_text(project, encoding="utf-8")
+        pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "install", "--quiet", "--no-index"]
+        build = ["--no-deps", "--no-build-isolation", "--target", str(self.installed), str(self.sources)]
+        subprocess.run([*pip, *build], check=True, capture_output=True)
+        shutil.rmtree(self.sources)
+
+    def run(self, *command: object) -> subprocess.CompletedProcess[str]:
+        """Run Python with the package installed."""
+        path = os.pathsep.join(filter(None, [str(self.installed), os.environ.get("PYTHONPATH", "")]))
+        environment = os.environ | {"PYTHONPATH": path}
+        return subprocess.run(
+            [sys.executable, *map(str, command)], env=environment, capture_output=True, text=True, check=False
+        )
+
+    def lipmotion(self, *arguments: object) -> str:
+        """Return what a verb prints."""
+        done = self.run("-m", "lipmotion.cli.main", *arguments)
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+
+@pytest.fixture(scope="module")
+def recording(toy_sentence: ToySentence, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("recording") / "speech.wav"
+    with wave.open(str(path), "wb") as file:
+        file.setnchannels(1)
+        file.setsampwidth(2)
+        file.setframerate(toy_sentence.audio.rate_hz)
+        file.writeframes(np.round(toy_sentence.audio.samples * 32767).astype("<i2").tobytes())
+    return path
+
+
+@pytest.mark.parametrize("page", ["engine.md", "face.md", "exporter.md"])
+def test_what_a_page_writes_keeps_its_contract(page: str, tmp_path: Path) -> None:
+    package = Package(page, tmp_path)
+    done = package.run("-c", package.check)
+    assert done.returncode == 0, done.stderr
+
+
+def test_an_installed_engine_trains_saves_loads_and_animates(
+    toy_corpus: Corpus, recording: Path, tmp_path: Path
+) -> None:
+    package, model = Package("engine.md", tmp_path / "package"), tmp_path / "ridge.lipmotion"
+    package.lipmotion("train", toy_corpus.path, "-o", model, "--engine", "ridge", "--set", "penalty=500")
+    assert "penalty=500.0" in package.lipmotion("info", model)
+    package.lipmotion("animate", recording, "--model", model, "-o", tmp_path / "a.csv")
+    lines = (tmp_path / "a.csv").read_text(encoding="utf-8").splitlines()
+    assert lines[0].startswith("time_s,opening,width,outer")
+    package.lipmotion("explain", model, recording, "--at", "1.0")
+    missing = subprocess.run(
+        [sys.executable, "-m", "lipmotion.cli.main", "info", "--trees", str(model)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert missing.returncode == 6
+    assert "no engine 'ridge'; there are: trajectory, coupled, joint; install the package" in missing.stderr
+
+
+def test_an_installed_face_and_format_work_from_the_command_line(recording: Path, tmp_path: Path) -> None:
+    face, table = Package("face.md", tmp_path / "face"), Package("exporter.md", tmp_path / "table")
+    face.lipmotion("animate", recording, "-o", tmp_path / "a.mp4", "--face", "bar")
+    assert (tmp_path / "a.mp4").stat().st_size > 1000
+    table.lipmotion("animate", recording, "-o", tmp_path / "a.tab", "--channels", "opening,width")
+    code = f"import lipmotion; print(lipmotion.read_motion({str(tmp_path / 'a.tab')!r})[0].names)"
+    assert table.run("-c", code).stdout.strip() == "('opening', 'width')"
+    unknown = face.run("-m", "lipmotion.cli.main", "animate", recording, "-o", tmp_path / "b.mp4", "--face", "rab")
+    assert "no face 'rab'; there are: portrait, bar" in unknown.stderr
+    assert not (tmp_path / "b.mp4").exists()
