@@ -1,4 +1,4 @@
-"""Parameter generation: the smooth trajectory behind means and precisions of it, its slope and its curvature."""
+"""Maximum-likelihood parameter generation: the trajectory of Gaussians of static values, Δ and Δ²."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from lipmotion.kernels.choice import compiled_pays
 
 Array = NDArray[np.float64]
 Bands = tuple[Array, Array, Array, Array]
-"""Main, first and second diagonal of a symmetric system per channel, and its right-hand side, all (T, P)."""
+"""Main, first and second diagonal of the symmetric system of each channel, and its right-hand side [shapes=(T, P)]."""
 FRAME_S = 12e-6
-"""What NumPy takes for a frame, with up to some 90 channels (docs/results/kernels.md)."""
+"""Time that NumPy takes for a frame, with up to some 90 channels (docs/results/kernels.md)."""
 
 
 def generate(mean: Array, precision: Array, pins: Mapping[tuple[int, int], float] | None = None) -> tuple[Array, Array]:
     """Return the most probable trajectory and its variance, both [shape=(T, P)].
 
     mean, precision : [shape=(T, 3, P)], of the static value, Δ = (-½, 0, ½) and Δ² = (1, -2, 1)
-    pins : (frame, channel) to the value there, which the trajectory takes exactly and with variance 0
+    pins : value by (frame, channel), which the trajectory takes exactly and with variance 0
     Source: Hofer 2008, Eqs. 6–11.  Cost: O(T·P).
     """
     fast = compiled_pays(len(mean) * FRAME_S)
@@ -41,7 +41,7 @@ def normal_equations(mean: Array, precision: Array) -> Bands:
     """Return the system W'PW x = W'P m of maximum-likelihood parameter generation.
 
     mean, precision : [shape=(T, 3, P)], of the static value, Δ = (-½, 0, ½) and Δ² = (1, -2, 1)
-    Dynamic rows that stick out at the ends have no precision.
+    Δ and Δ² of the first and last frame, which need frames outside, have precision 0.
     Source: Hofer 2008, Eqs. 6–11 (the print's Δ² lost its minus sign).
     """
     p0, p1, p2 = (np.array(precision[:, window], float) for window in range(3))
@@ -61,7 +61,7 @@ def normal_equations(mean: Array, precision: Array) -> Bands:
 
 
 def pin(bands: Bands, frame: int, channel: int, value: float) -> None:
-    """Make the solution take ``value`` in one frame of one channel, exactly (in place; once for each)."""
+    """Change the system, in place, so that its solution is ``value`` in one frame of one channel; once for each."""
     main, first, second, right = bands
     for reach, diagonal in ((1, first), (2, second)):
         if frame >= reach:
@@ -110,7 +110,7 @@ def _substitute(inverse: Array, lower1: Array, lower2: Array, x: Array) -> tuple
     frames, channels = inverse.shape
     values, variance = np.zeros((frames + 2, channels)), np.zeros((frames + 2, channels))
     np.multiply(x, inverse, out=values[:frames])
-    beside = np.zeros(channels)  # of the inverse, between the next row and the one behind it
+    beside = np.zeros(channels)  # of the inverse, between the next row and the one after it
     for t in range(frames - 1, -1, -1):
         l1, l2 = lower1[t], lower2[t]
         values[t] = values[t] - l1 * values[t + 1] - l2 * values[t + 2]

@@ -1,4 +1,4 @@
-"""One frame of a factorial hidden Markov model, as ``factorial_steps``, compiled but for products of matrices."""
+"""One frame of a factorial hidden Markov model as in ``factorial_steps``, compiled but for products of matrices."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from lipmotion.kernels.factorial_steps import BackwardStep, FramePosteriors, Joi
 from lipmotion.kernels.loops import FrameDensity, LoopTransitions
 
 LEAST = {np.dtype(np.float32): (1e-37, 1e-30), np.dtype(np.float64): (1e-140, 1e-140)}
-"""Products of less are 0, as are shares of a frame."""
+"""By precision: smaller products, and smaller shares of a frame, are set to 0."""
 
 
 def forward_step(
     before: Joint, audio: LoopTransitions, visual: LoopTransitions, density: FrameDensity
 ) -> tuple[Joint, Joint, float]:
-    """Return what ``factorial_steps.forward_step`` does."""
+    """Return the result of ``factorial_steps.forward_step``."""
     entering = audio.leaving.T @ before[-len(audio.leaving) :]
     moved = factorial.moved_to_last(before, audio.stay, audio.onward, entering, len(visual.leaving))
     after = np.empty_like(before)
@@ -40,7 +40,7 @@ def backward_step(
     visual: LoopTransitions,
     density: FrameDensity,
 ) -> BackwardStep:
-    """Return what ``factorial_steps.backward_step`` does."""
+    """Return the result of ``factorial_steps.backward_step``."""
     units, first = len(audio.leaving), backward[:, : len(visual.leaving)]
     moved = factorial.moved_back(backward, visual.stay, visual.onward, first @ visual.leaving.T)
     after = np.empty_like(before)
@@ -54,6 +54,6 @@ def backward_step(
     if not (total > 0 and overlap > 0):
         return factorial_steps.backward_step(before, backward, leaving, audio, visual, density)
     scale = 1 / overlap
-    closed = FramePosteriors(by_audio * scale, by_visual * scale, by_pair * scale, overlap)
+    frame = FramePosteriors(by_audio * scale, by_visual * scale, by_pair * scale, overlap)
     audio_entered, visual_entered = before[-units:] @ moved[:units].T, leaving.T @ first
-    return BackwardStep(closed, after, np.float64(scale) * audio_entered, np.float64(scale) * visual_entered)
+    return BackwardStep(frame, after, np.float64(scale) * audio_entered, np.float64(scale) * visual_entered)

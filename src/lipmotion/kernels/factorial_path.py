@@ -1,4 +1,4 @@
-"""The most probable states of factorial hidden Markov models (``kernels.loops``)."""
+"""The most probable paths of factorial hidden Markov models (``kernels.loops``)."""
 
 from __future__ import annotations
 
@@ -12,18 +12,19 @@ from lipmotion.kernels.loops import Array, FactorialLogLikelihoods, Index, Loop
 
 
 def factorial_best_path(
-    audio: Loop, visual: Loop, evidence: FactorialLogLikelihoods, stretch: int | None = None
+    audio: Loop, visual: Loop, logs: FactorialLogLikelihoods, stretch: int | None = None
 ) -> tuple[Index, Index, float]:
-    """Return the most probable states of both loops [shapes=(T,)] and the log probability of path and evidence.
+    """Return the most probable states of both loops [shapes=(T,)], and the log probability of path and recording.
 
-    stretch : frames whose decisions are kept at once, while those of the others are taken twice; None: √T
-    Where there is no path: states 0, and -inf.  Of paths as good as each other, one.
-    Source: Viterbi, along one loop's axis and then along the other's.
+    logs    : log densities of the recording
+    stretch : frames whose decisions are stored at once; those of the others are computed twice; None: √T
+    Where there is no path: states 0, and -inf.  Of equally probable paths, any one.
+    Source: the Viterbi recursion, along one loop's axis and then along the other's.
     Cost: time O(T·Na·Nv·(Ua + Uv)), memory O(stretch + T/stretch) times Na·Nv.
     """
-    frames = len(evidence.audio)
+    frames = len(logs.audio)
     stretch = stretch or math.isqrt(max(frames - 1, 0)) + 1
-    search = _Search(_LogMoves.of(audio), _LogMoves.of(visual), evidence)
+    search = _Search(_LogTransitions.of(audio), _LogTransitions.of(visual), logs)
     with np.errstate(divide="ignore"):
         initial, final = (
             np.add.outer(*(np.log(getattr(loop, name).ravel()) for loop in (audio, visual)))
@@ -48,24 +49,27 @@ def factorial_best_path(
 
 
 _Decisions = tuple[NDArray[Any], NDArray[Any]]
-"""Of each loop, where each joint state was come to from [shape=(N, M)], its own states first."""
+"""For each loop, the decision at each joint state [shape=(N, M)], the loop's own states along axis 0."""
 
 
-class _LogMoves(NamedTuple):
-    """Log probabilities of a loop, as ``loops.Moves``."""
+class _LogTransitions(NamedTuple):
+    """Log probabilities of a loop, as ``loops.LoopTransitions``."""
 
     stay: Array
     onward: Array
     leaving: Array
 
     @classmethod
-    def of(cls, loop: Loop) -> _LogMoves:
+    def of(cls, loop: Loop) -> _LogTransitions:
         with np.errstate(divide="ignore"):
             leaving = np.log(loop.leave)[:, None] + np.log(loop.enter)
             return cls(np.log(loop.stay.ravel()), np.log(loop.onward.ravel()), leaving)
 
     def forward(self, score: Array) -> tuple[Array, NDArray[Any]]:
-        """Return the best scores one frame on, along axis 0, and the decisions: U stay, U + 1 onward, else the unit."""
+        """Return the best scores one frame on, along axis 0, and the decisions.
+
+        A decision is U for staying, U + 1 for the next state, else the unit that was left.
+        """
         units = len(self.leaving)
         after = score + self.stay[:, None]
         decision = np.full(score.shape, units, np.min_scalar_type(units + 1))
@@ -81,7 +85,7 @@ class _LogMoves(NamedTuple):
         return after, decision
 
     def behind(self, state: int, decision: int) -> int:
-        """Return the state one frame back."""
+        """Return the state one frame before, given the decision."""
         units = len(self.leaving)
         if decision < units:
             return len(self.stay) - units + decision
@@ -89,19 +93,21 @@ class _LogMoves(NamedTuple):
 
 
 class _Search(NamedTuple):
-    audio: _LogMoves
-    visual: _LogMoves
-    evidence: FactorialLogLikelihoods
+    """The search in both loops for one recording."""
+
+    audio: _LogTransitions
+    visual: _LogTransitions
+    logs: FactorialLogLikelihoods
 
     def log_density(self, t: int) -> Array:
-        """Return the log density of every joint state."""
-        evidence = self.evidence
-        joint = np.add.outer(evidence.audio[t], evidence.visual[t], dtype=np.float64)
-        joint[tuple(evidence.pairs.T)] = evidence.pair[t]
+        """Return the log densities of all joint states in a frame [shape=(Na, Nv)]."""
+        logs = self.logs
+        joint = np.add.outer(logs.audio[t], logs.visual[t], dtype=np.float64)
+        joint[tuple(logs.pairs.T)] = logs.pair[t]
         return joint
 
     def through(self, start: int, stop: int, score: Array) -> tuple[Array, list[_Decisions]]:
-        """Return the scores of the last frame of a stretch, and the decisions on the way."""
+        """Return the scores after the frames of a stretch, and the decisions of each frame."""
         decisions = []
         for t in range(start, stop):
             score, by_audio = self.audio.forward(score)
@@ -111,7 +117,7 @@ class _Search(NamedTuple):
         return score, decisions
 
     def behind(self, decisions: _Decisions, audio: int, visual: int) -> tuple[int, int]:
-        """Return both states one frame back: the visual loop moved last."""
+        """Return both states one frame before; the decision of the visual loop was the later one."""
         by_audio, by_visual = decisions
         visual = self.visual.behind(visual, int(by_visual[visual, audio]))
         return self.audio.behind(audio, int(by_audio[audio, visual])), visual

@@ -12,14 +12,14 @@ from lipmotion.kernels.loops import FrameDensity, LoopTransitions
 Joint = NDArray[np.floating[Any]]
 """[shape=(Na, Nv)]"""
 LEAST_TOTAL = 1e-100
-"""Of what is emitted: less is computed again in logarithms."""
+"""Least sum of probabilities times densities; smaller sums are computed again in logarithms."""
 
 
 class FramePosteriors(NamedTuple):
-    """What forward and backward probabilities say of a frame.
+    """Posteriors of a frame.
 
-    audio, visual, pair : [shapes=(Na,), (Nv,), (P,)], posteriors
-    overlap             : the sum of the products of both, which posteriors are relative to
+    audio, visual, pair : [shapes=(Na,), (Nv,), (P,)], of the states of each loop, and of joint states of their own
+    overlap             : the sum of forward times backward probabilities, by which posteriors were divided
     """
 
     audio: NDArray[np.float64]
@@ -29,15 +29,15 @@ class FramePosteriors(NamedTuple):
 
 
 class BackwardStep(NamedTuple):
-    """What a step back says.
+    """The result of a step back to the frame before.
 
-    closed : of the frame before
-    backward : its backward probabilities and densities, multiplied, sum 1
-    audio_entered, visual_entered : [shapes=(U, U)], how often units were expected to follow each other, divided by
-        the probability that they do
+    frame    : its posteriors
+    backward : its backward probabilities times densities, normalised
+    audio_entered, visual_entered : [shapes=(U, U)], expected number of transitions from each unit to each, divided by
+        the probability of the transition
     """
 
-    frame_posteriors: FramePosteriors
+    frame: FramePosteriors
     backward: Joint
     audio_entered: Joint
     visual_entered: Joint
@@ -46,8 +46,11 @@ class BackwardStep(NamedTuple):
 def forward_step(
     before: Joint, audio: LoopTransitions, visual: LoopTransitions, density: FrameDensity
 ) -> tuple[Joint, Joint, float]:
-    """Return forward probabilities one frame on (sum 1), those that have moved in the audio loop only and are in last
-    visual states [shape=(Na, Uv)], and the log of what the former are divided by (-inf: all are 0).
+    """Return forward probabilities one frame on, and two values from the computation.
+
+    Returns the probabilities, normalised [shape=(Na, Nv)]; the probabilities of the last visual states after the audio
+    loop's transition only [shape=(Na, Uv)]; and the log of the first ones' sum before they were normalised (-inf: all
+    are 0).
     """
     moved = audio.forward(before)
     joint, log_total = times_density(visual.forward(moved.T).T, density)
@@ -62,27 +65,27 @@ def backward_step(
     visual: LoopTransitions,
     density: FrameDensity,
 ) -> BackwardStep:
-    """Return what a step back says.
+    """Return the result of a step back.
 
     before   : forward probabilities of the frame before
-    backward : backward probabilities and densities of this frame, multiplied
-    leaving  : as ``forward_step`` returned from ``before``
+    backward : backward probabilities times densities of this frame
+    leaving  : as ``forward_step`` returned it for ``before``
     density  : of the frame before
     """
     units_audio, units_visual = len(audio.leaving), len(visual.leaving)
     moved = visual.backward(backward.T).T
     beta = audio.backward(moved)
-    found = frame_posteriors(before, beta, density)
-    scale = 1 / found.overlap if found.overlap > 0 else 0.0
+    frame = frame_posteriors(before, beta, density)
+    scale = 1 / frame.overlap if frame.overlap > 0 else 0.0
     audio_entered = before[-units_audio:] @ moved[:units_audio].T
     visual_entered = leaving.T @ backward[:, :units_visual]
     return BackwardStep(
-        found, times_density(beta, density)[0], np.float64(scale) * audio_entered, np.float64(scale) * visual_entered
+        frame, times_density(beta, density)[0], np.float64(scale) * audio_entered, np.float64(scale) * visual_entered
     )
 
 
 def frame_posteriors(forward: Joint, backward: Joint, density: FrameDensity) -> FramePosteriors:
-    """Return posteriors of a frame."""
+    """Return the posteriors of a frame from its forward and backward probabilities."""
     joint = np.multiply(forward, backward, dtype=np.float64)
     overlap = float(joint.sum())
     joint /= overlap if overlap > 0 else 1
@@ -92,7 +95,7 @@ def frame_posteriors(forward: Joint, backward: Joint, density: FrameDensity) -> 
 
 
 def times_density(prior: Joint, density: FrameDensity) -> tuple[Joint, float]:
-    """Return probabilities times densities, sum 1, and the log of what they are divided by (-inf: all are 0)."""
+    """Return probabilities times densities, normalised, and the log of their sum before (-inf: all are 0)."""
     joint = prior * density.audio[:, None] * density.visual
     joint[density.pair_audio, density.pair_visual] = prior[density.pair_audio, density.pair_visual] * density.pair
     total = float(joint.sum(dtype=np.float64))

@@ -1,4 +1,4 @@
-"""Two loops of units beside each other that have nothing in common but what they emit: a factorial hidden Markov model.
+"""Factorial hidden Markov models: two loops of units with independent transitions, and joint densities.
 
 States of a loop are numbered state-major: index = state · U + unit.
 """
@@ -16,14 +16,14 @@ Logs = NDArray[np.floating[Any]]
 
 
 class Loop(NamedTuple):
-    """U units in any order, each of n states from left to right without skips; probabilities.
+    """The probabilities of a loop of U units in any order, each of n states from left to right without skips.
 
-    stay    : [shape=(n, U)]
-    onward  : [shape=(n - 1, U)], to the next state
-    leave   : [shape=(U,)], from the last state
-    enter   : [shape=(U, U)], of the unit that follows (column) the one that is left (row)
-    initial : [shape=(n, U)], of beginning there
-    final   : [shape=(n, U)], of ending there (all ones: anywhere)
+    stay    : [shape=(n, U)], of staying in each state
+    onward  : [shape=(n - 1, U)], of going to the next state
+    leave   : [shape=(U,)], of leaving the last state
+    enter   : [shape=(U, U)], of each next unit (column) after the unit that is left (row)
+    initial : [shape=(n, U)], of beginning in each state
+    final   : [shape=(n, U)], of ending in each state (all ones: anywhere)
     """
 
     stay: Array
@@ -35,10 +35,10 @@ class Loop(NamedTuple):
 
 
 class LoopCounts(NamedTuple):
-    """How often a loop is expected to do what; shapes as in ``Loop``.
+    """Expected counts of the transitions of a loop; shapes as in ``Loop``.
 
-    enter   : [shape=(U, U)], each unit behind each; the sum of a row is how often that unit is left
-    initial : [shape=(n, U)], the posteriors of the first frame
+    enter   : [shape=(U, U)], of each unit after each; the sum of a row is the count of that unit being left
+    initial : [shape=(n, U)], posteriors of the first frame
     """
 
     stay: Array
@@ -48,11 +48,11 @@ class LoopCounts(NamedTuple):
 
 
 class FactorialLogLikelihoods(NamedTuple):
-    """Log densities of one recording, finite or -inf; all as precise.
+    """Log densities of one recording, finite or -inf, all of one precision.
 
-    audio, visual : [shape=(T, Na)] and [shape=(T, Nv)]; that of a joint state is their sum,
-    pair          : [shape=(T, P)], but for some joint states, which have their own
-    pairs         : [shape=(P, 2)], the audio and visual states of these, each pair once
+    audio, visual : [shapes=(T, Na), (T, Nv)], whose sums are the log densities of joint states, except for pairs
+    pair          : [shape=(T, P)], the log densities of pairs, joint states that have densities of their own
+    pairs         : [shape=(P, 2)], the audio and visual state of each pair, each pair once
     """
 
     audio: Logs
@@ -62,11 +62,11 @@ class FactorialLogLikelihoods(NamedTuple):
 
     @classmethod
     def of(cls, audio: Logs, visual: Logs) -> FactorialLogLikelihoods:
-        """Return that without pairs."""
+        """Return the log densities of loops without pairs."""
         return cls(audio, visual, np.empty((len(audio), 0), audio.dtype), np.empty((0, 2), np.intp))
 
     def densities(self, start: int, stop: int) -> list[FrameDensity]:
-        """Return the densities of some frames."""
+        """Return the densities of the frames from ``start`` up to ``stop``."""
         logs = self.audio[start:stop], self.visual[start:stop], self.pair[start:stop]
         tops = [log.max(axis=1, initial=-np.inf).astype(np.float64) for log in logs]
         top_audio, top_visual = (np.where(np.isfinite(top), top, 0) for top in tops[:2])
@@ -74,21 +74,29 @@ class FactorialLogLikelihoods(NamedTuple):
         audio, visual, pair = (
             np.exp(log - top[:, None]) for log, top in zip(logs, (top_audio, best - top_audio, best), strict=True)
         )
-        one, other = self.pairs.T
+        pair_audio, pair_visual = self.pairs.T
         return [
-            FrameDensity(audio[t], visual[t], pair[t], one, other, float(best[t]), (logs[0][t], logs[1][t], logs[2][t]))
+            FrameDensity(
+                audio[t],
+                visual[t],
+                pair[t],
+                pair_audio,
+                pair_visual,
+                float(best[t]),
+                (logs[0][t], logs[1][t], logs[2][t]),
+            )
             for t in range(stop - start)
         ]
 
 
 class FrameDensity(NamedTuple):
-    """Densities of a frame relative to the best that is possible.
+    """Densities of a frame, relative to an upper bound.
 
-    audio, visual : [shapes=(Na,), (Nv,)], whose products are those of joint states, but for pairs
-    pair          : [shape=(P,)], those of pairs
+    audio, visual : [shapes=(Na,), (Nv,)], whose products are the densities of joint states, except for pairs
+    pair          : [shape=(P,)], the densities of pairs
     pair_audio, pair_visual : [shape=(P,)], the states of pairs
-    best          : the logarithm of the best
-    logs          : audio, visual and pair, as given
+    best          : the logarithm of the bound
+    logs          : the log densities of audio, visual and pairs
     """
 
     audio: Array
@@ -101,7 +109,7 @@ class FrameDensity(NamedTuple):
 
 
 class LoopTransitions(NamedTuple):
-    """The probabilities of a loop, ready to be applied.
+    """The transition probabilities of a loop, in the form that the steps apply.
 
     stay    : [shape=(N,)]
     onward  : [shape=(N - U,)], from state i to i + U
@@ -114,7 +122,7 @@ class LoopTransitions(NamedTuple):
 
     @classmethod
     def of(cls, loop: Loop, kind: np.dtype[Any]) -> LoopTransitions:
-        """Return those of a loop, in a precision."""
+        """Return the transitions of a loop, in the precision ``kind``."""
         leaving = loop.leave[:, None] * loop.enter
         return cls(*(np.ascontiguousarray(part, kind) for part in (loop.stay.ravel(), loop.onward.ravel(), leaving)))
 

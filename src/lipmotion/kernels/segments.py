@@ -1,4 +1,4 @@
-"""The cheapest way to divide time into segments that are not too short."""
+"""The cheapest division of time into segments of a least duration."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ def best_segments(cost: NDArray[np.float64], hold: int, change: float) -> list[t
     """Return the segments (first frame, label) of least cost, in order; neighbours differ in label.
 
     cost   : [shape=(T, S), finite], of label s in frame t
-    hold   : frames that every segment lasts at least, > 0; where there are fewer frames, one segment takes them all
+    hold   : least frames of a segment, > 0; with fewer frames in all, one segment has them all
     change : cost of every segment after the first, >= 0
     No frames: no segments. Ties go to the earlier label and to the longer segment.
     Exact: a segment of label s that ends with frame t either began ``hold`` frames ago, after the best division of
@@ -33,10 +33,11 @@ def best_segments(cost: NDArray[np.float64], hold: int, change: float) -> list[t
         np.minimum(begun, open_segments, out=open_segments)
         label[end] = open_segments.argmin()
         best[end] = open_segments[label[end]]
-    return _traced(label, began, hold)
+    return _trace_back(label, began, hold)
 
 
-def _traced(label: NDArray[np.intp], began: NDArray[np.bool_], hold: int) -> list[tuple[int, int]]:
+def _trace_back(label: NDArray[np.intp], began: NDArray[np.bool_], hold: int) -> list[tuple[int, int]]:
+    """Return the segments, from the best label at each end, and whether one of it began ``hold`` frames before."""
     segments: list[tuple[int, int]] = []
     end = len(label) - 1
     while end > 0:

@@ -1,4 +1,4 @@
-"""The library behind NumPy's matrix products: how many threads it uses, and for which processor it computes."""
+"""The library of NumPy's matrix products (BLAS): its number of threads, and the processor that it computes for."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from contextlib import contextmanager
 def one_thread() -> Iterator[None]:
     """Compute matrix products in one thread inside the block (or the function that this decorates).
 
-    The last bits of a product depend on how many threads share it: with one, results are the same whatever
-    ``OMP_NUM_THREADS`` says, and however work is divided among processes. For products as small as ours one thread is
-    no slower. The limit holds for the whole process; of several threads of Python the first one that sets it decides
-    (threadpoolctl). Libraries that cannot be limited (Accelerate on macOS) are left as they are.
+    The last bits of a product depend on the number of threads: with one, results do not depend on ``OMP_NUM_THREADS``,
+    nor on the division of work among processes. For products as small as ours one thread is no slower. The limit holds
+    for the whole process; of several Python threads the first that sets it decides (threadpoolctl). Libraries that
+    cannot be limited (Accelerate on macOS) are not changed.
     """
     import numpy as np  # noqa: F401 # only what is loaded can be limited
     from threadpoolctl import threadpool_limits

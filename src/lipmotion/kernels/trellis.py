@@ -1,4 +1,4 @@
-"""The cheapest path through a few states a frame, where every step has its own costs."""
+"""The cheapest path through a trellis of few states, with costs for every transition in every frame."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ Array = NDArray[np.float64]
 
 
 def cheapest_arrivals(start: Array, steps: Array) -> tuple[Array, NDArray[np.uint8]]:
-    """Return what the cheapest way to each last state costs [shape=(C,)], and where it came from [shape=(T, C)].
+    """Return the cost of the cheapest path to each last state [shape=(C,)], and back-pointers [shape=(T, C)].
 
-    start : cost of each state before the first step [shape=(C,)]; infinite ones cannot be
+    start : cost of each state before the first step [shape=(C,)]; infinite: impossible
     steps : cost of going from state i to state j [shape=(C, C, T), i first]; for every j one is finite, C ≤ 256
-    Ties go to the lower state. A long recording is passed a stretch at a time: what is returned starts the next one.
+    Ties go to the lower state. A long recording is processed by stretches: the costs returned start the next stretch.
     Exact: Viterbi, Δ_t(j) = min_i Δ_{t−1}(i) + steps(i, j, t). In the algebra of (min, +) a piece of √T frames is
     one C × C matrix; first these of all pieces at once, then the costs between pieces, one after another, then the
     costs within all pieces at once.
@@ -33,7 +33,7 @@ def cheapest_arrivals(start: Array, steps: Array) -> tuple[Array, NDArray[np.uin
 
 
 def trace_back(pointers: NDArray[np.uint8], last: int) -> NDArray[np.intp]:
-    """Return the state of every frame [shape=(T,)] on the way that ends in ``last``."""
+    """Return the state of every frame [shape=(T,)] on the path that ends in state ``last``."""
     states, table = pointers.shape[1], pointers.tobytes()
     path = [last]
     for row in range(len(table) - states, 0, -states):
@@ -42,7 +42,7 @@ def trace_back(pointers: NDArray[np.uint8], last: int) -> NDArray[np.intp]:
 
 
 def _in_pieces(steps: Array) -> Array:
-    """Return the steps [shape=(length, C, C, pieces)]; after the last, every state stays for nothing."""
+    """Return the steps [shape=(length, C, C, pieces)]; in padding, staying in a state costs nothing."""
     states, _, frames = steps.shape
     length = isqrt(frames - 1) + 1
     count = -(-frames // length)
@@ -53,7 +53,7 @@ def _in_pieces(steps: Array) -> Array:
 
 
 def _products(pieces: Array) -> Array:
-    """Return the cheapest ways through each piece, from any state to any [shape=(C, C, pieces)]."""
+    """Return the cost of the cheapest path through each piece, from each state to each [shape=(C, C, pieces)]."""
     product = pieces[0]
     for step in pieces[1:]:
         product = (product[:, :, None] + step).min(axis=1)
@@ -70,7 +70,10 @@ def _entries(start: Array, products: Array) -> Array:
 
 
 def _cheapest(ways: Array) -> tuple[Array, NDArray[np.uint8]]:
-    """Return the least over the state before [shape of ways: (length, C, C, pieces)], and which it is."""
+    """Return the least cost over the states before, and the state of it [shapes=(length, C, pieces)].
+
+    ways : [shape=(length, C, C, pieces)], the state before first
+    """
     least, which = ways[:, 0].copy(), np.zeros((len(ways), *ways.shape[2:]), np.uint8)
     for state in range(1, ways.shape[1]):
         which[ways[:, state] < least] = state
