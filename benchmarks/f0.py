@@ -143,8 +143,8 @@ def sentences() -> Iterator[tuple[Array, Array]]:
             for part in PHONE_TARGETS[span.label.phone]:
                 start_s, end_s = end_s, end_s + part.share * span.duration_s
                 inside = (time_s > start_s + 0.025) & (time_s < end_s - 0.025)
-                if part.voice >= 0.3 or part.voice == 0:
-                    known[inside] = hertz[inside] if part.voice else 0
+                if part.voicing >= 0.3 or part.voicing == 0:
+                    known[inside] = hertz[inside] if part.voicing else 0
         yield audio.samples, known
 
 

@@ -1,4 +1,4 @@
-"""Rules of the design that no linter knows."""
+"""Rules of the design that no linter checks."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from lipmotion.cli import command_line
 
 SOURCE = Path(__file__).parents[2] / "src" / "lipmotion"
 EMPTY_NAMES = {"utils", "util", "helpers", "helper", "common", "core", "misc"}
-"""Names that say nothing: what such a module holds belongs somewhere."""
+"""Module names without meaning."""
 LONGEST_MODULE, LONGEST_VERB = 400, 65
 VERBS = {verb.__name__.rpartition(".")[2] for verb in command_line.VERBS}
 PICKLES = {"pickle", "shelve", "marshal", "joblib", "dill"}

@@ -1,4 +1,4 @@
-"""The import contracts of pyproject.toml hold, and each of them has been seen to fail."""
+"""The import contracts of pyproject.toml hold, and each of them fails for a forbidden import."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 FORBIDDEN = [
-    # the contract that breaks, a module, and what it must not import
+    # the contract, a module, and an import that the contract forbids there
     ("Imports only go down", "errors.py", "import lipmotion.types"),
     ("Imports only go down", "units/phones.py", "from lipmotion.speech import audio_files"),
     ("Imports only go down", "types/audio.py", "import lipmotion.storage.files"),

@@ -1,1 +1,1 @@
-"""A fuzzer for everything that lipmotion reads: ``python -m fuzz`` in this folder's parent, or ``make fuzz``."""
+"""A fuzzer for all file readers of lipmotion: ``python -m fuzz`` with ``tests`` in PYTHONPATH, or ``make fuzz``."""

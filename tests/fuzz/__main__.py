@@ -3,8 +3,8 @@
     PYTHONPATH=tests python -m fuzz [--minutes 10] [--reader NAME ...] [--seed 0] [--json FILE]
     PYTHONPATH=tests python -m fuzz --reader NAME --replay FOLDER
 
-The minutes are shared between the readers; making the good input (a minute) is not counted. Each defect is kept in a
-folder of its own, made small, with its trace beside it; ``--replay`` reads such a folder again. Exit code 1: defects.
+The minutes are shared between the readers; making the good input (a minute) is not counted. Each defect is stored in a
+folder of its own, reduced, with its trace beside it; ``--replay`` reads such a folder again. Exit code 1: defects.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from pathlib import Path
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # of the processes that read
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from fuzz.campaign import Tally, campaign
+from fuzz.campaign import CampaignRecord, campaign
 from fuzz.findings import keep
 from fuzz.good import good_in, make_good
 from fuzz.inputs import Good, picked_up
@@ -58,14 +58,14 @@ def fuzz(options: argparse.Namespace, good: Good) -> int:
     stopped = threading.Event()
     budget_s = 60 * options.minutes * workers / len(names)
 
-    def one(name: str) -> Tally:
+    def one(name: str) -> CampaignRecord:
         with Worker(good) as worker:
             end_s = time.monotonic() + (0 if stopped.is_set() else budget_s)
             begin = (READERS[name], worker, good, options.seed)
-            tally = campaign(*begin, lambda _: time.monotonic() < end_s and not stopped.is_set())
-            for place in keep(tally, worker, options.found):
+            record = campaign(*begin, lambda _: time.monotonic() < end_s and not stopped.is_set())
+            for place in keep(record, worker, options.found):
                 print(f"{name}: {place}; again: python -m fuzz --reader {name} --replay {place}", file=sys.stderr)
-            return tally
+            return record
 
     with ThreadPoolExecutor(workers) as pool:
         runs = [pool.submit(one, name) for name in names]
@@ -73,18 +73,18 @@ def fuzz(options: argparse.Namespace, good: Good) -> int:
             wait(runs)
         except KeyboardInterrupt:
             stopped.set()
-        tallies = [run.result() for run in runs]
-    print(table(tallies))
+        records = [run.result() for run in runs]
+    print(table(records))
     if options.json:
-        write_json(options.json, tallies, options.seed, options.minutes)
-    return int(any(tally.findings for tally in tallies))
+        write_json(options.json, records, options.seed, options.minutes)
+    return int(any(record.findings for record in records))
 
 
 def replay(options: argparse.Namespace, good: Good) -> int:
     """Read one input again."""
     name = options.reader[0] if options.reader else options.replay.parent.name
     with Worker(good) as worker:
-        result = worker.tried(name, picked_up(options.replay))
+        result = worker.read_input(name, picked_up(options.replay))
     print(f"{result.kind}: {result.where}\n{result.detail}")
     return int(result.kind not in (READ, REFUSED))
 

@@ -1,4 +1,4 @@
-"""Good input, changed again and again: what reaches new lines, or new messages, is changed further."""
+"""A fuzzing campaign: inputs are changed repeatedly; those that reach new lines or messages are changed further."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from fuzz.mutators import mutated
 from fuzz.worker import Worker
 
 ACCEPTED, RECENT = 0.7, 0.5
-"""So often, one that was read is changed, which gets further than one that was refused; one of the last few."""
+"""Probability that an input that was read is changed, not one that was refused; that one of the last few is."""
 STOP_AFTER = 200
-"""Inputs of one kind of hang or crash: each costs a new process, so a reader full of them is left."""
+"""Hangs and crashes after which a reader is abandoned: each of them costs a new process."""
 
 
 @dataclass
 class Finding:
-    """A defect: the first input that showed it, and how many did."""
+    """A defect: the first input that showed it, and the number of inputs that did."""
 
     result: Result
     files: Files
@@ -29,11 +29,12 @@ class Finding:
 
 
 @dataclass
-class Tally:
-    """What was seen of one reader.
+class CampaignRecord:
+    """Counts and findings of the campaign on one reader.
 
-    made     : inputs made, some of them alike
-    distinct : inputs read
+    made     : number of inputs made, some of them equal
+    distinct : number of different inputs, which were read
+    kept     : number of inputs that were changed further
     """
 
     reader: str
@@ -47,7 +48,7 @@ class Tally:
     kept: int = 0
 
     def add(self, result: Result, files: Files) -> bool:
-        """Take one result; return whether it is new in some way."""
+        """Record one result; return whether its input is worth further changes."""
         self.distinct += 1
         self.kinds[result.kind] += 1
         key = (result.kind, result.where)
@@ -62,31 +63,33 @@ class Tally:
     _messages: set[tuple[str, str]] = field(default_factory=set)
 
 
-def campaign(reader: Reader, worker: Worker, good: Good, seed: int, going_on: Callable[[Tally], bool]) -> Tally:
-    """Read good input, then changed input while ``going_on`` says so. The same seed makes the same inputs."""
-    chance, tally, seen = Random(f"{seed} {reader.name}"), Tally(reader.name), set[bytes]()
+def campaign(
+    reader: Reader, worker: Worker, good: Good, seed: int, going_on: Callable[[CampaignRecord], bool]
+) -> CampaignRecord:
+    """Read good inputs, then changed inputs while ``going_on`` is true; the same seed makes the same inputs."""
+    chance, record, seen = Random(f"{seed} {reader.name}"), CampaignRecord(reader.name), set[bytes]()
     accepted, refused = list[Files](), list[Files]()
     queue = reader.seeds(good)
     start_s = time.monotonic()
-    while (queue or going_on(tally)) and tally.kinds[HANG] + tally.kinds[CRASH] < STOP_AFTER:
+    while (queue or going_on(record)) and record.kinds[HANG] + record.kinds[CRASH] < STOP_AFTER:
         first = bool(queue)
         files = (
             queue.pop(0)
             if first
             else mutated(chance, _chosen(chance, accepted, refused), chance.choice(accepted + refused))
         )
-        tally.made += 1
+        record.made += 1
         if digest(files) in seen:
             continue
         seen.add(digest(files))
         begun_s = time.monotonic()
-        result = worker.tried(reader.name, files)
-        new = tally.add(result, files)
-        tally.slowest_s = max(tally.slowest_s, time.monotonic() - begun_s)
+        result = worker.read_input(reader.name, files)
+        new = record.add(result, files)
+        record.slowest_s = max(record.slowest_s, time.monotonic() - begun_s)
         if new or first:
             (accepted if result.kind == READ else refused).append(files)
-    tally.kept, tally.seconds = len(accepted + refused), time.monotonic() - start_s
-    return tally
+    record.kept, record.seconds = len(accepted + refused), time.monotonic() - start_s
+    return record
 
 
 def _chosen(chance: Random, accepted: list[Files], refused: list[Files]) -> Files:

@@ -12,12 +12,12 @@ from lipmotion.corpora.store import Corpus
 
 @pytest.fixture(scope="session")
 def good(toy_corpus: Corpus, toy_model_file: Path, coupled_model_file: Path) -> Good:
-    """The good input of all tests."""
+    """The good corpus and models of all tests."""
     return Good(toy_corpus.path, (toy_model_file, coupled_model_file))
 
 
 @pytest.fixture(scope="module")
 def worker(good: Good) -> Iterator[Worker]:
-    """A process that reads."""
+    """A worker with all readers."""
     with Worker(good) as process:
         yield process

@@ -1,4 +1,4 @@
-"""What was found: made small, and kept."""
+"""Reduction and storage of the inputs that showed defects."""
 
 from __future__ import annotations
 
@@ -7,26 +7,26 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from fuzz.campaign import Finding, Tally
+from fuzz.campaign import Finding, CampaignRecord
 from fuzz.inputs import Files, lay_out
 from fuzz.judge import HANG
 from fuzz.worker import Worker
 
 PATIENCE_S = 30.0
-"""How long the inputs of one reader are made smaller."""
+"""Time for the reduction of the inputs of one reader."""
 
 
-def keep(tally: Tally, worker: Worker, folder: Path) -> list[Path]:
-    """Write every finding of a reader, as small as is easily had, into a folder each; return these."""
-    patience_s = PATIENCE_S / max(len(tally.findings), 1)
-    return [_kept(tally.reader, finding, worker, folder, patience_s) for finding in tally.findings.values()]
+def keep(record: CampaignRecord, worker: Worker, folder: Path) -> list[Path]:
+    """Write every finding of a reader, reduced, into a folder of its own; return the folders."""
+    patience_s = PATIENCE_S / max(len(record.findings), 1)
+    return [_kept(record.reader, finding, worker, folder, patience_s) for finding in record.findings.values()]
 
 
 def _kept(reader: str, finding: Finding, worker: Worker, folder: Path, patience_s: float) -> Path:
     result = finding.result
 
     def same(files: Files) -> bool:
-        found = worker.tried(reader, files)
+        found = worker.read_input(reader, files)
         return (found.kind, found.where) == (result.kind, result.where)
 
     files = finding.files if result.kind == HANG else smallest(finding.files, same, patience_s)
@@ -39,7 +39,7 @@ def _kept(reader: str, finding: Finding, worker: Worker, folder: Path, patience_
 
 
 def smallest(files: Files, same: Callable[[Files], bool], patience_s: float) -> Files:
-    """Return less of each file, as long as the same comes of it: parts are left out, ever smaller ones."""
+    """Return shorter files with the same result: ever smaller parts are left out."""
     end_s = time.monotonic() + patience_s
     for name in sorted(files):
         size = max(len(files[name]) // 2, 1)

@@ -1,4 +1,4 @@
-"""What was found once and is too large to be kept as files: much of the same."""
+"""Inputs that once showed defects and are too large to be stored: long repetitions."""
 
 from __future__ import annotations
 

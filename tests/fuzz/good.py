@@ -1,4 +1,4 @@
-"""The good things that everything begins with, made from the toy corpus."""
+"""The good corpus and models of the fuzzer, made from the toy corpus."""
 
 from __future__ import annotations
 
@@ -33,5 +33,5 @@ def make_good(folder: Path) -> Good:
 
 
 def good_in(folder: Path) -> Good:
-    """Return what ``make_good`` made there."""
+    """Return the good corpus and models that ``make_good`` wrote to a folder."""
     return Good(folder / "corpus", tuple(folder / f"{name}.lipmotion" for name in ENGINES))

@@ -1,4 +1,4 @@
-"""What is fuzzed: files, who reads them, and the good ones that all begins with."""
+"""Inputs of the fuzzer, the readers that are fuzzed, and the good inputs from which all others are made."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from hashlib import sha256
 from pathlib import Path
 
 Files = dict[str, bytes]
-"""One input: contents by name; a name may have folders in it."""
+"""One input: contents of files by name; a name may include folders."""
 
 
 class ImplausibleError(AssertionError):
-    """What was read, or made of it, cannot be."""
+    """A reader accepted an input, but its result is implausible."""
 
 
 @dataclass(frozen=True)
 class Good:
-    """Good things to read bad ones with.
+    """A good corpus and good models, which readers of other inputs need.
 
     corpus : a prepared corpus
     models : trained on it; the first one is of the default engine
@@ -31,8 +31,8 @@ class Good:
 class Reader:
     """A reader of the package.
 
-    seeds : good inputs
-    read  : reads the files of a folder, and looks at what came of it
+    seeds : returns good inputs
+    read  : reads the files of a folder, and checks the result
     """
 
     name: str
@@ -41,7 +41,7 @@ class Reader:
 
 
 def digest(files: Files) -> bytes:
-    """Return what tells one input from another."""
+    """Return a digest that identifies an input."""
     found = sha256()
     for name, content in sorted(files.items()):
         found.update(f"{len(name)} {name} {len(content)} ".encode("utf-8", "surrogatepass") + content)
@@ -49,7 +49,7 @@ def digest(files: Files) -> bytes:
 
 
 def lay_out(files: Files, folder: Path) -> None:
-    """Write an input into a folder that is empty."""
+    """Write the files of an input into an empty folder."""
     for name, content in files.items():
         path = folder / name
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""What became of one input."""
+"""Classification of the result of one input."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ READ, REFUSED = "read", "refused"
 ERROR, IMPLAUSIBLE, LEFT, MEMORY, HANG, CRASH = "error", "implausible", "left behind", "memory", "hang", "crash"
 WRONG = (ERROR, IMPLAUSIBLE, LEFT, MEMORY, HANG, CRASH)
 LONGEST_LINE = 2000
-"""Letters of a message."""
+"""Most characters of an error message."""
 OBEYED = re.compile("[\x00-\x1f\x7f-\x9f]")
-"""What a terminal obeys instead of showing it."""
+"""Terminal control characters."""
 
 
 @dataclass(frozen=True)
 class Result:
-    """What became of an input.
+    """The result of reading an input.
 
-    kind   : read or refused, or what is wrong
-    where  : tells one defect from another
-    detail : for people
-    lines  : of the package that were run for the first time
+    kind   : read, refused, or a kind of defect
+    where  : identifies a defect
+    detail : description for people
+    lines  : lines of the package that ran for the first time
     """
 
     kind: str
@@ -38,8 +38,8 @@ class Result:
     lines: frozenset[str] = field(default_factory=frozenset)
 
 
-def judged(reader: Reader, files: Files, folder: Path, good: Good) -> Result:
-    """Read an input in a folder of its own, which is emptied afterwards."""
+def read_result(reader: Reader, files: Files, folder: Path, good: Good) -> Result:
+    """Return the result of reading an input in a folder of its own, which is removed afterwards."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()
     try:
@@ -63,25 +63,25 @@ def _read(reader: Reader, folder: Path, good: Good) -> Result:
     except MemoryError as error:
         return Result(MEMORY, place_of(error), _trace(error))
     except Exception as error:
-        return _told(error)
+        return _error_result(error)
     return Result(READ)
 
 
-def _told(error: Exception) -> Result:
-    """Return what the command line makes of an error."""
+def _error_result(error: Exception) -> Result:
+    """Return the result for an error: refused, if the command line reports it in one good line."""
     known = outcome(error)
     if known is None:
         return Result(ERROR, f"{type(error).__name__} {place_of(error)}", _trace(error))
     code, line = known
     if len(line) > LONGEST_LINE:
-        return Result(ERROR, f"a long message {place_of(error)}", f"{len(line)} letters: {line[:400]!r}")
+        return Result(ERROR, f"a long message {place_of(error)}", f"{len(line)} characters: {line[:400]!r}")
     if OBEYED.search(line):
         return Result(ERROR, f"a raw message {place_of(error)}", repr(line))
     return Result(REFUSED, f"{code} {_shape(line)}", line)
 
 
 def place_of(error: BaseException) -> str:
-    """Return the innermost function of the package on the way to an error."""
+    """Return the innermost function of the package in the trace of an error."""
     steps = [step for step in traceback.extract_tb(error.__traceback__) if "lipmotion" in Path(step.filename).parts]
     return f"{Path(steps[-1].filename).name}:{steps[-1].name}" if steps else "outside"
 
@@ -91,17 +91,17 @@ def _trace(error: BaseException) -> str:
 
 
 def _shape(line: str) -> str:
-    """Return a message without what comes from the input."""
+    """Return a message without the parts that quote the input."""
     return re.sub(r"\d+|'[^']*'|\"[^\"]*\"|/\S+|\(.*\)", "", line)[:80]
 
 
 def quiet() -> None:
-    """Let warnings of the package be made, and go nowhere."""
+    """Format warnings of the package, but do not print them."""
     logger = logging.getLogger("lipmotion")
-    logger.addHandler(_Unheard())
+    logger.addHandler(_FormatOnly())
     logger.propagate = False
 
 
-class _Unheard(logging.Handler):
+class _FormatOnly(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         record.getMessage()

@@ -1,4 +1,4 @@
-"""Which lines of the package have been run: an input that reaches new ones is worth changing further."""
+"""Line coverage of the package: inputs that reach new lines are changed further."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ import lipmotion
 
 ROOT = str(Path(lipmotion.__file__).parent)
 OFTEN, SELDOM = 500, 50
-"""A function that has been called so often without a new line is watched once in so many calls."""
+"""After so many calls without a new line, a function is traced only once in so many calls."""
 
 
-class Lines:
-    """Notes every line of the package when it is first run, at little cost afterwards."""
+class LineCoverage:
+    """Records every line of the package when it first runs; later runs of the line cost little."""
 
     def __init__(self) -> None:
         self._new: set[str] = set()
 
     def taken(self) -> set[str]:
-        """Return what was first run since the last call."""
+        """Return the lines that first ran since the last call."""
         new, self._new = self._new, set()
         return new
 
@@ -31,7 +31,7 @@ class Lines:
     if sys.version_info >= (3, 12):
 
         def watch(self) -> None:
-            """Begin."""
+            """Start recording."""
             tool, events = sys.monitoring.COVERAGE_ID, sys.monitoring.events
             sys.monitoring.use_tool_id(tool, "fuzz")
             sys.monitoring.register_callback(tool, events.LINE, self._run)
@@ -45,7 +45,7 @@ class Lines:
     else:
 
         def watch(self) -> None:
-            """Begin."""
+            """Start recording."""
             self._missing: dict[CodeType, set[int]] = {}
             self._calls: dict[CodeType, int] = {}
             sys.settrace(self._called)

@@ -1,4 +1,4 @@
-"""How much memory, and how much of a processor, one input takes."""
+"""Memory and processor time that the reading of one input takes."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ STATUS, PEAK = Path("/proc/self/status"), Path("/proc/self/clear_refs")
 
 
 class Memory:
-    """Measures what one input adds to the memory of this process, and bounds it.
+    """Measures by how much one input makes this process grow, and limits its size.
 
-    most_mb : what is too much; three times as much, in address space, cannot be had at all
+    most_mb : growth that counts as a defect; the address space is limited to three times as much
     """
 
     MOST_MB = 500
@@ -35,26 +35,26 @@ class Memory:
             resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
     def begin(self) -> None:
-        """Measure from here on."""
+        """Start a new measurement."""
         with suppress(OSError):
-            PEAK.write_text("5")  # of the peak alone
+            PEAK.write_text("5")  # resets the peak
         self._before_mb = _now_mb("VmRSS")
 
     def grown_mb(self) -> float:
-        """Return by how much the process has been larger than at the beginning."""
+        """Return the largest growth since ``begin``, in megabytes."""
         return _now_mb("VmHWM") - self._before_mb
 
     def too_much(self) -> bool:
-        """Whether that is too much."""
+        """Return whether the growth counts as a defect."""
         return self.grown_mb() > self._most_mb
 
-    def weary(self) -> bool:
-        """Whether so much is kept that a new process is better."""
+    def retains_much(self) -> bool:
+        """Return whether the process keeps so much memory that it should be replaced."""
         return _now_mb("VmRSS") - self._first_mb > self._most_mb / 2
 
 
 def _now_mb(name: str) -> float:
-    """Return a figure of this process, 0 where the system does not tell."""
+    """Return a figure of this process in megabytes; 0 where the system does not provide it."""
     try:
         lines = STATUS.read_text().splitlines()
     except OSError:
@@ -63,7 +63,7 @@ def _now_mb(name: str) -> float:
 
 
 def busy_s(process: int) -> float:
-    """Return the processor time of a process, infinite where the system does not tell."""
+    """Return the processor time of a process in seconds; infinite where the system does not provide it."""
     try:
         fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
     except OSError:

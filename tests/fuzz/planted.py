@@ -1,4 +1,4 @@
-"""Readers with defects, to see that the fuzzer finds them."""
+"""A reader with planted defects, to test that the fuzzer finds them."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def seeds(_: Good) -> list[Files]:
 
 
 def read(folder: Path, _: Good) -> None:
-    """Do what the first letters say."""
+    """Show the defect that the content of the file names."""
     order = (folder / "a.txt").read_bytes()
     if b"raise" in order:
         raise RuntimeError("planted")

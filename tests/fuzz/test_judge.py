@@ -7,7 +7,7 @@ import pytest
 
 from fuzz import judge
 from fuzz.inputs import Files, Good, Reader
-from fuzz.judge import ERROR, MEMORY, REFUSED, Result, judged
+from fuzz.judge import ERROR, MEMORY, REFUSED, Result, read_result
 from fuzz.planted import seeds
 from lipmotion.errors import InputError
 
@@ -19,7 +19,7 @@ def read_with(error: Exception, folder: Path) -> Result:
     def read(*_: object) -> None:
         raise error
 
-    return judged(Reader("planted", seeds, read), FILES, folder / "bad", NOWHERE)
+    return read_result(Reader("planted", seeds, read), FILES, folder / "bad", NOWHERE)
 
 
 @pytest.mark.parametrize("line", ["x" * 5000, "a\nb", "\x1b[2J", "\x9b2J"])
@@ -41,7 +41,7 @@ def test_memory_and_warnings_are_defects(tmp_path: Path) -> None:
         warnings.warn("overflow", RuntimeWarning, stacklevel=1)
 
     assert read_with(MemoryError("no room"), tmp_path).kind == MEMORY
-    assert judged(Reader("planted", seeds, warn), FILES, tmp_path / "bad", NOWHERE).kind == ERROR
+    assert read_result(Reader("planted", seeds, warn), FILES, tmp_path / "bad", NOWHERE).kind == ERROR
 
 
 def test_nothing_stays(tmp_path: Path) -> None:

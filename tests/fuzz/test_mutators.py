@@ -1,4 +1,4 @@
-"""Changes that keep the form."""
+"""Mutations that keep the form of a file."""
 
 from __future__ import annotations
 

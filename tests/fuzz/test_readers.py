@@ -1,4 +1,4 @@
-"""Every reader with its good input, a few changes of that, and all that was ever found."""
+"""Every reader with its good inputs, some mutations of them, and all inputs that once showed defects."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from fuzz.worker import Worker
 FOUND = Path(__file__).parent / "found"
 FOLDERS = sorted(path for path in FOUND.glob("*/*") if path.is_dir())
 INPUTS = {"model": 8, "video": 20, "transcript": 20, "lexicon": 20}
-"""Changed inputs of readers that take longer."""
+"""Numbers of changed inputs of slower readers."""
 
 
 @pytest.mark.parametrize("name", READERS)
 def test_good_input_is_read(name: str, worker: Worker, good: Good) -> None:
-    results = [worker.tried(name, files) for files in READERS[name].seeds(good)]
+    results = [worker.read_input(name, files) for files in READERS[name].seeds(good)]
     assert {result.kind for result in results} <= {READ, REFUSED}, results
     assert results[0].kind == READ, results[0]
     assert sum(result.kind == READ for result in results) > len(results) / 2
@@ -53,5 +53,5 @@ def test_all_that_was_found_is_of_a_reader() -> None:
 
 
 def _check(worker: Worker, name: str, files: Files) -> None:
-    result = worker.tried(name, files)
+    result = worker.read_input(name, files)
     assert result.kind in (READ, REFUSED), f"{result.kind} {result.where}\n{result.detail}"

@@ -1,4 +1,4 @@
-"""The process that reads, with a reader that has defects."""
+"""The worker process, with a reader that has planted defects."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from fuzz.campaign import Tally, campaign
+from fuzz.campaign import CampaignRecord, campaign
 from fuzz.findings import keep, smallest
 from fuzz.inputs import Files, Good, picked_up
 from fuzz.judge import CRASH, ERROR, HANG, IMPLAUSIBLE, LEFT, MEMORY, READ, REFUSED
@@ -32,34 +32,34 @@ def planted() -> Iterator[Worker]:
 
 @pytest.mark.parametrize(("order", "kind"), ORDERS.items())
 def test_defects_are_told_apart(order: str, kind: str, planted: Worker) -> None:
-    result = planted.tried("planted", _said(order))
+    result = planted.read_input("planted", _input(order))
     assert result.kind == kind, result
     assert kind == READ or result.where
-    assert planted.tried("planted", _said("now")).kind == READ  # nothing of it is left
+    assert planted.read_input("planted", _input("now")).kind == READ  # the next input is not affected
 
 
 def test_a_hang() -> None:
     with Worker(NOWHERE, hang_s=1.0, readers=readers) as impatient:
-        result = impatient.tried("planted", _said("sleep"))
+        result = impatient.read_input("planted", _input("sleep"))
     assert result.kind == HANG
-    assert sys.platform == "win32" or "planted.py" in result.detail  # where it hangs
+    assert sys.platform == "win32" or "planted.py" in result.detail  # the place of the hang
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="memory is measured as Linux tells it")
 def test_too_much_memory(planted: Worker) -> None:
-    assert planted.tried("planted", _said("eat")).kind == MEMORY
+    assert planted.read_input("planted", _input("eat")).kind == MEMORY
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals as POSIX has them")
 def test_a_crash(planted: Worker) -> None:
-    result = planted.tried("planted", _said("abort"))
+    result = planted.read_input("planted", _input("abort"))
     assert (result.kind, result.where.split()[0]) == (CRASH, "SIGABRT")
-    assert planted.tried("planted", _said("now")).kind == READ
+    assert planted.read_input("planted", _input("now")).kind == READ
 
 
 def test_lines_are_new_once() -> None:
     with Worker(NOWHERE, readers=readers) as process:
-        first, second = (process.tried("planted", _said("now")).lines for _ in range(2))
+        first, second = (process.read_input("planted", _input("now")).lines for _ in range(2))
     assert any(line.startswith("units/transcript.py") for line in first)
     assert second == frozenset()
 
@@ -70,19 +70,19 @@ def test_smaller_ones_of_the_same() -> None:
 
 
 def test_a_finding_is_kept(planted: Worker, tmp_path: Path) -> None:
-    tally = Tally("planted")
-    files = _said("please raise it")
-    tally.add(planted.tried("planted", files), files)
-    (place,) = keep(tally, planted, tmp_path)
-    assert picked_up(place) == _said("raise")
+    record = CampaignRecord("planted")
+    files = _input("please raise it")
+    record.add(planted.read_input("planted", files), files)
+    (place,) = keep(record, planted, tmp_path)
+    assert picked_up(place) == _input("raise")
     assert "RuntimeError: planted" in place.with_name(f"{place.name}.trace").read_text(encoding="utf-8")
 
 
 def test_a_campaign_finds_and_counts(planted: Worker) -> None:
     (reader,) = readers().values()
 
-    def run() -> Tally:
-        return campaign(reader, planted, NOWHERE, 3, lambda tally: tally.distinct < 60)
+    def run() -> CampaignRecord:
+        return campaign(reader, planted, NOWHERE, 3, lambda record: record.distinct < 60)
 
     first, second = run(), run()
     assert first.distinct == 60 <= first.made
@@ -90,5 +90,5 @@ def test_a_campaign_finds_and_counts(planted: Worker) -> None:
     assert first.kinds == second.kinds
 
 
-def _said(order: str) -> Files:
+def _input(order: str) -> Files:
     return {"a.txt": order.encode()}

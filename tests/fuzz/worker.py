@@ -1,4 +1,4 @@
-"""A process that reads bad input, and what is left of it."""
+"""A process in which readers are run, because bad input may crash or hang it."""
 
 from __future__ import annotations
 
@@ -15,29 +15,29 @@ from types import TracebackType
 from typing import Any
 
 from fuzz.inputs import Files, Good, Reader
-from fuzz.judge import CRASH, HANG, LEFT, MEMORY, READ, REFUSED, Result, judged, quiet
-from fuzz.lines import Lines
+from fuzz.judge import CRASH, HANG, LEFT, MEMORY, READ, REFUSED, Result, read_result, quiet
+from fuzz.lines import LineCoverage
 from fuzz.memory import Memory, busy_s
 
 HANG_S = 20.0
 PATIENCE = 3
-"""So many times as long it may take where others keep the processor busy."""
+"""Factor between clock time and processor time that is allowed where other processes keep the processor busy."""
 START_S = 300.0
-"""The first import compiles."""
+"""Longest start of the process: the first import compiles kernels."""
 Readers = dict[str, Reader]
 
 
 class Worker:
-    """Reads inputs, one after the other; a process that died or hung is replaced by another.
+    """Runs readers on inputs in a process; a process that crashed or hangs is replaced by another.
 
-    readers : a function of a module, which gives them by name
-    hang_s  : after this long, in processor time, it hangs; ``PATIENCE`` times as long by the clock
+    readers : a function that returns the readers by name; None: all readers
+    hang_s  : processor time after which a reader counts as hanging; ``PATIENCE`` times as long by the clock
     """
 
     def __init__(
         self, good: Good, *, hang_s: float = HANG_S, memory_mb: int = Memory.MOST_MB, readers: Any = None
     ) -> None:
-        self._told = (good, memory_mb, readers)
+        self._arguments = (good, memory_mb, readers)
         self._hang_s = hang_s
         self._process: Any = None
         self._folder = tempfile.TemporaryDirectory(prefix="lipmotion-fuzz-")
@@ -50,15 +50,15 @@ class Worker:
         self._end()
         self._folder.cleanup()
 
-    def tried(self, reader: str, files: Files) -> Result:
-        """Return what became of an input."""
+    def read_input(self, reader: str, files: Files) -> Result:
+        """Return the result of reading an input."""
         if self._process is None:
             self._start()
         try:
             self._pipe.send((reader, files))
             if self._answered():
-                result, weary = self._pipe.recv()
-                if weary:
+                result, replace_process = self._pipe.recv()
+                if replace_process:
                     self._end()
                 return result
         except (EOFError, OSError):
@@ -66,7 +66,7 @@ class Worker:
         return self._hung()
 
     def _answered(self) -> bool:
-        """Wait for an answer, as long as it may take."""
+        """Return whether an answer arrives before the reader counts as hanging."""
         before_s = busy_s(self._process.pid)
         for _ in range(4 * PATIENCE):
             if self._pipe.poll(self._hang_s / 4):
@@ -79,33 +79,33 @@ class Worker:
         spawn = multiprocessing.get_context("spawn")
         self._pipe, theirs = spawn.Pipe()
         self._log.write_bytes(b"")
-        self._process = spawn.Process(target=serve, args=(theirs, self._folder.name, *self._told), daemon=True)
+        self._process = spawn.Process(target=serve, args=(theirs, self._folder.name, *self._arguments), daemon=True)
         self._process.start()
         theirs.close()
         if not self._pipe.poll(START_S):
-            raise RuntimeError(f"the process that reads does not start: {self._said()}")
+            raise RuntimeError(f"the reading process does not start: {self._log_text()}")
         try:
             self._pipe.recv()
         except EOFError as error:
-            raise RuntimeError(f"the process that reads ended: {self._said()}") from error
+            raise RuntimeError(f"the reading process ended: {self._log_text()}") from error
 
     def _died(self) -> Result:
         self._process.join()
         code = self._process.exitcode
         name = signal.Signals(-code).name if code < 0 else f"exit {code}"
-        said = self._said()
+        log_text = self._log_text()
         self._end()
-        return Result(CRASH, f"{name} {_place(said)}", said)
+        return Result(CRASH, f"{name} {_place(log_text)}", log_text)
 
     def _hung(self) -> Result:
         if hasattr(signal, "SIGUSR1"):
             os.kill(self._process.pid, signal.SIGUSR1)
             self._process.join(1.0)
-        said = self._said()
+        log_text = self._log_text()
         self._end()
-        return Result(HANG, _place(said), said)
+        return Result(HANG, _place(log_text), log_text)
 
-    def _said(self) -> str:
+    def _log_text(self) -> str:
         return self._log.read_text(encoding="utf-8", errors="replace")[-4000:]
 
     def _end(self) -> None:
@@ -117,8 +117,8 @@ class Worker:
 
 
 def serve(pipe: Any, folder: str, good: Good, memory_mb: int, readers: Any) -> None:
-    """Read what comes through the pipe, in a folder that must stay empty."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the one who asks
+    """Read the inputs that arrive through the pipe, in a folder that must stay empty."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is handled by the parent process
     here, log = Path(folder) / "here", (Path(folder) / "log").open("a")
     here.mkdir(exist_ok=True)
     for number in (1, 2):
@@ -129,15 +129,15 @@ def serve(pipe: Any, folder: str, good: Good, memory_mb: int, readers: Any) -> N
     os.chdir(here)
     tempfile.tempdir = str(here)
     quiet()
-    known, lines, memory = _known(readers), Lines(), Memory(memory_mb)
+    known, lines, memory = _known(readers), LineCoverage(), Memory(memory_mb)
     lines.watch()
     pipe.send("ready")
     with suppress(EOFError, OSError):
         while True:
             reader, files = pipe.recv()
             memory.begin()
-            result = judged(known[reader], files, Path(folder) / "bad", good)
-            pipe.send((replace(_checked(result, memory, here), lines=frozenset(lines.taken())), memory.weary()))
+            result = read_result(known[reader], files, Path(folder) / "bad", good)
+            pipe.send((replace(_checked(result, memory, here), lines=frozenset(lines.taken())), memory.retains_much()))
 
 
 def _known(readers: Any) -> Readers:
@@ -149,7 +149,7 @@ def _known(readers: Any) -> Readers:
 
 
 def _checked(result: Result, memory: Memory, here: Path) -> Result:
-    """Return the result, or what the reading used up or left."""
+    """Return the result; a defect instead, if the reader used too much memory or left files behind."""
     left = sorted(path.name for path in here.iterdir())
     for name in left:
         _removed(here / name)
@@ -169,7 +169,7 @@ def _removed(path: Path) -> None:
         path.unlink()
 
 
-def _place(said: str) -> str:
-    """Return the innermost function of the package in what faulthandler wrote."""
-    found = re.search(r'File ".*?lipmotion/([^"]*\.py)", line \d+ in (\S+)', said)
+def _place(log_text: str) -> str:
+    """Return the innermost function of the package in a trace of faulthandler."""
+    found = re.search(r'File ".*?lipmotion/([^"]*\.py)", line \d+ in (\S+)', log_text)
     return f"{Path(found[1]).name}:{found[2]}" if found else "outside"

@@ -1,4 +1,4 @@
-"""``python -m portable.recordings FILE ...``: the shipped model on recordings, here and on a processor without AVX."""
+"""``python -m portable.recordings FILE ...``: compare the shipped model on this processor and on one without AVX."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def compute(output: str, recordings: Sequence[str]) -> None:
 
 
 def compare(recordings: Sequence[str]) -> None:
-    """Print how much differs."""
+    """Print how many phones and how far the motion differ."""
     with TemporaryDirectory() as folder:
         paths = [Path(folder) / "here.npz", Path(folder) / "there.npz"]
         for path, changes in zip(paths, ({}, BEFORE_AVX), strict=True):

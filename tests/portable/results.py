@@ -1,4 +1,4 @@
-"""``python -m portable.results OUT.npz [MODEL ...]``: what is compared between processors, as arrays by name."""
+"""``python -m portable.results OUT.npz``: write the results that are compared between processors, as arrays."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ ENGINES = {"trajectory": {}, "joint": {"mixtures": 1}, "coupled": {"chains": "sV
 Results = Iterator[tuple[str, NDArray[np.generic]]]
 
 
-def nothing_said() -> dict[str, Audio]:
+def without_speech() -> dict[str, Audio]:
     """Return sounds of which all features are 0."""
     values = {"silence": np.zeros(RATE_HZ), "ten minutes of silence": np.zeros(600 * RATE_HZ)}
     values |= {"constant": np.full(RATE_HZ, 0.3), "faint constant": np.full(3 * RATE_HZ, 1e-6)}
@@ -36,11 +36,11 @@ def nothing_said() -> dict[str, Audio]:
 
 
 def front_ends() -> Results:
-    for name, audio in nothing_said().items():
+    for name, audio in without_speech().items():
         yield f"features of {name}", mfcc(audio).values
-    said = toy_sentences(3)[1].audio
-    yield "features of speech", mfcc(said).values
-    yield "F0 of speech", np.nan_to_num(log_f0(said))
+    speech = toy_sentences(3)[1].audio
+    yield "features of speech", mfcc(speech).values
+    yield "F0 of speech", np.nan_to_num(log_f0(speech))
 
 
 def generated(name: str, made: Generation) -> Results:
@@ -56,7 +56,7 @@ def animated(name: str, model: Model | None, speech: Audio | Path) -> Results:
 
 
 def trained() -> Results:
-    """Yield what models say that are trained here."""
+    """Yield the results of models that are trained here."""
     with TemporaryDirectory() as folder:
         corpus = Corpus.create(Path(folder) / "toy")
         for utterance in toy_utterances(8):

@@ -1,4 +1,4 @@
-"""``python -m portable.run``: the numeric tests as other processors would run them (``make test-portable``)."""
+"""``python -m portable.run``: run the numeric tests with the kernels of other processors (``make test-portable``)."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ NUMERIC = (
 )
 """Less than a minute of tests that compare what was computed; name others on the command line for more."""
 LEFT_OUT = ["-m", "not recordings and not slow and not video", "-k", "not memory"]
-"""These only take longer: what they compute, the others compute as well."""
+"""Tests that take longer and compute nothing that the others do not."""
 
 
 class Outcome(NamedTuple):
-    """What came of the tests under some settings."""
+    """The outcome of the tests under one setting."""
 
     name: str
     passed: bool
@@ -52,7 +52,7 @@ def settings() -> dict[str, dict[str, str]]:
 
 
 def tested(name: str, changes: dict[str, str], tests: Sequence[str]) -> Outcome:
-    """Run the tests in a process of their own."""
+    """Return the outcome of the tests in a process with changed environment variables."""
     began = time.monotonic()
     command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", *LEFT_OUT, *tests]
     ran = subprocess.run(

@@ -1,4 +1,4 @@
-"""Other processors, as far as this one can pretend to be them."""
+"""Environment variables that make this processor compute like others."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from functools import cache
 CORES = ("Haswell", "Zen", "SkylakeX", "Sandybridge", "Prescott")
 """Values of ``OPENBLAS_CORETYPE``: the processor whose matrix products are used."""
 BEFORE_AVX = {"OPENBLAS_CORETYPE": "Prescott", "NPY_DISABLE_CPU_FEATURES": "X86_V3 X86_V4 AVX512_ICL AVX512_SPR"}
-"""A processor of 2004, NumPy's own loops included."""
+"""A processor without AVX, also in NumPy's own loops."""
 KERNELS = "from lipmotion.kernels.threads import blas_kernels; print('; '.join(blas_kernels()))"
 
 
 def environment(changes: dict[str, str]) -> dict[str, str]:
-    """Return the variables of a process with these changes. What NumPy cannot switch off it is not asked to."""
+    """Return the environment of a process with changes; processor features unknown to NumPy are left out of them."""
     import numpy as np
 
     known = set(np._core._multiarray_umath.__cpu_dispatch__)
@@ -27,7 +27,7 @@ def environment(changes: dict[str, str]) -> dict[str, str]:
 
 @cache
 def kernels(core: str) -> str:
-    """Return the kernels that a process really uses when it is told to use those of ``core``."""
+    """Return the kernels that a process actually uses with the core type ``core``."""
     found = subprocess.run(
         [sys.executable, "-c", KERNELS],
         env=environment({"OPENBLAS_CORETYPE": core}),
@@ -40,7 +40,7 @@ def kernels(core: str) -> str:
 
 
 def different_cores() -> dict[str, str]:
-    """Return the kernels of every core type that are not those of an earlier one: a build may hold few of them."""
+    """Return the kernels of the core types, without repetitions: a build may contain few of them."""
     found: dict[str, str] = {}
     for core in CORES:
         if kernels(core) not in found.values():

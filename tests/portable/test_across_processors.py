@@ -1,4 +1,4 @@
-"""What comes out on another processor is the same within the tolerance that docs/long-work.md states."""
+"""Results on another processor agree within the tolerances that docs/long-work.md states."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def test_phones_are_the_same(both):
             assert there[name].tolist() == values.tolist(), name
 
 
-def test_where_nothing_is_said_all_features_are_nothing(both):
+def test_features_of_silence_and_constants_are_zero(both):
     for results in both:
         for name, values in results.items():
             if name.startswith("features of") and name != "features of speech":

@@ -21,7 +21,7 @@ AGAIN = ("not a whole utterance", "delete this folder and prepare again")
 def _damaged(name: str, code: int, *messages: str, verb: str = "train") -> Callable[[Callable[[Path], object]], None]:
     """Return a decorator that adds a case with a damaged copy of the corpus.
 
-    verb : what is done with it, and options
+    verb : the verb that reads it, and its options
     """
 
     def keep(damage: Callable[[Path], object]) -> None:
@@ -35,7 +35,7 @@ def _damaged(name: str, code: int, *messages: str, verb: str = "train") -> Calla
     return keep
 
 
-def _first(corpus: Path) -> Path:
+def _first_training_folder(corpus: Path) -> Path:
     return min(path for path in (corpus / "utterances").iterdir() if _entry(path)["split"] == "train")
 
 
@@ -44,13 +44,13 @@ def _entry(folder: Path) -> dict[str, Any]:
     return entry
 
 
-def _listed(corpus: Path, **changes: object) -> None:
+def _change_manifest(corpus: Path, **changes: object) -> None:
     path = corpus / "corpus.json"
     path.write_text(json.dumps(json.loads(path.read_text(encoding="utf-8")) | changes), encoding="utf-8")
 
 
-def _described(corpus: Path, **changes: object) -> None:
-    path = _first(corpus) / "entry.json"
+def _change_entry(corpus: Path, **changes: object) -> None:
+    path = _first_training_folder(corpus) / "entry.json"
     path.write_text(json.dumps(_entry(path.parent) | changes), encoding="utf-8")
 
 
@@ -59,12 +59,12 @@ PICTURED = "train --visual eigenlips"
 
 @_damaged("no mouth pictures for eigenlips", 4, "no mouth pictures, which eigenlips need; prepare", verb=PICTURED)
 def _(corpus: Path) -> None:
-    _described(corpus, crops=False)
+    _change_entry(corpus, crops=False)
 
 
 @_damaged("mouth pictures of another size", 4, "mouth pictures of 2 sizes; prepare", verb=PICTURED)
 def _(corpus: Path) -> None:
-    first = _first(corpus)
+    first = _first_training_folder(corpus)
     np.save(first / "crops.npy", np.zeros((_entry(first)["frames"], 9, 9, 3), np.uint8))
 
 
@@ -78,7 +78,7 @@ for _name, _damage in {
 
 @_damaged("a newer version", 4, "corpus version 9, this lipmotion reads versions up to 2; upgrade lipmotion")
 def _(corpus: Path) -> None:
-    _listed(corpus, version=9)
+    _change_manifest(corpus, version=9)
 
 
 for _name, _list in {
@@ -90,7 +90,7 @@ for _name, _list in {
 
     @_damaged(_name, 4, "the list of utterances is damaged", "prepare the corpus again")
     def _(corpus: Path, content: object = _list) -> None:
-        _listed(corpus, utterances=content)
+        _change_manifest(corpus, utterances=content)
 
 
 for _name in ("../../elsewhere", "/etc", ".hidden", "a/b", ""):
@@ -98,22 +98,22 @@ for _name in ("../../elsewhere", "/etc", ".hidden", "a/b", ""):
     @_damaged(f"an utterance named {_name!r}", 4, "is not listed as one; prepare the corpus again")
     def _(corpus: Path, name: str = _name) -> None:
         entry = {"split": "train", "duration_s": 1, "frames": 1, "unseen_frames": 0}
-        _listed(corpus, utterances={name: entry})
+        _change_manifest(corpus, utterances={name: entry})
 
 
 @_damaged("an utterance that is not there", 4, *AGAIN)
 def _(corpus: Path) -> None:
-    shutil.rmtree(_first(corpus))
+    shutil.rmtree(_first_training_folder(corpus))
 
 
 @_damaged("a description that is no JSON", 4, *AGAIN)
 def _(corpus: Path) -> None:
-    (_first(corpus) / "entry.json").write_text("{")
+    (_first_training_folder(corpus) / "entry.json").write_text("{")
 
 
 @_damaged("info of a description that is no JSON", 4, *AGAIN, verb="corpus info")
 def _(corpus: Path) -> None:
-    (_first(corpus) / "entry.json").write_text("{")
+    (_first_training_folder(corpus) / "entry.json").write_text("{")
 
 
 for _key, _value in {
@@ -129,43 +129,43 @@ for _key, _value in {
 
     @_damaged(f"{_key} that are {_value!r}", 4, *AGAIN)
     def _(corpus: Path, key: str = _key, value: object = _value) -> None:
-        _described(corpus, **{key: value})
+        _change_entry(corpus, **{key: value})
 
 
 for _array in ("audio", "features", "motion", "seen"):
 
     @_damaged(f"without its {_array}", 4, *AGAIN)
     def _(corpus: Path, name: str = _array) -> None:
-        (_first(corpus) / f"{name}.npy").unlink()
+        (_first_training_folder(corpus) / f"{name}.npy").unlink()
 
     @_damaged(f"{_array} cut off", 4, *AGAIN)
     def _(corpus: Path, name: str = _array) -> None:
-        path = _first(corpus) / f"{name}.npy"
+        path = _first_training_folder(corpus) / f"{name}.npy"
         path.write_bytes(path.read_bytes()[:-20])
 
     @_damaged(f"{_array} of texts", 4, *AGAIN, "holds <U1, required")
     def _(corpus: Path, name: str = _array) -> None:
-        (_first(corpus) / f"{name}.npy").write_bytes(npy(np.array(["a"] * 50)))
+        (_first_training_folder(corpus) / f"{name}.npy").write_bytes(npy(np.array(["a"] * 50)))
 
     @_damaged(f"{_array} of another shape", 4, *AGAIN)
     def _(corpus: Path, name: str = _array) -> None:
-        path = _first(corpus) / f"{name}.npy"
+        path = _first_training_folder(corpus) / f"{name}.npy"
         path.write_bytes(npy(np.load(path, allow_pickle=False)[:5][None]))
 
     @_damaged(f"{_array} of a trillion numbers declared", 4, *AGAIN)
     def _(corpus: Path, name: str = _array) -> None:
-        (_first(corpus) / f"{name}.npy").write_bytes(declared("(1000000000000,)"))
+        (_first_training_folder(corpus) / f"{name}.npy").write_bytes(declared("(1000000000000,)"))
 
     @_damaged(f"{_array} of pickled objects", 4, *AGAIN)
     def _(corpus: Path, name: str = _array) -> None:
-        (_first(corpus) / f"{name}.npy").write_bytes(npy(np.array([{}], object)))
+        (_first_training_folder(corpus) / f"{name}.npy").write_bytes(npy(np.array([{}], object)))
 
 
 for _array in ("features", "motion"):
 
     @_damaged(f"NaN in {_array}", 4, *AGAIN, "not finite")
     def _(corpus: Path, name: str = _array) -> None:
-        path = _first(corpus) / f"{name}.npy"
+        path = _first_training_folder(corpus) / f"{name}.npy"
         values = np.load(path, allow_pickle=False)
         values[3, 0] = np.nan
         np.save(path, values)
@@ -196,7 +196,7 @@ for _array in ("audio", "features", "motion", "seen"):
 
     @_damaged(f"bytes flipped in the middle of {_array}", 4, *AGAIN)
     def _(corpus: Path, name: str = _array) -> None:
-        path = _first(corpus) / f"{name}.npy"
+        path = _first_training_folder(corpus) / f"{name}.npy"
         content = bytearray(path.read_bytes())
         middle = 128 + (len(content) - 128) // 2
         content[middle : middle + 4] = bytes(byte ^ 1 for byte in content[middle : middle + 4])
@@ -205,20 +205,20 @@ for _array in ("audio", "features", "motion", "seen"):
 
 @_damaged("a description with a key twice", 4, *AGAIN, "stands there twice")
 def _(corpus: Path) -> None:
-    path = _first(corpus) / "entry.json"
+    path = _first_training_folder(corpus) / "entry.json"
     path.write_text(path.read_text(encoding="utf-8").replace("{", '{"name": "a", ', 1), encoding="utf-8")
 
 
 @_damaged("an array that is a device", 4, *AGAIN, "pipe or a device")
 def _(corpus: Path) -> None:
-    path = _first(corpus) / "audio.npy"
+    path = _first_training_folder(corpus) / "audio.npy"
     path.unlink()
     path.symlink_to("/dev/zero")
 
 
 @_damaged("an utterance that is a link", 0, verb="corpus info")
 def _(corpus: Path) -> None:
-    path = _first(corpus)
+    path = _first_training_folder(corpus)
     path.rename(corpus / "moved").rename(corpus.parent / path.name)
     path.symlink_to(corpus.parent / path.name)
 

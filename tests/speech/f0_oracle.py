@@ -1,7 +1,7 @@
 """The slow, readable twin of the correlations of ``speech.f0``: one frame, one lag, one sample at a time.
 
 Written from its description: a windowed-sinc band pass of 255 taps from 50 to 1200 Hz that stops 0 Hz, every fourth
-sample; 160 of them centred on the frame, weighted by a Hann window; the likeness to itself, normalised. A thousandth of
+sample; 160 of them centred on the frame, weighted by a Hann window; correlated with itself, normalised. A thousandth of
 the power of the slope of the full signal, 10 ms either side, counts as silence.
 """
 
@@ -50,7 +50,7 @@ def frame(samples: Array, n: int) -> Array:
     return np.array([low_passed(samples, 160 * n + 4 * i - 318) for i in range(160)])
 
 
-def likeness(x: Array, lag: int, silence: float) -> float:
+def correlation(x: Array, lag: int, silence: float) -> float:
     """Return the correlation of a frame with itself ``lag`` samples later."""
     weights = [window(t) * window(t + lag) for t in range(160 - lag)]
     pairs = list(zip(weights, x[: 160 - lag], x[lag:], strict=True))
@@ -59,7 +59,7 @@ def likeness(x: Array, lag: int, silence: float) -> float:
     return product / (math.sqrt(energy[0] * energy[1]) + silence * sum(weights))
 
 
-def hiss(samples: Array, n: int) -> float:
-    """Return the power that a frame's hiss adds to silence."""
+def frication(samples: Array, n: int) -> float:
+    """Return the power that a frame's frication adds to silence."""
     times = range(160 * n - 160, 160 * n + 160)
     return sum((sample(samples, t) - sample(samples, t - 1)) ** 2 for t in times) / 320 / 1000

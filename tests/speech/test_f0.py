@@ -59,8 +59,8 @@ def test_correlations_are_their_slow_twin(n: int) -> None:
     samples = voice(np.linspace(90, 200, 1700)) + noise(1700) / 20
     fast = correlations(samples, slice(0, 11), 1e-5)[n]
     x = f0_oracle.frame(samples.astype(float), n)
-    silence = 1e-5 + f0_oracle.hiss(samples.astype(float), n)
-    slow = [f0_oracle.likeness(x, int(lag), silence) for lag in lags()[1::2]]
+    silence = 1e-5 + f0_oracle.frication(samples.astype(float), n)
+    slow = [f0_oracle.correlation(x, int(lag), silence) for lag in lags()[1::2]]
     assert lags()[1::2].tolist() == list(range(10, 68))
     assert fast[1::2] == pytest.approx(slow, abs=1e-4)
 
@@ -72,9 +72,9 @@ def test_lags_cover_the_range_and_one_more_at_either_end() -> None:
 
 
 def test_the_best_peaks_are_the_candidates() -> None:
-    likeness = np.zeros((2, len(lags())), np.float32)
-    likeness[0, 39:42] = 0.5, 0.9, 0.7
-    pitch, cost = candidates(likeness)
+    correlation = np.zeros((2, len(lags())), np.float32)
+    correlation[0, 39:42] = 0.5, 0.9, 0.7
+    pitch, cost = candidates(correlation)
     lag = lags()[40] + 0.5 / 6  # the top of the parabola, a sixth of a step later
     assert np.exp(pitch[0, 0]) == pytest.approx(4000 / lag)
     assert cost[0, 0] == pytest.approx(1 - (0.9 + 1 / 120) * (1 - 0.2 * lag / (4000 / 60)))
@@ -128,9 +128,9 @@ def test_speech_is_voiced_where_it_is(pitch_hz: float) -> None:
     time_s = np.arange(len(result)) / 100
     for span in phones:
         inner = ~np.isnan(result[(time_s > span.start_s + 0.03) & (time_s < span.end_s - 0.03)])
-        if all(part.voice >= 0.3 for part in PHONE_TARGETS[span.label.phone]):
+        if all(segment.voicing >= 0.3 for segment in PHONE_TARGETS[span.label.phone]):
             assert inner.all(), span
-        if all(part.voice == 0 for part in PHONE_TARGETS[span.label.phone]):
+        if all(segment.voicing == 0 for segment in PHONE_TARGETS[span.label.phone]):
             assert not inner.any(), span
 
 
@@ -139,7 +139,7 @@ def test_noise_has_no_voice(smoothing: list[float]) -> None:
     assert np.isnan(found(np.convolve(noise(20 * RATE_HZ), smoothing).astype(np.float32))).all()
 
 
-def test_hiss_has_no_voice() -> None:
+def test_hiss_is_unvoiced() -> None:
     forward, back = butter(4, 3000, fs=RATE_HZ, btype="high")
     assert np.isnan(found(lfilter(forward, back, noise(20 * RATE_HZ)).astype(np.float32))).all()
 

@@ -30,7 +30,7 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.pipeline.animate import animate, check_outputs, write
     from lipmotion.pipeline.posteriors import animate_with_posteriors, check_picture, write_posteriors
 
-    check_outputs(options.output, options.speech, rate_hz=options.rate, fps=options.fps)
+    check_outputs(options.output, options.speech, rate_hz=options.rate, fps=options.fps, face=options.face)
     if options.posteriors:
         check_picture(options.posteriors, options.speech)
     request, model = request_and_model(options)

@@ -75,7 +75,7 @@ def write(
     All of that is checked before the first file is written.
     """
     paths = [Path(output) for output in ([outputs] if isinstance(outputs, str | Path) else outputs)]
-    check_outputs(paths, speech, rate_hz=rate_hz, fps=fps)
+    check_outputs(paths, speech, rate_hz=rate_hz, fps=fps, face=face)
     videos = [path for path in paths if path.suffix.lower() == VIDEO_SUFFIX]
     if videos and "opening" not in generation.motion.names:
         raise ExportError(f"{videos[0]}: the motion has no channel 'opening' to draw a face from; write motion files")
@@ -99,11 +99,13 @@ def check_outputs(
     *,
     rate_hz: float | None = None,
     fps: float = 25.0,
+    face: str = "portrait",
 ) -> None:
     """Raise ExportError or InputError unless every output can be written: before work begins, not after it."""
     for hertz in (fps, rate_hz):
         if hertz is not None and not SLOWEST_HZ <= hertz <= FASTEST_HZ:
             raise InputError(f"the frame rate is {hertz}, required {SLOWEST_HZ:.0f} to {FASTEST_HZ:.0f} a second")
+    face_named(face)
     suffixes = (*motion_suffixes(), VIDEO_SUFFIX)
     check_distinct([Path(path) for path in outputs])
     for path in map(Path, outputs):

@@ -19,6 +19,7 @@ from lipmotion.speech.mfcc import FEATURES, mfcc
 from lipmotion.speech.recogniser import Recogniser, own_model_weight
 from lipmotion.speech.speaker_similarity import WARPS, SpeakerSimilarity, best_warp
 from lipmotion.stats.affine import AffineStatistics, Array, improved_transform, prior_statistics, transform_statistics
+from lipmotion.stats.em import run_em
 from lipmotion.stats.mixture import Mixtures
 from lipmotion.types import FRAME_RATE_HZ, Audio, Features
 from lipmotion.units import is_silent
@@ -142,7 +143,9 @@ def _improved(
     transform : to begin with [shape=(D, D + 1)]
     free      : its entries that may change [shape=(D, D + 1)]
     """
-    for _ in range(ITERATIONS):
-        statistics, _ = transform_statistics(mixtures, features, densities, transform)
-        transform = improved_transform(transform, statistics + prior, free)
-    return transform
+    return run_em(
+        transform,
+        lambda transform: transform_statistics(mixtures, features, densities, transform),
+        lambda transform, expected: improved_transform(transform, expected.statistics + prior, free),
+        ITERATIONS,
+    ).model

@@ -1,4 +1,4 @@
-"""Changes of good input: those of its bytes, and those that know its form."""
+"""Mutations of inputs: of their bytes, and of formats."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ FORMS: dict[str, tuple[Mutate, ...]] = {
 def mutated(chance: Random, files: Files, other: Files) -> Files:
     """Return an input with one to four changes in its files.
 
-    other : another one, of which parts may be taken
+    other : another input, of which parts may be taken
     """
     result = dict(files)
     for _ in range(min(1 + int(chance.expovariate(1.0)), 4)):
@@ -49,5 +49,5 @@ def _changed(chance: Random, name: str, content: bytes, other: bytes) -> bytes:
     ways = (*FORMS.get(PurePosixPath(name).suffix, ()), raw.change)
     try:
         return chance.choice(ways)(chance, content)[: raw.LARGEST]
-    except Exception:  # there is no such change of what is there
+    except Exception:  # the content does not allow this change
         return raw.change(chance, content)

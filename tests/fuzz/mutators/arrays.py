@@ -1,4 +1,4 @@
-"""NumPy's files: what the header declares, and what values there are."""
+"""Mutations of ``.npy`` files: of the header, and of the values."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SHAPES = (0, 1, -1, 2, 3, 1000, 10**6, 10**9, 2**31, 2**62, 2**64, 10**30)
 
 
 def change(chance: Random, content: bytes) -> bytes:
-    """Change the header, or the array so that the header fits it."""
+    """Change the header alone, or the array with its header."""
     header = chance.random() < 0.4
     try:
         array = np.load(io.BytesIO(content), allow_pickle=False)
@@ -28,7 +28,7 @@ def change(chance: Random, content: bytes) -> bytes:
 
 
 def _head(chance: Random, content: bytes) -> bytes:
-    """Declare another type, shape, order or version, or anything."""
+    """Change type, shape, order or version in the header, or its bytes."""
     end = content.find(b"\n") + 1
     if end < 12:
         return raw.change(chance, content)

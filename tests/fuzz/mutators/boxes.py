@@ -1,4 +1,4 @@
-"""Boxes of an MP4 file: times, sizes, counts, and which there are."""
+"""Mutations of MP4 files: boxes, and the numbers in them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ CONTAINERS = frozenset(
 
 @dataclass
 class Box:
-    """One box: what it holds, or the boxes in it."""
+    """One box: its content, or the boxes in it."""
 
     name: bytes
     body: bytes
@@ -24,7 +24,7 @@ class Box:
 
 
 def change(chance: Random, content: bytes) -> bytes:
-    """Change one box, the sizes of those around it right; what has none, as bytes."""
+    """Change one box and correct the sizes of the enclosing ones; content without boxes is changed as bytes."""
     root = Box(b"", b"", _boxes(content))
     places = list(_places(root))
     if not places:
@@ -73,7 +73,7 @@ def _written(box: Box) -> bytes:
 
 
 def _number(chance: Random, body: bytes) -> bytes:
-    """Write over one of the first numbers: versions, time scales, counts, durations."""
+    """Overwrite one of the first numbers: versions, time scales, counts, durations."""
     if len(body) < 4:
         return raw.change(chance, body)
     at = 4 * chance.randrange(min(len(body) // 4, 24))

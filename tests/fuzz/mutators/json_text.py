@@ -1,4 +1,4 @@
-"""Values of a JSON document: other types, huge numbers, no numbers, deep nesting, keys that come twice."""
+"""Mutations of JSON documents: other types, huge numbers, NaN, deep nesting, repeated keys."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ NUMBERS = (
 )
 VALUES: tuple[Any, ...] = (*NUMBERS, *NUMBERS, None, True, False, "", "0", "é\ud800", [], {}, [[]], [None], {"": None})
 DEEP = 100_000
-"""Brackets inside one another; Python's own limit is far lower."""
+"""Nested brackets; Python's own limit is far lower."""
 
 
 def change(chance: Random, content: bytes) -> bytes:
-    """Change one value of a document; what is no JSON, as bytes."""
+    """Change one value of a document; other content is changed as bytes."""
     try:
         tree = json.loads(content)
     except (ValueError, RecursionError):
@@ -83,7 +83,7 @@ def _set(chance: Random, within: Any, key: Any) -> None:
 
 
 def _written(chance: Random, tree: Any) -> bytes:
-    """Write a document, now and then with a key that comes twice."""
+    """Return a document as text, sometimes with a repeated key."""
     written = json.dumps(tree, ensure_ascii=chance.random() < 0.5).encode("utf-8", "surrogatepass")
     if isinstance(tree, dict) and tree and chance.random() < 0.1:
         key = chance.choice(list(tree))

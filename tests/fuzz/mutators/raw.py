@@ -1,4 +1,4 @@
-"""Bytes, whatever they mean."""
+"""Mutations of bytes, whatever the format."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ LARGEST = 1 << 23
 """Bytes of one file: larger ones are not made."""
 PIECES = (b"\0", b"\xff", b"-", b"nan", b"1e999", b"9" * 40, b'"', b"{", b"[", b"]", b",", b"\n", b"\t", b" ", b"null")
 EDGES = (0, 1, -1, 2, 127, 128, 255, 256, 32_767, 32_768, 65_535, 65_536, 2**31 - 1, 2**31, 2**32 - 1, 2**63 - 1, 2**63)
-"""Numbers that counts and sizes stumble over."""
+"""Numbers at the limits of integer types."""
 
 
 def change(chance: Random, content: bytes) -> bytes:
-    """Cut off, overwrite, leave out, put in, repeat, turn a bit round, write a number over."""
+    """Truncate, overwrite, remove, insert, repeat, flip a bit, or overwrite with a number."""
     at, size = chance.randrange(len(content) + 1), chance.choice((1, 2, 4, 8, 16, 64, 256, 4096))
     piece = chance.choice(PIECES) if chance.random() < 0.5 else chance.randbytes(chance.randint(1, 8))
     kind = chance.choice(("cut", "write", "remove", "insert", "repeat", "flip", "number", "number"))
@@ -33,11 +33,11 @@ def change(chance: Random, content: bytes) -> bytes:
 
 
 def number(chance: Random) -> bytes:
-    """Return a number from the edge of what fits, of any size and order of bytes."""
+    """Return a number at the limit of an integer type, of any size and byte order."""
     form = chance.choice("<>") + chance.choice("BHIQ")
     return struct.pack(form, chance.choice(EDGES) % (1 << 8 * struct.calcsize(form)))
 
 
 def spliced(chance: Random, content: bytes, other: bytes) -> bytes:
-    """Return the beginning of one and the end of another."""
+    """Return the beginning of one content with the end of another."""
     return content[: chance.randrange(len(content) + 1)] + other[chance.randrange(len(other)) :]

@@ -1,4 +1,4 @@
-"""Chunks of a WAV or AVI file: their sizes, their order, the fields of the format."""
+"""Mutations of WAV and AVI files: chunks, their sizes and order, and the fields of the format."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ VALUES = (0, 1, 2, 3, 6, 7, 8, 11, 16, 24, 32, 64, 255, 4000, 8000, 44_100, 65_5
 
 
 def change(chance: Random, content: bytes) -> bytes:
-    """Change one chunk, or which there are; what has none, as bytes."""
+    """Change, add or remove one chunk; content without chunks is changed as bytes."""
     chunks = _chunks(content)
     if content[:4] != b"RIFF" or not chunks:
         return raw.change(chance, content)

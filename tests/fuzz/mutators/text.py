@@ -1,4 +1,4 @@
-"""Lines, words, numbers and letters."""
+"""Mutations of text: lines, words, numbers, characters and encodings."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ WORDS = (
     ),
 )
 POWERS = (2,) * 4 + (3,) * 4 + (4, 4, 5, 6)
-"""How often something comes again, as powers of ten."""
+"""Numbers of repetitions, as powers of ten."""
 BREAKS = ("\r\n", "\r", "\n\n", "\x0b", "\u2028", "\t", ",", ";", " ", "")
 
 
 def change(chance: Random, content: bytes) -> bytes:
-    """Change a text, or how it is written as bytes."""
+    """Change a text, or its encoding."""
     words = content.decode("utf-8", "surrogateescape")
     way = chance.choice((_lines, _lines, _token, _token, _number, _number, _flood, _break, _letter, _coding))
     changed = way(chance, words)
@@ -60,7 +60,7 @@ def _lines(chance: Random, words: str) -> str:
 
 
 def _token(chance: Random, words: str) -> str:
-    """Another word in the place of one, or beside it."""
+    """Replace a word, or insert one beside it."""
     return _replaced(chance, r"\S+", words, chance.choice(WORDS))
 
 
@@ -75,7 +75,7 @@ def _replaced(chance: Random, pattern: str, words: str, new: str) -> str:
 
 
 def _flood(chance: Random, words: str) -> str:
-    """Far more of something than anybody needs."""
+    """Insert many repetitions of something."""
     token = chance.choice(words[:100_000].split() or ["a"])
     one = chance.choice((token[:1000], "a", "9", "0.1", '"', "p")) + chance.choice(("", " ", "\n", ","))
     many = one * min(10 ** chance.choice(POWERS), raw.LARGEST // 2 // len(one))

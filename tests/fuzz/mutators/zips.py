@@ -1,4 +1,4 @@
-"""Members of a zip: changed with their checksums right, missing, doubled, renamed, too many."""
+"""Mutations of zip files: members are changed with correct checksums, removed, doubled, renamed or added."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Member = tuple[str, bytes]
 
 
 def change(chance: Random, content: bytes) -> bytes:
-    """Change one member, or which there are; what is no zip, as bytes."""
+    """Change, add or remove one member; other content is changed as bytes."""
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as file:
             members = [(info.filename, file.read(info)) for info in file.infolist()]
@@ -23,7 +23,7 @@ def change(chance: Random, content: bytes) -> bytes:
 
 
 def zipped(members: list[Member], method: int) -> bytes:
-    """Return a zip."""
+    """Return the content of a zip file."""
     stream = io.BytesIO()
     with warnings.catch_warnings(), zipfile.ZipFile(stream, "w", method) as file:
         warnings.simplefilter("ignore")  # names that come twice

@@ -1,4 +1,4 @@
-"""All that is fuzzed, by name."""
+"""The fuzzed readers by name."""
 
 from __future__ import annotations
 

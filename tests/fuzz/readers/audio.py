@@ -1,4 +1,4 @@
-"""Recordings, and the features of them."""
+"""Recordings and their acoustic features."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ TEXTS = {
 
 
 def seeds(_: Good) -> list[Files]:
-    """Return a tone in many containers, with a video, with a hole; and texts that FFmpeg takes for recordings."""
+    """Return a tone in many containers, with video, with a gap; and texts that FFmpeg accepts as recordings."""
     found: list[Files] = []
     with tempfile.TemporaryDirectory() as folder:
         for name, codec in CODECS.items():
@@ -45,7 +45,7 @@ def seeds(_: Good) -> list[Files]:
 
 
 def read(folder: Path, _: Good) -> None:
-    """Read a recording; hear it."""
+    """Read a recording; compute its features."""
     (path,) = folder.iterdir()
     audio = read_audio(path)
     require(bool(np.isfinite(audio.samples).all()), "samples that are not finite")

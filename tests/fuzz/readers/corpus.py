@@ -30,7 +30,7 @@ def seeds(good: Good) -> list[Files]:
 
 
 def _without_checksums(files: Files) -> Files:
-    """Return a corpus as it was before arrays had checksums: then what they hold is looked at."""
+    """Return a corpus without checksums, as earlier versions wrote it, so that damaged arrays are read."""
     (name,) = (name for name in files if name.endswith("entry.json"))
     entry = json.loads(files[name])
     entry.pop("checksums", None)
@@ -58,7 +58,7 @@ def _corpus(utterance: Utterance) -> Files:
 
 
 def read(folder: Path, _: Good) -> None:
-    """Open a corpus; look at every array of every utterance."""
+    """Open a corpus; check every array of every utterance."""
     corpus = Corpus.open(folder / "corpus")
     corpus.summary()
     require(all(0 <= seconds < AGES_S for _, seconds in corpus.speakers.values()), "ages of speech")

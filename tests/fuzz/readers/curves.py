@@ -1,4 +1,4 @@
-"""Motion that comes with sounds: tables, documents, bare arrays."""
+"""Motion that is supplied beside recordings: tables, documents, plain arrays."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def seeds(_: Good) -> list[Files]:
 
 
 def read(folder: Path, good: Good) -> None:
-    """Read motion; keep it in a corpus, and read it back from there."""
+    """Read motion; store it in a corpus, and read it again from there."""
     names = folder / NAMES
     path = folder / VALUES if names.exists() else next(folder.iterdir())
     curves = MotionFile(path, RATE_HZ, read_channels(names)) if names.exists() else MotionFile(path)

@@ -1,4 +1,4 @@
-"""What lies beside recordings: TextGrids, HTK's and Audacity's labels, word times, the lists of the splits."""
+"""Files beside recordings: TextGrids, labels of HTK and Audacity, word times, and the lists of the splits."""
 
 from __future__ import annotations
 

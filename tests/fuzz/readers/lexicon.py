@@ -23,7 +23,7 @@ def seeds(_: Good) -> list[Files]:
 
 
 def read(folder: Path, good: Good) -> None:
-    """Read a lexicon; say its first word."""
+    """Read a lexicon; align short speech with its first word."""
     lexicon = Lexicon.from_file(folder / "words.dict")
     for word, pronunciations in lexicon.user.items():
         require(lexicon.known(word), "a word that is not known")

@@ -1,4 +1,4 @@
-"""Model files, and the motion made with them."""
+"""Model files, and the motion generated with them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def seeds(good: Good) -> list[Files]:
 
 
 def read(folder: Path, good: Good) -> None:
-    """Load a model; animate a short sound, recognised and told."""
+    """Load a model; animate short speech, without and with a transcript."""
     model = load_model(folder / "a.lipmotion")
-    for said in (None, "baby"):
-        check_generation(animate(SpeechRequest(short_speech(good), transcript=said, recogniser="own"), model=model))
+    for text in (None, "baby"):
+        check_generation(animate(SpeechRequest(short_speech(good), transcript=text, recogniser="own"), model=model))

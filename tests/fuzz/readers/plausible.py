@@ -1,4 +1,4 @@
-"""What may come of any input, and short speech to try it with."""
+"""Plausibility checks of results, and short speech for them."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ from lipmotion.types import Audio, Generation, Motion
 from lipmotion.types.motion import LARGEST
 
 GENERATED = {"eye_distance": 10.0, "weight": 100.0, "grey": 1e6}
-"""By unit, of what a model makes: a whole head is two eye distances high."""
+"""Largest plausible value of generated motion, by unit: a whole head is two eye distances high."""
 LONGEST_S = 3600.0
 SHORT = slice(6000, 18_000)
 """Samples of the toy sentence: its first word."""
 
 
 def require(holds: bool, text: str) -> None:
-    """Raise ImplausibleError unless something holds."""
+    """Raise ImplausibleError unless a condition holds."""
     if not holds:
         raise ImplausibleError(text)
 
 
 @cache
 def short_speech(good: Good) -> Audio:
-    """Return most of a second of speech."""
+    """Return 0.75 seconds of speech."""
     corpus = Corpus.open(good.corpus)
     audio = corpus.utterance(corpus.names()[0]).audio
     return Audio(audio.samples[SHORT].copy(), audio.rate_hz)
@@ -47,7 +47,7 @@ def good_model(good: Good) -> Model:
 
 
 def check_motion(motion: Motion, largest_of: Mapping[str, float] = LARGEST) -> None:
-    """Raise ImplausibleError unless the motion is one that can be, as far as its units tell."""
+    """Raise ImplausibleError unless all values are finite and plausible in their units."""
     require(bool(np.isfinite(motion.values).all()), "values that are not finite")
     for channel, curve in zip(motion.channels, motion.values.T, strict=True):
         largest = float(np.abs(curve).max(initial=0.0))
@@ -55,7 +55,7 @@ def check_motion(motion: Motion, largest_of: Mapping[str, float] = LARGEST) -> N
 
 
 def check_generation(result: Generation) -> None:
-    """Raise ImplausibleError unless motion, its variance and the files written of it can be."""
+    """Raise ImplausibleError unless motion, variance and written files of a generation are plausible."""
     check_motion(result.motion, GENERATED)
     require(len(result.motion.values) <= LONGEST_S * result.motion.rate_hz, "hours of motion")
     require(bool((result.variance >= 0).all()), "a variance that is negative or none")

@@ -1,4 +1,4 @@
-"""What is said: text to words, words to phones, phones to their places in the sound."""
+"""Transcripts: text to words, words to phones, and forced alignment of the phones."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ TEXTS = (
     "baby's mother-in-law has 1,234,567 cats; 3 o'clock! (See two maps.)\nNow £5, 007, ½, twenty-three.\n",
     "naïve qwrx zzyx",
 )
-"""Those at the end are too long for the sound, or cannot be said."""
+"""The last ones are too long for the sound, or have words without a pronunciation."""
 
 
 def seeds(_: Good) -> list[Files]:
-    """Return texts with punctuation, numbers, and words that nobody knows."""
+    """Return texts with punctuation, numbers, and unknown words."""
     return [{"said.txt": text.encode()} for text in TEXTS]
 
 
 def read(folder: Path, good: Good) -> None:
-    """Animate a short sound that is told to say this."""
+    """Animate short speech with the transcript."""
     path = folder / "said.txt"
     check_generation(
         animate(SpeechRequest(short_speech(good), transcript=path, recogniser="own"), model=good_model(good))

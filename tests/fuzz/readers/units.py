@@ -1,4 +1,4 @@
-"""Phones in time, from a motion file, and the motion made of them."""
+"""Phones in time from a motion file, and the motion generated from them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from robustness.motion_cases import GOOD
 
 
 def seeds(good: Good) -> list[Files]:
-    """Return what ``animate`` writes, and the least that can be written by hand."""
+    """Return motion files of ``animate``, and a minimal one."""
     found: list[Files] = [{"a.json": json.dumps(GOOD).encode()}]
     result = animate(SpeechRequest(short_speech(good), recogniser="own"), model=good_model(good))
     with tempfile.TemporaryDirectory() as folder:

@@ -1,4 +1,4 @@
-"""Videos: their pictures, and the frame rate that these are put on."""
+"""Videos: their pictures, and the nominal frame rate."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def _pictures(path: Path, codec: str, form: str) -> Path:
 
 
 def read(folder: Path, _: Good) -> None:
-    """Look at every picture, and at the rate of them all."""
+    """Check every picture, and the frame rate."""
     (path,) = folder.iterdir()
     times_s: list[float] = []
     with open_video(path) as video:

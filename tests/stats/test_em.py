@@ -1,0 +1,48 @@
+"""The loop of expectation–maximisation, on a model that is one number."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from lipmotion.stats.em import run_em
+
+
+@dataclass(frozen=True)
+class Half:
+    """Statistics of a model that is moved half way to 1 by every step; its log likelihood is what is left."""
+
+    model: float
+
+    @property
+    def mean_log_likelihood(self) -> float:
+        return self.model - 1
+
+
+def maximise(model: float, statistics: Half) -> float:
+    assert statistics.model == model
+    return (model + 1) / 2
+
+
+def test_all_steps_are_taken_and_reported():
+    log = []
+    result = run_em(0.0, Half, maximise, 3, lambda *step: log.append(step))
+    assert result.model == 0.875
+    assert result.statistics == Half(0.75)
+    assert result.log_likelihoods == (-1, -0.5, -0.25)
+    assert log == [(1, 0.5, Half(0.0)), (2, 0.75, Half(0.5)), (3, 0.875, Half(0.75))]
+
+
+@pytest.mark.parametrize(("converged", "model", "reported"), [(True, 0.875, 3), (False, 0.75, 2)])
+def test_it_stops_at_the_first_step_that_gains_too_little(converged, model, reported):
+    log = []
+    result = run_em(
+        0.0, Half, maximise, 20, lambda *step: log.append(step), least_gain=0.3, maximise_converged=converged
+    )
+    assert result.model == model
+    assert result.log_likelihoods == (-1, -0.5, -0.25)
+    assert len(log) == reported
+
+
+def test_the_first_step_never_counts_as_converged():
+    assert run_em(1.0, Half, maximise, 5, least_gain=np.inf).log_likelihoods == (0, 0)
