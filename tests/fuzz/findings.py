@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from fuzz.campaign import Finding, CampaignRecord
+from fuzz.campaign import CampaignRecord, Finding
 from fuzz.inputs import Files, lay_out
 from fuzz.judge import HANG
 from fuzz.worker import Worker

@@ -15,7 +15,7 @@ from types import TracebackType
 from typing import Any
 
 from fuzz.inputs import Files, Good, Reader
-from fuzz.judge import CRASH, HANG, LEFT, MEMORY, READ, REFUSED, Result, read_result, quiet
+from fuzz.judge import CRASH, HANG, LEFT, MEMORY, READ, REFUSED, Result, quiet, read_result
 from fuzz.lines import LineCoverage
 from fuzz.memory import Memory, busy_s
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from lipmotion.cli import contents, prompts, sync
-from lipmotion.cli.options import add_machine_readable
+from lipmotion.cli.options import add_machine_readable, add_workers
 from lipmotion.cli.paths import add_input, add_output
 
 
@@ -17,7 +17,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     layouts = "folder of videos, or of sounds with motion (docs/corpora.md)"
     add_input(prepare, "recordings", what="folder of recordings", help=layouts)
     add_output(prepare, "-o", "--output", is_folder=True, required=True, metavar="CORPUS")
-    prepare.add_argument("--workers", type=int, help="number of processes (default: one per core)")
+    add_workers(prepare)
     prepare.add_argument("--no-crops", dest="crops", action="store_false", help="do not store mouth pictures")
     add_machine_readable(prepare)
     prepare.set_defaults(run=run_prepare)

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import argparse
-import os
 from collections.abc import Callable
 from typing import Any
 
 from lipmotion.cli.figures import add_figures_arguments, report_figures
+from lipmotion.cli.options import add_workers, worker_count
 from lipmotion.cli.paths import add_input
 
 
 def add_experiment_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the corpus, ``--workers``, and the options of ``add_figures_arguments``."""
     add_input(parser, "corpus", what="corpus")
-    parser.add_argument("--workers", type=int, help="number of processes (default: one per core)")
+    add_workers(parser)
     add_figures_arguments(parser)
 
 
@@ -28,7 +28,7 @@ def run_experiment(
     from lipmotion.experiments.runner import ExperimentSettings
 
     def compute(**given: Any) -> dict[str, Any]:
-        settings = ExperimentSettings(workers=options.workers or os.cpu_count() or 1, **given)
+        settings = ExperimentSettings(workers=worker_count(options), **given)
         return experiment(Corpus.open(options.corpus), settings=settings)
 
     report_figures(options, compute, table)

@@ -3,11 +3,22 @@
 from __future__ import annotations
 
 import argparse
+import os
 
 
 def add_machine_readable(parser: argparse.ArgumentParser) -> None:
     """Add ``--machine-readable`` (docs/long-work.md)."""
     parser.add_argument("--machine-readable", action="store_true", help="print only JSON objects, one per line")
+
+
+def add_workers(parser: argparse.ArgumentParser) -> None:
+    """Add ``--workers``."""
+    parser.add_argument("--workers", type=int, help="number of processes (default: one per core)")
+
+
+def worker_count(options: argparse.Namespace) -> int:
+    """Return the number of processes of ``--workers``; by default, that of the processor's cores."""
+    return options.workers or os.cpu_count() or 1
 
 
 def list_or_all(split: str) -> str | None:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import os
+from typing import Any
 
-from lipmotion.cli.options import add_machine_readable, list_or_all
+from lipmotion.cli.options import add_machine_readable, add_workers, list_or_all, worker_count
 from lipmotion.cli.paths import add_input, add_output
 from lipmotion.cli.speech import add_lexicon_argument
 
@@ -31,7 +31,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser.add_argument("--visual", default="geometry", metavar="KIND", help=VISUAL)
     parser.add_argument("--voices", action="store_true", help="also train on synthetic voices (coupled)")
     add_input(parser, "--recordings", what="folder of recordings", metavar="FOLDER", help=OTHERS)
-    parser.add_argument("--workers", type=int, help="number of processes (default: one per core)")
+    add_workers(parser)
     add_machine_readable(parser)
     parser.set_defaults(run=run)
 
@@ -47,23 +47,16 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.storage.files import unfinished_work
     from lipmotion.units import Lexicon
 
-    workers = options.workers or os.cpu_count() or 1
     with reporting(options) as report:
         lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
         engine = engine_from_settings(options.engine, preset=options.system, units=options.units, settings=options.set)
-        voices = other_voices(
-            synthetic=options.voices, recordings=options.recordings, lexicon=lexicon, monitor=report.receive
-        )
+        more: dict[str, Any] = {"recordings": options.recordings, "lexicon": lexicon, "monitor": report.receive}
+        chosen = {"engine": engine, "visual": options.visual, "lexicon": lexicon}
+        chosen |= {"selection": Selection(list_or_all(options.split), tuple(options.speaker))}
+        chosen |= {"voices": other_voices(synthetic=options.voices, **more)}
         with unfinished_work(options.output) as work:
-            model, result = train(
-                Corpus.open(options.corpus),
-                selection=Selection(list_or_all(options.split), tuple(options.speaker)),
-                engine=engine,
-                lexicon=lexicon,
-                visual=options.visual,
-                voices=voices,
-                run=Run(report.receive, work, workers),
-            )
+            run_settings = Run(report.receive, work, worker_count(options))
+            model, result = train(Corpus.open(options.corpus), **chosen, run=run_settings)
             save_model(model, options.output)
         figures = {"used": len(result.used), "minutes": model.about["minutes"], "skipped": len(result.skipped)}
         text = ", ".join(f"{value} {name}" for name, value in figures.items())
