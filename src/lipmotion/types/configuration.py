@@ -93,9 +93,7 @@ class Configuration:
         for name, value in values.items():
             if name in cls.gone and name not in known:
                 if value != cls.gone[name]:
-                    raise InputError(
-                        f"{name} is {value!r}; this option is gone, and {cls.gone[name]!r} is what is done"
-                    )
+                    raise InputError(f"{name} is {value!r}; this option is gone, required {cls.gone[name]!r}")
                 continue
             now = cls.former.get(name, name)
             if now not in known:
@@ -139,11 +137,9 @@ def check_value(one: Field[Any], value: Any) -> None:
     if fits and kind in (int, float) and not -LARGEST <= value <= LARGEST:
         raise InputError(f"{one.name} is {value}, required at most {LARGEST:g} in size")
     if not fits or not rule.allows(value):
-        words = (
-            rule.words if rule.words and (rule.odd or rule.power_of_two or rule.choices) else _WORDS[kind] + rule.words
-        )
-        shown = shortened(repr(value))
-        raise InputError(f"{one.name} is {shown}, required {words}")
+        named = rule.odd or rule.power_of_two or bool(rule.choices)
+        required = rule.words if named and fits else _WORDS[kind] + ("" if named else rule.words)
+        raise InputError(f"{one.name} is {shortened(repr(value))}, required {required}")
 
 
 def _from_text(one: Field[Any], text: str) -> Any:
