@@ -1,11 +1,11 @@
-"""F0 beside its peers: errors and speed where the frequency is known, or agreement on recordings.
+"""F0 compared with peers: errors and speed where the frequency is known, or agreement on recordings.
 
     python benchmarks/f0.py [--repeats 5]
     python benchmarks/f0.py RECORDING ...
 
-Peers take part if they can be imported: RAPT (pysptk), DIO and Harvest with StoneMask (pyworld). All look from 60 to
-400 Hz, every 10 ms. One JSON object a line. Gross: off by more than 20 %; fine: mean distance of all others; missed:
-voice held for none; false: the reverse. Frames within 25 ms of a change of voicing are not counted.
+Peers take part if they can be imported: RAPT (pysptk), DIO and Harvest with StoneMask (pyworld). All search from 60 to
+400 Hz, every 10 ms. One JSON object per line. Gross: errors of more than 20 %; fine: mean error of all others; missed:
+voiced frames found unvoiced; false: unvoiced frames found voiced. Frames within 25 ms of a change of voicing are not counted.
 ``factory`` is for a harness that hands over ``cfg`` and has a function ``audio(cfg)``.
 """
 
@@ -58,14 +58,14 @@ def main() -> None:
 
 
 def agreement(tried: dict[str, Tracker], recordings: list[Array]) -> None:
-    """Print how far each differs from each."""
+    """Print the differences of each pair of trackers."""
     tracks = {name: [track(samples) for samples in recordings] for name, track in tried.items()}
     for first, second in combinations(tracks, 2):
         show(of=first, beside=second, **errors(tracks[first], tracks[second]))
 
 
 def factory(cfg: Any) -> Callable[[], Array]:
-    """Return the work to time, on the harness's own sound."""
+    """Return the work to measure, on the sound of the harness."""
     import __main__
 
     samples = __main__.audio(cfg).astype(np.float32)
@@ -78,7 +78,7 @@ def ours(samples: Array) -> Array:
 
 
 def trackers() -> dict[str, Tracker]:
-    """Return ours and those that can be imported."""
+    """Return the tracker of this package and those that can be imported."""
     found: dict[str, Tracker] = {"lipmotion": ours}
     try:
         import pysptk
@@ -108,7 +108,7 @@ def trackers() -> dict[str, Tracker]:
 
 
 def errors(tracks: list[Array], references: list[Array]) -> dict[str, float]:
-    """Return what the docstring above explains; in references 0 is no voice, NaN is not counted."""
+    """Return the errors that the module docstring defines; in references 0 is unvoiced, NaN is not counted."""
     known = np.concatenate(references)
     found = np.concatenate([fitted(f, len(k)) for f, k in zip(tracks, references, strict=True)])
     voiced, both = known > 0, (known > 0) & (found > 0)
@@ -130,7 +130,7 @@ def fitted(track: Array, frames: int) -> Array:
 
 
 def sentences() -> Iterator[tuple[Array, Array]]:
-    """Give every phone twice in random order, at eight pitches."""
+    """Yield sound and F0 of all phones, twice in random order, at eight pitches."""
     names = [name for name in PHONE_TARGETS if name not in ("sil", "sp")]
     for seed, pitch_hz in enumerate((70, 90, 120, 160, 200, 260, 320, 370)):
         random = np.random.default_rng(seed)
@@ -149,7 +149,7 @@ def sentences() -> Iterator[tuple[Array, Array]]:
 
 
 def glides(noise: str) -> Iterator[tuple[Array, Array]]:
-    """Give glottal pulses through three formants, twice interrupted by noise alone."""
+    """Yield sound and F0 of glottal pulses through three formants, with noise in pauses."""
     time_s = np.arange(4 * RATE_HZ) / RATE_HZ
     silent = (time_s < 0.3) | (time_s > 3.7) | ((time_s > 1.9) & (time_s < 2.1))
     near = np.convolve(np.abs(np.diff(silent, prepend=True)), np.ones(801), "same") > 0

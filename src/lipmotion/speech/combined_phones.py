@@ -57,7 +57,7 @@ def combine_phones(own: UnitHmm) -> CombinedPhones:
         own,
         config=replace(own.config, bigram_weight=BIGRAM_WEIGHT, insertion=INSERTION),
         table=table,
-        mixtures=own.mixtures.picked(sources),
+        mixtures=own.mixtures.selected(sources),
         log_stay=own.log_stay[sources[: plain + len(added)]],
         bigram=_bigram(own.bigram, table.units),
     )
