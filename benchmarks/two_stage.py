@@ -1,13 +1,14 @@
-"""What a second stage of training, on speech of others without motion, is worth to coupled models.
+"""Benefit of a second stage of training, on speech of other speakers without motion, for coupled models.
 
     lipmotion corpus prepare ../shared/corpora/grid-others -o build/grid-others
     python benchmarks/two_stage.py [--clips 100] [--sentences 15] [--only "two stages" ...]
 
-Phones of GRID are placed by those of build/grid-s1-train.lipmotion (``make model``; it never heard that list).
+Phones of GRID are aligned by the phone models of build/grid-s1-train.lipmotion (``make model``; it was not trained on
+the validation list).
 
-One JSON object a line: a model each. ``own``: ACC of opening on the validation list of build/grid-s1; ``strangers``:
-its mean over the clips of build/grid-others; ``phones``: for speakers who only judge, the share of frames of speech
-whose most probable phone is the labelled one, and the same of visemes, words unknown.
+One JSON object per line and model. ``own``: ACC of the opening on the validation list of build/grid-s1; ``strangers``:
+its mean over the clips of build/grid-others; ``phones``: for held-out speakers, the share of frames of speech whose
+most probable phone is the labelled one, and the same for visemes, without transcripts.
 """
 
 from __future__ import annotations
@@ -37,8 +38,8 @@ from lipmotion.speech.voices.installed import installed_voices
 from lipmotion.types import Example, Speech, Timeline, Unit, Utterance, silent_monitor
 from lipmotion.units import VISEME_OF, Lexicon, is_silent
 
-SENTENCES, JUDGED = 60, 15
-"""Those said for judging are the last of the sixty, and nobody says them in training."""
+SENTENCES, HELD_OUT_SENTENCES = 60, 15
+"""Number of sentences; the last of them are held out from training, to test with."""
 OPEN = {"sense_and_*": "austen-reader", "*_corpus": "michael", "common_voice_en_*": "common-voice"}
 MODELS: dict[str, tuple[str, dict[str, Any]]] = {
     "one stage": ("", {}),
@@ -56,7 +57,7 @@ MODELS: dict[str, tuple[str, dict[str, Any]]] = {
 
 
 def main() -> None:
-    """Print one JSON object a line."""
+    """Print one JSON object per model."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--corpora", type=Path, default=Path("../shared/corpora"))
     parser.add_argument("--strangers", type=Path, default=Path("build/grid-others"))
@@ -69,10 +70,10 @@ def main() -> None:
     utterances = [corpus.utterance(name) for name in names[:: max(len(names) // options.clips, 1)][: options.clips]]
     phones = lipmotion.load_model("build/grid-s1-train.lipmotion").phones
     examples = [example(one, Recogniser(phones)) for one in utterances]
-    others, judges = speakers(options.corpora, options.sentences)
-    for who, said in (("GRID s1, val", corpus.names("val")), ("GRID, five others", strangers.names(None))):
+    others, held_out = speakers(options.corpora, options.sentences)
+    for who, listed in (("GRID s1, val", corpus.names("val")), ("GRID, five others", strangers.names(None))):
         known = corpus if "s1" in who else strangers
-        judges[who] = [aligned(known.utterance(name), Recogniser(phones)) for name in said]
+        held_out[who] = [aligned(known.utterance(name), Recogniser(phones)) for name in listed]
     for name in options.only or MODELS:
         kinds, config = MODELS[name]
         more = [one for kind in kinds.split() for one in others[kind]]
@@ -81,49 +82,50 @@ def main() -> None:
         fit = engine.fit([*examples, *examples_of_others(engine, more)], silent_monitor)
         model, minutes = Model(phones, engine, fit.model, {}), sum(one.features.duration_s for one in more) / 60
         figures = {"seconds": round(time.perf_counter() - started_s), "minutes of others": round(minutes, 1)}
-        figures |= {"own": own(model, corpus), "strangers": unknown(model, strangers)}
-        told = {"model": name, "clips": len(examples)} | figures
-        print(json.dumps(told | {"phones": {who: right(fit.model, said) for who, said in judges.items()}}), flush=True)
+        figures |= {"own": own_acc(model, corpus), "strangers": other_speakers_acc(model, strangers)}
+        row = {"model": name, "clips": len(examples)} | figures
+        row["phones"] = {who: frame_accuracy(fit.model, speech) for who, speech in held_out.items()}
+        print(json.dumps(row), flush=True)
 
 
 def speakers(corpora: Path, count: int) -> tuple[dict[str, list[Heard]], dict[str, list[Heard]]]:
-    """Return whom to learn from, by kind, and who judges, by name."""
+    """Return the training speech by kind, and the held-out speech by speaker."""
     texts = [prompt.text for prompt in prompts(count=SENTENCES).chosen]
     learned = [voice for voice in installed_voices() if not is_for_judging(voice.speaker)]
     judging = [voice for voice in installed_voices() if is_for_judging(voice.speaker)]
     general = Recogniser(lipmotion.load_model().phones, "general")
     recordings = list(heard(recorded_voices(corpora / "speech-open", general, speakers=OPEN)))
     others = {
-        "voices": list(heard(many_voices(texts[: min(count, SENTENCES - JUDGED)], learned))),
+        "voices": list(heard(many_voices(texts[: min(count, SENTENCES - HELD_OUT_SENTENCES)], learned))),
         "recordings": [one for one in recordings if not is_for_judging(one.speaker)],
     }
-    judges: dict[str, list[Heard]] = {}
-    for one in (*heard(many_voices(texts[-JUDGED:], judging)), *recordings):
+    held_out: dict[str, list[Heard]] = {}
+    for one in (*heard(many_voices(texts[-HELD_OUT_SENTENCES:], judging)), *recordings):
         if is_for_judging(one.speaker):
-            judges.setdefault(one.speaker, []).append(one)
-    return others, judges
+            held_out.setdefault(one.speaker, []).append(one)
+    return others, held_out
 
 
 def example(utterance: Utterance, phones: Recogniser) -> Example:
-    """Return an utterance as engines learn from it."""
+    """Return an utterance as a training example."""
     motion, valid = model_motion(utterance.track, len(utterance.features.values))
     return Example(utterance.name, Speech(*aligned(utterance, phones)[:2]), motion, valid)
 
 
 def aligned(utterance: Utterance, phones: Recogniser) -> Heard:
-    """Return a sentence of GRID with its phones in time."""
+    """Return an utterance of GRID with aligned phones."""
     features, words = mfcc(utterance.audio), utterance.words or words_of_name(utterance.name)
     return Heard(features, phones.align(utterance.audio, features, words or (), Lexicon()), utterance.speaker)
 
 
-def own(model: Model, corpus: Corpus) -> dict[str, float]:
+def own_acc(model: Model, corpus: Corpus) -> dict[str, float]:
     """Return the ACC of opening on the validation list, by condition."""
     conditions = evaluate(model, corpus, selection=Selection("val"))["conditions"]
     return {name: round(found["channels"]["opening"]["acc"], 3) for name, found in conditions.items()}
 
 
-def unknown(model: Model, strangers: Corpus) -> dict[str, float]:
-    """Return the mean ACC of opening over clips of strangers, by condition."""
+def other_speakers_acc(model: Model, strangers: Corpus) -> dict[str, float]:
+    """Return the mean ACC of the opening over clips of other speakers, by condition."""
     found: dict[str, list[float]] = {"audio only": [], "with transcript": []}
     for name in strangers.names(None):
         one = strangers.utterance(name)
@@ -138,27 +140,27 @@ def unknown(model: Model, strangers: Corpus) -> dict[str, float]:
     return {condition: round(float(np.mean(values)), 3) for condition, values in found.items()}
 
 
-def right(model: CoupledModel, said: Sequence[Heard]) -> tuple[float, float]:
-    """Return the shares of frames of speech whose most probable phone, and viseme, are the labelled ones."""
+def frame_accuracy(model: CoupledModel, said: Sequence[Heard]) -> tuple[float, float]:
+    """Return the shares of frames of speech whose most probable phone, and viseme, is the labelled one."""
     structure = model.chains.structure
     visemes = np.array([VISEME_OF[structure.chains[0].phones(unit)[0]] for unit in structure.units[0]])
     kinds, kind = np.unique(visemes, return_inverse=True)
     member = np.eye(len(kinds))[kind]
     found: list[tuple[bool, bool]] = []
     for one in said:
-        observed = model.unseen(np.asarray(one.features.values))
-        evidence = model.chains.evidence(observed, model.chains.everywhere)
-        states = model.chains.posteriors(evidence, model.chains.everywhere).chains[0]
+        observations = model.speech_observations(np.asarray(one.features.values))
+        emissions = model.chains.emission_log_densities(observations, model.chains.full_lattice)
+        states = model.chains.posteriors(emissions, model.chains.full_lattice).chains[0]
         units = states.reshape(len(states), len(kind), -1).sum(axis=2)
         unit, viseme = units.argmax(axis=1), (units @ member).argmax(axis=1)
-        for frame, number in labelled(one.units, len(units), structure):
+        for frame, number in frame_units(one.units, len(units), structure):
             found.append((unit[frame] == number, viseme[frame] == kind[number]))
     phones, looks = np.mean(found, axis=0)
     return round(float(phones), 3), round(float(looks), 3)
 
 
-def labelled(units: Timeline[Unit], frames: int, structure: Any) -> Iterable[tuple[int, int]]:
-    """Give every frame of speech with the number of its unit."""
+def frame_units(units: Timeline[Unit], frames: int, structure: Any) -> Iterable[tuple[int, int]]:
+    """Yield every frame of speech and the number of its unit."""
     for span in units:
         if not is_silent(span.label.phone):
             number = structure.units[0].index(structure.chains[0].unit(span.label.phone))

@@ -10,23 +10,23 @@ def log_gaussian(x, mean, variance):
     return float(-0.5 * np.sum(np.log(2 * np.pi * variance) + (x - mean) ** 2 / variance))
 
 
-def log_density(group, density, observed, frame):
+def log_density(group, density, observations, frame):
     """Log density of a frame under one density of a group, all of its streams, weighted and where seen."""
     mixtures, terms = group.mixtures, []
     for component in range(mixtures.log_weights.shape[1]):
         total = float(mixtures.log_weights[density, component])
         for stream, columns, weight in zip(group.streams, group.columns, group.weights, strict=True):
-            seen = observed.seen[stream]
+            seen = observations.observed[stream]
             if seen is not None and not seen[frame]:
                 continue
             mean = mixtures.means[density, component, columns].astype(float)
             variance = mixtures.variances[density, component, columns].astype(float)
-            total += weight * log_gaussian(observed.streams[stream][frame], mean, variance)
+            total += weight * log_gaussian(observations.streams[stream][frame], mean, variance)
         terms.append(total)
     return np.logaddexp.reduce(terms), np.array(terms)
 
 
-def paths(chains, observed):
+def paths(chains, observations):
     """Give every path of joint states that is possible, with the log of its probability and the densities along it."""
     found = chains.transitions.product
     arcs = dict(
@@ -36,18 +36,18 @@ def paths(chains, observed):
     emission = np.array(
         [
             [
-                sum(log_density(group, group.tie[state], observed, frame)[0] for group in chains.groups)
-                for state in range(len(found.joints))
+                sum(log_density(group, group.tie[state], observations, frame)[0] for group in chains.groups)
+                for state in range(len(found.joint_states))
             ]
-            for frame in range(observed.frames)
+            for frame in range(observations.frames)
         ]
     )
 
     def onward(path, score):
-        if len(path) == observed.frames:
+        if len(path) == observations.frames:
             yield path, score
             return
-        for state in range(len(found.joints)):
+        for state in range(len(found.joint_states)):
             arc = arcs.get((path[-1], state))
             if arc is not None:
                 yield from onward((*path, state), score + arc + emission[len(path), state])
@@ -56,12 +56,12 @@ def paths(chains, observed):
         yield from onward((state,), np.log(initial[state]) + emission[0, state])
 
 
-def posteriors(chains, observed):
+def posteriors(chains, observations):
     """Return posteriors of joint states [shape=(T, S)], expected arc counts by pair, and the log likelihood."""
-    every = list(paths(chains, observed))
+    every = list(paths(chains, observations))
     scores = np.array([score for _, score in every])
     log_likelihood = np.logaddexp.reduce(scores)
-    joint = np.zeros((observed.frames, len(chains.transitions.product.joints)))
+    joint = np.zeros((observations.frames, len(chains.transitions.product.joint_states)))
     counts: dict[tuple[int, int], float] = {}
     for (path, _), weight in zip(every, np.exp(scores - log_likelihood), strict=True):
         joint[np.arange(len(path)), path] += weight
@@ -70,16 +70,16 @@ def posteriors(chains, observed):
     return joint, counts, float(log_likelihood)
 
 
-def component_statistics(chains, observed, number, stream):
+def component_statistics(chains, observations, number, stream):
     """Return Σ γ(q, k) Σ⁻¹ and Σ γ(q, k) Σ⁻¹ μ of a stream [each shape=(T, D)], term by term."""
-    joint, _, _ = posteriors(chains, observed)
+    joint, _, _ = posteriors(chains, observations)
     group = chains.groups[number]
     columns = group.columns[group.streams.index(stream)]
     size = columns.stop - columns.start
-    precision, weighted = np.zeros((observed.frames, size)), np.zeros((observed.frames, size))
-    for frame, state in product(range(observed.frames), range(joint.shape[1])):
+    precision, weighted = np.zeros((observations.frames, size)), np.zeros((observations.frames, size))
+    for frame, state in product(range(observations.frames), range(joint.shape[1])):
         density = group.tie[state]
-        total, terms = log_density(group, density, observed, frame)
+        total, terms = log_density(group, density, observations, frame)
         for component, term in enumerate(terms):
             share = joint[frame, state] * np.exp(term - total)
             inverse = 1 / group.mixtures.variances[density, component, columns].astype(float)

@@ -1,21 +1,21 @@
-"""What stands behind a frame, against all paths of small chains and against a fitted model's own numbers."""
+"""Explanations of frames, against all paths of small chains and against the numbers of a fitted model."""
 
 from functools import cache
 
 import numpy as np
 import pytest
 
-from engines.coupled.tiny import THREE, TWO, chains, observed, structure
+from engines.coupled.tiny import THREE, TWO, chains, observations, structure
 from lipmotion.engines import engine_named
 from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, MULTISTREAM, SYSTEMS
 from lipmotion.engines.coupled.explanation import (
     _regression_name,
     chain_states,
-    explained,
+    explain_frames,
     joint_state,
     lead_posteriors,
     leads,
-    units_believed,
+    unit_posteriors,
 )
 from lipmotion.motion import generation
 from lipmotion.testing.examples import CHANNELS, examples, speech, timeline
@@ -36,8 +36,8 @@ SENTENCE = ("t", "aa", "p", "iy", "m", "uw", "s", "aa")
 
 
 def small(kind, sets, limit):
-    found, data = chains(structure(kind, sets, limit=limit)), observed()
-    return found, found.inferred(data, found.everywhere).posteriors, oracle.posteriors(found, data)[0]
+    found, data = chains(structure(kind, sets, limit=limit)), observations()
+    return found, found.infer(data, found.full_lattice).posteriors, oracle.posteriors(found, data)[0]
 
 
 @every
@@ -51,10 +51,9 @@ def test_the_asynchrony_is_that_of_all_paths(kind, sets, limit):
             expected = joint[:, product.lead[chain] == states].sum(axis=1)
             np.testing.assert_allclose(lead[:, column], expected, atol=2e-5)
     for row in range(len(joint)):
-        told = chain_states(found, posteriors, row)
-        for chain, one in enumerate(told):
+        for chain, states in enumerate(chain_states(found, posteriors, row)):
             if chain:
-                assert one.expected_lead == pytest.approx(joint[row] @ product.lead[chain], abs=5e-5)
+                assert states.expected_lead == pytest.approx(joint[row] @ product.lead[chain], abs=5e-5)
 
 
 @every
@@ -65,28 +64,28 @@ def test_states_are_named_with_their_probabilities(kind, sets, limit):
         best = joint_state(found, posteriors, row)
         assert best.name == product.name(int(joint[row].argmax()))
         assert best.probability == pytest.approx(joint[row].max(), abs=2e-5)
-        for chain, told in enumerate(chain_states(found, posteriors, row)):
-            names = [of.state_name(chain, state) for state in range(of.counts[chain])]
-            assert len(told.states) <= 3
-            for one in told.states:
+        for chain, explained in enumerate(chain_states(found, posteriors, row)):
+            names = [of.state_name(chain, state) for state in range(of.state_counts[chain])]
+            assert len(explained.states) <= 3
+            for one in explained.states:
                 state = names.index(one.name)
                 expected = joint[row, product.chain_states[chain] == state].sum()
                 assert one.probability == pytest.approx(expected, abs=2e-5)
-            shown = [one.probability for one in told.states]
+            shown = [one.probability for one in explained.states]
             assert shown == sorted(shown, reverse=True)
             assert shown[0] == pytest.approx(posteriors.chains[chain][row].max())
 
 
-def test_a_state_says_unit_and_place():
+def test_the_name_of_a_state_is_its_unit_and_position():
     of = structure(chains=(THREE, TWO))
     assert of.state_name(0, 0) == f"{of.units[0][0]}.1"
     assert of.state_name(1, 3) == f"{of.units[1][1]}.2"
     assert of.name([0, 3]) == f"{of.state_name(0, 0)} | {of.state_name(1, 3)}"
 
 
-def test_units_are_believed_as_their_states_are():
+def test_posteriors_of_units_are_sums_over_their_states():
     found, posteriors, _ = small(*KINDS[0])
-    first, second = units_believed(found, posteriors, slice(1, 4))
+    first, second = unit_posteriors(found, posteriors, slice(1, 4))
     for number, one in enumerate((first, second)):
         for unit, _ in enumerate(one.units):
             own = posteriors.chains[number][1:4, 2 * unit : 2 * unit + 2].sum(axis=1)
@@ -94,7 +93,7 @@ def test_units_are_believed_as_their_states_are():
     np.testing.assert_array_equal(second.lead, lead_posteriors(found, posteriors)[1][1:4])
 
 
-def test_chains_without_a_limit_have_no_asynchrony_to_tell():
+def test_chains_without_a_limit_have_no_leads():
     found, posteriors, _ = small(FACTORIAL, (THREE, TWO), None)
     assert [lead.shape[1] for lead in lead_posteriors(found, posteriors)] == [0, 0]
 
@@ -104,45 +103,47 @@ def fitted(name):
     engine = engine_named("coupled", {**SYSTEMS[name], "mixtures": 2})
     model = engine.fit(examples(), silent_monitor).model
     spoken = speech(timeline(SENTENCE))
-    inferred = engine.inferred(model, spoken.features.values, engine.lattice(model, spoken, slice(None)))
-    return model, inferred
+    inference = engine.inferred(model, spoken.features.values, engine.lattice(model, spoken, slice(None)))
+    return model, inference
 
 
 def explanation(name, row):
-    model, inferred = fitted(name)
-    return explained([Explanation(row / 100, row, None, "", {})], model, inferred, [row])[0]
+    model, inference = fitted(name)
+    return explain_frames([Explanation(row / 100, row, None, "", {})], model, inference, [row])[0]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["ph-HMM", "ph-vi-CHMM", "ph-vi-FHMM"])
 @pytest.mark.parametrize("row", [0, 64, 75, 91])
 def test_the_gaussian_is_the_most_responsible_one(name, row):
-    model, inferred = fitted(name)
+    model, inference = fitted(name)
     found = explanation(name, row)
     for number, group in enumerate(model.chains.groups):
-        shares, posterior = inferred.evidence.shares[number], inferred.posteriors.densities[number][row]
-        weight = posterior[None] if shares is None else shares[row] * posterior
+        responsibilities = inference.emissions.responsibilities[number]
+        posterior = inference.posteriors.densities[number][row]
+        weight = posterior[None] if responsibilities is None else responsibilities[row] * posterior
         for stream in group.streams:
-            told = found.gaussians[stream]
-            assert told.stream == model.chains.streams[stream]
-            assert told.responsibility == pytest.approx(weight.max())
-            assert (told.components, told.density != "") == (len(weight), True)
+            explained = found.gaussians[stream]
+            assert explained.stream == model.chains.streams[stream]
+            assert explained.responsibility == pytest.approx(weight.max())
+            assert (explained.components, explained.density != "") == (len(weight), True)
             component, place = np.argwhere(weight == weight.max())[0]
-            assert told.component == component + 1
-            density = inferred.lattice.densities[number][place]
+            assert explained.component == component + 1
+            density = inference.lattice.densities[number][place]
             columns = group.columns[group.streams.index(stream)]
             mean, variance = (
                 x[density, component, columns].astype(float) for x in (group.mixtures.means, group.mixtures.variances)
             )
             if stream == 0:
-                error = (inferred.observed.streams[0][row] - mean) ** 2 / variance
-                assert told.distance == pytest.approx(np.sqrt(error.mean()))
-                assert told.channels == {}
+                error = (inference.observations.streams[0][row] - mean) ** 2 / variance
+                assert explained.distance == pytest.approx(np.sqrt(error.mean()))
+                assert explained.channels == {}
                 continue
             visual = model.visual[stream - 1]
-            assert told.distance is None
-            assert set(told.channels) == {channel.name for channel in CHANNELS}
+            assert explained.distance is None
+            assert set(explained.channels) == {channel.name for channel in CHANNELS}
             for column, direct in enumerate(model.space.direct_names):
-                value = told.channels[direct]
+                value = explained.channels[direct]
                 assert value.value == pytest.approx(mean[column] * visual.deviation[column] + visual.mean[column])
                 assert value.deviation == pytest.approx(np.sqrt(variance[column]) * visual.deviation[column])
 
@@ -155,29 +156,28 @@ def test_densities_are_named_by_the_states_that_have_them():
     assert [part.partition(".")[0] for part in joint[0].density.split(" | ")] == ["t", "al"]
 
 
-def test_the_regressions_share_what_is_believed_of_the_visual_chain():
-    model, inferred = fitted("ph-vi-CHMM")
-    around = model.around(inferred)
-    gate = inferred.posteriors.chains[1]
-    mean = model.follow[1][0].means(around, gate)
+def test_shares_of_regressions_are_posteriors_of_the_visual_chain():
+    model, inference = fitted("ph-vi-CHMM")
+    posterior = inference.posteriors.chains[1]
+    mean = model.regression[1][0].means(model.regression_inputs(inference), posterior)
     for row in (64, 75, 91):
         (found,) = explanation("ph-vi-CHMM", row).regressions
-        names = [model.chains.structure.state_name(1, state) for state in range(gate.shape[1])]
+        names = [model.chains.structure.state_name(1, state) for state in range(posterior.shape[1])]
         for share in found.shares:
-            assert share.probability == pytest.approx(gate[row, names.index(share.name)], abs=0.02)
+            assert share.probability == pytest.approx(posterior[row, names.index(share.name)], abs=0.02)
         opening = mean[row, 0] * model.visual[0].deviation[0] + model.visual[0].mean[0]
         assert found.channels["opening"].value == pytest.approx(opening)
 
 
 def test_in_silence_away_from_speech_the_mean_is_the_pose_at_rest():
-    model, inferred = fitted("ph-vi-CHMM")
-    assert model.resting(inferred.posteriors.chains[0])[5]
+    model, inference = fitted("ph-vi-CHMM")
+    assert model.away_from_speech(inference.posteriors.chains[0])[5]
     (found,) = explanation("ph-vi-CHMM", 5).regressions
     assert found.shares == (NamedProbability("rest", 1.0),)
-    assert found.channels["opening"].value == pytest.approx(model.rest[0])
+    assert found.channels["opening"].value == pytest.approx(model.rest_pose[0])
 
 
-def test_a_regression_of_several_places_is_named_by_its_viseme():
+def test_a_regression_of_several_positions_is_named_by_its_viseme():
     of = structure(chains=(THREE, TWO))
     kind = np.repeat(np.arange(len(of.units[0])), of.states)
     first = VISEME_OF[of.chains[0].phones(of.units[0][0])[0]]
@@ -185,7 +185,7 @@ def test_a_regression_of_several_places_is_named_by_its_viseme():
     assert _regression_name(of, 0, np.arange(len(kind)), 1) == f"{first}.2"
 
 
-def test_recordings_of_several_stretches_are_explained_as_one(monkeypatch):
+def test_recordings_of_several_blocks_are_explained_as_one(monkeypatch):
     monkeypatch.setattr(generation, "STRETCH", 60)
     monkeypatch.setattr(generation, "MARGIN", 50)
     engine, (model, _) = engine_named("coupled", {**SYSTEMS["ph-vi-CHMM"], "mixtures": 2}), fitted("ph-vi-CHMM")
@@ -201,9 +201,9 @@ def test_recordings_of_several_stretches_are_explained_as_one(monkeypatch):
             assert beliefs[chain].probability[row, unit] >= own.states[0].probability - 1e-6
 
 
-def test_what_has_no_path_has_no_chains():
-    model, inferred = fitted("ph-HMM")
-    impossible = type(inferred.posteriors)(*[*vars(inferred.posteriors).values()][:4], -np.inf)
+def test_without_a_path_an_explanation_has_no_chains():
+    model, inference = fitted("ph-HMM")
+    impossible = type(inference.posteriors)(*[*vars(inference.posteriors).values()][:4], -np.inf)
     nothing = Explanation(0.0, 0, None, "", {})
-    lost = type(inferred)(inferred.observed, inferred.lattice, inferred.evidence, impossible)
-    assert explained([nothing], model, lost, [0]) == [nothing]
+    lost = type(inference)(inference.observations, inference.lattice, inference.emissions, impossible)
+    assert explain_frames([nothing], model, lost, [0]) == [nothing]

@@ -4,11 +4,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from lipmotion.engines.coupled.chains.densities import Group, Observed
+from lipmotion.engines.coupled.chains.densities import AudioVisualObservations, StreamGroup
 from lipmotion.engines.coupled.chains.model import Chains
 from lipmotion.engines.coupled.chains.product import Grammar, reachable
 from lipmotion.engines.coupled.chains.structures import COUPLED, HMM, Structure
-from lipmotion.engines.coupled.chains.transitions import first_transitions
+from lipmotion.engines.coupled.chains.transitions import initial_transitions
 from lipmotion.stats.mixture import Mixtures
 from lipmotion.units import PHONES, UnitSet
 from lipmotion.units.unit_set import CLOSED_UNIT
@@ -20,11 +20,11 @@ THREE = UnitSet(
     {phone: CLOSED_UNIT if phone in SHUT else "round" if phone in ("uw", "ow", "w") else "open" for phone in PHONES},
 )
 TWO = UnitSet("two", {phone: CLOSED_UNIT if phone in SHUT else "open" for phone in PHONES})
-"""What looks alike on the second chain: round and open."""
+"""On the second chain, round and open are one unit."""
 
 
-def structure(kind=COUPLED, chains=(THREE, TWO), states=2, limit=1, crosses=True) -> Structure:
-    return Structure(kind, chains, states, limit, crosses)
+def structure(kind=COUPLED, chains=(THREE, TWO), states=2, limit=1, cross_units=True) -> Structure:
+    return Structure(kind, chains, states, limit, cross_units)
 
 
 def grammar(of: Structure, seed=0) -> Grammar:
@@ -47,10 +47,10 @@ def mixtures(count, components, size, seed) -> Mixtures:
 
 
 def chains(of: Structure | None = None, components=(2, 2), sizes=(2, 1), seed=0, weights=(1.0, 1.0)) -> Chains:
-    """Chains of random densities and tables, one stream of speech and one that is seen."""
+    """Chains of random densities and tables, one stream of speech and one visual stream."""
     of = of or structure()
     product = reachable(of, grammar(of, seed))
-    transitions = first_transitions(product)
+    transitions = initial_transitions(product)
     draw = np.random.default_rng([seed, 1])
     advance = tuple(draw.uniform(0.2, 0.8, len(table)) for table in transitions.advance)
     transitions = type(transitions)(product, transitions.rows, advance)
@@ -60,12 +60,14 @@ def chains(of: Structure | None = None, components=(2, 2), sizes=(2, 1), seed=0,
         chain = of.chain_of(members[0])
         edges = np.cumsum([0, *(sizes[s] for s in members)]).tolist()
         columns = tuple(slice(a, b) for a, b in pairwise(edges))
-        found = mixtures(of.counts[chain], components[number], edges[-1], [seed, 2, number])
-        groups.append(Group(members, columns, found, tuple(weights[s] for s in members), product.chain_states[chain]))
+        found = mixtures(of.state_counts[chain], components[number], edges[-1], [seed, 2, number])
+        groups.append(
+            StreamGroup(members, columns, found, tuple(weights[s] for s in members), product.chain_states[chain])
+        )
     return Chains(("speech", "seen"), transitions, tuple(groups))
 
 
-def observed(frames=4, sizes=(2, 1), seed=0, seen=True) -> Observed:
+def observations(frames=4, sizes=(2, 1), seed=0, seen=True) -> AudioVisualObservations:
     draw = np.random.default_rng([seed, 3])
     streams = tuple(draw.normal(0, 1, (frames, size)).astype(np.float32) for size in sizes)
-    return Observed(streams, (None, None if seen else np.zeros(frames, bool)))
+    return AudioVisualObservations(streams, (None, None if seen else np.zeros(frames, bool)))

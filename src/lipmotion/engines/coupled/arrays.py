@@ -1,4 +1,4 @@
-"""A coupled model as plain arrays."""
+"""Conversion of a coupled model to and from arrays. The names of the arrays are the file format."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.coupled.chains.densities import Group
+from lipmotion.engines.coupled.chains.densities import StreamGroup
 from lipmotion.engines.coupled.chains.model import Chains
 from lipmotion.engines.coupled.chains.product import Grammar, reachable
 from lipmotion.engines.coupled.chains.structures import FACTORIAL, Structure
 from lipmotion.engines.coupled.chains.transitions import Transitions
-from lipmotion.engines.coupled.chains.unlimited import FreeProduct, FreeTransitions
+from lipmotion.engines.coupled.chains.factorial import FactorialProduct, FactorialTransitions
 from lipmotion.engines.coupled.chains.visual_streams import VisualStream
 from lipmotion.engines.coupled.config import CoupledConfig
-from lipmotion.engines.coupled.conversion.regression import OFFSETS, Following, Surroundings
+from lipmotion.engines.coupled.conversion.regression import OFFSETS, RegressionInputs, VisualRegression
 from lipmotion.engines.coupled.model import CoupledModel
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.motion.arrays import MOTION_ARRAYS, PHONE_SET, motion_arrays, motion_from_arrays
@@ -40,23 +40,23 @@ from lipmotion.units import UnitSet
 
 
 def coupled_arrays(model: CoupledModel) -> dict[str, NDArray[Any]]:
-    """Return a model as arrays; its configuration is not among them."""
+    """Serialise a model: return its arrays by name. The configuration is not among them."""
     chains = model.chains
     product = chains.transitions.product
     arrays = motion_arrays(PHONE_SET, model.space, model.closure) | {
-        "gain": model.gain,
-        "rest": model.rest,
+        "gain": model.scaling,
+        "rest": model.rest_pose,
         "streams": np.array(chains.streams),
     }
     for number, chain in enumerate(chains.structure.chains):
         arrays[f"chain_{number}/bigram"] = product.grammar.bigrams[number].astype(np.float32)
-        arrays[f"chain_{number}/first"] = product.grammar.firsts[number].astype(np.float32)
+        arrays[f"chain_{number}/first"] = product.grammar.initial[number].astype(np.float32)
         arrays[f"chain_{number}/units"] = np.array(list(chain.of.items()))
         arrays[f"chain_{number}/advance"] = chains.transitions.advance[number]
         if isinstance(chains.transitions, Transitions):
             arrays[f"chain_{number}/rows"] = chains.transitions.rows[number].astype(np.int32)
-    if isinstance(chains.transitions, FreeTransitions):
-        arrays["pairs"] = chains.transitions.pairs.astype(np.int32)
+    if isinstance(chains.transitions, FactorialTransitions):
+        arrays["pairs"] = chains.transitions.own_density_states.astype(np.int32)
     for number, group in enumerate(chains.groups):
         arrays |= {f"group_{number}/{key}": array for key, array in _group_arrays(group).items()}
     for number, stream in enumerate(model.visual):
@@ -64,10 +64,10 @@ def coupled_arrays(model: CoupledModel) -> dict[str, NDArray[Any]]:
             f"visual_{number}/columns": stream.columns,
             f"visual_{number}/scale": np.stack([stream.mean, stream.deviation]),
         }
-    return arrays | _follow_arrays(model)
+    return arrays | _regression_arrays(model)
 
 
-def _group_arrays(group: Group) -> dict[str, NDArray[Any]]:
+def _group_arrays(group: StreamGroup) -> dict[str, NDArray[Any]]:
     return {
         "streams": np.array(group.streams),
         "weights": np.array(group.weights),
@@ -78,46 +78,48 @@ def _group_arrays(group: Group) -> dict[str, NDArray[Any]]:
     }
 
 
-def _follow_arrays(model: CoupledModel) -> dict[str, NDArray[Any]]:
-    if model.follow is None:
+def _regression_arrays(model: CoupledModel) -> dict[str, NDArray[Any]]:
+    if model.regression is None:
         return {}
-    around, following = model.follow
+    inputs, regressions = model.regression
     arrays: dict[str, NDArray[Any]] = {
-        "around/window": np.stack([around.sound.mean, around.sound.scale]),
-        "around/window_basis": around.sound.basis.astype(np.float16),
-        "around/belief": around.belief.astype(np.float16),
-        "around/mean": around.mean,
-        "around/basis": around.basis.astype(np.float16),
+        "around/window": np.stack([inputs.acoustic.mean, inputs.acoustic.scale]),
+        "around/window_basis": inputs.acoustic.basis.astype(np.float16),
+        "around/belief": inputs.posterior_basis.astype(np.float16),
+        "around/mean": inputs.mean,
+        "around/basis": inputs.basis.astype(np.float16),
     }
-    for number, one in enumerate(following):
+    for number, regression in enumerate(regressions):
         arrays |= {
-            f"following_{number}/kind": one.kind,
-            f"following_{number}/coefficients": one.coefficients.astype(np.float16),
-            f"following_{number}/variances": one.variances,
+            f"following_{number}/kind": regression.regression_of_state,
+            f"following_{number}/coefficients": regression.coefficients.astype(np.float16),
+            f"following_{number}/variances": regression.variances,
         }
     return arrays
 
 
 def coupled_from_arrays(arrays: Arrays, config: CoupledConfig) -> CoupledModel:
-    """Return the model again. Raises ModelFormatError: something is missing, out of place or out of range."""
+    """Deserialise a model. Raises ModelFormatError: an array is missing, not declared, misshapen or out of range."""
     try:
         _, space, closure = motion_from_arrays(arrays, PHONE_SET.name)
         structure = _structure(arrays, config)
         poses = checked_arrays(arrays, POSES, Q=space.dimensions)
         streams = tuple(poses["streams"].tolist())
         _check_names(arrays, structure, len(streams))
-        if structure.counts[0] > arrays["group_0/tie"].size:
-            raise ValueError(f"{structure.counts[0]} states of the first chain, of {arrays['group_0/tie'].size} in all")
+        if structure.state_counts[0] > arrays["group_0/tie"].size:
+            raise ValueError(
+                f"{structure.state_counts[0]} states of the first chain, of {arrays['group_0/tie'].size} in all"
+            )
         transitions = _transitions(arrays, structure)
         visual = tuple(
             _visual(arrays_under(arrays, f"visual_{number}/"), name, space.dimensions, config.dynamic)
             for number, name in enumerate(streams[1:])
         )
         chains = Chains(streams, transitions, _groups(arrays, transitions.product.chain_states.shape[1], visual))
-        follow = _follow(arrays, structure, visual) if config.dynamic and config.acoustic_regression else None
-        model = CoupledModel(chains, space, visual, follow, poses["gain"], poses["rest"], closure)
-        check_rest(model.rest, model.poses)
-        check_poses(model.poses, space, closure)
+        regression = _regression(arrays, structure, visual) if config.dynamic and config.acoustic_regression else None
+        model = CoupledModel(chains, space, visual, regression, poses["gain"], poses["rest"], closure)
+        check_rest(model.rest_pose, model.pose_limits)
+        check_poses(model.pose_limits, space, closure)
         return model
     except (KeyError, ValueError, TypeError, IndexError, OverflowError, InputError) as error:
         raise ModelFormatError(f"the coupled model is damaged ({error}); train or download it again") from error
@@ -143,31 +145,33 @@ GROUP = {
     "weights": ArraySpec(np.float64, "S", 0, 1e6, whole=True),
     "tie": ArraySpec(np.intp, "J", 0, 1e9),
 }
-AROUND = {
+REGRESSION_INPUTS = {
     **WINDOW,
     "belief": ArraySpec(np.float32, "N B", -1.01, 1.01),
     "mean": ArraySpec(np.float32, "I", -STANDARD, STANDARD),
     "basis": ArraySpec(np.float32, "I F", -1.01, 1.01),
 }
-FOLLOWING = {
+VISUAL_REGRESSION = {
     "kind": ArraySpec(np.intp, "N", 0, 1e6),
     "coefficients": ArraySpec(np.float32, "E F D"),
     "variances": ArraySpec(np.float32, "N D", POSITIVE, LARGEST_VARIANCE),
 }
-"""How a model is stored: its chains, streams, groups of them, and what visual means follow."""
+"""The arrays of a model: of its chains, visual streams, stream groups, and regressions of visual means."""
 
 
 def _check_names(arrays: Arrays, structure: Structure, streams: int) -> None:
-    """Raise ValueError where there is an array that nothing declares."""
+    """Raise ValueError if there is an array that is not declared above."""
     chain = (f"chain_{number}/{key}" for number in range(len(structure.chains)) for key in UNITS | CHAIN | ROWS)
-    seen = (
+    visual = (
         f"{part}_{number}/{key}"
-        for part, table in (("visual", VISUAL), ("following", FOLLOWING))
+        for part, table in (("visual", VISUAL), ("following", VISUAL_REGRESSION))
         for number in range(streams - 1)
         for key in table
     )
     group = (f"group_{number}/{key}" for number in range(streams) for key in GROUP)
-    refuse_undeclared(arrays, MOTION_ARRAYS, POSES, PAIRS, chain, seen, group, (f"around/{key}" for key in AROUND))
+    refuse_undeclared(
+        arrays, MOTION_ARRAYS, POSES, PAIRS, chain, visual, group, (f"around/{key}" for key in REGRESSION_INPUTS)
+    )
 
 
 def _structure(arrays: Arrays, config: CoupledConfig) -> Structure:
@@ -179,26 +183,26 @@ def _structure(arrays: Arrays, config: CoupledConfig) -> Structure:
     return Structure(config.structure, tuple(sets), config.states, limit, config.cross_units)
 
 
-def _transitions(arrays: Arrays, structure: Structure) -> Transitions | FreeTransitions:
-    mine = [arrays_under(arrays, f"chain_{number}/") for number in range(len(structure.chains))]
-    found = [checked_arrays(own, CHAIN, U=len(units)) for own, units in zip(mine, structure.units, strict=True)]
-    for each in found:
-        check_sums_to_one("first", each["first"].sum(keepdims=True))
-        check_sums_to_one("bigram", each["bigram"].sum(axis=1))
-    grammar = Grammar(tuple(each["bigram"] for each in found), tuple(each["first"] for each in found))
-    advance = tuple(each["advance"] for each in found)
-    if structure.kind == FACTORIAL and structure.limit is None and len(found) == 2:
+def _transitions(arrays: Arrays, structure: Structure) -> Transitions | FactorialTransitions:
+    of_chains = [arrays_under(arrays, f"chain_{number}/") for number in range(len(structure.chains))]
+    chains = [checked_arrays(own, CHAIN, U=len(units)) for own, units in zip(of_chains, structure.units, strict=True)]
+    for chain in chains:
+        check_sums_to_one("first", chain["first"].sum(keepdims=True))
+        check_sums_to_one("bigram", chain["bigram"].sum(axis=1))
+    grammar = Grammar(tuple(chain["bigram"] for chain in chains), tuple(chain["first"] for chain in chains))
+    advance = tuple(chain["advance"] for chain in chains)
+    if structure.kind == FACTORIAL and structure.limit is None and len(chains) == 2:
         first, second = advance
-        pairs = checked_arrays(arrays, PAIRS)["pairs"]
-        for chain, count in enumerate(structure.counts):
-            if len(advance[chain]) != count:
-                raise ValueError(f"chain_{chain}/advance of {len(advance[chain])} states, required {count}")
-            check_index(f"pairs of chain {chain}", pairs[:, chain], count)
-        return FreeTransitions(FreeProduct(structure, grammar), (first, second), pairs)
+        own_density_states = checked_arrays(arrays, PAIRS)["pairs"]
+        for number, count in enumerate(structure.state_counts):
+            if len(advance[number]) != count:
+                raise ValueError(f"chain_{number}/advance of {len(advance[number])} states, required {count}")
+            check_index(f"pairs of chain {number}", own_density_states[:, number], count)
+        return FactorialTransitions(FactorialProduct(structure, grammar), (first, second), own_density_states)
     product = reachable(structure, grammar)
-    rows = tuple(checked_arrays(own, ROWS, J=len(product.joints))["rows"] for own in mine)
-    for chain, row in enumerate(rows):
-        check_index(f"chain_{chain}/rows", row, len(advance[chain]))
+    rows = tuple(checked_arrays(own, ROWS, J=len(product.joint_states))["rows"] for own in of_chains)
+    for number, row in enumerate(rows):
+        check_index(f"chain_{number}/rows", row, len(advance[number]))
     return Transitions(product, rows, advance)
 
 
@@ -213,35 +217,35 @@ def _visual(arrays: Arrays, name: str, dimensions: int, dynamic: bool) -> Visual
     return VisualStream(name, columns, dynamic, mean, deviation)
 
 
-def _groups(arrays: Arrays, states: int, visual: tuple[VisualStream, ...]) -> tuple[Group, ...]:
+def _groups(arrays: Arrays, joint_states: int, visual: tuple[VisualStream, ...]) -> tuple[StreamGroup, ...]:
     groups, widths = [], [FEATURES, *(len(stream.mean) for stream in visual)]
     for number in range(sum(key.endswith("/tie") for key in arrays)):
-        mine = arrays_under(arrays, f"group_{number}/")
-        streams = tuple(checked_arrays(mine, {"streams": GROUP["streams"]})["streams"].tolist())
+        of_group = arrays_under(arrays, f"group_{number}/")
+        streams = tuple(checked_arrays(of_group, {"streams": GROUP["streams"]})["streams"].tolist())
         check_index(f"group_{number}/streams", np.array(streams), len(widths))
         edges = np.cumsum([0, *(widths[stream] for stream in streams)]).tolist()
-        found = checked_arrays(mine, GROUP, J=states, D=edges[-1])
-        check_index(f"group_{number}/tie", found["tie"], found.sizes["G"])
-        columns, weights = tuple(slice(a, b) for a, b in pairwise(edges)), tuple(found["weights"].tolist())
-        groups.append(Group(streams, columns, mixtures_from_arrays(found), weights, found["tie"]))
+        checked = checked_arrays(of_group, GROUP, J=joint_states, D=edges[-1])
+        check_index(f"group_{number}/tie", checked["tie"], checked.sizes["G"])
+        columns, weights = tuple(slice(a, b) for a, b in pairwise(edges)), tuple(checked["weights"].tolist())
+        groups.append(StreamGroup(streams, columns, mixtures_from_arrays(checked), weights, checked["tie"]))
     if sorted(stream for group in groups for stream in group.streams) != list(range(len(widths))):
-        raise ValueError("streams that no group has, or two")
+        raise ValueError("streams that are in no group, or in two")
     return tuple(groups)
 
 
-def _follow(
+def _regression(
     arrays: Arrays, structure: Structure, visual: tuple[VisualStream, ...]
-) -> tuple[Surroundings, tuple[Following, ...]]:
-    mine = arrays_under(arrays, "around/")
-    checked_arrays(mine, AROUND, N=structure.counts[0])
-    axes = mine["window_basis"].shape[1] + mine["belief"].shape[1] * len(OFFSETS)
-    found = checked_arrays(mine, AROUND, N=structure.counts[0], I=axes)
-    around = Surroundings(acoustic_context_from(found), found["belief"], found["mean"], found["basis"])
-    following = []
+) -> tuple[RegressionInputs, tuple[VisualRegression, ...]]:
+    of_inputs = arrays_under(arrays, "around/")
+    checked_arrays(of_inputs, REGRESSION_INPUTS, N=structure.state_counts[0])
+    size = of_inputs["window_basis"].shape[1] + of_inputs["belief"].shape[1] * len(OFFSETS)
+    checked = checked_arrays(of_inputs, REGRESSION_INPUTS, N=structure.state_counts[0], I=size)
+    inputs = RegressionInputs(acoustic_context_from(checked), checked["belief"], checked["mean"], checked["basis"])
+    regressions = []
     for number, stream in enumerate(visual):
-        count = structure.counts[structure.chain_of(number + 1)]
-        sizes = {"N": count, "F": found.sizes["F"] + 1, "D": len(stream.mean)}
-        own = checked_arrays(arrays_under(arrays, f"following_{number}/"), FOLLOWING, **sizes)
+        count = structure.state_counts[structure.chain_of(number + 1)]
+        sizes = {"N": count, "F": checked.sizes["F"] + 1, "D": len(stream.mean)}
+        own = checked_arrays(arrays_under(arrays, f"following_{number}/"), VISUAL_REGRESSION, **sizes)
         check_index(f"following_{number}/kind", own["kind"], own.sizes["E"])
-        following.append(Following(own["kind"], own["coefficients"], own["variances"]))
-    return around, tuple(following)
+        regressions.append(VisualRegression(own["kind"], own["coefficients"], own["variances"]))
+    return inputs, tuple(regressions)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from lipmotion.engines.coupled.chains.structures import STRUCTURES, SYSTEMS, structure_of
-from lipmotion.engines.coupled.conversion.em import EXACT, SOFT, STARTS, UPDATES, Conversion
+from lipmotion.engines.coupled.conversion.em import EXACT, SOFT, STARTS, UPDATES, ConversionSettings
 from lipmotion.types import Configuration, Rule, option
 
 TRAJECTORY, FRAMES, PATH = "trajectory", "em", "viterbi"
@@ -33,8 +33,8 @@ class CoupledConfig(Configuration):
                  and of eigenlips
     conversion : ``trajectory``: parameter generation from expected precisions and means of static values, Δ and Δ²;
                  ``em``: the paper's, frame by frame;  ``viterbi``: means along the best path
-    start, update, steps : of the EM of conversion (``conversion.em.Conversion``); ``trajectory`` takes no steps after
-                 its soft start unless asked to
+    start, update, steps : of the EM of conversion (``conversion.em.ConversionSettings``); ``trajectory`` takes no
+                 steps after its soft start unless asked to
     acoustic_regression : regress visual means on the acoustic features and state posteriors around the frame
                  (``trajectory`` only)
     components : principal components that all point channels are reduced to
@@ -86,6 +86,6 @@ class CoupledConfig(Configuration):
         return self.conversion == TRAJECTORY
 
     @property
-    def em(self) -> Conversion:
+    def em(self) -> ConversionSettings:
         """The conversion by EM."""
-        return Conversion(self.start, self.update, self.steps)
+        return ConversionSettings(self.start, self.update, self.steps)

@@ -1,4 +1,4 @@
-"""What a coupled model is made of, in words."""
+"""A text that describes the parts of a coupled model."""
 
 from __future__ import annotations
 
@@ -7,22 +7,22 @@ from textwrap import wrap
 
 from lipmotion.engines.coupled.chains.product import Product
 from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, MULTISTREAM
-from lipmotion.engines.coupled.conversion.em import group_of
+from lipmotion.engines.coupled.conversion.em import group_index
 from lipmotion.engines.coupled.model import CoupledModel
 from lipmotion.printable import printable
 
 KINDS = {
     HMM: "one chain, one mixture over all streams",
     MULTISTREAM: "one chain, a mixture for each stream",
-    FACTORIAL: "chains that move on their own, densities of their joint states",
-    COUPLED: "chains whose moves depend on all chains, densities of their own states",
+    FACTORIAL: "chains with independent transitions, densities of their joint states",
+    COUPLED: "chains whose transitions depend on all chains, densities of their own states",
 }
 LINE = 110
 
 
-def described(model: CoupledModel) -> str:
-    """Return chains, streams and what the means follow, line by line."""
-    return "\n".join(map(printable, [*_chains(model), *_streams(model), *_following(model)]))
+def describe(model: CoupledModel) -> str:
+    """Return a text with the chains, the streams and the regressions of a model, one a line."""
+    return "\n".join(map(printable, [*_chains(model), *_streams(model), *_regressions(model)]))
 
 
 def _chains(model: CoupledModel) -> Iterator[str]:
@@ -30,9 +30,9 @@ def _chains(model: CoupledModel) -> Iterator[str]:
     yield f"{structure.kind}: {KINDS[structure.kind]}"
     if len(structure.chains) > 1:
         apart = "any number of states" if structure.limit is None else f"up to {structure.limit} state(s)"
-        together = "" if structure.crosses or structure.limit is None else ", units left together"
+        together = "" if structure.cross_units or structure.limit is None else ", units left together"
         yield f"  asynchrony: {apart} apart{together}"
-    count = len(product.joints) if isinstance(product, Product) else product.chain_states.shape[1]
+    count = len(product.joint_states) if isinstance(product, Product) else product.chain_states.shape[1]
     yield f"  joint states: {count}"
     for number, (chain, units) in enumerate(zip(structure.chains, structure.units, strict=True), start=1):
         yield f"chain {number}: {chain.name}, {len(units)} units of {structure.states} states"
@@ -42,13 +42,14 @@ def _chains(model: CoupledModel) -> Iterator[str]:
 def _streams(model: CoupledModel) -> Iterator[str]:
     chains = model.chains
     for number, name in enumerate(chains.streams):
-        mixtures = chains.groups[group_of(chains, number)].of_stream(number)
+        mixtures = chains.groups[group_index(chains, number)].stream_mixtures(number)
         densities, components, size = mixtures.means.shape
-        place = chains.structure.chain_of(number) + 1
-        yield f"stream {name}: {size} numbers on chain {place}, {densities} densities of {components} Gaussian(s)"
+        chain = chains.structure.chain_of(number) + 1
+        yield f"stream {name}: {size} dimensions on chain {chain}, {densities} densities of {components} Gaussian(s)"
 
 
-def _following(model: CoupledModel) -> Iterator[str]:
-    for stream, following in zip(model.visual, model.follow[1] if model.follow is not None else (), strict=False):
-        count, inputs, _ = following.coefficients.shape
-        yield f"means of {stream.name}: {count} regressions on {inputs} numbers of what is heard and believed around"
+def _regressions(model: CoupledModel) -> Iterator[str]:
+    regressions = model.regression[1] if model.regression is not None else ()
+    for stream, regression in zip(model.visual, regressions, strict=False):
+        count, inputs, _ = regression.coefficients.shape
+        yield f"means of {stream.name}: {count} regressions on {inputs} inputs, from features and posteriors around"

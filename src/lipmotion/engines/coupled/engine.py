@@ -13,14 +13,14 @@ from lipmotion.engines.base import Arrays, Engine, Fit, explain_by_trace
 from lipmotion.engines.coupled.arrays import coupled_arrays, coupled_from_arrays
 from lipmotion.engines.coupled.chains.densities import Single
 from lipmotion.engines.coupled.chains.lattice import Lattice
-from lipmotion.engines.coupled.chains.model import Inferred
+from lipmotion.engines.coupled.chains.model import Inference
 from lipmotion.engines.coupled.config import PATH, TRAJECTORY, CoupledConfig
-from lipmotion.engines.coupled.conversion.em import converted, path_means
-from lipmotion.engines.coupled.description import described
-from lipmotion.engines.coupled.explanation import explained, joined, units_believed
+from lipmotion.engines.coupled.conversion.em import convert, path_means
+from lipmotion.engines.coupled.description import describe
+from lipmotion.engines.coupled.explanation import concatenated, explain_frames, unit_posteriors
 from lipmotion.engines.coupled.model import CoupledModel
+from lipmotion.engines.coupled.training.alignment import allowed_units
 from lipmotion.engines.coupled.training.fit import fit_coupled
-from lipmotion.engines.coupled.training.train import allowed_units
 from lipmotion.kernels.banded import generate
 from lipmotion.motion.generation import Statistics, generation_blocks
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
@@ -79,24 +79,24 @@ class CoupledEngine(Engine[CoupledModel]):
 
         def statistics(wanted: slice) -> Statistics:
             lattice = self.lattice(model, speech, wanted)
-            found, path[wanted] = self._statistics(model, features[wanted], lattice)
-            return found
+            motion_statistics, path[wanted] = self._statistics(model, features[wanted], lattice)
+            return motion_statistics
 
         learned = model.motion if self.config.variance_scaling else replace(model.motion, scaling=None)
         motion, variance = learned.generate(statistics, frames, speech.units, constraints, close=self.config.closures)
-        states, places = np.unique(path, return_inverse=True)
+        states, positions = np.unique(path, return_inverse=True)
         return Generation(
             motion,
             variance,
-            _named(model, speech.units),
-            Trace(tuple(model.chains.transitions.product.name(int(state)) for state in states), places),
+            _with_units(model, speech.units),
+            Trace(tuple(model.chains.transitions.product.name(int(state)) for state in states), positions),
         )
 
     def lattice(self, model: CoupledModel, speech: Speech, wanted: slice) -> Lattice:
-        """Return where the chains can be in some frames: near what is said, if that is known, else anywhere."""
+        """Return the lattice of some frames: joint states near the phones of a transcript, or all without one."""
         chains = model.chains
         if not speech.said:
-            return chains.everywhere
+            return chains.full_lattice
         frames = len(speech.features.values)
         allowed = allowed_units(chains.structure, speech.units, frames)[wanted]
         return chains.lattice(allowed)
@@ -105,49 +105,50 @@ class CoupledEngine(Engine[CoupledModel]):
         self, model: CoupledModel, features: Single, lattice: Lattice
     ) -> tuple[Statistics, NDArray[np.intp]]:
         """Return means and precisions [each shape=(T, 3, Q)], and the most probable joint state of every frame."""
-        chains, observed = model.chains, model.unseen(features)
+        chains, observations = model.chains, model.speech_observations(features)
         if self.config.conversion == PATH:
-            path, _ = chains.best_path(chains.evidence(observed, lattice), lattice)
-            return model.frames([path_means(chains, path, s + 1) for s in range(len(model.visual))]), path
-        inferred = self.inferred(model, features, lattice)
+            path, _ = chains.best_path(chains.emission_log_densities(observations, lattice), lattice)
+            return model.frame_statistics([path_means(chains, path, s + 1) for s in range(len(model.visual))]), path
+        inference = self.inferred(model, features, lattice)
         if self.config.conversion != TRAJECTORY:
-            streams = converted(chains, observed, lattice, self.config.em).streams[1:]
-            return model.frames(streams), inferred.posteriors.best
-        return model.statistics(inferred), inferred.posteriors.best
+            streams = convert(chains, observations, lattice, self.config.em).streams[1:]
+            return model.frame_statistics(streams), inference.posteriors.most_probable
+        return model.motion_statistics(inference), inference.posteriors.most_probable
 
-    def inferred(self, model: CoupledModel, features: Single, lattice: Lattice) -> Inferred:
-        """Return what some frames of speech [shape=(T, 39)] say about the chains, after all steps of ``trajectory``."""
-        observed = model.unseen(features)
-        found = model.chains.inferred(observed, lattice)
+    def inferred(self, model: CoupledModel, features: Single, lattice: Lattice) -> Inference:
+        """Return the posteriors of the chains given some frames of speech [shape=(T, 39)].
+
+        With ``trajectory`` conversion, each of its steps infers again, with the generated motion as observed motion.
+        """
+        observations = model.speech_observations(features)
+        inference = model.chains.infer(observations, lattice)
         for _ in range(self.config.steps if self.config.conversion == TRAJECTORY else 0):
-            values = generate(*model.statistics(found))[0]
-            found = model.chains.inferred(model.seen(observed, values), lattice)
-        return found
+            values = generate(*model.motion_statistics(inference))[0]
+            inference = model.chains.infer(model.with_motion(observations, values), lattice)
+        return inference
 
     def explain(self, model: CoupledModel, speech: Speech, frames: Sequence[int]) -> tuple[Explanation, ...]:  # noqa: D102
         result = self.generate(model, speech)
-        features, found = np.asarray(speech.features.values), dict[int, Explanation]()
+        features, explanations = np.asarray(speech.features.values), dict[int, Explanation]()
         for inner, outer in generation_blocks(len(features)):
             inside = [frame for frame in frames if inner.start <= frame < inner.stop]
             if inside:
-                inferred = self.inferred(model, features[outer], self.lattice(model, speech, outer))
-                known, rows = (
-                    [explain_by_trace(result, frame) for frame in inside],
-                    [frame - outer.start for frame in inside],
-                )
-                found.update(zip(inside, explained(known, model, inferred, rows), strict=True))
-        return tuple(found[frame] for frame in frames)
+                inference = self.inferred(model, features[outer], self.lattice(model, speech, outer))
+                by_trace = [explain_by_trace(result, frame) for frame in inside]
+                rows = [frame - outer.start for frame in inside]
+                explanations.update(zip(inside, explain_frames(by_trace, model, inference, rows), strict=True))
+        return tuple(explanations[frame] for frame in frames)
 
     def posteriors(self, model: CoupledModel, speech: Speech) -> tuple[ChainPosteriors, ...]:  # noqa: D102
-        features, found = np.asarray(speech.features.values), []
+        features, blocks = np.asarray(speech.features.values), []
         for inner, outer in generation_blocks(len(features)):
-            inferred = self.inferred(model, features[outer], self.lattice(model, speech, outer))
+            inference = self.inferred(model, features[outer], self.lattice(model, speech, outer))
             kept = slice(inner.start - outer.start, inner.stop - outer.start)
-            found.append(units_believed(model.chains, inferred.posteriors, kept))
-        return tuple(joined(parts) for parts in zip(*found, strict=True))
+            blocks.append(unit_posteriors(model.chains, inference.posteriors, kept))
+        return tuple(concatenated(parts) for parts in zip(*blocks, strict=True))
 
     def describe(self, model: CoupledModel) -> str:  # noqa: D102
-        return described(model)
+        return describe(model)
 
     def to_arrays(self, model: CoupledModel) -> dict[str, NDArray[Any]]:  # noqa: D102
         return coupled_arrays(model)
@@ -156,8 +157,8 @@ class CoupledEngine(Engine[CoupledModel]):
         return coupled_from_arrays(arrays, self.config)
 
 
-def _named(model: CoupledModel, units: Timeline[Unit]) -> Timeline[Unit]:
-    """Return the phones with the units that model them, one a chain."""
+def _with_units(model: CoupledModel, units: Timeline[Unit]) -> Timeline[Unit]:
+    """Return the phones with the names of the units that model them, one for each chain, joined by ``/``."""
     chains = model.chains.structure.chains
     return Timeline(
         tuple(

@@ -1,4 +1,4 @@
-"""What stands behind a frame, in words and in the channels' own units."""
+"""Explanations of frames: posteriors of chains, dominant Gaussians, and regressed means in the channels' units."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.coupled.chains.densities import Single, component_posteriors
-from lipmotion.engines.coupled.chains.lattice import Posteriors
-from lipmotion.engines.coupled.chains.model import Chains, Inferred
+from lipmotion.engines.coupled.chains.lattice import LatticePosteriors
+from lipmotion.engines.coupled.chains.model import Chains, Inference
 from lipmotion.engines.coupled.chains.product import Product
 from lipmotion.engines.coupled.chains.structures import Structure
 from lipmotion.engines.coupled.chains.visual_streams import VisualStream
-from lipmotion.engines.coupled.conversion.em import group_of
-from lipmotion.engines.coupled.conversion.regression import gates
+from lipmotion.engines.coupled.conversion.em import group_index
+from lipmotion.engines.coupled.conversion.regression import regression_weights
 from lipmotion.engines.coupled.model import CoupledModel
 from lipmotion.types import (
     ChainPosteriors,
@@ -30,53 +30,55 @@ from lipmotion.units import VISEME_OF
 
 Array = NDArray[np.float64]
 MOST_STATES = 3
-"""States of a chain that are named."""
+"""Greatest number of states of a chain that an explanation names."""
 REST = "rest"
-"""What the mean comes from in silence away from speech."""
-LEAST = 0.005
-"""What is less probable is not named."""
+"""Name of what the mean comes from in silence away from speech."""
+LEAST_PROBABILITY = 0.005
+"""States and regressions with less probability are not named."""
 
 
-def explained(
-    frames: Sequence[Explanation], model: CoupledModel, inferred: Inferred, rows: Sequence[int]
+def explain_frames(
+    frames: Sequence[Explanation], model: CoupledModel, inference: Inference, rows: Sequence[int]
 ) -> list[Explanation]:
-    """Return explanations of frames with what the chains know of them.
+    """Return explanations of frames, completed with the chains, the Gaussians and the regressions behind them.
 
-    rows : the frames among those of ``inferred``
-    What no path of the chains leads through stays as it is.
+    rows : the number of each of these frames among the frames of ``inference``
+    If no path leads through the chains, the explanations are returned unchanged.
     """
-    if not np.isfinite(inferred.posteriors.log_likelihood):
+    if not np.isfinite(inference.posteriors.log_likelihood):
         return list(frames)
     streams = range(len(model.chains.streams))
     return [
         replace(
             frame,
-            chains=chain_states(model.chains, inferred.posteriors, row),
-            joint=joint_state(model.chains, inferred.posteriors, row),
-            gaussians=tuple(_gaussian(model, inferred, row, stream) for stream in streams),
+            chains=chain_states(model.chains, inference.posteriors, row),
+            joint=joint_state(model.chains, inference.posteriors, row),
+            gaussians=tuple(_dominant_gaussian(model, inference, row, stream) for stream in streams),
             regressions=regressions,
         )
-        for frame, row, regressions in zip(frames, rows, _regressions(model, inferred, rows), strict=True)
+        for frame, row, regressions in zip(frames, rows, _regressed_means(model, inference, rows), strict=True)
     ]
 
 
-def chain_states(chains: Chains, posteriors: Posteriors, row: int) -> tuple[ChainStates, ...]:
-    """Return where each chain is in a frame, and how far ahead of the first."""
+def chain_states(chains: Chains, posteriors: LatticePosteriors, row: int) -> tuple[ChainStates, ...]:
+    """Return the most probable states of each chain in a frame, and the probabilities of its asynchrony."""
     structure = chains.structure
     return tuple(
         ChainStates(
-            own.name,
-            _likely([structure.state_name(number, state) for state in range(count)], posteriors.chains[number][row]),
+            unit_set.name,
+            _most_probable(
+                [structure.state_name(number, state) for state in range(count)], posteriors.chains[number][row]
+            ),
             dict(zip(leads(chains, number), lead[row].tolist(), strict=True)),
         )
-        for number, (own, count, lead) in enumerate(
-            zip(structure.chains, structure.counts, lead_posteriors(chains, posteriors), strict=True)
+        for number, (unit_set, count, lead) in enumerate(
+            zip(structure.chains, structure.state_counts, lead_posteriors(chains, posteriors), strict=True)
         )
     )
 
 
-def joint_state(chains: Chains, posteriors: Posteriors, row: int) -> NamedProbability | None:
-    """Return the most probable state of all chains together in a frame; None where joint states are not listed."""
+def joint_state(chains: Chains, posteriors: LatticePosteriors, row: int) -> NamedProbability | None:
+    """Return the most probable joint state in a frame; None where joint states are not listed."""
     if posteriors.joint is None:
         return None
     best = int(posteriors.joint.probability[row].argmax())
@@ -85,143 +87,157 @@ def joint_state(chains: Chains, posteriors: Posteriors, row: int) -> NamedProbab
 
 
 def leads(chains: Chains, chain: int) -> tuple[int, ...]:
-    """Return how many states a chain may be ahead of the first; none for the first, and without a limit."""
+    """Return the possible leads of a chain: by how many states it may be ahead of the first chain.
+
+    Empty for the first chain, and without a limit of asynchrony.
+    """
     limit = chains.structure.limit
     return () if limit is None or chain == 0 else tuple(range(-limit, limit + 1))
 
 
-def lead_posteriors(chains: Chains, posteriors: Posteriors) -> list[Single]:
-    """Return the probabilities of ``leads``, chain by chain [each shape=(T, len(leads))]."""
-    product, found = chains.transitions.product, []
+def lead_posteriors(chains: Chains, posteriors: LatticePosteriors) -> list[Single]:
+    """Return, for each chain, the posteriors of its ``leads`` [each shape=(T, len(leads))]."""
+    product, result = chains.transitions.product, []
     for chain in range(len(chains.structure.chains)):
         ahead = np.array(leads(chains, chain), np.intp)
-        lead = np.zeros((len(posteriors.best), len(ahead)), np.float32)
+        lead = np.zeros((len(posteriors.most_probable), len(ahead)), np.float32)
         if isinstance(product, Product) and posteriors.joint is not None:
             own = product.lead[chain][posteriors.joint.states]
             lead = posteriors.joint.probability @ (own[:, None] == ahead).astype(np.float32)
-        found.append(lead)
-    return found
+        result.append(lead)
+    return result
 
 
-def units_believed(chains: Chains, posteriors: Posteriors, kept: slice) -> list[ChainPosteriors]:
-    """Return what is believed of the units of each chain in some frames."""
+def unit_posteriors(chains: Chains, posteriors: LatticePosteriors, kept: slice) -> list[ChainPosteriors]:
+    """Return the posteriors of the units of each chain in some frames."""
     structure = chains.structure
     return [
         ChainPosteriors(
-            own.name,
+            unit_set.name,
             units,
             posteriors.chains[number][kept].reshape(-1, len(units), structure.states).sum(axis=2),
             leads(chains, number),
             lead[kept],
         )
-        for number, (own, units, lead) in enumerate(
+        for number, (unit_set, units, lead) in enumerate(
             zip(structure.chains, structure.units, lead_posteriors(chains, posteriors), strict=True)
         )
     ]
 
 
-def joined(parts: Sequence[ChainPosteriors]) -> ChainPosteriors:
-    """Return successive beliefs of one chain as one."""
-    together = (np.concatenate([getattr(part, name) for part in parts]) for name in ("probability", "lead"))
-    probability, lead = together
+def concatenated(parts: Sequence[ChainPosteriors]) -> ChainPosteriors:
+    """Return the posteriors of one chain in successive parts of an utterance as one."""
+    probability, lead = (np.concatenate([getattr(part, name) for part in parts]) for name in ("probability", "lead"))
     return replace(parts[0], probability=probability, lead=lead)
 
 
-def _likely(names: Sequence[str], probability: NDArray[np.floating]) -> tuple[NamedProbability, ...]:
+def _most_probable(names: Sequence[str], probability: NDArray[np.floating]) -> tuple[NamedProbability, ...]:
+    """Return the most probable of some named states or regressions, the most probable first."""
     best = np.argsort(-probability, kind="stable")[:MOST_STATES]
     named = [NamedProbability(names[i], float(probability[i])) for i in best]
-    return (named[0], *(one for one in named[1:] if one.probability >= LEAST))
+    return (named[0], *(state for state in named[1:] if state.probability >= LEAST_PROBABILITY))
 
 
-def _gaussian(model: CoupledModel, inferred: Inferred, row: int, stream: int) -> DominantGaussian:
-    """Return the Gaussian of a stream that is most responsible for a frame."""
+def _dominant_gaussian(model: CoupledModel, inference: Inference, row: int, stream: int) -> DominantGaussian:
+    """Return the Gaussian of a stream with the largest posterior in a frame."""
     chains = model.chains
-    number = group_of(chains, stream)
-    group, shares = chains.groups[number], inferred.evidence.shares[number]
-    posterior = inferred.posteriors.densities[number][row : row + 1]
-    weight = component_posteriors(posterior, None if shares is None else shares[row : row + 1])[0]
-    component, place = np.unravel_index(weight.argmax(), weight.shape)
-    density = int(inferred.lattice.densities[number][place])
-    alone = group.of_stream(stream)
-    mean, variance = (x[density, component].astype(float) for x in (alone.means, alone.variances))
-    seen = inferred.observed.seen[stream]
-    distance = None
-    if seen is None or seen[row]:
-        error = inferred.observed.streams[stream][row] - mean
-        distance = float(np.sqrt(np.mean(error * error / variance)))
+    number = group_index(chains, stream)
+    group, responsibilities = chains.groups[number], inference.emissions.responsibilities[number]
+    posterior = inference.posteriors.densities[number][row : row + 1]
+    weight = component_posteriors(posterior, None if responsibilities is None else responsibilities[row : row + 1])[0]
+    component, position = np.unravel_index(weight.argmax(), weight.shape)
+    density = int(inference.lattice.densities[number][position])
+    mixtures = group.stream_mixtures(stream)
+    mean, variance = (x[density, component].astype(float) for x in (mixtures.means, mixtures.variances))
     channels: Mapping[str, ChannelValue] = {}
     if stream:
         visual = model.visual[stream - 1]
-        means, precisions = visual.restored(mean[None], 1 / variance[None])
-        channels = _in_channels(model, visual, means[0, 0], 1 / precisions[0, 0])
+        means, precisions = visual.unstandardised(mean[None], 1 / variance[None])
+        channels = _channel_values(model, visual, means[0, 0], 1 / precisions[0, 0])
     return DominantGaussian(
         chains.streams[stream],
         _density_name(chains, group.tie, density),
         int(component) + 1,
         len(weight),
-        float(weight[component, place]),
-        distance,
+        float(weight[component, position]),
+        _distance(inference, stream, row, mean, variance),
         channels,
     )
 
 
+def _distance(inference: Inference, stream: int, row: int, mean: Array, variance: Array) -> float | None:
+    """Return how far an observation is from a Gaussian, in standard deviations (root mean square over dimensions).
+
+    mean, variance : of the Gaussian [shape=(D_s,)]
+    None: the stream was not observed in this frame.
+    """
+    observed = inference.observations.observed[stream]
+    if observed is not None and not observed[row]:
+        return None
+    error = inference.observations.streams[stream][row] - mean
+    return float(np.sqrt(np.mean(error * error / variance)))
+
+
 def _density_name(chains: Chains, tie: NDArray[np.intp], density: int) -> str:
-    """Return the states of the chains that a density belongs to: those that all joint states with it share."""
+    """Return the name of a density: the states of the chains that all joint states with this density share."""
     states = chains.transitions.product.chain_states[:, tie == density]
     return " | ".join(
         chains.structure.state_name(chain, int(own[0])) for chain, own in enumerate(states) if (own == own[0]).all()
     )
 
 
-def _regressions(model: CoupledModel, inferred: Inferred, rows: Sequence[int]) -> list[tuple[RegressedMean, ...]]:
-    """Return what the means of frames come from where they are not those of the densities, frame by frame."""
+def _regressed_means(model: CoupledModel, inference: Inference, rows: Sequence[int]) -> list[tuple[RegressedMean, ...]]:
+    """Return, for each frame, the expected means of the visual streams and the regressions that they come from.
+
+    Empty where visual streams have no dynamics, as nothing is regressed then.
+    """
     if not all(stream.dynamic for stream in model.visual):
         return [() for _ in rows]
-    means, precisions = model.statistics(inferred)
-    resting, found = model.resting(inferred.posteriors.chains[0]), []
+    means, precisions = model.motion_statistics(inference)
+    away, result = model.away_from_speech(inference.posteriors.chains[0]), []
+    rest: list[tuple[NamedProbability, ...]] = [(NamedProbability(REST, 1.0),)] * len(model.visual)
     for row in rows:
-        shares = [(NamedProbability(REST, 1.0),)] * len(model.visual) if resting[row] else _shares(model, inferred, row)
-        found.append(
-            tuple(
-                RegressedMean(
-                    stream.name,
-                    own,
-                    _in_channels(model, stream, means[row, 0, columns], 1 / precisions[row, 0, columns]),
-                )
-                for stream, own, columns in ((s, own, s.columns) for s, own in zip(model.visual, shares, strict=False))
-            )
-        )
-    return found
+        shares = rest if away[row] else _regression_shares(model, inference, row)
+        regressed = []
+        for stream, own in zip(model.visual, shares, strict=False):
+            mean, variance = means[row, 0, stream.columns], 1 / precisions[row, 0, stream.columns]
+            regressed.append(RegressedMean(stream.name, own, _channel_values(model, stream, mean, variance)))
+        result.append(tuple(regressed))
+    return result
 
 
-def _shares(model: CoupledModel, inferred: Inferred, row: int) -> list[tuple[NamedProbability, ...]]:
-    """Return how much each regression of every visual stream says; none where means follow nothing."""
-    structure, found = model.chains.structure, []
-    for number, following in enumerate(model.follow[1] if model.follow is not None else ()):
-        chain = structure.chain_of(number + 1)
-        gate = inferred.posteriors.chains[chain][row : row + 1]
-        share = gates(gate, following.kind, len(following.coefficients))[0]
-        found.append(_likely([_regression_name(structure, chain, following.kind, k) for k in range(len(share))], share))
-    return found
+def _regression_shares(model: CoupledModel, inference: Inference, row: int) -> list[tuple[NamedProbability, ...]]:
+    """Return the weights of the most important regressions of every visual stream in a frame; empty without any."""
+    structure, result = model.chains.structure, []
+    for number, regression in enumerate(model.regression[1] if model.regression is not None else ()):
+        chain, regression_of_state = structure.chain_of(number + 1), regression.regression_of_state
+        posterior = inference.posteriors.chains[chain][row : row + 1]
+        weights = regression_weights(posterior, regression_of_state, len(regression.coefficients))[0]
+        names = [_regression_name(structure, chain, regression_of_state, k) for k in range(len(weights))]
+        result.append(_most_probable(names, weights))
+    return result
 
 
-def _regression_name(structure: Structure, chain: int, kind: NDArray[np.intp], number: int) -> str:
-    """Return the viseme, and the place if all are at the same, of the states that a regression serves: ``bi.2``."""
-    units, places = np.divmod(np.flatnonzero(kind == number), structure.states)
+def _regression_name(structure: Structure, chain: int, regression_of_state: NDArray[np.intp], regression: int) -> str:
+    """Return the viseme of the states that share a regression, with their position if it is the same: ``bi.2``."""
+    units, positions = np.divmod(np.flatnonzero(regression_of_state == regression), structure.states)
     phones = {structure.chains[chain].phones(structure.units[chain][unit])[0] for unit in units}
     viseme = "/".join(sorted({VISEME_OF[phone] for phone in phones}))
-    return f"{viseme}.{places[0] + 1}" if len(set(places.tolist())) == 1 else viseme
+    return f"{viseme}.{positions[0] + 1}" if len(set(positions.tolist())) == 1 else viseme
 
 
-def _in_channels(
+def _channel_values(
     model: CoupledModel, stream: VisualStream, means: Array, variances: Array
 ) -> Mapping[str, ChannelValue]:
-    """Return the means and deviations of a visual stream's channels from those in its dimensions [shapes=(q,)]."""
+    """Return the values and standard deviations of the channels of a visual stream, by channel name.
+
+    means, variances : in the dimensions of the stream [shapes=(q,)]
+    """
     space = model.space
     values, variance = np.zeros((1, space.dimensions)), np.full((1, space.dimensions), np.nan)
     values[:, stream.columns], variance[:, stream.columns] = means, variances
-    motion, spread = space.restore(values, variance)
-    found = zip(space.channels, motion[0].tolist(), np.sqrt(spread[0]).tolist(), strict=True)
+    motion, variance_of_motion = space.restore(values, variance)
+    channels = zip(space.channels, motion[0].tolist(), np.sqrt(variance_of_motion[0]).tolist(), strict=True)
     return {
-        channel.name: ChannelValue(value, deviation) for channel, value, deviation in found if np.isfinite(deviation)
+        channel.name: ChannelValue(value, deviation) for channel, value, deviation in channels if np.isfinite(deviation)
     }

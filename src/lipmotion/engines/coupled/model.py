@@ -1,4 +1,4 @@
-"""What the coupled engine learns."""
+"""The model of the coupled engine: chains, and how their posteriors become motion."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.coupled.chains.densities import Observed, Single
-from lipmotion.engines.coupled.chains.model import Chains, Inferred
-from lipmotion.engines.coupled.chains.visual_streams import VisualStream, unseen
-from lipmotion.engines.coupled.conversion.em import statistics
-from lipmotion.engines.coupled.conversion.regression import Following, Surroundings
+from lipmotion.engines.coupled.chains.densities import AudioVisualObservations, Single
+from lipmotion.engines.coupled.chains.model import Chains, Inference
+from lipmotion.engines.coupled.chains.visual_streams import VisualStream, speech_observations
+from lipmotion.engines.coupled.conversion.em import precision_statistics
+from lipmotion.engines.coupled.conversion.regression import RegressionInputs, VisualRegression
 from lipmotion.motion.closure import Closure
 from lipmotion.motion.generation import LearnedMotion
 from lipmotion.motion.limits import MotionLimits, limits_of
@@ -22,117 +22,122 @@ from lipmotion.motion.variance_scaling import VarianceScaling
 from lipmotion.types import FRAME_RATE_HZ
 
 Array = NDArray[np.float64]
-CALM_S = 0.45
-"""Silence this far from speech is rest: nearer, the mouth closes or gets ready."""
+AWAY_FROM_SPEECH_S = 0.45
+"""In silence this far from speech the mouth is in the rest pose; nearer, it is still closing or gets ready."""
 MOST_SPEECH = 0.05
-"""Of the probability of speech in a silent frame."""
-FIRM = 100.0
-"""How many times more precise the pose at rest is than what is around it."""
+"""Greatest posterior of speech in a frame that counts as silent."""
+REST_PRECISION_FACTOR = 100.0
+"""How many times more precise the rest pose is than the means that it replaces."""
 
 
 @dataclass(frozen=True, eq=False)
 class CoupledModel:
-    """Chains, and how what they emit becomes motion.
+    """Coupled chains with everything that turns their posteriors into motion.
 
-    space   : the Q dimensions in which motion is modelled
-    visual  : the streams that they are, in the order of the chains' streams after speech
-    follow  : how visual means follow what is around a frame (None: they are those of the chains' densities)
-    gain    : by how much movements away from rest are made larger [shape=(Q,)]
-    rest    : the pose in silence [shape=(Q,)]
-    closure : how the lips close (None: the motion has no opening)
+    space      : the motion space, of Q dimensions
+    visual     : the visual streams, in the order of the chains' streams after speech
+    regression : of the visual means: the inputs, and the regression of each visual stream; None: the means are those of
+                 the chains' densities
+    scaling    : factors of variance scaling, away from the rest pose [shape=(Q,)]
+    rest_pose  : the pose in silence away from speech [shape=(Q,)]
+    closure    : how the lips close; None: the motion has no opening
     """
 
     chains: Chains
     space: MotionSpace
     visual: tuple[VisualStream, ...]
-    follow: tuple[Surroundings, tuple[Following, ...]] | None
-    gain: Array
-    rest: Array
+    regression: tuple[RegressionInputs, tuple[VisualRegression, ...]] | None
+    scaling: Array
+    rest_pose: Array
     closure: Closure | None
 
     @cached_property
     def limits(self) -> MotionLimits:
-        """Between which values motion lies."""
-        poses, deviation = self.poses, np.zeros(self.space.dimensions)
+        """The limits of generated motion: those of the poses and of the rest pose, widened by a standard deviation."""
+        poses, deviation = self.pose_limits, np.zeros(self.space.dimensions)
         for stream in self.visual:
             deviation[stream.columns] = stream.deviation[: len(stream.columns)]
-        return MotionLimits(np.minimum(poses.low, self.rest), np.maximum(poses.high, self.rest)).widened(deviation)
+        low, high = np.minimum(poses.low, self.rest_pose), np.maximum(poses.high, self.rest_pose)
+        return MotionLimits(low, high).widened(deviation)
 
     @cached_property
     def motion(self) -> LearnedMotion:
-        """The end of the path from speech to motion."""
-        return LearnedMotion(self.space, self.closure, self.limits, VarianceScaling(self.gain, self.rest))
+        """What turns means and precisions into motion: space, closure, limits and variance scaling."""
+        return LearnedMotion(self.space, self.closure, self.limits, VarianceScaling(self.scaling, self.rest_pose))
 
     @property
-    def poses(self) -> MotionLimits:
-        """Between which values the means of all densities lie."""
+    def pose_limits(self) -> MotionLimits:
+        """The limits of the means of all densities."""
         low, high = np.zeros(self.space.dimensions), np.zeros(self.space.dimensions)
         for number, stream in enumerate(self.visual, start=1):
             group = next(group for group in self.chains.groups if number in group.streams)
-            means = group.of_stream(number).means.astype(float)
+            means = group.stream_mixtures(number).means.astype(float)
             flat = means.reshape(-1, means.shape[2])
-            low[stream.columns], high[stream.columns] = limits_of(stream.restored(flat, np.ones_like(flat))[0][:, 0])
+            poses = stream.unstandardised(flat, np.ones_like(flat))[0][:, 0]
+            low[stream.columns], high[stream.columns] = limits_of(poses)
         return MotionLimits(low, high)
 
-    def unseen(self, features: Single) -> Observed:
-        """Return speech [shape=(T, 39)] with nothing seen."""
-        return unseen(features, self.visual)
+    def speech_observations(self, features: Single) -> AudioVisualObservations:
+        """Return observations of speech [shape=(T, 39)] in which no visual stream was observed."""
+        return speech_observations(features, self.visual)
 
-    def statistics(self, inferred: Inferred) -> tuple[Array, Array]:
-        """Return means and precisions of the motion in its space [each shape=(T, 3, Q)]."""
-        shape = (inferred.observed.frames, 3, self.space.dimensions)
+    def with_motion(self, observations: AudioVisualObservations, values: Array) -> AudioVisualObservations:
+        """Return the observations with motion in the space [shape=(T, Q)] as the visual streams."""
+        for number, stream in enumerate(self.visual, start=1):
+            observations = observations.with_stream(number, stream.standardised(values))
+        return observations
+
+    def motion_statistics(self, inference: Inference) -> tuple[Array, Array]:
+        """Return the expected means and precisions of the motion in its space [each shape=(T, 3, Q)].
+
+        Axis 1: value, slope, curvature. In silence away from speech the mean is the rest pose.
+        """
+        shape = (inference.observations.frames, 3, self.space.dimensions)
         means, precisions = np.zeros(shape), np.zeros(shape)
-        around = self.around(inferred)
+        inputs = self.regression_inputs(inference)
         for number, stream in enumerate(self.visual):
-            if around is None or self.follow is None:
-                precision, weighted = statistics(
-                    self.chains, inferred.posteriors, inferred.evidence, inferred.lattice, number + 1
-                )
+            if inputs is None or self.regression is None:
+                precision, weighted = precision_statistics(self.chains, inference, number + 1)
                 mean = weighted / np.maximum(precision, 1e-300)
             else:
-                gate = inferred.posteriors.chains[self.chains.structure.chain_of(number + 1)]
-                following = self.follow[1][number]
-                mean, precision = following.means(around, gate), following.precisions(gate)
-            means[:, :, stream.columns], precisions[:, :, stream.columns] = stream.restored(mean, precision)
-        resting = self.resting(inferred.posteriors.chains[0])
-        means[resting] = 0
-        means[resting, 0] = self.rest
-        precisions[resting] *= FIRM
+                posterior = inference.posteriors.chains[self.chains.structure.chain_of(number + 1)]
+                regression = self.regression[1][number]
+                mean, precision = regression.means(inputs, posterior), regression.precisions(posterior)
+            means[:, :, stream.columns], precisions[:, :, stream.columns] = stream.unstandardised(mean, precision)
+        away = self.away_from_speech(inference.posteriors.chains[0])
+        means[away] = 0
+        means[away, 0] = self.rest_pose
+        precisions[away] *= REST_PRECISION_FACTOR
         return means, precisions
 
-    def resting(self, posterior: Single) -> NDArray[np.bool_]:
-        """Return which frames are silence away from speech [shape=(T,)].
+    def frame_statistics(self, streams: Sequence[Array]) -> tuple[Array, Array]:
+        """Return means and precisions of motion whose frames are converted one by one [each shape=(T, 3, Q)].
+
+        streams : the values of all visual streams [each shape=(T, D)]
+        These values are the means; only values have a precision, so parameter generation returns the means unchanged.
+        """
+        shape = (len(streams[0]), 3, self.space.dimensions)
+        means, precisions = np.zeros(shape), np.zeros(shape)
+        for stream, values in zip(self.visual, streams, strict=True):
+            mean, precision = stream.unstandardised(values, np.ones_like(values))
+            means[:, :, stream.columns], precisions[:, :, stream.columns] = mean, precision
+        precisions[:, 1:] = 0
+        return means, precisions
+
+    def regression_inputs(self, inference: Inference) -> Single | None:
+        """Return the regression inputs of all frames [shape=(T, F + 1)]; None: there is no regression."""
+        if self.regression is None:
+            return None
+        return self.regression[0](inference.observations.streams[0], inference.posteriors.chains[0])
+
+    def away_from_speech(self, posterior: Single) -> NDArray[np.bool_]:
+        """Return whether each frame is silence away from speech [shape=(T,)].
 
         posterior : of the first chain's states [shape=(T, N)]
         """
         structure = self.chains.structure
         silent = np.repeat([structure.chains[0].silent(unit) for unit in structure.units[0]], structure.states)
-        spoken = posterior @ (~silent).astype(np.float32) > MOST_SPEECH
-        reach = round(CALM_S * FRAME_RATE_HZ)
-        near = np.cumsum(np.pad(spoken.astype(np.intp), (reach + 1, reach)))
-        return np.asarray(near[2 * reach + 1 :] == near[: -2 * reach - 1])
-
-    def seen(self, observed: Observed, values: Array) -> Observed:
-        """Return what was observed, with motion in the space [shape=(T, Q)] as if it had been seen."""
-        for number, stream in enumerate(self.visual, start=1):
-            observed = observed.given(number, stream.observed(values))
-        return observed
-
-    def frames(self, streams: Sequence[Array]) -> tuple[Array, Array]:
-        """Return the values of all visual streams [each shape=(T, D)] as means, and precisions of the values alone.
-
-        Parameter generation gives such means back as they are.
-        """
-        shape = (len(streams[0]), 3, self.space.dimensions)
-        means, precisions = np.zeros(shape), np.zeros(shape)
-        for stream, values in zip(self.visual, streams, strict=True):
-            mean, precision = stream.restored(values, np.ones_like(values))
-            means[:, :, stream.columns], precisions[:, :, stream.columns] = mean, precision
-        precisions[:, 1:] = 0
-        return means, precisions
-
-    def around(self, inferred: Inferred) -> Single | None:
-        """Return what visual means follow, in numbers [shape=(T, F + 1)]; None: they follow nothing."""
-        if self.follow is None:
-            return None
-        return self.follow[0](inferred.observed.streams[0], inferred.posteriors.chains[0])
+        speech = posterior @ (~silent).astype(np.float32) > MOST_SPEECH
+        reach = round(AWAY_FROM_SPEECH_S * FRAME_RATE_HZ)
+        speech_before = np.cumsum(np.pad(speech.astype(np.intp), (reach + 1, reach)))
+        return np.asarray(speech_before[2 * reach + 1 :] == speech_before[: -2 * reach - 1])

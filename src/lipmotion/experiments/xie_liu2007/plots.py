@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from lipmotion.engines.coupled.conversion.em import converted
+from lipmotion.engines.coupled.conversion.em import convert
 from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.errors import ExportError, MissingDependencyError
 from lipmotion.experiments.xie_liu2007.systems import TrainedSystem
@@ -85,8 +85,8 @@ def _convergence(figure: Any, recordings: HeldOutRecordings, chains: TrainedSyst
     axes = picture.subplots()
     engine, model = chains.engine, chains.model
     for utterance in recordings.utterances:
-        observed = model.unseen(np.asarray(utterance.features.values))
-        steps = converted(model.chains, observed, model.chains.everywhere, engine.config.em).log_likelihood
+        observations = model.speech_observations(np.asarray(utterance.features.values))
+        steps = convert(model.chains, observations, model.chains.full_lattice, engine.config.em).log_likelihood
         axes.plot(range(len(steps)), steps, "o-", markersize=3, label=utterance.name)
     axes.set_xlabel("step of EM (0: means along the best path)")
     axes.set_ylabel("log likelihood of speech and lips (nats per frame)")

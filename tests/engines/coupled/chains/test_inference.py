@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from engines.coupled.tiny import THREE, TWO, chains, observed, structure
+from engines.coupled.tiny import THREE, TWO, chains, observations, structure
 from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, MULTISTREAM
 from lipmotion.engines.coupled.chains.transitions import Transitions
-from lipmotion.engines.coupled.conversion.em import statistics
+from lipmotion.engines.coupled.conversion.em import precision_statistics
 from oracles import coupled as oracle
 
 KINDS = [
@@ -25,18 +25,18 @@ def made(kind, sets, limit, **other):
 @every
 @pytest.mark.parametrize("seen", [True, False])
 def test_posteriors_are_those_of_all_paths(kind, sets, limit, seen):
-    found, data = made(kind, sets, limit), observed(seen=seen)
-    lattice = found.everywhere
-    result = found.posteriors(found.evidence(data, lattice), lattice)
+    found, data = made(kind, sets, limit), observations(seen=seen)
+    lattice = found.full_lattice
+    result = found.posteriors(found.emission_log_densities(data, lattice), lattice)
     joint, counts, log_likelihood = oracle.posteriors(found, data)
     for chain, states in enumerate(found.transitions.product.chain_states):
-        for state in range(found.structure.counts[chain]):
+        for state in range(found.structure.state_counts[chain]):
             np.testing.assert_allclose(result.chains[chain][:, state], joint[:, states == state].sum(axis=1), atol=2e-5)
-    np.testing.assert_array_equal(result.best, joint.argmax(axis=1))
+    np.testing.assert_array_equal(result.most_probable, joint.argmax(axis=1))
     assert result.log_likelihood == pytest.approx(log_likelihood, rel=1e-5)
     product = found.transitions.product
     expected = [counts.get(pair, 0.0) for pair in zip(product.arc_from.tolist(), product.arc_to.tolist(), strict=True)]
-    np.testing.assert_allclose(result.counts, expected, atol=5e-5)
+    np.testing.assert_allclose(result.transition_counts, expected, atol=5e-5)
     for number, group in enumerate(found.groups):
         for density in range(group.mixtures.size[0]):
             np.testing.assert_allclose(
@@ -46,8 +46,8 @@ def test_posteriors_are_those_of_all_paths(kind, sets, limit, seen):
 
 @every
 def test_the_best_path_is_the_best_of_all(kind, sets, limit):
-    found, data = made(kind, sets, limit), observed()
-    path, score = found.best_path(found.evidence(data, found.everywhere), found.everywhere)
+    found, data = made(kind, sets, limit), observations()
+    path, score = found.best_path(found.emission_log_densities(data, found.full_lattice), found.full_lattice)
     best, value = max(oracle.paths(found, data), key=lambda pair: pair[1])
     assert tuple(path) == best
     assert score == pytest.approx(value, rel=1e-4)
@@ -55,10 +55,8 @@ def test_the_best_path_is_the_best_of_all(kind, sets, limit):
 
 @every
 def test_expected_precisions_and_means(kind, sets, limit):
-    found, data = made(kind, sets, limit), observed()
-    evidence = found.evidence(data, found.everywhere)
-    result = found.posteriors(evidence, found.everywhere)
-    precision, weighted = statistics(found, result, evidence, found.everywhere, 1)
+    found, data = made(kind, sets, limit), observations()
+    precision, weighted = precision_statistics(found, found.infer(data, found.full_lattice), 1)
     number = 0 if kind == HMM else 1
     expected = oracle.component_statistics(found, data, number, 1)
     np.testing.assert_allclose(precision, expected[0], rtol=1e-4)
@@ -70,12 +68,12 @@ def test_decoupled_tables_without_a_limit_are_the_product_of_hmms():
     found = made(COUPLED, (THREE, TWO), None)
     product = found.transitions.product
     draw = np.random.default_rng(5)
-    own = [draw.uniform(0.2, 0.8, count) for count in product.structure.counts]
+    own = [draw.uniform(0.2, 0.8, count) for count in product.structure.state_counts]
     advance = tuple(own[c][product.chain_states[c]] for c in range(2))
     decoupled = Transitions(product, found.transitions.rows, advance)
     coupled = type(found)(found.streams, decoupled, found.groups)
-    data = observed(6)
-    result = coupled.posteriors(coupled.evidence(data, coupled.everywhere), coupled.everywhere)
+    data = observations(6)
+    result = coupled.posteriors(coupled.emission_log_densities(data, coupled.full_lattice), coupled.full_lattice)
     total = 0.0
     for chain in range(2):
         posterior, log_likelihood = single_chain(coupled, chain, own[chain], data)
@@ -87,9 +85,9 @@ def test_decoupled_tables_without_a_limit_are_the_product_of_hmms():
 def single_chain(found, chain, advance, data):
     """Posteriors of one chain alone, by dense matrices."""
     structure, grammar = found.structure, found.transitions.product.grammar
-    count, states = structure.counts[chain], structure.states
+    count, states = structure.state_counts[chain], structure.states
     matrix, initial = np.diag(1 - advance), np.zeros(count)
-    initial[::states] = grammar.firsts[chain] / grammar.firsts[chain].sum()
+    initial[::states] = grammar.initial[chain] / grammar.initial[chain].sum()
     for state in range(count):
         if state % states < states - 1:
             matrix[state, state + 1] += advance[state]
@@ -108,27 +106,27 @@ def single_chain(found, chain, advance, data):
 
 
 def test_a_factorial_hmm_of_one_chain_is_the_hmm():
-    """With the second chain's densities all alike, nothing that is seen says anything: what is left is the first."""
+    """With equal densities of all states of the second chain, the posteriors are those of the first chain alone."""
     found = made(FACTORIAL, (THREE, TWO), None)
     group = found.groups[1]
-    same = group.mixtures.picked(np.zeros(group.mixtures.size[0], np.intp))
+    same = group.mixtures.selected(np.zeros(group.mixtures.size[0], np.intp))
     blind = type(found)(
         found.streams,
         found.transitions,
         (found.groups[0], type(group)(group.streams, group.columns, same, group.weights, group.tie)),
     )
-    data = observed(6)
-    result = blind.posteriors(blind.evidence(data, blind.everywhere), blind.everywhere)
+    data = observations(6)
+    result = blind.posteriors(blind.emission_log_densities(data, blind.full_lattice), blind.full_lattice)
     posterior, _ = single_chain(blind, 0, blind.transitions.advance[0], data)
     np.testing.assert_allclose(result.densities[0], posterior, atol=2e-5)
 
 
-def test_a_multistream_hmm_that_hears_only_is_the_audio_hmm():
-    heard = made(MULTISTREAM, (THREE,), 1, weights=(1.0, 0.0))
-    seen, unseen = observed(6), observed(6, seen=False)
-    one, other = (heard.posteriors(heard.evidence(x, heard.everywhere), heard.everywhere) for x in (seen, unseen))
+def test_a_multistream_hmm_without_visual_weight_is_the_audio_hmm():
+    audio = made(MULTISTREAM, (THREE,), 1, weights=(1.0, 0.0))
+    seen, unseen = observations(6), observations(6, seen=False)
+    one, other = (audio.infer(x, audio.full_lattice).posteriors for x in (seen, unseen))
     np.testing.assert_allclose(one.chains[0], other.chains[0], atol=1e-6)
-    posterior, _ = single_chain(heard, 0, heard.transitions.advance[0], seen)
+    posterior, _ = single_chain(audio, 0, audio.transitions.advance[0], seen)
     np.testing.assert_allclose(one.densities[0], posterior, atol=2e-5)
 
 
@@ -140,28 +138,28 @@ def test_one_gaussian_each_makes_hmm_and_multistream_hmm_the_same():
         cut = type(whole)(whole.log_weights, whole.means[:, :, columns], whole.variances[:, :, columns])
         groups.append(type(group)(group.streams, group.columns, cut, group.weights, group.tie))
     apart = type(apart)(apart.streams, joint.transitions, tuple(groups))
-    data = observed(6)
-    one, other = (x.posteriors(x.evidence(data, x.everywhere), x.everywhere) for x in (joint, apart))
+    data = observations(6)
+    one, other = (x.posteriors(x.emission_log_densities(data, x.full_lattice), x.full_lattice) for x in (joint, apart))
     np.testing.assert_allclose(one.chains[0], other.chains[0], atol=1e-6)
     assert one.log_likelihood == pytest.approx(other.log_likelihood, rel=1e-6)
 
 
 def test_a_lattice_of_all_units_is_the_whole_and_a_smaller_one_forbids():
-    found, data = made(COUPLED, (THREE, TWO), 1), observed(5)
+    found, data = made(COUPLED, (THREE, TWO), 1), observations(5)
     product = found.transitions.product
     allowed = np.ones((5, 3), bool)
-    result = found.posteriors(found.evidence(data, found.everywhere), found.everywhere)
+    result = found.posteriors(found.emission_log_densities(data, found.full_lattice), found.full_lattice)
     free = found.lattice(allowed)
-    same = found.posteriors(found.evidence(data, free), free)
+    same = found.posteriors(found.emission_log_densities(data, free), free)
     assert same.log_likelihood == pytest.approx(result.log_likelihood, rel=1e-6)
     allowed[:, 1] = False
     allowed[2:, 2] = False
     part = found.lattice(allowed)
-    less = found.posteriors(found.evidence(data, part), part)
-    said = [
+    less = found.posteriors(found.emission_log_densities(data, part), part)
+    paths = [
         (path, score)
         for path, score in oracle.paths(found, data)
-        if all(allowed[t, product.joints[state].units[0]] for t, state in enumerate(path))
+        if all(allowed[t, product.joint_states[state].units[0]] for t, state in enumerate(path))
     ]
-    assert less.log_likelihood == pytest.approx(np.logaddexp.reduce([score for _, score in said]), rel=1e-5)
+    assert less.log_likelihood == pytest.approx(np.logaddexp.reduce([score for _, score in paths]), rel=1e-5)
     np.testing.assert_allclose(less.chains[0].sum(axis=1), 1, atol=1e-5)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from engines.coupled.tiny import THREE, TWO, grammar, structure
-from lipmotion.engines.coupled.chains.product import Joint, reachable
+from lipmotion.engines.coupled.chains.product import JointState, reachable
 from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, MULTISTREAM, SYSTEMS, structure_of
-from lipmotion.engines.coupled.chains.transitions import first_transitions
+from lipmotion.engines.coupled.chains.transitions import initial_transitions
 from lipmotion.errors import InputError
 
 
@@ -15,7 +15,7 @@ def even(of):
 
 
 @pytest.mark.parametrize(
-    ("system", "crosses", "joints"),
+    ("system", "cross_units", "joints"),
     [
         ("ph-HMM", True, 235),
         ("ph-MSHMM", True, 235),
@@ -25,92 +25,96 @@ def even(of):
         ("ph-vi-CHMM", False, 611),
     ],
 )
-def test_joint_states_of_the_papers_systems(system, crosses, joints):
+def test_joint_states_of_the_papers_systems(system, cross_units, joints):
     """47 × (5 + 4 + 4) when all leave a unit together; beyond that, one chain waits in the last state for the other."""
     options = {"asynchrony": 1} | SYSTEMS[system]
-    of = structure_of(options["structure"], options["chains"], 5, options["asynchrony"], crosses)
-    assert len(even(of).joints) == joints
+    of = structure_of(options["structure"], options["chains"], 5, options["asynchrony"], cross_units)
+    assert len(even(of).joint_states) == joints
 
 
 @pytest.mark.parametrize("limit", [0, 1, 2])
-@pytest.mark.parametrize("crosses", [True, False])
-def test_chains_are_never_farther_apart_than_the_limit(limit, crosses):
-    of = structure(states=3, limit=limit, crosses=crosses)
+@pytest.mark.parametrize("cross_units", [True, False])
+def test_chains_are_never_farther_apart_than_the_limit(limit, cross_units):
+    of = structure(states=3, limit=limit, cross_units=cross_units)
     found = even(of)
     spread = found.lead.max(axis=0) - found.lead.min(axis=0)
     assert spread.max() == limit
-    if not crosses:
-        assert not any(any(joint.ahead) for joint in found.joints)
+    if not cross_units:
+        assert not any(any(joint.ahead) for joint in found.joint_states)
 
 
 def test_arcs_are_those_of_the_definition():
-    """Each chain stays or moves one state on, no skips; whoever is behind must say what the other has begun."""
+    """Each chain stays or moves one state on, no skips; a chain that is behind must enter the unit that is begun."""
     of = structure(states=2, limit=1)
     found = even(of)
     arcs = set(zip(found.arc_from.tolist(), found.arc_to.tolist(), strict=True))
-    for source, target in product(range(len(found.joints)), repeat=2):
-        assert ((source, target) in arcs) is possible(of, found.joints[source], found.joints[target])
+    for source, target in product(range(len(found.joint_states)), repeat=2):
+        assert ((source, target) in arcs) is possible(of, found.joint_states[source], found.joint_states[target])
 
 
-def possible(of, before: Joint, after: Joint) -> bool:
-    """Whether some sequence of units, and a place in it for each chain, lead from one joint state to the other."""
+def possible(of, before: JointState, after: JointState) -> bool:
+    """Whether some sequence of units, and a position in it for each chain, lead from one joint state to the other."""
     units, count = range(len(of.units[0])), of.states
     for old, new, newer in product(units, repeat=3):
-        said = [old, new, newer]
+        sequence = [old, new, newer]
         for start in product(range(2 * count), repeat=2):
-            if not fits(of, before, said, start):
+            if not fits(of, before, sequence, start):
                 continue
             for moved in product((0, 1), repeat=2):
                 end = [a + b for a, b in zip(start, moved, strict=True)]
-                if max(end) - min(end) <= of.limit and fits(of, after, said, end, relative=True):
+                if max(end) - min(end) <= of.limit and fits(of, after, sequence, end, relative=True):
                     return True
     return False
 
 
-def fits(of, joint: Joint, said, places, relative=False) -> bool:
-    units = [place // of.states for place in places]
+def fits(of, joint: JointState, sequence, positions, relative=False) -> bool:
+    units = [position // of.states for position in positions]
     first = min(units)
     if not relative and first != 0:
         return False
     if max(units) - first > 1:
         return False
     return all(
-        joint.states[c] == places[c] % of.states
-        and joint.units[c] == of.follows[c][said[units[c]]]
+        joint.states[c] == positions[c] % of.states
+        and joint.units[c] == of.corresponding_units[c][sequence[units[c]]]
         and joint.ahead[c] == (units[c] > first)
         for c in range(2)
     )
 
 
-def test_what_is_said_next_has_the_bigrams_probability():
-    """Whoever enters first: the first chain's next unit, given its last, is as probable as the bigram says."""
+def test_the_next_unit_has_the_probability_of_the_bigram():
+    """Whichever chain enters first: P(next unit of the first chain | its last unit) is that of the bigram."""
     of = structure(states=2, limit=1)
     found = even(of)
     bigram, last = found.grammar.bigrams[0], of.states - 1
     for unit in range(len(of.units[0])):
-        together = found.joints.index(Joint((unit, of.follows[1][unit]), (last, last), (False, False)))
+        together = found.joint_states.index(
+            JointState((unit, of.corresponding_units[1][unit]), (last, last), (False, False))
+        )
         out = found.arc_from == together
         both = out & found.moves.all(axis=0)
         for entered in range(len(of.units[0])):
-            target = found.joints.index(Joint((entered, of.follows[1][entered]), (0, 0), (False, False)))
-            assert found.base[both & (found.arc_to == target)] == pytest.approx(bigram[unit, entered])
+            target = found.joint_states.index(
+                JointState((entered, of.corresponding_units[1][entered]), (0, 0), (False, False))
+            )
+            assert found.unit_probability[both & (found.arc_to == target)] == pytest.approx(bigram[unit, entered])
         seen_first = out & ~found.moves[0] & found.moves[1]
-        assert found.base[seen_first].sum() == pytest.approx(1)
+        assert found.unit_probability[seen_first].sum() == pytest.approx(1)
         for arc in np.flatnonzero(seen_first):
-            waiting = found.joints[found.arc_to[arc]]
-            alike = [u for u in range(len(of.units[0])) if of.follows[1][u] == waiting.units[1]]
-            assert found.base[arc] == pytest.approx(bigram[unit, alike].sum())
+            waiting = found.joint_states[found.arc_to[arc]]
+            alike = [u for u in range(len(of.units[0])) if of.corresponding_units[1][u] == waiting.units[1]]
+            assert found.unit_probability[arc] == pytest.approx(bigram[unit, alike].sum())
             follow = (found.arc_from == found.arc_to[arc]) & found.moves[0] & ~found.moves[1]
             for after in np.flatnonzero(follow):
-                entered = found.joints[found.arc_to[after]].units[0]
+                entered = found.joint_states[found.arc_to[after]].units[0]
                 expected = bigram[unit, entered] / bigram[unit, alike].sum()
-                assert found.base[after] == pytest.approx(expected)
+                assert found.unit_probability[after] == pytest.approx(expected)
 
 
 @pytest.mark.parametrize("kind", [COUPLED, FACTORIAL])
 @pytest.mark.parametrize("limit", [1, None])
 def test_probabilities_out_of_every_state_sum_to_one(kind, limit):
-    transitions = first_transitions(even(structure(kind, limit=limit)))
+    transitions = initial_transitions(even(structure(kind, limit=limit)))
     left = np.bincount(transitions.product.arc_from, np.exp(transitions.arc_log))
     np.testing.assert_allclose(left, 1, rtol=1e-12)
 
@@ -118,14 +122,14 @@ def test_probabilities_out_of_every_state_sum_to_one(kind, limit):
 def test_one_chain_is_the_hmm_of_its_units():
     of = structure(HMM, (THREE,), states=3, limit=1)
     found = even(of)
-    assert len(found.joints) == 9
+    assert len(found.joint_states) == 9
     assert len(found.arc_from) == 9 + 6 + 9  # stay, move within, enter
 
 
-def test_units_that_look_alike_stand_together():
+def test_units_that_correspond_to_the_same_visual_unit_stand_together():
     of = structure(states=2)
-    looks = of.follows[1]
-    assert sorted(looks) == list(looks)
+    corresponding = of.corresponding_units[1]
+    assert sorted(corresponding) == list(corresponding)
 
 
 @pytest.mark.parametrize(
@@ -159,4 +163,4 @@ def test_three_chains():
     found = even(of)
     assert found.moves.shape[0] == 3
     assert np.abs(found.lead).max() == 1
-    assert len(set(found.joints)) == len(found.joints)
+    assert len(set(found.joint_states)) == len(found.joint_states)

@@ -22,7 +22,7 @@ def random_counts(transitions, seed=0):
 def test_no_other_tables_explain_the_counts_better(kind, sets, limit):
     found = chains(structure(kind, sets, limit=limit)).transitions
     counts = random_counts(found)
-    best = found.relearned(counts)
+    best = found.reestimated(counts)
     value = explained(best, counts)
     assert value > explained(found, counts)
     draw = np.random.default_rng(1)
@@ -37,7 +37,7 @@ def test_no_other_tables_explain_the_counts_better(kind, sets, limit):
 def test_without_a_mask_it_is_the_closed_form():
     found = chains(structure(HMM, (THREE,), limit=1)).transitions
     counts = random_counts(found)
-    best = found.relearned(counts)
+    best = found.reestimated(counts)
     left = np.bincount(found.product.arc_from, counts)
     moved = np.bincount(found.product.arc_from, counts * found.product.moves[0])
     np.testing.assert_allclose(best.advance[0][best.rows[0]], moved / left, atol=1e-6)
@@ -48,14 +48,14 @@ def test_rows_without_data_stay():
     counts = random_counts(found)
     unseen = found.product.arc_from == 3
     counts[unseen] = 0
-    best = found.relearned(counts)
+    best = found.reestimated(counts)
     for chain in range(2):
         assert best.advance[chain][best.rows[chain][3]] == found.advance[chain][found.rows[chain][3]]
 
 
 def test_rare_joint_states_share_the_rows_of_their_own_state_and_lead():
     found = chains().transitions
-    frames = np.zeros(len(found.product.joints))
+    frames = np.zeros(len(found.product.joint_states))
     frames[:4] = 1000
     tied = found.tied(frames)
     for chain in range(2):
@@ -73,4 +73,4 @@ def test_rare_joint_states_share_the_rows_of_their_own_state_and_lead():
 def test_tied_tables_keep_their_probabilities_where_alike():
     found = chains().transitions
     even = Transitions(found.product, found.rows, tuple(np.full_like(a, 0.3) for a in found.advance))
-    np.testing.assert_allclose(even.tied(np.zeros(len(found.product.joints))).arc_log, even.arc_log)
+    np.testing.assert_allclose(even.tied(np.zeros(len(found.product.joint_states))).arc_log, even.arc_log)

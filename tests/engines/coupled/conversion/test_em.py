@@ -1,17 +1,17 @@
 import numpy as np
 import pytest
 
-from engines.coupled.tiny import THREE, TWO, chains, observed, structure
+from engines.coupled.tiny import THREE, TWO, chains, observations, structure
 from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, MULTISTREAM
 from lipmotion.engines.coupled.conversion.em import (
     EXACT,
     PRINTED,
     SOFT,
     VITERBI,
-    Conversion,
-    converted,
+    ConversionSettings,
+    convert,
     path_means,
-    speech_alone,
+    without_visual_streams,
 )
 from oracles import coupled as oracle
 
@@ -30,30 +30,32 @@ every = pytest.mark.parametrize(("kind", "sets", "limit"), KINDS)
 def test_speech_and_streams_become_more_likely_at_every_step(kind, sets, limit, start):
     for seed in range(6):
         found = chains(structure(kind, sets, limit=limit), seed=seed)
-        result = converted(found, observed(12, seed=seed), found.everywhere, Conversion(start, EXACT, 15))
+        result = convert(found, observations(12, seed=seed), found.full_lattice, ConversionSettings(start, EXACT, 15))
         assert len(result.log_likelihood) > 2
         assert min(np.diff(result.log_likelihood)) > -2e-6
 
 
 def test_the_soft_start_is_the_precision_weighted_mean_over_all_paths():
-    found, data = chains(), observed(4)
-    result = converted(found, data, found.everywhere, Conversion(SOFT, EXACT, 0))
-    precision, weighted = oracle.component_statistics(found, speech_alone(data), 1, 1)
+    found, data = chains(), observations(4)
+    result = convert(found, data, found.full_lattice, ConversionSettings(SOFT, EXACT, 0))
+    precision, weighted = oracle.component_statistics(found, without_visual_streams(data), 1, 1)
     np.testing.assert_allclose(result.streams[1], weighted / precision, rtol=1e-3, atol=1e-4)
 
 
-def test_what_is_seen_says_nothing():
+def test_values_of_visual_streams_are_ignored():
     found = chains()
-    one, other = observed(6, seed=1), observed(6, seed=2)
-    other = other.given(0, one.streams[0])
-    results = [converted(found, data, found.everywhere, Conversion(most=4)).streams[1] for data in (one, other)]
+    one, other = observations(6, seed=1), observations(6, seed=2)
+    other = other.with_stream(0, one.streams[0])
+    results = [
+        convert(found, data, found.full_lattice, ConversionSettings(most_steps=4)).streams[1] for data in (one, other)
+    ]
     np.testing.assert_array_equal(*results)
 
 
 def test_the_viterbi_start_is_the_means_along_the_best_path():
-    found, data = chains(), observed(5)
-    result = converted(found, data, found.everywhere, Conversion(VITERBI, EXACT, 0))
-    path, _ = max(oracle.paths(found, speech_alone(data)), key=lambda pair: pair[1])
+    found, data = chains(), observations(5)
+    result = convert(found, data, found.full_lattice, ConversionSettings(VITERBI, EXACT, 0))
+    path, _ = max(oracle.paths(found, without_visual_streams(data)), key=lambda pair: pair[1])
     group = found.groups[1]
     expected = [
         (np.exp(group.mixtures.log_weights[d])[:, None] * group.mixtures.means[d]).sum(axis=0)
@@ -65,11 +67,11 @@ def test_the_viterbi_start_is_the_means_along_the_best_path():
 
 def test_the_maximiser_is_where_the_derivative_vanishes():
     """Σ γ(q, k) Σ⁻¹ (μ − o) = 0: the joint likelihood itself is stationary where EM stands still."""
-    found, data = chains(seed=3), observed(4, seed=3)
-    result = converted(found, data, found.everywhere, Conversion(SOFT, EXACT, 400))
+    found, data = chains(seed=3), observations(4, seed=3)
+    result = convert(found, data, found.full_lattice, ConversionSettings(SOFT, EXACT, 400))
 
     def log_likelihood(values):
-        return oracle.posteriors(found, data.given(1, values.astype(np.float32)))[2]
+        return oracle.posteriors(found, data.with_stream(1, values.astype(np.float32)))[2]
 
     settled = result.streams[1]
     for frame in range(4):
@@ -81,10 +83,10 @@ def test_the_maximiser_is_where_the_derivative_vanishes():
 
 def test_the_printed_update_weighs_by_components_and_partners():
     """Eq. 9: every joint state counts, so a visual state counts as often as it has partners, and w stands twice."""
-    found, data = chains(), observed(4)
-    start = converted(found, data, found.everywhere, Conversion(SOFT, EXACT, 0)).streams[1]
-    printed = converted(found, data, found.everywhere, Conversion(SOFT, PRINTED, 1)).streams[1]
-    seen = data.given(1, start.astype(np.float32))
+    found, data = chains(), observations(4)
+    start = convert(found, data, found.full_lattice, ConversionSettings(SOFT, EXACT, 0)).streams[1]
+    printed = convert(found, data, found.full_lattice, ConversionSettings(SOFT, PRINTED, 1)).streams[1]
+    seen = data.with_stream(1, start.astype(np.float32))
     joint, _, _ = oracle.posteriors(found, seen)
     group = found.groups[1]
     expected = np.zeros_like(printed)
@@ -107,6 +109,8 @@ def test_the_printed_update_weighs_by_components_and_partners():
 
 def test_with_one_component_and_one_partner_each_print_and_maximiser_agree():
     found = chains(structure(MULTISTREAM, (THREE,)), components=(1, 1))
-    data = observed(6)
-    one, other = (converted(found, data, found.everywhere, Conversion(SOFT, update, 5)) for update in (EXACT, PRINTED))
+    data = observations(6)
+    one, other = (
+        convert(found, data, found.full_lattice, ConversionSettings(SOFT, update, 5)) for update in (EXACT, PRINTED)
+    )
     np.testing.assert_allclose(one.streams[1], other.streams[1], rtol=1e-4, atol=1e-5)

@@ -7,41 +7,44 @@ from lipmotion.engines.coupled.conversion.regression import (
     CONSTANT,
     OWN_RIDGE,
     SHARED_RIDGE,
-    Following,
-    Heard,
-    belief_axes,
-    fit_following,
-    fit_surroundings,
-    gates,
+    RegressionUtterance,
+    VisualRegression,
+    fit_regression_inputs,
+    fit_visual_regression,
+    posterior_axes,
+    regression_weights,
 )
 from lipmotion.engines.coupled.engine import CoupledEngine
-from lipmotion.engines.coupled.training.fit import _kinds, fit_coupled
+from lipmotion.engines.coupled.training.fit import _state_regressions, fit_coupled
 from lipmotion.testing.examples import example, examples, speech, timeline
 from lipmotion.types.progress import silent_monitor
 
 
-def heard(count=3, frames=60, states=4, seed=0) -> list[Heard]:
+def utterances(count=3, frames=60, states=4, seed=0) -> list[RegressionUtterance]:
     draw = np.random.default_rng(seed)
-    made = []
+    result = []
     for _ in range(count):
-        posterior = draw.dirichlet(np.full(states, 0.2), frames).astype(np.float32)
+        first = draw.dirichlet(np.full(states, 0.2), frames).astype(np.float32)
         features = draw.normal(0, 1, (frames, 39)).astype(np.float32)
-        gate = draw.dirichlet(np.full(6, 0.2), frames).astype(np.float32)
-        seen = draw.random(frames) < 0.8
-        target = (features[:, :2] + gate[:, :2] * 3).astype(np.float32)
-        made.append(Heard(features, posterior, [gate], [np.where(seen[:, None], target, 99).astype(np.float32)], seen))
-    return made
+        visual = draw.dirichlet(np.full(6, 0.2), frames).astype(np.float32)
+        observed = draw.random(frames) < 0.8
+        target = (features[:, :2] + visual[:, :2] * 3).astype(np.float32)
+        target = np.where(observed[:, None], target, 99).astype(np.float32)
+        result.append(RegressionUtterance(features, first, [visual], [target], observed))
+    return result
 
 
 def test_the_regressions_are_ridges_one_towards_the_other():
-    """By normal equations over explicitly weighted rows: all, then families, then kinds."""
-    data = heard()
-    around = fit_surroundings(np.eye(4, dtype=np.float32), data)
-    kind, family = np.array([0, 0, 1, 1, 2, 2]), np.array([0, 0, 1])
-    found = fit_following(around, data, 0, kind, family)
-    z = np.concatenate([around(one.features, one.belief)[one.seen] for one in data]).astype(float)
-    target = np.concatenate([one.targets[0][one.seen] for one in data]).astype(float)
-    weight = np.concatenate([gates(one.gates[0], kind, 3)[one.seen] for one in data]).astype(float)
+    """By normal equations over explicitly weighted rows: all, then families, then regressions."""
+    data = utterances()
+    inputs = fit_regression_inputs(np.eye(4, dtype=np.float32), data)
+    regression_of_state, family = np.array([0, 0, 1, 1, 2, 2]), np.array([0, 0, 1])
+    found = fit_visual_regression(inputs, data, 0, regression_of_state, family)
+    z = np.concatenate([inputs(one.features, one.reduced_posteriors)[one.observed] for one in data]).astype(float)
+    target = np.concatenate([one.targets[0][one.observed] for one in data]).astype(float)
+    weight = np.concatenate(
+        [regression_weights(one.chain_posteriors[0], regression_of_state, 3)[one.observed] for one in data]
+    ).astype(float)
 
     def solved(rows, prior, strength):
         system = z.T @ (rows[:, None] * z) + strength * np.eye(z.shape[1])
@@ -55,59 +58,59 @@ def test_the_regressions_are_ridges_one_towards_the_other():
 
 def test_expected_means_and_precisions_are_sums_over_states():
     draw = np.random.default_rng(0)
-    following = Following(
+    regression = VisualRegression(
         np.array([0, 1, 1]),
         draw.normal(0, 1, (2, 5, 3)).astype(np.float32),
         draw.uniform(0.5, 2, (3, 3)).astype(np.float32),
     )
-    gate = np.array([[0.5, 0.2, 0.3], [0.0, 1.0, 0.0], [0.995, 0.005, 0.0]], np.float32)
-    around = draw.normal(0, 1, (3, 5)).astype(np.float32)
+    posterior = np.array([[0.5, 0.2, 0.3], [0.0, 1.0, 0.0], [0.995, 0.005, 0.0]], np.float32)
+    inputs = draw.normal(0, 1, (3, 5)).astype(np.float32)
     expected = [
-        0.5 * around[0] @ following.coefficients[0] + 0.5 * around[0] @ following.coefficients[1],
-        around[1] @ following.coefficients[1],
-        around[2] @ following.coefficients[0],  # half a percent is left out
+        0.5 * inputs[0] @ regression.coefficients[0] + 0.5 * inputs[0] @ regression.coefficients[1],
+        inputs[1] @ regression.coefficients[1],
+        inputs[2] @ regression.coefficients[0],  # half a percent is left out
     ]
-    np.testing.assert_allclose(following.means(around, gate), expected, rtol=1e-4, atol=1e-5)
-    np.testing.assert_allclose(following.precisions(gate), gate @ (1 / following.variances), rtol=1e-6)
+    np.testing.assert_allclose(regression.means(inputs, posterior), expected, rtol=1e-4, atol=1e-5)
+    np.testing.assert_allclose(regression.precisions(posterior), posterior @ (1 / regression.variances), rtol=1e-6)
 
 
-def test_surroundings_hold_a_constant_and_few_axes():
-    data = heard(states=4)
-    axes = belief_axes(one.belief for one in data)
+def test_regression_inputs_end_with_a_constant_and_have_few_axes():
+    data = utterances(states=4)
+    axes = posterior_axes(one.reduced_posteriors for one in data)
     assert axes.shape == (4, 4)
     np.testing.assert_allclose(axes.T @ axes, np.eye(4), atol=1e-5)
-    around = fit_surroundings(axes, data)
-    z = around(data[0].features, data[0].belief)
+    inputs = fit_regression_inputs(axes, data)
+    z = inputs(data[0].features, data[0].reduced_posteriors)
     assert len(z) == 60
     assert (z[:, -1] == CONSTANT).all()
-    assert (
-        np.abs(np.concatenate([around(o.features, o.belief @ axes.T)[:, :-1] for o in data]).mean(axis=0)).max() < 1e-3
-    )
+    rows = np.concatenate([inputs(one.features, one.reduced_posteriors @ axes.T)[:, :-1] for one in data])
+    assert np.abs(rows.mean(axis=0)).max() < 1e-3
 
 
-def test_every_viseme_has_a_regression_for_each_place():
-    kind, family = _kinds(structure(states=2), 1)
-    assert kind.tolist() == [2, 3, 0, 1] or kind.tolist() == [0, 1, 2, 3]
+def test_every_viseme_has_a_regression_for_each_position_of_a_state():
+    regression_of_state, family = _state_regressions(structure(states=2), 1)
+    assert regression_of_state.tolist() in ([2, 3, 0, 1], [0, 1, 2, 3])
     assert family.tolist() == [0, 0, 1, 1]
     assert len(TWO.units) == 2
 
 
-@pytest.mark.parametrize("acoustic_regression", [True, False])
-def test_following_brings_motion_closer(follows):
-    config = CoupledConfig(follows=follows, mixtures=1, closures=False)
+@pytest.mark.parametrize("regression", [True, False])
+def test_the_regression_brings_motion_closer(regression):
+    config = CoupledConfig(acoustic_regression=regression, mixtures=1, closures=False)
     model = fit_coupled(examples(), config, silent_monitor)
-    assert (model.follow is not None) is follows
-    unheard = example(("t", "aa", "p", "iy", "m", "uw", "s", "aa"), seed=77)
-    generated = CoupledEngine(config).generate(model, unheard.speech).motion
-    error = np.sqrt(np.mean((generated["opening"] - unheard.motion["opening"]) ** 2))
-    assert error < (0.02 if follows else 0.05)
+    assert (model.regression is not None) is regression
+    held_out = example(("t", "aa", "p", "iy", "m", "uw", "s", "aa"), seed=77)
+    generated = CoupledEngine(config).generate(model, held_out.speech).motion
+    error = np.sqrt(np.mean((generated["opening"] - held_out.motion["opening"]) ** 2))
+    assert error < (0.02 if regression else 0.05)
 
 
+@pytest.mark.long
 def test_the_mouth_rests_in_long_silence():
     config = CoupledConfig(mixtures=1)
     engine = CoupledEngine(config)
     model = fit_coupled(examples(), config, silent_monitor)
     generated = engine.generate(model, speech(timeline(("aa", "t", "aa")))).motion["opening"]
-    opening = model.rest[model.space.direct_names.index("opening")]
+    opening = model.rest_pose[model.space.direct_names.index("opening")]
     assert np.abs(generated[:30] - opening).max() < 2e-3
     assert generated[30:].max() > 0.15

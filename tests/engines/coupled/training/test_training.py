@@ -4,21 +4,15 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from engines.coupled.tiny import THREE, TWO, chains, observed, structure
-from lipmotion.engines.coupled.chains.densities import Observed
+from engines.coupled.tiny import THREE, TWO, chains, observations, structure
+from lipmotion.engines.coupled.chains.densities import AudioVisualObservations
 from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, MULTISTREAM
 from lipmotion.engines.coupled.config import CoupledConfig
 from lipmotion.engines.coupled.engine import CoupledEngine
-from lipmotion.engines.coupled.training.expectation import Recording, expected, maximised
-from lipmotion.engines.coupled.training.fit import calm, fit_coupled
-from lipmotion.engines.coupled.training.train import (
-    Labelled,
-    Schedule,
-    allowed_units,
-    labelled_path,
-    train_chains,
-    variance_floors,
-)
+from lipmotion.engines.coupled.training.alignment import AlignedUtterance, allowed_units, uniform_path
+from lipmotion.engines.coupled.training.em_steps import TrainingUtterance, e_step, m_step, variance_floors
+from lipmotion.engines.coupled.training.fit import fit_coupled, frames_away_from_speech
+from lipmotion.engines.coupled.training.train import MixtureSchedule, train_chains
 from lipmotion.errors import InputError
 from lipmotion.testing.examples import examples
 from lipmotion.types import GREY, Channel, Example, Span, Timeline, Unit
@@ -29,22 +23,25 @@ FLOORS = (np.full(2, 1e-3, np.float32), np.full(1, 1e-3, np.float32))
 PHONES = ("p", "uw", "aa", "b", "aa", "uw")
 
 
-def sentences(count=6, frames_each=9, seed=0) -> list[Labelled]:
-    """Speech and motion that follow the phones, motion a little ahead."""
+def sentences(count=6, frames_each=9, seed=0) -> list[AlignedUtterance]:
+    """Speech and motion for the phones, motion a little ahead."""
     made = []
     for number in range(count):
         draw = np.random.default_rng([seed, number])
-        said = [str(phone) for phone in draw.permutation(PHONES)]
-        edges = np.arange(len(said) + 1) * frames_each / 100
+        phones = [str(phone) for phone in draw.permutation(PHONES)]
+        edges = np.arange(len(phones) + 1) * frames_each / 100
         spans = tuple(
-            Span(a, b, Unit(p)) for a, b, p in zip(edges[:-1].tolist(), edges[1:].tolist(), said, strict=True)
+            Span(a, b, Unit(p)) for a, b, p in zip(edges[:-1].tolist(), edges[1:].tolist(), phones, strict=True)
         )
-        index = np.repeat([THREE.units.index(THREE.unit(p)) for p in said], frames_each)
+        index = np.repeat([THREE.units.index(THREE.unit(p)) for p in phones], frames_each)
         early = np.append(index[2:], index[-1:].repeat(2))
         speech = draw.normal(0, 0.4, (len(index), 2)) + np.stack([index == 0, index == 1], axis=1) * 2
         seen = draw.normal(0, 0.3, (len(index), 1)) + (early == THREE.units.index("closed"))[:, None] * 2
         made.append(
-            Labelled(Observed((speech.astype(np.float32), seen.astype(np.float32)), (None, None)), Timeline(spans))
+            AlignedUtterance(
+                AudioVisualObservations((speech.astype(np.float32), seen.astype(np.float32)), (None, None)),
+                Timeline(spans),
+            )
         )
     return made
 
@@ -57,55 +54,55 @@ def test_the_likelihood_rises_at_every_step(kind, sets, limit):
     steps = []
     of = structure(kind, sets, states=3, limit=limit)
     mixtures = (4,) if kind == HMM else (4, 2)
-    train_chains(of, ("speech", "seen"), sentences(), Schedule(mixtures, (1.0, 1.0), most=8), steps.append)
+    train_chains(of, ("speech", "seen"), sentences(), MixtureSchedule(mixtures, (1.0, 1.0), most_steps=8), steps.append)
     assert {step.mixtures[0] for step in steps} == {1, 2, 4}
     for one, other in pairwise(steps):
         if one.mixtures == other.mixtures:
             assert other.log_likelihood >= one.log_likelihood - 1e-5
 
 
-def test_sums_over_recordings_are_those_of_all_paths():
+def test_statistics_of_utterances_are_those_of_all_paths():
     found = chains()
-    data = [observed(3, seed=1), observed(4, seed=2)]
-    result = expected(found, [Recording(one, found.everywhere) for one in data], workers=2)
+    data = [observations(3, seed=1), observations(4, seed=2)]
+    result = e_step(found, [TrainingUtterance(one, found.full_lattice) for one in data], workers=2)
     joints = [oracle.posteriors(found, one)[0] for one in data]
-    group, sums = found.groups[0], result.groups[0]
+    group, statistics = found.groups[0], result.emissions[0]
     for density in range(group.mixtures.size[0]):
         first = 0
         for one, joint in zip(data, joints, strict=True):
             posterior = joint[:, group.tie == density].sum(axis=1)
             first = first + posterior @ one.streams[0]
-        np.testing.assert_allclose(sums.products[0][:, density, :2].sum(axis=0), first, atol=1e-3)
+        np.testing.assert_allclose(statistics.products[0][:, density, :2].sum(axis=0), first, atol=1e-3)
     assert result.frames == 7
 
 
-def test_a_stream_that_was_not_seen_teaches_nothing_about_itself():
+def test_a_stream_that_was_not_observed_is_not_reestimated():
     found = chains()
-    blind = observed(8, seen=False)
-    said = expected(found, [Recording(blind, found.everywhere)])
-    assert not said.groups[1].products[0].any()
-    better = maximised(found, said, FLOORS, streams=(0, 1))
+    blind = observations(8, seen=False)
+    statistics = e_step(found, [TrainingUtterance(blind, found.full_lattice)])
+    assert not statistics.emissions[1].products[0].any()
+    better = m_step(found, statistics, FLOORS, streams=(0, 1))
     np.testing.assert_array_equal(better.groups[1].mixtures.means, found.groups[1].mixtures.means)
     assert not np.array_equal(better.groups[0].mixtures.means, found.groups[0].mixtures.means)
 
 
-def test_streams_that_are_not_learned_stay():
-    found, data = chains(), observed(12)
-    said = expected(found, [Recording(data, found.everywhere)])
-    better = maximised(found, said, FLOORS, streams=(0,), moves=False)
+def test_streams_that_are_not_reestimated_stay():
+    found, data = chains(), observations(12)
+    statistics = e_step(found, [TrainingUtterance(data, found.full_lattice)])
+    better = m_step(found, statistics, FLOORS, streams=(0,), transitions=False)
     assert better.groups[1] is found.groups[1]
     assert better.transitions is found.transitions
 
 
 def test_no_recording_has_a_path():
     found = chains()
-    data = observed(3)
-    lattice = replace(found.everywhere, allowed=np.zeros((3, 3), bool))
+    data = observations(3)
+    lattice = replace(found.full_lattice, allowed_units=np.zeros((3, 3), bool))
     with pytest.raises(InputError, match="labels"):
-        expected(found, [Recording(data, lattice)])
+        e_step(found, [TrainingUtterance(data, lattice)])
 
 
-def test_allowed_are_the_labels_and_what_is_near_them():
+def test_allowed_units_are_those_of_labels_near_a_frame():
     of = structure()
     phones = Timeline((Span(0.0, 0.2, Unit("p")), Span(0.2, 0.4, Unit("aa"))))
     allowed = allowed_units(of, phones, 60)
@@ -121,21 +118,21 @@ def test_allowed_are_the_labels_and_what_is_near_them():
 def test_labels_are_cut_into_equal_parts():
     of = structure(states=3)
     found = chains(of).transitions.product
-    path = labelled_path(found, Timeline((Span(0.0, 0.06, Unit("uw")), Span(0.06, 0.09, Unit("p")))), 9)
-    states = [found.joints[s].states for s in path]
+    path = uniform_path(found, Timeline((Span(0.0, 0.06, Unit("uw")), Span(0.06, 0.09, Unit("p")))), 9)
+    states = [found.joint_states[s].states for s in path]
     assert states == [(0, 0), (0, 0), (1, 1), (1, 1), (2, 2), (2, 2), (0, 0), (1, 1), (2, 2)]
 
 
-def test_floors_are_those_of_what_was_seen():
+def test_floors_are_of_observed_frames():
     seen = np.arange(40) < 20
     values = np.where(seen, np.tile([0.0, 2.0], 20), 1e6)[:, None].astype(np.float32)
-    data = Observed((np.zeros((40, 2), np.float32), values), (None, seen))
+    data = AudioVisualObservations((np.zeros((40, 2), np.float32), values), (None, seen))
     assert variance_floors([data])[1] == pytest.approx(0.01)
 
 
-def test_calm_is_silence_away_from_speech():
+def test_frames_away_from_speech_are_silence():
     units = Timeline((Span(0.0, 0.5, Unit("sil")), Span(0.5, 0.7, Unit("aa")), Span(0.7, 1.5, Unit("sil"))))
-    away = calm(units, 151)
+    away = frames_away_from_speech(units, 151)
     assert away[:4].all()
     assert not away[6:114].any()
     assert away[116:].all()
@@ -165,7 +162,7 @@ def test_options_that_cannot_be(options):
 
 
 def with_pictures(number: int) -> Example:
-    """An example whose mouth is also a picture: one eigenlip that follows the opening."""
+    """An example with a mouth picture: one eigenlip that depends on the opening."""
     plain = examples(number + 1)[number]
     grey = (500 * plain.motion["opening"] - 40)[:, None]
     channels = (*plain.motion.channels, Channel("lips_r_01", GREY))
@@ -174,8 +171,9 @@ def with_pictures(number: int) -> Example:
     )
 
 
+@pytest.mark.long
 def test_every_stream_has_a_chain_and_a_weight_of_its_own():
-    """Speech, points and pictures on three chains; what weighs nothing says nothing about the states."""
+    """Speech, points and pictures on three chains."""
     data = [with_pictures(number) for number in range(5)]
     config = CoupledConfig(chains="phone viseme viseme", states=2, mixtures=1, visual_weight=0.5, eigenlips_weight=0.25)
     model = fit_coupled(data, config, silent_monitor)

@@ -8,15 +8,16 @@ from itertools import groupby
 import numpy as np
 import pytest
 
-from lipmotion.engines.coupled.chains.densities import LEAST_COMPONENT_FRAMES, Observed
+from lipmotion.engines.coupled.chains.densities import LEAST_COMPONENT_FRAMES, AudioVisualObservations
 from lipmotion.engines.coupled.chains.model import Chains
 from lipmotion.engines.coupled.chains.structures import structure_of
 from lipmotion.engines.coupled.config import CoupledConfig
 from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.engines.coupled.model import CoupledModel
-from lipmotion.engines.coupled.training.expectation import expected
-from lipmotion.engines.coupled.training.speech_only import MoreSpeech, with_more_speech
-from lipmotion.engines.coupled.training.train import Labelled, Schedule, Step, recording, train_chains, variance_floors
+from lipmotion.engines.coupled.training.alignment import AlignedUtterance
+from lipmotion.engines.coupled.training.em_steps import e_step, training_utterance, variance_floors
+from lipmotion.engines.coupled.training.speech_only import SpeechOnlySchedule, train_on_speech
+from lipmotion.engines.coupled.training.train import MixtureSchedule, TrainingStep, train_chains
 from lipmotion.stats.mixture import Mixtures
 from lipmotion.testing.examples import RATE_HZ, examples
 from lipmotion.types import Example, Motion, Span, Timeline, Unit, silent_monitor
@@ -33,11 +34,13 @@ STRUCTURES = {
 }
 
 
-def labelled(sentences: Sequence[Example]) -> list[Labelled]:
-    """Speech, and lips in two numbers."""
+def aligned(sentences: Sequence[Example]) -> list[AlignedUtterance]:
+    """Speech with motion in two dimensions, and the phones in time."""
     return [
-        Labelled(
-            Observed((e.speech.features.values, e.motion.values[:, :2].astype(np.float32)), (None, e.valid)),
+        AlignedUtterance(
+            AudioVisualObservations(
+                (e.speech.features.values, e.motion.values[:, :2].astype(np.float32)), (None, e.valid)
+            ),
             e.speech.units,
         )
         for e in sentences
@@ -48,63 +51,65 @@ def labelled(sentences: Sequence[Example]) -> list[Labelled]:
 def trained(kind: str = "coupled", mixtures: int = 2) -> Chains:
     structure = structure_of(kind, STRUCTURES[kind], 2, 1, True)
     groups = 1 if kind == "hmm" else 2
-    how = Schedule((mixtures, 1)[:groups], (1.0, 1.0))
-    return train_chains(structure, ("speech", "lips"), labelled(examples(4)), how)
+    how = MixtureSchedule((mixtures, 1)[:groups], (1.0, 1.0))
+    return train_chains(structure, ("speech", "lips"), aligned(examples(4)), how)
 
 
-def stranger(example: Example, seed: int = 5) -> Example:
-    """The same said by someone who sounds otherwise, lips unseen."""
+def other_speaker(example: Example, seed: int = 5) -> Example:
+    """The same sentence by a speaker with other features, without motion."""
     turned = np.linalg.qr(np.random.default_rng(seed).normal(size=(39, 39)))[0]
     values = example.speech.features.values
     mixed = (0.3 * values + 0.8 * values @ turned).astype(np.float32)
     features = replace(example.speech.features, values=mixed)
     frames = len(values)
     return Example(
-        "stranger",
+        "other speaker",
         replace(example.speech, features=features),
         Motion(np.zeros((frames, 0)), RATE_HZ, ()),
         np.zeros(frames, bool),
     )
 
 
-def unseen(sentences: Sequence[Example]) -> list[Labelled]:
+def speech_alone(sentences: Sequence[Example]) -> list[AlignedUtterance]:
     return [
-        Labelled(
-            Observed(
+        AlignedUtterance(
+            AudioVisualObservations(
                 (e.speech.features.values, np.zeros((len(e.valid), 2), np.float32)), (None, np.zeros_like(e.valid))
             ),
             e.speech.units,
         )
-        for e in map(stranger, sentences)
+        for e in map(other_speaker, sentences)
     ]
 
 
-def three_frames() -> Labelled:
-    """Where a silence becomes a t, lips seen: so short that all paths can be tried."""
-    (whole,) = labelled(examples(1))
+def three_frames() -> AlignedUtterance:
+    """The end of a silence and the beginning of a t, with motion: so short that all paths can be tried."""
+    (whole,) = aligned(examples(1))
     start = round(whole.phones.spans[1].start_s * RATE_HZ) - 2
     phones = Timeline((Span(0.0, 0.02, Unit("sil")), Span(0.02, 0.03, Unit("t"))))
     cut = slice(start, start + 3)
-    seen = tuple(None if mask is None else mask[cut] for mask in whole.observed.seen)
-    return Labelled(Observed(tuple(values[cut] for values in whole.observed.streams), seen), phones)
+    seen = tuple(None if mask is None else mask[cut] for mask in whole.observations.observed)
+    return AlignedUtterance(
+        AudioVisualObservations(tuple(values[cut] for values in whole.observations.streams), seen), phones
+    )
 
 
-def speech_posteriors(chains: Chains, one: Labelled) -> np.ndarray:
+def speech_posteriors(chains: Chains, one: AlignedUtterance) -> np.ndarray:
     """Return the posterior of each density of speech [shape=(T, G)] in a model of speech alone, by all of its paths.
 
     Its states are the joint ones, its emissions those of speech, its moves the coupled ones.
     """
-    lattice, mixtures = recording(chains, one).lattice, chains.groups[0].mixtures
-    x, product = one.observed.streams[0], chains.transitions.product
+    lattice, mixtures = training_utterance(chains, one).lattice, chains.groups[0].mixtures
+    x, product = one.observations.streams[0], chains.transitions.product
     log = np.full((len(x), len(mixtures.means)), -np.inf)
     for frame, density in np.ndindex(log.shape):
-        if lattice.allowed[frame, density // chains.structure.states]:
+        if lattice.allowed_units[frame, density // chains.structure.states]:
             terms = mixtures.log_weights[density], mixtures.means[density], mixtures.variances[density]
             log[frame, density] = mixture(x[frame], *terms)
     place = {state: number for number, state in enumerate(lattice.states.tolist())}
     arcs = {
         (place[int(product.arc_from[arc])], place[int(product.arc_to[arc])]): chains.transitions.arc_log[arc]
-        for arc in lattice.counts
+        for arc in lattice.transition_index
     }
     with np.errstate(divide="ignore"):
         first = np.log(product.initial[lattice.states])
@@ -114,9 +119,9 @@ def speech_posteriors(chains: Chains, one: Labelled) -> np.ndarray:
 
 
 def learned(before: Mixtures, density: int, gamma: np.ndarray, x: np.ndarray, floor: np.ndarray):
-    """Return shares, means and variances of one density by the book; none ends for want of data.
+    """Return the weights, means and variances of one density after the textbook M-step, with variance floors.
 
-    gamma : how often it was in the density in each frame [shape=(T,)]
+    gamma : posterior of the density in each frame [shape=(T,)]
     """
     parts = [
         [mixture(frame, [share], [mean], [variance]) for share, mean, variance in zip(*components, strict=True)]
@@ -133,12 +138,12 @@ def learned(before: Mixtures, density: int, gamma: np.ndarray, x: np.ndarray, fl
 
 
 def test_a_step_is_that_of_the_split_model() -> None:
-    """Own speech and that of others, together fifty times the same."""
+    """Speech of the first stage and of other speakers: the same utterance, with weights 1 and 49."""
     chains, own = trained(), three_frames()
-    other = replace(own, observed=own.observed.missing(1))
-    found = with_more_speech(chains, [own], [other], MoreSpeech(2, 1, 49.0)).groups[0].mixtures
-    gamma, x = 50 * speech_posteriors(chains, own), own.observed.streams[0]
-    before, (floor, _) = chains.groups[0].mixtures, variance_floors([own.observed])
+    other = replace(own, observations=own.observations.without_stream(1))
+    found = train_on_speech(chains, [own], [other], SpeechOnlySchedule(2, 1, 49.0)).groups[0].mixtures
+    gamma, x = 50 * speech_posteriors(chains, own), own.observations.streams[0]
+    before, (floor, _) = chains.groups[0].mixtures, variance_floors([own.observations])
     visited = np.flatnonzero(gamma.sum(axis=0) >= 3)
     assert len(visited) >= 3
     for density in visited:
@@ -147,14 +152,18 @@ def test_a_step_is_that_of_the_split_model() -> None:
         assert found.means[density] == pytest.approx(means, abs=1e-3)
         assert found.variances[density] == pytest.approx(variances, rel=1e-2, abs=1e-3)
     others = np.setdiff1d(np.arange(len(before.means)), visited)
-    assert found.picked(others).means.tobytes() == before.picked(others).means.tobytes()
+    assert found.selected(others).means.tobytes() == before.selected(others).means.tobytes()
 
 
 @pytest.mark.parametrize("kind", STRUCTURES)
 def test_every_step_raises_the_likelihood(kind: str) -> None:
-    steps: list[Step] = []
-    with_more_speech(
-        trained(kind), labelled(examples(4)), unseen(examples(4, seed=9)), MoreSpeech(4, 6, 0.5), steps.append
+    steps: list[TrainingStep] = []
+    train_on_speech(
+        trained(kind),
+        aligned(examples(4)),
+        speech_alone(examples(4, seed=9)),
+        SpeechOnlySchedule(4, 6, 0.5),
+        steps.append,
     )
     for _, run in groupby(steps, lambda step: step.mixtures):
         figures = [step.log_likelihood for step in run]
@@ -165,32 +174,38 @@ def test_every_step_raises_the_likelihood(kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", STRUCTURES)
-def test_lips_and_moves_stay(kind: str) -> None:
+def test_visual_densities_and_transitions_stay(kind: str) -> None:
     chains = trained(kind)
-    found = with_more_speech(chains, labelled(examples(3)), unseen(examples(3, seed=9)), MoreSpeech(4, 2, 1.0))
+    found = train_on_speech(
+        chains, aligned(examples(3)), speech_alone(examples(3, seed=9)), SpeechOnlySchedule(4, 2, 1.0)
+    )
     assert found.transitions is chains.transitions
-    before, after = chains.groups[-1].of_stream(1), found.groups[-1].of_stream(1)
+    before, after = chains.groups[-1].stream_mixtures(1), found.groups[-1].stream_mixtures(1)
     assert after.means.tobytes() == before.means.tobytes()
     assert after.variances.tobytes() == before.variances.tobytes()
-    assert np.abs(found.groups[0].of_stream(0).means[:, :2] - chains.groups[0].of_stream(0).means).max() > 0.1
+    assert (
+        np.abs(found.groups[0].stream_mixtures(0).means[:, :2] - chains.groups[0].stream_mixtures(0).means).max() > 0.1
+    )
 
 
-def test_lips_of_the_first_stage_are_not_looked_at() -> None:
-    own, others = labelled(examples(3)), unseen(examples(3, seed=9))
-    elsewhere = [replace(one, observed=one.observed.given(1, one.observed.streams[1][::-1])) for one in own]
-    found = [with_more_speech(trained(), given, others, MoreSpeech(2, 2, 1.0)) for given in (own, elsewhere)]
+def test_motion_of_the_first_stage_is_ignored() -> None:
+    own, others = aligned(examples(3)), speech_alone(examples(3, seed=9))
+    elsewhere = [
+        replace(one, observations=one.observations.with_stream(1, one.observations.streams[1][::-1])) for one in own
+    ]
+    found = [train_on_speech(trained(), given, others, SpeechOnlySchedule(2, 2, 1.0)) for given in (own, elsewhere)]
     assert found[0].groups[0].mixtures.means.tobytes() == found[1].groups[0].mixtures.means.tobytes()
 
 
-def test_a_weight_is_how_often_a_recording_counts() -> None:
-    chains, (one,) = trained(), labelled(examples(1))
-    twice = expected(chains, [recording(chains, one)] * 2)
-    heavy = expected(chains, [recording(chains, one, 2.0)])
+def test_a_weight_is_how_often_an_utterance_counts() -> None:
+    chains, (one,) = trained(), aligned(examples(1))
+    twice = e_step(chains, [training_utterance(chains, one)] * 2)
+    heavy = e_step(chains, [training_utterance(chains, one, 2.0)])
     assert heavy.frames == twice.frames
     assert heavy.log_likelihood == pytest.approx(twice.log_likelihood)
-    assert heavy.counts == pytest.approx(twice.counts, abs=1e-5)
-    for a, b in zip(heavy.groups, twice.groups, strict=True):
-        assert a.count == pytest.approx(b.count, abs=1e-4)
+    assert heavy.transition_counts == pytest.approx(twice.transition_counts, abs=1e-5)
+    for a, b in zip(heavy.emissions, twice.emissions, strict=True):
+        assert a.occupancy == pytest.approx(b.occupancy, abs=1e-4)
         assert a.products[0] == pytest.approx(b.products[0], abs=1e-2)
 
 
@@ -205,29 +220,31 @@ def arrays(sentences: Sequence[Example], **options: object) -> list[bytes]:
 
 
 def test_without_more_speech_there_is_one_stage() -> None:
-    assert arrays(examples(4)) == arrays(examples(4), more_mixtures=8, more_weight=0.1, more_steps=1)
+    assert arrays(examples(4)) == arrays(
+        examples(4), speech_only_mixtures=8, speech_only_weight=0.1, speech_only_steps=1
+    )
 
 
-def test_lips_that_were_not_seen_teach_nothing_wherever_they_stand() -> None:
-    seen, heard = examples(4), [stranger(one) for one in examples(3, seed=9)]
+def test_motion_that_was_not_observed_is_ignored_wherever_the_example_stands() -> None:
+    moving, speech_only = examples(4), [other_speaker(one) for one in examples(3, seed=9)]
     channels = [
         replace(
-            one, motion=replace(seen[0].motion, values=np.full((len(one.valid), len(seen[0].motion.channels)), 9.0))
+            one, motion=replace(moving[0].motion, values=np.full((len(one.valid), len(moving[0].motion.channels)), 9.0))
         )
-        for one in heard
+        for one in speech_only
     ]
-    first = arrays([*seen, *heard])
-    assert first == arrays([heard[0], seen[0], *channels[1:], *seen[1:]])
-    assert first != arrays(seen)
+    first = arrays([*moving, *speech_only])
+    assert first == arrays([speech_only[0], moving[0], *channels[1:], *moving[1:]])
+    assert first != arrays(moving)
 
 
 def right(engine: CoupledEngine, model: CoupledModel, sentence: Example) -> tuple[float, float]:
     """Return the correlation of the opening with the original's, of unknown words, and of speech frames right."""
     spoken = replace(sentence.speech, said=False)
     generated = engine.generate(model, spoken).motion["opening"]
-    observed = model.unseen(np.asarray(spoken.features.values))
+    observations = model.speech_observations(np.asarray(spoken.features.values))
     chains = model.chains
-    found = chains.posteriors(chains.evidence(observed, chains.everywhere), chains.everywhere)
+    found = chains.posteriors(chains.emission_log_densities(observations, chains.full_lattice), chains.full_lattice)
     states = found.chains[0].argmax(axis=1) // chains.structure.states
     labels = [
         (chains.structure.units[0].index(span.label.phone), frame)
@@ -239,11 +256,11 @@ def right(engine: CoupledEngine, model: CoupledModel, sentence: Example) -> tupl
     return float(np.corrcoef(generated, sentence.motion["opening"])[0, 1]), share
 
 
-def test_a_stranger_is_understood_and_the_own_speaker_still_is() -> None:
-    seen, heard = examples(6), [stranger(one) for one in examples(6, seed=9)]
+def test_another_speaker_is_recognised_and_the_first_one_still_is() -> None:
+    moving, speech_only = examples(6), [other_speaker(one) for one in examples(6, seed=9)]
     (own,), (original,) = examples(1, seed=20), examples(1, seed=21)
-    other = replace(original, speech=stranger(original).speech)
-    one, two = fitted(seen), fitted([*seen, *heard])
+    other = replace(original, speech=other_speaker(original).speech)
+    one, two = fitted(moving), fitted([*moving, *speech_only])
     before, after = right(*one, other), right(*two, other)
     assert after[0] > before[0] + 0.1
     assert after[1] > before[1] + 0.2

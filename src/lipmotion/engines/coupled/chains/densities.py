@@ -1,4 +1,4 @@
-"""What chains emit: mixtures of the streams that a state of theirs, or a joint state, has."""
+"""Emission densities: Gaussian mixtures of the streams, tied to the states of a chain or to joint states."""
 
 from __future__ import annotations
 
@@ -17,39 +17,44 @@ LEAST_COMPONENT_FRAMES = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class Observed:
-    """What is known of some frames.
+class AudioVisualObservations:
+    """The observation vectors of T frames, stream by stream; the first stream is speech, the others are visual.
 
-    streams : values of every stream [each shape=(T, D_s)]
-    seen    : whether each stream was observed [each shape=(T,)]; None: everywhere
+    streams  : values of every stream [each shape=(T, D_s)]
+    observed : in which frames each stream was observed [each shape=(T,)]; None: in all
     """
 
     streams: tuple[Single, ...]
-    seen: tuple[NDArray[np.bool_] | None, ...]
+    observed: tuple[NDArray[np.bool_] | None, ...]
 
     @property
     def frames(self) -> int:
         """T."""
         return len(self.streams[0])
 
-    def missing(self, stream: int) -> Observed:
-        """Return the same with one stream unknown everywhere."""
-        return self.given(stream, self.streams[stream], np.zeros(self.frames, bool))
+    def without_stream(self, stream: int) -> AudioVisualObservations:
+        """Return the observations with one stream marked as not observed in any frame."""
+        return self.with_stream(stream, self.streams[stream], np.zeros(self.frames, bool))
 
-    def given(self, stream: int, values: Single, seen: NDArray[np.bool_] | None = None) -> Observed:
-        """Return the same with other values of one stream."""
-        streams, masks = list(self.streams), list(self.seen)
-        streams[stream], masks[stream] = values, seen
-        return Observed(tuple(streams), tuple(masks))
+    def with_stream(
+        self, stream: int, values: Single, observed: NDArray[np.bool_] | None = None
+    ) -> AudioVisualObservations:
+        """Return the observations with other values of one stream [shape=(T, D_s)].
+
+        observed : in which frames these values were observed [shape=(T,)]; None: in all
+        """
+        streams, masks = list(self.streams), list(self.observed)
+        streams[stream], masks[stream] = values, observed
+        return AudioVisualObservations(tuple(streams), tuple(masks))
 
 
 @dataclass(frozen=True, eq=False)
-class Group:
-    """Streams that share their mixture components, and with them one hidden choice.
+class StreamGroup:
+    """The emission densities of one or more streams that share their mixture components.
 
-    streams  : which they are
-    columns  : which numbers of the mixtures' D are each stream's
-    mixtures : G densities of all of them together
+    streams  : the numbers of the streams
+    columns  : for each of these streams, its columns among the D dimensions of the mixtures
+    mixtures : G densities over all of these streams
     weights  : the exponent of each stream's density
     tie      : the density of each joint state [shape=(S,)]
     """
@@ -60,130 +65,151 @@ class Group:
     weights: tuple[float, ...]
     tie: Index
 
-    def of_stream(self, stream: int) -> Mixtures:
-        """Return the densities of one stream alone."""
+    def stream_mixtures(self, stream: int) -> Mixtures:
+        """Return the marginal densities of one of the streams."""
         columns = self.columns[self.streams.index(stream)]
         mixtures = self.mixtures
         return Mixtures(mixtures.log_weights, mixtures.means[:, :, columns], mixtures.variances[:, :, columns])
 
-    def ready(self) -> Ready:
-        """Return the densities as what features are multiplied by."""
-        alone = (self.of_stream(stream) for stream in self.streams)
-        forms = [replace(one, log_weights=np.zeros_like(one.log_weights)).quadratic() for one in alone]
-        return Ready(self, tuple(forms))
+    def evaluator(self) -> EmissionEvaluator:
+        """Return the densities in the form in which they are computed for frames."""
+        marginals = (self.stream_mixtures(stream) for stream in self.streams)
+        forms = [
+            replace(mixtures, log_weights=np.zeros_like(mixtures.log_weights)).quadratic() for mixtures in marginals
+        ]
+        return EmissionEvaluator(self, tuple(forms))
 
 
 @dataclass(frozen=True, eq=False)
-class Ready:
-    """A group with the matrices of its streams, without the weights of components."""
+class EmissionEvaluator:
+    """A stream group with its densities as quadratic forms, one for each stream, without component weights."""
 
-    group: Group
+    group: StreamGroup
     forms: tuple[QuadraticForm, ...]
 
-    def divided(self, observed: Observed, chosen: Index) -> tuple[Single, Single | None]:
-        """Return the log density of some mixtures [shape=(T, G')], and their components' shares [shape=(T, M, G')].
+    def log_densities(self, observations: AudioVisualObservations, densities: Index) -> tuple[Single, Single | None]:
+        """Return the log density of every frame under some mixtures [shape=(T, G')], and component responsibilities.
 
-        chosen : the densities wanted [shape=(G',)]
-        A stream that was not seen is left out, which is exact: its density integrates to 1. Shares are None where
-        there is one component.
+        densities : the numbers of these mixtures [shape=(G',)]
+        The responsibilities [shape=(T, M, G')] sum to 1 over the M components; they are None where M is 1.
+        A stream that was not observed is left out. This is exact: its density integrates to 1.
         """
-        return normalised_components(self._components(observed, chosen))
+        return normalised_components(self._component_log_densities(observations, densities))
 
-    def _components(self, observed: Observed, chosen: Index) -> Single:
+    def _component_log_densities(self, observations: AudioVisualObservations, densities: Index) -> Single:
+        """Return log weight + weighted log density of every component [shape=(T, M, G')]."""
         group = self.group
-        priors = group.mixtures.log_weights[chosen].T
-        total = np.zeros((observed.frames, *priors.shape), np.float32)
-        for form, stream, weight in zip(self.forms, group.streams, group.weights, strict=True):
-            seen = observed.seen[stream]
-            if seen is not None and not seen.any():
+        log_weights = group.mixtures.log_weights[densities].T
+        total = np.zeros((observations.frames, *log_weights.shape), np.float32)
+        for form, stream, exponent in zip(self.forms, group.streams, group.weights, strict=True):
+            observed = observations.observed[stream]
+            if observed is not None and not observed.any():
                 continue
-            log = _among(form, chosen).log_components(observed.streams[stream])
-            if weight != 1:
-                log *= np.float32(weight)
-            if seen is not None:
-                log[~seen] = 0
+            log = _restricted(form, densities).log_components(observations.streams[stream])
+            if exponent != 1:
+                log *= np.float32(exponent)
+            if observed is not None:
+                log[~observed] = 0
             total += log
-        total += priors
+        total += log_weights
         return total
 
 
-def _among(form: QuadraticForm, chosen: Index) -> QuadraticForm:
-    """Return the matrix of some densities."""
-    if np.array_equal(chosen, np.arange(form.constant.shape[1])):
+def _restricted(form: QuadraticForm, densities: Index) -> QuadraticForm:
+    """Return the quadratic form of some of its densities [shape=(G',)]."""
+    if np.array_equal(densities, np.arange(form.constant.shape[1])):
         return form
-    columns = form.form.reshape(len(form.form), *form.constant.shape)[:, :, chosen]
-    return QuadraticForm(columns.reshape(len(columns), -1), form.constant[:, chosen])
+    columns = form.form.reshape(len(form.form), *form.constant.shape)[:, :, densities]
+    return QuadraticForm(columns.reshape(len(columns), -1), form.constant[:, densities])
 
 
 @dataclass(frozen=True, eq=False)
-class Sums:
-    """What frames say about a group, stream by stream; they grow in place.
+class EmissionStatistics:
+    """Sufficient statistics of a stream group; they accumulate in place.
 
-    products : of posteriors with features, their squares, and 1 [each shape=(M, G, 2 D_s + 1)]
-    count    : of the posteriors alone, seen or not [shape=(M, G)]
+    products  : for each stream, sums of component posteriors times features, features², and 1 [shape=(M, G, 2 D_s + 1)]
+    occupancy : sums of component posteriors over all frames, observed or not [shape=(M, G)]
     """
 
     products: tuple[NDArray[np.float64], ...]
-    count: NDArray[np.float64]
+    occupancy: NDArray[np.float64]
 
-    def add(self, group: Group, observed: Observed, chosen: Index, posterior: Single, shares: Single | None) -> None:
-        """Take in frames.
+    def accumulate(
+        self,
+        group: StreamGroup,
+        observations: AudioVisualObservations,
+        densities: Index,
+        posterior: Single,
+        responsibilities: Single | None,
+    ) -> None:
+        """Add the statistics of some frames.
 
-        chosen    : the densities that they may be of [shape=(G',)]
-        posterior : of these [shape=(T, G')]
-        shares    : of their components [shape=(T, M, G')]
+        densities        : the densities with posteriors [shape=(G',)]
+        posterior        : of these densities [shape=(T, G')]
+        responsibilities : of their components [shape=(T, M, G')]; None: one component
         """
-        weight = component_posteriors(posterior, shares)
+        weight = component_posteriors(posterior, responsibilities)
         flat = weight.reshape(len(weight), -1).T
         for stream, products in zip(group.streams, self.products, strict=True):
-            seen = observed.seen[stream]
-            if seen is not None and not seen.any():
+            observed = observations.observed[stream]
+            if observed is not None and not observed.any():
                 continue
-            features = with_squares(observed.streams[stream])
-            if seen is not None:
-                features *= seen[:, None]
-            products[:, chosen] += (flat @ features).reshape(*weight.shape[1:], -1)
-        self.count[:, chosen] += weight.sum(axis=0, dtype=np.float64)
+            features = with_squares(observations.streams[stream])
+            if observed is not None:
+                features *= observed[:, None]
+            products[:, densities] += (flat @ features).reshape(*weight.shape[1:], -1)
+        self.occupancy[:, densities] += weight.sum(axis=0, dtype=np.float64)
 
-    def plus(self, other: Sums) -> Sums:
-        """Return both together."""
+    def plus(self, other: EmissionStatistics) -> EmissionStatistics:
+        """Return the sum of both statistics."""
         products = tuple(a + b for a, b in zip(self.products, other.products, strict=True))
-        return Sums(products, self.count + other.count)
+        return EmissionStatistics(products, self.occupancy + other.occupancy)
 
 
-def no_sums(group: Group) -> Sums:
-    """Return the sums over no frames."""
+def zero_emission_statistics(group: StreamGroup) -> EmissionStatistics:
+    """Return zero statistics for a stream group."""
     count, components, _ = group.mixtures.size
     widths = [columns.stop - columns.start for columns in group.columns]
-    return Sums(tuple(np.zeros((components, count, 2 * width + 1)) for width in widths), np.zeros((components, count)))
+    products = tuple(np.zeros((components, count, 2 * width + 1)) for width in widths)
+    return EmissionStatistics(products, np.zeros((components, count)))
 
 
-def component_posteriors(posterior: Single, shares: Single | None) -> Single:
-    """Return γ(q, k) [shape=(T, M, G')] of densities [shape=(T, G')] and their components' shares [as the result]."""
-    return posterior[:, None] if shares is None else shares * posterior[:, None]
+def component_posteriors(posterior: Single, responsibilities: Single | None) -> Single:
+    """Return γ(q, k) [shape=(T, M, G')].
+
+    posterior        : γ(q) of the densities [shape=(T, G')]
+    responsibilities : of their components [shape=(T, M, G')]; None: one component
+    """
+    return posterior[:, None] if responsibilities is None else responsibilities * posterior[:, None]
 
 
-def relearned(group: Group, sums: Sums, floors: Sequence[Single], least: float, streams: Sequence[int]) -> Group:
-    """Return the group with the mixtures that explain the sums best.
+def reestimated_group(
+    group: StreamGroup,
+    statistics: EmissionStatistics,
+    floors: Sequence[Single],
+    least: float,
+    streams: Sequence[int],
+) -> StreamGroup:
+    """Return the group with the mixtures that maximise the expected log likelihood (M-step).
 
-    floors  : the least variance of every stream [each shape=(D_s,)]
+    floors  : the least variance of each stream of the group [each shape=(D_s,)]
     least   : densities with less data than so many frames stay as they are
-    streams : those whose means and variances are learned; of others they stay
+    streams : the streams whose means and variances are re-estimated; those of other streams stay
     """
     mixtures = group.mixtures.copy()
-    known = np.flatnonzero(sums.count.sum(axis=0) >= least)
-    count = sums.count.T[known]
+    enough = np.flatnonzero(statistics.occupancy.sum(axis=0) >= least)
+    occupancy = statistics.occupancy.T[enough]
     with np.errstate(divide="ignore"):
-        mixtures.log_weights[known] = np.log(count / count.sum(axis=1, keepdims=True))
-    for stream, columns, products, floor in zip(group.streams, group.columns, sums.products, floors, strict=True):
+        mixtures.log_weights[enough] = np.log(occupancy / occupancy.sum(axis=1, keepdims=True))
+    for stream, columns, products, floor in zip(group.streams, group.columns, statistics.products, floors, strict=True):
         if stream not in streams:
             continue
-        frames = products[:, known, -1].T[:, :, None]
-        first, second = np.split(products[:, known, :-1].transpose(1, 0, 2), 2, axis=2)
-        seen = frames > LEAST_COMPONENT_FRAMES
-        safe = np.where(seen, frames, 1)
-        mean = first / safe
-        variance = np.maximum(second / safe - mean * mean, floor)
-        mixtures.means[known, :, columns] = np.where(seen, mean, mixtures.means[known, :, columns])
-        mixtures.variances[known, :, columns] = np.where(seen, variance, mixtures.variances[known, :, columns])
+        frames = products[:, enough, -1].T[:, :, None]
+        first, second = np.split(products[:, enough, :-1].transpose(1, 0, 2), 2, axis=2)
+        known = frames > LEAST_COMPONENT_FRAMES
+        divisor = np.where(known, frames, 1)
+        mean = first / divisor
+        variance = np.maximum(second / divisor - mean * mean, floor)
+        mixtures.means[enough, :, columns] = np.where(known, mean, mixtures.means[enough, :, columns])
+        mixtures.variances[enough, :, columns] = np.where(known, variance, mixtures.variances[enough, :, columns])
     return replace(group, mixtures=mixtures)

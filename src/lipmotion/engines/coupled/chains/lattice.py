@@ -1,4 +1,4 @@
-"""The part of a product in which a recording can be, and inference there."""
+"""A lattice: the joint states in which an utterance can be, and inference over the paths through them."""
 
 from __future__ import annotations
 
@@ -17,46 +17,53 @@ Index = NDArray[np.intp]
 
 @dataclass(frozen=True, eq=False)
 class Lattice(ABC):
-    """Some joint states of a product; probabilities are those of the whole.
+    """Some joint states of a product; their probabilities are those of the whole product.
 
-    counts    : which of the numbers that transitions are learned from it can tell [shape=(C',)]
-    densities : those needed of each group [each shape=(G',)]
-    ties      : for each group, the position there of the density of each joint state [each shape=(S',)]
-    spoken    : the unit of the first chain behind each density of the first group [shape=(G',)]
-    allowed   : the units that may be said in each frame [shape=(T, U)]; None: all
+    transition_index : where the C' transition statistics of the lattice stand among those of all chains [shape=(C',)]
+    densities        : for each stream group, the densities that the lattice needs [each shape=(G',)]
+    ties             : for each stream group, the density of each joint state, as a position in ``densities``
+                       [each shape=(S',)]
+    density_units    : the unit of the first chain to which each density of the first group belongs [shape=(G',)]
+    allowed_units    : the units of the first chain that each frame may belong to [shape=(T, U)]; None: all
     """
 
-    counts: Index
+    transition_index: Index
     densities: tuple[Index, ...]
     ties: tuple[Index, ...]
-    spoken: Index
-    allowed: NDArray[np.bool_] | None
+    density_units: Index
+    allowed_units: NDArray[np.bool_] | None
 
     def masked(self, logs: Sequence[Single]) -> tuple[Single, ...]:
-        """Return log densities [each shape=(T, G')] without what may not be said."""
-        if self.allowed is None:
+        """Return log densities [each shape=(T, G')], with -inf for units that are not allowed in a frame.
+
+        logs : of each stream group [each shape=(T, G')]
+        """
+        if self.allowed_units is None:
             return tuple(logs)
-        return (np.where(self.allowed[:, self.spoken], logs[0], np.float32(-np.inf)), *logs[1:])
+        return (np.where(self.allowed_units[:, self.density_units], logs[0], np.float32(-np.inf)), *logs[1:])
 
     @abstractmethod
-    def posteriors(self, transitions: Any, logs: Sequence[Single]) -> Posteriors:
-        """Return what a recording says about the chains.
+    def posteriors(self, transitions: Any, logs: Sequence[Single]) -> LatticePosteriors:
+        """Return the posteriors of states, by the forward–backward algorithm.
 
-        transitions : those that the lattice is of
-        logs : log densities of all groups [each shape=(T, G')]
+        transitions : of the chains that the lattice belongs to
+        logs        : log densities of each stream group [each shape=(T, G')]
         """
 
     @abstractmethod
     def best_path(self, transitions: Any, logs: Sequence[Single]) -> tuple[Index, float]:
-        """Return the most probable joint states [shape=(T,)] and their log probability (-inf: there is no path)."""
+        """Return the most probable path of joint states [shape=(T,)] and its log probability (-inf: there is no path).
+
+        Arguments as in ``posteriors``.
+        """
 
 
 @dataclass(frozen=True, eq=False)
-class Joint:
-    """The posterior of joint states.
+class JointPosteriors:
+    """Posteriors of joint states.
 
-    states      : which they are [shape=(S',)]
-    probability : of each [shape=(T, S')]
+    states      : the joint states [shape=(S',)]
+    probability : their posteriors in every frame [shape=(T, S')]
     """
 
     states: Index
@@ -64,29 +71,31 @@ class Joint:
 
 
 @dataclass(frozen=True, eq=False)
-class Posteriors:
-    """Probabilities of states given a recording.
+class LatticePosteriors:
+    """Posteriors of the hidden states of an utterance, and the expected counts of transitions.
 
-    chains    : of the states of each chain [each shape=(T, N_c)]
-    densities : of the densities of each group that the lattice needs [each shape=(T, G')]
-    best      : the most probable joint state of every frame [shape=(T,)]
-    counts    : what transitions are learned from [shape=(C',)]
-    log_likelihood : of the recording; -inf where there is no path, and then all else is 0
-    joint     : of joint states; None where there are too many to list
+    chains            : posteriors of the states of each chain [each shape=(T, N_c)]
+    densities         : for each stream group, posteriors of the densities that the lattice needs [each shape=(T, G')]
+    most_probable     : the most probable joint state of every frame [shape=(T,)]
+    transition_counts : sufficient statistics of the transitions [shape=(C',)]
+    log_likelihood    : of the utterance; -inf where there is no path, and then all other numbers are 0
+    joint             : posteriors of joint states; None where these are too many to list
     """
 
     chains: tuple[Single, ...]
     densities: tuple[Single, ...]
-    best: Index
-    counts: NDArray[np.float64]
+    most_probable: Index
+    transition_counts: NDArray[np.float64]
     log_likelihood: float
-    joint: Joint | None = None
+    joint: JointPosteriors | None = None
 
 
-def summed(posterior: Single, tie: Index, count: int) -> Single:
-    """Return the posterior of every density [shape=(T, G)] from that of joint states [shape=(T, S)].
+def tied_posteriors(posterior: Single, tie: Index, count: int) -> Single:
+    """Return the posteriors of densities, or of states of a chain, that joint states share [shape=(T, G)].
 
-    tie : the density of each joint state [shape=(S,)]
+    posterior : of joint states [shape=(T, S)]
+    tie       : the density of each joint state [shape=(S,)]
+    count     : the number of densities, G
     """
     order = np.argsort(tie, kind="stable")
     present, starts = np.unique(tie[order], return_index=True)

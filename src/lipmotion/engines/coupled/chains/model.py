@@ -1,4 +1,4 @@
-"""Coupled chains as one value: where they can be, when they move on, what they emit."""
+"""Coupled chains: their product with its transitions, their emission densities, and inference."""
 
 from __future__ import annotations
 
@@ -8,90 +8,106 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.coupled.chains.densities import Group, Observed, Ready, Single
-from lipmotion.engines.coupled.chains.lattice import Index, Lattice, Posteriors
+from lipmotion.engines.coupled.chains.densities import (
+    AudioVisualObservations,
+    EmissionEvaluator,
+    Single,
+    StreamGroup,
+)
+from lipmotion.engines.coupled.chains.lattice import Index, Lattice, LatticePosteriors
 from lipmotion.engines.coupled.chains.network import network_lattice
 from lipmotion.engines.coupled.chains.structures import Structure
 from lipmotion.engines.coupled.chains.transitions import Transitions
-from lipmotion.engines.coupled.chains.unlimited import FreeTransitions, free_lattice
+from lipmotion.engines.coupled.chains.factorial import FactorialTransitions, factorial_lattice
 
 
 @dataclass(frozen=True, eq=False)
 class Chains:
-    """Chains of states with their densities.
+    """Chains of hidden states with their transitions and emission densities.
 
-    streams     : their names; the first is speech
+    streams     : the names of the streams; the first is speech
     transitions : with the product of the chains
-    groups      : of streams, speech in the first
+    groups      : the stream groups; speech is in the first
     """
 
     streams: tuple[str, ...]
-    transitions: Transitions | FreeTransitions
-    groups: tuple[Group, ...]
+    transitions: Transitions | FactorialTransitions
+    groups: tuple[StreamGroup, ...]
 
     @property
     def structure(self) -> Structure:
-        """Of the chains."""
+        """The structure of the chains."""
         return self.transitions.product.structure
 
     @cached_property
-    def everywhere(self) -> Lattice:
-        """All joint states: where a recording of unknown words can be."""
+    def full_lattice(self) -> Lattice:
+        """The lattice of all joint states, for an utterance without transcript."""
         return self._lattice(None)
 
-    def lattice(self, allowed: NDArray[np.bool_]) -> Lattice:
-        """Return where a recording can be.
+    def lattice(self, allowed_units: NDArray[np.bool_]) -> Lattice:
+        """Return the lattice of the joint states that an utterance may be in.
 
-        allowed : the units of the first chain that may be said in each frame [shape=(T, U)]
+        allowed_units : the units of the first chain that each frame may belong to [shape=(T, U)]
         """
-        return self._lattice(allowed)
+        return self._lattice(allowed_units)
 
-    def _lattice(self, allowed: NDArray[np.bool_] | None) -> Lattice:
+    def _lattice(self, allowed_units: NDArray[np.bool_] | None) -> Lattice:
         ties = [group.tie for group in self.groups]
-        if isinstance(self.transitions, FreeTransitions):
-            return free_lattice(self.transitions, ties, allowed)
-        return network_lattice(self.transitions, ties, allowed)
+        if isinstance(self.transitions, FactorialTransitions):
+            return factorial_lattice(self.transitions, ties, allowed_units)
+        return network_lattice(self.transitions, ties, allowed_units)
 
     @cached_property
-    def ready(self) -> tuple[Ready, ...]:
-        """The densities, group by group, as matrices."""
-        return tuple(group.ready() for group in self.groups)
+    def evaluators(self) -> tuple[EmissionEvaluator, ...]:
+        """The emission densities of each stream group, in the form in which they are computed."""
+        return tuple(group.evaluator() for group in self.groups)
 
-    def evidence(self, observed: Observed, lattice: Lattice) -> Evidence:
-        """Return the log densities of frames, those that the lattice needs."""
-        found = [ready.divided(observed, chosen) for ready, chosen in zip(self.ready, lattice.densities, strict=True)]
-        return Evidence(lattice.masked([log for log, _ in found]), tuple(shares for _, shares in found))
+    def emission_log_densities(self, observations: AudioVisualObservations, lattice: Lattice) -> EmissionLogDensities:
+        """Return the log densities of all frames under the densities that the lattice needs."""
+        computed = [
+            evaluator.log_densities(observations, densities)
+            for evaluator, densities in zip(self.evaluators, lattice.densities, strict=True)
+        ]
+        return EmissionLogDensities(
+            lattice.masked([log for log, _ in computed]), tuple(responsibilities for _, responsibilities in computed)
+        )
 
-    def posteriors(self, evidence: Evidence, lattice: Lattice) -> Posteriors:
-        """Return what a recording says about the chains."""
-        return lattice.posteriors(self.transitions, evidence.log)
+    def posteriors(self, emissions: EmissionLogDensities, lattice: Lattice) -> LatticePosteriors:
+        """Return the posteriors of hidden states, and expected transition counts."""
+        return lattice.posteriors(self.transitions, emissions.log_densities)
 
-    def inferred(self, observed: Observed, lattice: Lattice) -> Inferred:
-        """Return what a recording says about the chains, with what that rests on."""
-        evidence = self.evidence(observed, lattice)
-        return Inferred(observed, lattice, evidence, self.posteriors(evidence, lattice))
+    def infer(self, observations: AudioVisualObservations, lattice: Lattice) -> Inference:
+        """Return the posteriors of hidden states together with what they were computed from."""
+        emissions = self.emission_log_densities(observations, lattice)
+        return Inference(observations, lattice, emissions, self.posteriors(emissions, lattice))
 
-    def best_path(self, evidence: Evidence, lattice: Lattice) -> tuple[Index, float]:
-        """Return the most probable joint states [shape=(T,)] and their log probability (-inf: there is no path)."""
-        return lattice.best_path(self.transitions, evidence.log)
+    def best_path(self, emissions: EmissionLogDensities, lattice: Lattice) -> tuple[Index, float]:
+        """Return the most probable path of joint states [shape=(T,)] and its log probability; -inf: there is none."""
+        return lattice.best_path(self.transitions, emissions.log_densities)
 
 
 @dataclass(frozen=True, eq=False)
-class Evidence:
-    """Log densities of all groups [each shape=(T, G')], and the shares of their components [each shape=(T, M, G')].
+class EmissionLogDensities:
+    """Log densities of the frames of an utterance, group by group, for the G' densities that a lattice needs.
 
-    G' are those that the lattice needs.
+    log_densities    : of each stream group [each shape=(T, G')]
+    responsibilities : of the mixture components of each [each shape=(T, M, G')]; None: one component
     """
 
-    log: tuple[Single, ...]
-    shares: tuple[Single | None, ...]
+    log_densities: tuple[Single, ...]
+    responsibilities: tuple[Single | None, ...]
 
 
 @dataclass(frozen=True, eq=False)
-class Inferred:
-    """What a recording says about chains, with what that rests on."""
+class Inference:
+    """The posteriors of an utterance, with the observations, lattice and emission densities that they come from."""
 
-    observed: Observed
+    observations: AudioVisualObservations
     lattice: Lattice
-    evidence: Evidence
-    posteriors: Posteriors
+    emissions: EmissionLogDensities
+    posteriors: LatticePosteriors
+
+    @property
+    def mean_log_likelihood(self) -> float:
+        """Log likelihood of the observed streams per frame."""
+        return self.posteriors.log_likelihood / self.observations.frames

@@ -1,4 +1,4 @@
-"""Inference in products whose joint states and arcs are listed."""
+"""Lattices of products whose joint states and arcs are listed one by one."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.coupled.chains.densities import Single
-from lipmotion.engines.coupled.chains.lattice import Joint, Lattice, Posteriors, summed
+from lipmotion.engines.coupled.chains.lattice import JointPosteriors, Lattice, LatticePosteriors, tied_posteriors
 from lipmotion.engines.coupled.chains.transitions import Transitions
 from lipmotion.kernels.arcs import NetworkArrays
 from lipmotion.kernels.network import ForwardBackwardNetwork
@@ -20,35 +20,38 @@ Index = NDArray[np.intp]
 
 @dataclass(frozen=True, eq=False)
 class NetworkLattice(Lattice):
-    """Joint states with the arcs between them; ``counts`` are these arcs, sorted by target.
+    """Some joint states with the arcs between them; ``transition_index`` numbers these arcs, sorted by target.
 
-    states  : which they are [shape=(S',)]
-    chain_states : the state of each chain in them [shape=(C, S')]
-    network : laid out, without probabilities
+    states       : the numbers of the joint states in the product [shape=(S',)]
+    chain_states : the state of each chain in these joint states [shape=(C, S')]
+    network      : the arcs, laid out for forward–backward, without probabilities
     """
 
     states: Index
     chain_states: Index
     network: ForwardBackwardNetwork
 
-    def posteriors(self, transitions: Transitions, logs: Sequence[Single]) -> Posteriors:  # noqa: D102
-        ready = self.network.with_arcs(transitions.arc_log[self.counts], transitions.log_initial[self.states])
-        order = ready.layout.order
-        columns = [tie[order] for tie in self.ties]
-        found = ready.product_posteriors(logs, columns, np.array([len(logs[0])]))
+    def posteriors(self, transitions: Transitions, logs: Sequence[Single]) -> LatticePosteriors:  # noqa: D102
+        network = self.network.with_arcs(
+            transitions.arc_log[self.transition_index], transitions.log_initial[self.states]
+        )
+        order = network.layout.order
+        ordered_ties = [tie[order] for tie in self.ties]
+        expected = network.product_posteriors(logs, ordered_ties, np.array([len(logs[0])]))
         structure = transitions.product.structure
-        return Posteriors(
+        return LatticePosteriors(
             tuple(
-                summed(found.posterior, states[order], count)
-                for states, count in zip(self.chain_states, structure.counts, strict=True)
+                tied_posteriors(expected.posterior, states[order], count)
+                for states, count in zip(self.chain_states, structure.state_counts, strict=True)
             ),
             tuple(
-                summed(found.posterior, tie, len(chosen)) for tie, chosen in zip(columns, self.densities, strict=True)
+                tied_posteriors(expected.posterior, tie, len(densities))
+                for tie, densities in zip(ordered_ties, self.densities, strict=True)
             ),
-            self.states[order[found.posterior.argmax(axis=1)]],
-            found.counts,
-            float(found.log_likelihood[0]),
-            Joint(self.states[order], found.posterior),
+            self.states[order[expected.posterior.argmax(axis=1)]],
+            expected.counts,
+            float(expected.log_likelihood[0]),
+            JointPosteriors(self.states[order], expected.posterior),
         )
 
     def best_path(self, transitions: Transitions, logs: Sequence[Single]) -> tuple[Index, float]:  # noqa: D102
@@ -65,7 +68,7 @@ class NetworkLattice(Lattice):
             NetworkArrays(
                 np.arange(count),
                 self.network.arc_from,
-                transitions.arc_log[self.counts].astype(np.float32),
+                transitions.arc_log[self.transition_index].astype(np.float32),
                 self.network.arc_start,
                 transitions.log_initial[self.states].astype(np.float32),
                 np.zeros(count, np.float32),
@@ -76,26 +79,26 @@ class NetworkLattice(Lattice):
 
 
 def network_lattice(
-    transitions: Transitions, ties: Sequence[Index], allowed: NDArray[np.bool_] | None
+    transitions: Transitions, ties: Sequence[Index], allowed_units: NDArray[np.bool_] | None
 ) -> NetworkLattice:
-    """Return where chains can be.
+    """Return the lattice of the joint states whose units are allowed in some frame.
 
-    ties    : the density of each joint state in every group [each shape=(S,)]
-    allowed : the units of the first chain that may be said in each frame [shape=(T, U)]; None: all
+    ties          : for each stream group, the density of each joint state [each shape=(S,)]
+    allowed_units : the units of the first chain that each frame may belong to [shape=(T, U)]; None: all
     """
     product = transitions.product
     structure = product.structure
-    inside = np.ones(len(product.joints), bool)
-    if allowed is not None:
-        said = allowed.any(axis=0)
-        for chain, own in enumerate(product.chain_states):
-            fitting = np.zeros(len(structure.units[chain]), bool)
-            fitting[np.asarray(structure.follows[chain])[said]] = True
-            inside &= fitting[own // structure.states]
+    inside = np.ones(len(product.joint_states), bool)
+    if allowed_units is not None:
+        present = allowed_units.any(axis=0)
+        for chain, chain_states in enumerate(product.chain_states):
+            corresponding = np.zeros(len(structure.units[chain]), bool)
+            corresponding[np.asarray(structure.corresponding_units[chain])[present]] = True
+            inside &= corresponding[chain_states // structure.states]
     states = np.flatnonzero(inside)
     arcs = np.flatnonzero(inside[product.arc_from] & inside[product.arc_to])
-    place = np.cumsum(inside) - 1
-    arc_from, arc_to = place[product.arc_from[arcs]], place[product.arc_to[arcs]]
+    position = np.cumsum(inside) - 1
+    arc_from, arc_to = position[product.arc_from[arcs]], position[product.arc_to[arcs]]
     network = ForwardBackwardNetwork.of(
         arc_from,
         np.zeros(len(arcs)),
@@ -103,7 +106,16 @@ def network_lattice(
         np.zeros(len(states)),
         np.zeros(len(states)),
     )
-    densities, positions = zip(*(np.unique(tie[states], return_inverse=True) for tie in ties), strict=True)
-    spoken = np.zeros(len(densities[0]), np.intp)
-    spoken[positions[0]] = product.chain_states[0][states] // structure.states
-    return NetworkLattice(arcs, densities, positions, spoken, allowed, states, product.chain_states[:, states], network)
+    densities, lattice_ties = zip(*(np.unique(tie[states], return_inverse=True) for tie in ties), strict=True)
+    density_units = np.zeros(len(densities[0]), np.intp)
+    density_units[lattice_ties[0]] = product.chain_states[0][states] // structure.states
+    return NetworkLattice(
+        transition_index=arcs,
+        densities=densities,
+        ties=lattice_ties,
+        density_units=density_units,
+        allowed_units=allowed_units,
+        states=states,
+        chain_states=product.chain_states[:, states],
+        network=network,
+    )

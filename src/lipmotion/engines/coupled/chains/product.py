@@ -1,4 +1,4 @@
-"""The joint states that chains can reach together, and what leads from one to the next."""
+"""The product of chains: the joint states that they can reach together, and the arcs between them."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from lipmotion.errors import InputError
 
 Index = NDArray[np.intp]
 MOST_ARCS = 200_000
-"""Of products without a limit, which are listed arc by arc."""
+"""A product without a limit of asynchrony may have at most so many arcs, as it is listed arc by arc."""
 
 
-class Joint(NamedTuple):
-    """Where every chain is.
+class JointState(NamedTuple):
+    """The state of all chains together.
 
-    units, states : of every chain
-    ahead         : whether it has left the unit that others are still in
+    units, states : the unit of each chain, and its state within the unit
+    ahead         : whether each chain has left the unit that others are still in
     """
 
     units: tuple[int, ...]
@@ -33,123 +33,137 @@ class Joint(NamedTuple):
 
 
 class Grammar(NamedTuple):
-    """Which units follow which, chain by chain; chains with an asynchrony limit all go by that of the first.
+    """The bigrams of the units of each chain; chains with a limit of asynchrony all follow that of the first chain.
 
     bigrams : P(next unit | unit) [each shape=(U_c, U_c)], all more than 0
-    firsts  : probability that a recording begins with each unit [each shape=(U_c,)]
+    initial : probability that an utterance begins with each unit [each shape=(U_c,)]
     """
 
     bigrams: tuple[NDArray[np.float64], ...]
-    firsts: tuple[NDArray[np.float64], ...]
+    initial: tuple[NDArray[np.float64], ...]
 
 
 @dataclass(frozen=True, eq=False)
 class Product:
     """The reachable joint states of chains, and the arcs between them.
 
-    grammar  : as given to ``reachable``
-    joints   : S states
-    arc_from : [shape=(E,)], the source states of all arcs, sorted by target
-    arc_to   : [shape=(E,)]
-    moves    : bool array [shape=(C, E)], which chains an arc moves on
-    base     : [shape=(E,)], probability of the unit it leads to, among those that it may lead to
-    initial  : [shape=(S,)], probability of beginning in each state
-    Source: Xie & Liu 2007, Eqs. 17–19. The mask of Eq. 19 limits the current states, so what is left of a row of the
-    tables is made to sum to 1 again (``transitions``).
+    grammar          : of the units of the chains
+    joint_states     : the S joint states
+    arc_from         : the source states of all arcs, sorted by target [shape=(E,)]
+    arc_to           : the target states of all arcs [shape=(E,)]
+    moves            : whether each chain moves on along each arc [shape=(C, E)]
+    unit_probability : of the units that each arc enters, among those that may be entered [shape=(E,)]
+    initial          : probability of beginning in each joint state [shape=(S,)]
+    Source: Xie & Liu 2007, Eqs. 17–19. The mask of Eq. 19 removes entries from the rows of the transition tables; the
+    rest of each row is normalised to sum to 1 (``transitions``).
     """
 
     structure: Structure
     grammar: Grammar
-    joints: tuple[Joint, ...]
+    joint_states: tuple[JointState, ...]
     arc_from: Index
     arc_to: Index
     moves: NDArray[np.bool_]
-    base: NDArray[np.float64]
+    unit_probability: NDArray[np.float64]
     initial: NDArray[np.float64]
 
     @cached_property
     def arc_start(self) -> Index:
-        """Where each target's arcs begin [shape=(S,)]."""
-        return np.searchsorted(self.arc_to, np.arange(len(self.joints)))
+        """The position of the first arc to each joint state [shape=(S,)]."""
+        return np.searchsorted(self.arc_to, np.arange(len(self.joint_states)))
 
     @cached_property
     def chain_states(self) -> Index:
         """The state of every chain in each joint state [shape=(C, S)]."""
         chains = range(len(self.structure.chains))
         return np.array(
-            [[self.structure.state(joint.units[c], joint.states[c]) for joint in self.joints] for c in chains], np.intp
+            [[self.structure.state(joint.units[c], joint.states[c]) for joint in self.joint_states] for c in chains],
+            np.intp,
         )
 
     @cached_property
     def lead(self) -> Index:
-        """How many states each chain is ahead of the first [shape=(C, S)]."""
+        """The asynchrony: how many states each chain is ahead of the first in each joint state [shape=(C, S)]."""
         count = self.structure.states
-        places = np.array([[s + count * a for s, a in zip(j.states, j.ahead, strict=True)] for j in self.joints]).T
-        return places - places[0]
+        progress = [
+            [state + count * ahead for state, ahead in zip(joint.states, joint.ahead, strict=True)]
+            for joint in self.joint_states
+        ]
+        positions = np.array(progress).T
+        return positions - positions[0]
 
     def name(self, state: int) -> str:
-        """Return what a joint state is, in words."""
+        """Return the name of a joint state, as ``Structure.name``."""
         return self.structure.name(self.chain_states[:, state].tolist())
 
 
 def reachable(structure: Structure, grammar: Grammar) -> Product:
-    """Return the product of chains.
+    """Return the product of chains: the joint states that can be reached from the beginning of an utterance.
 
-    With a limit of asynchrony all chains say the same units; without one each goes its own way.
+    With a limit of asynchrony all chains go through corresponding units; without one each chain moves on its own.
     Raises InputError: chains without a limit that have too many joint states to list.
     """
     if structure.limit is None:
-        return _unlimited(structure, grammar)
+        return _all_combinations(structure, grammar)
     chains = range(len(structure.chains))
-    together, level = (False,) * len(chains), (0,) * len(chains)
-    begins = {
-        Joint(tuple(structure.follows[c][unit] for c in chains), level, together): float(probability)
-        for unit, probability in enumerate(grammar.firsts[0])
+    none_ahead, first_states = (False,) * len(chains), (0,) * len(chains)
+    initial_states = {
+        JointState(tuple(structure.corresponding_units[c][unit] for c in chains), first_states, none_ahead): float(
+            probability
+        )
+        for unit, probability in enumerate(grammar.initial[0])
     }
-    walk = _Walk(structure, grammar.bigrams[0])
-    found: dict[Joint, list[tuple[Joint, tuple[bool, ...], float]]] = {}
-    waiting = deque(begins)
+    successors = _Successors(structure, grammar.bigrams[0])
+    reached: dict[JointState, list[_Successor]] = {}
+    waiting = deque(initial_states)
     while waiting:
         joint = waiting.popleft()
-        if joint in found:
+        if joint in reached:
             continue
-        found[joint] = list(walk.onward(joint))
-        waiting.extend(target for target, _, _ in found[joint] if target not in found)
-    joints = tuple(sorted(found, key=lambda j: (j.ahead, j.states, j.units[1:], j.units[0])))
-    number = {joint: index for index, joint in enumerate(joints)}
-    arcs = [(number[target], number[source], moved, base) for source, to in found.items() for target, moved, base in to]
-    initial = np.zeros(len(joints))
-    for joint, probability in begins.items():
+        reached[joint] = list(successors.of(joint))
+        waiting.extend(target for target, _, _ in reached[joint] if target not in reached)
+    joint_states = tuple(sorted(reached, key=lambda j: (j.ahead, j.states, j.units[1:], j.units[0])))
+    number = {joint: index for index, joint in enumerate(joint_states)}
+    arcs = [
+        (number[target], number[source], moves, probability)
+        for source, targets in reached.items()
+        for target, moves, probability in targets
+    ]
+    initial = np.zeros(len(joint_states))
+    for joint, probability in initial_states.items():
         initial[number[joint]] = probability
-    return _listed(structure, grammar, joints, arcs, initial)
+    return _product_of(structure, grammar, joint_states, arcs, initial)
 
 
+_Successor = tuple[JointState, tuple[bool, ...], float]
+"""A joint state that may follow, which chains move on, and the probability of the units entered."""
 _Arc = tuple[int, int, tuple[bool, ...], float]
-"""Target, source, which chains move, and the probability of the units entered."""
+"""Target, source, which chains move on, and the probability of the units entered."""
 
 
-def _listed(
+def _product_of(
     structure: Structure,
     grammar: Grammar,
-    joints: tuple[Joint, ...],
+    joint_states: tuple[JointState, ...],
     arcs: Iterable[_Arc],
     initial: NDArray[np.float64],
 ) -> Product:
-    targets, sources, moves, base = zip(*sorted(arcs, key=lambda arc: arc[:2]), strict=True)
+    """Return a product of these joint states and arcs; ``initial`` [shape=(S,)] need not sum to 1."""
+    targets, sources, moves, unit_probability = zip(*sorted(arcs, key=lambda arc: arc[:2]), strict=True)
     return Product(
         structure,
         grammar,
-        joints,
-        np.array(sources, np.intp),
-        np.array(targets, np.intp),
-        np.array(moves, bool).T,
-        np.array(base, float),
-        initial / initial.sum(),
+        joint_states,
+        arc_from=np.array(sources, np.intp),
+        arc_to=np.array(targets, np.intp),
+        moves=np.array(moves, bool).T,
+        unit_probability=np.array(unit_probability, float),
+        initial=initial / initial.sum(),
     )
 
 
-def _unlimited(structure: Structure, grammar: Grammar) -> Product:
-    """Return all combinations of the chains' states, each chain following arcs of its own."""
+def _all_combinations(structure: Structure, grammar: Grammar) -> Product:
+    """Return the product of all combinations of the chains' states, in which each chain follows arcs of its own."""
     chains = range(len(structure.chains))
     arcs = [_chain_arcs(structure, grammar.bigrams[chain]) for chain in chains]
     total = int(np.prod([len(own) for own in arcs]))
@@ -158,9 +172,9 @@ def _unlimited(structure: Structure, grammar: Grammar) -> Product:
             f"{' and '.join(chain.name for chain in structure.chains)}: {total} arcs between joint states, at most "
             f"{MOST_ARCS}; limit the asynchrony, or take smaller unit sets"
         )
-    states = list(product(*(range(count) for count in structure.counts)))
-    joints = tuple(
-        Joint(
+    states = list(product(*(range(count) for count in structure.state_counts)))
+    joint_states = tuple(
+        JointState(
             tuple(state // structure.states for state in joint),
             tuple(state % structure.states for state in joint),
             (False,) * len(joint),
@@ -168,30 +182,30 @@ def _unlimited(structure: Structure, grammar: Grammar) -> Product:
         for joint in states
     )
     number = {joint: index for index, joint in enumerate(states)}
-    found = (
+    joint_arcs = (
         (
-            number[tuple(arc[1] for arc in together)],
-            number[tuple(arc[0] for arc in together)],
-            tuple(arc[2] for arc in together),
-            float(np.prod([arc[3] for arc in together])),
+            number[tuple(arc[1] for arc in combination)],
+            number[tuple(arc[0] for arc in combination)],
+            tuple(arc[2] for arc in combination),
+            float(np.prod([arc[3] for arc in combination])),
         )
-        for together in product(*arcs)
+        for combination in product(*arcs)
     )
-    begins = [np.zeros(count) for count in structure.counts]
-    for chain, own in enumerate(begins):
-        own[:: structure.states] = grammar.firsts[chain]
-    initial = np.array([np.prod([begins[c][state] for c, state in enumerate(joint)]) for joint in states])
-    return _listed(structure, grammar, joints, found, initial)
+    chain_initial = [np.zeros(count) for count in structure.state_counts]
+    for chain, own in enumerate(chain_initial):
+        own[:: structure.states] = grammar.initial[chain]
+    initial = np.array([np.prod([chain_initial[c][state] for c, state in enumerate(joint)]) for joint in states])
+    return _product_of(structure, grammar, joint_states, joint_arcs, initial)
 
 
 def _chain_arcs(structure: Structure, bigram: NDArray[np.float64]) -> list[tuple[int, int, bool, float]]:
-    """Return the source and target of one chain's arcs, whether they move on, and the probability of the unit."""
+    """Return the arcs of one chain: source, target, whether it moves on, and the probability of the unit entered."""
     arcs: list[tuple[int, int, bool, float]] = []
     for unit, row in enumerate(bigram):
-        for place in range(structure.states):
-            state = structure.state(unit, place)
+        for position in range(structure.states):
+            state = structure.state(unit, position)
             arcs.append((state, state, False, 1.0))
-            if place < structure.states - 1:
+            if position < structure.states - 1:
                 arcs.append((state, state + 1, True, 1.0))
         last = structure.state(unit, structure.states - 1)
         arcs += [(last, structure.state(entered, 0), True, float(share)) for entered, share in enumerate(row)]
@@ -199,61 +213,64 @@ def _chain_arcs(structure: Structure, bigram: NDArray[np.float64]) -> list[tuple
 
 
 @dataclass(frozen=True, eq=False)
-class _Walk:
+class _Successors:
+    """The joint states that may follow a joint state, by the limit of asynchrony and the first chain's bigram."""
+
     structure: Structure
     bigram: NDArray[np.float64]
 
-    def onward(self, joint: Joint) -> Iterator[tuple[Joint, tuple[bool, ...], float]]:
-        """Give the states that may follow, which chains move, and the probability of the units entered."""
+    def of(self, joint: JointState) -> Iterator[_Successor]:
+        """Yield the joint states that may follow, which chains move on, and the probability of the units entered."""
         for moved in product((False, True), repeat=len(joint.units)):
             leaving = tuple(
                 move and state == self.structure.states - 1 for move, state in zip(moved, joint.states, strict=True)
             )
             if any(out and ahead for out, ahead in zip(leaving, joint.ahead, strict=True)):
-                continue  # a second unit ahead
-            if any(leaving) and not (self.structure.crosses or all(leaving)):
+                continue  # the chain would be a second unit ahead
+            if any(leaving) and not (self.structure.cross_units or all(leaving)):
                 continue
             states = tuple(
                 0 if out else state + move for out, state, move in zip(leaving, joint.states, moved, strict=True)
             )
             ahead = tuple(out or was for out, was in zip(leaving, joint.ahead, strict=True))
-            if not self._near(states, ahead):
+            if not self._within_limit(states, ahead):
                 continue
-            settled = (False,) * len(ahead) if all(ahead) else ahead
-            for units, base in self._entered(joint, leaving):
-                yield Joint(units, states, settled), moved, base
+            relative_ahead = (False,) * len(ahead) if all(ahead) else ahead
+            for units, probability in self._entered(joint, leaving):
+                yield JointState(units, states, relative_ahead), moved, probability
 
-    def _near(self, states: tuple[int, ...], ahead: tuple[bool, ...]) -> bool:
-        places = [state + self.structure.states * out for state, out in zip(states, ahead, strict=True)]
-        return self.structure.limit is None or max(places) - min(places) <= self.structure.limit
+    def _within_limit(self, states: tuple[int, ...], ahead: tuple[bool, ...]) -> bool:
+        positions = [state + self.structure.states * out for state, out in zip(states, ahead, strict=True)]
+        return self.structure.limit is None or max(positions) - min(positions) <= self.structure.limit
 
-    def _entered(self, joint: Joint, leaving: tuple[bool, ...]) -> Iterator[tuple[tuple[int, ...], float]]:
-        """Give the units of all chains after those in ``leaving`` have entered the next one."""
-        follows = self.structure.follows
+    def _entered(self, joint: JointState, leaving: tuple[bool, ...]) -> Iterator[tuple[tuple[int, ...], float]]:
+        """Yield the units of all chains after those in ``leaving`` entered the next unit, and their probability."""
+        corresponding_units = self.structure.corresponding_units
         if not any(leaving):
             yield joint.units, 1.0
             return
-        if joint.ahead[0]:  # what is said next is known
+        if joint.ahead[0]:  # the first chain is in the next unit already
             yield self._with(joint, leaving, joint.units[0]), 1.0
             return
         row = self.bigram[joint.units[0]]
-        fitting = [
+        candidates = [
             unit
             for unit in range(len(row))
             if all(
-                follows[c][unit] == own
+                corresponding_units[c][unit] == own
                 for c, (own, out) in enumerate(zip(joint.units, joint.ahead, strict=True))
                 if out
             )
         ]
-        total = sum(row[unit] for unit in fitting)
-        shares: dict[tuple[int, ...], float] = defaultdict(float)
-        for unit in fitting:
-            shares[self._with(joint, leaving, unit)] += float(row[unit] / total)
-        yield from shares.items()
+        total = sum(row[unit] for unit in candidates)
+        probabilities: dict[tuple[int, ...], float] = defaultdict(float)
+        for unit in candidates:
+            probabilities[self._with(joint, leaving, unit)] += float(row[unit] / total)
+        yield from probabilities.items()
 
-    def _with(self, joint: Joint, leaving: tuple[bool, ...], unit: int) -> tuple[int, ...]:
+    def _with(self, joint: JointState, leaving: tuple[bool, ...], unit: int) -> tuple[int, ...]:
+        """Return the units of all chains; those in ``leaving`` get what corresponds to ``unit`` of the first chain."""
         return tuple(
-            self.structure.follows[c][unit] if out else own
+            self.structure.corresponding_units[c][unit] if out else own
             for c, (own, out) in enumerate(zip(joint.units, leaving, strict=True))
         )

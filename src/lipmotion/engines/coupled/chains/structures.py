@@ -1,4 +1,4 @@
-"""Structures of chains, and the six systems of the paper by name."""
+"""Structures of chains, and the six systems of Xie & Liu 2007 by name."""
 
 from __future__ import annotations
 
@@ -21,29 +21,30 @@ SYSTEMS: dict[str, dict[str, Any]] = {
     "ph-CHMM": {"structure": COUPLED, "chains": "phone phone"},
     "ph-vi-CHMM": {"structure": COUPLED, "chains": "phone viseme"},
 }
-"""Options of the coupled engine. Source: Xie & Liu 2007, Table 2."""
+"""Options of the coupled engine for each system. Source: Xie & Liu 2007, Table 2."""
 
 
 @dataclass(frozen=True)
 class Structure:
-    """How many chains there are, what their units are, and how they depend on each other.
+    """The chains, their units, and how the chains depend on each other.
 
-    kind   : ``hmm`` (one chain, one mixture over all streams), ``multistream`` (one chain, a mixture a stream),
-             ``factorial`` (chains that move on their own, densities of the joint state) or ``coupled`` (chains whose
-             moves depend on all chains, densities of their own states)
-    chains : the unit set of each chain; speech is on the first, which also decides what is said
-    states : states per unit, left to right, no skips
-    limit  : how many states chains may be apart; None: any number
-    crosses : whether chains may leave a unit at different times
+    kind        : ``hmm`` (one chain, one mixture over all streams), ``multistream`` (one chain, one mixture for each
+                  stream), ``factorial`` (chains with independent transitions, emission densities of joint states) or
+                  ``coupled`` (chains whose transitions depend on the states of all chains, emission densities of each
+                  chain's states)
+    chains      : the unit set of each chain; the first chain emits speech, and its bigram decides which unit follows
+    states      : states per unit, left to right, without skips
+    limit       : the greatest asynchrony, in states; None: no limit
+    cross_units : whether chains may leave a unit at different times
     Source: Xie & Liu 2007, Fig. 3 and Eqs. 17–19.
-    Raises InputError: something does not fit together.
+    Raises InputError: an unknown kind, or a number of chains or limit that does not fit it.
     """
 
     kind: str
     chains: tuple[UnitSet, ...]
     states: int
     limit: int | None
-    crosses: bool = True
+    cross_units: bool = True
 
     def __post_init__(self) -> None:
         if self.kind not in STRUCTURES:
@@ -57,55 +58,63 @@ class Structure:
 
     @cached_property
     def units(self) -> tuple[tuple[str, ...], ...]:
-        """The units of every chain; those of the first that look alike on the others stand together."""
+        """The units of every chain; those of the first are sorted by the corresponding units of the others."""
         first, *others = self.chains
-        looks = {unit: [chain.units.index(unit_over(chain, first, unit)) for chain in others] for unit in first.units}
-        return (tuple(sorted(first.units, key=lambda unit: looks[unit])), *(chain.units for chain in others))
+        key = {
+            unit: [chain.units.index(corresponding_unit(chain, first, unit)) for chain in others]
+            for unit in first.units
+        }
+        return (tuple(sorted(first.units, key=lambda unit: key[unit])), *(chain.units for chain in others))
 
     @cached_property
-    def follows(self) -> tuple[tuple[int, ...], ...]:
-        """The unit of every chain that goes with each unit of the first."""
+    def corresponding_units(self) -> tuple[tuple[int, ...], ...]:
+        """For each chain, the number of its unit that corresponds to each unit of the first chain."""
         return tuple(
-            tuple(units.index(unit_over(chain, self.chains[0], unit)) for unit in self.units[0])
+            tuple(units.index(corresponding_unit(chain, self.chains[0], unit)) for unit in self.units[0])
             for chain, units in zip(self.chains, self.units, strict=True)
         )
 
     @cached_property
-    def counts(self) -> tuple[int, ...]:
-        """How many states every chain has."""
+    def state_counts(self) -> tuple[int, ...]:
+        """The number of states of each chain."""
         return tuple(len(units) * self.states for units in self.units)
 
     def chain_of(self, stream: int) -> int:
-        """Return the chain that a stream is on: speech on the first, all others in order on the rest."""
+        """Return the chain that emits a stream: the first emits speech, the others the visual streams in order."""
         return min(stream, len(self.chains) - 1)
 
     def name(self, states: Sequence[int]) -> str:
-        """Return what the states of all chains are, in words: ``b.1 | bi.2``, unit and place, counted from 1."""
+        """Return the name of a joint state, as ``b.1 | bi.2``: of each chain the unit, and its state, counted from 1.
+
+        states : the state of each chain
+        """
         return " | ".join(self.state_name(chain, state) for chain, state in enumerate(states))
 
     def state_name(self, chain: int, state: int) -> str:
-        """Return what a state of one chain is, in words: ``b.1``."""
-        unit, place = divmod(state, self.states)
-        return f"{self.units[chain][unit]}.{place + 1}"
+        """Return the name of a state of one chain, as ``b.1``."""
+        unit, position = divmod(state, self.states)
+        return f"{self.units[chain][unit]}.{position + 1}"
 
     def state(self, unit: int, state: int) -> int:
-        """Return the number of a state within its chain."""
+        """Return the number of a state within its chain, from its unit and its number within the unit."""
         return unit * self.states + state
 
 
-def structure_of(kind: str, chains: str, states: int, asynchrony: int, crosses: bool) -> Structure:
-    """Return a structure. Raises InputError: no such unit set, or something does not fit together.
+def structure_of(kind: str, chains: str, states: int, asynchrony: int, cross_units: bool) -> Structure:
+    """Return the structure that a configuration asks for.
 
-    chains : names of unit sets or files of their tables, separated by blanks;  asynchrony : -1 stands for no limit
+    chains     : names of unit sets, or files with their tables, separated by blanks
+    asynchrony : the greatest asynchrony, in states; negative: no limit
+    Raises InputError: no such unit set, or arguments that do not fit together.
     """
     sets = tuple(unit_set(name) for name in chains.split())
     if not sets:
         raise InputError("no chains were given; required the unit set of each, as in 'phone viseme'")
-    return Structure(kind, sets, states, None if asynchrony < 0 else asynchrony, crosses)
+    return Structure(kind, sets, states, None if asynchrony < 0 else asynchrony, cross_units)
 
 
-def unit_over(chain: UnitSet, first: UnitSet, unit: str) -> str:
-    """Return the unit of a chain that goes with a unit of the first: that of most of its phones."""
+def corresponding_unit(chain: UnitSet, first: UnitSet, unit: str) -> str:
+    """Return the unit of a chain that corresponds to a unit of the first chain: that of most of its phones."""
     if chain is first:
         return unit
     units = [chain.unit(phone) for phone in PHONES if first.unit(phone) == unit]

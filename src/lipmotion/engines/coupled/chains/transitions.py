@@ -1,4 +1,4 @@
-"""When chains move on: coupled tables under the asynchrony mask, and their exact re-estimation."""
+"""Transition probabilities of chains with a limit of asynchrony: coupled tables under a mask, and their M-step."""
 
 from __future__ import annotations
 
@@ -15,23 +15,27 @@ from lipmotion.engines.coupled.chains.structures import COUPLED
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
-FIRST_ADVANCE = 0.2
-"""Probability of moving on in a frame before anything is known: 50 ms a state."""
+INITIAL_ADVANCE = 0.2
+"""Probability of moving on in a frame before training: a state lasts 50 ms on average."""
 LEAST_FRAMES = 50.0
-"""A joint state with fewer frames in training moves on as all with the same own state and the same lead do."""
-LEAST, SWEEPS, ENOUGH = 1e-5, 50, 1e-6
+"""A joint state with fewer frames in training shares its row with all that have the same own state and asynchrony."""
+LEAST_ADVANCE = 1e-5
+"""Least probability of moving on, and of staying."""
+MOST_SWEEPS, CONVERGED = 50, 1e-6
+"""Iterative scaling ends after so many sweeps, or when no probability changes by as much."""
 
 
 @dataclass(frozen=True, eq=False)
 class Transitions:
-    """Probability that each chain moves on, given the joint state before.
+    """The probability that each chain moves on, given the joint state of the frame before.
 
-    rows    : the row of the tables that holds in each joint state, chain by chain [each shape=(S,)]
-    advance : probability of moving on in each row, chain by chain [each shape=(R_c,)]
+    rows    : for each chain, the row of its table that each joint state uses [each shape=(S,)]
+    advance : for each chain, the probability of moving on in each row of its table [each shape=(R_c,)]
 
-    An arc has the product of its chains' probabilities of moving or staying and that of the unit entered, divided by
-    the sum of these over the arcs that the mask leaves.
-    Source: Xie & Liu 2007, Eqs. 2, 17–19. Deviation: which unit follows is the bigram's, not the tables'.
+    The weight of an arc is the product of its chains' probabilities of moving on or staying and of the probability of
+    the units entered. Its probability is this weight, divided by the sum over the arcs from the same joint state that
+    the mask leaves.
+    Source: Xie & Liu 2007, Eqs. 2, 17–19. Deviation: which unit follows is decided by the bigram, not by the tables.
     """
 
     product: Product
@@ -45,84 +49,94 @@ class Transitions:
             return np.log(self.product.initial)
 
     @property
-    def count(self) -> int:
-        """How many numbers transitions are learned from: one an arc."""
+    def statistic_count(self) -> int:
+        """The number of transition statistics: the expected count of each arc."""
         return len(self.product.arc_from)
 
     @cached_property
     def arc_log(self) -> Array:
         """Log probability of every arc [shape=(E,)]."""
-        weight = self.product.base.copy()
+        weight = self.product.unit_probability.copy()
         for chain in range(len(self.rows)):
             weight *= self._factor(chain)
-        total = np.bincount(self.product.arc_from, weight, len(self.product.joints))
+        total = np.bincount(self.product.arc_from, weight, len(self.product.joint_states))
         return np.log(weight / total[self.product.arc_from])
 
-    def relearned(self, counts: Array) -> Transitions:
-        """Return the tables that explain best how often arcs were followed [shape=(E,)].
+    def reestimated(self, counts: Array) -> Transitions:
+        """Return the transitions with the most likely tables (M-step); rows without data stay as they are.
 
-        Every arc takes one entry of each chain's table, so with the others fixed the likelihood is highest where the
-        expected use of each entry is the counted one: iterative scaling, chain after chain, which never lowers it.
-        Without a mask one sweep is the usual closed form. Rows without data stay as they are.
+        counts : the expected count of each arc [shape=(E,)]
+        Every arc uses one entry of each chain's table. While the other chains' tables are fixed, the likelihood is
+        highest where the expected use of each entry equals its count. Iterative scaling does this chain after chain and
+        never lowers the likelihood. Without a mask one sweep is the usual closed form.
         Source: Darroch & Ratcliff 1972; the M-step of Xie & Liu 2007, Eq. A.16, is exact only without the mask.
         """
-        left: Array = np.bincount(self.product.arc_from, counts, len(self.product.joints)).astype(float)[
+        left: Array = np.bincount(self.product.arc_from, counts, len(self.product.joint_states)).astype(float)[
             self.product.arc_from
         ]
         current = self
-        for _ in range(SWEEPS):
+        for _ in range(MOST_SWEEPS):
             before = current.advance
             for chain in range(len(self.rows)):
                 current = current._rescaled(chain, counts, left * np.exp(current.arc_log))
-            if all(np.abs(a - b).max() < ENOUGH for a, b in zip(before, current.advance, strict=True)):
+            if all(np.abs(a - b).max() < CONVERGED for a, b in zip(before, current.advance, strict=True)):
                 break
         return current
 
     def tied(self, frames: NDArray[Any]) -> Transitions:
-        """Return the same tables, rows of rare joint states shared.
+        """Return the transitions with one shared row for rare joint states of the same own state and asynchrony.
 
-        frames : how long each joint state is expected to have been visited [shape=(S,)]
+        frames : number of frames spent in each joint state [shape=(S,)]
         """
         rows, advance = [], []
         for chain, own in enumerate(self.rows):
             key, count = own.copy(), len(self.advance[chain])
             rare = frames < LEAST_FRAMES
-            key[rare] = count + _alike(self.product, chain)[rare]
+            key[rare] = count + _own_state_and_asynchrony(self.product, chain)[rare]
             distinct, first, row = np.unique(key, return_index=True, return_inverse=True)
             rows.append(row.astype(np.intp))
             advance.append(self.advance[chain][own[first[: len(distinct)]]])
         return replace(self, rows=tuple(rows), advance=tuple(advance))
 
     def _factor(self, chain: int) -> Array:
+        """Return the probability that a chain moves on or stays as each arc says [shape=(E,)]."""
         advance = self.advance[chain][self.rows[chain]][self.product.arc_from]
         return np.where(self.product.moves[chain], advance, 1 - advance)
 
     def _rescaled(self, chain: int, counts: Array, expected: Array) -> Transitions:
+        """Return the transitions after one step of iterative scaling of one chain's table.
+
+        counts   : of each arc [shape=(E,)]
+        expected : what the present tables expect instead of the counts [shape=(E,)]
+        """
         row, moves = self.rows[chain][self.product.arc_from], self.product.moves[chain]
         size = len(self.advance[chain])
         entries = []
-        for moved, now in ((True, self.advance[chain]), (False, 1 - self.advance[chain])):
-            seen = np.bincount(row, np.where(moves == moved, counts, 0), size)
-            meant = np.bincount(row, np.where(moves == moved, expected, 0), size)
-            entries.append(np.where(meant > 0, now * seen / np.where(meant > 0, meant, 1), now))
+        for moved, present in ((True, self.advance[chain]), (False, 1 - self.advance[chain])):
+            counted_use = np.bincount(row, np.where(moves == moved, counts, 0), size)
+            expected_use = np.bincount(row, np.where(moves == moved, expected, 0), size)
+            divisor = np.where(expected_use > 0, expected_use, 1)
+            entries.append(np.where(expected_use > 0, present * counted_use / divisor, present))
         total = entries[0] + entries[1]
         known = total > 0
-        share = np.where(known, entries[0] / np.where(known, total, 1), self.advance[chain])
-        new = np.clip(share, LEAST, 1 - LEAST)
-        return replace(self, advance=(*self.advance[:chain], new, *self.advance[chain + 1 :]))
+        advance = np.where(known, entries[0] / np.where(known, total, 1), self.advance[chain])
+        advance = np.clip(advance, LEAST_ADVANCE, 1 - LEAST_ADVANCE)
+        return replace(self, advance=(*self.advance[:chain], advance, *self.advance[chain + 1 :]))
 
 
-def first_transitions(product: Product) -> Transitions:
-    """Return tables before training: coupled chains have a row a joint state, others one a state of their own."""
+def initial_transitions(product: Product) -> Transitions:
+    """Return the transitions before training: in tables of coupled chains each joint state has a row of its own; in
+    those of other chains each state of the chain has one.
+    """
     coupled = product.structure.kind == COUPLED
-    own = np.arange(len(product.joints))
+    own = np.arange(len(product.joint_states))
     rows = [own if coupled else states for states in product.chain_states]
-    counts = [len(own) if coupled else count for count in product.structure.counts]
-    return Transitions(product, tuple(rows), tuple(np.full(count, FIRST_ADVANCE) for count in counts))
+    counts = [len(own) if coupled else count for count in product.structure.state_counts]
+    return Transitions(product, tuple(rows), tuple(np.full(count, INITIAL_ADVANCE) for count in counts))
 
 
-def _alike(product: Product, chain: int) -> Index:
-    """Return a number for the own state and the leads of all chains [shape=(S,)]."""
+def _own_state_and_asynchrony(product: Product, chain: int) -> Index:
+    """Return a number for each joint state that is the same where the chain's state and all leads are [shape=(S,)]."""
     key: Sequence[Index] = [product.chain_states[chain], *(product.lead - product.lead[chain])]
     _, number = np.unique(np.stack(key), axis=1, return_inverse=True)
     return np.asarray(number, np.intp).reshape(-1)

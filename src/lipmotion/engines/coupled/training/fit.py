@@ -1,4 +1,4 @@
-"""Learning a coupled model from examples."""
+"""Training of a coupled model from examples: chains, regression of visual means, variance scaling, rest pose."""
 
 from __future__ import annotations
 
@@ -14,23 +14,30 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.coupled.chains.densities import Observed
+from lipmotion.engines.coupled.chains.densities import AudioVisualObservations
 from lipmotion.engines.coupled.chains.model import Chains
 from lipmotion.engines.coupled.chains.structures import HMM, Structure, structure_of
-from lipmotion.engines.coupled.chains.visual_streams import EIGENLIPS, GEOMETRY, VisualStream, unseen, visual_streams
-from lipmotion.engines.coupled.config import CoupledConfig
-from lipmotion.engines.coupled.conversion.em import speech_alone
-from lipmotion.engines.coupled.conversion.regression import (
-    Following,
-    Heard,
-    Surroundings,
-    belief_axes,
-    fit_following,
-    fit_surroundings,
+from lipmotion.engines.coupled.chains.visual_streams import (
+    EIGENLIPS,
+    GEOMETRY,
+    VisualStream,
+    fit_visual_streams,
+    speech_observations,
 )
-from lipmotion.engines.coupled.model import CALM_S, CoupledModel
-from lipmotion.engines.coupled.training.speech_only import MoreSpeech, with_more_speech
-from lipmotion.engines.coupled.training.train import Labelled, Schedule, Step, growing_chains
+from lipmotion.engines.coupled.config import CoupledConfig
+from lipmotion.engines.coupled.conversion.em import without_visual_streams
+from lipmotion.engines.coupled.conversion.regression import (
+    RegressionInputs,
+    RegressionUtterance,
+    VisualRegression,
+    fit_regression_inputs,
+    fit_visual_regression,
+    posterior_axes,
+)
+from lipmotion.engines.coupled.model import AWAY_FROM_SPEECH_S, CoupledModel
+from lipmotion.engines.coupled.training.alignment import AlignedUtterance
+from lipmotion.engines.coupled.training.speech_only import SpeechOnlySchedule, train_on_speech
+from lipmotion.engines.coupled.training.train import MixtureSchedule, TrainingStep, growing_chains
 from lipmotion.errors import CorpusError
 from lipmotion.kernels.banded import generate
 from lipmotion.motion.closure import fit_closure_of
@@ -47,12 +54,12 @@ SPEECH = "speech"
 
 
 def fit_coupled(examples: Sequence[Example], config: CoupledConfig, monitor: Monitor) -> CoupledModel:
-    """Return a model of speech with its motion.
+    """Return a coupled model trained on examples of speech with its motion.
 
-    Examples in which no motion was seen are for the second stage of training, which makes the densities of speech those
-    of more speakers (``more_speech``). They teach nothing before it; after it, what follows from the beliefs of these
-    densities is learned from the examples with motion only.
-    Raises CorpusError: no example with motion that was seen, or examples of different channels.
+    Examples without observed motion are for the second stage of training, which re-estimates the densities of speech
+    from more speakers (``speech_only``). The first stage ignores them, and so does what follows the second: the
+    regression of visual means, and variance scaling, which are learned from the examples with motion.
+    Raises CorpusError: no example with observed motion, or examples of different channels.
     Raises InputError: no such unit set, or a structure that does not fit together.
     """
     return deque(growing_models(examples, config, monitor), maxlen=1)[0]()
@@ -61,161 +68,194 @@ def fit_coupled(examples: Sequence[Example], config: CoupledConfig, monitor: Mon
 def growing_models(
     examples: Sequence[Example], config: CoupledConfig, monitor: Monitor
 ) -> Iterator[Callable[[], CoupledModel]]:
-    """Give what makes the models with 1, 2, 4, … Gaussians that ``fit_coupled`` learns on its way, itself the last.
+    """Yield functions that return the models with 1, 2, 4, … Gaussians that ``fit_coupled`` passes through.
 
-    Raises as ``fit_coupled``.
+    The last function returns the model of ``fit_coupled``. Raises as ``fit_coupled``.
     """
     structure = structure_of(config.structure, config.chains, config.states, config.asynchrony, config.cross_units)
     moving = [example for example in examples if dynamics_known(example.valid).any()]
     space, values = fit_reduced_motion(moving or examples, config.components)
     if all(is_silent(span.label.phone) for example in moving for span in example.speech.units):
         raise CorpusError(f"nothing is said in {len(moving)} examples with motion; learn from speech")
-    seen = [dynamics_known(example.valid) for example in moving]
-    visual = visual_streams(space, values, seen, config.dynamic)
+    valid = [dynamics_known(example.valid) for example in moving]
+    visual = fit_visual_streams(space, values, valid, config.dynamic)
     data = [
-        Labelled(
-            Observed((_features(example), *(stream.observed(x) for stream in visual)), (None, *(mask for _ in visual))),
-            example.speech.units,
-        )
-        for example, x, mask in zip(moving, values, seen, strict=True)
+        AlignedUtterance(_observations(example, x, mask, visual), example.speech.units)
+        for example, x, mask in zip(moving, values, valid, strict=True)
     ]
-    rest, closure = _rest(moving, values, seen), fit_closure_of(space.direct_names, values, moving)
-    others = [
-        Labelled(unseen(_features(example), visual), example.speech.units)
+    speech_only = [
+        AlignedUtterance(speech_observations(_features(example), visual), example.speech.units)
         for example in examples
         if not dynamics_known(example.valid).any()
     ]
-    first, second = (0.4, 0.7) if others else (0.7, 0.7)
+    rest_pose, closure = _rest_pose(moving, values, valid), fit_closure_of(space.direct_names, values, moving)
+    first_share, second_share = (0.4, 0.7) if speech_only else (0.7, 0.7)
 
-    def model_of(chains: Chains) -> CoupledModel:
-        if others:
-            chains = _second_stage(chains, data, others, config, part_of(monitor, first, second))
-        model = CoupledModel(chains, space, visual, None, np.ones(space.dimensions), rest, closure)
+    def finished_model(chains: Chains) -> CoupledModel:
+        if speech_only:
+            second_monitor = part_of(monitor, first_share, second_share)
+            chains = _second_stage(chains, data, speech_only, config, second_monitor)
+        model = CoupledModel(chains, space, visual, None, np.ones(space.dimensions), rest_pose, closure)
         if config.dynamic and config.acoustic_regression:
-            monitor(Progress("following the sound", 1, 1, 0.75))
-            model = replace(model, follow=_follow(model, data))
+            monitor(Progress("regression of visual means", 1, 1, 0.75))
+            model = replace(model, regression=_fitted_regression(model, data))
         if config.dynamic and config.variance_scaling:
-            model = replace(model, gain=_gain(model, data, values))
-        monitor(Progress("following the sound", 1, 1, 1.0))
+            model = replace(model, scaling=_fitted_scaling(model, data, values))
+        monitor(Progress("regression of visual means", 1, 1, 1.0))
         return model
 
-    names, how = (SPEECH, *(stream.name for stream in visual)), _schedule(structure, visual, config)
-    steps = how.most * max(how.mixtures).bit_length()
-    told = _told("chains", steps, part_of(monitor, 0, first))
-    for chains in growing_chains(structure, names, data, how, told, workers()):
-        yield partial(model_of, chains)
-
-
-def _schedule(structure: Structure, visual: Sequence[VisualStream], config: CoupledConfig) -> Schedule:
-    mixtures = (config.mixtures, *(config.visual_mixtures for _ in visual))
-    weights = {GEOMETRY: config.visual_weight, EIGENLIPS: config.eigenlips_weight}
-    return Schedule(
-        mixtures[:1] if structure.kind == HMM else mixtures,
-        (config.audio_weight, *(weights[stream.name] for stream in visual)),
-    )
-
-
-def _second_stage(
-    chains: Chains, data: Sequence[Labelled], others: Sequence[Labelled], config: CoupledConfig, monitor: Monitor
-) -> Chains:
-    """Return the chains after the second stage of training, on speech without motion as well."""
-    more = MoreSpeech(config.speech_only_mixtures, config.speech_only_steps, config.speech_only_weight)
-    steps = more.steps * max(more.mixtures // config.mixtures, 1).bit_length()
-    return with_more_speech(chains, data, others, more, _told("more speech", steps, monitor), workers())
+    names, schedule = (SPEECH, *(stream.name for stream in visual)), _schedule(structure, visual, config)
+    most_steps = schedule.most_steps * max(schedule.mixtures).bit_length()
+    report = _reporter("chains", most_steps, part_of(monitor, 0, first_share))
+    for chains in growing_chains(structure, names, data, schedule, report, workers()):
+        yield partial(finished_model, chains)
 
 
 def workers() -> int:
-    """Return how many threads share the work; the result does not depend on it."""
+    """Return the number of threads that share the work; the result does not depend on it."""
     return min(os.cpu_count() or 1, 8)
+
+
+def frames_away_from_speech(units: Timeline[Unit], frames: int) -> NDArray[np.bool_]:
+    """Return whether each frame is silence, further than 0.45 s from every phone [shape=(T,)]."""
+    return away_from_speech(np.arange(frames) / FRAME_RATE_HZ, speech_intervals(units), AWAY_FROM_SPEECH_S)
+
+
+def _observations(
+    example: Example, values: Array, valid: NDArray[np.bool_], visual: Sequence[VisualStream]
+) -> AudioVisualObservations:
+    """Return the speech of an example with its visual streams.
+
+    values : motion in the space [shape=(T, Q)]
+    valid  : the frames in which it was observed [shape=(T,)]
+    """
+    streams = (_features(example), *(stream.standardised(values) for stream in visual))
+    return AudioVisualObservations(streams, (None, *(valid for _ in visual)))
 
 
 def _features(example: Example) -> NDArray[np.float32]:
     return np.asarray(example.speech.features.values)
 
 
-def _told(stage: str, most: int, monitor: Monitor) -> Callable[[Step], None]:
-    """Return what reports the steps of a stage of training; how many there will be is not known beforehand.
-
-    most : steps, if none is left out
-    """
-    done = itertools.count(1)
-
-    def tell(step: Step) -> None:
-        number = next(done)
-        monitor(Progress(stage, number, most, number / most, step.log_likelihood))
-
-    return tell
-
-
-def _rest(examples: Sequence[Example], values: Sequence[Array], seen: Sequence[NDArray[np.bool_]]) -> Array:
-    """Return the median pose of silence away from speech; of everything where there is none [shape=(Q,)]."""
-    poses = [
-        x[mask & calm(example.speech.units, len(x))] for example, x, mask in zip(examples, values, seen, strict=True)
-    ]
-    chosen = np.concatenate(poses)
-    if not len(chosen):
-        chosen = np.concatenate([x[mask] for x, mask in zip(values, seen, strict=True)])
-    rest: Array = np.median(chosen, axis=0)
-    return rest
-
-
-def calm(units: Timeline[Unit], frames: int) -> NDArray[np.bool_]:
-    """Return which frames are silence away from speech [shape=(T,)]."""
-    return away_from_speech(np.arange(frames) / FRAME_RATE_HZ, speech_intervals(units), CALM_S)
-
-
-def _follow(model: CoupledModel, data: Sequence[Labelled]) -> tuple[Surroundings, tuple[Following, ...]]:
-    """Return how the visual means follow what is around a frame, believed as when only speech is known."""
-    chains = model.chains
-    structure = chains.structure
-    others = [structure.chain_of(stream + 1) for stream in range(len(model.visual))]
-    believed = list(_each(lambda one: _believed(chains, one, (0, *others)), data))
-    axes = belief_axes(posterior for posterior, *_ in believed)
-    heard = [
-        Heard(
-            one.observed.streams[0],
-            posterior @ axes,
-            gates,
-            one.observed.streams[1:],
-            np.asarray(one.observed.seen[1]),
-        )
-        for one, (posterior, *gates) in zip(data, believed, strict=True)
-    ]
-    around = fit_surroundings(axes, heard)
-    return around, tuple(
-        fit_following(around, heard, stream, *_kinds(structure, chain)) for stream, chain in enumerate(others)
+def _schedule(structure: Structure, visual: Sequence[VisualStream], config: CoupledConfig) -> MixtureSchedule:
+    mixtures = (config.mixtures, *(config.visual_mixtures for _ in visual))
+    weights = {GEOMETRY: config.visual_weight, EIGENLIPS: config.eigenlips_weight}
+    return MixtureSchedule(
+        mixtures[:1] if structure.kind == HMM else mixtures,
+        (config.audio_weight, *(weights[stream.name] for stream in visual)),
     )
 
 
-def _believed(chains: Chains, one: Labelled, which: Sequence[int]) -> tuple[NDArray[np.float32], ...]:
-    evidence = chains.evidence(speech_alone(one.observed), chains.everywhere)
-    posteriors = chains.posteriors(evidence, chains.everywhere)
-    return tuple(posteriors.chains[chain] for chain in which)
+def _second_stage(
+    chains: Chains,
+    data: Sequence[AlignedUtterance],
+    speech_only: Sequence[AlignedUtterance],
+    config: CoupledConfig,
+    monitor: Monitor,
+) -> Chains:
+    """Return the chains after the second stage of training, on speech without motion as well."""
+    schedule = SpeechOnlySchedule(config.speech_only_mixtures, config.speech_only_steps, config.speech_only_weight)
+    most_steps = schedule.most_steps * max(schedule.mixtures // config.mixtures, 1).bit_length()
+    report = _reporter("more speech", most_steps, monitor)
+    return train_on_speech(chains, data, speech_only, schedule, report, workers())
 
 
-def _kinds(structure: Structure, chain: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return a number for the viseme and place of each state of a chain [shape=(N,)], and the viseme of each [(E,)]."""
+def _reporter(stage: str, most_steps: int, monitor: Monitor) -> Callable[[TrainingStep], None]:
+    """Return a function that reports the steps of a stage of training to the monitor.
+
+    most_steps : how many steps there will be at most; the stage may end earlier
+    """
+    numbers = itertools.count(1)
+
+    def report(step: TrainingStep) -> None:
+        number = next(numbers)
+        monitor(Progress(stage, number, most_steps, number / most_steps, step.log_likelihood))
+
+    return report
+
+
+def _rest_pose(examples: Sequence[Example], values: Sequence[Array], valid: Sequence[NDArray[np.bool_]]) -> Array:
+    """Return the median pose of silence away from speech, or that of all frames if there is none [shape=(Q,)].
+
+    values : motion in the space [each shape=(T, Q)]
+    valid  : the frames in which it was observed [each shape=(T,)]
+    """
+    silent_poses = [
+        x[mask & frames_away_from_speech(example.speech.units, len(x))]
+        for example, x, mask in zip(examples, values, valid, strict=True)
+    ]
+    poses = np.concatenate(silent_poses)
+    if not len(poses):
+        poses = np.concatenate([x[mask] for x, mask in zip(values, valid, strict=True)])
+    rest_pose: Array = np.median(poses, axis=0)
+    return rest_pose
+
+
+def _fitted_regression(
+    model: CoupledModel, data: Sequence[AlignedUtterance]
+) -> tuple[RegressionInputs, tuple[VisualRegression, ...]]:
+    """Return the regression of visual means on acoustic features and on the posteriors given speech alone."""
+    structure = model.chains.structure
+    visual_chains = [structure.chain_of(stream + 1) for stream in range(len(model.visual))]
+    posteriors = list(
+        _threaded(lambda utterance: _chain_posteriors(model.chains, utterance, (0, *visual_chains)), data)
+    )
+    axes = posterior_axes(first for first, *_ in posteriors)
+    utterances = [
+        RegressionUtterance(
+            utterance.observations.streams[0],
+            first @ axes,
+            visual,
+            utterance.observations.streams[1:],
+            np.asarray(utterance.observations.observed[1]),
+        )
+        for utterance, (first, *visual) in zip(data, posteriors, strict=True)
+    ]
+    inputs = fit_regression_inputs(axes, utterances)
+    return inputs, tuple(
+        fit_visual_regression(inputs, utterances, stream, *_state_regressions(structure, chain))
+        for stream, chain in enumerate(visual_chains)
+    )
+
+
+def _chain_posteriors(
+    chains: Chains, utterance: AlignedUtterance, numbers: Sequence[int]
+) -> tuple[NDArray[np.float32], ...]:
+    """Return the posteriors of the states of some chains given speech alone, without transcript [each shape=(T, N)]."""
+    posteriors = chains.infer(without_visual_streams(utterance.observations), chains.full_lattice).posteriors
+    return tuple(posteriors.chains[number] for number in numbers)
+
+
+def _state_regressions(structure: Structure, chain: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return the regression of each state of a chain [shape=(N,)], and the viseme of each regression [shape=(E,)].
+
+    There is one regression for each viseme and each position of a state within its unit.
+    """
     visemes = [VISEME_OF[structure.chains[chain].phones(unit)[0]] for unit in structure.units[chain]]
     numbers = np.unique(visemes, return_inverse=True)[1]
     family = np.repeat(np.arange(numbers.max() + 1), structure.states)
     return (numbers[:, None] * structure.states + np.arange(structure.states)).ravel().astype(np.intp), family
 
 
-def _gain(model: CoupledModel, data: Sequence[Labelled], values: Sequence[Array]) -> Array:
-    """Return by how much movements must grow to be as large as the original's [shape=(Q,)]."""
+def _fitted_scaling(model: CoupledModel, data: Sequence[AlignedUtterance], values: Sequence[Array]) -> Array:
+    """Return the factors of variance scaling, from generated to recorded motion [shape=(Q,)].
+
+    values : recorded motion in the space [each shape=(T, Q)]
+    """
     chains = model.chains
 
-    def spread(one: Labelled) -> Array:
-        observed = speech_alone(one.observed)
-        motion, _ = generate(*model.statistics(chains.inferred(observed, chains.everywhere)))
-        deviation: Array = motion[one.observed.seen[1]].std(axis=0)
+    def generated_deviation(utterance: AlignedUtterance) -> Array:
+        speech = without_visual_streams(utterance.observations)
+        motion, _ = generate(*model.motion_statistics(chains.infer(speech, chains.full_lattice)))
+        deviation: Array = motion[utterance.observations.observed[1]].std(axis=0)
         return deviation
 
-    generated = list(_each(spread, data))
-    original = [x[one.observed.seen[1]].std(axis=0) for one, x in zip(data, values, strict=True)]
+    generated = list(_threaded(generated_deviation, data))
+    original = [x[utterance.observations.observed[1]].std(axis=0) for utterance, x in zip(data, values, strict=True)]
     return scaling_factors(original, generated)
 
 
-def _each(function: Callable[[Labelled], ResultT], data: Sequence[Labelled]) -> Iterator[ResultT]:
+def _threaded(function: Callable[[AlignedUtterance], ResultT], data: Sequence[AlignedUtterance]) -> Iterator[ResultT]:
+    """Yield the results in the order of the data."""
     with ThreadPoolExecutor(workers()) as pool:
         yield from pool.map(function, data)

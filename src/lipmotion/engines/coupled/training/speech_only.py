@@ -1,71 +1,75 @@
-"""The second stage of training: densities of speech from recordings of many speakers, whose lips were not seen.
+"""The second stage of training: densities of speech from recordings of many speakers, without motion.
 
-Xie & Liu split their trained model into one of speech and one of lips, train the first on more recordings, audio only,
-and put both together again. Nothing need be split here: in a recording whose lips were not seen the visual streams are
-integrated out, so its likelihood is that of a model of speech alone whose hidden states are the joint ones. A step of
-EM that keeps visual densities and coupled transitions is therefore the step of the split model, and the chains stay
-together.
+Xie & Liu split their trained model into one of speech and one of lips, train the first on more recordings of speech
+alone, and join both again. Here nothing needs to be split. In a recording without motion the visual streams are
+integrated out, so its likelihood is that of a model of speech alone whose hidden states are the joint states. A step of
+EM that keeps the visual densities and the coupled transitions is therefore the step of the split model.
 Source: Xie & Liu 2007, §3.4.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from lipmotion.engines.coupled.chains.model import Chains
 from lipmotion.engines.coupled.chains.structures import HMM
-from lipmotion.engines.coupled.conversion.em import speech_alone
+from lipmotion.engines.coupled.conversion.em import without_visual_streams
+from lipmotion.engines.coupled.training.alignment import AlignedUtterance
+from lipmotion.engines.coupled.training.em_steps import training_utterance, variance_floors
 from lipmotion.engines.coupled.training.train import (
-    Labelled,
-    Step,
-    components,
-    converged,
-    recording,
-    split,
-    variance_floors,
+    Report,
+    baum_welch,
+    component_counts,
+    no_report,
+    with_split_components,
 )
 
 
 @dataclass(frozen=True)
-class MoreSpeech:
-    """How the second stage goes on.
+class SpeechOnlySchedule:
+    """How many Gaussians the densities of speech get in the second stage, and how many steps of EM.
 
-    mixtures : Gaussians per density of speech in the end, a power of two; never fewer than before
-    steps    : of EM between one splitting and the next, at most
-    weight   : how much a frame of the other speakers counts beside one of the first stage
+    mixtures   : Gaussians per density of speech in the end, a power of two; never fewer than before
+    most_steps : greatest number of EM steps between one splitting and the next
+    weight     : of a frame of the other speakers, relative to a frame of the first stage
     """
 
     mixtures: int
-    steps: int
+    most_steps: int
     weight: float
 
 
-def with_more_speech(
+def train_on_speech(
     chains: Chains,
-    own: Sequence[Labelled],
-    others: Sequence[Labelled],
-    how: MoreSpeech,
-    heard: Callable[[Step], None] = lambda _: None,
+    data: Sequence[AlignedUtterance],
+    speech_only: Sequence[AlignedUtterance],
+    schedule: SpeechOnlySchedule,
+    report: Report = no_report,
     workers: int = 1,
 ) -> Chains:
-    """Return chains whose densities of speech have learned from other speakers as well; all else is as it was.
+    """Return chains whose densities of speech are re-estimated from other speakers as well; all else stays.
 
-    own    : what the chains were trained on; its speech is learned from again, without its lips
-    others : speech alone; the visual streams may hold anything
-    heard  : is told every step; within a number of components the log likelihood, by the weights, never falls
-    Where speech and lips share their components (``hmm``), these stay as many, but their shares are learned again.
+    data        : what the chains were trained on; its speech is used again, without its motion
+    speech_only : utterances of other speakers; the values of their visual streams are ignored
+    report      : is called after every step; while the number of components stays, the weighted log likelihood never
+                  falls
+    Where speech and motion share their components (``hmm``), these stay as many, but their weights are re-estimated.
     """
-    floors = variance_floors([one.observed for one in own])
-    recordings = [
-        recording(chains, replace(one, observed=speech_alone(one.observed)), weight)
-        for group, weight in ((own, 1.0), (others, how.weight))
-        for one in group
+    floors = variance_floors([utterance.observations for utterance in data])
+    utterances = [
+        training_utterance(
+            chains, replace(utterance, observations=without_visual_streams(utterance.observations)), weight
+        )
+        for group, weight in ((data, 1.0), (speech_only, schedule.weight))
+        for utterance in group
     ]
-    now = components(chains)
-    most = now if chains.structure.kind == HMM else (max(how.mixtures, now[0]), *now[1:])
+    present = component_counts(chains)
+    most = present if chains.structure.kind == HMM else (max(schedule.mixtures, present[0]), *present[1:])
     while True:
-        chains, said = converged(chains, recordings, floors, how.steps, heard, workers, speech_only=True)
-        if components(chains) == most:
+        chains, statistics = baum_welch(
+            chains, utterances, floors, schedule.most_steps, report, workers, speech_only=True
+        )
+        if component_counts(chains) == most:
             return chains
-        chains = split(chains, most, said)
+        chains = with_split_components(chains, most, statistics)

@@ -1,0 +1,173 @@
+"""The E-step and the M-step of coupled chains (Xie & Liu 2007, Appendix A)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.engines.coupled.chains.densities import (
+    AudioVisualObservations,
+    EmissionStatistics,
+    Single,
+    reestimated_group,
+    zero_emission_statistics,
+)
+from lipmotion.engines.coupled.chains.lattice import Lattice
+from lipmotion.engines.coupled.chains.model import Chains
+from lipmotion.engines.coupled.training.alignment import AlignedUtterance, allowed_units
+from lipmotion.errors import InputError
+
+BATCH = 16
+"""Utterances whose statistics are accumulated together before they are added to those of other batches."""
+LEAST_FRAMES = 3.0
+"""A density with less data than so many frames stays as it is."""
+FLOOR_SHARE, LEAST_VARIANCE = 0.01, 1e-4
+"""No variance falls under this share of the stream's own variance, or under this least variance."""
+
+
+@dataclass(frozen=True, eq=False)
+class TrainingUtterance:
+    """The observations of an utterance, and the joint states that it may be in.
+
+    weight : how often the utterance counts
+    """
+
+    observations: AudioVisualObservations
+    lattice: Lattice
+    weight: float = 1.0
+
+
+def training_utterance(chains: Chains, utterance: AlignedUtterance, weight: float = 1.0) -> TrainingUtterance:
+    """Return an utterance with the joint states that its phone labels allow.
+
+    weight : how often the utterance counts
+    """
+    allowed = allowed_units(chains.structure, utterance.phones, utterance.observations.frames)
+    return TrainingUtterance(utterance.observations, chains.lattice(allowed), weight)
+
+
+@dataclass(frozen=True, eq=False)
+class ChainStatistics:
+    """Sufficient statistics of chains, accumulated over utterances by their weights.
+
+    emissions         : of each stream group
+    transition_counts : of the transitions [shape=(C,)]
+    log_likelihood, frames : of the utterances that have a path through the chains
+    """
+
+    emissions: tuple[EmissionStatistics, ...]
+    transition_counts: NDArray[np.float64]
+    log_likelihood: float
+    frames: float
+
+    @property
+    def mean_log_likelihood(self) -> float:
+        """Log likelihood per frame."""
+        return self.log_likelihood / self.frames
+
+    def plus(self, other: ChainStatistics) -> ChainStatistics:
+        """Return the sum of both statistics."""
+        return ChainStatistics(
+            tuple(a.plus(b) for a, b in zip(self.emissions, other.emissions, strict=True)),
+            self.transition_counts + other.transition_counts,
+            self.log_likelihood + other.log_likelihood,
+            self.frames + other.frames,
+        )
+
+
+def e_step(chains: Chains, utterances: Sequence[TrainingUtterance], workers: int = 1) -> ChainStatistics:
+    """Return the sufficient statistics of utterances under the chains.
+
+    workers : number of threads; the result does not depend on it
+    Raises InputError: no utterance has a path through the chains.
+    """
+    starts = range(0, len(utterances), BATCH)
+    jobs = ((chains, utterances[start : start + BATCH]) for start in starts)
+    total: ChainStatistics | None = None
+    for batch in _ordered_results(_batch_statistics, jobs, workers):
+        total = batch if total is None else total.plus(batch)
+    if total is None or not total.frames:
+        raise InputError(f"none of {len(utterances)} recordings has a path through the chains; check their labels")
+    return total
+
+
+def m_step(
+    chains: Chains,
+    statistics: ChainStatistics,
+    floors: Sequence[Single],
+    *,
+    streams: Sequence[int],
+    transitions: bool = True,
+) -> Chains:
+    """Return the chains that maximise the expected log likelihood.
+
+    floors      : the least variance of each stream [each shape=(D_s,)]
+    streams     : the streams whose densities are re-estimated
+    transitions : whether transitions are re-estimated
+    """
+    groups = [
+        reestimated_group(group, own, [floors[s] for s in group.streams], LEAST_FRAMES, streams)
+        if set(group.streams) & set(streams)
+        else group
+        for group, own in zip(chains.groups, statistics.emissions, strict=True)
+    ]
+    new_transitions = (
+        chains.transitions.reestimated(statistics.transition_counts) if transitions else chains.transitions
+    )
+    return replace(chains, groups=tuple(groups), transitions=new_transitions)
+
+
+def variance_floors(observations: Sequence[AudioVisualObservations]) -> tuple[Single, ...]:
+    """Return the least variance of every stream [each shape=(D_s,)], from its variance where it was observed."""
+    floors = []
+    for stream in range(len(observations[0].streams)):
+        masks = [utterance.observed[stream] for utterance in observations]
+        rows = [
+            utterance.streams[stream] if mask is None else utterance.streams[stream][mask]
+            for utterance, mask in zip(observations, masks, strict=True)
+        ]
+        floors.append(np.maximum(FLOOR_SHARE * np.concatenate(rows).var(axis=0), LEAST_VARIANCE).astype(np.float32))
+    return tuple(floors)
+
+
+def _batch_statistics(job: tuple[Chains, Sequence[TrainingUtterance]]) -> ChainStatistics:
+    chains, utterances = job
+    emission_statistics = tuple(zero_emission_statistics(group) for group in chains.groups)
+    transition_counts = np.zeros(chains.transitions.statistic_count)
+    log_likelihood, frames = 0.0, 0.0
+    for utterance in utterances:
+        observations, lattice, weight = utterance.observations, utterance.lattice, utterance.weight
+        emissions = chains.emission_log_densities(observations, lattice)
+        posteriors = chains.posteriors(emissions, lattice)
+        if not np.isfinite(posteriors.log_likelihood):
+            continue
+        for statistics, group, densities, posterior, responsibilities in zip(
+            emission_statistics,
+            chains.groups,
+            lattice.densities,
+            posteriors.densities,
+            emissions.responsibilities,
+            strict=True,
+        ):
+            weighted = posterior if weight == 1 else posterior * np.float32(weight)
+            statistics.accumulate(group, observations, densities, weighted, responsibilities)
+        transition_counts[lattice.transition_index] += weight * posteriors.transition_counts
+        log_likelihood += weight * posteriors.log_likelihood
+        frames += weight * observations.frames
+    return ChainStatistics(emission_statistics, transition_counts, log_likelihood, frames)
+
+
+def _ordered_results(
+    function: Callable[[Any], ChainStatistics], jobs: Iterable[Any], workers: int
+) -> Iterator[ChainStatistics]:
+    """Yield the results in the order of the jobs. Kernels and matrix products release the interpreter's lock."""
+    if workers < 2:
+        yield from map(function, jobs)
+        return
+    with ThreadPoolExecutor(workers) as pool:
+        yield from pool.map(function, jobs)
