@@ -1,5 +1,6 @@
 # make demo   installs, then turns a spoken sentence into an animated face with the model in the package
-# make test   installs everything, then runs the tests
+# make test   installs everything, then runs the tests that take no seconds
+# make test-all   the other tests: mutations, kills, real recordings, copies of the repository; then make test-portable
 # make test-portable   the numeric tests as other processors would run them
 # make check  lint, types, import contracts
 # make fuzz   changed input for every reader, MINUTES=10 in all; READER=name: that one only; SEED=1: other input
@@ -13,11 +14,12 @@ GRID ?= ../shared/corpora/grid-s1
 BUILD ?= build
 MINUTES ?= 10
 SEED ?= 0
+WORKERS ?= 2
 READER ?=
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
 SOURCES := $(shell find src -type f -not -name '*.pyc') pyproject.toml README.md
-.PHONY: demo test test-portable check fuzz bench model requirements clean
+.PHONY: demo test test-all test-portable check fuzz bench model requirements clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/core
@@ -25,7 +27,10 @@ demo: $(VENV)/core
 	$(BIN)/lipmotion animate examples/welcome.flac --transcript examples/welcome.txt -o $(BUILD)/welcome.mp4 $(BUILD)/welcome.json
 
 test: $(VENV)/dev
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n $(WORKERS) -m "not long"
+
+test-all: $(VENV)/dev test-portable
+	$(BIN)/python -m pytest -n $(WORKERS) -m long
 
 test-portable: $(VENV)/dev
 	PYTHONPATH=tests $(BIN)/python -m portable.run

@@ -1,10 +1,10 @@
-"""Adaptation to strangers from untranscribed recordings: phone accuracy and lip motion before and after.
+"""Adaptation to unknown speakers from untranscribed recordings: phone accuracy and lip motion before and after.
 
     python benchmarks/adapt.py [--corpora FOLDER] [--model FILE]
 
-speech-open : recordings with transcripts; where there are several of a voice, it is adapted to all but the one judged,
-              else to that recording itself; the phones wanted are those of the transcript's alignment
-grid-others : one clip a speaker, adapted to that clip itself, untranscribed; correlation of opening with its track
+speech-open : recordings with transcripts; the model is adapted to the other recordings of the same voice, or, where
+              there are none, to the recording itself; the reference phones are those of forced alignment
+grid-others : one clip per speaker; the model is adapted to the clip itself; correlation of the opening with its track
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ VOICES = {
     "two of one man, the other": ("acoustic_corpus.wav", "cold_corpus.wav"),
     "itself": tuple(name for name in SPOKEN if name.startswith(("61-", "common"))),
 }
-"""Recordings by what each is adapted to."""
+"""Recordings, by the recordings that the model is adapted to."""
 
 
 def main() -> None:
@@ -42,12 +42,12 @@ def main() -> None:
     parser.add_argument("--model", type=Path, help="default: the one that ships")
     options = parser.parse_args()
     model = load_model(options.model)
-    strangers(options.corpora / "speech-open", model)
-    others(options.corpora / "grid-others", model)
+    speech_open(options.corpora / "speech-open", model)
+    grid_others(options.corpora / "grid-others", model)
 
 
-def strangers(folder: Path, model: Model) -> None:
-    """Recognise what has a transcript."""
+def speech_open(folder: Path, model: Model) -> None:
+    """Print the phone accuracies of the recordings with transcripts."""
     total: dict[str, list[tuple[int, int]]] = {}
     for name, files in VOICES.items():
         audios = [read_audio(folder / file) for file in files]
@@ -55,7 +55,7 @@ def strangers(folder: Path, model: Model) -> None:
         found: dict[str, list[tuple[int, int]]] = {}
         for i, audio in enumerate(audios):
             learned = [audio] if name == "itself" else [other for j, other in enumerate(audios) if j != i]
-            for key, errors in judged(model, adapted_if_possible(model, learned), audio, wanted[i]).items():
+            for key, errors in phone_errors(model, adapted_if_possible(model, learned), audio, wanted[i]).items():
                 found.setdefault(key, []).append((errors, len(wanted[i])))
         for key, pairs in found.items():
             total.setdefault(key, []).extend(pairs)
@@ -64,7 +64,7 @@ def strangers(folder: Path, model: Model) -> None:
 
 
 def adapted_if_possible(model: Model, recordings: list[Audio]) -> Model:
-    """Return an adapted model; where there is too little speech, the model as it is."""
+    """Return an adapted model, or the model itself if there is too little speech."""
     try:
         return adapt(model, recordings)
     except InputError as error:
@@ -72,8 +72,8 @@ def adapted_if_possible(model: Model, recordings: list[Audio]) -> Model:
         return model
 
 
-def judged(model: Model, adapted: Model, audio: Audio, wanted: list[str]) -> dict[str, int]:
-    """Return the errors of every recogniser before and after."""
+def phone_errors(model: Model, adapted: Model, audio: Audio, wanted: list[str]) -> dict[str, int]:
+    """Return the number of phone errors of every recogniser before and after adaptation."""
     features = mfcc(audio)
     return {
         f"{kind} {when}": edits(
@@ -88,7 +88,7 @@ def judged(model: Model, adapted: Model, audio: Audio, wanted: list[str]) -> dic
 
 
 def phones_of(model: Model, path: Path) -> list[str]:
-    """Return the phones of a recording's transcript, as the general models hear them pronounced."""
+    """Return the phones of a recording's transcript, as the general models align them."""
     text = path.with_suffix(".txt")
     words = words_of((text if text.exists() else path.with_suffix(".lab")).read_text())
     audio = read_audio(path)
@@ -97,14 +97,14 @@ def phones_of(model: Model, path: Path) -> list[str]:
 
 
 def accuracies(found: dict[str, list[tuple[int, int]]]) -> dict[str, object]:
-    """Return phone accuracies, and how many phones they are of."""
+    """Return the number of phones, and the phone accuracies."""
     count = sum(phones for _, phones in next(iter(found.values())))
     values = {key: round(1 - sum(errors for errors, _ in pairs) / count, 3) for key, pairs in found.items()}
     return {"phones": count, **values}
 
 
-def others(folder: Path, model: Model) -> None:
-    """Animate five GRID speakers."""
+def grid_others(folder: Path, model: Model) -> None:
+    """Print the correlation of the opening for five GRID speakers."""
     figures: dict[str, dict[str, float]] = {}
     errors: dict[str, list[tuple[int, int]]] = {}
     for clip in sorted(folder.glob("*.mpg")):
@@ -112,7 +112,7 @@ def others(folder: Path, model: Model) -> None:
         adapted, words = adapt(model, [audio]), " ".join(words_of_name(clip.stem) or ())
         aligned = Recogniser(model.phones, "general").align(audio, mfcc(audio), words.split(), Lexicon())
         wanted = spoken(span.label.phone for span in aligned)
-        for key, count in judged(model, adapted, audio, wanted).items():
+        for key, count in phone_errors(model, adapted, audio, wanted).items():
             errors.setdefault(key, []).append((count, len(wanted)))
         for kind in ("auto", "own"):
             for when, one in (("before", model), ("after", adapted)):

@@ -1,10 +1,11 @@
-"""Speed of coupled models of speech and motion beside their peers, in the peers' own harness.
+"""Speed of coupled models of speech and motion compared with peers, in the harness of the peers.
 
     python benchmarks/coupled.py --bench ../shared/bench [--rounds 3]
 
-Forward–backward with posteriors and counts: of 47 phones whose audio and visual states (5 each) may be one apart, 611
-joint states; and of two loops that have only emission in common, 235 × 65 (the prototype has no counts) and 235 × 235
-states. Work per CPU second of one thread, over rounds in which all take turns: median and best. Peers that cannot be
+Forward–backward with posteriors and counts for two models: 47 phones whose audio and visual states (5 each) may be one
+state apart, with 611 product states; and two phone loops that share only the emission, with 235 × 65 (the prototype
+has no counts) and 235 × 235 states. Work per CPU second of one thread, over rounds in which all take turns: median and
+best. Peers that cannot be
 imported are left out (pip install hmmlearn dynamax psutil threadpoolctl).
 """
 
@@ -35,7 +36,7 @@ RUNS = {
 
 
 def constrained(options: Any, kind: type = np.float32) -> Work:
-    """Posteriors and counts of the harness's constrained product, from log densities of both chains."""
+    """Return the work: posteriors and counts of the constrained product, from log densities of both chains."""
     from lipmotion.kernels.network import ForwardBackwardNetwork
 
     harness: Any = sys.modules["__main__"]
@@ -58,12 +59,12 @@ def constrained(options: Any, kind: type = np.float32) -> Work:
 
 
 def constrained_double(options: Any) -> Work:
-    """The same in double precision."""
+    """Return the same work in double precision."""
     return constrained(options, np.float64)
 
 
 def factorial(options: Any, visual_units: int = 13) -> Work:
-    """Posteriors and counts of two loops."""
+    """Return the work: posteriors and counts of two loops."""
     import numba  # noqa: F401
 
     from lipmotion.kernels.factorial import factorial_posteriors
@@ -84,12 +85,12 @@ def factorial(options: Any, visual_units: int = 13) -> Work:
 
 
 def factorial_wide(options: Any) -> Work:
-    """Those of 47 units each."""
+    """Return the same work with 47 units in each loop."""
     return factorial(options, 47)
 
 
 def main() -> None:
-    """Print one JSON object for each that is measured."""
+    """Print one JSON object for each implementation."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--bench", type=Path, default=Path("../shared/bench"))
     parser.add_argument("--rounds", type=int, default=3)

@@ -1,9 +1,9 @@
-"""How long the coupled engine takes for recordings that it can hear as one: CPU seconds a second of speech, warm.
+"""Real-time factor of generation with the coupled engine: CPU seconds per second of speech, after a warm-up.
 
     python benchmarks/coupled_conversion.py MODEL CORPUS [--split val] [--rounds 5]
 
-MODEL is from ``lipmotion train --engine coupled``. The features and phones are found beforehand; the figure is that of
-the engine alone, words unknown, median of the rounds, one thread for matrix products (OMP_NUM_THREADS=1).
+MODEL is from ``lipmotion train --engine coupled``. Features and phones are computed beforehand; the figure is that of
+the engine alone, without transcripts, median of the rounds, one thread for matrix products (OMP_NUM_THREADS=1).
 """
 
 from __future__ import annotations
@@ -16,11 +16,12 @@ from time import process_time
 import numpy as np
 
 import lipmotion
-from lipmotion.pipeline.understand import hear_unsaid
+from lipmotion.pipeline.understand import recognised_speech
 from lipmotion.speech.recogniser import cached_recogniser
 
 
 def main() -> None:
+    """Print the real-time factor."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("model", type=Path)
     parser.add_argument("corpus", type=Path)
@@ -29,20 +30,22 @@ def main() -> None:
     options = parser.parse_args()
     model, corpus = lipmotion.load_model(options.model), lipmotion.Corpus.open(options.corpus)
     phones = cached_recogniser(model.phones, "auto", model.adaptation)
-    heard = []
+    recordings = []
     for name in corpus.names(options.split):
-        said = corpus.utterance(name)
-        features = type(said.features)(np.asarray(said.features.values), said.features.duration_s)
-        found = phones.recognise(said.audio, features)
-        heard.append(hear_unsaid(model.engine, model.learned, said.audio, features, phones, lambda found=found: found))
-    seconds = sum(speech.features.duration_s for speech in heard)
-    taken = []
+        utterance = corpus.utterance(name)
+        features = type(utterance.features)(np.asarray(utterance.features.values), utterance.features.duration_s)
+        units = phones.recognise(utterance.audio, features)
+        given = model.engine, model.learned, utterance.audio, features, phones
+        recordings.append(recognised_speech(*given, lambda units=units: units))
+    seconds = sum(speech.features.duration_s for speech in recordings)
+    times_s = []
     for _ in range(options.rounds + 1):
         start_s = process_time()
-        for speech in heard:
+        for speech in recordings:
             model.engine.generate(model.learned, speech)
-        taken.append(process_time() - start_s)
-    print(f"{len(heard)} recordings, {seconds:.1f} s: real-time factor {statistics.median(taken[1:]) / seconds:.4f}")
+        times_s.append(process_time() - start_s)
+    factor = statistics.median(times_s[1:]) / seconds
+    print(f"{len(recordings)} recordings, {seconds:.1f} s: real-time factor {factor:.4f}")
 
 
 if __name__ == "__main__":

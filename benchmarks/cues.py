@@ -1,9 +1,9 @@
-"""Cues on recordings that a model has not seen: closures, silence, flicker; and how long the choice takes.
+"""Cues on held-out recordings: closures, silence and flicker; and the time of the selection.
 
     python benchmarks/cues.py MODEL CORPUS [--split test] [--fps 24]
 
-Phones are those of the transcripts, aligned by the model (audio only: ``--recognised``). Beside the cues stands what a
-choice frame by frame would give, from the same costs: no hold, and no price of a change.
+Phones are those of the transcripts, aligned by the model (audio only: ``--recognised``). The baseline selects each
+frame alone from the same costs, without a hold and without a cost of changes.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from lipmotion.export.cues.costs import frame_costs
 from lipmotion.export.cues.shapes import SHAPES
 from lipmotion.export.cues.sheet import CueSheet, cue_sheet, frame_count
 from lipmotion.pipeline.training.train import labels_of
-from lipmotion.speech.phone_models import recognise
+from lipmotion.speech.recogniser import cached_recogniser
 from lipmotion.types import Generation, Motion, Speech, Timeline, Trace
 from lipmotion.units import LIP_CLOSING, VISEMES, Lexicon, is_silent
 
 MARGIN_S = 0.1
-"""Silence this close to speech is not counted: the mouth may be on its way."""
+"""Silence this close to speech is not counted: the mouth may already move."""
 
 
 def main() -> None:
-    """Print one JSON object a way of choosing, and the time that an hour takes."""
+    """Print one JSON object per method of selection, and the time for an hour."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("model")
     parser.add_argument("corpus")
@@ -39,13 +39,15 @@ def main() -> None:
     parser.add_argument("--recognised", action="store_true", help="phones from the audio alone")
     options = parser.parse_args()
     model, corpus = lipmotion.load_model(options.model), lipmotion.Corpus.open(options.corpus)
+    recogniser = cached_recogniser(model.phones, "own")
     results, references = [], []
     for name in corpus.required(options.split):
         utterance = corpus.utterance(name)
-        said = labels_of(utterance, model.phones, Lexicon())
-        units = recognise(model.phones, utterance.features) if options.recognised else said
+        aligned = labels_of(utterance, recogniser, Lexicon())
+        recognised = options.recognised
+        units = recogniser.recognise(utterance.audio, utterance.features) if recognised else aligned
         results.append(model.engine.generate(model.learned, Speech(utterance.features, units)))
-        references.append(said)
+        references.append(aligned)
     for way, choose in (("cues", choose_cues), ("frame by frame", frame_by_frame)):
         sheets = [choose(result, options.fps) for result in results]
         print(json.dumps({"way": way, "clips": len(sheets), **figures(sheets, references, options.fps)}))
@@ -56,7 +58,7 @@ def main() -> None:
 
 
 def frame_by_frame(result: Generation, fps: float) -> CueSheet:
-    """Return the cheapest shape of every frame."""
+    """Return the cue sheet of the shape with least cost in every frame."""
     duration_s = max((len(result.motion.values) - 1) / result.motion.rate_hz, result.units[-1].end_s)
     best = frame_costs(result, frame_count(duration_s, fps), fps).argmin(axis=1).tolist()
     changes = [0, *(k for k, (before, after) in enumerate(pairwise(best), start=1) if before != after)]
@@ -65,7 +67,7 @@ def frame_by_frame(result: Generation, fps: float) -> CueSheet:
 
 
 def figures(sheets: list[CueSheet], references: list[Timeline], fps: float) -> dict[str, object]:
-    """Return what docs/cues.md reports."""
+    """Return the figures of docs/cues.md."""
     seen = {"p b m": [0, 0], "f v": [0, 0]}
     silent: list[bool] = []
     lengths = [int(fps * b.start_s) - int(fps * a.start_s) for s in sheets for a, b in pairwise(s.cues)]
@@ -98,12 +100,12 @@ def silent_frames(units: Timeline, fps: float) -> list[float]:
 
 
 def shape_at(sheet: CueSheet, time_s: float) -> str:
-    """Return which shape is shown."""
+    """Return the shape that is shown at a time."""
     return next((cue.label for cue in sheet.cues if cue.start_s <= time_s < cue.end_s), sheet.rest)
 
 
 def an_hour(results: list[Generation]) -> Generation:
-    """Return results one after the other, again and again, until they last an hour."""
+    """Return a concatenation of results that lasts an hour."""
     values, spans, start_s, turn = [], [], 0.0, 0
     while start_s < 3600:
         result = results[turn % len(results)]

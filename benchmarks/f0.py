@@ -5,7 +5,8 @@
 
 Peers take part if they can be imported: RAPT (pysptk), DIO and Harvest with StoneMask (pyworld). All search from 60 to
 400 Hz, every 10 ms. One JSON object per line. Gross: errors of more than 20 %; fine: mean error of all others; missed:
-voiced frames found unvoiced; false: unvoiced frames found voiced. Frames within 25 ms of a change of voicing are not counted.
+voiced frames found unvoiced; false: unvoiced frames found voiced. Frames within 25 ms of a change of voicing do not
+count.
 ``factory`` is for a harness that hands over ``cfg`` and has a function ``audio(cfg)``.
 """
 

@@ -1,6 +1,6 @@
 """``python benchmarks/golden.py WORK -o FILE.json [--against FILE.json]``: hashes of trained models and their output.
 
-Takes the command line only, so that the same driver runs on any version of the package: every engine is trained on the
+It uses the command line only, so it runs on any version of the package: every engine is trained on the
 tiny corpus, and on twenty clips of GRID where they are present; models are hashed array by array, without the header;
 motion, cues, explanations and figures as they are written. Computed floats differ between processors: compare
 two versions on one machine.
@@ -20,7 +20,7 @@ from pathlib import Path
 
 HERE = Path(__file__).parents[1]
 GRID = HERE / ".." / "shared" / "corpora" / "grid-s1"
-WELCOME, SAID = HERE / "examples" / "welcome.flac", HERE / "examples" / "welcome.txt"
+WELCOME, WELCOME_WORDS = HERE / "examples" / "welcome.flac", HERE / "examples" / "welcome.txt"
 SYSTEMS = ("ph-HMM", "ph-MSHMM", "ph-FHMM", "ph-vi-FHMM", "ph-CHMM", "ph-vi-CHMM")
 ENGINES: dict[str, tuple[str, ...]] = {
     "trajectory": (),
@@ -86,26 +86,26 @@ def _of_corpus(name: str, recordings: Path, engines: Iterable[str], work: Path) 
         yield from _outputs(f"{name}: {engine}", model, work)
         figures = work / "figures.json"
         figures.unlink(missing_ok=True)
-        said = run(work, "evaluate", model, corpus, "-o", figures)
-        yield f"{name}: {engine}: figures", of_archive(figures) if figures.exists() else said.decode()
+        output = run(work, "evaluate", model, corpus, "-o", figures)
+        yield f"{name}: {engine}: figures", of_archive(figures) if figures.exists() else output.decode()
 
 
 def _outputs(name: str, model: Path | None, work: Path) -> Iterator[tuple[str, str]]:
     chosen = ("--model", model) if model else ()
     kinds = ("npz", "json", "csv", "mp4") if model is None else ("npz",)
-    for way, told in (("audio only", ()), ("transcript", ("--transcript", SAID))):
+    for way, arguments in (("audio only", ()), ("transcript", ("--transcript", WELCOME_WORDS))):
         made = [work / f"motion.{kind}" for kind in kinds]
         for file in made:
             file.unlink(missing_ok=True)
-        said = run(work, "animate", WELCOME, *chosen, *told, "-o", *made)
+        output = run(work, "animate", WELCOME, *chosen, *arguments, "-o", *made)
         for file in made:
-            yield f"{name}: {way}: {file.suffix[1:]}", of_archive(file) if file.exists() else said.decode()
+            yield f"{name}: {way}: {file.suffix[1:]}", of_archive(file) if file.exists() else output.decode()
         if model is None:
             for kind in ("tsv", "xml", "json", "dat"):
-                yield f"{name}: {way}: cues {kind}", of_bytes(run(work, "cues", WELCOME, *told, "-f", kind))
+                yield f"{name}: {way}: cues {kind}", of_bytes(run(work, "cues", WELCOME, *arguments, "-f", kind))
     shipped = HERE / "src" / "lipmotion" / "models" / "grid-s1.lipmotion"
-    told = ("--transcript", SAID, "--at", "0.5", "--at", "1.0", "--json")
-    yield f"{name}: explanation", of_bytes(run(work, "explain", model or shipped, WELCOME, *told))
+    arguments = ("--transcript", WELCOME_WORDS, "--at", "0.5", "--at", "1.0", "--json")
+    yield f"{name}: explanation", of_bytes(run(work, "explain", model or shipped, WELCOME, *arguments))
     yield f"{name}: trees", of_bytes(run(work, "info", *(() if model is None else (model,)), "--trees"))
 
 

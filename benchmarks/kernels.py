@@ -1,9 +1,9 @@
-"""Speed of the compiled kernels beside their peers, in the peers' own harness.
+"""Speed of the compiled kernels compared with peers, in the harness of the peers.
 
     python benchmarks/kernels.py --bench ../shared/bench [--rounds 3] [--only NAME ...]
 
-Each figure is work per CPU second of one thread, over rounds in which ours and the peer take turns: the median and the
-best round (what else the machine does makes both slower, and short runs most); what is compared is the ratio. Peers
+Each figure is work per CPU second of one thread, over rounds in which this package and the peer take turns: the median
+and the best round. Other processes slow both down, short runs most; so the ratio is compared. Peers
 that cannot be imported are left out (pip install hmmlearn nnmnkwii psutil).
 """
 
@@ -26,8 +26,8 @@ HERE = Path(__file__).resolve().parent
 Work = Callable[[], Any]
 
 
-class Case(NamedTuple):
-    """One comparison: the harness's script, our factory, the peer and its package, and options of both."""
+class PeerComparison(NamedTuple):
+    """One comparison: script of the harness, factory of this package, the peer and its package, options of both."""
 
     script: str
     ours: str
@@ -39,16 +39,20 @@ class Case(NamedTuple):
 LOOP = ("--utts", "100", "--repeats", "3")
 SHORT_LOOP = ("--utts", "10", "--repeats", "2", "--K", "8")
 CASES = {
-    "parameter generation, D=90": Case("bench_mlpg.py", "mlpg", "nnmnkwii", "nnmnkwii", ("--repeats", "15")),
-    "EM, K=1": Case("bench_hmm.py", "em", "hmmlearn_scaling", "hmmlearn", (*LOOP, "--op", "em")),
-    "EM, K=8": Case("bench_hmm.py", "em", "hmmlearn_scaling", "hmmlearn", (*SHORT_LOOP, "--op", "em")),
-    "Viterbi, K=1": Case("bench_hmm.py", "viterbi", "hmmlearn_scaling", "hmmlearn", (*LOOP, "--op", "viterbi")),
-    "Viterbi, beam 200": Case("bench_hmm.py", "narrow", "hmmlearn_scaling", "hmmlearn", (*LOOP, "--op", "viterbi")),
+    "parameter generation, D=90": PeerComparison("bench_mlpg.py", "mlpg", "nnmnkwii", "nnmnkwii", ("--repeats", "15")),
+    "EM, K=1": PeerComparison("bench_hmm.py", "em", "hmmlearn_scaling", "hmmlearn", (*LOOP, "--op", "em")),
+    "EM, K=8": PeerComparison("bench_hmm.py", "em", "hmmlearn_scaling", "hmmlearn", (*SHORT_LOOP, "--op", "em")),
+    "Viterbi, K=1": PeerComparison(
+        "bench_hmm.py", "viterbi", "hmmlearn_scaling", "hmmlearn", (*LOOP, "--op", "viterbi")
+    ),
+    "Viterbi, beam 200": PeerComparison(
+        "bench_hmm.py", "narrow", "hmmlearn_scaling", "hmmlearn", (*LOOP, "--op", "viterbi")
+    ),
 }
 
 
 def mlpg(options: Any) -> Work:
-    """Trajectory and variance of every frame (the peers compute no variance)."""
+    """Return the work: trajectory and variance of every frame (the peers compute no variance)."""
     import numba  # noqa: F401  (loaded: so the compiled form is taken at once)
 
     from lipmotion.kernels.banded import generate
@@ -58,7 +62,7 @@ def mlpg(options: Any) -> Work:
 
 
 def em(options: Any) -> Work:
-    """One step of expectation and maximisation of all recordings."""
+    """Return the work: one EM step on all recordings."""
     from network_em import em_step
 
     mixtures, network, data = _loop(options)
@@ -71,7 +75,7 @@ def em(options: Any) -> Work:
 
 
 def viterbi(options: Any, beam: float | None = None) -> Work:
-    """Densities and best path of every recording."""
+    """Return the work: densities and best path of every recording."""
     import numba  # noqa: F401
 
     from lipmotion.kernels.viterbi import best_path
@@ -91,7 +95,7 @@ def viterbi(options: Any, beam: float | None = None) -> Work:
 
 
 def narrow(options: Any) -> Work:
-    """The same with a beam."""
+    """Return the same work with a beam."""
     return viterbi(options, 200.0)
 
 
@@ -100,7 +104,7 @@ def _harness(name: str) -> Any:
 
 
 def _loop(options: Any) -> tuple[Any, Any, list[np.ndarray]]:
-    """Return the harness's model as mixtures and network, and its recordings."""
+    """Return the model of the harness as mixtures and network, and its recordings."""
     from lipmotion.hmm.network import NetworkBuilder
     from lipmotion.stats.mixture import Mixtures
 
@@ -119,7 +123,7 @@ def _loop(options: Any) -> tuple[Any, Any, list[np.ndarray]]:
 
 
 def main() -> None:
-    """Print one JSON object a comparison."""
+    """Print one JSON object per comparison."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--bench", type=Path, default=Path("../shared/bench"))
     parser.add_argument("--rounds", type=int, default=3)
@@ -131,8 +135,8 @@ def main() -> None:
         print(json.dumps({"figure": name} | compared(options.bench, CASES[name], options.rounds)), flush=True)
 
 
-def compared(bench: Path, case: Case, rounds: int) -> dict[str, Any]:
-    """Return work per CPU second of ours and of the peer, and what the harness checks of both."""
+def compared(bench: Path, case: PeerComparison, rounds: int) -> dict[str, Any]:
+    """Return work per CPU second of this package and of the peer, and the check values of the harness."""
     implementations = {"ours": f"kernels:{case.ours}"}
     if find_spec(case.package):
         implementations[case.peer] = case.peer
@@ -158,7 +162,7 @@ def run(script: Path, implementation: str, options: tuple[str, ...]) -> dict[str
 
 
 def start_up() -> dict[str, float]:
-    """Return the median time of importing numba, and of the first call of a kernel that was compiled before."""
+    """Return the median times of importing numba and of the first call of a kernel from the cache, in seconds."""
     code = """
 import time, numpy as np
 start = time.perf_counter()

@@ -1,4 +1,4 @@
-"""The commands that ``kills.py`` kills, and what they work on."""
+"""The commands that ``kills.py`` kills, and their inputs."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from pathlib import Path
 import numpy as np
 
 CLIPS, TRAINED, MANY = 3, 6, 96
-"""Recordings to track; utterances to train on; so many that training is shared between two processes."""
+"""Recordings to track; utterances to train on; utterances for which two processes share the training."""
 
 
 @dataclass(frozen=True)
 class Job:
     """A command.
 
-    replaces : the outputs of a verb that does not go on where it was stopped: old or new, never between
-    events   : the stream on which it says JSON lines, if it does
+    replaces : the outputs of a verb that cannot continue after a stop: each is the old file or the complete new one
+    events   : the stream on which it writes JSON lines, if it does
     weight   : its share of the kills
     """
 
@@ -32,7 +32,7 @@ class Job:
 
     @property
     def shown(self) -> str:
-        """The command as a person writes it."""
+        """The command line, with file names instead of paths."""
         return " ".join(["lipmotion", *(Path(word).name if "/" in word else word for word in self.arguments)])
 
 
@@ -57,7 +57,7 @@ def make_inputs(folder: Path, command: Sequence[str]) -> Path:
 
 
 def _write_sound(path: Path, utterance: object) -> None:
-    """Write a sound, and its motion as a table beside it."""
+    """Write the sound of an utterance, and its motion as a table beside it."""
     audio, motion = utterance.audio, utterance.track.motion  # type: ignore[attr-defined]
     with wave.open(str(path), "wb") as file:
         file.setnchannels(1)
@@ -78,18 +78,30 @@ def _prepare(name: str, recordings: Path, workers: str) -> Job:
 
 
 def _animate(inputs: Path) -> Job:
-    told = (str(inputs / "recordings" / "toy00.mp4"), "--model", str(inputs / "model.lipmotion"), "--recogniser", "own")
-    return Job("animate", ("animate", *told, "-o", "a.json", "a.mp4"), ("a.json", "a.mp4"))
+    speech = (
+        str(inputs / "recordings" / "toy00.mp4"),
+        "--model",
+        str(inputs / "model.lipmotion"),
+        "--recogniser",
+        "own",
+    )
+    return Job("animate", ("animate", *speech, "-o", "a.json", "a.mp4"), ("a.json", "a.mp4"))
 
 
 def _cues(inputs: Path) -> Job:
-    told = (str(inputs / "recordings" / "toy00.mp4"), "--model", str(inputs / "model.lipmotion"), "--recogniser", "own")
-    return Job("cues", ("cues", *told, "-o", "a.tsv", "--machine-readable"), ("a.tsv",), "stderr")
+    speech = (
+        str(inputs / "recordings" / "toy00.mp4"),
+        "--model",
+        str(inputs / "model.lipmotion"),
+        "--recogniser",
+        "own",
+    )
+    return Job("cues", ("cues", *speech, "-o", "a.tsv", "--machine-readable"), ("a.tsv",), "stderr")
 
 
 def _adapt(inputs: Path) -> Job:
-    heard = [str(inputs / "recordings" / f"toy{n:02}.mp4") for n in range(CLIPS)]
-    arguments = ("adapt", *heard, "--model", str(inputs / "model.lipmotion"), "-o", "a.lipmotion")
+    recordings = [str(inputs / "recordings" / f"toy{n:02}.mp4") for n in range(CLIPS)]
+    arguments = ("adapt", *recordings, "--model", str(inputs / "model.lipmotion"), "-o", "a.lipmotion")
     return Job("adapt", arguments, ("a.lipmotion",))
 
 

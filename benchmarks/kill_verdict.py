@@ -1,4 +1,4 @@
-"""Whether a run that was killed ended as it should."""
+"""Verdict on a killed run: whether it ended as it should."""
 
 from __future__ import annotations
 
@@ -9,39 +9,39 @@ from kill_jobs import Job
 
 LINE = "lipmotion: stopped; run the same command again to go on"
 EARLY = 0.5
-"""Before this share of its usual duration, Python itself may still be starting, which knows no handlers."""
+"""Before this share of its usual duration, Python may still be starting, without the program's signal handlers."""
 
 
-def judged(number: int, code: int, out: str, said: str, share: float, job: Job) -> tuple[str, str]:
-    """Return how a killed run ended, and what is wrong with that, empty if nothing is.
+def verdict(number: int, code: int, out: str, err: str, share: float, job: Job) -> tuple[str, str]:
+    """Return how a killed run ended, and what is wrong with it; an empty text if nothing is.
 
     number, code : the signal, and the exit code
-    out, said    : standard output and standard error
-    share        : when the signal came, of the usual duration
+    out, err     : standard output and standard error
+    share        : time of the signal relative to the usual duration
     """
     early = not out and share < EARLY
     if number == signal.SIGKILL:
-        return "killed at once", "" if code == -number else f"exit code {code}: {said}"
-    if "runpy" in said or (code == -number and early):
+        return "killed at once", "" if code == -number else f"exit code {code}: {err}"
+    if "runpy" in err or (code == -number and early):
         return "before the program had begun", ""
     if code != 128 + number:
         what = "killed without a word" if code == -number else f"exit code {code}"
-        return what, f"at {share:.0%} of its duration, having said {out[-200:]!r} and {said!r}"
-    return _stopped(out, said, job)
+        return what, f"at {share:.0%} of its duration, with output {out[-200:]!r} and {err!r}"
+    return _stopped(out, err, job)
 
 
-def _stopped(out: str, said: str, job: Job) -> tuple[str, str]:
-    events, others = parted(out if job.events == "stdout" else said)
+def _stopped(out: str, err: str, job: Job) -> tuple[str, str]:
+    events, others = events_and_lines(out if job.events == "stdout" else err)
     if job.events and (not events or events[-1].get("type") != "failure"):
-        return "no failure event", f"said {out!r} and {said!r}"
-    spoken = said.splitlines() if job.events != "stderr" else others
-    if spoken != [LINE] and not (job.events == "stderr" and not spoken):
-        return "other words", f"said {said!r}"
+        return "no failure event", f"said {out!r} and {err!r}"
+    lines = err.splitlines() if job.events != "stderr" else others
+    if lines != [LINE] and not (job.events == "stderr" and not lines):
+        return "other words", f"said {err!r}"
     return "stopped with one line", ""
 
 
-def parted(text: str) -> tuple[list[dict[str, object]], list[str]]:
-    """Return the lines that are JSON objects, and the others."""
+def events_and_lines(text: str) -> tuple[list[dict[str, object]], list[str]]:
+    """Return the JSON objects among the lines, and the other lines."""
     events, others = [], []
     for line in text.splitlines():
         if line.startswith("{"):

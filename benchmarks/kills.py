@@ -1,10 +1,10 @@
-"""Kill every long or writing verb at random moments, run it again, and compare every byte with an undisturbed run.
+"""Kill verbs at random moments, run them again, and compare every byte with an undisturbed run.
 
     python benchmarks/kills.py [--kills 500] [--seed 0] [--job NAME ...] [--at-once 2] [-o docs/results/kills.txt]
 
 Ctrl-C (SIGINT), ``kill`` (SIGTERM) and ``kill -9`` (SIGKILL) are sent to the first process alone or to all of them, at
 moments spread over the whole duration of an undisturbed run, some of them close to its end. Up to ``CHAIN`` kills hit
-the same folder before a run may finish there. A run that has ended before its signal came is compared, and no kill.
+the same folder before a run may finish there. A run that ends before its signal is compared, but counts as no kill.
 The recordings are the package's own toy recordings. POSIX only.
 """
 
@@ -30,22 +30,22 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from kill_jobs import MAKERS, Job, make_inputs
-from kill_verdict import judged
+from kill_verdict import verdict
 
 COMMAND = [sys.executable, "-m", "lipmotion.cli.main"]
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGKILL)
 CHAIN = 4
 END_SHARE, END_S = 0.2, 0.3
-"""So many kills are aimed at the last moments of a run."""
+"""Share of the kills that are aimed at the end of a run, and the length of the end in seconds."""
 TRIES = 5
-"""Runs for each kill: of those that are aimed at the end, many have ended."""
+"""Most runs per kill: many runs end before a signal that is aimed at their end."""
 PATIENCE_S = 300
 OLD = b"an earlier output"
 
 
 @dataclass
-class Tally:
-    """What was seen of one job."""
+class KillRecord:
+    """Outcomes of the kills of one job."""
 
     job: Job
     duration_s: float = 0.0
@@ -54,8 +54,8 @@ class Tally:
     problems: list[str] = field(default_factory=list)
     lock: threading.Lock = field(default_factory=threading.Lock)
 
-    def see(self, what: str, problem: str = "", *, kill: bool = False) -> None:
-        """Count one thing, and note what is wrong with it."""
+    def count(self, what: str, problem: str = "", *, kill: bool = False) -> None:
+        """Count one outcome, and record its problem, if there is one."""
         with self.lock:
             self.kills += kill
             self.counts[what] += 1
@@ -65,7 +65,7 @@ class Tally:
 
 @dataclass(frozen=True)
 class Goal:
-    """What an undisturbed run leaves, by name, and how long it takes."""
+    """Result of an undisturbed run: digests of its files by name, and its duration."""
 
     content: dict[str, str]
     duration_s: float
@@ -84,21 +84,21 @@ def main() -> int:
         inputs = make_inputs(Path(folder) / "inputs", COMMAND)
         before = content(inputs)
         jobs = [MAKERS[name](inputs) for name in options.job or MAKERS]
-        tallies = []
+        records = []
         with ThreadPoolExecutor(options.at_once) as pool:
             for job, kills in shared(jobs, options.kills):
-                tallies.append(kill_often(job, Path(folder), kills, options.seed, pool))
-                print(f"{job.name}: {tallies[-1].kills} kills, {len(tallies[-1].problems)} problems", file=sys.stderr)
+                records.append(kill_often(job, Path(folder), kills, options.seed, pool))
+                print(f"{job.name}: {records[-1].kills} kills, {len(records[-1].problems)} problems", file=sys.stderr)
         changed = sorted(name for name, found in content(inputs).items() if before.get(name) != found)
-    text = written(tallies, changed, options)
+    text = written(records, changed, options)
     print(text)
     if options.output:
         options.output.write_text(text + "\n", encoding="utf-8")
-    return int(bool(changed) or any(tally.problems for tally in tallies))
+    return int(bool(changed) or any(record.problems for record in records))
 
 
 def shared(jobs: list[Job], kills: int) -> Iterator[tuple[Job, int]]:
-    """Yield each job and its kills, as its weight tells; all kills together are those asked for."""
+    """Yield each job and its number of kills, in proportion to its weight."""
     left, weight = kills, sum(job.weight for job in jobs)
     for job in jobs:
         share = round(left * job.weight / weight)
@@ -106,22 +106,22 @@ def shared(jobs: list[Job], kills: int) -> Iterator[tuple[Job, int]]:
         left, weight = left - share, weight - job.weight
 
 
-def kill_often(job: Job, folder: Path, kills: int, seed: int, pool: ThreadPoolExecutor) -> Tally:
-    """Kill ``kills`` runs, in rounds that each end with a whole one."""
+def kill_often(job: Job, folder: Path, kills: int, seed: int, pool: ThreadPoolExecutor) -> KillRecord:
+    """Kill ``kills`` runs, in rounds that each end with a complete run; return the outcomes."""
     goal = undisturbed(job, folder, pool)
-    tally = Tally(job, goal.duration_s)
+    record = KillRecord(job, goal.duration_s)
 
     def one_round(number: int) -> None:
         here, chance = folder / f"{job.name}-{number}", random.Random(f"{seed} {job.name} {number}")  # noqa: S311
-        kill_and_finish(here, chance, min(CHAIN, kills - CHAIN * number), goal, tally)
+        kill_and_finish(here, chance, min(CHAIN, kills - CHAIN * number), goal, record)
         shutil.rmtree(here)
 
     list(pool.map(one_round, range(-(-kills // CHAIN))))
-    return tally
+    return record
 
 
 def undisturbed(job: Job, folder: Path, pool: ThreadPoolExecutor) -> Goal:
-    """Return what a run leaves that nobody disturbs, and how long it takes where as many run at once as later."""
+    """Return the result of undisturbed runs, with the duration while as many run in parallel as later."""
 
     def whole(number: int) -> Goal:
         here = fresh(folder / f"{job.name}-whole-{number}", job)
@@ -133,7 +133,7 @@ def undisturbed(job: Job, folder: Path, pool: ThreadPoolExecutor) -> Goal:
         shutil.rmtree(here)
         return found
 
-    whole(0)  # fills the system's caches
+    whole(0)  # fills the caches of the system
     goals = list(pool.map(whole, range(1, 5)))
     if any(goal.content != goals[0].content for goal in goals):
         raise SystemExit(f"{job.name}: two undisturbed runs differ")
@@ -141,7 +141,7 @@ def undisturbed(job: Job, folder: Path, pool: ThreadPoolExecutor) -> Goal:
 
 
 def fresh(here: Path, job: Job) -> Path:
-    """Return a new folder with the outputs of an earlier run in it, where the verb replaces such."""
+    """Return a new folder; with outputs of an earlier run, if the verb replaces them."""
     shutil.rmtree(here, ignore_errors=True)
     here.mkdir()
     for name in job.replaces:
@@ -154,62 +154,62 @@ def run(job: Job, here: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run([*COMMAND, *job.arguments], cwd=here, capture_output=True, text=True, check=False)
 
 
-def kill_and_finish(here: Path, chance: random.Random, kills: int, goal: Goal, tally: Tally) -> None:
-    """Kill so many runs in one folder, then let one finish."""
-    fresh(here, tally.job)
+def kill_and_finish(here: Path, chance: random.Random, kills: int, goal: Goal, record: KillRecord) -> None:
+    """Kill ``kills`` runs in one folder, then let one finish, and compare its result."""
+    fresh(here, record.job)
     hit = 0
     for _ in range(TRIES * kills):
-        if hit < kills and kill_once(here, chance, goal, tally):
+        if hit < kills and kill_once(here, chance, goal, record):
             hit += 1
         elif hit == kills:
             break
         else:
-            compare(here, goal, tally, "had ended already")
-            fresh(here, tally.job)
-    finished = run(tally.job, here)
+            compare(here, goal, record, "had ended already")
+            fresh(here, record.job)
+    finished = run(record.job, here)
     if finished.returncode:
-        tally.see("could not go on", finished.stderr)
+        record.count("could not go on", finished.stderr)
     else:
-        compare(here, goal, tally, "same bytes after going on")
+        compare(here, goal, record, "same bytes after going on")
 
 
-def compare(here: Path, goal: Goal, tally: Tally, what: str) -> None:
-    """Note whether a whole run left what it should, and nothing else."""
+def compare(here: Path, goal: Goal, record: KillRecord, what: str) -> None:
+    """Record whether a complete run left exactly the expected files."""
     found = content(here)
     names = sorted(name for name in found.keys() | goal.content.keys() if found.get(name) != goal.content.get(name))
-    tally.see("other bytes, or other files" if names else what, ", ".join(names))
+    record.count("other bytes, or other files" if names else what, ", ".join(names))
 
 
 def moment_s(chance: random.Random, duration_s: float) -> float:
-    """Return when a signal is to come."""
+    """Return the time at which a signal is sent, in seconds after the start."""
     if chance.random() < END_SHARE:
         return max(chance.uniform(duration_s - END_S, duration_s + END_S / 3), 0.0)
     return chance.uniform(0, duration_s)
 
 
-def kill_once(here: Path, chance: random.Random, goal: Goal, tally: Tally) -> bool:
-    """Start the job, kill it at some moment, and look at what it says and leaves; False: it had ended."""
+def kill_once(here: Path, chance: random.Random, goal: Goal, record: KillRecord) -> bool:
+    """Start the job, kill it, and record its messages and files; return False if it had ended before."""
     number, to_all, after_s = chance.choice(SIGNALS), chance.random() < 0.5, moment_s(chance, goal.duration_s)
     before, pipe = set(content(here)), subprocess.PIPE
     with subprocess.Popen(
-        [*COMMAND, *tally.job.arguments], cwd=here, stdout=pipe, stderr=pipe, text=True, start_new_session=True
+        [*COMMAND, *record.job.arguments], cwd=here, stdout=pipe, stderr=pipe, text=True, start_new_session=True
     ) as process:
         time.sleep(after_s)
         if process.poll() is None:
             (os.killpg if to_all else os.kill)(process.pid, number)
-        said = process.communicate(timeout=PATIENCE_S)
+        streams = process.communicate(timeout=PATIENCE_S)
     if process.returncode == 0:
         return False
-    what, problem = judged(number, process.returncode, *said, after_s / goal.duration_s, tally.job)
-    left = unwanted(here, before, goal, tally.job, number)
+    what, problem = verdict(number, process.returncode, *streams, after_s / goal.duration_s, record.job)
+    left = unwanted(here, before, goal, record.job, number)
     problem = problem or (f"left {', '.join(left)}" if left else "")
     name = f"{signal.Signals(number).name} to {'all' if to_all else 'the first'}"
-    tally.see(f"{name}, {what}", f"{problem} (after {after_s:.3f} s)" if problem else "", kill=True)
+    record.count(f"{name}, {what}", f"{problem} (after {after_s:.3f} s)" if problem else "", kill=True)
     return True
 
 
 def unwanted(here: Path, before: set[str], goal: Goal, job: Job, number: int) -> list[str]:
-    """Return files that a killed run should not have left: unfinished ones, locks, outputs neither old nor new."""
+    """Return the files that a killed run should not have left: partial files, locks, incomplete outputs."""
     old, found = hashlib.sha256(OLD).hexdigest(), content(here)
     torn = [name for name in job.replaces if found.get(name) not in (old, goal.content[name])]
     new = [name for name in found if name not in before]
@@ -219,7 +219,7 @@ def unwanted(here: Path, before: set[str], goal: Goal, job: Job, number: int) ->
 
 
 def content(here: Path) -> dict[str, str]:
-    """Return a digest of every file, by name; of folders, that they are there."""
+    """Return a digest of every file by name; an empty text for folders."""
     paths = sorted(here.rglob("*"))
     found = {str(path.relative_to(here)): path for path in paths}
     return {
@@ -227,20 +227,20 @@ def content(here: Path) -> dict[str, str]:
     }
 
 
-def written(tallies: list[Tally], changed: list[str], options: argparse.Namespace) -> str:
-    """Return the table."""
+def written(records: list[KillRecord], changed: list[str], options: argparse.Namespace) -> str:
+    """Return the table as text."""
     machine = f"{platform.system()}, Python {platform.python_version()}, {os.cpu_count()} cores"
-    kills, problems = sum(tally.kills for tally in tallies), sum(len(tally.problems) for tally in tallies)
+    kills, problems = sum(record.kills for record in records), sum(len(record.problems) for record in records)
     found = f"{kills} kills, {problems} problems, {len(changed)} inputs changed"
     lines = [f"{found}; seed {options.seed}; {machine}, {options.at_once} at once"]
-    for tally in tallies:
+    for record in records:
         lines += [
             "",
-            f"{tally.job.name}: {tally.kills} kills, undisturbed {tally.duration_s:.1f} s",
-            f"  {tally.job.shown}",
+            f"{record.job.name}: {record.kills} kills, undisturbed {record.duration_s:.1f} s",
+            f"  {record.job.shown}",
         ]
-        lines += [f"  {count:5} {what}" for what, count in sorted(tally.counts.items())]
-        lines += [f"  WRONG {problem}" for problem in tally.problems]
+        lines += [f"  {count:5} {what}" for what, count in sorted(record.counts.items())]
+        lines += [f"  WRONG {problem}" for problem in record.problems]
     return "\n".join(lines)
 
 

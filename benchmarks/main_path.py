@@ -2,8 +2,8 @@
 
     python benchmarks/main_path.py [--grid FOLDER] [--full]
 
-Whole processes are timed from outside, second run (caches on disk, nothing in memory), median of ``--repeats``.
-The machine's own speed stands beside the figures: compare ratios of one run, not runs.
+Whole processes are timed from outside, after a first run (caches on disk, nothing in memory), median of ``--repeats``.
+The speed of the machine is printed, too: compare ratios within one run, not absolute figures of different runs.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ EXAMPLE = Path(__file__).parent.parent / "examples" / "welcome.flac"
 
 
 def main() -> None:
-    """Print one JSON object a figure."""
+    """Print one JSON object per figure."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--grid", type=Path, default=Path("../shared/corpora/grid-s1"))
     parser.add_argument("--repeats", type=int, default=5)
@@ -72,7 +72,7 @@ def gemm_seconds() -> float:
 
 
 def sixty_seconds(path: Path) -> Path:
-    """Write the example sentence again and again, 60 s in all."""
+    """Write 60 s of sound: the example sentence repeated; return the path."""
     from lipmotion.speech.audio_files import read_audio
 
     audio = read_audio(EXAMPLE)
@@ -112,7 +112,7 @@ def frames_per_second(grid: Path, clips: int = 10) -> float:
 
 
 def prepare_and_train(grid: Path, folder: Path) -> None:
-    """Time the two long jobs once."""
+    """Measure the two long jobs once."""
     corpus, model = folder / "corpus", folder / "model.lipmotion"
     for name, command in (
         ("corpus prepare", ["corpus", "prepare", str(grid), "-o", str(corpus)]),

@@ -1,9 +1,9 @@
-"""The memory that an hour of speech takes: reading it, and its features, over what they return.
+"""Memory for an hour of speech: reading the recording, and computing its features.
 
     python benchmarks/memory.py [--minutes 60] [--suffix wav|flac|mp3|m4a|opus]
 
-Prints one JSON object a step. ``traced`` is what Python and NumPy asked for at most (tracemalloc), ``process`` by how
-much the largest resident size of the process grew.
+Prints one JSON object per step. ``traced`` is the peak of allocations by Python and NumPy (tracemalloc), ``process``
+the growth of the largest resident size of the process.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ RATE_HZ = 48_000
 
 
 def main() -> None:
-    """Print what reading and features need."""
+    """Print the memory of reading and of the features."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--minutes", type=int, default=60)
     parser.add_argument("--suffix", choices=CODECS, default="wav")
@@ -43,7 +43,7 @@ def main() -> None:
 
 
 def write(path: Path, codec: str, minutes: int) -> Path:
-    """Write noise in stereo, a second at a time."""
+    """Write stereo noise, a second at a time; return the path."""
     draw = np.random.default_rng(0)
     with av.open(str(path), "w") as container:
         stream: Any = container.add_stream(codec, rate=RATE_HZ, layout="stereo")
@@ -62,7 +62,7 @@ def write(path: Path, codec: str, minutes: int) -> Path:
 
 
 def measured(step: str, run: Callable[[], Any], size: Callable[[Any], int], untraced: bool) -> Any:
-    """Run a step, print what it needed, return its result."""
+    """Run a step, print its memory, return its result."""
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     if not untraced:
         tracemalloc.start()
@@ -77,7 +77,7 @@ def measured(step: str, run: Callable[[], Any], size: Callable[[Any], int], untr
 
 
 def megabytes(count: float) -> float:
-    """Return bytes as 10⁶ bytes."""
+    """Return a number of bytes in units of 10⁶ bytes."""
     return round(count / 1e6, 1)
 
 

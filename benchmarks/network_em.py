@@ -52,7 +52,7 @@ def em_step(
     products = total.products.transpose(1, 0, 2)
     known = products[:, :, -1].sum(axis=1) >= LEAST_FRAMES
     first, second = np.split(products[known, :, :-1], 2, axis=2)
-    better.estimate(used[known], products[known, :, -1], first, second, floor)
+    better.set_from_statistics(used[known], products[known, :, -1], first, second, floor)
     return better, _reestimated(network, total), total.log_likelihood / total.frames
 
 
@@ -127,7 +127,7 @@ def _accumulated(job: tuple[_Model, list[NDArray[np.float32]]]) -> _Statistics:
     model, data = job
     frames = np.array([len(x) for x in data])
     features = with_squares(np.concatenate(data))
-    log_density, shares = model.form.divided(features)
+    log_density, shares = model.form.log_density_and_shares(features)
     expected = model.network.posteriors(log_density, model.columns, frames)
     possible = np.isfinite(expected.log_likelihood)
     begins = np.append(0, np.cumsum(frames[:-1]))

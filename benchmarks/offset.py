@@ -1,9 +1,9 @@
-"""How well the offset of sound and video is found: clips moved by known amounts, singly and pooled.
+"""Accuracy of the measured offset of sound and video: clips shifted by known amounts, single and pooled.
 
     python benchmarks/offset.py CORPUS [--split test] [--step 25] [--reach 200]
 
-Prints one JSON object a way: errors in ms of the offsets said to be known, and how often they are; then what is said
-of clips with the sound of another clip (nothing should be known of them).
+Prints one JSON object per method: errors in ms of the offsets that are reported as known, and their share; then the
+share of known offsets for clips with the sound of another clip (it should be 0).
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def main() -> None:
 
 
 def late(utterance: Utterance, by_ms: float) -> Utterance:
-    """Return the utterance with its sound later, or earlier, than the track."""
+    """Return the utterance with its sound shifted against the track."""
     shift = round(by_ms / 1000 * utterance.audio.rate_hz)
     samples = utterance.audio.samples
     moved = np.pad(samples, (shift, 0), mode="reflect") if shift > 0 else samples[-shift:]
@@ -59,12 +59,12 @@ def late(utterance: Utterance, by_ms: float) -> Utterance:
 
 
 def parts(row: list[np.ndarray], count: int) -> list[list[np.ndarray]]:
-    """Return the scores by ``count`` clips, the rest left out."""
+    """Return the scores in groups of ``count`` clips; the rest is left out."""
     return [row[start : start + count] for start in range(0, len(row) - count + 1, count)]
 
 
 def figures(found: list[tuple[Offset, float]]) -> dict[str, float]:
-    """Return how far off the known offsets are, and all of them."""
+    """Return the errors of the known offsets, and of all of them."""
     errors = np.array([1000 * each.late_s - ms for each, ms in found])
     known = np.array([each.known for each, _ in found])
     sure = np.abs(errors[known])
@@ -80,7 +80,7 @@ def figures(found: list[tuple[Offset, float]]) -> dict[str, float]:
 
 
 def share(flags: object) -> float:
-    """Return the share that is true."""
+    """Return the share of true values."""
     return round(float(np.mean(np.asarray(flags))), 3)
 
 

@@ -1,9 +1,9 @@
-"""Principal components of many pictures, beside scikit-learn's randomised ones where it is installed.
+"""Principal components of many pictures, compared with scikit-learn's randomised ones if it is installed.
 
     python benchmarks/pca.py [--rows 20000] [--columns 7200] [--components 90] [--threads 1]
 
-Prints one JSON object an implementation: processor seconds, by how much the largest resident size of a process of its
-own grew beside the numbers themselves, and the share of the variance that the components hold.
+Prints one JSON object per implementation: processor seconds, growth of the largest resident size of its process beyond
+the data, and the share of the variance that the components explain.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 
 def main() -> None:
-    """Print what each implementation needs."""
+    """Print the figures of each implementation."""
     parser = argparse.ArgumentParser(description=__doc__)
     for name, default in (("rows", 20_000), ("columns", 7200), ("components", 90), ("threads", 1)):
         parser.add_argument(f"--{name}", type=int, default=default)
@@ -38,14 +38,14 @@ def main() -> None:
 
 
 def measure(name: str, rows: int, columns: int, components: int) -> None:
-    """Print what one implementation needs."""
+    """Print the figures of one implementation."""
     draw = np.random.default_rng(0)
     values = draw.standard_normal((rows, columns), np.float32)
     values *= 0.5
     scales = (100 * 0.96 ** np.arange(120)).astype(np.float32)
     smooth = np.cumsum(np.cumsum(draw.standard_normal((120, columns), np.float32), axis=1), axis=1)
     smooth /= np.linalg.norm(smooth, axis=1, keepdims=True)
-    for start in range(0, rows, 1000):  # a block at a time, so that the peak before is that of the numbers
+    for start in range(0, rows, 1000):  # a block at a time, so that the peak before is that of the data
         block = values[start : start + 1000]
         block += (draw.standard_normal((len(block), 120), np.float32) * scales) @ smooth
     fit(name, values[:2000, :400], 5)  # modules are loaded

@@ -1,11 +1,11 @@
-"""Speakers, words and lengths that the shipped model was not trained on: accuracy, speed, memory.
+"""Speakers, words and lengths outside the training data of the shipped model: accuracy, speed, memory.
 
     python benchmarks/robust.py [--corpora FOLDER] [--model FILE] [--only others|phones|noise|hour|calls]
 
 others : GRID clips of other speakers, correlation of opening per clip, audio only and with the words of the file's name
 phones : recordings with transcripts of ``speech-open``, phone accuracy against their forced alignment by the general
          models, and real-time factors (recognition in one process, warm, median of five)
-noise  : what is not speech: share of the time that is taken for speech, and how far the mouth opens
+noise  : sounds that are not speech: share of the time that is recognised as speech, and mean opening of the mouth
 hour   : peak memory and time of ``lipmotion animate`` on an hour of speech, a process of its own
 calls  : memory of one process over a thousand ``animate`` calls
 """
@@ -38,7 +38,7 @@ from lipmotion.vision.track import track
 
 RATE_HZ = 16_000
 SAME = {"ax": "ah", "axr": "er", "ix": "ih", "el": "l", "em": "m", "en": "n", "ao": "aa", "zh": "sh"}
-"""Phones that count as one: reduced vowels, syllabic consonants, and two pairs that accents merge."""
+"""Phones that count as equal: reduced vowels, syllabic consonants, and two pairs that accents merge."""
 SPOKEN = ("61-70968-0000.flac", "acoustic_corpus.wav", "cold_corpus.wav", "common_voice_en_22058264.mp3",
           "common_voice_en_22058266.mp3", "common_voice_en_22058267.mp3",
           *(f"sense_and_sensibility_01_austen_64kb-0{n}.wav" for n in (870, 880, 890, 920, 930)))  # fmt: skip
@@ -62,7 +62,7 @@ def show(figure: str, **values: object) -> None:
 
 
 def others(corpora: Path, model: Model, _: Path | None) -> None:
-    """Compare with the tracks of five GRID speakers."""
+    """Print the correlation with the tracked openings of five GRID speakers."""
     clips = sorted((corpora / "grid-others").glob("*.mpg"))
     tracks = {clip: track(clip, crops=False) for clip in clips}
     for kind in RECOGNISER_KINDS:
@@ -82,7 +82,7 @@ def others(corpora: Path, model: Model, _: Path | None) -> None:
 
 
 def phones(corpora: Path, model: Model, _: Path | None) -> None:
-    """Recognise what has a transcript."""
+    """Print the phone accuracy of the recordings with transcripts."""
     folder = corpora / "speech-open"
     recordings = []
     for name in SPOKEN:
@@ -92,11 +92,14 @@ def phones(corpora: Path, model: Model, _: Path | None) -> None:
         aligned = cached_recogniser(model.phones, "general").align(audio, mfcc(audio), words, Lexicon())
         recordings.append((audio, spoken(span.label.phone for span in aligned)))
     for kind in RECOGNISER_KINDS:
-        hear = cached_recogniser(model.phones, kind)
-        errors = [edits(wanted, spoken(s.label.phone for s in hear.recognise(a, mfcc(a)))) for a, wanted in recordings]
+        phone_recogniser = cached_recogniser(model.phones, kind)
+        errors = [
+            edits(wanted, spoken(s.label.phone for s in phone_recogniser.recognise(a, mfcc(a))))
+            for a, wanted in recordings
+        ]
         count = sum(len(wanted) for _, wanted in recordings)
         total_s = sum(audio.duration_s for audio, _ in recordings)
-        times = [seconds(lambda: [hear.recognise(a, mfcc(a)) for a, _ in recordings]) for _ in range(5)]  # noqa: B023
+        times = [seconds(lambda: [phone_recogniser.recognise(a, mfcc(a)) for a, _ in recordings]) for _ in range(5)]  # noqa: B023
         show(
             f"speech-open, {kind}: phone accuracy",
             value=round(1 - sum(errors) / count, 3),
@@ -107,7 +110,7 @@ def phones(corpora: Path, model: Model, _: Path | None) -> None:
 
 
 def spoken(names: object) -> list[str]:
-    """Return phones without silence, those that count as one under one name."""
+    """Return phones without silence; phones that count as equal get one name."""
     return [SAME.get(name, name) for name in names if not is_silent(name)]  # type: ignore[attr-defined]
 
 
@@ -129,7 +132,7 @@ def seconds(work: object) -> float:
 
 
 def noise(corpora: Path, model: Model, _: Path | None) -> None:
-    """Animate what is not speech."""
+    """Print the figures of sounds that are not speech."""
     recordings = {name: Audio(np.asarray(x, np.float32), RATE_HZ) for name, x in not_speech().items()}
     for name in ("breaths", "laughter", "whisper", "falsetto", "exaggerated", "longstop"):
         path = corpora / "speech-open" / f"mfa_{name}.flac"
@@ -137,9 +140,9 @@ def noise(corpora: Path, model: Model, _: Path | None) -> None:
             recordings[path.name] = read_audio(path)
     for name, audio in recordings.items():
         result = animate(audio, model=model)
-        said_s = sum(span.duration_s for span in result.units if not is_silent(span.label.phone))
+        speech_s = sum(span.duration_s for span in result.units if not is_silent(span.label.phone))
         opening = result.motion["opening"]
-        share = round(said_s / audio.duration_s, 2)
+        share = round(speech_s / audio.duration_s, 2)
         show(f"not speech: {name}", spoken=share, mean_opening=round(float(opening.mean()), 3))
 
 
@@ -167,7 +170,7 @@ def not_speech() -> dict[str, np.ndarray]:
 
 
 def hour(corpora: Path, _: Model, model_file: Path | None) -> None:
-    """Animate an hour: a reading, over and over."""
+    """Print peak memory and time for an hour: a repeated reading."""
     reading = read_audio(corpora / "speech-open" / "threelittlekittens_01_rountreesmith.ogg").samples
     samples = np.tile(reading, 1 + 3600 * RATE_HZ // len(reading))[: 3600 * RATE_HZ]
     with tempfile.TemporaryDirectory() as folder:
@@ -190,13 +193,13 @@ def hour(corpora: Path, _: Model, model_file: Path | None) -> None:
                 f"{path}{suffix}",
                 *chosen,
             ]
-            taken_s = seconds(lambda: subprocess.run(command, check=True, stdout=subprocess.DEVNULL))  # noqa: B023
+            time_s = seconds(lambda: subprocess.run(command, check=True, stdout=subprocess.DEVNULL))  # noqa: B023
             peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
-            show(f"an hour to {suffix}: peak so far", megabytes=round(peak), seconds=round(taken_s, 1))
+            show(f"an hour to {suffix}: peak so far", megabytes=round(peak), seconds=round(time_s, 1))
 
 
 def calls(corpora: Path, model: Model, _: Path | None) -> None:
-    """Call ``animate`` a thousand times."""
+    """Print the memory of the process over a thousand calls of ``animate``."""
     clip = read_audio(corpora / "grid-others" / "swwp2s.mpg")
     sizes = {}
     for number in range(1, 1001):

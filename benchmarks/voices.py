@@ -1,10 +1,10 @@
-"""The synthetic voices that are installed: how much they say, how fast, and how their phone times agree with ours.
+"""Installed synthetic voices: amount of speech, speed, and agreement of their phone times with forced alignment.
 
     python benchmarks/voices.py [--sentences 60]
 
-One JSON object a line: a synthesiser each, then all. ``late_ms``: median of (its start of a phone − where general phone
-models place the same phone); ``off_ms``, ``worst_ms``: median and 90th percentile of the distance. ``biased``: phones
-that it starts 12 ms or more too late or too early in the median (of 20 or more).
+One JSON object per synthesiser, then one for all. ``late_ms``: median of (its start of a phone − the start that the
+general phone models align); ``off_ms``, ``worst_ms``: median and 90th percentile of the distance. ``biased``: phones whose
+median difference (of 20 or more) is at least 12 ms.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ FEWEST, BIASED_MS = 20, 12
 
 
 def main() -> None:
-    """Print one JSON object a line."""
+    """Print one JSON object per synthesiser, and those of all voices."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--sentences", type=int, default=60)
     texts = [prompt.text for prompt in prompts(count=parser.parse_args().sentences).chosen]
@@ -45,7 +45,7 @@ def main() -> None:
         count = sum(1 for _ in heard(sentences))
         taken_s = time.perf_counter() - before_s
         size = {"synthesiser": name, "voices": len(voices), "sentences": count, "minutes": minutes(sentences)}
-        print(json.dumps(size | {"seconds": round(taken_s, 1)} | late(sentences, general)))
+        print(json.dumps(size | {"seconds": round(taken_s, 1)} | start_differences(sentences, general)))
         everything += sentences
         total_s += taken_s
     speakers = dict.fromkeys(sentence.speaker for sentence in everything)
@@ -57,12 +57,12 @@ def main() -> None:
 
 
 def minutes(sentences: Sequence[SpokenSentence]) -> float:
-    """Return how long they are."""
+    """Return the total duration of sentences in minutes."""
     return round(sum(sentence.audio.duration_s for sentence in sentences) / 60, 1)
 
 
-def late(sentences: Sequence[SpokenSentence], general: Recogniser) -> dict[str, object]:
-    """Return how much later than in the ears of the general models phones start."""
+def start_differences(sentences: Sequence[SpokenSentence], general: Recogniser) -> dict[str, object]:
+    """Return by how much phones start later than in the alignment of the general models."""
     late_ms, misfits = defaultdict(list), 0
     for sentence in sentences:
         try:
@@ -70,8 +70,8 @@ def late(sentences: Sequence[SpokenSentence], general: Recogniser) -> dict[str, 
         except AlignmentError:
             misfits += 1
             continue
-        for said, found in zip(spoken(sentence.phones), spoken(placed), strict=True):
-            late_ms[said.label.phone].append(1000 * (said.start_s - found.start_s))
+        for stated, found in zip(without_silence(sentence.phones), without_silence(placed), strict=True):
+            late_ms[stated.label.phone].append(1000 * (stated.start_s - found.start_s))
     errors = np.concatenate(list(late_ms.values()))
     medians = {phone: round(float(np.median(values))) for phone, values in late_ms.items() if len(values) >= FEWEST}
     return {
@@ -84,8 +84,8 @@ def late(sentences: Sequence[SpokenSentence], general: Recogniser) -> dict[str, 
     }
 
 
-def spoken(units: Timeline[Unit]) -> list[Span[Unit]]:
-    """Return the phones between the silences."""
+def without_silence(units: Timeline[Unit]) -> list[Span[Unit]]:
+    """Return the spans of phones without silence."""
     return [span for span in units if not is_silent(span.label.phone)]
 
 

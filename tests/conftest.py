@@ -18,6 +18,13 @@ from lipmotion.testing.toy import ToySentence, toy_sentences, toy_utterances
 SENTENCES = 12
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Whatever needs real recordings, or trains on them, takes long."""
+    for item in items:
+        if item.get_closest_marker("recordings") or item.get_closest_marker("slow"):
+            item.add_marker(pytest.mark.long)
+
+
 @pytest.fixture(scope="session")
 def toy_corpus(tmp_path_factory: pytest.TempPathFactory) -> Corpus:
     """Eight sentences to train on, two to choose, two to test. Do not change it: copy it."""

@@ -36,7 +36,7 @@ def test_names_and_loading(installed: None) -> None:  # noqa: ARG001
     with pytest.raises(InputError, match="no thing 'other'; there are: built, broken, text"):
         registry.load("other")
     with pytest.raises(
-        InputError, match="'broken' of the package 'no_such_module_at_all' cannot be imported: No module"
+        InputError, match=r"'broken' of the package 'no_such_module_at_all' cannot be imported: No module"
     ):
         registry.load("broken")
 

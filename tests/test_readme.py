@@ -45,6 +45,7 @@ def test_make_targets_exist() -> None:
         assert "lipmotion" in run(["make", "-n", target], ROOT) or target == "test"
 
 
+@pytest.mark.long
 def test_commands_of_use(checkout: Path) -> None:
     used = [command for command in commands("lipmotion") if "examples/welcome.flac" in command or command[1] == "info"]
     assert len(used) == 3
@@ -62,6 +63,7 @@ def test_python_example(checkout: Path) -> None:
     assert (checkout / "edited.mp4").stat().st_size > 10_000
 
 
+@pytest.mark.long
 @pytest.mark.video
 def test_training_on_own_recordings(checkout: Path) -> None:
     pytest.importorskip("mediapipe")

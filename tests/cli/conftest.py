@@ -25,7 +25,7 @@ class Done(NamedTuple):
     err: list[str]
 
 
-Run = Callable[..., Done]
+RunCommand = Callable[..., Done]
 
 
 @pytest.fixture
@@ -38,7 +38,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.fixture
-def run(capsys: pytest.CaptureFixture[str]) -> Run:
+def run(capsys: pytest.CaptureFixture[str]) -> RunCommand:
     """Runs a command in this process."""
 
     def run(*arguments: object) -> Done:
@@ -54,7 +54,7 @@ def run(capsys: pytest.CaptureFixture[str]) -> Run:
 
 
 @pytest.fixture
-def run_outside() -> Run:
+def run_outside() -> RunCommand:
     """Runs a command in a process of its own, as a shell does."""
 
     module = (sys.executable, "-m", "lipmotion.cli.main")

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cli.conftest import Run, is_one_error
+from cli.conftest import RunCommand, is_one_error
 from lipmotion.pipeline.adapt import adapt
 from lipmotion.pipeline.model import load_model, save_model
 
@@ -20,7 +20,10 @@ def sound(path: Path, samples: np.ndarray) -> Path:
     return path
 
 
-def test_it_is_the_function_of_the_same_name(run: Run, here: Path, toy_speech: Path, toy_model_file: Path) -> None:
+@pytest.mark.long
+def test_it_is_the_function_of_the_same_name(
+    run: RunCommand, here: Path, toy_speech: Path, toy_model_file: Path
+) -> None:
     done = run("adapt", toy_speech, "--model", toy_model_file, "-o", "voice.lipmotion")
     assert (done.code, done.err) == (0, [])
     assert done.out[0].startswith("voice.lipmotion: 1 recordings, ")
@@ -41,7 +44,7 @@ def test_it_is_the_function_of_the_same_name(run: Run, here: Path, toy_speech: P
     ],
 )
 def test_what_cannot_be_adapted_to(
-    run: Run, here: Path, toy_model_file: Path, tmp_path: Path, content: object, words: str
+    run: RunCommand, here: Path, toy_model_file: Path, tmp_path: Path, content: object, words: str
 ) -> None:
     path = tmp_path / "other.wav"
     if isinstance(content, bytes):
@@ -54,7 +57,7 @@ def test_what_cannot_be_adapted_to(
     assert list(here.iterdir()) == []
 
 
-def test_a_recording_is_not_overwritten(run: Run, here: Path, toy_speech: Path, toy_model_file: Path) -> None:
+def test_a_recording_is_not_overwritten(run: RunCommand, here: Path, toy_speech: Path, toy_model_file: Path) -> None:
     (here / "a.wav").write_bytes(toy_speech.read_bytes())
     done = run("adapt", toy_speech, "a.wav", "--model", toy_model_file, "-o", "a.wav")
     assert is_one_error(done, 7)

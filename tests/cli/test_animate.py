@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from cli.conftest import Run, is_one_error
+from cli.conftest import RunCommand, is_one_error
 from lipmotion.export.base import read_motion
 from lipmotion.pipeline.animate import animate, write
 from lipmotion.pipeline.model import VERSION, load_model
@@ -17,7 +17,7 @@ def basics(toy_speech: Path, toy_model_file: Path) -> tuple[object, ...]:
     return ("animate", toy_speech, "--model", toy_model_file)
 
 
-def test_motion_files(run: Run, basics: tuple[object, ...], here: Path) -> None:
+def test_motion_files(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:
     done = run(*basics, "-o", "a.json", "a.csv", "a.npz", "--rate", "50")
     assert done == (0, ["a.json", "a.csv", "a.npz"], [])
     assert sorted(path.name for path in here.iterdir()) == ["a.csv", "a.json", "a.npz"]
@@ -25,12 +25,13 @@ def test_motion_files(run: Run, basics: tuple[object, ...], here: Path) -> None:
 
 
 @pytest.mark.usefixtures("here")
-def test_outputs_may_be_given_one_by_one(run: Run, basics: tuple[object, ...]) -> None:
+def test_outputs_may_be_given_one_by_one(run: RunCommand, basics: tuple[object, ...]) -> None:
     assert run(*basics, "-o", "a.json", "-o", "a.csv") == (0, ["a.json", "a.csv"], [])
 
 
+@pytest.mark.long
 def test_it_is_the_function_of_the_same_name(
-    run: Run, basics: tuple[object, ...], here: Path, toy_speech: Path, toy_model_file: Path
+    run: RunCommand, basics: tuple[object, ...], here: Path, toy_speech: Path, toy_model_file: Path
 ) -> None:
     run(*basics, "-o", "command.json")
     model = load_model(toy_model_file)
@@ -38,13 +39,13 @@ def test_it_is_the_function_of_the_same_name(
     assert (here / "command.json").read_bytes() == (here / "function.json").read_bytes()
 
 
-def test_a_video(run: Run, basics: tuple[object, ...], here: Path) -> None:
+def test_a_video(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:
     assert run(*basics, "-o", "a.mp4", "--fps", "5") == (0, ["a.mp4"], [])
     assert (here / "a.mp4").stat().st_size > 5000
 
 
 @pytest.mark.parametrize("as_file", [True, False])
-def test_a_transcript(run: Run, basics: tuple[object, ...], here: Path, as_file: bool) -> None:
+def test_a_transcript(run: RunCommand, basics: tuple[object, ...], here: Path, as_file: bool) -> None:
     words = "See Bob, papa & mama!"
     (here / "words.lab").write_text("\ufeff" + words, encoding="utf-8")
     done = run(*basics, "-o", "a.json", "--transcript", "words.lab" if as_file else words)
@@ -53,13 +54,13 @@ def test_a_transcript(run: Run, basics: tuple[object, ...], here: Path, as_file:
     assert " ".join(unit["phone"] for unit in units) == "sil s iy b aa b p aa p ax m aa m ax sil"
 
 
-def test_an_unknown_word_is_a_warning(run: Run, basics: tuple[object, ...], here: Path, caplog) -> None:
+def test_an_unknown_word_is_a_warning(run: RunCommand, basics: tuple[object, ...], here: Path, caplog) -> None:
     assert run(*basics, "-o", "a.json", "--transcript", "see bimab papa mama").code == 0
     assert "'bimab' is not in the dictionary; read as 'b ih m ae b'" in caplog.text
     assert (here / "a.json").exists()
 
 
-def test_a_lexicon_file(run: Run, basics: tuple[object, ...], here: Path, caplog) -> None:
+def test_a_lexicon_file(run: RunCommand, basics: tuple[object, ...], here: Path, caplog) -> None:
     (here / "lexicon.txt").write_text("bimab B AA1 B\n")
     done = run(*basics, "-o", "a.json", "--transcript", "see bimab papa mama", "--lexicon", "lexicon.txt")
     assert (done.code, caplog.text) == (0, "")
@@ -67,7 +68,7 @@ def test_a_lexicon_file(run: Run, basics: tuple[object, ...], here: Path, caplog
 
 @pytest.mark.parametrize("what", ["missing", "empty", "text", "mute", "short", "folder", "long name"])
 def test_speech_that_cannot_be_used(
-    run: Run, toy_model_file: Path, bad_speech: dict[str, Path], here: Path, what: str
+    run: RunCommand, toy_model_file: Path, bad_speech: dict[str, Path], here: Path, what: str
 ) -> None:
     assert is_one_error(run("animate", bad_speech[what], "--model", toy_model_file, "-o", "a.json", "a.mp4"), 3)
     assert list(here.iterdir()) == []
@@ -100,7 +101,7 @@ def test_speech_that_cannot_be_used(
     ],
 )
 def test_options_that_cannot_be_used(
-    run: Run, basics: tuple[object, ...], here: Path, options: list[str], code: int, words: str
+    run: RunCommand, basics: tuple[object, ...], here: Path, options: list[str], code: int, words: str
 ) -> None:
     done = run(*basics, "-o", "a.json", "a.mp4", *options)
     assert is_one_error(done, code)
@@ -112,14 +113,14 @@ def test_options_that_cannot_be_used(
     ("options", "code"), [(["-o", "missing/a.json"], 7), (["-o", "a.json", "--rate", "0"], 3), (["-o", "a.xyz"], 7)]
 )
 @pytest.mark.usefixtures("here")
-def test_outputs_are_checked_before_work_begins(run: Run, options: list[str], code: int) -> None:
+def test_outputs_are_checked_before_work_begins(run: RunCommand, options: list[str], code: int) -> None:
     done = run("animate", "missing.wav", "--model", "missing.lipmotion", *options)
     assert is_one_error(done, code)
     assert "no such" not in done.err[0]
 
 
 def test_files_that_are_not_what_they_should_be(
-    run: Run, basics: tuple[object, ...], here: Path, toy_speech: Path, newer_model: Path
+    run: RunCommand, basics: tuple[object, ...], here: Path, toy_speech: Path, newer_model: Path
 ) -> None:
     (here / "latin.txt").write_bytes("näh".encode("latin-1"))
     (here / "empty.txt").touch()
@@ -143,7 +144,7 @@ def test_files_that_are_not_what_they_should_be(
         assert sorted(here.iterdir()) == before
 
 
-def test_the_recording_is_not_overwritten(run: Run, toy_model_file: Path, toy_speech: Path, here: Path) -> None:
+def test_the_recording_is_not_overwritten(run: RunCommand, toy_model_file: Path, toy_speech: Path, here: Path) -> None:
     (here / "speech.mp4").write_bytes(toy_speech.read_bytes())
     done = run("animate", "speech.mp4", "--model", toy_model_file, "-o", "speech.mp4")
     assert is_one_error(done, 7)
@@ -151,14 +152,14 @@ def test_the_recording_is_not_overwritten(run: Run, toy_model_file: Path, toy_sp
 
 
 @pytest.mark.parametrize("options", [[], ["-o"], ["-o", "a.json", "--rate", "fast"], ["-o", "a.json", "--bogus"]])
-def test_a_wrong_command_line(run: Run, basics: tuple[object, ...], here: Path, options: list[str]) -> None:
+def test_a_wrong_command_line(run: RunCommand, basics: tuple[object, ...], here: Path, options: list[str]) -> None:
     done = run(*basics, *options)
     assert done.code == 2
     assert done.err[-1].startswith("lipmotion")
     assert list(here.iterdir()) == []
 
 
-def test_edited_units_are_used(run: Run, basics: tuple[object, ...], here: Path) -> None:
+def test_edited_units_are_used(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:
     run(*basics, "-o", "a.json")
     text = (here / "a.json").read_text(encoding="utf-8")
     document = json.loads(text)
@@ -170,13 +171,13 @@ def test_edited_units_are_used(run: Run, basics: tuple[object, ...], here: Path)
     assert [channel["name"] for channel in after["channels"]] == ["opening"]
 
 
-def test_units_that_cannot_be_used(run: Run, basics: tuple[object, ...], here: Path) -> None:
+def test_units_that_cannot_be_used(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:
     done = run(*basics, "-o", "a.json", "--units", "missing.json")
     assert (done.code, len(done.err)) == (3, 1)
     assert not (here / "a.json").exists()
 
 
-def test_a_picture_of_the_posteriors(run: Run, coupled_model_file: Path, toy_speech: Path, here: Path) -> None:
+def test_a_picture_of_the_posteriors(run: RunCommand, coupled_model_file: Path, toy_speech: Path, here: Path) -> None:
     basics = ("animate", toy_speech, "--model", coupled_model_file, "-o")
     assert run(*basics, "a.json", "--posteriors", "a.png") == (0, ["a.json", "a.png"], [])
     with Image.open(here / "a.png") as picture:
@@ -196,7 +197,7 @@ def test_a_picture_of_the_posteriors(run: Run, coupled_model_file: Path, toy_spe
     ],
 )
 def test_posteriors_that_cannot_be_drawn(
-    run: Run, basics: tuple[object, ...], here: Path, picture: str, code: int, words: str
+    run: RunCommand, basics: tuple[object, ...], here: Path, picture: str, code: int, words: str
 ) -> None:
     done = run(*basics, "-o", "a.json", "--posteriors", picture)
     assert is_one_error(done, code)

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cli.conftest import Run, is_one_error
+from cli.conftest import RunCommand, is_one_error
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import MissingDependencyError
 from lipmotion.export.video import write_mp4
@@ -16,7 +16,7 @@ from lipmotion.pipeline.corpus.prepare import PrepareReport
 from lipmotion.types import Audio, Item, Progress
 
 
-def test_info(run: Run, toy_corpus: Corpus) -> None:
+def test_info(run: RunCommand, toy_corpus: Corpus) -> None:
     done = run("corpus", "info", toy_corpus.path)
     assert (done.code, done.err) == (0, [])
     summary = dict(line.split(maxsplit=1) for line in done.out)
@@ -25,7 +25,7 @@ def test_info(run: Run, toy_corpus: Corpus) -> None:
     assert summary["offset"].startswith("toy: ") or summary["offset"].startswith("corpus: ")
 
 
-def test_sync(run: Run, toy_corpus: Corpus, here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_sync(run: RunCommand, toy_corpus: Corpus, here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     shutil.copytree(toy_corpus.path, here / "mine")
     monkeypatch.setattr(offset, "sync", lambda _corpus: {"studio": 0.12})
     assert run("corpus", "sync", "mine") == (0, ["studio: sound moved by -120 ms"], [])
@@ -39,7 +39,7 @@ def test_sync(run: Run, toy_corpus: Corpus, here: Path, monkeypatch: pytest.Monk
 EVENTS = (Item("a", "prepared"), Progress("preparing recordings", 1, 2, 0.5), Item("d", "skipped", "no face"))
 
 
-def test_prepare_prints_the_counts(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_prepare_prints_the_counts(run: RunCommand, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: dict[str, object] = {}
 
     def done(directory: Path, output: Path, **options: object) -> PrepareReport:
@@ -71,7 +71,7 @@ def test_prepare_prints_the_counts(run: Run, monkeypatch: pytest.MonkeyPatch) ->
         (["prepare", "empty", "-o", "mine"], 4, "empty: no videos in it"),
     ],
 )
-def test_what_cannot_be_used(run: Run, here: Path, arguments: list[str], code: int, words: str) -> None:
+def test_what_cannot_be_used(run: RunCommand, here: Path, arguments: list[str], code: int, words: str) -> None:
     (here / "empty").mkdir()
     done = run("corpus", *arguments)
     assert is_one_error(done, code)
@@ -79,11 +79,11 @@ def test_what_cannot_be_used(run: Run, here: Path, arguments: list[str], code: i
     assert [path.name for path in here.rglob("*")] == ["empty"]
 
 
-def test_without_the_packages_for_video(run: Run, here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_the_packages_for_video(run: RunCommand, here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def missing() -> dict[str, str]:
         raise MissingDependencyError('face tracking needs MediaPipe; pip install "lipmotion[video]"')
 
-    monkeypatch.setattr(prepare, "versions", missing)
+    monkeypatch.setattr(prepare, "package_versions", missing)
     (here / "videos").mkdir()
     (here / "videos" / "a.mp4").touch()
     assert is_one_error(run("corpus", "prepare", "videos", "-o", "mine"), 8)
@@ -97,7 +97,7 @@ def faceless(path: Path) -> None:
 
 
 @pytest.mark.video
-def test_videos_that_cannot_be_used(run_outside: Run, here: Path, bad_speech: dict[str, Path]) -> None:
+def test_videos_that_cannot_be_used(run_outside: RunCommand, here: Path, bad_speech: dict[str, Path]) -> None:
     """Videos without a face, without sound, or empty: each is named, and no corpus is made of them."""
     pytest.importorskip("mediapipe")
     (here / "videos").mkdir()

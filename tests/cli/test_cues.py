@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from cli.conftest import Done, Run, is_one_error
+from cli.conftest import Done, RunCommand, is_one_error
 from lipmotion.pipeline.animate import animate
 from lipmotion.pipeline.cues import cue_text, cues, write_cues
 from lipmotion.pipeline.model import load_model
@@ -23,7 +23,7 @@ def events(done: Done) -> list[dict[str, object]]:
 
 @pytest.mark.parametrize("form", ["tsv", "xml", "json", "dat"])
 def test_without_a_file_it_is_printed(
-    run: Run, basics: tuple[object, ...], here: Path, toy_speech: Path, toy_model_file: Path, form: str
+    run: RunCommand, basics: tuple[object, ...], here: Path, toy_speech: Path, toy_model_file: Path, form: str
 ) -> None:
     done = run(*basics, "-f", form)
     sheet = cues(animate(toy_speech, model=load_model(toy_model_file)))
@@ -32,12 +32,12 @@ def test_without_a_file_it_is_printed(
 
 
 @pytest.mark.usefixtures("here")
-def test_tsv_is_the_default(run: Run, basics: tuple[object, ...]) -> None:
+def test_tsv_is_the_default(run: RunCommand, basics: tuple[object, ...]) -> None:
     assert run(*basics) == run(*basics, "--format", "tsv")
 
 
 def test_it_is_the_functions_of_the_same_names(
-    run: Run, basics: tuple[object, ...], here: Path, toy_speech: Path, toy_model_file: Path
+    run: RunCommand, basics: tuple[object, ...], here: Path, toy_speech: Path, toy_model_file: Path
 ) -> None:
     done = run(*basics, "-o", "a.tsv", "a.xml", "-o", "a.json", "a.dat", "--fps", "30", "--hold", "4", "--shapes", "GX")
     assert done == (0, ["a.tsv", "a.xml", "a.json", "a.dat"], [])
@@ -47,12 +47,12 @@ def test_it_is_the_functions_of_the_same_names(
         assert (here / f"a.{form}").read_bytes() == (here / f"b.{form}").read_bytes()
 
 
-def test_a_format_whatever_the_suffix(run: Run, basics: tuple[object, ...], here: Path) -> None:
+def test_a_format_whatever_the_suffix(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:
     assert run(*basics, "-o", "mouth.txt", "-f", "dat") == (0, ["mouth.txt"], [])
     assert (here / "mouth.txt").read_text().startswith("MohoSwitch1\n1 ")
 
 
-def test_transcript_and_edited_phones(run: Run, basics: tuple[object, ...], here: Path) -> None:
+def test_transcript_and_edited_phones(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:
     said = run(*basics, "--transcript", "see bob papa mama")
     run("animate", *basics[1:], "--transcript", "see bob papa mama", "-o", "a.json")
     assert run(*basics, "--units", "a.json").out == said.out
@@ -77,7 +77,7 @@ def test_transcript_and_edited_phones(run: Run, basics: tuple[object, ...], here
 )
 @pytest.mark.parametrize("machine", [False, True])
 def test_what_cannot_be_done(
-    run: Run, basics: tuple[object, ...], here: Path, options: list[str], code: int, words: str, machine: bool
+    run: RunCommand, basics: tuple[object, ...], here: Path, options: list[str], code: int, words: str, machine: bool
 ) -> None:
     done = run(*basics, *options, *["--machine-readable"] * machine)
     if machine:
@@ -90,7 +90,9 @@ def test_what_cannot_be_done(
 
 
 @pytest.mark.parametrize("what", ["missing", "empty", "text", "mute", "short", "folder"])
-def test_speech_that_cannot_be_used(run: Run, toy_model_file: Path, bad_speech: dict[str, Path], what: str) -> None:
+def test_speech_that_cannot_be_used(
+    run: RunCommand, toy_model_file: Path, bad_speech: dict[str, Path], what: str
+) -> None:
     basics = ("cues", bad_speech[what], "--model", toy_model_file)
     assert is_one_error(run(*basics), 3)
     done = run(*basics, "--machineReadable")
@@ -106,7 +108,7 @@ def test_speech_that_cannot_be_used(run: Run, toy_model_file: Path, bad_speech: 
 
 @pytest.mark.parametrize("option", ["--machine-readable", "--machineReadable"])
 @pytest.mark.usefixtures("here")
-def test_status_lines(run: Run, basics: tuple[object, ...], toy_speech: Path, option: str) -> None:
+def test_status_lines(run: RunCommand, basics: tuple[object, ...], toy_speech: Path, option: str) -> None:
     done = run(*basics, "-f", "json", option)
     assert done.code == 0
     assert json.loads("\n".join(done.out))["mouthCues"]
@@ -126,7 +128,7 @@ def test_status_lines(run: Run, basics: tuple[object, ...], toy_speech: Path, op
 
 
 @pytest.mark.usefixtures("here")
-def test_warnings_are_status_lines_too(run: Run, basics: tuple[object, ...]) -> None:
+def test_warnings_are_status_lines_too(run: RunCommand, basics: tuple[object, ...]) -> None:
     handlers = list(logging.getLogger().handlers)
     done = run(*basics, "--machine-readable", "--transcript", "see bimab papa mama")
     (said,) = [event["log"] for event in events(done) if event["type"] == "log"]
@@ -135,7 +137,7 @@ def test_warnings_are_status_lines_too(run: Run, basics: tuple[object, ...]) -> 
     assert logging.getLogger().handlers == handlers
 
 
-def test_other_processes_can_read_it(run_outside: Run, basics: tuple[object, ...]) -> None:
+def test_other_processes_can_read_it(run_outside: RunCommand, basics: tuple[object, ...]) -> None:
     """As an add-on runs it: the output is ASCII, whatever the encoding of the terminal."""
     done = run_outside(*basics, "-f", "json", "--machineReadable", encoding="ascii")
     assert done.code == 0
@@ -145,6 +147,6 @@ def test_other_processes_can_read_it(run_outside: Run, basics: tuple[object, ...
 
 
 @pytest.mark.parametrize("options", [["-f", "csv"], ["--hold", "2.5"], ["--bogus"], ["-o"]])
-def test_a_wrong_command_line(run: Run, basics: tuple[object, ...], here: Path, options: list[str]) -> None:
+def test_a_wrong_command_line(run: RunCommand, basics: tuple[object, ...], here: Path, options: list[str]) -> None:
     assert run(*basics, *options).code == 2
     assert list(here.iterdir()) == []

@@ -5,14 +5,16 @@ from pathlib import Path
 
 import pytest
 
-from cli.conftest import Run, is_one_error
+from cli.conftest import RunCommand, is_one_error
 from lipmotion.corpora.store import Corpus
 from lipmotion.measures.report import figures_table
 from lipmotion.pipeline.evaluation.evaluate import evaluate
 from lipmotion.pipeline.model import VERSION, load_model
 
 
-def test_the_figures_are_those_of_the_function(run: Run, toy_corpus: Corpus, toy_model_file: Path, here: Path) -> None:
+def test_the_figures_are_those_of_the_function(
+    run: RunCommand, toy_corpus: Corpus, toy_model_file: Path, here: Path
+) -> None:
     done = run("evaluate", toy_model_file, toy_corpus.path, "-o", "figures.json")
     assert (done.code, done.err) == (0, [])
     figures = evaluate(load_model(toy_model_file), toy_corpus)
@@ -21,7 +23,7 @@ def test_the_figures_are_those_of_the_function(run: Run, toy_corpus: Corpus, toy
     assert [path.name for path in here.iterdir()] == ["figures.json"]
 
 
-def test_other_lists(run: Run, toy_corpus: Corpus, toy_model_file: Path) -> None:
+def test_other_lists(run: RunCommand, toy_corpus: Corpus, toy_model_file: Path) -> None:
     assert run("evaluate", toy_model_file, toy_corpus.path, "--split", "val").out[0].startswith("split val: 2 clips")
     assert run("evaluate", toy_model_file, toy_corpus.path, "--split", "all").out[0].startswith("split all: 12 clips")
 
@@ -39,7 +41,7 @@ def test_other_lists(run: Run, toy_corpus: Corpus, toy_model_file: Path) -> None
     ],
 )
 def test_what_cannot_be_used(
-    run: Run,
+    run: RunCommand,
     toy_corpus: Corpus,
     toy_model_file: Path,
     newer_model: Path,

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from cli.conftest import Run, is_one_error
+from cli.conftest import RunCommand, is_one_error
 from lipmotion.corpora.store import Corpus
 from lipmotion.experiments import comparison, folds, learning_curve
 from lipmotion.experiments.hofer2008 import unit_sets
@@ -25,7 +25,7 @@ def few_draws(monkeypatch: pytest.MonkeyPatch) -> None:
     )
 
 
-def test_the_table_is_that_of_the_figures(run: Run, toy_corpus: Corpus, here: Path) -> None:
+def test_the_table_is_that_of_the_figures(run: RunCommand, toy_corpus: Corpus, here: Path) -> None:
     done = run("experiment", "unit-sets", toy_corpus.path, "-o", "a.json", "--split", "all", "--workers", "1")
     assert (done.code, done.err) == (0, [])
     figures = json.loads((here / "a.json").read_text())
@@ -34,7 +34,7 @@ def test_the_table_is_that_of_the_figures(run: Run, toy_corpus: Corpus, here: Pa
     assert [path.name for path in here.iterdir()] == ["a.json"]
 
 
-def test_a_program_reads_the_figures(run: Run, toy_corpus: Corpus) -> None:
+def test_a_program_reads_the_figures(run: RunCommand, toy_corpus: Corpus) -> None:
     done = run("experiment", "unit-sets", toy_corpus.path, "--closures", "--machine-readable")
     assert (done.code, done.err) == (0, [])
     last = json.loads(done.out[-1])
@@ -43,7 +43,7 @@ def test_a_program_reads_the_figures(run: Run, toy_corpus: Corpus) -> None:
     assert {"type", "stage", "step", "steps", "value"} == set(json.loads(done.out[1]))
 
 
-def test_the_learning_curve_of_a_list(run: Run, toy_corpus: Corpus, here: Path) -> None:
+def test_the_learning_curve_of_a_list(run: RunCommand, toy_corpus: Corpus, here: Path) -> None:
     (here / "order.txt").write_text("\n".join(toy_corpus.names("train")) + "\n\n")
     chosen = ("--order", "order.txt", "--sizes", "8,3", "--split", "val")
     done = run("experiment", "learning-curve", toy_corpus.path, *chosen, "-o", "a.json", "--workers", "1")
@@ -54,7 +54,7 @@ def test_the_learning_curve_of_a_list(run: Run, toy_corpus: Corpus, here: Path) 
     assert [row["names"] for row in figures["rows"]] == [3, 8]
 
 
-def test_folds_of_the_training_list(run: Run, toy_corpus: Corpus, here: Path) -> None:
+def test_folds_of_the_training_list(run: RunCommand, toy_corpus: Corpus, here: Path) -> None:
     done = run("experiment", "folds", toy_corpus.path, "--folds", "2", "-o", "a.json", "--workers", "1")
     assert (done.code, done.err) == (0, [])
     figures = json.loads((here / "a.json").read_text())
@@ -62,13 +62,14 @@ def test_folds_of_the_training_list(run: Run, toy_corpus: Corpus, here: Path) ->
     assert (figures["folds"], figures["trained_on"]) == (2, [4, 4])
 
 
-def test_a_program_reads_them(run: Run, toy_corpus: Corpus) -> None:
+def test_a_program_reads_them(run: RunCommand, toy_corpus: Corpus) -> None:
     done = run("experiment", "learning-curve", toy_corpus.path, "--sizes", "3", "--machine-readable")
     assert (done.code, done.err) == (0, [])
     assert json.loads(done.out[-1])["figures"]["order"] == "shuffled"
 
 
-def test_table3_of_some_systems(run: Run, toy_corpus: Corpus, here: Path) -> None:
+@pytest.mark.long
+def test_table3_of_some_systems(run: RunCommand, toy_corpus: Corpus, here: Path) -> None:
     (here / "order.txt").write_text("\n".join(toy_corpus.names("train")))
     chosen = ("--systems", "ph-MSHMM;loudness", "--states", "2", "--mixtures", "1", "--order", "order.txt")
     chosen = (*chosen, "--sizes", "8,3", "--noise", "white", "--snr", "5", "--plots", "pictures", "--workers", "1")
@@ -105,7 +106,7 @@ LEARNING_CURVE, FOLDS, TABLE3 = "learning-curve CORPUS", "folds CORPUS", "table3
     ],
 )
 def test_lists_and_numbers_that_cannot_be_used(
-    run: Run, toy_corpus: Corpus, here: Path, arguments: str, code: int, words: str
+    run: RunCommand, toy_corpus: Corpus, here: Path, arguments: str, code: int, words: str
 ) -> None:
     (here / "empty.txt").write_text("\n")
     (here / "strange.txt").write_text("toy00\nnobody\n")
@@ -116,7 +117,7 @@ def test_lists_and_numbers_that_cannot_be_used(
     assert len(list(here.iterdir())) == 2
 
 
-def test_sizes_that_are_not_numbers(run: Run, toy_corpus: Corpus) -> None:
+def test_sizes_that_are_not_numbers(run: RunCommand, toy_corpus: Corpus) -> None:
     done = run("experiment", "learning-curve", toy_corpus.path, "--sizes", "20,many")
     assert done.code == 2
     assert "'20,many'; required: numbers with commas between them" in done.err[-1]
@@ -132,7 +133,7 @@ def test_sizes_that_are_not_numbers(run: Run, toy_corpus: Corpus) -> None:
     ],
 )
 def test_what_cannot_be_used(
-    run: Run, toy_corpus: Corpus, here: Path, arguments: list[str], code: int, words: str
+    run: RunCommand, toy_corpus: Corpus, here: Path, arguments: list[str], code: int, words: str
 ) -> None:
     names = [toy_corpus.path if argument == "CORPUS" else argument for argument in arguments]
     done = run("experiment", "unit-sets", *names)

@@ -5,19 +5,19 @@ from pathlib import Path
 
 import pytest
 
-from cli.conftest import Run, is_one_error
+from cli.conftest import RunCommand, is_one_error
 
 pytestmark = pytest.mark.usefixtures("here")
 
 
-def test_a_frame_of_a_coupled_model(run: Run, coupled_model_file: Path, toy_speech: Path) -> None:
+def test_a_frame_of_a_coupled_model(run: RunCommand, coupled_model_file: Path, toy_speech: Path) -> None:
     done = run("explain", coupled_model_file, toy_speech, "--at", "0.8", "--transcript", "See Bob, papa & mama!")
     assert (done.code, done.err) == (0, [])
     assert done.out[0] == "0.80 s (frame 80)"
     assert [line for line in done.out if line.startswith("  asynchrony ")]
 
 
-def test_several_times_and_any_engine(run: Run, toy_model_file: Path, toy_speech: Path) -> None:
+def test_several_times_and_any_engine(run: RunCommand, toy_model_file: Path, toy_speech: Path) -> None:
     done = run("explain", toy_model_file, toy_speech, "--at", "0.8", "--at", "0.5")
     assert [line for line in done.out if line and not line.startswith(" ")] == [
         "0.80 s (frame 80)",
@@ -25,7 +25,7 @@ def test_several_times_and_any_engine(run: Run, toy_model_file: Path, toy_speech
     ]
 
 
-def test_for_machines(run: Run, coupled_model_file: Path, toy_speech: Path) -> None:
+def test_for_machines(run: RunCommand, coupled_model_file: Path, toy_speech: Path) -> None:
     done = run("explain", coupled_model_file, toy_speech, "--at", "0.8", "--at", "0.5", "--json")
     assert [json.loads(line)["frame"] for line in done.out] == [80, 50]
 
@@ -42,7 +42,7 @@ def test_for_machines(run: Run, coupled_model_file: Path, toy_speech: Path) -> N
     ],
 )
 def test_what_cannot_be_explained(
-    run: Run, coupled_model_file: Path, toy_speech: Path, options: list[str], code: int, words: str
+    run: RunCommand, coupled_model_file: Path, toy_speech: Path, options: list[str], code: int, words: str
 ) -> None:
     given = {"MODEL": coupled_model_file, "SPEECH": toy_speech}
     done = run("explain", *[given.get(option, option) for option in options])
@@ -50,5 +50,5 @@ def test_what_cannot_be_explained(
     assert words in done.err[0]
 
 
-def test_a_time_is_needed(run: Run, coupled_model_file: Path, toy_speech: Path) -> None:
+def test_a_time_is_needed(run: RunCommand, coupled_model_file: Path, toy_speech: Path) -> None:
     assert run("explain", coupled_model_file, toy_speech).code == 2

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from cli.conftest import Run
+from cli.conftest import RunCommand
 from lipmotion.corpora.store import Corpus
 
 resource = pytest.importorskip("resource")
@@ -44,8 +44,11 @@ def test_evaluate(toy_corpus: Corpus, toy_model_file: Path, here: Path) -> None:
     assert list(here.iterdir()) == []
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("limit", [LIMIT, 100_000, 140_000])
-def test_train_says_what_is_kept_and_goes_on(run_outside: Run, toy_corpus: Corpus, here: Path, limit: int) -> None:
+def test_train_says_what_is_kept_and_goes_on(
+    run_outside: RunCommand, toy_corpus: Corpus, here: Path, limit: int
+) -> None:
     code, line = run_limited("train", toy_corpus.path, "-o", "m.lipmotion", limit=limit)
     assert (code, "cannot be written: " in line) == (7, True)
     assert "make room, then run it again; what is finished is kept in m.lipmotion.unfinished" in line

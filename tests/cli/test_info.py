@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pytest
 
-from cli.conftest import Run, is_one_error
+from cli.conftest import RunCommand, is_one_error
 from lipmotion.pipeline.model import VERSION, read_header, shipped_path
 
 
-def test_a_model_says_whose_recordings_it_comes_from(run: Run, toy_model_file: Path) -> None:
+def test_a_model_says_whose_recordings_it_comes_from(run: RunCommand, toy_model_file: Path) -> None:
     done = run("info", toy_model_file)
     assert (done.code, done.err) == (0, [])
     assert done.out[0].split() == ["file", str(toy_model_file), "(0.2", "MB)"]
@@ -20,19 +20,19 @@ def test_a_model_says_whose_recordings_it_comes_from(run: Run, toy_model_file: P
     assert [line.split()[0] for line in done.out[1:]] == list(read_header(toy_model_file))
 
 
-def test_its_trees_can_be_printed(run: Run, toy_model_file: Path) -> None:
+def test_its_trees_can_be_printed(run: RunCommand, toy_model_file: Path) -> None:
     done = run("info", toy_model_file, "--structure")
     assert (done.code, done.err) == (0, [])
     assert done.out[0] == "speech.0"
     assert sum("leaf (" in line for line in done.out) >= 18
 
 
-def test_the_former_name_of_the_option_still_works(run: Run, toy_model_file: Path) -> None:
+def test_the_former_name_of_the_option_still_works(run: RunCommand, toy_model_file: Path) -> None:
     assert run("info", toy_model_file, "--trees") == run("info", toy_model_file, "--structure")
     assert not any("--trees" in line for line in run("info", "--help").out)
 
 
-def test_the_chains_of_a_coupled_model(run: Run, coupled_model_file: Path) -> None:
+def test_the_chains_of_a_coupled_model(run: RunCommand, coupled_model_file: Path) -> None:
     done = run("info", coupled_model_file, "--structure")
     assert (done.code, done.err) == (0, [])
     assert done.out[0].startswith("coupled: chains whose moves depend on all chains")
@@ -42,7 +42,7 @@ def test_the_chains_of_a_coupled_model(run: Run, coupled_model_file: Path) -> No
     assert any(line.startswith("means of geometry: ") for line in done.out)
 
 
-def test_the_shipped_model_is_the_default(run: Run) -> None:
+def test_the_shipped_model_is_the_default(run: RunCommand) -> None:
     done = run("info")
     assert done.out == run("info", shipped_path()).out
     assert any(line.startswith("attribution") and "GRID" in line for line in done.out)
@@ -57,7 +57,7 @@ def test_the_shipped_model_is_the_default(run: Run) -> None:
         ("NEWER", 6, f"version {VERSION + 1}, this lipmotion reads version {VERSION}; upgrade"),
     ],
 )
-def test_what_is_no_model(run: Run, newer_model: Path, here: Path, name: str, code: int, words: str) -> None:
+def test_what_is_no_model(run: RunCommand, newer_model: Path, here: Path, name: str, code: int, words: str) -> None:
     (here / "text").write_text("words")
     done = run("info", newer_model if name == "NEWER" else name)
     assert is_one_error(done, code)

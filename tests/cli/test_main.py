@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from cli.conftest import Run
+from cli.conftest import RunCommand
 from lipmotion.cli import info, main
 from lipmotion.errors import AlignmentError, LipMotionError, MissingDependencyError
 
@@ -14,7 +14,7 @@ STOPPED = "lipmotion: stopped; run the same command again to go on"
 VERBS = ["animate", "corpus", "train", "evaluate", "info"]
 
 
-def test_help_lists_verbs_and_exit_codes(run: Run) -> None:
+def test_help_lists_verbs_and_exit_codes(run: RunCommand) -> None:
     done = run("--help")
     assert (done.code, done.err) == (0, [])
     text = " ".join(" ".join(done.out).split())
@@ -24,20 +24,20 @@ def test_help_lists_verbs_and_exit_codes(run: Run) -> None:
 
 
 @pytest.mark.parametrize("verb", [*VERBS, "corpus prepare", "corpus info"])
-def test_every_verb_has_help(run: Run, verb: str) -> None:
+def test_every_verb_has_help(run: RunCommand, verb: str) -> None:
     done = run(*verb.split(), "--help")
     assert (done.code, done.err) == (0, [])
     assert done.out[0].startswith(f"usage: lipmotion {verb} ")
 
 
-def test_the_version(run: Run) -> None:
+def test_the_version(run: RunCommand) -> None:
     from importlib.metadata import version
 
     assert run("--version") == (0, [f"lipmotion {version('lipmotion')}"], [])
 
 
 @pytest.mark.parametrize("arguments", [[], ["bogus"], ["corpus"], ["corpus", "bogus"], ["--bogus"], ["train"]])
-def test_a_wrong_command_line(run: Run, arguments: list[str]) -> None:
+def test_a_wrong_command_line(run: RunCommand, arguments: list[str]) -> None:
     done = run(*arguments)
     assert (done.code, done.out) == (2, [])
     assert "error: " in done.err[-1]
@@ -58,7 +58,7 @@ def test_a_wrong_command_line(run: Run, arguments: list[str]) -> None:
     ],
 )
 def test_an_error_is_one_line(
-    run: Run, monkeypatch: pytest.MonkeyPatch, error: BaseException, code: int, line: str
+    run: RunCommand, monkeypatch: pytest.MonkeyPatch, error: BaseException, code: int, line: str
 ) -> None:
     def fail(_: object) -> None:
         raise error

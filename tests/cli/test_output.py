@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cli.conftest import Run
+from cli.conftest import RunCommand
 from lipmotion.cli import info
 from lipmotion.cli.events import Events
 from lipmotion.cli.main import main
@@ -161,7 +161,7 @@ def test_what_is_obeyed_is_shown(line: str, capsys: pytest.CaptureFixture[str]) 
     assert SHOWN[:8] in (out + err).replace("\\u001b", "\\x1b").replace("\\\\", "\\") or line in NOT_SHOWN
 
 
-def test_warnings(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_warnings(run: RunCommand, monkeypatch: pytest.MonkeyPatch) -> None:
     def warn(_: Namespace) -> None:
         logging.getLogger("lipmotion").warning("%s is odd", EVIL)
         logging.getLogger("another.package").error(EVIL)

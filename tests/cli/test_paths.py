@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from cli.conftest import Run, is_one_error
+from cli.conftest import RunCommand, is_one_error
 from lipmotion.cli.command_line import parser
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import ExportError
@@ -19,7 +19,7 @@ from lipmotion.pipeline.corpus.prepare import prepare
 from lipmotion.pipeline.cues import cues, write_cues
 from lipmotion.pipeline.model import load_model, shipped_path
 from lipmotion.pipeline.request import SpeechRequest
-from lipmotion.pipeline.training.train import train
+from lipmotion.pipeline.training.train import Run, train
 
 TALKING = "a.wav --transcript t.txt --lexicon l.txt --units u.json --model m.lipmotion"
 FIGURES = "c --lexicon l.txt"
@@ -78,7 +78,7 @@ def content(folder: Path) -> dict[str, bytes]:
 
 
 @pytest.mark.parametrize(("what", "line"), REFUSED, ids=lambda value: value if " -" in value else "")
-def test_an_output_that_is_an_input(run: Run, laid: Path, what: str, line: str) -> None:
+def test_an_output_that_is_an_input(run: RunCommand, laid: Path, what: str, line: str) -> None:
     before = content(laid)
     done = run(*line.split())
     assert is_one_error(done, 7), done
@@ -88,7 +88,7 @@ def test_an_output_that_is_an_input(run: Run, laid: Path, what: str, line: str) 
 
 @pytest.mark.parametrize("spelled", ["./{}", "../here/{}", "soft", "hard"])
 @pytest.mark.parametrize("name", ["a.wav", "t.txt", "u.json", "m.lipmotion"])
-def test_however_it_is_spelled(run: Run, laid: Path, name: str, spelled: str) -> None:
+def test_however_it_is_spelled(run: RunCommand, laid: Path, name: str, spelled: str) -> None:
     (laid / "soft").symlink_to(name)
     os.link(laid / name, laid / "hard")
     before = content(laid)
@@ -98,7 +98,7 @@ def test_however_it_is_spelled(run: Run, laid: Path, name: str, spelled: str) ->
     assert content(laid) == before
 
 
-def test_the_model_that_ships_is_an_input_too(run: Run, laid: Path) -> None:
+def test_the_model_that_ships_is_an_input_too(run: RunCommand, laid: Path) -> None:
     before = shipped_path().read_bytes()
     done = run("adapt", laid / "a.wav", "-o", shipped_path())
     assert is_one_error(done, 7)
@@ -107,14 +107,16 @@ def test_the_model_that_ships_is_an_input_too(run: Run, laid: Path) -> None:
 
 
 @pytest.mark.parametrize("force", [[], ["--force"]])
-def test_a_program_is_told(run: Run, laid: Path, force: list[str]) -> None:
+def test_a_program_is_told(run: RunCommand, laid: Path, force: list[str]) -> None:
     done = run("train", "c", "-o", "c/corpus.json", "--machine-readable", *force)
     assert done.code == 7
     assert '"exit_code": 7' in done.out[-1]
     assert laid.is_dir()
 
 
-def test_units_are_replaced_where_that_is_meant(run: Run, here: Path, toy_speech: Path, toy_model_file: Path) -> None:
+def test_units_are_replaced_where_that_is_meant(
+    run: RunCommand, here: Path, toy_speech: Path, toy_model_file: Path
+) -> None:
     line = ["animate", toy_speech, "--model", toy_model_file, "--recogniser", "own", "-o", "u.json"]
     assert run(*line).code == 0
     before = (here / "u.json").read_bytes()
@@ -123,14 +125,14 @@ def test_units_are_replaced_where_that_is_meant(run: Run, here: Path, toy_speech
     assert (here / "u.json").read_bytes() != before
 
 
-def test_a_model_is_adapted_in_its_place(run: Run, here: Path, toy_speech: Path, toy_model_file: Path) -> None:
+def test_a_model_is_adapted_in_its_place(run: RunCommand, here: Path, toy_speech: Path, toy_model_file: Path) -> None:
     shutil.copy(toy_model_file, here / "m.lipmotion")
     assert run("adapt", toy_speech, "--model", "m.lipmotion", "-o", "m.lipmotion", "--force").code == 0
     assert load_model(here / "m.lipmotion").adaptation is not None
 
 
 @pytest.mark.parametrize("line", ["animate a.wav -o a.wav --force", "adapt a.wav -o a.wav --force"])
-def test_a_recording_is_never_replaced(run: Run, laid: Path, line: str) -> None:
+def test_a_recording_is_never_replaced(run: RunCommand, laid: Path, line: str) -> None:
     done = run(*line.split())
     assert is_one_error(done, 7)
     assert "--force" not in done.err[0]
@@ -139,14 +141,14 @@ def test_a_recording_is_never_replaced(run: Run, laid: Path, line: str) -> None:
 
 @pytest.mark.usefixtures("here")
 def test_a_transcript_may_have_the_name_of_a_folder(
-    run: Run, here: Path, toy_speech: Path, toy_model_file: Path
+    run: RunCommand, here: Path, toy_speech: Path, toy_model_file: Path
 ) -> None:
     (here / "papa").mkdir()
     line = ["animate", toy_speech, "--model", toy_model_file, "--recogniser", "own", "--transcript", "papa"]
     assert run(*line, "-o", "papa/a.json").code == 0
 
 
-def test_a_link_is_written_through(run: Run, here: Path, toy_speech: Path, toy_model_file: Path) -> None:
+def test_a_link_is_written_through(run: RunCommand, here: Path, toy_speech: Path, toy_model_file: Path) -> None:
     (here / "there").mkdir()
     (here / "a.json").symlink_to("there/b.json")
     line = ["animate", toy_speech, "--model", toy_model_file, "--recogniser", "own", "-o", "a.json"]

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from cli.conftest import Done, Run
+from cli.conftest import Done, RunCommand
 from lipmotion.cli import evaluate
 from lipmotion.cli.events import Events, JsonLines
 from lipmotion.cli.main import main
@@ -83,7 +83,7 @@ def test_a_terminal_gets_a_bar(capsys: pytest.CaptureFixture[str], monkeypatch: 
     assert "lipmotion: warning: skipped b: no face\\nanywhere\n" in err
 
 
-def test_training_for_a_program(run: Run, toy_corpus: Corpus, here: Path) -> None:
+def test_training_for_a_program(run: RunCommand, toy_corpus: Corpus, here: Path) -> None:
     done = run("train", toy_corpus.path, "-o", "m.lipmotion", "--machine-readable")
     assert (done.code, done.err) == (0, [])
     first, *between, last = objects(done)
@@ -95,14 +95,14 @@ def test_training_for_a_program(run: Run, toy_corpus: Corpus, here: Path) -> Non
     assert [path.name for path in here.iterdir()] == ["m.lipmotion"]
 
 
-def test_evaluation_for_a_program(run: Run, toy_corpus: Corpus, toy_model_file: Path) -> None:
+def test_evaluation_for_a_program(run: RunCommand, toy_corpus: Corpus, toy_model_file: Path) -> None:
     done = run("evaluate", toy_model_file, toy_corpus.path, "--machine-readable")
     last = objects(done)[-1]
     assert (done.code, last["type"]) == (0, "success")
     assert last["figures"]["clips"] == 2  # type: ignore[index]
 
 
-def test_a_failure_is_said_to_both(run: Run) -> None:
+def test_a_failure_is_said_to_both(run: RunCommand) -> None:
     done = run("train", "missing", "-o", "m", "--machine-readable")
     assert done.code == 4
     start, failure = objects(done)
@@ -137,7 +137,7 @@ def test_why_it_failed(
     assert said.err.endswith(f"{reason}\n") or code == 1
 
 
-def test_an_error_on_the_command_line_is_a_failure_too(run: Run) -> None:
+def test_an_error_on_the_command_line_is_a_failure_too(run: RunCommand) -> None:
     done = run("evaluate", "--machine-readable")
     assert done.code == 2
     assert objects(done) == [{"type": "failure", "reason": "wrong command line", "exit_code": 2}]
@@ -165,7 +165,7 @@ def test_output_that_is_full(toy_corpus: Corpus, here: Path, arguments: list[str
     assert list(here.iterdir()) == []
 
 
-def test_what_is_swallowed_stops_at_the_next_event(monkeypatch: pytest.MonkeyPatch, run: Run) -> None:
+def test_what_is_swallowed_stops_at_the_next_event(monkeypatch: pytest.MonkeyPatch, run: RunCommand) -> None:
     """As when the signal comes during an import that treats any exception as a missing package."""
 
     def swallows(given: Namespace) -> None:

@@ -4,12 +4,12 @@ from pathlib import Path
 
 import pytest
 
-from cli.conftest import Run, is_one_error
+from cli.conftest import RunCommand, is_one_error
 from lipmotion.corpora.store import Corpus
 from lipmotion.pipeline.corpus.prompts import prompts
 
 
-def test_sentences_with_what_they_cover(run: Run) -> None:
+def test_sentences_with_what_they_cover(run: RunCommand) -> None:
     done = run("corpus", "prompts", "--count", "3")
     found = prompts(count=3)
     assert (done.code, done.err) == (0, [])
@@ -21,7 +21,7 @@ def test_sentences_with_what_they_cover(run: Run) -> None:
     )
 
 
-def test_options(run: Run, here: Path, toy_corpus: Corpus) -> None:
+def test_options(run: RunCommand, here: Path, toy_corpus: Corpus) -> None:
     (here / "mine.txt").write_text("Two qwrtzx.\nFive.\nPapa vxvx.\n")
     (here / "lexicon.txt").write_text("qwrtzx zh oy\n")
     done = run("corpus", "prompts", "--text", "mine.txt", "--lexicon", "lexicon.txt", "--have", toy_corpus.path)
@@ -29,7 +29,7 @@ def test_options(run: Run, here: Path, toy_corpus: Corpus) -> None:
     assert done.err == ["lipmotion: warning: left out 1 sentences for their words: vxvx"]
 
 
-def test_nothing_new(run: Run, here: Path, toy_corpus: Corpus) -> None:
+def test_nothing_new(run: RunCommand, here: Path, toy_corpus: Corpus) -> None:
     words = toy_corpus.utterance("toy00").words
     (here / "mine.txt").write_text(" ".join(words or ()))
     done = run("corpus", "prompts", "--text", "mine.txt", "--have", toy_corpus.path)
@@ -45,7 +45,7 @@ def test_nothing_new(run: Run, here: Path, toy_corpus: Corpus) -> None:
         (["--lexicon", "missing"], 3, "missing: no such lexicon file"),
     ],
 )
-def test_what_cannot_be_used(run: Run, here: Path, arguments: list[str], code: int, words: str) -> None:
+def test_what_cannot_be_used(run: RunCommand, here: Path, arguments: list[str], code: int, words: str) -> None:
     done = run("corpus", "prompts", *arguments)
     assert is_one_error(done, code)
     assert words in done.err[0]

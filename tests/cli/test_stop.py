@@ -15,7 +15,7 @@ import pytest
 
 import lipmotion
 from cli import signalled
-from cli.conftest import Run
+from cli.conftest import RunCommand
 from lipmotion.cli import info
 from lipmotion.cli.stop import Stopped, Stopper
 from lipmotion.corpora.store import Corpus
@@ -28,7 +28,7 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals as POSI
 
 @BOTH
 def test_a_signal_is_one_line_and_an_exit_code(
-    run: Run, monkeypatch: pytest.MonkeyPatch, number: signal.Signals
+    run: RunCommand, monkeypatch: pytest.MonkeyPatch, number: signal.Signals
 ) -> None:
     before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM), sys.excepthook
 
@@ -43,7 +43,7 @@ def test_a_signal_is_one_line_and_an_exit_code(
 
 @pytest.mark.parametrize("error", [ImportError("cannot import"), OSError("interrupted"), ZeroDivisionError()])
 def test_an_error_that_follows_from_a_signal_is_not_shown(
-    run: Run, monkeypatch: pytest.MonkeyPatch, error: Exception
+    run: RunCommand, monkeypatch: pytest.MonkeyPatch, error: Exception
 ) -> None:
     def kill(_: Namespace) -> None:
         try:
@@ -55,7 +55,9 @@ def test_an_error_that_follows_from_a_signal_is_not_shown(
     assert run("info") == (130, [], [LINE])
 
 
-def test_a_second_signal_at_once_does_not_disturb_the_tidying_up(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_second_signal_at_once_does_not_disturb_the_tidying_up(
+    run: RunCommand, monkeypatch: pytest.MonkeyPatch
+) -> None:
     tidied = []
 
     def kill(_: Namespace) -> None:
@@ -70,7 +72,7 @@ def test_a_second_signal_at_once_does_not_disturb_the_tidying_up(run: Run, monke
     assert tidied == [True]
 
 
-def test_an_ignored_signal_stays_ignored(monkeypatch: pytest.MonkeyPatch, run: Run) -> None:
+def test_an_ignored_signal_stays_ignored(monkeypatch: pytest.MonkeyPatch, run: RunCommand) -> None:
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         monkeypatch.setattr(info, "run", lambda _: signal.raise_signal(signal.SIGINT))
@@ -116,9 +118,10 @@ sys.exit(main())
 """A training run that pauses once it has written a checkpoint."""
 
 
+@pytest.mark.long
 @BOTH
 def test_training_stopped_in_the_middle_goes_on(
-    number: signal.Signals, toy_corpus, here: Path, run_outside: Run
+    number: signal.Signals, toy_corpus, here: Path, run_outside: RunCommand
 ) -> None:
     run_outside("train", toy_corpus.path, "-o", "whole.lipmotion")
     arguments = ["train", str(toy_corpus.path), "-o", "m.lipmotion"]
@@ -197,6 +200,7 @@ def lines(
     }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["cues", "cues of nothing", "evaluate", "train"])
 def test_whenever_the_signal_comes(name: str, lines: dict[str, tuple[list[object], bool, int]], here: Path) -> None:
     """From the first call to the end of Python: one final event says how the command ended, and no file is left."""

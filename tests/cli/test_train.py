@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cli.conftest import Run, is_one_error
+from cli.conftest import RunCommand, is_one_error
 from lipmotion.corpora.store import Corpus
 from lipmotion.export.base import read_motion
 from lipmotion.pipeline.model import Model, load_model, save_model
@@ -19,7 +19,7 @@ from lipmotion.testing.toy import toy_sentences
 from lipmotion.units import unit_set
 
 
-def test_a_model_and_what_it_was_made_of(run: Run, toy_corpus: Corpus, here: Path) -> None:
+def test_a_model_and_what_it_was_made_of(run: RunCommand, toy_corpus: Corpus, here: Path) -> None:
     done = run("train", toy_corpus.path, "-o", "mine.lipmotion")
     use = "use it: lipmotion animate SPEECH -o FILE --model mine.lipmotion"
     assert done == (0, [f"mine.lipmotion: 8 used, 0.3 minutes, 0 skipped; {use}"], [])
@@ -28,12 +28,12 @@ def test_a_model_and_what_it_was_made_of(run: Run, toy_corpus: Corpus, here: Pat
     assert (here / "mine.lipmotion").read_bytes() == (here / "function.lipmotion").read_bytes()
 
 
-def test_all_of_a_corpus(run: Run, toy_corpus: Corpus, here: Path) -> None:
+def test_all_of_a_corpus(run: RunCommand, toy_corpus: Corpus, here: Path) -> None:
     assert run("train", toy_corpus.path, "-o", "all.lipmotion", "--split", "all").code == 0
     assert load_model(here / "all.lipmotion").about["split"] == "all"
 
 
-def test_what_was_left_out_is_said(run: Run, toy_corpus: Corpus, here: Path) -> None:
+def test_what_was_left_out_is_said(run: RunCommand, toy_corpus: Corpus, here: Path) -> None:
     corpus = Corpus.create(here / "corpus")
     for name in toy_corpus.names("train")[:4]:
         utterance = toy_corpus.utterance(name)
@@ -45,7 +45,7 @@ def test_what_was_left_out_is_said(run: Run, toy_corpus: Corpus, here: Path) -> 
     assert warning.startswith("lipmotion: warning: skipped toy02: ")
 
 
-def test_speakers_are_chosen(run: Run, toy_corpus: Corpus, here: Path) -> None:
+def test_speakers_are_chosen(run: RunCommand, toy_corpus: Corpus, here: Path) -> None:
     corpus = Corpus.create(here / "corpus")
     for name, speaker in zip(toy_corpus.names("train"), ("anna", "anna", "ben", "ben", "carl"), strict=False):
         corpus.add(replace(toy_corpus.utterance(name), speaker=speaker))
@@ -60,7 +60,7 @@ def test_speakers_are_chosen(run: Run, toy_corpus: Corpus, here: Path) -> None:
     )
 
 
-def test_the_joint_engine(run: Run, toy_corpus: Corpus, here: Path) -> None:
+def test_the_joint_engine(run: RunCommand, toy_corpus: Corpus, here: Path) -> None:
     assert run("train", toy_corpus.path, "-o", "joint", "--engine", "joint").code == 0
     assert load_model(here / "joint").engine.name == "joint"
     assert run("evaluate", "joint", toy_corpus.path).code == 0
@@ -68,7 +68,7 @@ def test_the_joint_engine(run: Run, toy_corpus: Corpus, here: Path) -> None:
 
 
 def test_what_is_given_wins_over_what_the_joint_engine_recognises(
-    run: Run, toy_corpus: Corpus, toy_speech: Path, here: Path
+    run: RunCommand, toy_corpus: Corpus, toy_speech: Path, here: Path
 ) -> None:
     own = ["--units", "eVis", "--set", "recognise_units=true", "--set", "mixtures=1"]
     assert run("train", toy_corpus.path, "-o", "m", "--engine", "joint", *own).code == 0
@@ -85,7 +85,7 @@ def test_what_is_given_wins_over_what_the_joint_engine_recognises(
     assert {span.label.unit for span in units[0] if not span.label.phone} >= {"bilabial", "low"}
 
 
-def test_a_system_of_the_coupled_engine(run: Run, toy_corpus: Corpus, here: Path) -> None:
+def test_a_system_of_the_coupled_engine(run: RunCommand, toy_corpus: Corpus, here: Path) -> None:
     wanted = ["--engine", "coupled", "--system", "ph-MSHMM", "--set", "chains=2vis", "--set", "acoustic_regression=no"]
     assert run("train", toy_corpus.path, "-o", "m", *wanted).code == 0
     config = load_model(here / "m").engine.config
@@ -95,7 +95,7 @@ def test_a_system_of_the_coupled_engine(run: Run, toy_corpus: Corpus, here: Path
     assert "chain 1: 2vis, 2 units of 3 states" in said
 
 
-def test_units_of_a_table_that_is_not_needed_again(run: Run, toy_corpus: Corpus, here: Path) -> None:
+def test_units_of_a_table_that_is_not_needed_again(run: RunCommand, toy_corpus: Corpus, here: Path) -> None:
     units = unit_set("eVis")
     table = here / "mine.txt"
     table.write_text("".join(f"u{n} {' '.join(units.phones(unit))}\n" for n, unit in enumerate(units.units)))
@@ -109,7 +109,7 @@ def test_units_of_a_table_that_is_not_needed_again(run: Run, toy_corpus: Corpus,
 
 
 def test_other_voices_are_learned_from_but_those_for_judging(
-    run: Run, toy_model: Model, toy_corpus: Corpus, toy_speech: Path, here: Path, monkeypatch: pytest.MonkeyPatch
+    run: RunCommand, toy_model: Model, toy_corpus: Corpus, toy_speech: Path, here: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Of two installed voices, slt is held out; one friend was recorded."""
     speakers: list[list[str]] = []
@@ -135,14 +135,14 @@ def test_other_voices_are_learned_from_but_those_for_judging(
 
 
 def test_an_engine_without_a_use_for_voices(
-    run: Run, toy_corpus: Corpus, here: Path, monkeypatch: pytest.MonkeyPatch
+    run: RunCommand, toy_corpus: Corpus, here: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     sentence = toy_sentences(3)[0]
     one = SpokenSentence("one", "rms", sentence.audio, sentence.units)
     monkeypatch.setattr("lipmotion.pipeline.training.voices.many_voices", lambda **_: iter([one]))
     refused = run("train", toy_corpus.path, "-o", "other", "--voices")
     assert is_one_error(refused, 3)
-    assert "the trajectory engine cannot learn from other voices" in refused.err[0]
+    assert "the engine 'trajectory' does not learn from other voices without motion" in refused.err[0]
     assert list(here.iterdir()) == []
 
 
@@ -166,7 +166,7 @@ def test_an_engine_without_a_use_for_voices(
     ],
 )
 def test_what_cannot_be_used(
-    run: Run, toy_corpus: Corpus, here: Path, arguments: list[str], code: int, words: str
+    run: RunCommand, toy_corpus: Corpus, here: Path, arguments: list[str], code: int, words: str
 ) -> None:
     (here / "folder").mkdir()
     done = run("train", *[toy_corpus.path if argument == "CORPUS" else argument for argument in arguments])

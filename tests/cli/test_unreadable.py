@@ -116,6 +116,7 @@ def run_as_ordinary(line: str) -> Done:
     return Done(done.returncode, done.stdout.splitlines(), done.stderr.splitlines())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("closed", "code", "line"), LINES, ids=str)
 def test_what_may_not_be_read_or_written(laid: Path, closed: str, code: int, line: str) -> None:
     before = sorted(path.name for path in laid.iterdir())

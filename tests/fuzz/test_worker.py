@@ -38,6 +38,7 @@ def test_defects_are_told_apart(order: str, kind: str, planted: Worker) -> None:
     assert planted.read_input("planted", _input("now")).kind == READ  # the next input is not affected
 
 
+@pytest.mark.long
 def test_a_hang() -> None:
     with Worker(NOWHERE, hang_s=1.0, readers=readers) as impatient:
         result = impatient.read_input("planted", _input("sleep"))

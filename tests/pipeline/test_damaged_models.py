@@ -55,6 +55,7 @@ def test_damaged_arrays_of_an_engine(name: str, toy_sentence: ToySentence, reque
     assert harmless < refusals / 4
 
 
+@pytest.mark.long
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ENGINES)
 def test_all_damages_of_an_engine(name: str, toy_sentence: ToySentence, request: pytest.FixtureRequest) -> None:

@@ -11,6 +11,7 @@ import pytest
 SCRIPT = Path(__file__).parents[2] / "benchmarks" / "kills.py"
 
 
+@pytest.mark.long
 @pytest.mark.slow
 @pytest.mark.video
 @pytest.mark.parametrize("jobs", [["prepare"], ["train", "prepare-sounds"], ["animate", "cues", "adapt"]])

@@ -34,6 +34,7 @@ def some_of_grid(recordings: Path, tmp_path_factory: pytest.TempPathFactory) -> 
     return folder
 
 
+@pytest.mark.long
 @pytest.mark.recordings
 @pytest.mark.video
 @pytest.mark.slow

@@ -85,6 +85,7 @@ def killed_while_sending(_: int) -> bytes:
     return bytes(2_000_000_000)
 
 
+@pytest.mark.long
 def test_a_worker_that_dies_while_it_sends_is_a_clear_error() -> None:
     with pytest.raises(CorpusError, match="a worker process died"), working(2) as team:
         list(team.each(killed_while_sending, range(2)))

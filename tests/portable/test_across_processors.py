@@ -33,6 +33,7 @@ def both(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, np.ndarray
     return here, there
 
 
+@pytest.mark.long
 def test_everything_is_compared(both):
     here, there = both
     assert here.keys() == there.keys()

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from cli.conftest import Run
+from cli.conftest import RunCommand
 from lipmotion.cli import info
 from robustness.case import CASES, Bench, Case
 from robustness.document import DOCUMENT, rendered
@@ -16,7 +16,7 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="pipes, devices 
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: f"{case.group}: {case.name}")
-def test_bad_input(case: Case, bench: Bench, run: Run, here: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_bad_input(case: Case, bench: Bench, run: RunCommand, here: Path, caplog: pytest.LogCaptureFixture) -> None:
     if case.group == "videos":
         pytest.importorskip("mediapipe")
     done = run(*case.make(bench))
@@ -48,7 +48,7 @@ def test_a_full_disk_behind_the_standard_output() -> None:
     assert done.returncode == 7
 
 
-def test_not_enough_memory(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_not_enough_memory(run: RunCommand, monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(_: object) -> None:
         raise MemoryError("Unable to allocate 7 TiB")
 

@@ -82,6 +82,7 @@ def test_the_same_recordings_give_the_same_adaptation(
     assert np.array_equal(again.general, same_speaker.adaptation.general)
 
 
+@pytest.mark.long
 def test_silence_beside_speech_does_no_harm(
     toy_model: Model, voice: list[Audio], same_speaker: EstimatedAdaptation
 ) -> None:

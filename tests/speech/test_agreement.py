@@ -41,6 +41,7 @@ def test_it_is_the_mean_over_frames_of_the_best_state_of_what_is_said(sentences:
     assert agreement_score(sentence.audio, sentence.units) == pytest.approx(np.mean(wanted), abs=1e-4)
 
 
+@pytest.mark.long
 def test_right_words_agree_and_wrong_ones_do_not(sentences: list[ToySentence], toy_model: Model) -> None:
     phones = Recogniser(toy_model.phones, "auto")
     for said in sentences:

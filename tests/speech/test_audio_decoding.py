@@ -377,6 +377,7 @@ def test_a_video_without_sound_and_a_sound_without_video(tmp_path: Path) -> None
         pass
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("suffix", "codec"), [("wav", "pcm_s16le"), ("aac", "aac")])
 def test_memory_is_that_of_the_result(tmp_path: Path, suffix: str, codec: str) -> None:
     path = write_sound(tmp_path / f"a.{suffix}", np.tile(babble(16_000, 20), (2, 15)), 16_000, codec)  # 5 minutes

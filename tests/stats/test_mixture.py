@@ -53,8 +53,8 @@ def test_chosen_densities_come_in_the_order_asked_for():
     mixtures, (x, _) = random_mixtures(1), random_data(1, 10)
     chosen = np.array([2, 0, 2])
     assert mixtures.log_likelihood(x, chosen) == pytest.approx(mixtures.log_likelihood(x)[:, chosen], abs=1e-5)
-    assert np.array_equal(mixtures.picked(chosen).log_likelihood(x), mixtures.log_likelihood(x, chosen))
-    assert mixtures.joined(mixtures.picked(chosen)).size == (6, 2, 3)
+    assert np.array_equal(mixtures.selected(chosen).log_likelihood(x), mixtures.log_likelihood(x, chosen))
+    assert mixtures.concatenated(mixtures.selected(chosen)).size == (6, 2, 3)
 
 
 @given(seed=SEEDS)
@@ -63,9 +63,9 @@ def test_no_step_of_improvement_lowers_the_likelihood(seed):
     mixtures, (x, share) = random_mixtures(seed), random_data(seed)
     before = -np.inf
     for _ in range(8):
-        mixtures.improve(1, x, share, FLOOR)
+        mixtures.em_update(1, x, share, FLOOR)
         used = np.isfinite(mixtures.log_weights[1])
-        after = weighted_log_likelihood(mixtures.picked(np.array([1])), 0, x, share)
+        after = weighted_log_likelihood(mixtures.selected(np.array([1])), 0, x, share)
         if used.all():  # switching a component off is no step of EM
             assert after >= before - 1e-2  # single precision, 200 frames
         before = after
@@ -74,7 +74,7 @@ def test_no_step_of_improvement_lowers_the_likelihood(seed):
 def test_one_gaussian_takes_the_weighted_mean_and_variance():
     mixtures, (x, share) = random_mixtures(2, components=1), random_data(2)
     untouched = mixtures.copy()
-    mixtures.improve(1, x, share, FLOOR)
+    mixtures.em_update(1, x, share, FLOOR)
     mean = np.average(x, axis=0, weights=share)
     assert mixtures.means[1, 0] == pytest.approx(mean, abs=1e-4)
     assert mixtures.variances[1, 0] == pytest.approx(np.average((x - mean) ** 2, axis=0, weights=share), abs=1e-3)
@@ -85,17 +85,17 @@ def test_one_gaussian_takes_the_weighted_mean_and_variance():
 def test_variances_stay_above_the_floor():
     mixtures = equal_gaussians(np.zeros((10, 3), np.float32), 1)
     floor = np.array([0.1, 0.2, 0.3], np.float32)
-    mixtures.improve(0, np.ones((50, 3), np.float32), np.ones(50, np.float32), floor)
+    mixtures.em_update(0, np.ones((50, 3), np.float32), np.ones(50, np.float32), floor)
     assert mixtures.variances[0, 0] == pytest.approx(floor)
 
 
 def test_a_component_without_data_is_switched_off():
     mixtures, (x, share) = random_mixtures(3), random_data(3)
     mixtures.means[0, 1] = 1000
-    mixtures.improve(0, x, share, FLOOR)
+    mixtures.em_update(0, x, share, FLOOR)
     assert mixtures.log_weights[0].tolist() == pytest.approx([0, -np.inf])
     assert np.isfinite(mixtures.log_likelihood(x)).all()
-    mixtures.improve(0, x, share, FLOOR)
+    mixtures.em_update(0, x, share, FLOOR)
     assert np.isfinite(mixtures.split().log_likelihood(x)).all()
 
 
@@ -103,13 +103,13 @@ def test_a_component_without_data_is_switched_off():
 @settings(deadline=None, max_examples=20)
 def test_huge_relevance_keeps_the_prior(seed):
     mixtures, (x, share) = random_mixtures(seed), random_data(seed)
-    wanted = mixtures.picked(np.array([2]))
+    wanted = mixtures.selected(np.array([2]))
     mixtures.means[0], mixtures.variances[0], mixtures.log_weights[0] = (
         wanted.means[0],
         wanted.variances[0],
         wanted.log_weights[0],
     )
-    mixtures.adapt(0, x, share, prior=2, relevance=1e8)
+    mixtures.map_update(0, x, share, prior=2, relevance=1e8)
     assert mixtures.means[0] == pytest.approx(wanted.means[0], abs=1e-3)
     assert mixtures.variances[0] == pytest.approx(wanted.variances[0], rel=1e-3, abs=1e-3)
     assert mixtures.log_weights[0] == pytest.approx(wanted.log_weights[0], abs=1e-3)
@@ -118,7 +118,7 @@ def test_huge_relevance_keeps_the_prior(seed):
 def test_tiny_relevance_follows_the_data():
     mixtures, (x, share) = random_mixtures(4, components=1), random_data(4)
     mixtures.variances[2] = 1  # the prior's variance bounds what adaptation may reach from below
-    mixtures.adapt(0, x, share, prior=2, relevance=1e-6)
+    mixtures.map_update(0, x, share, prior=2, relevance=1e-6)
     mean = np.average(x, axis=0, weights=share)
     variance = np.average((x - mean) ** 2, axis=0, weights=share)
     assert mixtures.means[0, 0] == pytest.approx(mean, abs=1e-3)
@@ -128,7 +128,7 @@ def test_tiny_relevance_follows_the_data():
 def test_relevance_counts_as_frames():
     mixtures, x = random_mixtures(5, components=1), np.full((30, 3), 2.0, np.float32)
     prior = mixtures.means[1, 0].astype(float)
-    mixtures.adapt(0, x, np.ones(30, np.float32), prior=1, relevance=10.0)
+    mixtures.map_update(0, x, np.ones(30, np.float32), prior=1, relevance=10.0)
     assert mixtures.means[0, 0] == pytest.approx((10 * prior + 30 * 2) / 40, abs=1e-5)
 
 

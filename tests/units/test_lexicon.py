@@ -142,6 +142,7 @@ def test_without_a_dictionary_it_says_what_to_install(monkeypatch: pytest.Monkey
         Lexicon().known("bin")
 
 
+@pytest.mark.long
 def test_the_dictionary_is_searched_as_if_line_by_line() -> None:
     """Words at both ends, with variants, beside longer ones, and none at all."""
     lines = [line.split() for line in lexicon._dictionary().decode().lower().splitlines() if line]

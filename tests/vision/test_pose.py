@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from lipmotion.vision.landmarks import EYE_CORNERS, JAW_POINTS, LIP_POINTS, NASION, RIGID_POINTS, TRACKED_POINTS
-from lipmotion.vision.pose import head_frame, similarity_transforms
+from lipmotion.vision.pose import similarity_transforms, without_head_motion
 
 COLUMN = {index: n for n, index in enumerate(TRACKED_POINTS)}
 FRAMES = 40
@@ -33,8 +33,8 @@ def moved(speech) -> NDArray[np.float64]:
 
 
 def test_head_motion_is_removed_and_speech_is_not(speech, moved):
-    still = head_frame(speech, TRACKED_POINTS)
-    np.testing.assert_allclose(head_frame(moved, TRACKED_POINTS), still, atol=1e-6)
+    still = without_head_motion(speech, TRACKED_POINTS)
+    np.testing.assert_allclose(without_head_motion(moved, TRACKED_POINTS), still, atol=1e-6)
     np.testing.assert_allclose(  # distances within a frame, in eye distances, are those of the speech
         np.linalg.norm(still[:, COLUMN[13]] - still[:, COLUMN[14]], axis=1),
         np.linalg.norm(speech[:, COLUMN[13]] - speech[:, COLUMN[14]], axis=1),
@@ -43,7 +43,7 @@ def test_head_motion_is_removed_and_speech_is_not(speech, moved):
 
 
 def test_the_axes_are_those_of_the_head(moved):
-    head = head_frame(moved, TRACKED_POINTS)
+    head = without_head_motion(moved, TRACKED_POINTS)
     right, left = (head[:, COLUMN[index]].mean(axis=0) for index in EYE_CORNERS)
     np.testing.assert_allclose(right, [-0.5, 0, 0], atol=1e-6)
     np.testing.assert_allclose(left, [0.5, 0, 0], atol=1e-6)
@@ -55,10 +55,10 @@ def test_the_axes_are_those_of_the_head(moved):
 
 
 def test_noise_of_the_rigid_points_hardly_reaches_the_lips(speech, moved):
-    clean = head_frame(speech, TRACKED_POINTS)
+    clean = without_head_motion(speech, TRACKED_POINTS)
     noise = np.random.default_rng(7).normal(size=moved.shape)
     noise[:, [COLUMN[index] for index in LIP_POINTS]] = 0
-    noisy = head_frame(moved + 0.5 * noise, TRACKED_POINTS)  # under 1 % of the distance between the eyes
+    noisy = without_head_motion(moved + 0.5 * noise, TRACKED_POINTS)  # under 1 % of the distance between the eyes
     lips = [COLUMN[index] for index in LIP_POINTS]
     assert np.sqrt(np.square(noisy - clean)[:, lips].mean()) < 0.01
 

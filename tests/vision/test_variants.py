@@ -83,6 +83,7 @@ def test_frames_out_of_step(tmp_path: Path, frames: list[Image], usual: Track) -
     assert alike(found, usual) > 0.97
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("rate", "least"), [(24, 0.96), (30, 0.97), (60, 0.98)])
 def test_other_rates_by_repeating_or_dropping(
     tmp_path: Path, frames: list[Image], usual: Track, rate: int, least: float
@@ -93,6 +94,7 @@ def test_other_rates_by_repeating_or_dropping(
     assert alike(found, usual) > least
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("rotation", [90, 180, 270])
 def test_phones_held_sideways(tmp_path: Path, frames: list[Image], usual: Track, rotation: int) -> None:
     turned = [np.rot90(frame, -rotation // 90) for frame in frames]
@@ -101,6 +103,7 @@ def test_phones_held_sideways(tmp_path: Path, frames: list[Image], usual: Track,
     assert alike(found, usual) > 0.99
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "codec", "options", "pixels"),
     [
@@ -143,6 +146,7 @@ def test_dropped_frames_are_unseen(tmp_path: Path, frames: list[Image], usual: T
     assert alike(found, usual) > 0.99
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["grey", "noise"])
 def test_ruined_frames_are_unseen(tmp_path: Path, frames: list[Image], usual: Track, kind: str) -> None:
     draw = np.random.default_rng(0)
@@ -152,6 +156,7 @@ def test_ruined_frames_are_unseen(tmp_path: Path, frames: list[Image], usual: Tr
     assert alike(found, usual) > 0.99
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("by", ["box", "hand"])
 def test_something_before_the_mouth(
     tmp_path: Path, frames: list[Image], usual: Track, mouths: list[tuple[NDArray[np.float64], float]], by: str
@@ -201,6 +206,7 @@ def test_a_jump_cut_to_the_same_person_is_followed(tmp_path: Path, frames: list[
     assert found.notes == ("cut at 1.52 s",)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("is_left", [True, False])
 def test_of_two_people_the_larger_is_followed(
     tmp_path: Path, frames: list[Image], usual: Track, stranger: tuple[list[Image], Track], is_left: bool
@@ -212,6 +218,7 @@ def test_of_two_people_the_larger_is_followed(
         assert alike(found, expected) > 0.98
 
 
+@pytest.mark.long
 def test_two_alike_are_not_mixed_up(
     tmp_path: Path, frames: list[Image], usual: Track, stranger: tuple[list[Image], Track]
 ) -> None:

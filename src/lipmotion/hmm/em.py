@@ -69,7 +69,7 @@ def adapt_contexts(
         mixtures = model.mixtures.copy()
         for density, x, weights in statistics.by_density():
             if density >= plain:
-                mixtures.adapt(density, x, weights, int(parents[density]), model.config.relevance)
+                mixtures.map_update(density, x, weights, int(parents[density]), model.config.relevance)
         return replace(model, mixtures=mixtures)
 
     return run_em(hmm, lambda model: accumulate_statistics(model, data, sequences, each), maximise, steps, after_step)
@@ -85,7 +85,7 @@ def reestimated_mixtures(hmm: UnitHmm, statistics: UnitStatistics, data: Sequenc
     floor = hmm.config.variance_floor * np.concatenate(data).var(axis=0)
     for density, x, weights in statistics.by_density():
         if weights.sum() >= 1:
-            mixtures.improve(density, x, weights, floor)
+            mixtures.em_update(density, x, weights, floor)
     return mixtures
 
 

@@ -362,8 +362,8 @@ def _initial_path(energy: NDArray[np.float32], chain: StateSequence, units: int)
 def _with_contexts(hmm: UnitHmm, names: tuple[str, ...]) -> UnitHmm:
     """Return models with more states in context, whose densities are copies of those without context."""
     table = hmm.table.extended(names)
-    new = hmm.mixtures.picked(table.parents()[len(hmm.log_stay) :])
-    return replace(hmm, table=table, mixtures=hmm.mixtures.joined(new))
+    new = hmm.mixtures.selected(table.parents()[len(hmm.log_stay) :])
+    return replace(hmm, table=table, mixtures=hmm.mixtures.concatenated(new))
 
 
 def _frequent_contexts(

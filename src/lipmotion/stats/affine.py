@@ -1,8 +1,9 @@
-"""Affine transforms of features that make them most like what Gaussians expect (constrained MLLR)."""
+"""Affine transforms of features that maximise their likelihood under Gaussians (constrained MLLR)."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,17 +12,17 @@ from lipmotion.stats.mixture import Mixtures
 
 Array = NDArray[np.float64]
 SWEEPS = 8
-"""Times that all rows are set anew, one after the other, for one set of statistics."""
+"""How often all rows are re-estimated, one after the other, from one set of statistics."""
 
 
 @dataclass(frozen=True, eq=False)
 class AffineStatistics:
-    """What frames say about the rows of a transform, given the Gaussian that each belongs to.
+    """Sufficient statistics of frames for a transform.
 
-    count     : β, the frames
-    quadratic : the sum over frames and Gaussians of posterior / variance · ζ ζᵀ [shape=(D, D + 1, D + 1)], row by row,
-                where ζ are the features of a frame and 1
-    linear    : the sum of posterior · mean / variance · ζ [shape=(D, D + 1)]
+    count     : β, the number of frames
+    quadratic : for each row of the transform [shape=(D, D + 1, D + 1)], the sum over frames and Gaussians of
+                posterior / variance · ζ ζᵀ, where ζ are the features of a frame and 1
+    linear    : for each row [shape=(D, D + 1)], the sum of posterior · mean / variance · ζ
     """
 
     count: float
@@ -32,7 +33,7 @@ class AffineStatistics:
         return AffineStatistics(self.count + other.count, self.quadratic + other.quadratic, self.linear + other.linear)
 
     def times(self, factor: float) -> AffineStatistics:
-        """Return what ``factor`` times as many frames of the same kind would say."""
+        """Return the statistics of ``factor`` times as many such frames."""
         return AffineStatistics(factor * self.count, factor * self.quadratic, factor * self.linear)
 
     def objective(self, transform: Array) -> float:
@@ -41,8 +42,23 @@ class AffineStatistics:
         Source: Gales 1998, Eq. 25.
         """
         _, log_determinant = np.linalg.slogdet(transform[:, :-1])
-        bent = np.einsum("ij,ijk,ik->", transform, self.quadratic, transform)
-        return float(self.count * log_determinant - 0.5 * bent + (self.linear * transform).sum())
+        squared = np.einsum("ij,ijk,ik->", transform, self.quadratic, transform)
+        return float(self.count * log_determinant - 0.5 * squared + (self.linear * transform).sum())
+
+
+class TransformStatistics(NamedTuple):
+    """The result of the E-step for a transform.
+
+    log_likelihood : of the frames under the transform so far
+    """
+
+    statistics: AffineStatistics
+    log_likelihood: float
+
+    @property
+    def mean_log_likelihood(self) -> float:
+        """Mean log likelihood per frame."""
+        return self.log_likelihood / max(self.statistics.count, 1.0)
 
 
 def identity(size: int) -> Array:
@@ -51,44 +67,48 @@ def identity(size: int) -> Array:
 
 
 def transformed(features: NDArray[np.float32], transform: Array) -> NDArray[np.float32]:
-    """Return features [shape=(T, D)] after a transform [shape=(D, D + 1)]."""
+    """Return the features after a transform [shape=(T, D)].
+
+    features : [shape=(T, D)];  transform : [shape=(D, D + 1)]
+    """
     matrix, offset = transform[:, :-1].T.astype(np.float32), transform[:, -1].astype(np.float32)
     return np.asarray(features @ matrix + offset, np.float32)
 
 
 def log_determinant(transform: Array) -> float:
-    """Return what a transform adds to the log density of every frame."""
+    """Return the log-determinant of a transform, which it adds to the log density of every frame."""
     return float(np.linalg.slogdet(transform[:, :-1])[1])
 
 
 def transform_statistics(
     mixtures: Mixtures, features: NDArray[np.float32], densities: NDArray[np.intp], transform: Array
-) -> tuple[AffineStatistics, float]:
-    """Return what frames say whose densities are known, and their log likelihood under the transform so far.
+) -> TransformStatistics:
+    """Return the statistics of frames whose densities are known, with posteriors under the transform so far.
 
     features  : before the transform [shape=(T, D)]
-    densities : [shape=(T,)]
+    densities : the density of every frame [shape=(T,)]
     """
-    heard = transformed(features, transform)
-    precision, pull = (np.zeros(features.shape) for _ in range(2))
+    current = transformed(features, transform)
+    precision, target = (np.zeros(features.shape) for _ in range(2))
     log_likelihood = len(features) * log_determinant(transform)
     for density in np.unique(densities):
-        mine = np.flatnonzero(densities == density)
-        components = mixtures.log_components(heard[mine], np.array([density]))[:, 0].astype(float)
+        of_density = np.flatnonzero(densities == density)
+        components = mixtures.log_components(current[of_density], np.array([density]))[:, 0].astype(float)
         total = np.logaddexp.reduce(components, axis=1)
         posterior = np.exp(components - total[:, None])
-        precision[mine] = posterior @ (1 / mixtures.variances[density])
-        pull[mine] = posterior @ (mixtures.means[density] / mixtures.variances[density])
+        precision[of_density] = posterior @ (1 / mixtures.variances[density])
+        target[of_density] = posterior @ (mixtures.means[density] / mixtures.variances[density])
         log_likelihood += float(total.sum())
     extended = np.concatenate([features, np.ones((len(features), 1))], axis=1)
     quadratic = np.stack([(extended * weights[:, None]).T @ extended for weights in precision.T])
-    return AffineStatistics(float(len(features)), quadratic, pull.T @ extended), log_likelihood
+    return TransformStatistics(AffineStatistics(float(len(features)), quadratic, target.T @ extended), log_likelihood)
 
 
 def prior_statistics(mixtures: Mixtures, densities: NDArray[np.intp]) -> AffineStatistics:
-    """Return what one frame drawn from the densities themselves [shape=(N,)], all as often, says on average.
+    """Return the expected statistics of one frame drawn from densities, each equally often.
 
-    Nothing explains it better than the identity: as a prior it draws every transform there.
+    densities : their numbers [shape=(N,)]
+    The transform that maximises their likelihood is the identity: as a prior they draw any transform towards it.
     """
     weights = np.exp(mixtures.log_weights[densities].astype(float)).ravel() / len(densities)
     used = np.flatnonzero(weights)
@@ -97,7 +117,7 @@ def prior_statistics(mixtures: Mixtures, densities: NDArray[np.intp]) -> AffineS
     variances = mixtures.variances[densities].reshape(-1, size)[used].astype(float)
     extended = np.concatenate([means, np.ones((len(means), 1))], axis=1)
     precision = weights[used, None] / variances
-    quadratic = np.stack([(extended * one[:, None]).T @ extended for one in precision.T])
+    quadratic = np.stack([(extended * weights_of_row[:, None]).T @ extended for weights_of_row in precision.T])
     spread = precision.T @ variances
     quadratic[:, np.arange(size), np.arange(size)] += spread
     return AffineStatistics(float(weights.sum()), quadratic, (precision * means).T @ extended)
@@ -106,8 +126,9 @@ def prior_statistics(mixtures: Mixtures, densities: NDArray[np.intp]) -> AffineS
 def improved_transform(
     transform: Array, statistics: AffineStatistics, free: NDArray[np.bool_], sweeps: int = SWEEPS
 ) -> Array:
-    """Return a transform [shape=(D, D + 1)] with no less ``AffineStatistics.objective``, row after row the best.
+    """Return a transform [shape=(D, D + 1)] whose ``AffineStatistics.objective`` is at least as high (the M-step).
 
+    Each row in turn is set to its best values given the others.
     free : the entries that may change [shape=(D, D + 1)], the diagonal among them; others stay
     Source: Gales 1998, §3.2 and appendix: a row's best values are a quadratic equation given the cofactors.
     Cost: O(sweeps · D⁴).
@@ -122,13 +143,14 @@ def improved_transform(
 
 
 def _best_row(old: Array, columns: NDArray[np.intp], cofactors: Array, statistics: AffineStatistics, row: int) -> Array:
+    """Return the best values of some columns of a row, given the other columns, and the cofactors of the other rows."""
     fixed = np.where(np.isin(np.arange(len(old)), columns), 0.0, old)
     inverse = np.linalg.inv(statistics.quadratic[row][np.ix_(columns, columns)])
-    pull = (statistics.linear[row] - statistics.quadratic[row] @ fixed)[columns]
+    target = (statistics.linear[row] - statistics.quadratic[row] @ fixed)[columns]
     volume, offset = cofactors[columns], float(cofactors @ fixed)
     # α maximises β log|α·a + b + offset| − α²·a / 2
-    a, b = float(volume @ inverse @ volume), float(volume @ inverse @ pull) + offset
+    a, b = float(volume @ inverse @ volume), float(volume @ inverse @ target) + offset
     root = np.sqrt(b * b + 4 * a * statistics.count)
     alphas = np.array([(-b + root) / (2 * a), (-b - root) / (2 * a)])
     values = statistics.count * np.log(np.abs(alphas * a + b)) - alphas * alphas * a / 2
-    return np.asarray((alphas[int(values.argmax())] * volume + pull) @ inverse)
+    return np.asarray((alphas[int(values.argmax())] * volume + target) @ inverse)

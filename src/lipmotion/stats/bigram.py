@@ -1,4 +1,4 @@
-"""A back-off bigram over units."""
+"""A back-off bigram language model over units."""
 
 from __future__ import annotations
 
@@ -13,14 +13,16 @@ from numpy.typing import NDArray
 from lipmotion.storage.schema import ArraySpec
 
 DISCOUNT = 0.5
+"""Subtracted from the count of every pair of units that occurred."""
 BIGRAM = {"bigram": ArraySpec(np.float32, "U U", -1e4, 0.1)}
-"""Log probabilities, stored."""
+"""How log probabilities are stored."""
 ROW_TOLERANCE = 0.01
+"""Largest error of a sum of stored probabilities."""
 
 
 @dataclass(frozen=True, eq=False)
 class Bigram:
-    """Log P(next | unit) [shape=(V, V)], row: unit, column: next."""
+    """A bigram: log P(next | unit) [shape=(V, V)], a row for each unit, a column for each next unit."""
 
     units: tuple[str, ...]
     log_probability: NDArray[np.float32]
@@ -31,10 +33,10 @@ class Bigram:
 
 
 def estimate_bigram(units: Sequence[str], sentences: Iterable[Sequence[str]]) -> Bigram:
-    """Estimate by absolute discounting, backing off to unigrams.
+    """Return the bigram of sentences, by absolute discounting with back-off to unigrams.
 
-    Pairs seen lose ``DISCOUNT`` of their count; what they lose is shared by the unseen pairs of the same
-    unit in proportion to P(next), so every row sums to 1. Units never seen count as seen half a time.
+    Pairs that occur lose ``DISCOUNT`` of their count; the other pairs of the same unit share what is lost, in
+    proportion to P(next), so every row sums to 1. A unit that never occurs has a count of one half.
     Source: the back-off bigram of Hofer 2008, Eq. 5 (the print names no discount).
     """
     pairs: Counter[tuple[str, str]] = Counter()
@@ -52,23 +54,24 @@ def estimate_bigram(units: Sequence[str], sentences: Iterable[Sequence[str]]) ->
 
 
 def bigram_from_array(units: Sequence[str], stored: NDArray[np.float32]) -> Bigram:
-    """Return a stored bigram, as ``BIGRAM`` says. Raises ValueError: a row whose probabilities do not sum to 1."""
+    """Deserialise a bigram, stored as ``BIGRAM``. Raises ValueError: a row whose probabilities do not sum to 1."""
     check_sums_to_one("bigram", np.exp(stored.astype(float)).sum(axis=1))
     return Bigram(tuple(units), stored)
 
 
 def check_sums_to_one(name: str, totals: NDArray[np.float64]) -> None:
-    """Raise ValueError unless probabilities sum to 1."""
+    """Raise ValueError unless all totals, sums of probabilities, are 1; ``name`` is that of the array."""
     worst = float(np.abs(totals - 1).max())
     if worst > ROW_TOLERANCE:
         raise ValueError(f"{name} of probabilities whose sum is {worst:g} off, required 1")
 
 
 def _row(counts: NDArray[np.float64], unigram: NDArray[np.float64]) -> NDArray[np.float64]:
-    total, seen = counts.sum(), counts > 0
+    """Return P(next | unit) [shape=(V,)] from the counts of its pairs."""
+    total, occurs = counts.sum(), counts > 0
     if not total:
         return unigram
-    row = np.where(seen, (counts - DISCOUNT) / total, 0)
-    if seen.all():
+    row = np.where(occurs, (counts - DISCOUNT) / total, 0)
+    if occurs.all():
         return row / row.sum()
-    return row + np.where(seen, 0, unigram) * (1 - row.sum()) / unigram[~seen].sum()
+    return row + np.where(occurs, 0, unigram) * (1 - row.sum()) / unigram[~occurs].sum()

@@ -1,4 +1,4 @@
-"""Static values with their slope and curvature."""
+"""Dynamic features: static values with Δ (slope) and Δ² (curvature)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ def with_dynamics(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return each value with its Δ = (-½, 0, ½) and Δ² = (1, -2, 1) [shape=(T, 3, P)].
 
     values : [shape=(T, P)]
-    The dynamic rows that stick out at the ends are 0; parameter generation gives them no weight.
+    Δ and Δ² of the first and last frame, which need frames outside, are 0; parameter generation gives them no weight.
     Source: Hofer 2008, Eqs. 6–8 (the print's Δ² lost its minus sign).
     """
     dynamics = np.zeros((len(values), 3, values.shape[1]))
@@ -21,7 +21,10 @@ def with_dynamics(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def dynamics_known(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return which frames hold with both neighbours [shape=(T,)]: those whose dynamics are known."""
+    """Return where Δ and Δ² are known [shape=(T,)]: in frames that are known with both neighbours.
+
+    mask : where the static values are known [shape=(T,)]
+    """
     inner = np.zeros_like(mask)
     inner[1:-1] = mask[:-2] & mask[1:-1] & mask[2:]
     return inner

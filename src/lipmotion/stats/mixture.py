@@ -1,4 +1,4 @@
-"""Mixtures of diagonal Gaussians, many densities at a time."""
+"""Sets of mixture densities of diagonal Gaussians."""
 
 from __future__ import annotations
 
@@ -11,27 +11,28 @@ from numpy.typing import NDArray
 from lipmotion.storage.schema import LARGEST_VARIANCE, POSITIVE, STANDARD, ArraySpec, CheckedArrays
 
 SPLIT_STEP = 0.2
-"""Halves of a split component move apart by this many standard deviations."""
+"""The halves of a split component move by so many standard deviations, in opposite directions."""
 BLOCK = 256
-"""Frames whose components are computed at a time: they fit into the cache."""
+"""Frames whose components are computed at a time: these fit into the cache."""
 LEAST_LOG_SHARE = np.float32(-50)
+"""Least logarithm of a component's posterior, relative to the best component."""
 LOG_2PI = float(np.log(2 * np.pi))
 MIXTURES = {
     "log_weights": ArraySpec(np.float32, "G M", -np.inf, 0.1),
     "means": ArraySpec(np.float32, "G M D", -STANDARD, STANDARD),
     "variances": ArraySpec(np.float32, "G M D", POSITIVE, LARGEST_VARIANCE),
 }
-"""Of standardised values; weights may be rounded to half precision."""
+"""How mixtures of standardised values are stored; weights may be rounded to half precision."""
 LEAST_WEIGHT, MOST_WEIGHT = 0.5, 1.5
-"""The weights of a density sum to 1 but for rounding."""
+"""Limits of the sum of a density's stored weights, which is 1 but for rounding."""
 
 
 @dataclass(frozen=True, eq=False)
 class Mixtures:
     """G mixture densities of M diagonal Gaussians each.
 
-    log_weights : float32 array [shape=(G, M)], -inf marks an unused component
-    means, variances : float32 arrays [shape=(G, M, D)]
+    log_weights : [shape=(G, M)], -inf for an unused component
+    means, variances : [shape=(G, M, D)]
     """
 
     log_weights: NDArray[np.float32]
@@ -40,7 +41,7 @@ class Mixtures:
 
     @property
     def size(self) -> tuple[int, int, int]:
-        """G, M and D."""
+        """Numbers of densities G, components M and dimensions D."""
         G, M, D = self.means.shape
         return G, M, D
 
@@ -48,13 +49,13 @@ class Mixtures:
         """Return log weight + log density of every component [shape=(T, G', M)].
 
         x      : [shape=(T, D)]
-        chosen : [shape=(G',)], the densities wanted; all by default
+        chosen : [shape=(G',)], the numbers of the densities to compute; None: all
         Cost: O(T·G'·M·D), as one matrix product.
         """
         return self.quadratic(chosen).log_components(x).transpose(0, 2, 1)
 
     def log_likelihood(self, x: NDArray[np.float32], chosen: NDArray[np.intp] | None = None) -> NDArray[np.float32]:
-        """Return the log density of every frame under every mixture [shape=(T, G')]."""
+        """Return the log density of every frame under every chosen mixture [shape=(T, G')]; see ``log_components``."""
         form = self.quadratic(chosen)
         result = np.empty((len(x), form.constant.shape[1]), np.float32)
         for start in range(0, len(x), BLOCK):
@@ -69,7 +70,7 @@ class Mixtures:
         return result
 
     def quadratic(self, chosen: NDArray[np.intp] | None = None) -> QuadraticForm:
-        """Return the densities [shape=(G',)] as one matrix; all by default."""
+        """Return the chosen densities as the coefficients of a quadratic form; None: all."""
         pick = slice(None) if chosen is None else chosen
         means, precision = self.means[pick], 1 / self.variances[pick]
         constant = self.log_weights[pick] - 0.5 * (
@@ -79,7 +80,7 @@ class Mixtures:
         return QuadraticForm(np.ascontiguousarray(form).reshape(len(form), -1), constant.T.astype(np.float32))
 
     def split(self) -> Mixtures:
-        """Return twice as many components, each half moved apart along all axes."""
+        """Return mixtures of twice as many components: each is split into halves, which move apart along all axes."""
         step = SPLIT_STEP * np.sqrt(self.variances)
         return Mixtures(
             np.concatenate([self.log_weights, self.log_weights], axis=1) - np.float32(np.log(2)),
@@ -87,33 +88,33 @@ class Mixtures:
             np.concatenate([self.variances, self.variances], axis=1),
         )
 
-    def picked(self, chosen: NDArray[np.intp]) -> Mixtures:
-        """Return copies of some densities, in the order given."""
+    def selected(self, chosen: NDArray[np.intp]) -> Mixtures:
+        """Return copies of the chosen densities, in the given order."""
         return Mixtures(self.log_weights[chosen], self.means[chosen], self.variances[chosen])
 
-    def joined(self, other: Mixtures) -> Mixtures:
-        """Return both sets of densities, which have as many components each."""
+    def concatenated(self, other: Mixtures) -> Mixtures:
+        """Return both sets of densities as one; they have equal numbers of components."""
         return Mixtures(
             np.concatenate([self.log_weights, other.log_weights]),
             np.concatenate([self.means, other.means]),
             np.concatenate([self.variances, other.variances]),
         )
 
-    def improve(
-        self, density: int, x: NDArray[np.float32], share: NDArray[np.float32], floor: NDArray[np.float32]
+    def em_update(
+        self, density: int, x: NDArray[np.float32], weights: NDArray[np.float32], floor: NDArray[np.float32]
     ) -> None:
         """Take one EM step of one density, in place (training works on a ``copy``).
 
-        x     : [shape=(N, D)], the frames it accounts for
-        share : [shape=(N,)], their state posteriors
-        floor : [shape=(D,)], least variance
-        A component with less than two frames' worth of data is switched off.
+        x       : [shape=(N, D)], the frames in which it has a posterior
+        weights : [shape=(N,)], these posteriors
+        floor   : [shape=(D,)], least variance
+        A component with less than two frames of data is switched off.
         """
-        posterior = self.responsibilities(density, x, share)
+        posterior = self.responsibilities(density, x, weights)
         count, first, second = posterior.sum(axis=0), posterior.T @ x, posterior.T @ (x * x)
-        self.estimate(np.array([density]), count[None], first[None], second[None], floor)
+        self.set_from_statistics(np.array([density]), count[None], first[None], second[None], floor)
 
-    def estimate(
+    def set_from_statistics(
         self,
         densities: NDArray[np.intp],
         count: NDArray[np.floating[Any]],
@@ -121,57 +122,60 @@ class Mixtures:
         second: NDArray[np.floating[Any]],
         floor: NDArray[np.float32],
     ) -> None:
-        """Give densities the weights, means and variances that explain sums over their frames best.
+        """Set weights, means and variances of densities, in place, to the maximum-likelihood estimates of statistics.
 
-        densities     : [shape=(G',)], each once
-        count         : [shape=(G', M)], of the posteriors of each component; some of each density
-        first, second : [shape=(G', M, D)], of the features and of their squares, times the posteriors
+        densities     : [shape=(G',)], each at most once
+        count         : [shape=(G', M)], sums of the posteriors of each component; more than 0 for each density
+        first, second : [shape=(G', M, D)], sums of features and of squared features, weighted by the posteriors
         floor         : [shape=(D,)], least variance
-        A component with less than two frames' worth of data is switched off.
+        A component with less than two frames of data is switched off.
         """
-        alive = count >= np.minimum(2.0, count.max(axis=1, keepdims=True))
-        safe = np.where(alive, count, 1)[:, :, None]
+        enough = count >= np.minimum(2.0, count.max(axis=1, keepdims=True))
+        safe = np.where(enough, count, 1)[:, :, None]
         mean = first / safe
         variance = np.maximum(second / safe - mean * mean, floor)
-        weights = np.where(alive, count, 0)
+        weights = np.where(enough, count, 0)
         with np.errstate(divide="ignore"):
             self.log_weights[densities] = np.log(weights / weights.sum(axis=1, keepdims=True))
-        self.means[densities] = np.where(alive[:, :, None], mean, 0)
-        self.variances[densities] = np.where(alive[:, :, None], variance, 1)
+        self.means[densities] = np.where(enough[:, :, None], mean, 0)
+        self.variances[densities] = np.where(enough[:, :, None], variance, 1)
 
-    def adapt(
-        self, density: int, x: NDArray[np.float32], share: NDArray[np.float32], prior: int, relevance: float
+    def map_update(
+        self, density: int, x: NDArray[np.float32], weights: NDArray[np.float32], prior: int, relevance: float
     ) -> None:
-        """Take one maximum-a-posteriori step of one density towards its data, from another one as its prior.
+        """Take one maximum-a-posteriori (MAP) step of one density, in place, with another density as its prior.
 
-        x, share  : as in ``improve``
-        prior     : the density that counts as much as ``relevance`` frames a component
-        Source: Gauvain & Lee 1994, with the prior's own shape as its certainty.
+        x, weights : as in ``em_update``
+        prior      : the number of the density that is the prior
+        relevance  : weight of the prior, in frames per component
+        Source: Gauvain & Lee 1994.
         """
-        posterior = self.responsibilities(density, x, share)
+        posterior = self.responsibilities(density, x, weights)
         count = posterior.sum(axis=0)[:, None]
-        weight, mean, variance = np.exp(self.log_weights[prior]), self.means[prior], self.variances[prior]
+        prior_weights, mean, variance = np.exp(self.log_weights[prior]), self.means[prior], self.variances[prior]
         new_mean = (relevance * mean + posterior.T @ x) / (relevance + count)
         second = (relevance * (variance + mean * mean) + posterior.T @ (x * x)) / (relevance + count)
-        weights = relevance * len(weight) * weight + count[:, 0]
+        total = relevance * len(prior_weights) * prior_weights + count[:, 0]
         with np.errstate(divide="ignore"):
-            self.log_weights[density] = np.log(weights / weights.sum())
+            self.log_weights[density] = np.log(total / total.sum())
         self.means[density] = new_mean
         self.variances[density] = np.maximum(second - new_mean * new_mean, variance / 4)
 
-    def responsibilities(self, density: int, x: NDArray[np.float32], share: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return each frame's share divided between the components of one density [shape=(N, M)].
+    def responsibilities(
+        self, density: int, x: NDArray[np.float32], weights: NDArray[np.float32]
+    ) -> NDArray[np.float32]:
+        """Return the posteriors of the components of one density, times the density's own posterior [shape=(N, M)].
 
-        x, share : as in ``improve``
+        x, weights : as in ``em_update``
         """
         components = self.log_components(x, np.array([density]))[:, 0]
         components -= components.max(axis=1, keepdims=True)
         posterior = np.exp(components)
-        posterior *= (share / posterior.sum(axis=1))[:, None]
+        posterior *= (weights / posterior.sum(axis=1))[:, None]
         return posterior
 
     def copy(self) -> Mixtures:
-        """Return the same mixtures in arrays of their own."""
+        """Return a copy in new arrays."""
         return replace(
             self, log_weights=self.log_weights.copy(), means=self.means.copy(), variances=self.variances.copy()
         )
@@ -179,10 +183,10 @@ class Mixtures:
 
 @dataclass(frozen=True, eq=False)
 class QuadraticForm:
-    """Mixtures as what features and their squares are multiplied by.
+    """Log densities of components as a quadratic function of features.
 
-    form     : [shape=(2 D, M G)]
-    constant : [shape=(M, G)], what is added; G last, for sums over M run along memory
+    form     : coefficients of features and of their squares [shape=(2 D, M G)]
+    constant : [shape=(M, G)]; G is last, for fast sums over M
     """
 
     form: NDArray[np.float32]
@@ -194,24 +198,26 @@ class QuadraticForm:
         values += self.constant
         return values
 
-    def divided(self, features: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
-        """Return the log density of every mixture [shape=(T, G)], and its components' shares of it [shape=(T, M, G)].
+    def log_density_and_shares(
+        self, features: NDArray[np.float32]
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
+        """Return log densities and component posteriors; see ``normalised_components``.
 
-        features : ``with_squares`` of what the densities are of
+        features : from ``with_squares`` [shape=(T, 2 D + 1)]
         """
         whole = np.concatenate([self.form, self.constant.reshape(1, -1)])
-        shares = (features @ whole).reshape(len(features), *self.constant.shape)
-        return normalised_components(shares)
+        components = (features @ whole).reshape(len(features), *self.constant.shape)
+        return normalised_components(components)
 
 
 def normalised_components(
     components: NDArray[np.float32],
 ) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
-    """Return the log density of mixtures [shape=(T, G)], and their components' shares of it [shape=(T, M, G)].
+    """Return the log density of mixtures [shape=(T, G)], and posteriors of their components [shape=(T, M, G)].
 
-    components : log weight + log density of each [shape=(T, M, G)], changed in place
-    Of a single component the share is 1, and not told (None). Shares under e^``LEAST_LOG_SHARE`` are not told apart:
-    in products smaller ones would be denormal, and slow.
+    components : log weight + log density of each [shape=(T, M, G)], overwritten by the posteriors
+    With one component the posteriors, all 1, are not returned (None). Posteriors are e^``LEAST_LOG_SHARE`` of the best
+    one at least: products with smaller ones would be denormal, which is slow.
     """
     if components.shape[1] == 1:
         return components[:, 0], None
@@ -224,12 +230,12 @@ def normalised_components(
 
 
 def with_squares(x: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return features [shape=(T, D)], their squares and 1: what densities, and sums over frames, are products of."""
+    """Return features [shape=(T, D)], their squares, and 1, side by side [shape=(T, 2 D + 1)]."""
     return np.concatenate([x, x * x, np.ones((len(x), 1), np.float32)], axis=1)
 
 
 def equal_gaussians(x: NDArray[np.float32], count: int) -> Mixtures:
-    """Return ``count`` equal single Gaussians with the mean and variance of ``x`` (the flat start)."""
+    """Return ``count`` equal Gaussians with the mean and variance of ``x`` [shape=(T, D)] (the flat start)."""
     mean, variance = x.mean(axis=0), np.maximum(x.var(axis=0), 1e-4)
     return Mixtures(
         np.zeros((count, 1), np.float32),
@@ -239,7 +245,7 @@ def equal_gaussians(x: NDArray[np.float32], count: int) -> Mixtures:
 
 
 def mixtures_from_arrays(found: CheckedArrays) -> Mixtures:
-    """Return mixtures, stored as ``MIXTURES`` says. Raises ValueError: the weights of one do not sum to 1."""
+    """Deserialise mixtures, stored as ``MIXTURES``. Raises ValueError: the weights of a density do not sum to 1."""
     total = np.exp(found["log_weights"]).sum(axis=1)
     if not ((total > LEAST_WEIGHT) & (total < MOST_WEIGHT)).all():
         raise ValueError("log_weights of a density without a Gaussian of a finite weight, or that do not sum to 1")

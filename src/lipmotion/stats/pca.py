@@ -1,4 +1,4 @@
-"""Principal components."""
+"""Principal component analysis."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 EXACT = 1500
-"""Up to so many rows or columns all components are computed, and the first are kept; of larger tables only those."""
+"""Up to so many rows or columns all components are computed; of larger tables only the first ones."""
 ROWS = 256
 """Rows of a large table that are centred at a time."""
 SPARE = 16
-"""Directions that are searched beside those that are wanted: they make the search converge."""
+"""Additional directions of the iteration, which speed up its convergence."""
 TOLERANCE, MOST_PASSES = 1e-4, 12
-"""The search ends when a pass over the table adds less than this share of the variance found, or after so many."""
+"""The iteration ends when a pass raises the explained variance by less than this share, or after so many passes."""
 ORTHONORMAL = 0.01
-"""Rows of a stored basis are orthonormal but for rounding."""
+"""Largest error of the products of a stored basis' rows."""
 RANK_TOLERANCE = 1e-10
-"""Components with less than this share of the largest one's variance are rounding."""
+"""Components with less variance, as a share of the largest, are rounding errors."""
 CONSTANT = 1e-12
-"""Values that deviate from their mean by less than this share of the largest do so by rounding."""
+"""Values that deviate from their mean by less than this share of the largest are constant but for rounding."""
 
 
 @dataclass(frozen=True, eq=False)
 class Pca:
-    """An affine space of few dimensions.
+    """The affine space of principal components.
 
     mean  : [shape=(D,)]
     basis : [shape=(K, D)], orthonormal rows, most variance first
@@ -45,9 +45,9 @@ class Pca:
 
 
 def fit_pca(values: NDArray[Any], components: int) -> Pca:
-    """Return the first principal components of numbers [shape=(N, D)]; no more than the numbers span.
+    """Return the first principal components of values [shape=(N, D)]; at most as many as the values span.
 
-    The entry of each that is the furthest from 0 is positive, so the same values have the same components.
+    The entry of each component that is furthest from 0 is positive, so equal values have equal components.
     Cost: O(N·D·min(N, D)) and min(N, D)³ up to ``EXACT`` rows or columns; of larger tables O(N·D·components) a pass,
     with ``ROWS`` rows of memory, in single precision and up to ``TOLERANCE`` of the variance.
     """
@@ -65,6 +65,7 @@ def fit_pca(values: NDArray[Any], components: int) -> Pca:
 
 
 def _of_columns(centred: NDArray[np.float64], components: int, least: float) -> NDArray[np.float64]:
+    """Return the first components [shape=(K, D)] from the products of the columns of centred values."""
     squares, vectors = np.linalg.eigh(centred.T @ centred)
     return vectors[:, _largest(squares, components, least)].T
 
@@ -77,44 +78,44 @@ def check_orthonormal(name: str, basis: NDArray[Any]) -> None:
 
 
 def _of_rows(centred: NDArray[np.float64], components: int, least: float) -> NDArray[np.float64]:
-    """Return the same from the products of N < D rows: XXᵀu = λu gives XᵀX(Xᵀu) = λ(Xᵀu)."""
+    """Return the first components [shape=(K, D)] from the products of N < D rows: XXᵀu = λu gives XᵀX(Xᵀu) = λ(Xᵀu)."""
     squares, vectors = np.linalg.eigh(centred @ centred.T)
     kept = _largest(squares, components, least)
     return (vectors[:, kept] / np.sqrt(squares[kept])).T @ centred
 
 
 def _largest(squares: NDArray[np.float64], count: int, least: float) -> NDArray[np.intp]:
-    """Return the places of the largest of rising numbers, without those that are rounding: their directions are chance.
+    """Return the indices of the largest of ascending numbers, without those that are rounding errors.
 
-    least : what rounding alone may make of them
+    least : largest value that rounding alone may produce
     """
-    places = np.arange(len(squares))[::-1][:count]
-    return places[squares[places] > max(RANK_TOLERANCE * squares[-1], least)]
+    indices = np.arange(len(squares))[::-1][:count]
+    return indices[squares[indices] > max(RANK_TOLERANCE * squares[-1], least)]
 
 
 def _leading(values: NDArray[Any], mean: NDArray[np.float64], components: int) -> NDArray[np.float64]:
-    """Return the first components of a large table by block power iteration from some of its own rows.
+    """Return the first components of a large table [shape=(K, D)], by block power iteration from some of its own rows.
 
     Source: Halko, Martinsson & Tropp 2011, §4.5 (subspace iteration) and §5.1; Rayleigh-Ritz at its end.
     """
     size = min(components + SPARE, *values.shape)
     start = values[evenly_spaced(size, len(values))] - mean
     directions = np.linalg.qr(start.T.astype(np.float32))[0]
-    found = 0.0
+    variance = 0.0
     for _ in range(MOST_PASSES):
         product = _covariance_times(values, mean, directions)
-        squares, turn = np.linalg.eigh((directions.T @ product).astype(np.float64))
-        before, found = found, float(squares[-components:].sum())
-        if found - before <= TOLERANCE * found:
+        squares, rotation = np.linalg.eigh((directions.T @ product).astype(np.float64))
+        before, variance = variance, float(squares[-components:].sum())
+        if variance - before <= TOLERANCE * variance:
             break
         directions = np.linalg.qr(product)[0]
-    return (directions @ turn[:, ::-1][:, :components].astype(np.float32)).T.astype(np.float64)
+    return (directions @ rotation[:, ::-1][:, :components].astype(np.float32)).T.astype(np.float64)
 
 
 def _covariance_times(
     values: NDArray[Any], mean: NDArray[np.float64], directions: NDArray[np.float32]
 ) -> NDArray[np.float32]:
-    """Return XᵀXQ of the centred X, which is never whole in memory."""
+    """Return XᵀXQ [shape=(D, K)] of centred values X, in blocks of rows, and directions Q [shape=(D, K)]."""
     total, centre = np.zeros_like(directions), mean.astype(np.float32)
     for start in range(0, len(values), ROWS):
         rows = values[start : start + ROWS] - centre
@@ -123,6 +124,6 @@ def _covariance_times(
 
 
 def evenly_spaced(count: int, total: int) -> NDArray[np.intp]:
-    """Return ``count`` of ``total`` places, evenly spread [shape=(min(count, total),)]."""
+    """Return ``count`` of ``total`` indices, evenly spaced [shape=(min(count, total),)]."""
     count = min(count, total)
     return ((np.arange(count) + 0.5) * total / max(count, 1)).astype(np.intp)

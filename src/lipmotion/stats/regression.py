@@ -1,4 +1,4 @@
-"""Linear regressions along decision trees: each node's is drawn towards that of the node above it."""
+"""Linear regressions in decision trees: that of each node has the regression of the node above as its prior."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class RegressionStatistics:
-    """Sums over frames of inputs z [shape=(F,)] and what they should explain, r [shape=(P,)]; they grow in place.
+    """Sufficient statistics of a regression of targets r [shape=(P,)] on inputs z [shape=(F,)]; accumulated in place.
 
     products : Σ z zᵀ [shape=(F, F)]
     targets  : Σ z rᵀ [shape=(F, P)]
@@ -26,7 +26,7 @@ class RegressionStatistics:
     targets: Array
 
     def add(self, z: NDArray[np.floating[Any]], r: NDArray[np.floating[Any]]) -> None:
-        """Take in frames [shapes=(N, F), (N, P)]."""
+        """Accumulate the statistics of frames [shapes=(N, F), (N, P)]."""
         np.add(self.products, z.T @ z, out=self.products)
         np.add(self.targets, z.T @ r, out=self.targets)
 
@@ -35,15 +35,15 @@ class RegressionStatistics:
 
 
 def zero_statistics(inputs: int, outputs: int) -> RegressionStatistics:
-    """Return the sums over no frames."""
+    """Return zero statistics."""
     return RegressionStatistics(np.zeros((inputs, inputs)), np.zeros((inputs, outputs)))
 
 
 def ridge(moments: RegressionStatistics, prior: Array, strength: float) -> Array:
-    """Return the coefficients [shape=(F, P)] that explain the targets best, near those expected beforehand.
+    """Return the coefficients of a ridge regression towards a prior [shape=(F, P)].
 
-    prior    : [shape=(F, P)]
-    strength : how many squared units of z the prior counts for
+    prior    : coefficients [shape=(F, P)]
+    strength : weight of the prior, in squared units of z
     argmin Σ |r - Cᵀz|² + strength |C - prior|²
     """
     system = moments.products + strength * np.eye(len(moments.products))
@@ -51,30 +51,30 @@ def ridge(moments: RegressionStatistics, prior: Array, strength: float) -> Array
 
 
 def regression_node(tree: Tree, path: list[int], least: float) -> int:
-    """Return the last node on the way to a leaf that has enough frames for a regression of its own, or the root."""
+    """Return the last node of a path that has at least ``least`` frames, enough for its own regression; or the root."""
     return next((node for node in reversed(path) if tree.frames[node] >= least), 0)
 
 
 def fit_tree_regressions(
     tree: Tree, moments: Mapping[int, RegressionStatistics], shared: Array, strength: float
 ) -> dict[int, Array]:
-    """Return the coefficients of every owner [shape=(F, P)]: each node's are drawn towards those of the one above.
+    """Return the coefficients of every node in ``moments`` [shape=(F, P)]; each has those of the node above as prior.
 
-    moments : of the frames of the leaves that each owner stands for
-    shared  : what the root's are drawn towards
+    moments : by node, the statistics of the leaves whose regression is that of the node (``regression_node``)
+    shared  : the prior of the root
     """
-    found: dict[int, Array] = {}
+    regressions: dict[int, Array] = {}
 
     def visit(node: int, end: int, prior: Array) -> None:
-        inside = [moments[owned] for owned in moments if node <= owned < end]
+        inside = [moments[other] for other in moments if node <= other < end]
         if not inside:
             return
         coefficients = ridge(sum(inside[1:], inside[0]), prior, strength)
         if node in moments:
-            found[node] = coefficients
+            regressions[node] = coefficients
         if tree.asked[node] >= 0:
             visit(node + 1, int(tree.no[node]), coefficients)
             visit(int(tree.no[node]), end, coefficients)
 
     visit(0, len(tree.asked), shared)
-    return found
+    return regressions

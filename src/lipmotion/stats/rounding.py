@@ -1,4 +1,4 @@
-"""Which curves move, and which only seem to because of rounding, which differs between processors."""
+"""Variation beyond rounding errors, which differ between processors."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 ROUNDING = 1e-6
 """Values that differ by less than this share of the largest are equal: single precision keeps seven digits. Curves
-that are modelled move by 1e-3 of their magnitude and more."""
+that are modelled vary by 1e-3 of their magnitude and more."""
 
 
 def varies(values: NDArray[Any]) -> NDArray[np.bool_]:
-    """Return which columns of finite values [shape=(T, D)] are more than a constant with rounding [shape=(D,)]."""
+    """Return which columns of finite values [shape=(T, D)] are not constant but for rounding [shape=(D,)]."""
     return np.asarray(np.ptp(values, axis=0) > ROUNDING * np.abs(values).max(axis=0))

@@ -1,4 +1,4 @@
-"""Decision trees that tie states in contexts: alike contexts share a density, unseen ones find theirs by questions."""
+"""Decision trees that tie states in context: contexts with the same answers to questions share a density."""
 
 from __future__ import annotations
 
@@ -14,19 +14,23 @@ from lipmotion.printable import printable
 from lipmotion.storage.schema import Arrays, ArraySpec, checked_arrays
 
 Context = tuple[str, ...]
-"""What a state depends on, one name a place (left neighbour, unit, right neighbour)."""
+"""The names that a state depends on, one for each position: left neighbour, unit, right neighbour."""
 Array = NDArray[np.float64]
 Likelihood = Callable[[Array], Array]
-"""Sufficient statistics [shape=(N, K)], the count of frames first -> log likelihood, each under its own density."""
+"""Function of N sufficient statistics [shape=(N, K)], the number of frames first: returns the log likelihood of each
+under the density estimated from it [shape=(N,)]."""
 LEAST_VARIANCE = 1e-12
+"""Least variance of a Gaussian."""
 TIE = 1e-10
-"""Questions whose gains differ by less than this share of the log likelihood, or of the frames, split alike."""
+"""Gains of questions that differ by less, as a share of the log likelihood or of the frames, are equal."""
 
 
 class Question(NamedTuple):
-    """Whether the name at one place of a context is one of some.
+    """The question whether the name at one position of a context is one of some.
 
-    place : 0 is the left neighbour, 1 the unit, 2 the right neighbour
+    position : 0 the left neighbour, 1 the unit, 2 the right neighbour
+    name     : of the question
+    members  : the names for which the answer is yes
     """
 
     position: int
@@ -34,18 +38,18 @@ class Question(NamedTuple):
     members: frozenset[str]
 
     def answer(self, context: Context) -> bool:
-        """Return whether it is."""
+        """Return the answer for a context."""
         return context[self.position] in self.members
 
 
 @dataclass(frozen=True, eq=False)
 class Tree:
-    """Nodes in the order in which they are met going down the yes-side first; node 0 is the root.
+    """A decision tree; its nodes are in depth-first order, the yes-branch first, and node 0 is the root.
 
     questions : those that may be asked
-    asked     : int array [shape=(N,)], the question of each node; -1 marks a leaf
-    no        : int array [shape=(N,)], the node behind the answer no (the one behind yes is the next); -1 at a leaf
-    frames    : float array [shape=(N,)], the frames behind each node
+    asked     : [shape=(N,)], the number of each node's question; -1 for a leaf
+    no        : [shape=(N,)], the node after the answer no (after yes it is the next one); -1 for a leaf
+    frames    : [shape=(N,)], the frames of training data in each node
     """
 
     questions: tuple[Question, ...]
@@ -54,7 +58,7 @@ class Tree:
     frames: NDArray[np.float64]
 
     def path(self, context: Context) -> list[int]:
-        """Return the nodes from the root to the leaf of a context, seen in training or not."""
+        """Return the nodes from the root to the leaf of a context, whether or not it occurred in training."""
         nodes = [0]
         while self.asked[nodes[-1]] >= 0:
             node = nodes[-1]
@@ -71,7 +75,7 @@ class Tree:
 
     @property
     def leaves(self) -> NDArray[np.intp]:
-        """The nodes that ask nothing."""
+        """The numbers of the leaves."""
         return np.nonzero(self.asked < 0)[0]
 
     def name(self, node: int) -> str:
@@ -84,14 +88,14 @@ class Tree:
         return ", ".join(answers) or "any"
 
     def text(self) -> str:
-        """Return the tree for people to read: a line a node, indented by its depth."""
+        """Return the tree as readable text: one line for each node, indented by its depth."""
         lines: list[str] = []
 
         def write(node: int, depth: int, answer: str) -> None:
             asked = self.asked[node]
             question = self.questions[asked] if asked >= 0 else None
-            says = f"{POSITIONS[question.position]} is {question.name}?" if question else "leaf"
-            lines.append(f"{'  ' * depth}{answer}{says} ({self.frames[node]:.0f} frames)")
+            line = f"{POSITIONS[question.position]} is {question.name}?" if question else "leaf"
+            lines.append(f"{'  ' * depth}{answer}{line} ({self.frames[node]:.0f} frames)")
             if question:
                 write(node + 1, depth + 1, "yes: ")
                 write(int(self.no[node]), depth + 1, "no: ")
@@ -101,15 +105,14 @@ class Tree:
 
 
 POSITIONS = ("left", "unit", "right")
-_PLACES = [str(place) for place in range(len(POSITIONS))]
-"""As they are stored."""
+_STORED_POSITIONS = [str(position) for position in range(len(POSITIONS))]
 
 
 def gaussian_log_likelihood(statistics: Array, least_variance: float = LEAST_VARIANCE) -> Array:
-    """Return the log likelihood of frames under the diagonal Gaussian that fits them best [shape=(N,)].
+    """Return the log likelihood of frames under their maximum-likelihood diagonal Gaussian [shape=(N,)].
 
-    statistics     : [shape=(N, 1 + 2·D)]: count, sums, sums of squares
-    least_variance : that the Gaussian may have: else a few frames that are alike gain without limit
+    statistics     : [shape=(N, 1 + 2·D)]: number of frames, sums, sums of squares
+    least_variance : of the Gaussian; without it the likelihood of a few equal frames has no limit
     """
     count = np.maximum(statistics[:, :1], 1e-12)
     sums, squares = np.split(statistics[:, 1:] / count, 2, axis=1)
@@ -120,9 +123,9 @@ def gaussian_log_likelihood(statistics: Array, least_variance: float = LEAST_VAR
 
 
 def multispace_log_likelihood(statistics: Array, least_variance: float = LEAST_VARIANCE) -> Array:
-    """Return the log likelihood of frames, some without a value, under the density that fits them best [shape=(N,)].
+    """Return the log likelihood of frames, some without a value, under their maximum-likelihood density [shape=(N,)].
 
-    statistics : [shape=(N, 2 + 2·D)]: count, count of frames with a value, their sums, sums of squares
+    statistics : [shape=(N, 2 + 2·D)]: number of frames, of frames with a value, and their sums and sums of squares
     least_variance : as in ``gaussian_log_likelihood``
     The density is a Gaussian for frames with a value and a point mass for those without one.
     """
@@ -148,11 +151,12 @@ def grow_tree(
     factor: float,
     least: float,
 ) -> Tree:
-    """Return the tree whose every split gains more likelihood than its description costs.
+    """Return the tree in which every split raises the log likelihood by more than its description length.
 
-    contexts   : C different ones
-    statistics : [shape=(C, K)], additive, the count of frames first
-    parameters : of one density; a split adds as many, at ``factor`` · ½ log(frames) each
+    contexts   : C distinct ones
+    statistics : of each context [shape=(C, K)], additive, the number of frames first
+    log_likelihood : function of statistics
+    parameters : number of parameters of a density; a split adds as many, of price ``factor`` · ½ log(frames) each
     least      : frames that a leaf must have
     Source: Shinoda & Watanabe 2000 (minimum description length).
     """
@@ -180,8 +184,11 @@ def grow_tree(
 
 
 def _best_question(answers: Array, statistics: Array, log_likelihood: Likelihood, price: float, least: float) -> int:
-    """Return the question that gains most, the first of several that gain the same, or -1 where none gains more than
-    its price.
+    """Return the number of the question with the largest gain in log likelihood; -1: no gain exceeds the price.
+
+    answers    : of each question for each context [shape=(N, C)], 1 for yes
+    statistics : of the contexts [shape=(C, K)]
+    Of several equal gains the first question's is taken.
     """
     total = statistics.sum(axis=0)
     yes = answers @ statistics
@@ -190,13 +197,13 @@ def _best_question(answers: Array, statistics: Array, log_likelihood: Likelihood
         return -1
     whole = log_likelihood(total[None])
     gain = log_likelihood(yes[allowed]) + log_likelihood(total - yes[allowed]) - whole
-    alike = TIE * (np.abs(whole[0]) + total[0])
-    best = int(np.argmax(gain >= gain.max() - alike))  # the first: rounding must not choose among equal splits
+    tolerance = TIE * (np.abs(whole[0]) + total[0])
+    best = int(np.argmax(gain >= gain.max() - tolerance))  # the first: rounding must not choose among equal splits
     return int(allowed[best]) if gain[best] > price else -1
 
 
 def tree_arrays(trees: Mapping[str, Tree]) -> dict[str, NDArray[Any]]:
-    """Return trees that share their questions, by name, as plain arrays, with the questions that are asked."""
+    """Serialise trees that share their questions, by name; only questions that are asked are stored."""
     questions = next(iter(trees.values())).questions
     asked = np.concatenate([tree.asked for tree in trees.values()])
     used = np.unique(asked[asked >= 0])
@@ -225,11 +232,11 @@ TREES = {
 
 
 def trees_from_arrays(arrays: Arrays) -> dict[str, Tree]:
-    """Return the trees again. Raises KeyError, ValueError: something is missing or inconsistent."""
+    """Deserialise trees, by name. Raises KeyError, ValueError: something is missing or inconsistent."""
     found = checked_arrays(arrays, TREES)
     questions = tuple(
-        Question(_PLACES.index(place), name, frozenset(members.split()))
-        for place, name, members in found["questions"].tolist()
+        Question(_STORED_POSITIONS.index(position), name, frozenset(members.split()))
+        for position, name, members in found["questions"].tolist()
     )
     names, sizes, ends = found["trees"].tolist(), found["sizes"], np.cumsum(found["sizes"])
     if ends[-1] != found.sizes["S"] or len(set(names)) < len(names):
@@ -243,17 +250,17 @@ def trees_from_arrays(arrays: Arrays) -> dict[str, Tree]:
 
 
 def _check_nodes(asked: NDArray[np.int32], no: NDArray[np.int32], questions: int) -> None:
-    """Raise ValueError where the nodes are no tree in the order of ``Tree``."""
+    """Raise ValueError unless the nodes are a tree in the order of ``Tree``."""
     inner = asked >= 0
     if (asked >= questions).any() or (asked < -1).any() or (no[~inner] != -1).any():
-        raise ValueError("a tree asks a question that there is not")
-    end = [len(asked)]  # where the subtrees that are open end
+        raise ValueError("a tree asks a question that does not exist")
+    ends = [len(asked)]  # of the subtrees that contain the node
     for node in range(len(asked)):
-        if node == end[-1]:
-            end.pop()
+        if node == ends[-1]:
+            ends.pop()
         if inner[node]:
-            if not node + 1 < no[node] < end[-1]:
+            if not node + 1 < no[node] < ends[-1]:
                 raise ValueError("a tree whose branches do not end")
-            end.append(int(no[node]))
-        elif node + 1 != end[-1]:
+            ends.append(int(no[node]))
+        elif node + 1 != ends[-1]:
             raise ValueError("a tree whose branches do not meet")

@@ -1,1 +1,1 @@
-"""Files: written whole or not at all, arrays with a JSON header, what is read from media, what is checked when read."""
+"""Reading and writing of files: atomic writes, archives of arrays, checks of stored arrays, JSON, and media."""

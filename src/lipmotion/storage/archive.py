@@ -1,4 +1,4 @@
-"""Arrays and a JSON header in one file: a zip, without pickle, the same bytes for the same content."""
+"""Archives of arrays with a JSON header: zip files without pickle, with equal bytes for equal content."""
 
 from __future__ import annotations
 
@@ -20,25 +20,25 @@ from lipmotion.storage.json_text import as_json, from_json
 
 HEADER, ARRAY = "header.json", ".npy"
 OLDEST_DATE = (1980, 1, 1, 0, 0, 0)
-"""The date of everything in the file."""
+"""The date of all members of an archive."""
 LARGE = 1 << 30
-"""Arrays of so many bytes need the zip format's large sizes."""
+"""Arrays from so many bytes on are written with the zip64 extension."""
 UNREADABLE = (
     *(OSError, EOFError, KeyError, ValueError, TypeError, RuntimeError),
     *(zlib.error, struct.error, zipfile.BadZipFile),
 )
-"""What reading a damaged zip, or one of something else, may raise."""
+"""The errors that reading a damaged zip, or one of other content, may raise."""
 LAST_LETTER = 0x10FFFF
-"""The last one of Unicode."""
+"""The last code point of Unicode."""
 SMALL_ARCHIVE, LARGEST_RATIO = 1 << 26, 20
-"""Bytes that a zip may always grow to, and how many times its own size; our arrays shrink to half, bombs to a
-thousandth."""
+"""An archive may have so many bytes uncompressed, or so many times its own size: our arrays are compressed to half their
+size, zip bombs to a thousandth."""
 
 
 def write_archive(
     path: Path, header: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]], *, compressed: bool = True
 ) -> None:
-    """Write a file, whole or not at all. Raises ExportError: it cannot be written."""
+    """Write an archive, whole or not at all. Raises ExportError: it cannot be written."""
     method = zipfile.ZIP_DEFLATED if compressed else zipfile.ZIP_STORED
     with whole_file(path) as unfinished, zipfile.ZipFile(unfinished, "w") as file:
         file.writestr(_member(HEADER, method), as_json(header, indent=1, ensure_ascii=False).encode())
@@ -48,25 +48,25 @@ def write_archive(
 
 
 def read_archive_header(path: Path) -> Any:
-    """Return what a file says of itself. Raises one of ``UNREADABLE``."""
+    """Return the header of an archive. Raises one of ``UNREADABLE``: it is damaged, or no archive."""
     with zipfile.ZipFile(path) as file:
         check_archive(file)
         return from_json(file.read(HEADER))
 
 
 def read_archive(path: Path) -> dict[str, NDArray[Any]]:
-    """Return all arrays of a file by name. Raises one of ``UNREADABLE``: any byte of it is wrong."""
+    """Return all arrays of an archive, by name. Raises one of ``UNREADABLE``: any byte of it is wrong."""
     with zipfile.ZipFile(path) as file:
         check_archive(file)
         members = {name: file.read(name) for name in file.namelist() if name != HEADER}  # whole: checksums come first
-    strange = next((name for name in members if not name.endswith(ARRAY)), None)
-    if strange is not None:
-        raise ValueError(f"undeclared {strange!r}, which is no array")
+    unknown = next((name for name in members if not name.endswith(ARRAY)), None)
+    if unknown is not None:
+        raise ValueError(f"undeclared {unknown!r}, which is no array")
     return {name.removesuffix(ARRAY): array_in(content) for name, content in members.items()}
 
 
 def check_archive(file: zipfile.ZipFile) -> None:
-    """Raise ValueError if members of a zip share a name, could fill the memory, or are compressed in another way."""
+    """Raise ValueError if members of a zip share a name, may fill the memory, or have an unknown compression."""
     members, names = file.infolist(), file.namelist()
     if len(set(names)) < len(names):
         raise ValueError(f"the part {next(name for name in names if names.count(name) > 1)!r} is in it twice")
@@ -79,22 +79,22 @@ def check_archive(file: zipfile.ZipFile) -> None:
 
 
 def array_in(content: bytes) -> NDArray[Any]:
-    """Return the array that the content of a ``.npy`` file describes.
+    """Return the array of a ``.npy`` file's content.
 
-    Raises ValueError: not one, pickled objects, or more or less bytes than its header declares: they are compared
-    before anything is allocated.
+    Raises ValueError: no array, pickled objects, or more or fewer bytes than the header declares; sizes are compared
+    before memory is allocated.
     """
     stream = io.BytesIO(content)
     try:
         read_header = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}[npy.read_magic(stream)]
         shape, _, dtype = read_header(stream)
-    except Exception as error:  # the header is read as a piece of Python, which fails in many ways
+    except Exception as error:  # the header is parsed as Python, which raises many kinds of errors
         raise ValueError(f"not an array ({type(error).__name__}: {error})") from error
-    wanted, found = math.prod(shape) * dtype.itemsize, len(content) - stream.tell()
-    if dtype.hasobject or not dtype.itemsize or wanted != found:
-        raise ValueError(f"an array of {dtype} of shape {shape} in {found} bytes, required {wanted} bytes of numbers")
-    if dtype.kind == "U" and found and np.frombuffer(content[-found:], dtype.byteorder + "u4").max() > LAST_LETTER:
-        raise ValueError("texts of letters that there are not")
+    required, size = math.prod(shape) * dtype.itemsize, len(content) - stream.tell()
+    if dtype.hasobject or not dtype.itemsize or required != size:
+        raise ValueError(f"an array of {dtype} of shape {shape} in {size} bytes, required {required} bytes of numbers")
+    if dtype.kind == "U" and size and np.frombuffer(content[-size:], dtype.byteorder + "u4").max() > LAST_LETTER:
+        raise ValueError("texts with characters that do not exist")
     stream.seek(0)
     array: NDArray[Any] = npy.read_array(stream, allow_pickle=False)
     return array

@@ -1,4 +1,4 @@
-"""What a long job has finished so far, kept so that a later run goes on from there."""
+"""Checkpoints: the state of a long job, stored so that a later run continues from it."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ FORMAT = "lipmotion.checkpoint"
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """A folder with one file a stage; without a folder, nothing is kept and nothing found.
+    """A folder with one file for each stage of a job; without a folder, nothing is stored and nothing found.
 
-    folder      : exists
-    fingerprint : of everything that the result depends on; what another one left is not used
+    folder      : an existing one
+    fingerprint : of everything that the result depends on; a checkpoint with another fingerprint is not used
     """
 
     folder: Path | None = None
     fingerprint: str = ""
 
     def load(self, stage: str) -> dict[str, NDArray[Any]] | None:
-        """Return what was saved of a stage; None if nothing was, or if it is damaged or of another job."""
+        """Return the arrays stored for a stage; None: there are none, or they are damaged or of another job."""
         if self.folder is None or not self._path(self.folder, stage).is_file():
             return None
         path = self._path(self.folder, stage)
@@ -42,7 +42,7 @@ class Checkpoint:
             return None
 
     def save(self, stage: str, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Keep the state of a stage, in the place of an earlier one. Raises ExportError: it cannot be written."""
+        """Store the state of a stage, replacing an earlier one. Raises ExportError: it cannot be written."""
         if self.folder is not None:
             write_archive(self._path(self.folder, stage), self._header(), arrays, compressed=False)
 

@@ -1,6 +1,6 @@
-"""Files and folders that appear whole or not at all.
+"""Files and folders that are written whole or not at all, checks of paths, and locks.
 
-Everything is written under a temporary name beside its target and renamed at the end.
+Everything is written under a temporary name beside its target, and renamed at the end.
 """
 
 from __future__ import annotations
@@ -26,19 +26,19 @@ else:
     import fcntl
 
 TEMPORARY = ".part-"
-"""Names of unfinished files start with this; a killed run may leave one, the next removes it."""
+"""Prefix of unfinished files' names; a killed run may leave such a file, which the next run removes."""
 LOCK = f"{TEMPORARY}lock"
-"""The file that a process holds while it works on a folder."""
+"""The file that a process locks while it works on a folder."""
 UNFINISHED = ".unfinished"
-"""What a folder of unfinished work adds to the name of the file that the work is for."""
+"""Suffix of a folder of unfinished work, after the name of the file that the work is for."""
 
 
 LARGEST_TEXT = 1 << 26
-"""Bytes of a text that is read whole: more than all the words that anyone says in a year."""
+"""Most bytes of a text file: more than the words that a person speaks in a year."""
 
 
 def check_source(path: Path, kind: str) -> None:
-    """Raise InputError unless ``path`` is a file with something in it; ``kind`` says what it should be."""
+    """Raise InputError unless ``path`` is a file that is not empty; ``kind`` is what it should be, for the message."""
     check_regular(path, kind)
     if not path.is_file():
         raise InputError(f"{path}: no such file")
@@ -47,7 +47,7 @@ def check_source(path: Path, kind: str) -> None:
 
 
 def sha256_of(path: Path) -> str:
-    """Return the digest of a file's content."""
+    """Return the SHA-256 digest of a file's content, in hexadecimal."""
     digest = hashlib.sha256()
     with path.open("rb") as file:
         while block := file.read(1 << 20):
@@ -56,7 +56,7 @@ def sha256_of(path: Path) -> str:
 
 
 def check_regular(path: Path, kind: str) -> None:
-    """Raise InputError for a folder, and for a pipe or a device, which may never end. What is missing passes."""
+    """Raise InputError for a folder, a pipe or a device, which may never end; a missing file is accepted."""
     if path.is_dir():
         raise InputError(f"{path}: is a folder; give one {kind}")
     if path.exists() and not path.is_file():
@@ -64,7 +64,7 @@ def check_regular(path: Path, kind: str) -> None:
 
 
 def check_listable(folder: Path) -> None:
-    """Raise InputError if a folder may not be looked into: what looks for files in it would just find none."""
+    """Raise InputError if a folder may not be listed: a search for files in it would find none, without an error."""
     try:
         os.scandir(folder).close()
     except OSError as error:
@@ -72,8 +72,9 @@ def check_listable(folder: Path) -> None:
 
 
 def read_text_file(path: Path, kind: str, largest: int = LARGEST_TEXT) -> str:
-    """Return the text of a file, without a byte order mark.
+    """Return the text of a UTF-8 file, without a byte order mark.
 
+    kind : what it should be, for messages
     Raises InputError: no such file, not a file, larger than ``largest`` bytes, or not UTF-8.
     """
     check_regular(path, f"{kind} file")
@@ -89,7 +90,7 @@ def read_text_file(path: Path, kind: str, largest: int = LARGEST_TEXT) -> str:
 
 
 def check_target(target: Path, source: str | Path | None = None) -> None:
-    """Raise ExportError unless a file can be put there: before work begins, not after it.
+    """Raise ExportError unless a file can be written at ``target``; called before the work that leads to it.
 
     source : a recording that must not be overwritten
     """
@@ -105,7 +106,7 @@ def check_target(target: Path, source: str | Path | None = None) -> None:
 
 
 def check_distinct(targets: Sequence[Path]) -> None:
-    """Raise ExportError if two outputs are one file."""
+    """Raise ExportError if two outputs are the same file."""
     places = [os.path.realpath(target) for target in targets]
     for number, place in enumerate(places):
         if any(place == other or is_same(place, other) for other in places[:number]):
@@ -113,7 +114,7 @@ def check_distinct(targets: Sequence[Path]) -> None:
 
 
 def as_text(path: str | Path) -> str:
-    """Return what can be written as UTF-8: a file's name may be of any bytes."""
+    """Return a path as text that UTF-8 can encode: names of files may have any bytes."""
     return str(path).encode("utf-8", "backslashreplace").decode("utf-8")
 
 
@@ -128,13 +129,13 @@ def _temporary(target: Path, suffix: str) -> Path:
 
 
 def _prefix(target: Path) -> str:
-    """Return how temporary names for this target begin on this machine."""
+    """Return the prefix of temporary names for a target on this machine."""
     name = f"{platform.node()}/{target.name}".encode(errors="surrogatepass")
     return f"{TEMPORARY}{hashlib.sha256(name).hexdigest()[:8]}-"
 
 
 def _sweep(target: Path) -> None:
-    """Remove what killed runs of this machine left of a file."""
+    """Remove the unfinished files that killed runs on this machine left beside a target."""
     prefix = _prefix(target)
     with suppress(OSError):  # a folder that may be written to, but not listed
         for left in target.parent.glob(f"{prefix}*"):
@@ -143,7 +144,7 @@ def _sweep(target: Path) -> None:
 
 
 def _is_alive(process: str) -> bool:
-    """Whether a process may still be at work. Windows deletes no file that is open, so there nobody need be asked."""
+    """Return whether a process may still be running; on Windows False, as it deletes no file that is open."""
     if sys.platform == "win32" or not process.isdigit():
         return sys.platform != "win32"
     try:
@@ -151,12 +152,12 @@ def _is_alive(process: str) -> bool:
     except ProcessLookupError:
         return False
     except OSError:
-        return True  # somebody else's
+        return True  # a process of another user
     return True
 
 
 def _place(target: Path) -> Path:
-    """Return where an output goes: to what a link points to, so that the link stays one."""
+    """Return the path that an output is written to: where it is a link, that of its target, so that the link remains."""
     try:
         place = Path(os.path.realpath(target)) if target.is_symlink() else target
         endless = place.is_symlink()
@@ -171,7 +172,7 @@ def _place(target: Path) -> Path:
 def whole_file(target: Path, *, follow: bool = True) -> Iterator[Path]:
     """Give a temporary path to write to, with the target's suffix (lower case); rename it to ``target`` on success.
 
-    follow : where ``target`` is a link, write what it points to; else the file takes the place of the link
+    follow : where ``target`` is a link, write the file that it points to; otherwise the file replaces the link
     Raises ExportError: the folder does not exist, or the file cannot be written (disk full, no permission).
     """
     place = _place(target) if follow else target
@@ -214,10 +215,10 @@ def _refused(target: Path, error: OSError) -> ExportError:
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Hold a folder, made if needed, for this process alone.
+    """Lock a folder, created if needed, for this process.
 
-    The system itself lets go of it when the process ends, however it ends: a lock that was left never blocks.
-    Raises ExportError: another process holds it, or it cannot be made.
+    The system releases the lock when the process ends in any way: no lock is left behind.
+    Raises ExportError: another process has locked it, or it cannot be created.
     """
     path = folder / LOCK
     file = None
@@ -226,25 +227,25 @@ def locked(folder: Path) -> Iterator[None]:
             file = _lock_in(folder)
             yield
         finally:
-            _let_go(path, file)
-    except BaseException:  # an interrupt may have come while letting go; a second one does not follow at once
-        _let_go(path, file)
+            _release(path, file)
+    except BaseException:  # an interrupt may have come during the release; a second one does not follow at once
+        _release(path, file)
         raise
 
 
 def _lock_in(folder: Path) -> IO[bytes]:
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        return _held(folder / LOCK)
+        return _open_lock(folder / LOCK)
     except FileExistsError as error:
         raise ExportError(f"{folder}: is a file; give the name of a new or an empty folder") from error
     except OSError as error:
         raise _refused(folder, error) from error
 
 
-def _let_go(path: Path, file: IO[bytes] | None) -> None:
-    """Delete a lock: that of ``file`` or, where an interrupt came between making and keeping it, one nobody holds."""
-    with suppress(OSError):  # none there, or another's
+def _release(path: Path, file: IO[bytes] | None) -> None:
+    """Delete a lock: that of ``file``, or one that no process holds (after an interrupt while it was created)."""
+    with suppress(OSError):  # there is none, or another process has it
         is_held = file is not None and not file.closed
         with file if file is not None and is_held else path.open("r+b", buffering=0) as lock:
             if not is_held:
@@ -254,7 +255,8 @@ def _let_go(path: Path, file: IO[bytes] | None) -> None:
             path.unlink()
 
 
-def _held(path: Path) -> IO[bytes]:
+def _open_lock(path: Path) -> IO[bytes]:
+    """Return the lock file, open and locked. Raises ExportError: another process has locked it."""
     while True:
         file = None
         try:
@@ -265,7 +267,7 @@ def _held(path: Path) -> IO[bytes]:
                     file.truncate(0)
                     file.write(str(os.getpid()).encode())
                 return file
-            file.close()  # whoever held it has just deleted it
+            file.close()  # the process that held it has just deleted it
         except BlockingIOError as error:
             raise _busy(path, file) from error
         except BaseException:
@@ -275,6 +277,7 @@ def _held(path: Path) -> IO[bytes]:
 
 
 def _is_there(path: Path, file: IO[bytes]) -> bool:
+    """Return whether the open file is still the one at a path."""
     try:
         return os.path.samestat(os.fstat(file.fileno()), path.stat())
     except FileNotFoundError:
@@ -294,7 +297,7 @@ def _busy(path: Path, file: IO[bytes] | None) -> ExportError:
 if sys.platform == "win32":
 
     def _lock(file: IO[bytes]) -> None:
-        file.seek(1 << 30)  # what is locked cannot be read, and the owner's number should be
+        file.seek(1 << 30)  # locked bytes cannot be read, and the owner's number must be readable
         try:
             msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
         except OSError as error:
@@ -307,17 +310,17 @@ else:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             raise
-        except OSError:  # some network file systems know no locks
+        except OSError:  # some network file systems have no locks
             pass
 
 
 @contextmanager
 def unfinished_work(target: Path) -> Iterator[Path]:
-    """Give a folder beside ``target`` for what is finished of the work on it, held for this process alone.
+    """Give a locked folder beside ``target`` for the finished parts of the work on it.
 
-    It is deleted when the block ends well; after an error, or when the process is killed, a later run finds in it
-    what this one left.
-    Raises ExportError: the file could not be put there, or another process is at work on it.
+    The folder is deleted when the block ends without an error; after an error, or when the process is killed, a later
+    run finds the finished parts in it.
+    Raises ExportError: the target could not be written, or another process is at work on it.
     """
     check_target(target)
     target = _place(target)
@@ -334,18 +337,18 @@ def unfinished_work(target: Path) -> Iterator[Path]:
                 if path.name != LOCK:
                     _remove(path)
     finally:
-        with suppress(OSError):  # there is something in it to go on from
+        with suppress(OSError):  # it contains finished parts
             folder.rmdir()
 
 
 def work_folder(target: Path) -> Path:
-    """Return the folder that ``unfinished_work`` gives."""
+    """Return the path of the folder that ``unfinished_work`` gives."""
     target = _place(target)
     return target.with_name(target.name + UNFINISHED)
 
 
 def remove_unfinished(folder: Path) -> None:
-    """Delete what a killed run left behind in ``folder``."""
+    """Delete the unfinished files that a killed run left in ``folder``."""
     for path in folder.glob(f"{TEMPORARY}*"):
         if path.name != LOCK:
             _remove(path)

@@ -1,4 +1,4 @@
-"""JSON as every program reads it: finite numbers only, each key once."""
+"""JSON that every program reads: finite numbers only, and each key once."""
 
 from __future__ import annotations
 
@@ -9,25 +9,26 @@ from typing import Any, NoReturn
 
 from lipmotion.errors import ExportError
 
-HALF_CHARACTER = re.compile("[\ud800-\udfff]")
+SURROGATE = re.compile("[\ud800-\udfff]")
 
 
-def as_json(content: Any, **how: Any) -> str:
-    """Return content as JSON that is UTF-8. ``how``: as ``json.dumps`` takes it; half a character is escaped anyway.
+def as_json(content: Any, **options: Any) -> str:
+    """Return content as JSON text that can be encoded as UTF-8.
 
-    Raises ExportError: a number that is not finite; JSON has none (``nan_as_null`` takes them out of reports).
+    options : of ``json.dumps``; surrogates, which UTF-8 cannot encode, are escaped in any case
+    Raises ExportError: a number that is not finite; JSON has none (``nan_as_null`` removes them from reports).
     """
     try:
-        text = json.dumps(content, allow_nan=False, **how)
-        if HALF_CHARACTER.search(text):  # JSON that was read may hold one, escaped; UTF-8 has none
-            text = json.dumps(content, allow_nan=False, **how | {"ensure_ascii": True})
+        text = json.dumps(content, allow_nan=False, **options)
+        if SURROGATE.search(text):  # JSON that was read may contain one, escaped
+            text = json.dumps(content, allow_nan=False, **options | {"ensure_ascii": True})
         return text
     except ValueError as error:
         raise ExportError(f"cannot be written as JSON ({error}): every number must be finite") from error
 
 
 def nan_as_null(content: Any) -> Any:
-    """Return content with null for every number that is not finite: a figure that nothing defines."""
+    """Return content with None (null in JSON) for every number that is not finite: such figures are undefined."""
     if isinstance(content, dict):
         return {key: nan_as_null(value) for key, value in content.items()}
     if isinstance(content, list | tuple):
@@ -36,16 +37,16 @@ def nan_as_null(content: Any) -> Any:
 
 
 def from_json(text: str | bytes) -> Any:
-    """Return what JSON holds. Raises ValueError: not JSON, a key twice, or a number that is not finite."""
-    return json.loads(text, object_pairs_hook=_once, parse_constant=_refused, parse_float=_finite)
+    """Return the content of JSON text. Raises ValueError: not JSON, a key twice, or a number that is not finite."""
+    return json.loads(text, object_pairs_hook=_distinct_keys, parse_constant=_refused, parse_float=_finite)
 
 
-def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    found = dict(pairs)
-    if len(found) < len(pairs):
+def _distinct_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    content = dict(pairs)
+    if len(content) < len(pairs):
         names = [key for key, _ in pairs]
-        raise ValueError(f"the key {next(key for key in names if names.count(key) > 1)!r} stands there twice")
-    return found
+        raise ValueError(f"the key {next(key for key in names if names.count(key) > 1)!r} occurs twice")
+    return content
 
 
 def _refused(constant: str) -> NoReturn:

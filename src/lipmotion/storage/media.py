@@ -1,4 +1,4 @@
-"""Recordings opened by FFmpeg: one file, and nothing else."""
+"""Opening of recordings with FFmpeg, restricted to the one file."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ MEDIA_FORMATS = (
     "apng asf asf_o avi dv dvd flv gif gxf h264 hevc ivf live_flv m4v matroska mjpeg mov mpeg mpegts mpegvideo mxf "
     "nut obu rm smjpeg wtv yuv4mpegpipe"
 ).split()
-"""FFmpeg's names of the containers that hold what they play. All other formats are refused before they open anything:
-playlists (hls, concat, dash, imf), indexes (vobsub), numbered pictures (image2), addresses (sdp, rtsp), devices."""
+"""FFmpeg's names of the container formats whose content is in the file itself. All others are refused before they open
+anything: playlists (hls, concat, dash, imf), indexes (vobsub), numbered pictures (image2), addresses (sdp, rtsp), devices."""
 LARGEST_BLOCK = 1 << 28
-"""Bytes that FFmpeg may allocate at a time: three times a picture of ``MOST_PIXELS`` in 16 bits and four channels."""
+"""Most bytes that FFmpeg may allocate at a time: three times a picture of ``MOST_PIXELS`` in 16 bits and four channels."""
 DURATION = re.compile(r"(\d{1,6}):(\d\d):(\d\d(?:\.\d{1,9})?)")
 MOST_PIXELS = 4096 * 2304
-"""Pixels of one picture: a little more than 4K has. A decoder may keep sixteen of them."""
+"""Most pixels of a picture: slightly more than 4K. A decoder may keep sixteen pictures."""
 
 
 def open_media(path: Path) -> Any:
-    """Return an open PyAV container; close it. Raises what PyAV raises.
+    """Return an open PyAV container, which the caller closes.
 
-    The name is taken as a file's whatever is in it (``12:30.wav`` is no protocol), and nothing but this file is
-    opened, whatever the content says: FFmpeg itself refuses every other protocol, and what is not in ``MEDIA_FORMATS``.
-    Raises ValueError: of another format, or damaged.
+    The name is always that of a file (in ``12:30.wav`` there is no protocol), and no other file is opened, whatever the
+    content: FFmpeg itself refuses all other protocols, and all formats but ``MEDIA_FORMATS``.
+    Raises ValueError: another format, or damaged. Raises the errors of PyAV.
     """
     import av
 
@@ -52,15 +52,15 @@ def open_media(path: Path) -> Any:
 
 @cache
 def _bound_allocations() -> None:
-    """Let FFmpeg refuse blocks over ``LARGEST_BLOCK``, for the whole process: it trusts sizes that headers state."""
+    """Limit FFmpeg's allocations to ``LARGEST_BLOCK``, in the whole process: it trusts the sizes in file headers."""
     import av._core
 
-    with suppress(OSError, AttributeError):  # where a module does not show what the libraries behind it export
+    with suppress(OSError, AttributeError):  # on systems where the module does not export the libraries' functions
         ctypes.CDLL(av._core.__file__).av_max_alloc(ctypes.c_size_t(LARGEST_BLOCK))
 
 
 def video_streams(container: Any) -> list[Any]:
-    """Return the video streams of an open container that are not the cover of an album."""
+    """Return the video streams of an open container, without album covers."""
     import av
 
     cover = av.stream.Disposition.attached_pic
@@ -68,10 +68,10 @@ def video_streams(container: Any) -> list[Any]:
 
 
 def stated_duration_s(container: Any, stream: Any) -> float:
-    """Return the duration that an open container states for one of its streams, 0 if none.
+    """Return the duration of a stream that an open container states, in seconds; 0 if it states none.
 
-    Where the stream has none of its own, that of the container stands for it. Subtitles may last longer than what they
-    belong to: beside them it is the longest of the sound and the pictures.
+    A stream without a duration of its own has that of the container; but as subtitles may last longer than sound and
+    video, in a container with subtitles it has the longest duration of sound and video.
     """
     if stream.duration:
         return float(stream.duration * stream.time_base)
@@ -81,7 +81,7 @@ def stated_duration_s(container: Any, stream: Any) -> float:
 
 
 def _tagged_s(stream: Any) -> float:
-    """Return the duration of a stream of Matroska, which keeps it as text."""
-    found = DURATION.fullmatch(stream.metadata.get("DURATION", ""))
-    hours, minutes, seconds = map(float, found.groups()) if found else (0.0, 0.0, 0.0)
+    """Return the duration of a Matroska stream, which is stored as text, in seconds; 0 if there is none."""
+    match = DURATION.fullmatch(stream.metadata.get("DURATION", ""))
+    hours, minutes, seconds = map(float, match.groups()) if match else (0.0, 0.0, 0.0)
     return 3600 * hours + 60 * minutes + seconds

@@ -1,4 +1,4 @@
-"""What stored arrays must be: a table of members, checked and turned into the types that are computed with."""
+"""Schemas of stored arrays: tables of specifications, by which arrays are checked and converted."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ from lipmotion.errors import ModelFormatError
 
 Arrays = Mapping[str, NDArray[Any]]
 POSITIVE, NEGATIVE, BELOW_ONE = 5e-324, -5e-324, math.nextafter(1, 0)
-"""The least number over 0, the largest under 0, the largest under 1: ends of ranges that leave 0 or 1 out."""
+"""The least number over 0, the largest under 0, the largest under 1: limits of ranges that exclude 0 or 1."""
 LARGEST = 1e30
 """No number of a model is larger, whatever its unit."""
 STANDARD = 500.0
-"""No mean of standardised values is larger: of N numbers none is √N deviations away from the mean of all."""
+"""No mean of standardised values is larger: none of N numbers is more than √N deviations from the mean of all."""
 LARGEST_VARIANCE = 1e6
-"""Nor is any variance of them; a component that is switched off has 1."""
+"""No variance of standardised values is larger; a component that is switched off has 1."""
 _KINDS = {"f": "fractions", "i": "whole numbers", "U": "texts", "b": "truth values", "u": "whole numbers from 0"}
 _SPELLED = {POSITIVE: "more than 0", NEGATIVE: "less than 0", BELOW_ONE: "less than 1"}
 
 
 @dataclass(frozen=True)
 class ArraySpec:
-    """What one array must be.
+    """The specification of one stored array.
 
-    dtype : what it becomes; it may be stored in another precision, but not as another kind of number
-    shape : sizes, as "L 3 Q": a letter is one size throughout a table, a small letter may also be 0; "" is one value
-    least, most : range, both ends in it; infinite only where it says so
-    optional : need not be there
-    whole : whole numbers will do for fractions
+    dtype    : its type after reading; it may be stored in another precision, but not as another kind of number
+    shape    : sizes, as "L 3 Q": a letter is one size throughout a table; a lower-case letter may be 0; "" is one value
+    least, most : range, limits included; values are infinite only if a limit is
+    optional : whether it may be missing
+    whole    : whether fractions may be stored as whole numbers
     """
 
     dtype: type[Any]
@@ -46,26 +46,26 @@ class ArraySpec:
 
     @property
     def kinds(self) -> str:
-        """The kinds of NumPy's types that it may be stored in."""
+        """The kinds of NumPy types that it may be stored as."""
         kind = np.dtype(self.dtype).kind
         return kind + "iu" if kind == "f" and self.whole else "iu" if kind == "i" else kind
 
     @property
     def range(self) -> str:
-        """Its range in words."""
+        """The range in words."""
         low, high = (_SPELLED.get(end, f"{end:g}") for end in (self.least, self.most))
         return f"{low} to {high}"
 
 
 @dataclass(frozen=True, eq=False)
 class CheckedArrays:
-    """Arrays that are as their table says, and the size of each letter in it."""
+    """Arrays that satisfy their table, and the size of each letter in it."""
 
     arrays: dict[str, NDArray[Any]]
     sizes: dict[str, int]
 
     def __getitem__(self, name: str) -> NDArray[Any]:
-        """Return one array. Raises KeyError: an optional one that is not there."""
+        """Return one array. Raises KeyError: an optional one that is missing."""
         return self.arrays[name]
 
 
@@ -82,9 +82,9 @@ def format_errors(what: str, remedy: str = "train or download it again") -> Iter
 
 
 def checked_arrays(arrays: Arrays, table: Mapping[str, ArraySpec], **sizes: int) -> CheckedArrays:
-    """Return the arrays of a table, in the types it says; other arrays are let be (``refuse_undeclared`` refuses them).
+    """Return the arrays of a table, in its types; other arrays are ignored (see ``refuse_undeclared``).
 
-    sizes : of letters that are known
+    sizes : of letters that are known before
     Raises ValueError: an array of another kind of number, of another shape or out of its range. KeyError: one is
     missing.
     """
@@ -107,20 +107,20 @@ def checked_sizes(arrays: Arrays, table: Mapping[str, ArraySpec], **sizes: int) 
 
 
 def refuse_undeclared(arrays: Iterable[str], *names: Iterable[str]) -> None:
-    """Raise ValueError where there is an array that none of some tables, or lists of names, has."""
+    """Raise ValueError if an array is in none of some tables, or lists of names."""
     unknown = sorted(set(arrays).difference(*names))
     if unknown:
         raise ValueError(f"undeclared {unknown[0]!r}")
 
 
 def check_index(name: str, numbers: NDArray[Any], count: int) -> None:
-    """Raise ValueError unless all numbers are of one of ``count`` things."""
+    """Raise ValueError unless all numbers are from 0 to ``count`` - 1."""
     if len(numbers) and not 0 <= numbers.min() <= numbers.max() < count:
         raise ValueError(f"{name} is {numbers.min()} to {numbers.max()}, required 0 to {count - 1}")
 
 
 def arrays_under(arrays: Arrays, prefix: str) -> dict[str, NDArray[Any]]:
-    """Return the arrays of a part, whose names begin with its prefix, under their own names."""
+    """Return the arrays whose names begin with a prefix, by their names without it."""
     return {name[len(prefix) :]: array for name, array in arrays.items() if name.startswith(prefix)}
 
 

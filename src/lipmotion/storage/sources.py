@@ -1,4 +1,4 @@
-"""What a call reads, and that nothing it writes destroys it."""
+"""The inputs of a call, and checks that its outputs do not overwrite them."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ from lipmotion.errors import ExportError
 class Source:
     """A file or a folder that a call reads.
 
-    what        : what it is, in a word: ``recording``, ``corpus``
-    replaceable : a file that is read whole before anything is written, so that an output may take its place
+    kind        : what it is, in a word: ``recording``, ``corpus``
+    replaceable : whether it is a file that is read whole before anything is written, so an output may replace it
     """
 
     path: Path
-    what: str
+    kind: str
     replaceable: bool = False
 
 
 def check_apart(
     targets: Iterable[Path], sources: Iterable[Source], *, folders: Iterable[Path] = (), force: bool = False
 ) -> None:
-    """Raise ExportError if writing would destroy what the same call reads.
+    """Raise ExportError if writing would overwrite what the same call reads.
 
     targets : files to be written
     folders : folders to be filled or emptied
-    force   : allow a file to take the place of a replaceable source
-    A file is known by its device and number, whatever its name, through links of both kinds. No output may lie in a
-    folder that is read, and no such file or folder in a folder that is written.
+    force   : allow a file to replace a replaceable source
+    Files are compared by device and inode, whatever their names, through links of both kinds. No output may lie in a
+    folder that is read, and no input in a folder that is written.
     """
     files, folders = list(targets), list(folders)
     for source in sources:
@@ -44,11 +44,14 @@ def check_apart(
             if clash:
                 itself = " itself" if clash == "is" else f" {source.path}"
                 way_out = ", or add --force to replace it" if clash == "is" and source.replaceable else ""
-                raise ExportError(f"{target}: {clash} the {source.what}{itself}; give another name{way_out}")
+                raise ExportError(f"{target}: {clash} the {source.kind}{itself}; give another name{way_out}")
 
 
 def _clash(target: Path, source: Path, *, holds: bool) -> str:
-    """Return how an output meets an input: ``is``, ``lies in``, ``belongs to`` or ``holds``; "" where it does not."""
+    """Return how an output and an input clash: ``is``, ``lies in``, ``belongs to`` or ``holds``; "" where they do not.
+
+    holds : whether the output is a folder, which may contain the input
+    """
     place = Path(os.path.realpath(target))
     if is_same(place, source):
         return "is"
@@ -61,30 +64,30 @@ def _clash(target: Path, source: Path, *, holds: bool) -> str:
         "holds"
         if holds
         and _status(source)
-        and any(is_same(place, around) for around in Path(os.path.realpath(source)).parents)
+        and any(is_same(place, parent) for parent in Path(os.path.realpath(source)).parents)
         else ""
     )
 
 
 def is_folder(path: Path) -> bool:
-    """Whether a folder of that name is there, however long the name."""
-    found = _status(path)
-    return found is not None and stat.S_ISDIR(found.st_mode)
+    """Return whether a folder exists; False also for names that are not valid."""
+    status = _status(path)
+    return status is not None and stat.S_ISDIR(status.st_mode)
 
 
 def is_same(path: str | Path, other: str | Path) -> bool:
-    """Whether two names, links followed, are one file or folder that is there."""
-    found, wanted = _status(path), _status(other)
-    return found is not None and wanted is not None and os.path.samestat(found, wanted)
+    """Return whether two names, links followed, are of one existing file or folder."""
+    one, two = _status(path), _status(other)
+    return one is not None and two is not None and os.path.samestat(one, two)
 
 
 def _is_in(folder: Path, file: Path) -> bool:
-    """Whether a file in a folder, or one that a link in it points to, is this one."""
+    """Return whether a file lies in a folder or its subfolders, or a link there points to it."""
     return any(is_same(Path(root) / name, file) for root, _, names in os.walk(folder) for name in names)
 
 
 def _status(path: str | Path) -> os.stat_result | None:
-    """Return what the system knows of a file or folder; None where there is none, or the text can be no name."""
+    """Return the status of a file or folder; None: there is none, or the name is not valid."""
     try:
         return Path(path).stat()
     except (OSError, ValueError):

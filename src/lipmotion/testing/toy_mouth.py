@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.appearance.mouth_region import EYE_DISTANCE_PX, HEIGHT, WIDTH
 from lipmotion.types import Motion
-from lipmotion.vision.mouth import EYE_DISTANCE_PX, HEIGHT, WIDTH
 
 SKIN, LIPS, INSIDE = (206.0, 160.0, 141.0), (172.0, 84.0, 88.0), (58.0, 24.0, 30.0)
 """Colours, RGB."""

@@ -1,1 +1,1 @@
-"""Video in, motion out."""
+"""Face tracking: videos to motion and mouth pictures."""

@@ -1,4 +1,4 @@
-"""Which of the 478 face-mesh points are used, and why.
+"""The face-mesh points (of 478) that are used, and why.
 
 Left and right are the speaker's own; in the picture the speaker's left is on the right.
 """
@@ -34,16 +34,16 @@ RIGID_POINTS = (
     # eye corners: fixed by ligaments, while the lids blink
     *(33, 133, 362, 263),
 )
-"""Points that do not move with speech; from them the motion of the head is found."""
+"""Points that do not move with speech; the head pose is estimated from them."""
 
 FOREHEAD, NASION = 10, 168
-"""Top of the forehead, and the bridge of the nose between the eyes: the upright direction."""
+"""Top of the forehead, and bridge of the nose between the eyes; they give the upright direction."""
 
 FOREHEAD_SLOPE_DEG = 8.6
-"""How far the line from NASION to FOREHEAD leans back in MediaPipe's canonical face, which looks straight ahead."""
+"""Slope of the line from NASION to FOREHEAD, backwards, in MediaPipe's canonical face, which looks straight ahead."""
 
 DISTANCES = {"opening": (13, 14), "width": (61, 291), "outer": (0, 17)}
-"""The three distances: between the inner lips, the corners, the outer lips."""
+"""The three distances as pairs of points: between the inner lips, the lip corners, the outer lips."""
 
 TRACKED_POINTS = tuple(sorted({*LIP_POINTS, *JAW_POINTS, *RIGID_POINTS}))
 """Every point that is kept from a frame."""

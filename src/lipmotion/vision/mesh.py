@@ -1,4 +1,4 @@
-"""MediaPipe's face mesh, one instance a clip, silent."""
+"""MediaPipe's face mesh: one instance a clip, without its log output."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from lipmotion.vision.packages import import_face_mesh
 class FaceMesh:
     """Finds the faces in the frames of one clip, in order; it follows them from frame to frame.
 
-    most : how many faces to look for; with one, the plainest is kept
+    most : the largest number of faces to find; with 1, the most probable one is kept
     Use it as a context manager. Raises MissingDependencyError: MediaPipe is not installed.
     """
 
@@ -36,10 +36,10 @@ class FaceMesh:
             self._mesh.close()
 
     def faces(self, image: NDArray[np.uint8]) -> list[NDArray[np.float64]]:
-        """Return the points of every face in one frame.
+        """Return the points of every face in the next frame.
 
         image : uint8 array [shape=(H, W, 3)], RGB
-        Returns arrays [shape=(len(TRACKED_POINTS), 3)], px, x to the right, y down, z away from the camera.
+        Returns one array a face [shape=(len(TRACKED_POINTS), 3)]: px, x to the right, y down, z away from the camera.
         """
         height, width = image.shape[:2]
         return [
@@ -60,7 +60,7 @@ class FaceMesh:
 
 @contextmanager
 def quiet_stderr() -> Iterator[None]:
-    """Drop what native code writes to stderr: MediaPipe logs before its log level can be set."""
+    """Discard the output of native code to stderr: MediaPipe logs before its log level can be set."""
     try:
         saved = os.dup(2)
     except OSError:  # the process has no stderr

@@ -1,29 +1,26 @@
-"""The mouth cut out of a frame, head upright, facing the camera and always of the same size."""
+"""Mouth pictures: the mouth region of a frame, with the head upright, facing the camera and always of the same size."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.appearance.mouth_region import CORNER, EYE_DISTANCE_PX, HEIGHT, WIDTH
 from lipmotion.vision.landmarks import LIP_POINTS, TRACKED_POINTS
 from lipmotion.vision.packages import import_opencv
 from lipmotion.vision.pose import head_pose
 
 Array = NDArray[np.float64]
 
-WIDTH, HEIGHT = 72, 56
-CORNER = (-36.0, 48.0)
-"""Upper left corner of the region, in px from the point between the eyes, y down."""
-EYE_DISTANCE_PX = 90.0
 _LIPS = [TRACKED_POINTS.index(index) for index in LIP_POINTS]
 
 
 def mouth_crop(image: NDArray[np.uint8], to_image: Array) -> NDArray[np.uint8]:
-    """Return the mouth region of one frame.
+    """Return the mouth picture of one frame: uint8 array [shape=(56, 72, 3)].
 
     image    : uint8 array [shape=(H, W, 3)]
     to_image : affine map [shape=(2, 3)] of ``face_to_image`` or ``eyes_to_image``
-    Returns uint8 array [shape=(56, 72, 3)]. What lies outside the image repeats its edge.
+    Pixels outside the image repeat its edge.
     """
     cv2 = import_opencv()
     shrink = max(1, int(np.sqrt(abs(np.linalg.det(to_image[:, :2]))) + 1e-9))
@@ -40,7 +37,7 @@ def mouth_crop(image: NDArray[np.uint8], to_image: Array) -> NDArray[np.uint8]:
 
 
 def region_to_image(to_image: Array, samples: int = 1) -> Array:
-    """Return the affine map from a pixel of the region to its place in the image [shape=(2, 3)].
+    """Return the affine map from a pixel of the mouth region to its position in the image [shape=(2, 3)].
 
     to_image : as in ``mouth_crop``
     samples  : pixels per pixel of the region, along each side
@@ -52,7 +49,7 @@ def region_to_image(to_image: Array, samples: int = 1) -> Array:
 
 
 def face_to_image(points: Array) -> Array:
-    """Return, frame by frame, where the plane of the lips is seen in the image, head motion taken out.
+    """Return the affine maps of every frame from the plane of the lips, without head motion, to the image.
 
     points : array [shape=(T, len(TRACKED_POINTS), 3)] of one person, px, x to the right, y down, z away from the camera
     Returns affine maps [shape=(T, 2, 3)] from px of the face that looks straight ahead (origin between the outer eye
@@ -61,7 +58,7 @@ def face_to_image(points: Array) -> Array:
     """
     upright = points * (1, -1, -1)
     pose = head_pose(upright, TRACKED_POINTS)
-    maps = pose.plane(float(pose.still(upright)[:, _LIPS, 2].mean()))
+    maps = pose.plane_to_image(float(pose.to_head_coordinates(upright)[:, _LIPS, 2].mean()))
     maps[:, 1] *= -1  # y is down in the image,
     maps[:, :, 1] *= -1  # and in the region
     maps[:, :, :2] /= EYE_DISTANCE_PX
@@ -69,7 +66,7 @@ def face_to_image(points: Array) -> Array:
 
 
 def eyes_to_image(eyes: Array) -> Array:
-    """Return the same map [shape=(2, 3)] of one frame by itself, of a face that is turned in the image plane only.
+    """Return the affine map of ``face_to_image`` for one frame [shape=(2, 3)], as if the face turned in its plane only.
 
     eyes : array [shape=(2, 2)], x and y of the right and left outer eye corner in the image, px, y down
     """

@@ -10,7 +10,7 @@ from lipmotion.errors import MissingDependencyError
 
 
 def import_opencv() -> Any:
-    """Return the module ``cv2``. Raises MissingDependencyError."""
+    """Return the module ``cv2``. Raises MissingDependencyError: it cannot be imported."""
     try:
         import cv2
     except ImportError as error:
@@ -19,7 +19,7 @@ def import_opencv() -> Any:
 
 
 def import_face_mesh() -> Any:
-    """Return MediaPipe's module ``face_mesh``, its log lowered. Raises MissingDependencyError."""
+    """Return MediaPipe's module ``face_mesh``, with less logging. Raises MissingDependencyError: it cannot be imported."""
     os.environ.setdefault("GLOG_minloglevel", "2")
     os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")
     try:
@@ -30,7 +30,7 @@ def import_face_mesh() -> Any:
 
 
 def package_versions() -> dict[str, str]:
-    """Return the versions of the packages that a track depends on. Raises MissingDependencyError."""
+    """Return the versions of the packages that tracking depends on, by name. Raises MissingDependencyError."""
     try:
         mediapipe = metadata.version("mediapipe")
     except metadata.PackageNotFoundError as error:

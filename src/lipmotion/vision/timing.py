@@ -1,4 +1,4 @@
-"""Frames at whatever times, put on a constant rate."""
+"""Resampling of frames at irregular times to a constant rate."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 RATE_TOLERANCE = 0.05
-"""A rate that the container states is believed when it is this close to the rate of its time stamps."""
+"""A frame rate that the container states is used when it differs from that of the time stamps by this share or less."""
 TIME_TOLERANCE = 0.05
-"""A frame this close to its place, in frames, is in its place: time stamps are rounded, often to 1 ms."""
+"""A frame at most this far from its nominal time, in frames, counts as on time: time stamps are often rounded to 1 ms."""
 CUBIC_GAP = 4.0
-"""Gaps of up to this many frames are bridged by a cubic; in longer ones it could swing, so they get a straight line."""
+"""Gaps of up to this many frames are interpolated by a cubic spline; longer ones linearly, as it could overshoot there."""
 RATE_WHEN_UNKNOWN_HZ = 25.0
 LOWEST_HZ, HIGHEST_HZ = 1.0, 1000.0
-"""Less often seen, no lips move; no camera is faster. Other rates are those of wrong time stamps."""
+"""Lowest and highest frame rate: lip motion needs more than the lowest, no camera is faster than the highest."""
 
 
 def nominal_rate_hz(times_s: Array, stated_rates_hz: Sequence[float]) -> float:
-    """Return the constant frame rate that the time stamps belong to, dropped frames or not.
+    """Return the constant frame rate of the time stamps, even if frames were dropped.
 
     times_s         : times of the decoded frames, rising
-    stated_rates_hz : rates to believe, in this order, when one fits the median interval of the times
+    stated_rates_hz : of the container; the first that fits the median interval of the times is returned
     """
     if len(times_s) < 2:
         return stated_rates_hz[0] if stated_rates_hz else RATE_WHEN_UNKNOWN_HZ
@@ -34,7 +34,7 @@ def nominal_rate_hz(times_s: Array, stated_rates_hz: Sequence[float]) -> float:
 
 
 def frame_count(times_s: Array, rate_hz: float) -> int:
-    """Return how many frames of the constant rate, the first at 0 s, reach to the last time."""
+    """Return how many frames at a constant rate, the first at 0 s, there are up to the last time."""
     return round(float(times_s[-1]) * rate_hz) + 1
 
 
@@ -47,12 +47,13 @@ def nearest_indices(times_s: Array, wanted_s: Array) -> NDArray[np.intp]:
 
 
 def resample_to_constant_rate(times_s: Array, values: Array, rate_hz: float, count: int) -> Array:
-    """Return the values at n / rate_hz seconds.
+    """Return the values at the times n / rate_hz.
 
     times_s : array [shape=(S,)], rising
     values  : array [shape=(S, P)]
-    Returns array [shape=(count, P)]: frames that are in their place unchanged, others by a cubic spline through all
-    (a straight line across long gaps), constant before the first and after the last.
+    count   : of frames returned
+    Returns array [shape=(count, P)]: frames that are on time unchanged, others by a cubic spline through all (linear in
+    long gaps), constant before the first and after the last.
     """
     from scipy.interpolate import CubicSpline
 

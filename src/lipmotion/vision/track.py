@@ -15,7 +15,7 @@ from lipmotion.vision.frames import OpenVideo, open_video
 from lipmotion.vision.image_similarity import mouth_thumbnail, occluded_mouths
 from lipmotion.vision.landmarks import DISTANCES, EYE_CORNERS, JAW_POINTS, LIP_POINTS, TRACKED_POINTS
 from lipmotion.vision.mouth import eyes_to_image, face_to_image, mouth_crop
-from lipmotion.vision.pose import head_frame
+from lipmotion.vision.pose import without_head_motion
 from lipmotion.vision.timing import (
     HIGHEST_HZ,
     LOWEST_HZ,
@@ -133,7 +133,7 @@ def motion_values(points: Array) -> Array:
     flat = points[:, :, :2]
     unit = _distance(flat, EYE_CORNERS)
     distances = np.stack([_distance(flat, pair) / unit for pair in DISTANCES.values()], axis=1)
-    head = head_frame(points * (1, -1, -1), TRACKED_POINTS)
+    head = without_head_motion(points * (1, -1, -1), TRACKED_POINTS)
     spoken = head[:, [COLUMN[index] for index in (*LIP_POINTS, *JAW_POINTS)]]
     return np.concatenate([distances, spoken.reshape(len(points), -1)], axis=1)
 

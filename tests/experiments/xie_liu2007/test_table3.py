@@ -65,6 +65,7 @@ def figures(toy_corpus: Corpus, folder: Path, stages: list[Progress]) -> dict[st
     )
 
 
+@pytest.mark.long
 def test_every_size_condition_and_system(figures: dict[str, Any]) -> None:
     assert [(row["names"], row["used"]) for row in figures["rows"]] == [(3, 3), (8, 8)]
     for row in figures["rows"]:

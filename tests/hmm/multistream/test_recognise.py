@@ -145,7 +145,7 @@ def test_speech_alone_is_the_plain_model():
             leaves.append(part.forest.leaf((context, state)))
     table = StateTable(known.names, tuple(map(known.count, known.names)), tuple(names), known.free)
     config = HmmConfig(bigram_weight=hmm.config.bigram_weight, insertion=hmm.config.insertion)
-    plain = UnitHmm(config, table, part.tied.mixtures.picked(np.array(leaves)), hmm.log_stay, hmm.bigram)
+    plain = UnitHmm(config, table, part.tied.mixtures.selected(np.array(leaves)), hmm.log_stay, hmm.bigram)
     data = observed(np.random.default_rng(9), 60, (SPEECH,))
     rows = part.scale.standardise(data.streams[SPEECH])
     units, bounds = decode_units(unit_loop(plain, ["sil", "a", "b"]), log_likelihoods_of(plain, part.tied.values(rows)))

@@ -308,6 +308,7 @@ def started(script: Path, folder: Path, corpus: Path) -> subprocess.Popen[str]:
     return process
 
 
+@pytest.mark.long
 @pytest.mark.video
 @pytest.mark.recordings
 @pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGKILL])

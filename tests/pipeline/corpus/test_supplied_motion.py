@@ -159,6 +159,7 @@ def test_labels_that_go_on_after_the_sound():
     assert given_phones(recording(spans((0, 2, "aa"))), 1.95) == spans((0, 1.95, "aa"))
 
 
+@pytest.mark.long
 @pytest.mark.recordings
 def test_facegood_from_recordings_to_figures(recordings: Path, tmp_path: Path) -> None:
     """Two recordings to train on, the third to test: Mandarin, 30 Hz, 116 blendshapes, no transcript."""

@@ -120,6 +120,7 @@ def test_lips_that_do_not_follow_are_left_alone(corpus: Corpus) -> None:
     np.testing.assert_array_equal(corpus.utterance(names[0]).audio.samples, before)
 
 
+@pytest.mark.long
 @pytest.mark.video
 @pytest.mark.recordings
 @pytest.mark.parametrize("late_s", [-0.2, -0.06, 0.0, 0.13])

@@ -52,6 +52,7 @@ def crops(given: Sequence[Utterance]) -> list[np.ndarray]:
     return [np.asarray(utterance.track.crops) for utterance in given]
 
 
+@pytest.mark.long
 def test_few_pictures_are_all_learned_from(utterances: list[Utterance], space: Eigenlips) -> None:
     wanted = fit_eigenlips(np.concatenate(crops(utterances)), 4)
     assert np.array_equal(space.basis, wanted.basis)

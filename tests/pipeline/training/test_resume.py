@@ -71,6 +71,7 @@ def events_of(corpus: Corpus, work: Path | None = None) -> list[Progress | Item]
     return events
 
 
+@pytest.mark.long
 def test_stopped_after_any_event(corpus: Corpus, work: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(labels, "AT_A_TIME", 2)
     whole = content(run(corpus), tmp_path)
@@ -112,6 +113,7 @@ def test_left_out_utterances_are_told_again(corpus: Corpus, work: Path) -> None:
     assert "too short" in first[0].reason
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("what", ["corpus", "recogniser", "lexicon", "names"])
 def test_another_job_starts_over(corpus: Corpus, work: Path, tmp_path: Path, what: str) -> None:
     run(corpus, work)
@@ -141,6 +143,7 @@ def test_a_damaged_checkpoint_is_not_used(corpus: Corpus, work: Path, tmp_path: 
     assert content(run(corpus, work), tmp_path) == whole
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("here", "there"), [(1, 2), (2, 1)])
 def test_threads_of_matrix_products_change_nothing(
     corpus: Corpus, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, here: int, there: int
@@ -154,6 +157,7 @@ def test_threads_of_matrix_products_change_nothing(
         assert {each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"} == {here}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("stop", [0, 6, 12])
 def test_in_two_processes(
     corpus: Corpus, work: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stop: int

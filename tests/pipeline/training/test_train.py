@@ -102,6 +102,7 @@ def labelled(utterance: Utterance) -> Utterance:
     return replace(utterance, words=None, phones=phones)
 
 
+@pytest.mark.long
 def test_labelled_phones_are_used_as_they_are(
     toy_corpus: Corpus, toy_model: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -116,6 +117,7 @@ def test_labelled_phones_are_used_as_they_are(
     assert labels_of(given[0], Recogniser(model.phones, "own"), Lexicon()) == given[0].phones
 
 
+@pytest.mark.long
 def test_labelled_and_transcribed_utterances_together(toy_corpus: Corpus, tmp_path: Path) -> None:
     both = [u if number % 2 else labelled(u) for number, u in enumerate(some(toy_corpus, 8))]
     model, report = train(corpus_of(both, tmp_path), recogniser=SMALL)

@@ -89,6 +89,7 @@ def test_a_sentence_that_festival_leaves_out_is_missed(faked: Path) -> None:
     assert list(faked.iterdir()) == []
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("voice", EACH)
 def test_a_program_that_hangs_is_stopped(faked: Path, voice: SyntheticVoice, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(synthesiser, "START_S", 1.0)

@@ -153,7 +153,7 @@ def _context(silence: str, unit: str, neighbour: str, side: int) -> Context:
 def _unit_hmm(hmm: JointHmm, states: _LoopStates) -> UnitHmm:
     """Return unit models with the densities of the speech stream, from which the loop is built."""
     config = HmmConfig(states=hmm.config.states, bigram_weight=hmm.config.bigram_weight, insertion=hmm.config.insertion)
-    mixtures = hmm.models[SPEECH].tied.mixtures.picked(states.leaves[SPEECH][states.column])
+    mixtures = hmm.models[SPEECH].tied.mixtures.selected(states.leaves[SPEECH][states.column])
     bigram = Bigram(hmm.inventory.names, hmm.bigram.log_probability)
     return UnitHmm(config, states.table, mixtures, hmm.log_stay.astype(np.float32), bigram)
 

@@ -1,0 +1,10 @@
+"""The region of a face that mouth pictures show, in pixels of a head that is upright and faces the camera."""
+
+from __future__ import annotations
+
+WIDTH, HEIGHT = 72, 56
+"""Size of a mouth picture, px."""
+CORNER = (-36.0, 48.0)
+"""Upper left corner of the region, in px from the point between the eyes, y down."""
+EYE_DISTANCE_PX = 90.0
+"""Distance between the outer eye corners, px."""
