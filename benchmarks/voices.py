@@ -3,8 +3,8 @@
     python benchmarks/voices.py [--sentences 60]
 
 One JSON object per synthesiser, then one for all. ``late_ms``: median of (its start of a phone − the start that the
-general phone models align); ``off_ms``, ``worst_ms``: median and 90th percentile of the distance. ``biased``: phones whose
-median difference (of 20 or more) is at least 12 ms.
+general phone models align); ``off_ms``, ``worst_ms``: median and 90th percentile of the distance. ``biased``: phones
+whose median difference (of 20 or more) is at least 12 ms.
 """
 
 from __future__ import annotations

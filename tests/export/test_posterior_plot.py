@@ -30,7 +30,7 @@ def generated(frames: int = FRAMES, name: str = "opening") -> Generation:
 
 
 def halves(frames: int = FRAMES) -> np.ndarray:
-    """Probabilities of four units: the first in the first half, the second in the other, the third and fourth seldom."""
+    """Return probabilities of four units: the first in one half, the second in the other, the others seldom."""
     early = (np.arange(frames) < frames // 2).astype(float)
     sometimes = np.where(np.arange(frames) == frames - 1, 0.5, 0.2)
     return np.stack([1 - early, early, sometimes, np.full(frames, 0.04)], axis=1)

@@ -262,8 +262,8 @@ ONE_TIER = '"ooTextFile"\n"TextGrid"\n0 1 <exists> 1\n"IntervalTier" "a" 0 1'
 _label_file("binary", ".TextGrid", b"ooBinaryFile\x08TextGrid\x00\xff", "binary TextGrid; save it as a text file")
 _label_file("cut off", ".TextGrid", 'File type = "ooTextFile"\n"TextGrid"\n0\n1\n<exists>\n1\n', "is damaged")
 _label_file("a billion tiers", ".TextGrid", '"ooTextFile"\n"TextGrid"\n0 1 <exists> 1000000000\n', "tier 1 is damaged")
-_label_file("a tier of a billion labels", ".TextGrid", '"ooTextFile"\n"TextGrid"\n0 1 <exists> 1\n"IntervalTier" "a" 0 1 '
-          "1000000000\n0 1 \"b\"\n", "more than 250000 labels; give those of one recording")  # fmt: skip
+_label_file("a tier of a billion labels", ".TextGrid", '"ooTextFile"\n"TextGrid"\n0 1 <exists> 1\n"IntervalTier" "a" '
+            '0 1 1000000000\n0 1 "b"\n', "more than 250000 labels; give those of one recording")  # fmt: skip
 _label_file("half a tier", ".TextGrid", '"ooTextFile"\n"TextGrid"\n0 1 <exists> 0.5\n', "is damaged")
 _label_file("times of NaN", ".TextGrid", '"ooTextFile"\n"TextGrid"\n0 nan <exists> 1\n', "is damaged")
 _label_file("times of 1e999", ".TextGrid", '"ooTextFile"\n"TextGrid"\n0 1 <exists> 1e999\n', "is damaged")

@@ -58,14 +58,14 @@ def _line(name: str, row: Mapping[str, Any], training: Mapping[str, Any]) -> str
 
 
 def _opening(row: Mapping[str, Any]) -> str:
+    """Return the columns from the ACC of the opening to its variance."""
     lips = row["opening"] or dict.fromkeys(
         ("nrmse", "rmse", "score", "recall_p_b_m", "false_per_minute", "global_variance")
     )
-    return (
-        f"{_with_interval(row, 'opening_acc', '.3f'):22}{figure_text(lips['nrmse'], '7.3f')}{figure_text(lips['rmse'], '8.4f')}"
-        f"{figure_text(row['lag_ms'], '+7.0f')}{figure_text(lips['score'], '7.1f')}{figure_text(lips['recall_p_b_m'], '7.1f')}"
-        f"{figure_text(lips['false_per_minute'], '7.1f')}{figure_text(lips['global_variance'], '10.2f')}"
-    )
+    columns = ((lips["nrmse"], "7.3f"), (lips["rmse"], "8.4f"), (row["lag_ms"], "+7.0f"), (lips["score"], "7.1f"))
+    columns += ((lips["recall_p_b_m"], "7.1f"), (lips["false_per_minute"], "7.1f"), (lips["global_variance"], "10.2f"))
+    texts = "".join(figure_text(value, form) for value, form in columns)
+    return f"{_with_interval(row, 'opening_acc', '.3f'):22}{texts}"
 
 
 def _eigenlips(rows: Mapping[str, Any]) -> list[str]:
@@ -96,7 +96,8 @@ def _noise(kind: str, figures: Mapping[str, Any]) -> list[str]:
     lines.append(f"  {'system':{WIDTH}}" + "".join(f"{head:>17}" for head in heads))
     for name in clean:
         cells = [
-            f"{row['acc']:.3f}{significance_mark(row['acc_gain_95'])} / {row['amse']:.4f}{significance_mark(row['amse_gain_95'])}"
+            f"{row['acc']:.3f}{significance_mark(row['acc_gain_95'])} / "
+            f"{row['amse']:.4f}{significance_mark(row['amse_gain_95'])}"
             for row in (clean[name], *(row["systems"][name] for row in in_noise))
         ]
         lines.append(f"  {name:{WIDTH}}" + "".join(f"{cell:>17}" for cell in cells))
