@@ -1,4 +1,4 @@
-"""A video as pictures with their times."""
+"""Decoding of a video into pictures with their times."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from lipmotion.storage.media import MOST_PIXELS, open_media, stated_duration_s, 
 class VideoFrame:
     """One picture.
 
-    time_s : its time, relative to the container's time 0
+    time_s : its time since the container's time 0, s
     image  : uint8 array [shape=(H, W, 3)], RGB, upright, square pixels
     """
 
@@ -32,10 +32,10 @@ class VideoFrame:
 class OpenVideo:
     """An open video.
 
-    frames          : the pictures, decoded as they are asked for
-    stated_rates_hz : the frame rates that the container states, the most trustworthy first
+    frames          : the pictures; each is decoded when the iterator reaches it
+    stated_rates_hz : the frame rates that the container states, the most reliable first
     stated_s        : the duration that the container states, 0 if none
-    damage          : of every packet or picture that was left out so far, why
+    damage          : a reason for every packet or picture that was left out so far
     """
 
     frames: Iterator[VideoFrame]
@@ -45,7 +45,7 @@ class OpenVideo:
 
 
 LEAST_SIDE, LONGEST_SIDE = 16, 8192
-"""Width and height of a picture, in pixels: in a smaller one there is no face, a larger one fills the memory."""
+"""Bounds of a picture's width and height, px: a smaller one shows no face, a larger one fills the memory."""
 
 
 @contextmanager
@@ -54,7 +54,7 @@ def open_video(path: Path) -> Iterator[OpenVideo]:
 
     Time 0 is the container's start, as in ``speech.audio_files``, so sound and picture agree.
     Raises InputError: no such file, empty, not a video, no video stream, or no picture that can be decoded.
-    What is damaged later is left out and counted.
+    Packets and pictures that are damaged later are left out, and listed in ``OpenVideo.damage``.
     """
     import av
 
@@ -74,7 +74,9 @@ def open_video(path: Path) -> Iterator[OpenVideo]:
         stream.codec_context.options = {"max_pixels": str(MOST_PIXELS)}
         rates = [float(rate) for rate in (stream.guessed_rate, stream.average_rate) if rate]
         damage: list[str] = []
-        with closing(_frames(container, stream, path, damage)) as frames:  # decoding from a closed one would crash
+        with closing(
+            _frames(container, stream, path, damage)
+        ) as frames:  # decoding from a closed container would crash
             yield OpenVideo(frames, tuple(rates), stated_duration_s(container, stream), damage)
 
 
@@ -84,7 +86,7 @@ def _frames(container: Any, stream: Any, path: Path, damage: list[str]) -> Gener
     last_s = float("-inf")
     for picture in _pictures(container, stream, damage):
         if picture.time is None or picture.time - start_s <= last_s:
-            continue  # without a time, or shown twice: it cannot be placed
+            continue  # it has no time, or one that another picture has
         last_s = picture.time - start_s
         _check_size(path, picture.width, picture.height, float(pixel_shape or 1))
         yield VideoFrame(last_s, _upright(picture, float(pixel_shape or 1)))
@@ -93,7 +95,7 @@ def _frames(container: Any, stream: Any, path: Path, damage: list[str]) -> Gener
 
 
 def _pictures(container: Any, stream: Any, damage: list[str]) -> Iterator[Any]:
-    """Yield the pictures that are whole."""
+    """Yield the pictures that are not damaged."""
     import av
 
     packets = container.demux(stream)
@@ -113,7 +115,11 @@ def _pictures(container: Any, stream: Any, damage: list[str]) -> Iterator[Any]:
 
 
 def _check_size(path: Path, width: int, height: int, pixel_shape: float) -> None:
-    if not width or not height:  # FFmpeg does not say what it refuses
+    """Raise InputError for pictures that are too small or too large.
+
+    pixel_shape : width of a pixel over its height
+    """
+    if not width or not height:  # FFmpeg gives no size for pictures that it refuses
         raise InputError(f"{path}: pictures of no size, or of more than {MOST_PIXELS} pixels; scale the video")
     shown = round(width * pixel_shape)
     if not (LEAST_SIDE <= shown <= LONGEST_SIDE and LEAST_SIDE <= height <= LONGEST_SIDE):
@@ -127,6 +133,7 @@ def _check_size(path: Path, width: int, height: int, pixel_shape: float) -> None
 
 
 def _upright(picture: Any, pixel_shape: float) -> NDArray[np.uint8]:
+    """Return a picture as RGB [shape=(H, W, 3)], rotated upright, with square pixels."""
     width = round(picture.width * pixel_shape)
     image: NDArray[np.uint8] = picture.to_ndarray(format="rgb24", width=width, height=picture.height)
     return np.ascontiguousarray(np.rot90(image, picture.rotation // 90)) if picture.rotation else image

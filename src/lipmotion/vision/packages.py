@@ -19,7 +19,7 @@ def import_opencv() -> Any:
 
 
 def import_face_mesh() -> Any:
-    """Return MediaPipe's module ``face_mesh``, with less logging. Raises MissingDependencyError: it cannot be imported."""
+    """Return MediaPipe's module ``face_mesh``, with less logging. Raises MissingDependencyError: no import."""
     os.environ.setdefault("GLOG_minloglevel", "2")
     os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")
     try:

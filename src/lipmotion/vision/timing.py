@@ -12,9 +12,9 @@ Array = NDArray[np.float64]
 RATE_TOLERANCE = 0.05
 """A frame rate that the container states is used when it differs from that of the time stamps by this share or less."""
 TIME_TOLERANCE = 0.05
-"""A frame at most this far from its nominal time, in frames, counts as on time: time stamps are often rounded to 1 ms."""
+"""A frame this close to its nominal time, in frames, counts as on time: time stamps are often rounded to 1 ms."""
 CUBIC_GAP = 4.0
-"""Gaps of up to this many frames are interpolated by a cubic spline; longer ones linearly, as it could overshoot there."""
+"""Gaps of up to this many frames are interpolated by a cubic spline; in longer ones it could overshoot: linearly."""
 RATE_WHEN_UNKNOWN_HZ = 25.0
 LOWEST_HZ, HIGHEST_HZ = 1.0, 1000.0
 """Lowest and highest frame rate: lip motion needs more than the lowest, no camera is faster than the highest."""

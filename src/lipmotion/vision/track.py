@@ -1,4 +1,4 @@
-"""A video to the motion of lips and jaw."""
+"""Tracking: a video to the motion of lips and jaw, and mouth pictures."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ Array = NDArray[np.float64]
 UNSEEN_LIMIT = 0.2
 """A clip is refused when more than this share of its frames shows no face."""
 USABLE = 0.5
-"""A clip is refused when its pictures reach less than this share of the duration that it states."""
+"""A clip is refused when its pictures cover less than this share of the duration that it states."""
 SHORT_S = 0.5
-"""Pictures that end this much before the stated duration are reported."""
+"""Pictures that end more than this before the stated duration are reported."""
 STRETCH_LIMIT = 2.0
 """A clip is refused when its time stamps span more than this many times the frames that it holds."""
 
@@ -45,8 +45,8 @@ CHANNELS = tuple(
 
 
 @dataclass(eq=False)
-class _Sighting:
-    """What was found in the frames so far; ``points`` and ``mouths`` only of those that show the face."""
+class _TrackedFrames:
+    """The frames so far: times, and whether each shows the face; points and mouth thumbnails of those that do."""
 
     times_s: list[float] = field(default_factory=list)
     seen: list[bool] = field(default_factory=list)
@@ -61,8 +61,8 @@ class _Sighting:
             self.points.append(points)
             self.mouths.append(mouth_thumbnail(mouth_crop(image, eyes_to_image(eyes))))
 
-    def leave_out(self, wrong: NDArray[np.bool_]) -> int:
-        """Take out some of the frames that show a face [shape=(number of them,)]; return how many."""
+    def mark_unseen(self, wrong: NDArray[np.bool_]) -> int:
+        """Mark some of the frames that show a face as if they did not [shape=(number of them,)]; return how many."""
         for index in np.flatnonzero(self.seen)[wrong]:
             self.seen[index] = False
         right = np.flatnonzero(~wrong)
@@ -72,24 +72,24 @@ class _Sighting:
 
 
 def track(path: Path, *, crops: bool = True) -> Track:
-    """Follow the face in a video and return how lips and jaw move, head motion removed.
+    """Return the motion of lips and jaw in a video, without head motion, and the mouth pictures.
 
     path  : a video that shows one face, more or less from the front
-    crops : cut out the mouth images as well
+    crops : whether mouth pictures are wanted
     Returns a Track at the video's nominal frame rate, frame n at n / rate seconds after the container's start, not
-    smoothed. Frames that were dropped or damaged, show no face, somebody else or something before the mouth, are
-    interpolated, marked in ``seen``, and have the mouth image of the nearest frame that is seen. Of several people the
-    largest and most central is followed. What was odd is told in ``notes``.
+    smoothed. Frames that were dropped or damaged, show no face or another one, or in which the mouth is occluded, are
+    interpolated, False in ``seen``, and have the mouth picture of the nearest frame that is seen. Of several people the
+    largest and most central is followed. ``notes`` reports damage, cuts and other faces.
     Raises InputError: not a video, damaged or cut short before half of it, or the face in too few of the frames.
     Raises MissingDependencyError: MediaPipe or OpenCV is not installed.
     """
-    sighting = _Sighting()
+    tracked = _TrackedFrames()
     with open_video(path) as video, FaceFollower() as follower:
         for frame in video.frames:
-            sighting.add(frame.time_s, frame.image, follower.points(frame.image))
-    others = sighting.leave_out(~follower.person()[sighting.seen])
-    covered = sighting.leave_out(occluded_mouths(np.stack(sighting.mouths))) if sighting.mouths else 0
-    times_s = np.array(sighting.times_s)
+            tracked.add(frame.time_s, frame.image, follower.points(frame.image))
+    others = tracked.mark_unseen(~follower.person()[tracked.seen])
+    covered = tracked.mark_unseen(occluded_mouths(np.stack(tracked.mouths))) if tracked.mouths else 0
+    times_s = np.array(tracked.times_s)
     rate_hz = nominal_rate_hz(times_s, video.stated_rates_hz)
     notes = (
         *_damage(video, times_s, rate_hz),
@@ -97,23 +97,24 @@ def track(path: Path, *, crops: bool = True) -> Track:
         *([f"another face, or one that is not recognised, in {others} frames"] if others else []),
         *([f"the mouth is covered, or the picture damaged, in {covered} frames"] if covered else []),
     )
-    _check(path, sighting, video, rate_hz, notes)
-    mouths = _mouths(path, sighting) if crops else None
-    return replace(_assembled(sighting, mouths, rate_hz, frame_count(times_s, rate_hz)), notes=notes)
+    _check(path, tracked, video, rate_hz, notes)
+    mouths = _mouths(path, tracked) if crops else None
+    return replace(_resampled(tracked, mouths, rate_hz, frame_count(times_s, rate_hz)), notes=notes)
 
 
-def _mouths(path: Path, sighting: _Sighting) -> NDArray[np.uint8]:
-    """Return the mouth image of every frame that shows the face.
+def _mouths(path: Path, tracked: _TrackedFrames) -> NDArray[np.uint8]:
+    """Return the mouth picture of every frame that shows the face [shape=(n, 56, 72, 3)].
 
-    The video is decoded once more: where the head is depends on all frames, and they do not fit into memory.
+    The video is decoded once more: the head pose depends on all frames, and the frames do not fit into memory.
     """
-    maps = iter(face_to_image(np.stack(sighting.points)))
+    maps = iter(face_to_image(np.stack(tracked.points)))
     with open_video(path) as video:
-        shown = zip(sighting.seen, video.frames, strict=False)
+        shown = zip(tracked.seen, video.frames, strict=False)
         return np.stack([mouth_crop(frame.image, next(maps)) for seen, frame in shown if seen])
 
 
 def _damage(video: OpenVideo, times_s: Array, rate_hz: float) -> list[str]:
+    """Return notes on pictures that cannot be decoded or are missing at the end."""
     notes = []
     end_s = float(times_s[-1]) + 1 / rate_hz
     if video.damage:
@@ -125,41 +126,41 @@ def _damage(video: OpenVideo, times_s: Array, rate_hz: float) -> list[str]:
 
 
 def motion_values(points: Array) -> Array:
-    """Return the channels of tracked frames.
+    """Return the values of ``CHANNELS`` in tracked frames [shape=(T, len(CHANNELS))].
 
     points : array [shape=(T, len(TRACKED_POINTS), 3)], px, x to the right, y down, z away from the camera
-    Returns array [shape=(T, len(CHANNELS))]
     """
     flat = points[:, :, :2]
     unit = _distance(flat, EYE_CORNERS)
     distances = np.stack([_distance(flat, pair) / unit for pair in DISTANCES.values()], axis=1)
     head = without_head_motion(points * (1, -1, -1), TRACKED_POINTS)
-    spoken = head[:, [COLUMN[index] for index in (*LIP_POINTS, *JAW_POINTS)]]
-    return np.concatenate([distances, spoken.reshape(len(points), -1)], axis=1)
+    moving = head[:, [COLUMN[index] for index in (*LIP_POINTS, *JAW_POINTS)]]
+    return np.concatenate([distances, moving.reshape(len(points), -1)], axis=1)
 
 
 def _distance(flat: Array, pair: tuple[int, int]) -> Array:
+    """Return the distance between two points in every frame, px [shape=(T,)]."""
     distance: Array = np.linalg.norm(flat[:, COLUMN[pair[0]]] - flat[:, COLUMN[pair[1]]], axis=1)
     return distance
 
 
-def _check(path: Path, sighting: _Sighting, video: OpenVideo, rate_hz: float, notes: tuple[str, ...]) -> None:
-    times_s, seen = np.array(sighting.times_s), np.array(sighting.seen)
+def _check(path: Path, tracked: _TrackedFrames, video: OpenVideo, rate_hz: float, notes: tuple[str, ...]) -> None:
+    times_s, seen = np.array(tracked.times_s), np.array(tracked.seen)
     if not LOWEST_HZ <= rate_hz <= HIGHEST_HZ:
         raise InputError(
             f"{path}: {rate_hz:g} pictures a second, required {LOWEST_HZ:g} to {HIGHEST_HZ:g}; export the video again"
         )
     count = frame_count(times_s, rate_hz)
-    told = f" ({'; '.join(notes)})" if notes else ""
+    noted = f" ({'; '.join(notes)})" if notes else ""
     if count < USABLE * video.stated_s * rate_hz:
         raise InputError(
-            f"{path}: pictures for {count / rate_hz:.1f} of {video.stated_s:.1f} s; required at least half{told}; "
+            f"{path}: pictures for {count / rate_hz:.1f} of {video.stated_s:.1f} s; required at least half{noted}; "
             "export the video again"
         )
     unseen = int((~seen).sum())
     if unseen > UNSEEN_LIMIT * len(seen):
         raise InputError(
-            f"{path}: no face in {unseen} of {len(seen)} frames{told}; required: a face in at least "
+            f"{path}: no face in {unseen} of {len(seen)} frames{noted}; required: a face in at least "
             f"{1 - UNSEEN_LIMIT:.0%} of them, one person, from the front"
         )
     if count > STRETCH_LIMIT * len(seen):
@@ -169,9 +170,9 @@ def _check(path: Path, sighting: _Sighting, video: OpenVideo, rate_hz: float, no
         )
 
 
-def _assembled(sighting: _Sighting, mouths: NDArray[np.uint8] | None, rate_hz: float, count: int) -> Track:
-    times_s = np.array(sighting.times_s)[sighting.seen]
-    values = resample_to_constant_rate(times_s, motion_values(np.stack(sighting.points)), rate_hz, count)
+def _resampled(tracked: _TrackedFrames, mouths: NDArray[np.uint8] | None, rate_hz: float, count: int) -> Track:
+    times_s = np.array(tracked.times_s)[tracked.seen]
+    values = resample_to_constant_rate(times_s, motion_values(np.stack(tracked.points)), rate_hz, count)
     wanted_s = np.arange(count) / rate_hz
     index = nearest_indices(times_s, wanted_s)
     seen = np.abs(times_s[index] - wanted_s) * rate_hz <= 0.5
