@@ -20,9 +20,9 @@ from lipmotion.export.cues.choose import choose_cues, default_hold_frames
 from lipmotion.export.cues.costs import frame_costs
 from lipmotion.export.cues.shapes import SHAPES
 from lipmotion.export.cues.sheet import CueSheet, cue_sheet, frame_count
-from lipmotion.pipeline.training.train import labels_of
+from lipmotion.pipeline.training.train import phones_of
 from lipmotion.speech.recogniser import cached_recogniser
-from lipmotion.types import Generation, Motion, Speech, Timeline, Trace
+from lipmotion.types import Generation, Motion, Speech, StateTrace, Timeline
 from lipmotion.units import LIP_CLOSING, VISEMES, Lexicon, is_silent
 
 MARGIN_S = 0.1
@@ -43,7 +43,7 @@ def main() -> None:
     results, references = [], []
     for name in corpus.required(options.split):
         utterance = corpus.utterance(name)
-        aligned = labels_of(utterance, recogniser, Lexicon())
+        aligned = phones_of(utterance, recogniser, Lexicon())
         recognised = options.recognised
         units = recogniser.recognise(utterance.audio, utterance.features) if recognised else aligned
         results.append(model.engine.generate(model.learned, Speech(utterance.features, units)))
@@ -113,7 +113,7 @@ def an_hour(results: list[Generation]) -> Generation:
         spans += result.units.shifted(start_s).spans
         start_s, turn = start_s + len(result.motion.values) / result.motion.rate_hz + 0.01, turn + 1
     motion = Motion(np.concatenate(values), results[0].motion.rate_hz, results[0].motion.channels)
-    nothing = Trace(("",), np.zeros(len(motion.values), np.intp))
+    nothing = StateTrace(("",), np.zeros(len(motion.values), np.intp))
     return Generation(motion, motion.values, Timeline(tuple(spans)), nothing)
 
 

@@ -30,8 +30,14 @@ from lipmotion.engines.coupled.model import CoupledModel
 from lipmotion.pipeline.corpus.prompts import prompts
 from lipmotion.pipeline.evaluation.evaluate import evaluate
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.training.train import examples_of_others, model_motion
-from lipmotion.pipeline.training.voices import Heard, heard, is_for_judging, many_voices, recorded_voices
+from lipmotion.pipeline.training.train import examples_without_motion, model_motion
+from lipmotion.pipeline.training.voices import (
+    VoiceExample,
+    is_held_out_speaker,
+    recorded_sentences,
+    synthetic_sentences,
+    voice_examples,
+)
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.recogniser import Recogniser
 from lipmotion.speech.voices.installed import installed_voices
@@ -60,48 +66,50 @@ def main() -> None:
     """Print one JSON object per model."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--corpora", type=Path, default=Path("../shared/corpora"))
-    parser.add_argument("--strangers", type=Path, default=Path("build/grid-others"))
+    parser.add_argument("--other-speakers", type=Path, default=Path("build/grid-others"))
     parser.add_argument("--clips", type=int, default=100)
     parser.add_argument("--sentences", type=int, default=15, help="in each synthetic voice")
     parser.add_argument("--only", action="append", choices=list(MODELS), help="repeatable; default: all")
     options = parser.parse_args()
-    corpus, strangers = Corpus.open("build/grid-s1"), Corpus.open(options.strangers)
+    corpus, other_speakers = Corpus.open("build/grid-s1"), Corpus.open(options.other_speakers)
     names = corpus.names("train")
     utterances = [corpus.utterance(name) for name in names[:: max(len(names) // options.clips, 1)][: options.clips]]
     phones = lipmotion.load_model("build/grid-s1-train.lipmotion").phones
     examples = [example(one, Recogniser(phones)) for one in utterances]
     others, held_out = speakers(options.corpora, options.sentences)
-    for who, listed in (("GRID s1, val", corpus.names("val")), ("GRID, five others", strangers.names(None))):
-        known = corpus if "s1" in who else strangers
+    for who, listed in (("GRID s1, val", corpus.names("val")), ("GRID, five others", other_speakers.names(None))):
+        known = corpus if "s1" in who else other_speakers
         held_out[who] = [aligned(known.utterance(name), Recogniser(phones)) for name in listed]
     for name in options.only or MODELS:
         kinds, config = MODELS[name]
         more = [one for kind in kinds.split() for one in others[kind]]
         engine = engine_named("coupled", {"mixtures": 4} | config)
         started_s = time.perf_counter()
-        fit = engine.fit([*examples, *examples_of_others(engine, more)], silent_monitor)
+        fit = engine.fit([*examples, *examples_without_motion(engine, more)], silent_monitor)
         model, minutes = Model(phones, engine, fit.model, {}), sum(one.features.duration_s for one in more) / 60
         figures = {"seconds": round(time.perf_counter() - started_s), "minutes of others": round(minutes, 1)}
-        figures |= {"own": own_acc(model, corpus), "strangers": other_speakers_acc(model, strangers)}
+        figures |= {"own": own_acc(model, corpus), "strangers": other_speakers_acc(model, other_speakers)}
         row = {"model": name, "clips": len(examples)} | figures
         row["phones"] = {who: frame_accuracy(fit.model, speech) for who, speech in held_out.items()}
         print(json.dumps(row), flush=True)
 
 
-def speakers(corpora: Path, count: int) -> tuple[dict[str, list[Heard]], dict[str, list[Heard]]]:
+def speakers(corpora: Path, count: int) -> tuple[dict[str, list[VoiceExample]], dict[str, list[VoiceExample]]]:
     """Return the training speech by kind, and the held-out speech by speaker."""
     texts = [prompt.text for prompt in prompts(count=SENTENCES).chosen]
-    learned = [voice for voice in installed_voices() if not is_for_judging(voice.speaker)]
-    judging = [voice for voice in installed_voices() if is_for_judging(voice.speaker)]
+    learned = [voice for voice in installed_voices() if not is_held_out_speaker(voice.speaker)]
+    judging = [voice for voice in installed_voices() if is_held_out_speaker(voice.speaker)]
     general = Recogniser(lipmotion.load_model().phones, "general")
-    recordings = list(heard(recorded_voices(corpora / "speech-open", general, speakers=OPEN)))
+    recordings = list(voice_examples(recorded_sentences(corpora / "speech-open", general, speakers=OPEN)))
     others = {
-        "voices": list(heard(many_voices(texts[: min(count, SENTENCES - HELD_OUT_SENTENCES)], learned))),
-        "recordings": [one for one in recordings if not is_for_judging(one.speaker)],
+        "voices": list(
+            voice_examples(synthetic_sentences(texts[: min(count, SENTENCES - HELD_OUT_SENTENCES)], learned))
+        ),
+        "recordings": [one for one in recordings if not is_held_out_speaker(one.speaker)],
     }
-    held_out: dict[str, list[Heard]] = {}
-    for one in (*heard(many_voices(texts[-HELD_OUT_SENTENCES:], judging)), *recordings):
-        if is_for_judging(one.speaker):
+    held_out: dict[str, list[VoiceExample]] = {}
+    for one in (*voice_examples(synthetic_sentences(texts[-HELD_OUT_SENTENCES:], judging)), *recordings):
+        if is_held_out_speaker(one.speaker):
             held_out.setdefault(one.speaker, []).append(one)
     return others, held_out
 
@@ -112,10 +120,10 @@ def example(utterance: Utterance, phones: Recogniser) -> Example:
     return Example(utterance.name, Speech(*aligned(utterance, phones)[:2]), motion, valid)
 
 
-def aligned(utterance: Utterance, phones: Recogniser) -> Heard:
+def aligned(utterance: Utterance, phones: Recogniser) -> VoiceExample:
     """Return an utterance of GRID with aligned phones."""
     features, words = mfcc(utterance.audio), utterance.words or words_of_name(utterance.name)
-    return Heard(features, phones.align(utterance.audio, features, words or (), Lexicon()), utterance.speaker)
+    return VoiceExample(features, phones.align(utterance.audio, features, words or (), Lexicon()), utterance.speaker)
 
 
 def own_acc(model: Model, corpus: Corpus) -> dict[str, float]:
@@ -124,11 +132,11 @@ def own_acc(model: Model, corpus: Corpus) -> dict[str, float]:
     return {name: round(found["channels"]["opening"]["acc"], 3) for name, found in conditions.items()}
 
 
-def other_speakers_acc(model: Model, strangers: Corpus) -> dict[str, float]:
+def other_speakers_acc(model: Model, other_speakers: Corpus) -> dict[str, float]:
     """Return the mean ACC of the opening over clips of other speakers, by condition."""
     found: dict[str, list[float]] = {"audio only": [], "with transcript": []}
-    for name in strangers.names(None):
-        one = strangers.utterance(name)
+    for name in other_speakers.names(None):
+        one = other_speakers.utterance(name)
         seen, recorded = np.asarray(one.track.seen), one.track.motion
         for condition, words in (
             ("audio only", None),
@@ -140,7 +148,7 @@ def other_speakers_acc(model: Model, strangers: Corpus) -> dict[str, float]:
     return {condition: round(float(np.mean(values)), 3) for condition, values in found.items()}
 
 
-def frame_accuracy(model: CoupledModel, said: Sequence[Heard]) -> tuple[float, float]:
+def frame_accuracy(model: CoupledModel, said: Sequence[VoiceExample]) -> tuple[float, float]:
     """Return the shares of frames of speech whose most probable phone, and viseme, is the labelled one."""
     structure = model.chains.structure
     visemes = np.array([VISEME_OF[structure.chains[0].phones(unit)[0]] for unit in structure.units[0]])

@@ -20,7 +20,7 @@ import numpy as np
 import lipmotion
 from lipmotion.errors import AlignmentError
 from lipmotion.pipeline.corpus.prompts import prompts
-from lipmotion.pipeline.training.voices import SpokenSentence, heard, is_for_judging, many_voices
+from lipmotion.pipeline.training.voices import SpokenSentence, is_held_out_speaker, synthetic_sentences, voice_examples
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.recogniser import Recogniser
 from lipmotion.speech.voices.installed import installed_voices
@@ -41,8 +41,8 @@ def main() -> None:
     for name in dict.fromkeys(voice.synthesiser for voice in installed_voices()):
         voices = [voice for voice in installed_voices() if voice.synthesiser == name]
         before_s = time.perf_counter()
-        sentences = list(many_voices(texts, voices))
-        count = sum(1 for _ in heard(sentences))
+        sentences = list(synthetic_sentences(texts, voices))
+        count = sum(1 for _ in voice_examples(sentences))
         taken_s = time.perf_counter() - before_s
         size = {"synthesiser": name, "voices": len(voices), "sentences": count, "minutes": minutes(sentences)}
         print(json.dumps(size | {"seconds": round(taken_s, 1)} | start_differences(sentences, general)))
@@ -53,7 +53,11 @@ def main() -> None:
     print(
         json.dumps({"minutes": minutes(everything), "seconds": round(total_s, 1), "phones": dict(counts.most_common())})
     )
-    print(json.dumps({"speakers": list(speakers), "for judging": [name for name in speakers if is_for_judging(name)]}))
+    print(
+        json.dumps(
+            {"speakers": list(speakers), "for judging": [name for name in speakers if is_held_out_speaker(name)]}
+        )
+    )
 
 
 def minutes(sentences: Sequence[SpokenSentence]) -> float:

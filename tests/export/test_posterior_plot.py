@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from lipmotion.export.posterior_plot import COLOURS, LEFT, NARROWEST, RIGHT, ROW, TITLE, WIDEST, draw_posteriors
-from lipmotion.types import ChainPosteriors, Channel, Generation, Motion, Span, Timeline, Trace, Unit
+from lipmotion.types import ChainPosteriors, Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
 
 FRAMES = 400
 
@@ -26,7 +26,7 @@ def generated(frames: int = FRAMES, name: str = "opening") -> Generation:
     half = frames / 200
     units = Timeline((Span(0.0, half, Unit("aa", "aa")), Span(half, 2 * half, Unit("m", "m"))))
     motion = Motion(values, 100.0, (Channel(name),))
-    return Generation(motion, np.ones_like(values), units, Trace(("a",), np.zeros(frames, np.intp)))
+    return Generation(motion, np.ones_like(values), units, StateTrace(("a",), np.zeros(frames, np.intp)))
 
 
 def halves(frames: int = FRAMES) -> np.ndarray:

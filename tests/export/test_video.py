@@ -58,12 +58,12 @@ def test_streams_start_at_zero_and_keep_their_lengths(tmp_path, fps, duration_s)
     count = int(1.2 * fps)
     write_mp4(tmp_path / "a.mp4", black(count), fps=fps, audio=silence(duration_s, 22_050))
     with av.open(str(tmp_path / "a.mp4")) as container:
-        video, heard = container.streams.video[0], container.streams.audio[0]
-        assert video.start_time == heard.start_time == 0
+        video, sound_stream = container.streams.video[0], container.streams.audio[0]
+        assert video.start_time == sound_stream.start_time == 0
         assert video.frames == count
         assert video.average_rate == frame_rate(fps)
         assert float(video.duration * video.time_base) == pytest.approx(count / fps, abs=1e-3)
-        assert float(heard.duration * heard.time_base) == pytest.approx(duration_s, abs=1e-3)
+        assert float(sound_stream.duration * sound_stream.time_base) == pytest.approx(duration_s, abs=1e-3)
     time_s, _ = pictures(tmp_path / "a.mp4")
     assert len(time_s) == count
     assert np.diff(time_s) == pytest.approx(np.full(count - 1, 1 / fps), abs=2e-4)
@@ -83,8 +83,8 @@ def test_players_find_it_playable(tmp_path):
     content = (tmp_path / "a.mp4").read_bytes()
     assert content.index(b"moov") < content.index(b"mdat")
     with av.open(str(tmp_path / "a.mp4")) as container:
-        video, heard = container.streams.video[0], container.streams.audio[0]
-        assert (video.codec_context.name, heard.codec_context.name) == ("h264", "aac")
+        video, sound_stream = container.streams.video[0], container.streams.audio[0]
+        assert (video.codec_context.name, sound_stream.codec_context.name) == ("h264", "aac")
         assert video.codec_context.pix_fmt == "yuv420p"
         assert (video.width, video.height) == (96, 64)
 

@@ -203,7 +203,7 @@ for _array in ("audio", "features", "motion", "seen"):
         path.write_bytes(content)
 
 
-@_damaged("a description with a key twice", 4, *AGAIN, "stands there twice")
+@_damaged("a description with a key twice", 4, *AGAIN, "occurs twice")
 def _(corpus: Path) -> None:
     path = _first_training_folder(corpus) / "entry.json"
     path.write_text(path.read_text(encoding="utf-8").replace("{", '{"name": "a", ', 1), encoding="utf-8")

@@ -63,7 +63,7 @@ _header("an engine that is a list", *DAMAGED, engine=[])
 _header("an unknown option", *DAMAGED, "unexpected keyword argument", configuration={"colour": 1})
 _header("an option that is a text", *DAMAGED, configuration={"states": "5"})
 _header("an option of NaN", *NO_MODEL, "the number NaN, required a finite one", configuration={"edge_s": float("nan")})
-_header("more parts than were learned", *DAMAGED, configuration={"states": 9})
+_header("more parts than the model has", *DAMAGED, configuration={"states": 9})
 _header("a recogniser's option that is a text", *DAMAGED, recogniser={"bigram_weight": "much"})
 
 
@@ -76,11 +76,11 @@ def _changed(name: str, member: str, content: bytes | None, *messages: str) -> N
 _changed("without its header", "header.json", None, *NO_MODEL)
 _changed("a header of 100,000 brackets", "header.json", b"[" * 100_000, *NO_MODEL)
 _changed("without an array", "phones/means.npy", None, *DAMAGED)
-_changed("without what the engine learned", "engine/variances.npy", None, *DAMAGED)
-_changed("an array that is none", "phones/means.npy", b"hello", *DAMAGED, "not an array")
+_changed("without an array of the engine", "engine/variances.npy", None, *DAMAGED)
+_changed("a member that is not an array", "phones/means.npy", b"hello", *DAMAGED, "not an array")
 _changed("a trillion numbers declared", "phones/means.npy", declared("(1000000000000,)"), *DAMAGED, "in 0 bytes")
 _changed("texts of no length", "phones/names.npy", declared("(1000000000000,)", "<U0"), *DAMAGED)
-_changed("a hundred megabytes of nothing", "phones/means.npy", bytes(2**27), *NO_MODEL, "would grow to", "at most")
+_changed("a hundred megabytes of zeros", "phones/means.npy", bytes(2**27), *NO_MODEL, "would grow to", "at most")
 _changed("pickled objects", "phones/means.npy", npy(np.array([{}], object)), *DAMAGED)
 _changed("a path to elsewhere", "../../elsewhere.npy", npy(np.zeros(3)), *DAMAGED)
 _changed("units that are numbers", "phones/units.npy", npy(np.zeros(3)), *DAMAGED)
@@ -98,17 +98,17 @@ def _array(name: str, member: str, value: float, *messages: str) -> None:
 _array("NaN among means", "phones/means", np.nan, "means holds values that are not finite")
 _array("a variance of 0", "phones/variances", 0, "variances holds 0 to", "required more than 0")
 _array("a probability over 1", "phones/log_stay", 0.5, "log_stay holds", "to less than 0")
-_array("a state without states", "phones/counts", -1)
-_array("NaN in what the engine learned", "engine/means", np.nan, "not finite")
-_array("NaN in how the engine follows the sound", "engine/coefficients", np.nan, "not finite")
-_array("a tree that asks what there is not", "engine/asked", 10**6, "tree")
+_array("a unit without states", "phones/counts", -1)
+_array("NaN among the means of the engine", "engine/means", np.nan, "not finite")
+_array("NaN in the acoustic regression", "engine/coefficients", np.nan, "not finite")
+_array("a tree with an unknown question", "engine/asked", 10**6, "tree")
 _array("a gain of 0", "engine/gain", 0, "gain holds 0 to", "required more than 0")
 _array("an infinite variance of the engine", "engine/variances", np.inf, "not finite")
 _array("a negative variance of the engine", "engine/variances", -1, "required more than 0")
 _array("a channel that is not there", "engine/direct", 10**6, "direct channels")
 
 
-def _remade(name: str, member: str, remake: Remake, *messages: str, of: str = "model") -> None:
+def _changed_array(name: str, member: str, remake: Remake, *messages: str, of: str = "model") -> None:
     @case(GROUP, name, 6, *(messages or DAMAGED))
     def _(bench: Bench) -> list[object]:
         whole = getattr(bench, of)
@@ -117,12 +117,16 @@ def _remade(name: str, member: str, remake: Remake, *messages: str, of: str = "m
 
 
 FAR = ("the motion would go from", "the model is damaged; train or download it again")
-_remade("coefficients times 1000", "engine/coefficients", lambda a: a.astype(float) * 1000, *FAR)
-_remade("means times 1000", "engine/means", lambda a: a.astype(float) * 1000, *DAMAGED, "of their deviations")
-_remade("complex means", "engine/means", lambda a: a.astype(complex), *DAMAGED, "holds complex128, required fractions")
-_remade("means that are dates", "engine/means", lambda a: a.astype("i8").astype("M8[s]"), *DAMAGED, "holds datetime64")
-_remade("probabilities that do not sum to 1", "phones/bigram", lambda a: a * 0, *DAMAGED, "whose sum is")
-_remade("a question of a fourth neighbour", "engine/questions", lambda a: np.where(a == "0", "3", a))
+_changed_array("coefficients times 1000", "engine/coefficients", lambda a: a.astype(float) * 1000, *FAR)
+_changed_array("means times 1000", "engine/means", lambda a: a.astype(float) * 1000, *DAMAGED, "of their deviations")
+_changed_array(
+    "complex means", "engine/means", lambda a: a.astype(complex), *DAMAGED, "holds complex128, required fractions"
+)
+_changed_array(
+    "means that are dates", "engine/means", lambda a: a.astype("i8").astype("M8[s]"), *DAMAGED, "holds datetime64"
+)
+_changed_array("probabilities that do not sum to 1", "phones/bigram", lambda a: a * 0, *DAMAGED, "whose sum is")
+_changed_array("a question of a fourth neighbour", "engine/questions", lambda a: np.where(a == "0", "3", a))
 for _member, _remake in {
     "means": lambda a: a.astype(complex),
     "variances": lambda a: -a,
@@ -130,32 +134,43 @@ for _member, _remake in {
     "tie": lambda a: a + 10**6,
     "streams": lambda a: a + 9,
 }.items():
-    _remade(f"coupled: {_member} that cannot be", f"engine/group_1/{_member}", _remake, of="coupled")
-_remade("coupled: a bigram times 1000", "engine/chain_0/bigram", lambda a: a * 1000, of="coupled")
-_remade("coupled: a scale times 1000", "engine/visual_0/scale", lambda a: a * 1000, of="coupled")
-_remade("coupled: NaN in rest", "engine/rest", lambda a: a * np.nan, of="coupled")
-_remade("coupled: rest times 1000", "engine/rest", lambda a: a * 1000, *DAMAGED, "rest of", of="coupled")
-_remade("coupled: one state less", "engine/chain_0/advance", lambda a: a[:1], of="coupled")
-_remade("coupled: a transposed basis", "engine/around/basis", lambda a: a.T, of="coupled")
-_remade("coupled: what is followed, times 1000", "engine/following_0/coefficients", lambda a: a.astype(float) * 1000,
-        *FAR, of="coupled")  # fmt: skip
+    _changed_array(f"coupled: impossible {_member}", f"engine/group_1/{_member}", _remake, of="coupled")
+_changed_array("coupled: a bigram times 1000", "engine/chain_0/bigram", lambda a: a * 1000, of="coupled")
+_changed_array("coupled: a scale times 1000", "engine/visual_0/scale", lambda a: a * 1000, of="coupled")
+_changed_array("coupled: NaN in rest", "engine/rest", lambda a: a * np.nan, of="coupled")
+_changed_array("coupled: rest times 1000", "engine/rest", lambda a: a * 1000, *DAMAGED, "rest of", of="coupled")
+_changed_array("coupled: one state less", "engine/chain_0/advance", lambda a: a[:1], of="coupled")
+_changed_array("coupled: a transposed basis", "engine/around/basis", lambda a: a.T, of="coupled")
+_changed_array(
+    "coupled: acoustic regression times 1000",
+    "engine/following_0/coefficients",
+    lambda a: a.astype(float) * 1000,
+    *FAR,
+    of="coupled",
+)
 LIPS = ("the eigenlips are damaged", "train the model again")
-_remade("eigenlips: times 1000", "eigenlips/basis", lambda a: a * 1000, *LIPS, of="pictured")
-_remade("eigenlips: components that are alike", "eigenlips/basis", lambda a: a[:, :1] + 0 * a, *LIPS, "orthonormal",
-        of="pictured")  # fmt: skip
-_remade("eigenlips: a negative size", "eigenlips/size", lambda a: -a, *LIPS, "size holds", of="pictured")
-_remade("eigenlips: a mean of NaN", "eigenlips/mean", lambda a: a * np.nan, *LIPS, "not finite", of="pictured")
-_remade("eigenlips: a colour less", "eigenlips/basis", lambda a: a[:2], *LIPS, "basis of shape", of="pictured")
-_remade("eigenlips: complex", "eigenlips/basis", lambda a: a.astype(complex), *LIPS, "complex", of="pictured")
+_changed_array("eigenlips: times 1000", "eigenlips/basis", lambda a: a * 1000, *LIPS, of="pictured")
+_changed_array(
+    "eigenlips: equal components",
+    "eigenlips/basis",
+    lambda a: a[:, :1] + 0 * a,
+    *LIPS,
+    "orthonormal",
+    of="pictured",
+)
+_changed_array("eigenlips: a negative size", "eigenlips/size", lambda a: -a, *LIPS, "size holds", of="pictured")
+_changed_array("eigenlips: a mean of NaN", "eigenlips/mean", lambda a: a * np.nan, *LIPS, "not finite", of="pictured")
+_changed_array("eigenlips: a colour less", "eigenlips/basis", lambda a: a[:2], *LIPS, "basis of shape", of="pictured")
+_changed_array("eigenlips: complex", "eigenlips/basis", lambda a: a.astype(complex), *LIPS, "complex", of="pictured")
 
 _changed("an array that nothing declares", "engine/more.npy", npy(np.zeros(3)), *DAMAGED, "undeclared 'more'")
 _changed("a part that nothing declares", "more/means.npy", npy(np.zeros(3)), *DAMAGED, "undeclared 'more/means'")
 _changed("a member that is no array", "engine/notes.txt", b"hello", *DAMAGED, "undeclared 'engine/notes.txt'")
 _changed("a header with a key twice", "header.json", b'{"format": "lipmotion.model", "format": "other"}', *NO_MODEL,
-         "the key 'format' stands there twice")  # fmt: skip
+         "the key 'format' occurs twice")  # fmt: skip
 _changed("a header of 1e999", "header.json", b'{"format": "lipmotion.model", "version": 1e999}', *NO_MODEL, "1e999")
 _header("an option of a billion", *DAMAGED, "required at most", configuration={"states": 10**9 + 1})
-_header("states by the billion", *DAMAGED, engine="joint", configuration={"states": 10**6})
+_header("a million states", *DAMAGED, engine="joint", configuration={"states": 10**6})
 _header("an option that is true", *DAMAGED, "required a whole number", configuration={"states": True})
 _header("a truth value that is a text", *DAMAGED, "required true or false", configuration={"acoustic_regression": "no"})
 
@@ -177,7 +192,7 @@ def _(bench: Bench) -> list[object]:
     return bench.animate(None, "--model", bench.file("m.lipmotion", content.getvalue()))
 
 
-@case(GROUP, "a size that lies", 6, *DAMAGED)
+@case(GROUP, "a wrong size of a member", 6, *DAMAGED)
 def _(bench: Bench) -> list[object]:
     content = bytearray(bench.model.read_bytes())
     place = content.rindex(b"PK\1\2")
@@ -210,4 +225,6 @@ def _(bench: Bench) -> list[object]:
     return bench.animate(None, "--model", bench.changed_model({"eigenlips/mean.npy": npy(np.zeros((3, 9)))}))
 
 
-_header("eigenlips that it says it has", "the model says visual 'both', which its eigenlips do not fit", visual="both")
+_header(
+    "eigenlips that the header claims", "the model says visual 'both', which its eigenlips do not fit", visual="both"
+)

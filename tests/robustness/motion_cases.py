@@ -58,7 +58,7 @@ _json("five million rows", json.dumps(GOOD | {"values": []}).replace("[]", "[" +
 _json("a channel that is a spreadsheet's formula", {"channels": [{"name": "=1+1", "unit": "weight"}]}, 3,
       "the channel name '=1+1' begins as a spreadsheet's formula")  # fmt: skip
 _json("no units", {"units": []}, 3, "the units are an empty list", "or leave them out")
-_json("units that are none", {"units": 7}, 3, *DAMAGED)
+_json("units that are a number", {"units": 7}, 3, *DAMAGED)
 _json("a unit without a phone", {"units": [{"start_s": 0}]}, 3, "has no 'end_s'; export it again")
 _json("a newer version", {"version": 2}, 3, "version 2, this lipmotion reads up to 1: upgrade lipmotion")
 _json("a version that is a text", {"version": "1"}, 3, "version '1', required 1; export it again")
@@ -106,7 +106,7 @@ def _npz(name: str, values: bytes, *messages: str, document: bytes | None = None
 
 NO_MOTION = ("not a motion file", "export it again")
 _npz("a trillion frames declared", declared("(1000000000000, 1)"), *NO_MOTION, "in 0 bytes, required 8000000000000")
-_npz("a hundred megabytes of nothing", bytes(2**27), *NO_MOTION, "would grow to", "required at most 67108864")
+_npz("a hundred megabytes of zeros", bytes(2**27), *NO_MOTION, "would grow to", "required at most 67108864")
 _npz("fewer values than declared", declared("(9, 1)", content=bytes(8)), *NO_MOTION)
 _npz("a shape under 0", declared("(-1, 1)"), *NO_MOTION)
 _npz("pickled objects", npy(np.array([{}], object)), *NO_MOTION)
@@ -134,7 +134,7 @@ def _(bench: Bench) -> list[object]:
     return bench.animate(None, "--units", bench.folder / "units.json")
 
 
-@case(GROUP, "nothing of that name", 3, "units.json: cannot be read: No such file")
+@case(GROUP, "a file that does not exist", 3, "units.json: cannot be read: No such file")
 def _(bench: Bench) -> list[object]:
     return bench.animate(None, "--units", bench.folder / "units.json")
 

@@ -21,7 +21,7 @@ for _value in ("0", "-1", "nan", "inf", "1e9"):
     for _name in ("--fps", "--rate"):
         _option(f"{_name} {_value}", 3, ("the frame rate is", RATE), f"{_name}={_value}")
 _option("--channels of an unknown name", 3, ("no motion channel 'smile' among",), "--channels", "opening,smile")
-_option("--channels of nothing", 3, ("no motion channel ''",), "--channels", "")
+_option("--channels of an empty text", 3, ("no motion channel ''",), "--channels", "")
 _option("--channels of one name twice", 3, ("channel names repeat",), "--channels", "opening,opening")
 _option("an unknown --recogniser", 3, ("unknown recogniser 'best'; required one of: auto",), "--recogniser", "best")
 
@@ -41,12 +41,12 @@ _cues("--shapes of unknown letters", 3, ("the optional shapes are 'QZ', required
 
 
 for _verb in ("evaluate", "train"):
-    for _name, _options, _says in [
+    for _name, _options, _messages in [
         ("--split of an unknown name", ("--split", "tomorrow"), ("no utterances of split 'tomorrow'", "there are")),
         ("--speaker of an unknown name", ("--speaker", "nobody"), ("no speaker 'nobody'", "there are:")),
     ]:
 
-        @case(GROUP, f"{_verb} {_name}", 4, *_says)
+        @case(GROUP, f"{_verb} {_name}", 4, *_messages)
         def _(bench: Bench, verb: str = _verb, options: tuple[str, ...] = _options) -> list[object]:
             what = ["evaluate", bench.model, bench.corpus] if verb == "evaluate" else ["train", bench.corpus, "-o", "m"]
             return [*what, *options]
@@ -67,17 +67,17 @@ for _value in ("-1", "99", "nan", "inf"):
 _option("--posteriors of a model without chains", 3, ("'trajectory' has no chains",), "--posteriors", "a.png")
 _option("--posteriors as .jpg", 7, ("unknown format '.jpg'; required: .png",), "--posteriors", "a.jpg")
 
-for _name, _options, _says in [
+for _name, _options, _messages in [
     ("--set without a value", ("--set", "states"), "the setting 'states' has no value; required NAME=VALUE"),
     ("--set of an unknown option", ("--set", "part=5"), "has no option 'part'; there are: parts"),
-    ("--set of a number that is none", ("--set", "states=many"), "states is 'many', required a whole number"),
+    ("--set of a text instead of a number", ("--set", "states=many"), "states is 'many', required a whole number"),
     ("--set of a number out of range", ("--set", "states=4"), "states is 4, required an odd number from 1"),
     ("--system of another engine", ("--system", "ph-HMM"), "add --engine coupled"),
     ("--system of an unknown name", ("--engine", "coupled", "--system", "HMM"), "no system 'HMM'; there are: ph-HMM"),
     ("--units of chains", ("--engine", "coupled", "--units", "eVis"), "has a unit set a chain; say --set chains="),
 ]:
 
-    @case(GROUP, f"train {_name}", 3, _says)
+    @case(GROUP, f"train {_name}", 3, _messages)
     def _(bench: Bench, options: tuple[str, ...] = _options) -> list[object]:
         return ["train", bench.corpus, "-o", "m", *options]
 

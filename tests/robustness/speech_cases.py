@@ -86,14 +86,14 @@ def _(bench: Bench) -> list[object]:
     return bench.animate(bench.sound(bench.samples() * np.float32(1e8)))
 
 
-for _name, _rate_hz, _code, _says in [
+for _name, _rate_hz, _code, _messages in [
     ("1 Hz", 1, 3, ("sampled at 1 Hz, required 4000 to 1000000",)),
     ("400 Hz", 400, 3, ("sampled at 400 Hz, required 4000",)),
     ("384 kHz", 384_000, 0, ()),
     ("1 GHz", 1_000_000_000, 3, ("sampled at 1000000000 Hz, required",)),
 ]:
 
-    @case(GROUP, f"sampled at {_name}", _code, *_says)
+    @case(GROUP, f"sampled at {_name}", _code, *_messages)
     def _(bench: Bench, rate_hz: int = _rate_hz) -> list[object]:
         samples = np.repeat(bench.samples(), 24) if rate_hz == 384_000 else bench.samples()
         return bench.animate(bench.sound(samples, rate_hz))
@@ -162,12 +162,12 @@ def _(bench: Bench) -> list[object]:
     return bench.animate(bench.folder)
 
 
-@case(GROUP, "nothing of that name", 3, "no such file")
+@case(GROUP, "a file that does not exist", 3, "no such file")
 def _(bench: Bench) -> list[object]:
     return bench.animate(bench.folder / "none.wav")
 
 
-@case(GROUP, "a link to nothing", 3, "no such file")
+@case(GROUP, "a link to a file that does not exist", 3, "no such file")
 def _(bench: Bench) -> list[object]:
     (bench.folder / "a.wav").symlink_to(bench.folder / "none.wav")
     return bench.animate(bench.folder / "a.wav")
@@ -218,7 +218,7 @@ def _(bench: Bench) -> list[object]:
     return bench.animate(write_stamped(bench.folder / "a.mkv", [599.0 * n for n in range(150)]))
 
 
-@case(GROUP, "time stamps to and fro", 3, "beside 8.0 s of sound, at most 760 s are bridged; export the recording")
+@case(GROUP, "time stamps that alternate", 3, "beside 8.0 s of sound, at most 760 s are bridged; export the recording")
 def _(bench: Bench) -> list[object]:
     return bench.animate(write_stamped(bench.folder / "a.mkv", [598.0 * (n % 2) + n / 50 for n in range(400)]))
 

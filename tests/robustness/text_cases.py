@@ -19,7 +19,7 @@ def _transcript(name: str, text: str, code: int, *messages: str) -> None:
         return bench.animate(None, "--transcript", text)
 
 
-_transcript("an empty one", "", 3, *NO_WORD)
+_transcript("an empty text", "", 3, *NO_WORD)
 _transcript("only punctuation", "... --- !?!", 3, *NO_WORD)
 _transcript("emoji", "😀 🎉", 3, *NO_WORD)
 _transcript("control characters among words", "papa\x07\x1b[31m \x9d mama", 0)
@@ -129,6 +129,6 @@ def _(bench: Bench) -> list[object]:
     return bench.animate(None, "--transcript", "papa", "--lexicon", bench.folder)
 
 
-@case(LEXICONS, "nothing of that name", 3, "no such lexicon file")
+@case(LEXICONS, "a file that does not exist", 3, "no such lexicon file")
 def _(bench: Bench) -> list[object]:
     return bench.animate(None, "--transcript", "papa", "--lexicon", bench.folder / "none")

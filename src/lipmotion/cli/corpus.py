@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from lipmotion.cli import contents, prompts, sync
+from lipmotion.cli import corpus_info, corpus_prompts, corpus_sync
 from lipmotion.cli.options import add_machine_readable, add_workers
 from lipmotion.cli.paths import add_input, add_output
 
@@ -21,9 +21,9 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     prepare.add_argument("--no-crops", dest="crops", action="store_false", help="do not store mouth pictures")
     add_machine_readable(prepare)
     prepare.set_defaults(run=run_prepare)
-    contents.add(actions)
-    sync.add(actions)
-    prompts.add(actions)
+    corpus_info.add(actions)
+    corpus_sync.add(actions)
+    corpus_prompts.add(actions)
 
 
 def run_prepare(options: argparse.Namespace) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from lipmotion.cli.experiments import add_experiment_arguments, run_experiment
+from lipmotion.cli.experiment_options import add_experiment_arguments, run_experiment
 from lipmotion.cli.options import list_or_all, numbers
 from lipmotion.cli.paths import add_input
 

@@ -25,7 +25,7 @@ from lipmotion.measures.report import figure_text
 from lipmotion.pipeline.evaluation.conditions import OPENING
 from lipmotion.pipeline.evaluation.figures import figures_of
 from lipmotion.storage.json_text import nan_as_null
-from lipmotion.types import part_of
+from lipmotion.types import sub_monitor
 
 FOLDS = 5
 
@@ -50,7 +50,7 @@ def folds(corpus: Corpus, *, count: int = FOLDS, settings: ExperimentSettings = 
     results = []
     for fold in range(count):
         held_out = mixed[fold::count]
-        monitor = part_of(settings.monitor, fold / count, (fold + 1) / count, f"fold {fold + 1}: ")
+        monitor = sub_monitor(settings.monitor, fold / count, (fold + 1) / count, f"fold {fold + 1}: ")
         others = [name for name in names if name not in held_out]
         results.append(train_and_generate(corpus, others, held_out, (OPENING,), replace(settings, monitor=monitor)))
     about: dict[str, Any] = {"folds": count, "seed": settings.seed, "clips": len(names)}

@@ -24,7 +24,7 @@ from lipmotion.kernels.threads import one_thread
 from lipmotion.measures.report import figure_text
 from lipmotion.pipeline.evaluation.figures import figures_of
 from lipmotion.storage.json_text import nan_as_null
-from lipmotion.types import part_of
+from lipmotion.types import sub_monitor
 
 SIZES = (20, 50, 100, 200)
 """Default numbers of recordings: those of them that are smaller than the list; and the whole list."""
@@ -60,7 +60,7 @@ def learning_curve(
     shares = np.cumsum([0, *steps]) / sum(steps)
     rows = []
     for count, (start, stop) in zip(steps, pairwise(shares), strict=True):
-        monitor = part_of(settings.monitor, float(start), float(stop), f"{count} clips: ")
+        monitor = sub_monitor(settings.monitor, float(start), float(stop), f"{count} clips: ")
         result = train_and_generate(corpus, listed[:count], held_out, channels, replace(settings, monitor=monitor))
         rows.append({"names": count} | _row(corpus, result, settings.seed))
     about = {"split": split or "all", "clips": len(held_out), "seed": settings.seed, "workers": settings.workers}

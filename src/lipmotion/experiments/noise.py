@@ -12,7 +12,7 @@ from lipmotion.speech.audio_files import SPEECH_RATE_HZ, read_audio
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.noise import noisy_audio
 from lipmotion.storage.files import check_listable
-from lipmotion.types import Audio, Monitor, counted, silent_monitor
+from lipmotion.types import Audio, Monitor, silent_monitor, with_progress
 
 LONGEST_S = 30
 """Seconds that are read of each talker."""
@@ -32,7 +32,7 @@ def recordings_in_noise(
     Raises InputError: as ``speech.noise.noisy_audio``.
     """
     utterances, phones = [], []
-    for number, utterance in enumerate(counted(recordings.utterances, "adding noise", monitor)):
+    for number, utterance in enumerate(with_progress(recordings.utterances, "adding noise", monitor)):
         audio = noisy_audio(utterance.audio, kind, snr_db, talkers, seed + number)
         utterances.append(replace(utterance, audio=audio, features=mfcc(audio)))
         phones.append(recordings.phones.recognise(audio, utterances[-1].features))

@@ -22,7 +22,7 @@ from lipmotion.pipeline.evaluation.conditions import (
 )
 from lipmotion.pipeline.training.train import Run, train
 from lipmotion.speech.recogniser import cached_recogniser
-from lipmotion.types import Monitor, counted, part_of, silent_monitor
+from lipmotion.types import Monitor, silent_monitor, sub_monitor, with_progress
 from lipmotion.units import Lexicon
 
 
@@ -78,10 +78,10 @@ def train_and_generate(
         selection=Selection(names=sorted(names)),
         recogniser=settings.recogniser,
         lexicon=lexicon,
-        run=Run(monitor=part_of(monitor, 0, 0.8), workers=settings.workers),
+        run=Run(monitor=sub_monitor(monitor, 0, 0.8), workers=settings.workers),
     )
     seconds = perf_counter() - start_s
-    phones, recognising = cached_recogniser(model.phones), part_of(monitor, 0.8, 0.95)
+    phones, recognising = cached_recogniser(model.phones), sub_monitor(monitor, 0.8, 0.95)
     recordings = held_out_recordings(
         corpus,
         phones,
@@ -90,7 +90,7 @@ def train_and_generate(
         lexicon=lexicon,
         monitor=recognising,
     )
-    conditions = counted(list(recordings.conditions), "comparing", part_of(monitor, 0.95, 1))
+    conditions = with_progress(list(recordings.conditions), "comparing", sub_monitor(monitor, 0.95, 1))
     generated = {
         condition: compared_clips(recordings, condition, model.engine, model.learned) for condition in conditions
     }

@@ -6,7 +6,7 @@ from itertools import accumulate
 import numpy as np
 
 from lipmotion.testing.toy import toy_motion
-from lipmotion.types import Generation, Motion, Span, Timeline, Trace, Unit
+from lipmotion.types import Generation, Motion, Span, StateTrace, Timeline, Unit
 
 
 def timeline(phones: Sequence[tuple[str, float]]) -> Timeline[Unit]:
@@ -19,7 +19,7 @@ def timeline(phones: Sequence[tuple[str, float]]) -> Timeline[Unit]:
 def result(units: Timeline[Unit], motion: Motion | None = None) -> Generation:
     """Return a generation with these phones; its motion is that of the toy face, unless another is given."""
     motion = motion or toy_motion(units, 100.0)
-    trace = Trace(("a",), np.zeros(len(motion.values), np.intp))
+    trace = StateTrace(("a",), np.zeros(len(motion.values), np.intp))
     return Generation(motion, np.ones_like(motion.values), units, trace)
 
 

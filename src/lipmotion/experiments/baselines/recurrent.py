@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import MissingDependencyError
 from lipmotion.experiments.baselines.regression import Array, Baseline, Float32Array
-from lipmotion.types import Monitor, counted
+from lipmotion.types import Monitor, with_progress
 
 UNITS, LAYERS = 192, 2
 STACKED = 4
@@ -71,7 +71,7 @@ class BlstmBaseline(Baseline):
         steps = epochs * -(-len(sequences) // BATCH_SIZE)
         schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, LEARNING_RATE, total_steps=steps)
         order = np.random.default_rng(self.seed)
-        for _ in counted(range(epochs), "training the network", monitor):
+        for _ in with_progress(range(epochs), "training the network", monitor):
             mixed = order.permutation(len(sequences))
             for start in range(0, len(mixed), BATCH_SIZE):
                 _step(torch, network, optimiser, [sequences[i] for i in mixed[start : start + BATCH_SIZE]])

@@ -23,7 +23,7 @@ from lipmotion.types import (
     Monitor,
     Motion,
     Speech,
-    Trace,
+    StateTrace,
 )
 
 Array = NDArray[np.float64]
@@ -78,7 +78,7 @@ class Baseline(Animator[FrameRegressionModel]):
         predicted = self.predict(model.learned, np.asarray(speech.features.values))
         values, variance = model.space.restore(predicted, np.broadcast_to(model.variance, predicted.shape))
         motion = Motion(values, FRAME_RATE_HZ, model.space.channels)
-        return Generation(motion, variance, speech.units, Trace(("all",), np.zeros(len(values), np.intp)))
+        return Generation(motion, variance, speech.units, StateTrace(("all",), np.zeros(len(values), np.intp)))
 
     @abstractmethod
     def fit_map(

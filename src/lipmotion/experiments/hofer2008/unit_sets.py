@@ -25,12 +25,12 @@ from lipmotion.pipeline.evaluation.conditions import (
     held_out_recordings,
 )
 from lipmotion.pipeline.evaluation.figures import figures_of
-from lipmotion.pipeline.training.train import FEWEST, phones_and_examples
-from lipmotion.pipeline.workers import working
+from lipmotion.pipeline.training.train import UTTERANCES_PER_WORKER, phones_and_examples
+from lipmotion.pipeline.workers import worker_pool
 from lipmotion.speech.recogniser import cached_recogniser
 from lipmotion.storage.checkpoint import NO_CHECKPOINT
 from lipmotion.storage.json_text import nan_as_null
-from lipmotion.types import Example, Monitor, counted, part_of, silent_monitor
+from lipmotion.types import Example, Monitor, silent_monitor, sub_monitor, with_progress
 from lipmotion.units import UNIT_SETS, Lexicon
 
 PAPER_SCORES: dict[str, float] = {"2vis": 66.5, "pbVis": 67.7, "sVis": 67.4, "eVis": 68.8, "phone": 65.2}
@@ -72,17 +72,19 @@ def unit_sets(
     channels_with_opening(corpus, corpus.required(split))  # before the long work
     utterances = [corpus.utterance(name) for name in corpus.required("train")]
     lexicon, monitor = settings.lexicon or Lexicon(), settings.monitor
-    with working(min(settings.workers, len(utterances) // FEWEST)) as team:
-        aligning = part_of(monitor, 0, 0.5)
+    with worker_pool(min(settings.workers, len(utterances) // UTTERANCES_PER_WORKER)) as team:
+        aligning = sub_monitor(monitor, 0, 0.5)
         config = settings.recogniser or HmmConfig()
-        phones, examples, _ = phones_and_examples(utterances, config, lexicon, aligning, NO_CHECKPOINT, team.each)
-    recognising = part_of(monitor, 0.5, 0.6)
+        phones, examples, _ = phones_and_examples(
+            utterances, config, lexicon, aligning, NO_CHECKPOINT, team.ordered_map
+        )
+    recognising = sub_monitor(monitor, 0.5, 0.6)
     recordings = held_out_recordings(
         corpus, cached_recogniser(phones), selection=Selection(split), lexicon=lexicon, monitor=recognising
     )
     blocks = {}
     for (name, options), share in zip(ENGINE_SETTINGS.items(), ((0.6, 0.75), (0.75, 1.0)), strict=True):
-        part = part_of(monitor, *share, f"{name}: ")
+        part = sub_monitor(monitor, *share, f"{name}: ")
         blocks[name] = _block(recordings, examples, options | {"closures": closures}, settings.seed, part)
     about = {"split": split or "all", "clips": len(recordings.utterances), "trained_on": len(examples)}
     about |= {"closed_under": recordings.closed_under, "closures": closures}
@@ -95,7 +97,7 @@ def _block(
 ) -> dict[str, dict[str, Any]]:
     """Return the figures of every condition and unit set."""
     generated: dict[str, dict[str, list[ComparedClip]]] = {condition: {} for condition in recordings.conditions}
-    for units in counted(list(PAPER_SCORES), "unit sets", monitor):
+    for units in with_progress(list(PAPER_SCORES), "unit sets", monitor):
         engine = engine_named("trajectory", {**options, "units": units})
         model = engine.fit(examples, silent_monitor).model
         for condition in recordings.conditions:

@@ -16,7 +16,7 @@ from lipmotion.experiments.baselines.recurrent import BlstmBaseline, import_torc
 from lipmotion.experiments.baselines.regression import ContextRidge, LoudnessRegression, MeanPose
 from lipmotion.experiments.xie_liu2007.mixtures import select_mixtures
 from lipmotion.pipeline.evaluation.conditions import HeldOutRecordings
-from lipmotion.types import Example, Monitor, part_of
+from lipmotion.types import Example, Monitor, sub_monitor
 
 REFERENCE_SYSTEM = "ph-vi-CHMM"
 """The system that every other one is compared with."""
@@ -128,7 +128,7 @@ def train_systems(
     """
     trained: dict[str, TrainedSystem] = {}
     for number, name in enumerate(names):
-        part = part_of(monitor, number / len(names), (number + 1) / len(names), f"{name}: ")
+        part = sub_monitor(monitor, number / len(names), (number + 1) / len(names), f"{name}: ")
         system = COMPARED_SYSTEMS[name]
         if system.same_model_as:
             twin = trained[system.same_model_as]

@@ -39,16 +39,22 @@ from lipmotion.pipeline.evaluation.conditions import (
     held_out_recordings,
 )
 from lipmotion.pipeline.evaluation.figures import figures_of
-from lipmotion.pipeline.training.channels import EIGENLIPS, GEOMETRY, as_learned, check_visual, learned_eigenlips
-from lipmotion.pipeline.training.train import FEWEST, phones_and_examples
-from lipmotion.pipeline.workers import working
+from lipmotion.pipeline.training.channels import (
+    EIGENLIPS,
+    GEOMETRY,
+    check_visual,
+    train_eigenlips,
+    with_visual_channels,
+)
+from lipmotion.pipeline.training.train import UTTERANCES_PER_WORKER, phones_and_examples
+from lipmotion.pipeline.workers import worker_pool
 from lipmotion.speech.noise import FEWEST_TALKERS, NOISE_KINDS
 from lipmotion.speech.recogniser import cached_recogniser
 from lipmotion.stats.rounding import varies
 from lipmotion.storage.checkpoint import NO_CHECKPOINT
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.storage.sources import Source, check_apart
-from lipmotion.types import Audio, Monitor, counted, part_of
+from lipmotion.types import Audio, Monitor, sub_monitor, with_progress
 from lipmotion.units import Lexicon
 
 Array = NDArray[np.float64]
@@ -140,11 +146,11 @@ def table3(
     shares = 0.9 * np.cumsum([0, *steps]) / sum(steps)
     rows: list[dict[str, Any]] = []
     for count, (start, stop) in zip(steps, pairwise(shares), strict=True):
-        part = part_of(settings.monitor, float(start), float(stop), f"{count} clips: ")
+        part = sub_monitor(settings.monitor, float(start), float(stop), f"{count} clips: ")
         trained = setup.train(listed[:count], part)
         rows.append({"names": count} | _size(trained, options.transcripts, seed))
     noise = options.noise or NoiseConditions()
-    noise_rows = _noise_rows(trained, noise, seed, part_of(settings.monitor, 0.9, 1))
+    noise_rows = _noise_rows(trained, noise, seed, sub_monitor(settings.monitor, 0.9, 1))
     recordings = trained.recordings
     if plots is not None:
         draw_plots(trained.systems[REFERENCE_SYSTEM], recordings, plots)
@@ -188,21 +194,23 @@ class _TrainingSetup:
         lexicon, config = self.settings.lexicon or Lexicon(), self.settings.recogniser or HmmConfig()
         visual, options = self.options.visual, self.options
         utterances = [self.corpus.utterance(name) for name in sorted(names)]
-        eigenlips = learned_eigenlips(utterances) if visual != GEOMETRY else None
-        utterances = [as_learned(utterance, visual, eigenlips) for utterance in utterances]
-        with working(min(self.settings.workers, len(utterances) // FEWEST)) as team:
-            aligning = part_of(monitor, 0, 0.2)
-            phones, examples, _ = phones_and_examples(utterances, config, lexicon, aligning, NO_CHECKPOINT, team.each)
+        eigenlips = train_eigenlips(utterances) if visual != GEOMETRY else None
+        utterances = [with_visual_channels(utterance, visual, eigenlips) for utterance in utterances]
+        with worker_pool(min(self.settings.workers, len(utterances) // UTTERANCES_PER_WORKER)) as team:
+            aligning = sub_monitor(monitor, 0, 0.2)
+            phones, examples, _ = phones_and_examples(
+                utterances, config, lexicon, aligning, NO_CHECKPOINT, team.ordered_map
+            )
         read = partial(held_out_recordings, self.corpus, cached_recogniser(phones), lexicon=lexicon)
         read = partial(read, visual=visual, eigenlips=eigenlips)
-        recordings = read(selection=Selection(names=self.held_out), monitor=part_of(monitor, 0.2, 0.25))
+        recordings = read(selection=Selection(names=self.held_out), monitor=sub_monitor(monitor, 0.2, 0.25))
         validation = None
         if self.validation:
-            recognising = part_of(monitor, 0.25, 0.3)
+            recognising = sub_monitor(monitor, 0.25, 0.3)
             validation = read(
                 selection=Selection(names=self.validation), channels=recordings.channels, monitor=recognising
             )
-        training = part_of(monitor, 0.3, 1)
+        training = sub_monitor(monitor, 0.3, 1)
         systems = train_systems(self.systems, examples, validation, options.states, options.mixtures, training)
         return _TrainedSystems(tuple(example.name for example in examples), recordings, systems)
 
@@ -254,7 +262,7 @@ def _row(
 
 def _statistics(recordings: HeldOutRecordings, made: Sequence[ComparedClip]) -> dict[str, ClipStatistic]:
     """Return AMSE and ACC of geometry, or of eigenlips if there is no geometry; and the ACC of the opening."""
-    pictured = np.array([name in recordings.pictured for name in recordings.channels])
+    pictured = np.array([name in recordings.eigenlips_channels for name in recordings.channels])
     parts = {"": pictured} if pictured.all() else {"": ~pictured, "eigenlips_": pictured}
     statistics = {}
     for part, columns in parts.items():
@@ -276,7 +284,7 @@ def _noise_rows(trained: _TrainedSystems, noise: NoiseConditions, seed: int, mon
     """Return the figures of all systems for every kind of noise and ratio."""
     rows = []
     conditions = [(kind, ratio_db) for kind in noise.kinds for ratio_db in noise.ratios_db]
-    for kind, ratio_db in counted(conditions, "comparing in noise", monitor):
+    for kind, ratio_db in with_progress(conditions, "comparing in noise", monitor):
         recordings = recordings_in_noise(trained.recordings, kind, ratio_db, noise.talkers, seed)
         systems = _rows(recordings, AUDIO_ONLY, trained.systems, seed)
         rows.append({"kind": kind, "snr_db": ratio_db, "systems": systems})

@@ -62,8 +62,8 @@ def _opening(row: Mapping[str, Any]) -> str:
     lips = row["opening"] or dict.fromkeys(
         ("nrmse", "rmse", "score", "recall_p_b_m", "false_per_minute", "global_variance")
     )
-    columns = ((lips["nrmse"], "7.3f"), (lips["rmse"], "8.4f"), (row["lag_ms"], "+7.0f"), (lips["score"], "7.1f"))
-    columns += ((lips["recall_p_b_m"], "7.1f"), (lips["false_per_minute"], "7.1f"), (lips["global_variance"], "10.2f"))
+    columns = [(lips["nrmse"], "7.3f"), (lips["rmse"], "8.4f"), (row["lag_ms"], "+7.0f"), (lips["score"], "7.1f")]
+    columns += [(lips["recall_p_b_m"], "7.1f"), (lips["false_per_minute"], "7.1f"), (lips["global_variance"], "10.2f")]
     texts = "".join(figure_text(value, form) for value, form in columns)
     return f"{_with_interval(row, 'opening_acc', '.3f'):22}{texts}"
 

@@ -1,0 +1,86 @@
+from __future__ import annotations
+
+import re
+from importlib.metadata import version
+from pathlib import Path
+
+import pytest
+
+from cli.conftest import RunCommand, is_one_error
+from lipmotion.citations import ENGINE_KEYS, bibliography, engine_citations, model_citations
+from lipmotion.engines import ENGINES
+from lipmotion.pipeline.model import shipped_path
+
+ROOT = Path(__file__).parents[2]
+
+
+def keys(lines: list[str]) -> list[str]:
+    """Return the citation keys of BibTeX entries."""
+    return re.findall(r"^@\w+\{(\w+),$", "\n".join(lines), flags=re.MULTILINE)
+
+
+def test_the_shipped_model_is_the_default(run: RunCommand) -> None:
+    done = run("cite")
+    assert (done.code, done.err) == (0, [])
+    assert keys(done.out) == ["lipmotion", *ENGINE_KEYS["trajectory"], "cooke2006"]
+    assert done.out == run("cite", shipped_path()).out
+
+
+def test_a_model_of_other_recordings(run: RunCommand, coupled_model_file: Path) -> None:
+    done = run("cite", coupled_model_file)
+    assert (done.code, done.err) == (0, [])
+    assert keys(done.out) == ["lipmotion", *ENGINE_KEYS["coupled"]]
+
+
+@pytest.mark.parametrize("name", sorted(ENGINE_KEYS))
+def test_an_engine(run: RunCommand, name: str) -> None:
+    assert keys(run("cite", name).out) == ["lipmotion", *ENGINE_KEYS[name]]
+
+
+@pytest.mark.parametrize("key", [key for key in bibliography() if key != "lipmotion"])
+def test_a_key(run: RunCommand, key: str) -> None:
+    done = run("cite", key)
+    assert (done.code, done.err) == (0, [])
+    assert keys(done.out) == [key]
+
+
+@pytest.mark.parametrize(
+    ("name", "code", "words"),
+    [
+        ("hofer", 3, "nothing to cite is called 'hofer'; give a model file, or one of: trajectory, coupled, joint, "),
+        ("text", 6, "text: not a lipmotion model"),
+        (".", 3, ".: no such model"),
+    ],
+)
+def test_what_cannot_be_cited(run: RunCommand, here: Path, name: str, code: int, words: str) -> None:
+    (here / "text").write_text("words")
+    done = run("cite", name)
+    assert is_one_error(done, code)
+    assert words in done.err[0]
+
+
+def test_every_built_in_engine_names_its_papers() -> None:
+    assert set(ENGINE_KEYS) == set(ENGINES.built_in)
+    assert {key for named in ENGINE_KEYS.values() for key in named} <= set(bibliography())
+
+
+def test_what_a_header_adds() -> None:
+    header = {"engine": "joint", "visual": "both", "adapted": {}, "attribution": ["GRID corpus, CC BY 4.0", "a; b"]}
+    text = model_citations(header)
+    assert keys(text.splitlines()) == ["lipmotion", *ENGINE_KEYS["joint"], "xieliu2007", "gales1998", "cooke2006"]
+    assert text.endswith("\n% recordings: a; b")
+    assert "another package" in engine_citations("ridge")
+    assert keys(model_citations({"engine": "ridge"}).splitlines()) == ["lipmotion"]
+
+
+@pytest.mark.parametrize("key", bibliography())
+def test_an_entry_is_whole(key: str) -> None:
+    entry = bibliography()[key]
+    assert entry.count("{") == entry.count("}")
+    assert {"author", "title", "year"} <= set(re.findall(r"^ {2}(\w+) +=", entry, flags=re.MULTILINE))
+    assert entry.endswith("\n}")
+
+
+def test_the_version_is_this_one() -> None:
+    assert f"version = {{{version('lipmotion')}}}" in bibliography()["lipmotion"]
+    assert f"\nversion: {version('lipmotion')}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
