@@ -32,7 +32,7 @@ def test_an_array_is_exactly_as_long_as_its_header_says() -> None:
 def test_letters_beyond_unicode_are_refused() -> None:
     stream = io.BytesIO()
     np.save(stream, np.array(["ab"]))
-    with pytest.raises(ValueError, match="letters that there are not"):
+    with pytest.raises(ValueError, match="characters that do not exist"):
         array_in(stream.getvalue()[:-4] + b"\0\0\x11\0")
 
 

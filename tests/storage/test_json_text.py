@@ -31,8 +31,8 @@ def test_a_figure_that_nothing_defines_is_null() -> None:
     ("text", "says"),
     [
         ("{", "Expecting"),
-        ('{"a": 1, "b": 2, "a": 1}', "the key 'a' stands there twice"),
-        ('{"a": {"b": 1, "b": 2}}', "the key 'b' stands there twice"),
+        ('{"a": 1, "b": 2, "a": 1}', "the key 'a' occurs twice"),
+        ('{"a": {"b": 1, "b": 2}}', "the key 'b' occurs twice"),
         ('{"a": NaN}', "the number NaN, required a finite one"),
         ("[-Infinity]", "the number -Infinity"),
         ("[1e999]", "the number 1e999"),

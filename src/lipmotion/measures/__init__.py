@@ -1,1 +1,1 @@
-"""Figures: arrays in, numbers out, exactly as docs/measures.md defines them."""
+"""The measures of quality that docs/measures.md defines: functions of arrays that return numbers."""

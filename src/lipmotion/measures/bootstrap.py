@@ -1,4 +1,4 @@
-"""Confidence intervals by resampling clips."""
+"""Bootstrap confidence intervals over clips."""
 
 from __future__ import annotations
 
@@ -9,12 +9,16 @@ from numpy.typing import NDArray
 
 Clips = Sequence[NDArray[np.float64]]
 DRAWS = 2000
+"""Bootstrap samples of an interval."""
 
 
 def bootstrap_interval(
     figure: Callable[[Clips, Clips], float], generated: Clips, original: Clips, seed: int, draws: int = DRAWS
 ) -> tuple[float, float]:
-    """Return the 95 % bootstrap interval of a figure over clips."""
+    """Return the 95 % bootstrap interval (lower and upper limit) of a figure over clips.
+
+    figure : function of generated and original clips
+    """
     draw = np.random.default_rng(seed)
     values = []
     for _ in range(draws):

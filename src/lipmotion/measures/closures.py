@@ -1,4 +1,4 @@
-"""Does the mouth close when it should?"""
+"""Closure measures: whether the generated mouth closes when the original mouth does."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from numpy.typing import NDArray
 
 Curve = NDArray[np.float64]
 CLOSED_SHARE = 0.10
-"""The mouth is closed under this share of the 95th percentile of opening on the training list."""
+"""The mouth is closed at openings below this share of the 95th percentile of opening on the training list."""
 REACH = 2
 """A generated closing matches an original one within this many frames (Hofer 2008, §6)."""
 
 
 @dataclass(frozen=True)
 class Closures:
-    """Figures over a set of clips.
+    """Closure figures of a set of clips.
 
     score     : share of original closings with a generated one within ±2 frames (Hofer 2008)
     precision : share of generated closings with an original one within ±2 frames
-    timing_ms : median signed error of the matched ones, positive = generated late
-    original, generated : how many closings there are
+    timing_ms : median signed error of matched closings, positive where the generated one is late
+    original, generated : numbers of closings
     """
 
     score: float
@@ -34,11 +34,11 @@ class Closures:
 
 @dataclass(frozen=True)
 class PhoneClosures:
-    """Figures over the intervals of some phones in which the original closes.
+    """Closure figures of the intervals of some phones in which the original mouth closes.
 
-    recall        : share of them in which the generated mouth closes
-    intervals     : how many there are
-    false_per_minute, original_per_minute : closings outside these phones per minute of speech
+    recall    : share of these intervals in which the generated mouth closes
+    intervals : number of these intervals
+    false_per_minute, original_per_minute : generated and original closings outside the phones per minute of speech
     """
 
     recall: float
@@ -48,12 +48,12 @@ class PhoneClosures:
 
 
 def closed_threshold(openings: Sequence[Curve], share: float = CLOSED_SHARE) -> float:
-    """Return the opening under which a mouth is closed, from the training list's curves."""
+    """Return the opening below which the mouth is closed, from the openings of the training list."""
     return float(share * np.percentile(np.concatenate(openings), 95))
 
 
 def closings(opening: Curve, threshold: float) -> NDArray[np.intp]:
-    """Return the frames of all closings: the first closed frame after an open one."""
+    """Return the frames of all closings; a closing is the first closed frame after an open one."""
     closed = opening < threshold
     return np.nonzero(closed[1:] & ~closed[:-1])[0] + 1
 
@@ -61,7 +61,7 @@ def closings(opening: Curve, threshold: float) -> NDArray[np.intp]:
 def match_closings(
     generated: NDArray[np.intp], original: NDArray[np.intp], reach: int = REACH
 ) -> list[tuple[int, int]]:
-    """Return pairs of closings no further apart than ``reach``, one to one, nearest first."""
+    """Return pairs of a generated and an original closing within ``reach`` frames, one to one, nearest first."""
     pairs = sorted(
         (abs(int(g) - int(o)), int(g), int(o)) for g in generated for o in original if abs(int(g) - int(o)) <= reach
     )
@@ -77,14 +77,14 @@ def match_closings(
 
 
 def matched_count(some: NDArray[np.intp], others: NDArray[np.intp], reach: int = REACH) -> int:
-    """Return how many of some closings have one of the others within ``reach``, whichever it is."""
+    """Return the number of closings that have any of the others within ``reach`` frames."""
     return int((np.abs(some[:, None] - others) <= reach).any(axis=1).sum())
 
 
 def closure_figures(
     generated: Sequence[Curve], original: Sequence[Curve], threshold: float, rate_hz: float
 ) -> Closures:
-    """Return the closure figures of openings, clip by clip."""
+    """Return the closure figures of openings, which are given clip by clip."""
     g_closings = [closings(g, threshold) for g in generated]
     o_closings = [closings(o, threshold) for o in original]
     both = list(zip(g_closings, o_closings, strict=True))
@@ -102,15 +102,15 @@ def closure_figures(
 def clip_closure_counts(
     generated: Sequence[Curve], original: Sequence[Curve], threshold: float
 ) -> tuple[list[Curve], list[Curve]]:
-    """Return, clip by clip, how many original closings have a generated one near them, and how many there are.
+    """Return two counts for each clip: original closings with a generated one near them, and all original closings.
 
     generated, original : openings [each shape=(T, 1)]
-    Both as arrays [shape=(1,)]: the closure score is the sum of the first over that of the second, also of clips that
-    are drawn for an interval.
+    Both are arrays [shape=(1,)] for each clip; the closure score is the sum of the first divided by the sum of the
+    second, also for clips that are drawn for a bootstrap interval.
     """
-    wanted = [closings(o[:, 0], threshold) for o in original]
-    hits = [matched_count(o, closings(g[:, 0], threshold)) for g, o in zip(generated, wanted, strict=True)]
-    return [np.array([hit], float) for hit in hits], [np.array([len(o)], float) for o in wanted]
+    expected = [closings(o[:, 0], threshold) for o in original]
+    hits = [matched_count(o, closings(g[:, 0], threshold)) for g, o in zip(generated, expected, strict=True)]
+    return [np.array([hit], float) for hit in hits], [np.array([len(o)], float) for o in expected]
 
 
 def phone_closures(
@@ -121,11 +121,12 @@ def phone_closures(
     threshold: float,
     rate_hz: float,
 ) -> PhoneClosures:
-    """Return how often the mouth closes in given intervals (seconds, taken ±1 frame), and elsewhere.
+    """Return how often the mouth closes in given intervals, and outside them.
 
-    speech_s : seconds of speech outside the intervals, over all clips
+    intervals : of each clip, start and end in seconds; they are extended by one frame on both sides
+    speech_s  : seconds of speech outside the intervals, in all clips
     """
-    wanted = hit = false = natural = 0
+    closed = hit = false = natural = 0
     for g, o, clip in zip(generated, original, intervals, strict=True):
         inside = np.zeros(len(o), bool)
         for start_s, end_s in clip:
@@ -133,14 +134,14 @@ def phone_closures(
             stop = min(int(np.floor(end_s * rate_hz + 1e-6)) + 2, len(o))
             inside[first:stop] = True
             if (o[first:stop] < threshold).any():
-                wanted += 1
+                closed += 1
                 hit += bool((g[first:stop] < threshold).any())
         false += int((~inside[closings(g, threshold)]).sum())
         natural += int((~inside[closings(o, threshold)]).sum())
     minutes = speech_s / 60
     return PhoneClosures(
-        recall=hit / wanted if wanted else float("nan"),
-        intervals=wanted,
+        recall=hit / closed if closed else float("nan"),
+        intervals=closed,
         false_per_minute=false / minutes if minutes else float("nan"),
         original_per_minute=natural / minutes if minutes else float("nan"),
     )

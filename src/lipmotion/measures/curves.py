@@ -1,6 +1,6 @@
-"""How close generated curves are to recorded ones.
+"""Measures of the similarity of generated and recorded curves.
 
-A set of clips is a list of arrays [shape=(T_i, P)] at the video's own rate, generated and original alike.
+A set of clips is a list of arrays [shape=(T_i, P)] at the frame rate of the video, generated and original alike.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from lipmotion.stats.rounding import varies
 Array = NDArray[np.float64]
 Clips = Sequence[Array]
 STILL_SHARE = 0.01
-"""Curves that move less than this, beside others of the same unit, are rounding or noise."""
+"""Curves that move by less than this share of the widest of the same unit are rounding or noise."""
 
 
 def correlation(generated: Array, original: Array) -> Array:
@@ -30,7 +30,10 @@ def correlation(generated: Array, original: Array) -> Array:
 
 
 def moving(original: Clips, units: Sequence[str]) -> NDArray[np.bool_]:
-    """Return which channels move [shape=(P,)]: by more than ``STILL_SHARE`` of the widest of their unit."""
+    """Return which channels move [shape=(P,)]: by more than ``STILL_SHARE`` of the widest of their unit.
+
+    units : of the channels
+    """
     values = np.concatenate(original)
     extents: Array = np.ptp(values, axis=0)
     widest = {unit: max(e for e, other in zip(extents, units, strict=True) if other == unit) for unit in set(units)}
@@ -38,12 +41,12 @@ def moving(original: Clips, units: Sequence[str]) -> NDArray[np.bool_]:
 
 
 def pooled_correlation(generated: Clips, original: Clips) -> Array:
-    """Return ``correlation`` over the frames of all clips together."""
+    """Return the ``correlation`` over the frames of all clips together [shape=(P,)]."""
     return correlation(np.concatenate(generated), np.concatenate(original))
 
 
 def per_clip_correlation(generated: Clips, original: Clips) -> Array:
-    """Return the mean over clips of each clip's ``correlation``."""
+    """Return the mean over clips of each clip's ``correlation`` [shape=(P,)]."""
     return np.mean([correlation(g, o) for g, o in zip(generated, original, strict=True)], axis=0)
 
 
@@ -81,24 +84,27 @@ def jerk_ratio(generated: Clips, original: Clips) -> Array:
 
 
 def _where_moving(original: Clips, divisor: Array) -> Array:
-    """Return what is divided by [shape=(P,)]: NaN for channels that do not move, and where it is 0."""
+    """Return the divisor [shape=(P,)], NaN for channels that do not move, and where it is 0."""
     return np.where(varies(np.concatenate(original)) & (divisor > 0), divisor, np.nan)
 
 
 def lag_ms(generated: Clips, original: Clips, rate_hz: float, reach_s: float = 0.4) -> float:
-    """Return how late the first channel is, in ms: the cross-correlation's maximum, refined by a parabola."""
+    """Return the lag of the first channel in ms, positive where it is late.
+
+    It is the maximum of the cross-correlation within ``reach_s`` seconds, refined by a parabola.
+    """
     reach = round(reach_s * rate_hz)
     shifts = range(-reach, reach + 1)
     scores = np.array([_shifted_correlation(generated, original, shift) for shift in shifts])
     best = int(np.clip(scores.argmax(), 1, len(scores) - 2))
-    before, at, after = scores[best - 1 : best + 2]
-    curvature = before - 2 * at + after
+    before, peak, after = scores[best - 1 : best + 2]
+    curvature = before - 2 * peak + after
     refined = best + (0.5 * (before - after) / curvature if curvature < 0 else 0)
     return float((refined - reach) / rate_hz * 1000)
 
 
 def _shifted_correlation(generated: Clips, original: Clips, shift: int) -> float:
-    """Correlate generated[t + shift] with original[t]."""
+    """Return the correlation of generated[t + shift] with original[t] over all clips; 0 where none is long enough."""
     pairs = [
         (g[max(shift, 0) : len(g) + min(shift, 0), :1], o[max(-shift, 0) : len(o) - max(shift, 0), :1])
         for g, o in zip(generated, original, strict=True)

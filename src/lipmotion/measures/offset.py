@@ -1,4 +1,4 @@
-"""How late the sound of a video is, from two curves that should move together."""
+"""Offset of sound and video, estimated from two curves that should be synchronous."""
 
 from __future__ import annotations
 
@@ -13,23 +13,24 @@ from lipmotion.measures.curves import correlation
 Array = NDArray[np.float64]
 
 LEAST_SCORE = 0.5
-"""Under this correlation an offset is not known."""
+"""Least correlation at which an offset is known."""
 LEAST_MARGIN = 0.15
-"""Nor where another maximum is nearly as high as the best."""
+"""Least difference between the best and the second maximum at which an offset is known."""
 PEAK_S = 0.12
-"""A maximum further than this from the best is another one."""
+"""Maxima further from the best than this, in seconds, are other ones."""
 LEAST_SHARE = 0.5
-"""A shift counts when at least this share of the frames can be compared."""
+"""Least share of the frames that can be compared at a shift."""
 DRAWS = 500
+"""Bootstrap samples of an interval."""
 
 
 @dataclass(frozen=True)
 class Offset:
-    """How late the sound is.
+    """Offset of the sound from the video.
 
-    late_s : seconds; negative: early
-    score  : correlation of the two curves there
-    margin : by how much it exceeds the best of any other place
+    late_s : seconds by which the sound is late; negative: early
+    score  : correlation of the two curves at this offset
+    margin : difference to the highest correlation further than ``PEAK_S`` away
     low_s, high_s : 95 % interval where several clips were pooled, else both ``late_s``
     """
 
@@ -41,27 +42,27 @@ class Offset:
 
     @property
     def known(self) -> bool:
-        """Whether the curves agree enough, and at one place only."""
+        """Whether the correlation is high enough, and has one maximum only."""
         return self.score > LEAST_SCORE and self.margin > LEAST_MARGIN
 
 
 def shift_scores(predicted: Array, measured: Array, valid: NDArray[np.bool_], reach: int) -> Array:
     """Return the correlation of predicted[t + k] with measured[t] for k = -reach … reach [shape=(2·reach + 1,)].
 
-    predicted, measured : curves [shape=(T,)] at one rate;  valid : where ``measured`` holds [shape=(T,)]
-    0 where too few frames overlap, or one curve is constant.
+    predicted, measured : curves [shape=(T,)] at one rate;  valid : where ``measured`` is known [shape=(T,)]
+    It is 0 where too few frames overlap, or one curve is constant.
     """
     return np.array([_score(predicted, measured, valid, shift) for shift in range(-reach, reach + 1)])
 
 
 def best_offset(scores: Array, rate_hz: float) -> Offset:
-    """Return where the scores [shape=(2·reach + 1,)] are highest, refined by a parabola."""
+    """Return the offset of the highest score [shape=(2·reach + 1,)], refined by a parabola."""
     late_s, score, margin = _highest(scores, rate_hz)
     return Offset(late_s, score, margin, late_s, late_s)
 
 
 def pooled_offset(scores: Sequence[Array], rate_hz: float, seed: int = 0) -> Offset:
-    """Return the offset that clips share: the maximum of their mean scores, with a bootstrap interval over clips."""
+    """Return the common offset of clips: that of the highest mean score, with a bootstrap interval over clips."""
     clips = np.stack(scores)
     late_s, score, margin = _highest(clips.mean(axis=0), rate_hz)
     draw = np.random.default_rng(seed)
@@ -81,9 +82,10 @@ def _score(predicted: Array, measured: Array, valid: NDArray[np.bool_], shift: i
 
 
 def _highest(scores: Array, rate_hz: float) -> tuple[float, float, float]:
+    """Return offset in seconds, score and margin of the highest score (see ``Offset``)."""
     best = int(np.clip(scores.argmax(), 1, len(scores) - 2))
-    before, at, after = scores[best - 1 : best + 2]
-    curvature = before - 2 * at + after
-    place = best + (0.5 * (before - after) / curvature if curvature < 0 else 0.0)
-    elsewhere = np.abs(np.arange(len(scores)) - place) > PEAK_S * rate_hz
-    return (place - len(scores) // 2) / rate_hz, float(at), float(at - scores[elsewhere].max(initial=-1.0))
+    before, peak, after = scores[best - 1 : best + 2]
+    curvature = before - 2 * peak + after
+    position = best + (0.5 * (before - after) / curvature if curvature < 0 else 0.0)
+    elsewhere = np.abs(np.arange(len(scores)) - position) > PEAK_S * rate_hz
+    return (position - len(scores) // 2) / rate_hz, float(peak), float(peak - scores[elsewhere].max(initial=-1.0))

@@ -1,4 +1,4 @@
-"""Figures as a table that people read."""
+"""The figures of an evaluation as a text table."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def figures_table(figures: Mapping[str, Any]) -> str:
     lines += [f"left out, for they do not move: {', '.join(still)}"] if still else []
     lines += [PINNED] if any("unpinned" in condition for condition in figures["conditions"].values()) else []
     for name, condition in figures["conditions"].items():
-        rows = condition["channels"] | _pictured(condition)
+        rows = condition["channels"] | _eigenlips_row(condition)
         size = max(9, *map(len, rows))
         lines += ["", name, f"  {'channel':{size}}{'ACC':>7}{'per clip':>10}{'nRMSE':>7}{'variance':>10}{'jerk':>7}"]
         for channel, row in rows.items():
@@ -30,17 +30,18 @@ def figures_table(figures: Mapping[str, Any]) -> str:
                 f"{figure_text(row['nrmse'], '7.3f')}{figure_text(row['global_variance'], '10.2f')}"
                 f"{figure_text(row['jerk'], '7.2f')}"
             )
-        lines += _rest(condition)
+        lines += _summary(condition)
     return "\n".join(map(printable, lines))
 
 
-def _pictured(condition: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the row of the means over all eigenlips, if there are some."""
+def _eigenlips_row(condition: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the row of the means over all eigenlips; empty without eigenlips."""
     means = condition.get("eigenlips")
     return {f"{len(means['channels'])} eigenlips": means} if means else {}
 
 
-def _rest(condition: Mapping[str, Any]) -> list[str]:
+def _summary(condition: Mapping[str, Any]) -> list[str]:
+    """Return the lines of figures over all channels."""
     lines = [
         f"  mean ACC {condition['acc']:.3f}; AMSE {condition['amse']:.4f}; "
         f"lag of {condition['leading']} {condition['lag_ms']:+.1f} ms"
@@ -56,14 +57,16 @@ def _rest(condition: Mapping[str, Any]) -> list[str]:
     return [
         f"  opening ACC 95 % interval {low:.3f} to {high:.3f};{lines[0][1:]}",
         *lines[1:],
-        *_closing(condition),
+        *_closure_lines(condition),
         f"  silence: opening {figure_text(quiet['mean'], '.4f')} ± {figure_text(quiet['std'], '.4f')} "
-        f"(original {figure_text(original['mean'], '.4f')} ± {figure_text(original['std'], '.4f')}, {quiet['frames']} frames)",
+        f"(original {figure_text(original['mean'], '.4f')} ± {figure_text(original['std'], '.4f')}, "
+        f"{quiet['frames']} frames)",
         *_unpinned(condition),
     ]
 
 
-def _closing(condition: Mapping[str, Any]) -> list[str]:
+def _closure_lines(condition: Mapping[str, Any]) -> list[str]:
+    """Return the lines of closure figures."""
     closures, phones = condition["closures"], condition["closures_p_b_m"]
     return [
         f"  closures: score {figure_text(closures['score'], '.3f')} of {closures['original']}, precision "
@@ -76,16 +79,17 @@ def _closing(condition: Mapping[str, Any]) -> list[str]:
 
 
 def _unpinned(condition: Mapping[str, Any]) -> list[str]:
+    """Return the lines of figures without pins; none where they were not computed."""
     free = condition.get("unpinned")
     if free is None:
         return []
     low, high = free["opening_acc_95"]
     acc = figure_text(free["channels"]["opening"]["acc"], ".3f")
     head = f"  without pins: ACC of opening {acc} ({low:.3f} to {high:.3f}), mean ACC {free['acc']:.3f}"
-    return [head, *(f"  {line}" for line in _closing(free))]
+    return [head, *(f"  {line}" for line in _closure_lines(free))]
 
 
 def figure_text(value: float | None, form: str) -> str:
-    """Return a figure as text, a dash in the same width where there is none."""
+    """Return a figure as text, formatted by ``form``; None is a dash of the same width."""
     width = form.partition(".")[0].strip("+")
     return f"{'–':>{width or 0}}" if value is None else format(value, form)

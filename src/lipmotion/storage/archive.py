@@ -31,8 +31,8 @@ UNREADABLE = (
 LAST_LETTER = 0x10FFFF
 """The last code point of Unicode."""
 SMALL_ARCHIVE, LARGEST_RATIO = 1 << 26, 20
-"""An archive may have so many bytes uncompressed, or so many times its own size: our arrays are compressed to half their
-size, zip bombs to a thousandth."""
+"""An archive may have so many bytes uncompressed, or so many times its own size: our arrays are compressed to half
+their size, zip bombs to a thousandth."""
 
 
 def write_archive(

@@ -157,7 +157,7 @@ def _is_alive(process: str) -> bool:
 
 
 def _place(target: Path) -> Path:
-    """Return the path that an output is written to: where it is a link, that of its target, so that the link remains."""
+    """Return the path that an output is written to; for a link, that of its target, so that the link remains."""
     try:
         place = Path(os.path.realpath(target)) if target.is_symlink() else target
         endless = place.is_symlink()

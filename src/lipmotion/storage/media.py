@@ -17,10 +17,11 @@ MEDIA_FORMATS = (
     "apng asf asf_o avi dv dvd flv gif gxf h264 hevc ivf live_flv m4v matroska mjpeg mov mpeg mpegts mpegvideo mxf "
     "nut obu rm smjpeg wtv yuv4mpegpipe"
 ).split()
-"""FFmpeg's names of the container formats whose content is in the file itself. All others are refused before they open
-anything: playlists (hls, concat, dash, imf), indexes (vobsub), numbered pictures (image2), addresses (sdp, rtsp), devices."""
+"""FFmpeg's names of the container formats whose content is in the file itself. All others are refused before they
+open anything: playlists (hls, concat, dash, imf), indexes (vobsub), numbered pictures (image2), addresses (sdp, rtsp),
+devices."""
 LARGEST_BLOCK = 1 << 28
-"""Most bytes that FFmpeg may allocate at a time: three times a picture of ``MOST_PIXELS`` in 16 bits and four channels."""
+"""Most bytes that FFmpeg may allocate at a time: three pictures of ``MOST_PIXELS`` with four channels of 16 bits."""
 DURATION = re.compile(r"(\d{1,6}):(\d\d):(\d\d(?:\.\d{1,9})?)")
 MOST_PIXELS = 4096 * 2304
 """Most pixels of a picture: slightly more than 4K. A decoder may keep sixteen pictures."""

@@ -29,7 +29,7 @@ from lipmotion.hmm.multistream.streams import F0_STREAMS, MOTION, SPEECH, STREAM
 from lipmotion.stats.bigram import estimate_bigram
 from lipmotion.stats.em import run_em
 from lipmotion.stats.trees import Question
-from lipmotion.types import Monitor, Progress, part_of, silent_monitor
+from lipmotion.types import Monitor, Progress, silent_monitor, sub_monitor
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +116,7 @@ def _doublings(most: int) -> int:
 def _part_monitors(monitor: Monitor, widths: Sequence[int]) -> list[Monitor]:
     """Return a monitor for each part of the work; the widths are the relative amounts of work."""
     edges = np.cumsum([0, *widths]) / max(sum(widths), 1)
-    return [part_of(monitor, start, stop) for start, stop in pairwise(edges.tolist())]
+    return [sub_monitor(monitor, start, stop) for start, stop in pairwise(edges.tolist())]
 
 
 def _run_em(hmm: JointHmm, prepared: PreparedUtterances, stage: str, steps: int, monitor: Monitor) -> JointHmm:
