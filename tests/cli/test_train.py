@@ -103,7 +103,7 @@ def test_units_of_a_table_that_is_not_needed_again(run: RunCommand, toy_corpus: 
     table.unlink()
     assert set(load_model(here / "m").learned.units.units) == {f"u{n}" for n in range(19)}
     assert run("train", toy_corpus.path, "-o", "named", "--units", "eVis").code == 0
-    assert load_model(here / "named").learned.units.of == units.of
+    assert load_model(here / "named").learned.units.unit_of_phone == units.unit_of_phone
     figures = [run("evaluate", name, toy_corpus.path).out for name in ("m", "named")]
     assert figures[0] == figures[1]
 

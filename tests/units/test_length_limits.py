@@ -4,12 +4,17 @@ import pytest
 
 from lipmotion.errors import AlignmentError, InputError
 from lipmotion.units import check_phones, check_text, check_words
-from lipmotion.units.length_limits import CHARACTERS_PER_S, FEW_PHONES, PHONES_PER_S, SHORT_TEXT
+from lipmotion.units.length_limits import (
+    ALWAYS_ALLOWED_CHARACTERS,
+    ALWAYS_ALLOWED_PHONES,
+    CHARACTERS_PER_S,
+    PHONES_PER_S,
+)
 
 
 @pytest.mark.parametrize("duration_s", [0.0, 1.0, 3600.0])
 def test_a_text_may_be_as_long_as_can_be_said(duration_s: float) -> None:
-    most = SHORT_TEXT + int(CHARACTERS_PER_S * duration_s)
+    most = ALWAYS_ALLOWED_CHARACTERS + int(CHARACTERS_PER_S * duration_s)
     check_text("a" * most, duration_s)
     with pytest.raises(
         AlignmentError, match=f"has {most + 1} characters, required at most {most} for {duration_s:.2f} s"
@@ -18,11 +23,11 @@ def test_a_text_may_be_as_long_as_can_be_said(duration_s: float) -> None:
 
 
 def test_words_count_with_the_blanks_between_them() -> None:
-    check_words(["a"] * (SHORT_TEXT // 2), 0.0)
-    with pytest.raises(AlignmentError, match=f"has {SHORT_TEXT + 2} characters"):
-        check_words(["a"] * (SHORT_TEXT // 2 + 1), 0.0)
+    check_words(["a"] * (ALWAYS_ALLOWED_CHARACTERS // 2), 0.0)
+    with pytest.raises(AlignmentError, match=f"has {ALWAYS_ALLOWED_CHARACTERS + 2} characters"):
+        check_words(["a"] * (ALWAYS_ALLOWED_CHARACTERS // 2 + 1), 0.0)
     with pytest.raises(AlignmentError, match="give the words of this recording"):
-        check_words(["a" * SHORT_TEXT], 0.0)
+        check_words(["a" * ALWAYS_ALLOWED_CHARACTERS], 0.0)
 
 
 def test_the_fastest_speech_on_record_fits() -> None:
@@ -31,7 +36,7 @@ def test_the_fastest_speech_on_record_fits() -> None:
 
 
 def test_phones_are_no_more_than_frames() -> None:
-    most = FEW_PHONES + 2 * PHONES_PER_S
+    most = ALWAYS_ALLOWED_PHONES + 2 * PHONES_PER_S
     check_phones(most, 2.0)
     with pytest.raises(InputError, match=f"{most + 1} units in time, required at most {most} for 2.00 s of sound"):
         check_phones(most + 1, 2.0)

@@ -76,7 +76,7 @@ def kinds(name: str) -> dict[str, int]:
 def test_the_parts_of_the_sets_are_those_of_the_paper() -> None:
     assert kinds("eVis") == {"diphthong": 5, "vowel": 4, "other": 10}
     assert kinds("sVis") == {"diphthong": 0, "vowel": 3, "other": 3 + 1}
-    assert unit_set("phone").of == {phone: phone for phone in PHONES}
+    assert unit_set("phone").unit_of_phone == {phone: phone for phone in PHONES}
 
 
 @pytest.mark.parametrize(("fine", "coarse"), [("phone", "eVis"), ("eVis", "sVis"), ("sVis", "2vis")])
@@ -125,13 +125,17 @@ def test_classes_of_any_table(units: list[str], quiet: tuple[str, str]) -> None:
 
 @named
 def test_a_table_says_the_same_as_the_set(name: str, tmp_path: Path) -> None:
-    path = written(tmp_path, "# mine\n\n" + table(dict(unit_set(name).of)).replace("\n", " # why\n"))
+    path = written(tmp_path, "# mine\n\n" + table(dict(unit_set(name).unit_of_phone)).replace("\n", " # why\n"))
     found = unit_set(path)
-    assert (found.name, dict(found.of), found.units) == ("mine", dict(unit_set(name).of), unit_set(name).units)
+    assert (found.name, dict(found.unit_of_phone), found.units) == (
+        "mine",
+        dict(unit_set(name).unit_of_phone),
+        unit_set(name).units,
+    )
     assert found.count == len(found.units)
 
 
-GOOD = table(dict(unit_set("eVis").of))
+GOOD = table(dict(unit_set("eVis").unit_of_phone))
 WRONG = {
     "a phone is missing": (GOOD.replace(" zh", ""), r"mine\.txt.*missing zh"),
     "a phone twice": (GOOD + "more zh\n", r"line 20: phone 'zh' has a unit in line 15"),
@@ -175,14 +179,14 @@ def test_neither_a_name_nor_a_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize("unit", ["", "a b", " a", "a\n"])
 def test_a_unit_is_a_word(unit: str) -> None:
     with pytest.raises(InputError, match="not a word"):
-        UnitSet("mine", {**unit_set("phone").of, "zh": unit})
+        UnitSet("mine", {**unit_set("phone").unit_of_phone, "zh": unit})
 
 
 def test_an_unknown_phone_has_no_unit() -> None:
     with pytest.raises(InputError, match="'xx'; the phones: aa"):
         unit_set("eVis").unit("xx")
     with pytest.raises(InputError, match="unknown xx"):
-        UnitSet("mine", {**unit_set("phone").of, "xx": "xx"})
+        UnitSet("mine", {**unit_set("phone").unit_of_phone, "xx": "xx"})
 
 
 def test_the_document_says_what_the_tables_say() -> None:
@@ -237,6 +241,6 @@ def test_a_unit_alone_tells_its_phone_only_where_it_has_one() -> None:
 
 
 def test_units_within_a_class_of_phones() -> None:
-    assert UNIT_SETS["pbVis"].within(LIP_CLOSING) == ("MBP",)
-    assert UNIT_SETS["2vis"].within(LIP_CLOSING) == ()
-    assert sorted(UNIT_SETS["phone"].within(LIP_CLOSING)) == ["b", "em", "m", "p"]
+    assert UNIT_SETS["pbVis"].units_within(LIP_CLOSING) == ("MBP",)
+    assert UNIT_SETS["2vis"].units_within(LIP_CLOSING) == ()
+    assert sorted(UNIT_SETS["phone"].units_within(LIP_CLOSING)) == ["b", "em", "m", "p"]

@@ -1,1 +1,1 @@
-"""What vision measures and faces draw: the mouth region and the space of its pictures."""
+"""The mouth region of a face, and the space of mouth pictures (eigenlips): vision measures them, faces draw them."""

@@ -1,4 +1,4 @@
-"""Eigenlips: pictures of a mouth as a few numbers a colour."""
+"""Eigenlips: principal components of mouth pictures, for each colour."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from lipmotion.types import GREY, Channel
 
 COLOURS = "rgb"
 COMPONENTS = 30
-"""Of each colour, as in the paper."""
+"""Components of each colour, as in the paper."""
 Images = NDArray[np.uint8]
 
 
@@ -25,7 +25,7 @@ class Eigenlips:
 
     mean      : float32 array [shape=(3, D)], grey levels, D = height · width, row by row
     basis     : float32 array [shape=(3, K, D)], orthonormal in each colour, most variance first
-    explained : share of each colour's variance that the components hold, in the pictures they come from [shape=(3,)]
+    explained : share of each colour's variance in the training pictures that the components explain [shape=(3,)]
     size      : height and width of a picture, px
     Source: Xie & Liu 2007, §5, Eqs. 12–13 (there r > d; read r < d). Deviation: the covariance is diagonalised, not the
     correlation matrix, so that Eq. 13 is the least-squares solution of Eq. 12.
@@ -44,7 +44,7 @@ class Eigenlips:
 
     @property
     def summary(self) -> str:
-        """In words: how many coefficients, of which pictures, and what they hold."""
+        """A description: number of coefficients, size of the pictures, explained variance."""
         height, width = self.size
         share = 100 * float(self.explained.mean())
         return f"{len(self.channels)} of {width} × {height} px, {share:.1f} % of the variance of the pictures"
@@ -87,10 +87,10 @@ def fit_eigenlips(images: Images, components: int = COMPONENTS) -> Eigenlips:
     _check(images)
     flat = _by_colour(images)
     spaces = [fit_pca(colour, components) for colour in flat]
-    kept = min(len(space.basis) for space in spaces)
-    if len(images) < 2 or not kept:
+    count = min(len(space.basis) for space in spaces)
+    if len(images) < 2 or not count:
         raise InputError(f"{len(images)} mouth pictures, all the same; required at least two that differ")
-    basis = np.stack([space.basis[:kept] for space in spaces]).astype(np.float32)
+    basis = np.stack([space.basis[:count] for space in spaces]).astype(np.float32)
     mean = np.stack([space.mean for space in spaces]).astype(np.float32)
     explained = np.array([_share(colour - m, b) for colour, m, b in zip(flat, mean, basis, strict=True)])
     height, width = images.shape[1:3]
@@ -98,7 +98,7 @@ def fit_eigenlips(images: Images, components: int = COMPONENTS) -> Eigenlips:
 
 
 def eigenlips_arrays(eigenlips: Eigenlips) -> dict[str, NDArray[Any]]:
-    """Return eigenlips as arrays."""
+    """Return eigenlips serialised as arrays (``SIZE``, ``SPACES``)."""
     return {
         "mean": eigenlips.mean,
         "basis": eigenlips.basis,
@@ -108,14 +108,14 @@ def eigenlips_arrays(eigenlips: Eigenlips) -> dict[str, NDArray[Any]]:
 
 
 def eigenlips_from_arrays(arrays: Arrays) -> Eigenlips:
-    """Return eigenlips again. Raises ModelFormatError: something is missing, or does not belong together."""
+    """Deserialise eigenlips. Raises ModelFormatError: an array is missing, or they do not fit together."""
     try:
         refuse_undeclared(arrays, SIZE, SPACES)
         height, width = checked_arrays(arrays, SIZE)["size"].tolist()
-        found = checked_arrays(arrays, SPACES, D=height * width)
-        for basis in found["basis"]:
+        spaces = checked_arrays(arrays, SPACES, D=height * width)
+        for basis in spaces["basis"]:
             check_orthonormal("basis", basis)
-        return Eigenlips(found["mean"], found["basis"], found["explained"], (height, width))
+        return Eigenlips(spaces["mean"], spaces["basis"], spaces["explained"], (height, width))
     except (KeyError, ValueError, TypeError, IndexError) as error:
         raise ModelFormatError(f"the eigenlips are damaged ({error}); train the model again") from error
 
@@ -126,7 +126,7 @@ SPACES = {
     "basis": ArraySpec(np.float32, f"{len(COLOURS)} K D", -1.01, 1.01),
     "explained": ArraySpec(np.float64, f"{len(COLOURS)}", 0, 1.01),
 }
-"""How eigenlips are stored."""
+"""The arrays of eigenlips."""
 
 
 def _by_colour(images: Images) -> NDArray[np.uint8]:
@@ -135,13 +135,15 @@ def _by_colour(images: Images) -> NDArray[np.uint8]:
 
 
 def _share(centred: NDArray[np.float32], basis: NDArray[np.float32]) -> float:
+    """Return the share of the variance that a basis [shape=(K, D)] explains of centred pictures [shape=(N, D)]."""
     return float(np.square(centred @ basis.T).sum(dtype=float) / np.square(centred).sum(dtype=float))
 
 
 def _check(images: Images, size: tuple[int, int] | None = None) -> None:
+    """Raise InputError unless these are pictures, of a height and width if given."""
     required = f"(T, {size[0]}, {size[1]}, 3)" if size else "(N, H, W, 3)"
-    is_one = images.ndim == 4 and images.shape[3] == len(COLOURS) and (size is None or images.shape[1:3] == size)
-    if not is_one or images.dtype != np.uint8 or not images.size:
+    is_valid = images.ndim == 4 and images.shape[3] == len(COLOURS) and (size is None or images.shape[1:3] == size)
+    if not is_valid or images.dtype != np.uint8 or not images.size:
         raise InputError(
             f"mouth pictures of shape {images.shape} and type {images.dtype}, required {required}, uint8; "
             "prepare the recordings again with mouth images"

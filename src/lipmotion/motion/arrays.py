@@ -1,4 +1,4 @@
-"""Serialisation of what every engine learns of motion: units, the space of the motion, closures."""
+"""Arrays of the parts of a model that engines share: the unit set, the motion space, closures, limits, scaling."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from lipmotion.types import Channel
 from lipmotion.units import UNIT_SETS, UnitSet
 
 PHONE_SET = UNIT_SETS["phone"]
-"""Each phone its own unit: needs no table."""
+"""The unit set in which each phone is a unit of its own; models do not store it."""
 
 
 def motion_arrays(units: UnitSet, space: MotionSpace, closure: Closure | None) -> dict[str, NDArray[Any]]:
@@ -28,7 +28,7 @@ def motion_arrays(units: UnitSet, space: MotionSpace, closure: Closure | None) -
         "direct": space.direct,
     }
     if units != PHONE_SET:
-        arrays["units"] = np.array(list(units.of.items()))
+        arrays["units"] = np.array(list(units.unit_of_phone.items()))
     if space.points is not None:
         arrays |= {"points_mean": space.points.mean, "points_basis": space.points.basis.astype(np.float32)}
     if closure is not None:
@@ -37,7 +37,10 @@ def motion_arrays(units: UnitSet, space: MotionSpace, closure: Closure | None) -
 
 
 def learned_motion_arrays(motion: LearnedMotion) -> dict[str, NDArray[Any]]:
-    """Serialise learned motion with its limits and variance scaling: for engines that store nothing of it themselves."""
+    """Serialise learned motion, with its limits and its variance scaling.
+
+    For engines that do not store limits and scaling in arrays of their own.
+    """
     arrays = motion_arrays(PHONE_SET, motion.space, motion.closure) | {"limits": np.stack(motion.limits)}
     return arrays | ({"scaling": np.stack(motion.scaling)} if motion.scaling is not None else {})
 
@@ -61,18 +64,22 @@ def motion_from_arrays(arrays: Arrays, units: str) -> tuple[UnitSet, MotionSpace
     """Deserialise the mapping of phones to units, the motion space and the closure.
 
     units : the name of the unit set; the set itself is in the arrays
-    Raises KeyError, ValueError, IndexError, TypeError: something is missing, out of place or out of range.
+    Raises KeyError, ValueError, IndexError, TypeError: an array is missing, or has a wrong shape, type or range.
     """
     space = _space(arrays)
     closure = None
     if OPENING in space.direct_names:
-        found = checked_arrays(arrays, CLOSURE, Q=space.dimensions)
-        column, closed = found["closure"]
+        stored = checked_arrays(arrays, CLOSURE, Q=space.dimensions)
+        column, closed = stored["closure"]
         if column != space.direct_names.index(OPENING) or closed < 0:
-            raise ValueError(f"closure of column {column:g} at {closed:g}, required that of {OPENING}, 0 or more")
-        closure = Closure(int(column), float(closed), found["closure_follow"])
-    of = PHONE_SET if units == PHONE_SET.name else UnitSet(units, _mapping(checked_arrays(arrays, UNITS)["units"]))
-    return of, space, closure
+            raise ValueError(
+                f"closure of column {column:g} at {closed:g}, required the column of {OPENING} and 0 or more"
+            )
+        closure = Closure(int(column), float(closed), stored["closure_follow"])
+    unit_set = PHONE_SET
+    if units != PHONE_SET.name:
+        unit_set = UnitSet(units, _unit_of_phone(checked_arrays(arrays, UNITS)["units"]))
+    return unit_set, space, closure
 
 
 CHANNELS = {"channels": ArraySpec(np.str_, "P 2"), "direct": ArraySpec(np.intp, "d", 0, 1e6)}
@@ -85,15 +92,15 @@ UNITS = {"units": ArraySpec(np.str_, "N 2")}
 LIMITS = {"limits": ArraySpec(np.float64, "2 Q")}
 SCALING = {"scaling": ArraySpec(np.float64, "2 Q")}
 MOTION_ARRAYS = (*CHANNELS, *POINTS, *CLOSURE, *UNITS)
-"""The names of the arrays: P channels, of which R are reduced to K dimensions."""
+"""Names of the arrays of ``motion_arrays``: P channels, of which R are reduced to K dimensions."""
 LEARNED_MOTION_ARRAYS = (*CHANNELS, *POINTS, *CLOSURE, *LIMITS, *SCALING)
-"""The names of the arrays of ``learned_motion_arrays``."""
+"""Names of the arrays of ``learned_motion_arrays``."""
 
 
 def _space(arrays: Arrays) -> MotionSpace:
-    named = checked_arrays(arrays, CHANNELS)
-    count, direct = named.sizes["P"], named["direct"]
-    channels = tuple(Channel(name, unit) for name, unit in named["channels"].tolist())
+    stored = checked_arrays(arrays, CHANNELS)
+    count, direct = stored.sizes["P"], stored["direct"]
+    channels = tuple(Channel(name, unit) for name, unit in stored["channels"].tolist())
     if len({channel.name for channel in channels}) < count:
         raise ValueError("channels whose names repeat")
     if len(set(direct.tolist()) & set(range(count))) < len(direct):
@@ -101,14 +108,14 @@ def _space(arrays: Arrays) -> MotionSpace:
     if len(direct) == count:
         refuse_undeclared(arrays.keys() & POINTS.keys())
         return MotionSpace(channels, direct, None)
-    found = checked_arrays(arrays, POINTS, R=count - len(direct))
-    check_orthonormal("points_basis", found["points_basis"])
-    return MotionSpace(channels, direct, Pca(found["points_mean"], found["points_basis"]))
+    points = checked_arrays(arrays, POINTS, R=count - len(direct))
+    check_orthonormal("points_basis", points["points_basis"])
+    return MotionSpace(channels, direct, Pca(points["points_mean"], points["points_basis"]))
 
 
-def _mapping(pairs: NDArray[Any]) -> dict[str, str]:
-    """Return the unit of every phone. Raises ValueError: something else."""
-    of = {str(phone): str(unit) for phone, unit in pairs}
-    if len(of) != len(pairs):
+def _unit_of_phone(pairs: NDArray[Any]) -> dict[str, str]:
+    """Return the unit of every phone. Raises ValueError: a phone has two units."""
+    units = {str(phone): str(unit) for phone, unit in pairs}
+    if len(units) != len(pairs):
         raise ValueError("a phone with two units")
-    return of
+    return units

@@ -1,4 +1,4 @@
-"""What is spoken: phones, visemes, words. Data and look-ups, no audio."""
+"""Phones, visemes, unit sets, and words with their pronunciations. Data and look-ups, no audio."""
 
 from lipmotion.units.classes import phone_classes
 from lipmotion.units.length_limits import check_phones, check_text, check_words

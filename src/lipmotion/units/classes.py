@@ -1,4 +1,4 @@
-"""Classes of phones by which contexts are alike: what decision trees ask for."""
+"""Classes of phones that the questions of decision trees are made of."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ CLASSES: dict[str, tuple[str, ...]] = {
         "fricative": "f v th dh s z sh zh hh",
         "affricate": "ch jh",
         "approximant": "l el r w y",
-        # Where, as far as lips and jaw show it.
+        # Where it is made, as far as lips and jaw show it.
         "lips": "p b m em f v w",
         "alveolar": "t d n en s z l el",
         "front vowel": "iy ih ix eh ey ae ay y",
@@ -28,11 +28,11 @@ CLASSES: dict[str, tuple[str, ...]] = {
         "rounded": "w uw uh ow ao oy aw",
     }.items()
 }
-"""By articulation, as in any textbook of phonetics; the visemes and the single phones come beside them."""
+"""Classes by articulation, as in any textbook of phonetics; ``phone_classes`` adds visemes and single phones."""
 
 
 def phone_classes() -> dict[str, frozenset[str]]:
-    """Return all classes: by articulation, the visemes, and each phone alone."""
+    """Return the phones of all classes, by name: articulatory classes, visemes, and each phone alone; each set once."""
     named = CLASSES | {f"viseme {name}": phones for name, phones in VISEMES.items()}
     distinct: dict[frozenset[str], str] = {}
     for name, phones in [*named.items(), *((phone, (phone,)) for phone in PHONES)]:

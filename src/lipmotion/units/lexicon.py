@@ -1,4 +1,4 @@
-"""Words to phones: a user's file, then the dictionary inside pocketsphinx's package, then spelling rules."""
+"""Pronunciations of words: from a user's file, then pocketsphinx's dictionary, then letter-to-sound rules."""
 
 from __future__ import annotations
 
@@ -18,23 +18,24 @@ from lipmotion.units.transcript import normalised_text
 Pronunciation = tuple[str, ...]
 
 REDUCED_VOWELS = {"ah": "ax", "er": "axr", "ih": "ix"}
-"""What the unstressed forms of these ARPAbet vowels are called in the inventory."""
+"""ARPAbet vowels to the inventory's names of their unstressed forms."""
 FULL_VOWELS = frozenset("aa ae ao aw ay eh ey iy ow oy uh uw".split())
 WEAK_WORDS = frozenset("a an the of and from was but than that's her were your for if in is it its".split())
-"""Words of one syllable that are unstressed in running speech."""
+"""Monosyllables that are unstressed in running speech."""
 LARGEST_LEXICON, MOST_LINES = 1 << 25, 1 << 20
-"""Bytes and lines of a user's file; the dictionary of 134,000 words has 3.3 million bytes."""
+"""Most bytes and lines of a user's file; the dictionary of 134,000 words has 3.3 million bytes."""
 LONGEST_LINE = 2000
-"""Characters of a word, its phones and a comment."""
+"""Most characters of a line: a word, its phones and a comment."""
 VARIANT_NUMBER = re.compile(r"\(\d+\)$")
-"""The dictionary's number of a further pronunciation."""
+"""The number by which the dictionary marks a further pronunciation."""
 MOST_VARIANTS = 32
-"""Pronunciations of a word: alignment tries each after each of the word before. The dictionary's most are six."""
+"""Most pronunciations of a word: alignment tries each after each of the word before. In the dictionary there are up to
+six."""
 
 
 @lru_cache(maxsize=4096)
 def phone_named(label: str) -> str | None:
-    """Return the phone that a label means, or None. ARPAbet in either case, stressed or not, or the project's own."""
+    """Return the phone that a label names, or None: ARPAbet in either case, stressed or not, or our own name."""
     name = re.sub(r"\d$", "", label.lower())
     name = REDUCED_VOWELS.get(name, name) if label.endswith("0") else name
     return name if name in PHONES else None
@@ -44,16 +45,16 @@ def phone_named(label: str) -> str | None:
 class Lexicon:
     """Pronunciations of words.
 
-    user : words of the user's own, ahead of the dictionary
+    user : the user's pronunciations, which replace those of the dictionary
     """
 
     user: dict[str, tuple[Pronunciation, ...]] = field(default_factory=dict)
 
     @classmethod
     def from_file(cls, path: str | Path) -> Lexicon:
-        """Read ``word PHONE PHONE ...`` lines, one pronunciation a line; ``#`` starts a comment.
+        """Return the lexicon of a file: a pronunciation ``word PHONE PHONE ...`` a line; ``#`` starts a comment.
 
-        Phones are ARPAbet in either case, with or without stress digits, or the project's own names.
+        Phones are ARPAbet in either case, with or without stress digits, or names of the inventory.
         Raises InputError: no such file, not UTF-8, more than a lexicon holds (``LARGEST_LEXICON``, ``MOST_LINES``,
         ``LONGEST_LINE``, ``MOST_VARIANTS``), no phones after a word, or an unknown phone (with its line).
         """
@@ -66,11 +67,11 @@ class Lexicon:
         return cls({word: tuple(variants) for word, variants in user.items()})
 
     def known(self, word: str) -> bool:
-        """Whether the word is in the user's file or in the dictionary."""
+        """Return whether the word is in the user's file or in the dictionary."""
         return word in self.user or bool(_dictionary_entries(word))
 
     def pronunciations(self, word: str) -> tuple[Pronunciation, ...]:
-        """Return every pronunciation of a lower-case word; of an unknown one, the spelling rules' guess."""
+        """Return every pronunciation of a lower-case word; of an unknown one, that of the letter-to-sound rules."""
         if word in self.user:
             return self.user[word]
         entries = _dictionary_entries(word)
@@ -95,7 +96,7 @@ def _add_line(user: dict[str, list[Pronunciation]], line: str) -> None:
 
 
 def _lines(path: Path) -> Iterator[str]:
-    """Give the lines of a lexicon one by one. Raises InputError: not a text, or more than a lexicon holds."""
+    """Yield the lines of a lexicon file. Raises InputError: not a text, or more than a lexicon holds."""
     text = read_text_file(path, "lexicon", LARGEST_LEXICON)
     count = text.count("\n") + 1
     if count > MOST_LINES:
@@ -124,7 +125,7 @@ def _spoken_phone(label: str) -> str | None:
 
 
 def english_data() -> Path:
-    """Return where pocketsphinx keeps its dictionary and models. Raises MissingDependencyError: it is missing."""
+    """Return the folder of pocketsphinx's dictionary and models. Raises MissingDependencyError: it is not installed."""
     spec = find_spec("pocketsphinx")  # its data files are read, the package itself is not imported
     if spec is None or not spec.submodule_search_locations:
         raise MissingDependencyError(
@@ -141,7 +142,10 @@ def _dictionary() -> bytes:
 
 @cache
 def _dictionary_entries(word: str) -> tuple[Pronunciation, ...]:
-    """Search the sorted text itself, by halves: faster than reading 134,000 lines for one sentence."""
+    """Return the pronunciations of a word in the dictionary; none if it is not in it.
+
+    Binary search in the sorted text is faster than reading 134,000 lines for one sentence.
+    """
     text, wanted, entries = _dictionary(), word.encode(), []
     low, high = 0, len(text) - 1  # each at the line break before a line
     while low < high:
@@ -163,7 +167,7 @@ def _head(text: bytes, line_break: int) -> bytes:
 
 
 def with_reduced_vowels(word: str, phones: Pronunciation) -> Pronunciation:
-    """Mark the unstressed AH, ER and IH. The dictionary has no stress, so a rule decides.
+    """Return phones with the unstressed AH, ER and IH reduced. The dictionary has no stress, so a rule decides.
 
     A word of one syllable keeps its vowel unless it is a weak word. In a longer word these three are
     unstressed, but for the first vowel when it follows a consonant and no full vowel (see FULL_VOWELS)

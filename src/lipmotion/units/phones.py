@@ -1,4 +1,4 @@
-"""The one phone inventory: the 47 of Xie & Liu 2007, Table 1."""
+"""The phone inventory: the 47 phones of Xie & Liu 2007, Table 1."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from lipmotion.units.visemes import VISEME_OF, VISEMES
 
 SILENCE = "sil"
 PAUSE = "sp"
-"""A pause between words too short to be silence."""
+"""A pause between words that is too short to be silence."""
 
 PHONES: tuple[str, ...] = tuple(sorted(VISEME_OF))
 
@@ -16,7 +16,7 @@ LIP_CLOSING: tuple[str, ...] = (*VISEMES["bi"], "em")
 """The phones in which the lips meet."""
 
 SIMILAR_PHONES: dict[str, tuple[str, ...]] = {
-    # A phone that a corpus never says borrows the sound of the first of these that it does say.
+    # A phone that is not in a corpus borrows the model of the first of these that is.
     "aa": ("ao", "ah"),
     "ae": ("eh", "aa"),
     "ah": ("ax", "aa"),
@@ -68,26 +68,30 @@ SIMILAR_PHONES: dict[str, tuple[str, ...]] = {
 
 
 def is_silent(phone: str) -> bool:
-    """Whether nothing is spoken in this phone."""
+    """Return whether a phone is silence or a pause."""
     return phone in (SILENCE, PAUSE)
 
 
 def unknown_phone_message(phone: str, where: str = "") -> str:
-    """Return what to say of a phone that is not in the inventory; an empty one is of a recognised unit."""
+    """Return the error message for a phone that is not in the inventory.
+
+    phone : empty if a model recognised a unit of several phones
+    where : where the phone was found, with a blank before it
+    """
     if not phone:
         return f"a unit without a phone{where}: only the model that recognised it can use it; give phones instead"
     return f"unknown phone {phone!r}{where}; the phones: {' '.join(PHONES)}"
 
 
 def most_similar_phone(phone: str, known: Collection[str]) -> str:
-    """Return the phone itself if known, else the known phone that sounds most like it.
+    """Return the phone itself if it is known, else the most similar known phone.
 
-    First its relatives, then the relatives of those, then its viseme class, then any.
+    Its similar phones (``SIMILAR_PHONES``) come first, then the similar phones of those, then its viseme, then any.
     """
     queue = [phone]
     for candidate in queue:
         if candidate in known:
             return candidate
-        queue += [relative for relative in SIMILAR_PHONES[candidate] if relative not in queue]
-    alike = [other for other in VISEMES[VISEME_OF[phone]] if other in known]
-    return alike[0] if alike else min(known)
+        queue += [similar for similar in SIMILAR_PHONES[candidate] if similar not in queue]
+    same_viseme = [other for other in VISEMES[VISEME_OF[phone]] if other in known]
+    return same_viseme[0] if same_viseme else min(known)

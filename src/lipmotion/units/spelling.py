@@ -1,4 +1,4 @@
-"""Letter-to-sound rules: a guess for words that no dictionary has."""
+"""Letter-to-sound rules for words that are in no dictionary."""
 
 from __future__ import annotations
 
@@ -87,9 +87,9 @@ SPELLINGS: dict[str, str] = {
 LONG_VOWELS = {"a": "ey", "e": "iy", "i": "ay", "o": "ow", "u": "uw"}
 _LONGEST = max(map(len, SPELLINGS))
 _SILENT_E = re.compile(r"e'?s?")
-"""At the end of a word."""
+"""A silent e, with or without an s, at the end of a word."""
 _LONG_VOWEL = re.compile(r"[aeiou][bcdfgklmnpstvz]e('?s)?$")
-"""Vowel, consonant, final e."""
+"""A long vowel: vowel, consonant, final e."""
 
 
 def guess_pronunciation(word: str) -> tuple[str, ...]:
@@ -114,7 +114,10 @@ def guess_pronunciation(word: str) -> tuple[str, ...]:
 
 
 def _next_sound(letters: str, at: int, *, begun: bool) -> tuple[int, str]:
-    """Return how many letters from there on are used up, and their sound."""
+    """Return how many letters from ``at`` on make the next sound, and their phones.
+
+    begun : whether there is a sound before them
+    """
     if _SILENT_E.fullmatch(letters, at) and begun:
         return len(letters) - at, "z" if letters.endswith("s") else ""
     if _LONG_VOWEL.match(letters, at):

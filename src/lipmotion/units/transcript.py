@@ -1,4 +1,4 @@
-"""Text as people write it to the words that are spoken."""
+"""Text normalisation: a transcript as people write it, to the words that are spoken."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ ONES = (
 ).split()
 TENS = "_ _ twenty thirty forty fifty sixty seventy eighty ninety".split()
 MOST_MARKS = 30
-"""Accents on one letter; no language has so many."""
+"""Most accents on one letter; no language has so many."""
 SCALES = ((10**9, "billion"), (10**6, "million"), (1000, "thousand"), (100, "hundred"))
 
 
@@ -31,12 +31,12 @@ def words_of(text: str) -> tuple[str, ...]:
 
 
 def normalised_text(text: str) -> str:
-    """Return a text in lower case, its characters and apostrophes in one form each."""
+    """Return a text in lower case, in Unicode's NFKC form, with straight apostrophes."""
     return unicodedata.normalize("NFKC", _few_marks(text)).lower().replace("’", "'")
 
 
 def _few_marks(text: str) -> str:
-    """Return a text with at most ``MOST_MARKS`` marks on a letter: they are sorted, which takes the square of the time.
+    """Return a text with at most ``MOST_MARKS`` marks on a letter: Unicode sorts them in quadratic time.
 
     Source: Unicode Standard Annex 15, Stream-Safe Text Format.
     """
@@ -47,7 +47,7 @@ def _few_marks(text: str) -> str:
 
 
 def number_words(digits: str) -> list[str]:
-    """Return the words of a whole number; past a trillion, or with leading zeros, digit by digit."""
+    """Return the words of a whole number; from a trillion on, or with leading zeros, digit by digit."""
     if len(digits) > 12 or (len(digits) > 1 and digits[0] == "0"):
         return [ONES[int(digit)] for digit in digits]
     number = int(digits)

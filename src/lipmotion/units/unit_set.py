@@ -1,4 +1,4 @@
-"""Which unit models a phone: a mapping of the whole inventory, and tables of it that people write."""
+"""Unit sets: maps from every phone of the inventory to the unit that models it, built in or read from table files."""
 
 from __future__ import annotations
 
@@ -14,71 +14,73 @@ from lipmotion.units.classes import phone_classes
 from lipmotion.units.phones import PHONES, SILENCE, is_silent, unknown_phone_message
 
 LARGEST_TABLE = 1 << 18
-"""Bytes of a table: one of 47 phones has some hundred."""
+"""The most bytes of a table file; one of 47 phones has a few hundred."""
 CLOSED_UNIT = "closed"
-"""The only unit that silence may share with speech."""
+"""Name of the only unit that may hold silence and speech."""
 
 
 @dataclass(frozen=True)
 class UnitSet:
-    """The unit of every phone.
+    """A map from every phone of the inventory to its unit.
 
-    name      : as the user calls it
-    of        : phone to unit, all phones of the inventory
-    uncounted : units that a printed count leaves out (``count``)
+    name          : of the set, for users
+    unit_of_phone : phone to unit, for all phones of the inventory
+    uncounted     : units that the printed count of a paper leaves out (``count``)
 
     Raises InputError: a phone is missing or unknown, a unit has no name or one with a blank in it, or silence shares a
     unit other than ``closed`` with speech.
     """
 
     name: str
-    of: Mapping[str, str]
+    unit_of_phone: Mapping[str, str]
     uncounted: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
-        unknown, missing = sorted(set(self.of) - set(PHONES)), [phone for phone in PHONES if phone not in self.of]
+        unknown = sorted(set(self.unit_of_phone) - set(PHONES))
+        missing = [phone for phone in PHONES if phone not in self.unit_of_phone]
         if unknown or missing:
             wrong = [f"unknown {' '.join(unknown)}"] * bool(unknown) + [f"missing {' '.join(missing)}"] * bool(missing)
             raise InputError(f"unit set {self.name}: phones {'; '.join(wrong)}; required: {' '.join(PHONES)}")
-        nameless = [phone for phone, unit in self.of.items() if len(unit.split()) != 1 or unit != unit.strip()]
+        nameless = [
+            phone for phone, unit in self.unit_of_phone.items() if len(unit.split()) != 1 or unit != unit.strip()
+        ]
         if nameless:
-            raise InputError(
-                f"unit set {self.name}: the unit of {nameless[0]} is {shortened(self.of[nameless[0]])!r}, not a word"
-            )
-        for unit in _mixed(self.of):
+            unit = shortened(self.unit_of_phone[nameless[0]])
+            raise InputError(f"unit set {self.name}: the unit of {nameless[0]} is {unit!r}, not a word")
+        for unit in _mixed(self.unit_of_phone):
             raise InputError(f"unit set {self.name}: {_ADVICE.format(shortened(unit))}")
 
     @cached_property
     def units(self) -> tuple[str, ...]:
         """All units, in the order of the table."""
-        return tuple(dict.fromkeys(self.of.values()))
+        return tuple(dict.fromkeys(self.unit_of_phone.values()))
 
     @property
     def count(self) -> int:
-        """How many units a printed table counts."""
+        """The number of units without the uncounted ones."""
         return len(self.units) - len(self.uncounted)
 
     @cached_property
     def silence(self) -> tuple[str, ...]:
-        """The units that silence (sil, sp) has, alone or shared with closed lips."""
-        return tuple(dict.fromkeys(unit for phone, unit in self.of.items() if is_silent(phone)))
+        """The units of the silent phones (sil, sp), whether or not they hold others, too."""
+        return tuple(dict.fromkeys(unit for phone, unit in self.unit_of_phone.items() if is_silent(phone)))
 
     @cached_property
     def _silent(self) -> frozenset[str]:
         return frozenset(unit for unit in self.silence if all(map(is_silent, self.phones(unit))))
 
     def silent(self, unit: str) -> bool:
-        """Whether a unit is silence and nothing else."""
+        """Return whether all phones of a unit are silent."""
         return unit in self._silent
 
     def unit(self, phone: str) -> str:
         """Return the unit of a phone. Raises InputError: it is not in the inventory."""
-        if phone not in self.of:
+        if phone not in self.unit_of_phone:
             raise InputError(unknown_phone_message(phone))
-        return self.of[phone]
+        return self.unit_of_phone[phone]
 
     def unit_of(self, label: Unit) -> str:
-        """Return the unit of what is spoken: its phone's, or where it has no phone its own.
+        """Return the unit of a label: that of its phone or, where it has no phone, its own.
 
         Raises InputError: an unknown phone, or a unit that this set does not have.
         """
@@ -91,7 +93,7 @@ class UnitSet:
         return label.unit
 
     def label(self, unit: str) -> Unit:
-        """Return what is known to be spoken in a unit: its phone, if it has one only or is silence; else the unit."""
+        """Return a label for a unit: with its phone if it has only one or is silence, else without a phone."""
         phones = self.phones(unit)
         if self.silent(unit) and SILENCE in phones:
             return Unit(SILENCE, unit)
@@ -99,40 +101,40 @@ class UnitSet:
 
     def phones(self, unit: str) -> tuple[str, ...]:
         """Return the phones of a unit."""
-        return tuple(phone for phone, other in self.of.items() if other == unit)
+        return tuple(phone for phone, other in self.unit_of_phone.items() if other == unit)
 
-    def within(self, phones: Container[str]) -> tuple[str, ...]:
-        """Return the units all of whose phones are among these."""
+    def units_within(self, phones: Container[str]) -> tuple[str, ...]:
+        """Return the units all of whose phones are among some phones."""
         return tuple(unit for unit in self.units if all(phone in phones for phone in self.phones(unit)))
 
     def classes(self) -> dict[str, frozenset[str]]:
-        """Return the sets of units that decision trees may ask about, by name, each once.
+        """Return the sets of units that decision trees may ask about, by name, each set once.
 
-        A class of phones becomes the units all of whose phones lie in it; every unit alone is one, too. What would hold
-        no unit, or all, is left out. Of single phones these are ``phone_classes`` themselves.
+        A class of phones becomes the set of the units all of whose phones are in the class; every unit alone is a set,
+        too. Sets of no unit or of all units are left out. Where every phone is a unit these are ``phone_classes``.
         """
         members = {unit: frozenset(self.phones(unit)) for unit in self.units}
-        found: dict[frozenset[str], str] = {}
+        names: dict[frozenset[str], str] = {}
         for name, phones in phone_classes().items():
             inside = frozenset(unit for unit in self.units if members[unit] <= phones)
             if 1 < len(inside) < len(self.units):
-                found.setdefault(inside, f"class {name}" if name in self.units else name)
+                names.setdefault(inside, f"class {name}" if name in self.units else name)
             elif len(inside) == 1:
-                found.setdefault(inside, *inside)
+                names.setdefault(inside, *inside)
         for unit in self.units:
-            found.setdefault(frozenset([unit]), unit)
-        return {name: units for units, name in found.items() if len(units) < len(self.units)}
+            names.setdefault(frozenset([unit]), unit)
+        return {name: units for units, name in names.items() if len(units) < len(self.units)}
 
 
 def read_unit_table(path: Path) -> UnitSet:
-    """Read ``UNIT phone phone ...`` lines; ``#`` starts a comment.
+    """Return the unit set of a table file: lines ``UNIT phone phone ...``; ``#`` starts a comment.
 
-    Raises InputError, with the line: no such file, not UTF-8, a unit twice or without phones, a phone that is unknown,
+    Raises InputError (with the line): no such file, not UTF-8, a unit twice or without phones, a phone that is unknown,
     twice or missing, or silence in one unit with speech that is not called ``closed``.
     """
     unit_line: dict[str, int] = {}
     phone_line: dict[str, int] = {}
-    of: dict[str, str] = {}
+    unit_of_phone: dict[str, str] = {}
     for number, line in enumerate(read_text_file(path, "unit table", LARGEST_TABLE).splitlines(), start=1):
         unit, *phones = line.split("#")[0].split() or [""]
         if not unit:
@@ -150,17 +152,17 @@ def read_unit_table(path: Path) -> UnitSet:
                 raise InputError(f"{where}: unknown phone {shortened(phone)!r}; the phones are: {' '.join(PHONES)}")
             if phone in phone_line:
                 raise InputError(f"{where}: phone {phone!r} has a unit in line {phone_line[phone]} already; keep one")
-            phone_line[phone], of[phone] = number, unit
-    for unit in _mixed(of):
+            phone_line[phone], unit_of_phone[phone] = number, unit
+    for unit in _mixed(unit_of_phone):
         raise InputError(f"{path}, line {unit_line[unit]}: {_ADVICE.format(shortened(unit))}")
     try:
-        return UnitSet(path.stem, of)
+        return UnitSet(path.stem, unit_of_phone)
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
 
 
 def _mixed(of: Mapping[str, str]) -> list[str]:
-    """Return the units, other than ``closed``, in which silence stands beside speech."""
+    """Return the units, other than ``closed``, that hold silence and speech."""
     silent, spoken = ({unit for phone, unit in of.items() if is_silent(phone) is wanted} for wanted in (True, False))
     return sorted((silent & spoken) - {CLOSED_UNIT})
 

@@ -1,10 +1,10 @@
-"""The five unit sets of Hofer 2008 (§6, Table 1), each group with its reason.
+"""The five unit sets of Hofer 2008 (§6, Table 1), with a reason for each group of phones.
 
-The paper prints how many units a set has and what they are in a line of text; the groups are ours. How silence counts:
+The paper gives the number of units of each set and a line of text on them; the groups are ours. Counts, and silence:
 
-- ``2vis``: 2; the closed mouth is silence's, too;
+- ``2vis``: 2; silence belongs to the closed mouth;
 - ``sVis``: 6 groups of speech as printed, and silence is a unit beside them;
-- ``pbVis``: 9 drawings of a speaking mouth, and Preston Blair's mouth at rest is a unit beside them;
+- ``pbVis``: 9 drawings of a speaking mouth; Preston Blair's mouth at rest is a unit beside them;
 - ``eVis``: 19; silence is one of the 10 that are not vowels;
 - ``phone``: 46, silence among them; ``sp``, a pause between words, is the 47th phone of our inventory.
 """
@@ -34,12 +34,12 @@ _OPEN_PHONES = (
 )
 _BILABIAL = UnitGroup("bilabial", "p b m em", "the lips meet")
 _LABIODENTAL = UnitGroup("labiodental", "f v", "the lower lip is at the upper teeth")
-_SILENCE = UnitGroup("silence", "sil sp", "nothing is said; the mouth rests or gets ready")
+_SILENCE = UnitGroup("silence", "sil sp", "no speech; the mouth rests or prepares for speech")
 
 GROUPS: dict[str, tuple[UnitGroup, ...]] = {
     "2vis": (
         UnitGroup(
-            "open", _OPEN_PHONES, "the lips are apart; of f v, too: the lip is at the teeth, not at the other lip"
+            "open", _OPEN_PHONES, "the lips are apart, in f v, too: the lip is at the teeth, not at the other lip"
         ),
         UnitGroup(CLOSED_UNIT, "p b m em sil sp", "the lips meet; in silence they rest on each other"),
     ),
@@ -109,13 +109,13 @@ def _built_in(name: str) -> UnitSet:
 
 
 UNIT_SETS: dict[str, UnitSet] = {name: _built_in(name) for name in GROUPS}
-"""In the order of the paper's Table 1 but for sVis, which goes by its size."""
+"""The unit sets in the order of the paper's Table 1, except sVis, which is placed by its size."""
 VISEME_SET = UnitSet("viseme", VISEME_OF)
-"""The 13 visemes of Xie & Liu 2007, Table 1, which is none of the five."""
+"""The 13 visemes of Xie & Liu 2007, Table 1; not one of the five."""
 
 
 def unit_set(name_or_path: str | Path) -> UnitSet:
-    """Return a unit set of the papers by its name, or that of a table file (docs/unit-sets.md).
+    """Return a unit set of the papers by its name, or read one from a table file (docs/unit-sets.md).
 
     Raises InputError: neither a name nor a file, or a table that is wrong (with its line).
     """

@@ -8,7 +8,7 @@ import pytest
 
 from lipmotion.engines import Engine, engine_named
 from lipmotion.errors import InputError, ModelFormatError
-from lipmotion.motion.closure import closing_spans
+from lipmotion.motion.closure import closable_ranges
 from lipmotion.motion.frame_labels import StateLayout, full_context_states
 from lipmotion.testing.examples import OPENINGS, examples, speech, timeline
 from lipmotion.types import Generation
@@ -21,8 +21,8 @@ named = pytest.mark.parametrize("name", UNIT_SETS)
 
 
 @cache
-def trained(units: str, listens: bool = False):
-    engine = engine_named("trajectory", PLAIN | {"units": units, "acoustic_regression": listens})
+def trained(units: str, acoustic_regression: bool = False):
+    engine = engine_named("trajectory", PLAIN | {"units": units, "acoustic_regression": acoustic_regression})
     return engine, engine.fit(examples(), silent_monitor).model
 
 
@@ -39,8 +39,8 @@ def renamed_phones(folder: Path) -> str:
 
 
 @pytest.mark.parametrize("acoustic_regression", [False, True])
-def test_phones_by_another_name_move_the_same_to_the_bit(tmp_path, listens):
-    own, renamed = (trained(units, listens) for units in ("phone", renamed_phones(tmp_path)))
+def test_phones_by_another_name_move_the_same_to_the_bit(tmp_path, acoustic_regression):
+    own, renamed = (trained(units, acoustic_regression) for units in ("phone", renamed_phones(tmp_path)))
     one, two = (engine.generate(model, SPOKEN) for engine, model in (own, renamed))
     assert one.motion.values.tobytes() == two.motion.values.tobytes()
     assert one.variance.tobytes() == two.variance.tobytes()
@@ -62,7 +62,7 @@ def test_trees_ask_about_units_of_the_set(name):
 def test_the_timeline_names_units_in_context(name):
     units = unit_set(name)
     phones = ["sil", *(span.label.phone for span in SPOKEN.units), "sil"]
-    of = [units.of[phone] for phone in phones]
+    of = [units.unit_of_phone[phone] for phone in phones]
     wanted = [f"{left}-{unit}+{right}" for left, unit, right in zip(of, of[1:], of[2:], strict=False)]
     result = generated(name)
     assert [span.label.unit for span in result.units] == wanted
@@ -75,7 +75,7 @@ def test_phones_of_one_unit_move_alike(name):
     engine, model = trained(name)
     units = unit_set(name)
     for one, two in (("t", "d"), ("iy", "ih"), ("aa", "ah"), ("f", "v")):
-        assert units.of[one] == units.of[two]
+        assert units.unit_of_phone[one] == units.unit_of_phone[two]
         pair = [engine.generate(model, speech(timeline(("s", phone, "s")))).motion.values for phone in (one, two)]
         assert pair[0].tobytes() == pair[1].tobytes()
 
@@ -93,7 +93,7 @@ def test_finer_sets_tell_more_apart():
 @named
 def test_lips_meet_on_p_b_m_whatever_their_unit(name):
     result, (_, model) = generated(name), trained(name)
-    spans = closing_spans(SPOKEN.units, len(result.motion.values))
+    spans = closable_ranges(SPOKEN.units, len(result.motion.values))
     assert len(spans) == sum(span.label.phone in LIP_CLOSING for span in SPOKEN.units) == 2
     for span in spans:
         assert result.motion["opening"][span].min() <= model.closure.closed + 1e-9
@@ -133,7 +133,7 @@ def table_model(folder: Path) -> tuple[Engine, dict]:
 def test_a_model_needs_its_table_no_more(tmp_path):
     engine, arrays = table_model(tmp_path)
     model = engine.from_arrays(arrays)
-    assert model.units.of == {phone: f"u{99 - number}{phone}" for number, phone in enumerate(PHONES)}
+    assert model.units.unit_of_phone == {phone: f"u{99 - number}{phone}" for number, phone in enumerate(PHONES)}
     assert np.isfinite(engine.generate(model, SPOKEN).motion.values).all()
     with pytest.raises(InputError, match="no unit set"):
         engine.fit(examples(1), silent_monitor)
