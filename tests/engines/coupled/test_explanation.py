@@ -186,19 +186,19 @@ def test_a_regression_of_several_positions_is_named_by_its_viseme():
 
 
 def test_recordings_of_several_blocks_are_explained_as_one(monkeypatch):
-    monkeypatch.setattr(generation, "STRETCH", 60)
-    monkeypatch.setattr(generation, "MARGIN", 50)
+    monkeypatch.setattr(generation, "BLOCK_FRAMES", 60)
+    monkeypatch.setattr(generation, "MARGIN_FRAMES", 50)
     engine, (model, _) = engine_named("coupled", {**SYSTEMS["ph-vi-CHMM"], "mixtures": 2}), fitted("ph-vi-CHMM")
     spoken = speech(timeline(SENTENCE))
-    beliefs = engine.beliefs(model, spoken)
+    posteriors = engine.posteriors(model, spoken)
     result = engine.generate(model, spoken)
     frames = [3, 59, 60, 61, 119, 120, 150]
     for row, found in zip(frames, engine.explain(model, spoken, frames), strict=True):
         assert found.state == result.trace.states[result.trace.frames[row]] == found.joint.name
-        assert list(found.chains[1].lead.values()) == pytest.approx(beliefs[1].lead[row].tolist())
+        assert list(found.chains[1].lead.values()) == pytest.approx(posteriors[1].lead[row].tolist())
         for chain, own in enumerate(found.chains):
-            unit = beliefs[chain].units.index(own.states[0].name.rpartition(".")[0])
-            assert beliefs[chain].probability[row, unit] >= own.states[0].probability - 1e-6
+            unit = posteriors[chain].units.index(own.states[0].name.rpartition(".")[0])
+            assert posteriors[chain].probability[row, unit] >= own.states[0].probability - 1e-6
 
 
 def test_without_a_path_an_explanation_has_no_chains():

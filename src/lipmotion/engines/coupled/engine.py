@@ -34,8 +34,8 @@ from lipmotion.types import (
     Monitor,
     Span,
     Speech,
+    StateTrace,
     Timeline,
-    Trace,
     Unit,
 )
 
@@ -89,13 +89,13 @@ class CoupledEngine(Engine[CoupledModel]):
             motion,
             variance,
             _with_units(model, speech.units),
-            Trace(tuple(model.chains.transitions.product.name(int(state)) for state in states), positions),
+            StateTrace(tuple(model.chains.transitions.product.name(int(state)) for state in states), positions),
         )
 
     def lattice(self, model: CoupledModel, speech: Speech, wanted: slice) -> Lattice:
         """Return the lattice of some frames: joint states near the phones of a transcript, or all without one."""
         chains = model.chains
-        if not speech.said:
+        if not speech.units_known:
             return chains.full_lattice
         frames = len(speech.features.values)
         allowed = allowed_units(chains.structure, speech.units, frames)[wanted]

@@ -8,10 +8,10 @@ import pytest
 
 from engines.coupled.tiny import THREE, TWO, chains, observations, structure
 from engines.coupled.training.test_training import sentences
+from lipmotion.engines.coupled.chains.factorial import UNSEEN_PENALTY, FactorialProduct, FactorialTransitions
 from lipmotion.engines.coupled.chains.joint_densities import with_joint_state_densities
 from lipmotion.engines.coupled.chains.model import Chains
 from lipmotion.engines.coupled.chains.structures import FACTORIAL
-from lipmotion.engines.coupled.chains.factorial import UNSEEN_PENALTY, FactorialProduct, FactorialTransitions
 from lipmotion.engines.coupled.conversion.em import ConversionSettings, convert
 from lipmotion.engines.coupled.training.train import MixtureSchedule, train_chains
 

@@ -240,7 +240,7 @@ def test_motion_that_was_not_observed_is_ignored_wherever_the_example_stands() -
 
 def right(engine: CoupledEngine, model: CoupledModel, sentence: Example) -> tuple[float, float]:
     """Return the correlation of the opening with the original's, of unknown words, and of speech frames right."""
-    spoken = replace(sentence.speech, said=False)
+    spoken = replace(sentence.speech, units_known=False)
     generated = engine.generate(model, spoken).motion["opening"]
     observations = model.speech_observations(np.asarray(spoken.features.values))
     chains = model.chains

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.engines.coupled.chains.factorial import FactorialProduct, FactorialTransitions
 from lipmotion.engines.coupled.chains.model import Chains
 from lipmotion.engines.coupled.chains.structures import Structure
 from lipmotion.engines.coupled.chains.transitions import Transitions
-from lipmotion.engines.coupled.chains.factorial import FactorialProduct, FactorialTransitions
 
 LEAST_FRAMES = 10
 """A joint state with at least so many frames in training has densities of its own."""

@@ -40,12 +40,12 @@ from lipmotion.engines.coupled.training.speech_only import SpeechOnlySchedule, t
 from lipmotion.engines.coupled.training.train import MixtureSchedule, TrainingStep, growing_chains
 from lipmotion.errors import CorpusError
 from lipmotion.kernels.banded import generate
-from lipmotion.motion.closure import fit_closure_of
+from lipmotion.motion.closure import fit_closure
 from lipmotion.motion.rest import away_from_speech, speech_intervals
 from lipmotion.motion.space import fit_reduced_motion
 from lipmotion.motion.variance_scaling import scaling_factors
 from lipmotion.stats.delta_windows import dynamics_known
-from lipmotion.types import FRAME_RATE_HZ, Example, Monitor, Progress, Timeline, Unit, part_of
+from lipmotion.types import FRAME_RATE_HZ, Example, Monitor, Progress, Timeline, Unit, sub_monitor
 from lipmotion.units import VISEME_OF, is_silent
 
 Array = NDArray[np.float64]
@@ -88,12 +88,12 @@ def growing_models(
         for example in examples
         if not dynamics_known(example.valid).any()
     ]
-    rest_pose, closure = _rest_pose(moving, values, valid), fit_closure_of(space.direct_names, values, moving)
+    rest_pose, closure = _rest_pose(moving, values, valid), fit_closure(space.direct_names, values, moving)
     first_share, second_share = (0.4, 0.7) if speech_only else (0.7, 0.7)
 
     def finished_model(chains: Chains) -> CoupledModel:
         if speech_only:
-            second_monitor = part_of(monitor, first_share, second_share)
+            second_monitor = sub_monitor(monitor, first_share, second_share)
             chains = _second_stage(chains, data, speech_only, config, second_monitor)
         model = CoupledModel(chains, space, visual, None, np.ones(space.dimensions), rest_pose, closure)
         if config.dynamic and config.acoustic_regression:
@@ -106,7 +106,7 @@ def growing_models(
 
     names, schedule = (SPEECH, *(stream.name for stream in visual)), _schedule(structure, visual, config)
     most_steps = schedule.most_steps * max(schedule.mixtures).bit_length()
-    report = _reporter("chains", most_steps, part_of(monitor, 0, first_share))
+    report = _reporter("chains", most_steps, sub_monitor(monitor, 0, first_share))
     for chains in growing_chains(structure, names, data, schedule, report, workers()):
         yield partial(finished_model, chains)
 
