@@ -51,7 +51,7 @@ def coupled_arrays(model: CoupledModel) -> dict[str, NDArray[Any]]:
     for number, chain in enumerate(chains.structure.chains):
         arrays[f"chain_{number}/bigram"] = product.grammar.bigrams[number].astype(np.float32)
         arrays[f"chain_{number}/first"] = product.grammar.initial[number].astype(np.float32)
-        arrays[f"chain_{number}/units"] = np.array(list(chain.of.items()))
+        arrays[f"chain_{number}/units"] = np.array(list(chain.unit_of_phone.items()))
         arrays[f"chain_{number}/advance"] = chains.transitions.advance[number]
         if isinstance(chains.transitions, Transitions):
             arrays[f"chain_{number}/rows"] = chains.transitions.rows[number].astype(np.int32)
