@@ -19,7 +19,7 @@ import lipmotion
 from lipmotion.export.cues.choose import choose_cues, default_hold_frames
 from lipmotion.export.cues.costs import frame_costs
 from lipmotion.export.cues.shapes import SHAPES
-from lipmotion.export.cues.sheet import CueSheet, cue_sheet, frame_count
+from lipmotion.export.cues.sheet import CueSheet, cue_frame_count, cue_sheet
 from lipmotion.pipeline.training.train import phones_of
 from lipmotion.speech.recogniser import cached_recogniser
 from lipmotion.types import Generation, Motion, Speech, StateTrace, Timeline
@@ -60,7 +60,7 @@ def main() -> None:
 def frame_by_frame(result: Generation, fps: float) -> CueSheet:
     """Return the cue sheet of the shape with least cost in every frame."""
     duration_s = max((len(result.motion.values) - 1) / result.motion.rate_hz, result.units[-1].end_s)
-    best = frame_costs(result, frame_count(duration_s, fps), fps).argmin(axis=1).tolist()
+    best = frame_costs(result, cue_frame_count(duration_s, fps), fps).argmin(axis=1).tolist()
     changes = [0, *(k for k, (before, after) in enumerate(pairwise(best), start=1) if before != after)]
     names = list(SHAPES)
     return cue_sheet([(k, names[best[k]]) for k in changes], duration_s, fps, "".join(names))

@@ -18,7 +18,7 @@ def spans(*labels: tuple[float, float, str]) -> Timeline[Unit]:
 
 def parts_of(units: Timeline[Unit], phone: str, parts: int = 5, edge_s: float = 0.08) -> list[int]:
     return [
-        place.part for place in full_context_states(units, 200, StateLayout(parts, 1, edge_s)) if place.unit == phone
+        place.state for place in full_context_states(units, 200, StateLayout(parts, 1, edge_s)) if place.unit == phone
     ]
 
 

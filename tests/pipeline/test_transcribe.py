@@ -6,7 +6,7 @@ import pytest
 
 from lipmotion.errors import AlignmentError, InputError
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.transcribe import MOST_GUESSES, report_guesses, transcribe
+from lipmotion.pipeline.transcribe import MOST_WARNINGS, transcribe, warn_of_guesses
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.recogniser import Recogniser
 from lipmotion.testing.toy import ToySentence
@@ -65,7 +65,7 @@ def test_what_the_user_s_lexicon_knows_is_not_reported(
 
 
 def test_nothing_is_reported_when_nothing_is_guessed(caplog: pytest.LogCaptureFixture) -> None:
-    report_guesses(("see", "bob's", "hello"), Lexicon())
+    warn_of_guesses(("see", "bob's", "hello"), Lexicon())
     assert not caplog.records
 
 
@@ -98,7 +98,7 @@ def test_without_general_models_nothing_is_doubted(
 
 
 def test_a_long_word_is_not_repeated_in_full(caplog: pytest.LogCaptureFixture) -> None:
-    report_guesses(("ab" * 5000,), Lexicon())
+    warn_of_guesses(("ab" * 5000,), Lexicon())
     (record,) = caplog.records
     assert len(record.getMessage()) < 300
 
@@ -111,9 +111,9 @@ def test_it_says_what_is_wrong(phones: Recogniser, audio: Audio, features: Featu
 
 
 def test_of_many_guesses_some_are_told(caplog: pytest.LogCaptureFixture) -> None:
-    report_guesses([f"bimab{'ab' * i}" for i in range(MOST_GUESSES + 7)], Lexicon())
+    warn_of_guesses([f"bimab{'ab' * i}" for i in range(MOST_WARNINGS + 7)], Lexicon())
     *each, last = [record.getMessage() for record in caplog.records]
-    assert len(each) == MOST_GUESSES
+    assert len(each) == MOST_WARNINGS
     assert last == "7 more words are not in the dictionary; a lexicon file can say better"
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.pipeline import workers as module
-from lipmotion.pipeline.workers import working
+from lipmotion.pipeline.workers import worker_pool
 
 
 def square(number: int) -> int:
@@ -37,28 +37,28 @@ def held(_: int) -> bool:
 
 @pytest.mark.parametrize("count", [0, 1, 2])
 def test_results_come_in_order(count: int) -> None:
-    with working(count) as team:
-        assert list(team.each(square, range(20))) == [number * number for number in range(20)]
-        assert list(team.each(square, [])) == []
-        assert sorted(team.as_they_come(square, range(20))) == [number * number for number in range(20)]
+    with worker_pool(count) as team:
+        assert list(team.ordered_map(square, range(20))) == [number * number for number in range(20)]
+        assert list(team.ordered_map(square, [])) == []
+        assert sorted(team.unordered_map(square, range(20))) == [number * number for number in range(20)]
 
 
 def test_one_worker_is_this_process_and_several_are_others() -> None:
-    with working(1) as team:
-        assert set(team.each(whose, range(3))) == {os.getpid()}
-    with working(2) as team:
-        assert os.getpid() not in set(team.each(whose, range(3)))
+    with worker_pool(1) as team:
+        assert set(team.ordered_map(whose, range(3))) == {os.getpid()}
+    with worker_pool(2) as team:
+        assert os.getpid() not in set(team.ordered_map(whose, range(3)))
 
 
 @pytest.mark.parametrize("count", [1, 2])
 def test_errors_come_back(count: int) -> None:
-    with pytest.raises(InputError, match="less than nothing"), working(count) as team:
-        list(team.each(square, [1, -1, 2]))
+    with pytest.raises(InputError, match="less than nothing"), worker_pool(count) as team:
+        list(team.ordered_map(square, [1, -1, 2]))
 
 
 def test_a_worker_that_dies_is_a_clear_error() -> None:
-    with pytest.raises(CorpusError, match="a worker process died"), working(2) as team:
-        list(team.each(die, [0, 1, 0]))
+    with pytest.raises(CorpusError, match="a worker process died"), worker_pool(2) as team:
+        list(team.ordered_map(die, [0, 1, 0]))
 
 
 def large(_: int) -> bytes:
@@ -71,8 +71,8 @@ def test_a_worker_that_is_ended_while_it_sends_does_not_block(_: int) -> None:
     before = set(multiprocessing.active_children())
 
     def interrupted() -> None:
-        with working(2) as team:
-            next(team.as_they_come(large, range(10)))
+        with worker_pool(2) as team:
+            next(team.unordered_map(large, range(10)))
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
@@ -87,8 +87,8 @@ def killed_while_sending(_: int) -> bytes:
 
 @pytest.mark.long
 def test_a_worker_that_dies_while_it_sends_is_a_clear_error() -> None:
-    with pytest.raises(CorpusError, match="a worker process died"), working(2) as team:
-        list(team.each(killed_while_sending, range(2)))
+    with pytest.raises(CorpusError, match="a worker process died"), worker_pool(2) as team:
+        list(team.ordered_map(killed_while_sending, range(2)))
 
 
 def test_items_are_taken_when_they_are_needed() -> None:
@@ -99,8 +99,8 @@ def test_items_are_taken_when_they_are_needed() -> None:
             taken.append(number)
             yield number
 
-    with working(2) as team:
-        results = team.as_they_come(square, items())
+    with worker_pool(2) as team:
+        results = team.unordered_map(square, items())
         next(results)
         assert len(taken) <= 4
         assert len(list(results)) == 19
@@ -108,8 +108,8 @@ def test_items_are_taken_when_they_are_needed() -> None:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals as POSIX has them")
 def test_workers_leave_signals_to_the_process_that_started_them() -> None:
-    with working(2) as team:
-        assert all(team.each(held, range(4)))
+    with worker_pool(2) as team:
+        assert all(team.ordered_map(held, range(4)))
     assert not signal.pthread_sigmask(signal.SIG_BLOCK, ()) & {signal.SIGINT, signal.SIGTERM}
 
 

@@ -74,7 +74,11 @@ for _name, _options, _messages in [
     ("--set of a number out of range", ("--set", "states=4"), "states is 4, required an odd number from 1"),
     ("--system of another engine", ("--system", "ph-HMM"), "add --engine coupled"),
     ("--system of an unknown name", ("--engine", "coupled", "--system", "HMM"), "no system 'HMM'; there are: ph-HMM"),
-    ("--units of chains", ("--engine", "coupled", "--units", "eVis"), "has a unit set a chain; say --set chains="),
+    (
+        "--units of chains",
+        ("--engine", "coupled", "--units", "eVis"),
+        "there is a unit set for each chain; say --set chains=",
+    ),
 ]:
 
     @case(GROUP, f"train {_name}", 3, _messages)

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from lipmotion.errors import InputError
+from lipmotion.speech.audio_decoding import _TrackDecoder
 from lipmotion.speech.audio_files import read_audio
 from lipmotion.storage.media import open_media
 from speech.opened import opened_in
@@ -396,3 +397,15 @@ def test_eight_channels_do_not_crash_a_process(tmp_path: Path) -> None:
     call = f"read_audio(Path({str(path)!r}))"
     code = f"from pathlib import Path; from lipmotion.speech.audio_files import read_audio; {call}"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+@pytest.mark.parametrize(("size", "is_refused"), [(810, True), (810_000, False)])
+def test_sound_and_silence_are_bounded_together(size: int, is_refused: bool) -> None:
+    """30 s of sound and 620 s of holes are each short enough for 810 bytes; their sum is not."""
+    decoder = object.__new__(_TrackDecoder)
+    decoder._name, decoder._size, decoder._sound_s, decoder._silence_s = "a.mkv", size, 30.0, 620.0
+    if is_refused:
+        with pytest.raises(InputError, match="810 bytes of sound last 650 s"):
+            decoder._check_silence()
+    else:
+        decoder._check_silence()

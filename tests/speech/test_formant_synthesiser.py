@@ -50,9 +50,9 @@ def test_it_speaks_the_inventory() -> None:
     assert sorted(PHONE_TARGETS) == sorted(PHONES)
 
 
-@pytest.mark.parametrize("phone", PHONE_TARGETS)
-def test_the_parts_of_a_phone_fill_it(phone: str) -> None:
-    assert sum(part.share for part in PHONE_TARGETS[phone]) == pytest.approx(1)
+def test_the_parts_of_a_phone_fill_it() -> None:
+    for phone in PHONE_TARGETS:
+        assert sum(part.share for part in PHONE_TARGETS[phone]) == pytest.approx(1)
 
 
 @pytest.mark.parametrize("rate_hz", [16000, 22050, 44100])

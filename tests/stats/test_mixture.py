@@ -152,3 +152,13 @@ def test_a_copy_shares_nothing():
     mixtures = random_mixtures(6)
     mixtures.copy().means[:] = 0
     assert mixtures.means.any()
+
+
+def test_a_component_with_less_than_two_frames_of_data_is_switched_off():
+    mixtures = random_mixtures(3)
+    size = mixtures.means.shape[2]
+    first, second = np.ones((1, 2, size)), np.full((1, 2, size), 4.0)
+    for frames, is_off in ((1.0, True), (1.9, True), (2.1, False)):
+        mixtures.set_from_statistics(np.array([0]), np.array([[50.0, frames]]), first, second, FLOOR)
+        assert (mixtures.log_weights[0, 1] == -np.inf) == is_off
+        assert (mixtures.variances[0, 1] == 1).all() == is_off

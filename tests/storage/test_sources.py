@@ -69,3 +69,9 @@ def test_names_of_any_length(place: Path) -> None:
     assert is_folder(place)
     assert not is_folder(place / ("x" * 5000))
     assert not is_same(place / "none", place / "none")
+
+
+def test_a_link_to_a_folder_inside_a_corpus_leads_into_the_corpus(place: Path) -> None:
+    (place / "shortcut").symlink_to(place / "folder" / "deep")
+    with pytest.raises(ExportError, match=r"lies in the corpus .*folder"):
+        check_apart([place / "shortcut" / "new.json"], [Source(place / "folder", "corpus")])

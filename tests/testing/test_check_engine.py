@@ -14,7 +14,7 @@ from lipmotion.errors import CorpusError, InputError, ModelFormatError
 from lipmotion.motion import fit_motion, learned_motion_arrays, learned_motion_from_arrays, with_unit_names
 from lipmotion.storage.schema import ArraySpec, checked_arrays, format_errors
 from lipmotion.testing import ENGINE_CHECKS, ContractError, TrainedEngine, check_engine
-from lipmotion.types import Configuration, Generation, Rule, Trace, option
+from lipmotion.types import Configuration, Generation, Rule, StateTrace, option
 
 MEANS = {"means": ArraySpec(np.float64, "N Q")}
 
@@ -48,7 +48,7 @@ class MeanPoses(Engine[Any]):
         means[:, 0] = poses[phones_of(speech)]
         precisions = np.broadcast_to(np.array([1e3, 1e4, 1e4])[None, :, None], means.shape)
         values, variance = motion.generate(lambda x: (means[x], precisions[x]), len(means), speech.units, constraints)
-        trace = Trace(("pose",), np.zeros(len(means), int))
+        trace = StateTrace(("pose",), np.zeros(len(means), int))
         return Generation(values, variance, with_unit_names(speech.units), trace)
 
     def to_arrays(self, model: Any) -> dict[str, Any]:
@@ -84,7 +84,7 @@ class Broken:
         return replace(result, motion=replace(result.motion, values=result.motion.values + noise))
 
     def traceless(self, result: Generation) -> Generation:
-        return replace(result, trace=Trace(("",), result.trace.frames))
+        return replace(result, trace=StateTrace(("",), result.trace.frames))
 
     def nameless(self, result: Generation) -> Generation:
         spans = tuple(replace(span, label=replace(span.label, unit="")) for span in result.units)

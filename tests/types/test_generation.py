@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.types import Audio, Channel, Generation, Motion, ReducedVariance, Span, Timeline, Trace, Unit
+from lipmotion.types import Audio, Channel, Generation, Motion, ReducedVariance, Span, StateTrace, Timeline, Unit
 
 
 def generation(frames: int = 101) -> Generation:
@@ -12,7 +12,7 @@ def generation(frames: int = 101) -> Generation:
     line = np.arange(frames, dtype=float)[:, None]
     units = Timeline((Span(0.0, 1.0, Unit("aa")),))
     states = tuple(f"state {number}" for number in range(10))
-    trace = Trace(states, np.minimum(np.arange(frames) // 10, 9))
+    trace = StateTrace(states, np.minimum(np.arange(frames) // 10, 9))
     return Generation(Motion(line, 100.0, (Channel("opening"),)), line**2, units, trace)
 
 

@@ -185,3 +185,7 @@ def test_the_whole_dictionary_can_be_a_user_s_file(lexicon_file: Path) -> None:
     found = Lexicon.from_file(lexicon_file)
     assert len(found.user) > 125_000
     assert found.pronunciations("read") == (("r", "eh", "d"), ("r", "iy", "d"))
+
+
+def test_without_a_full_vowel_the_second_vowel_keeps_its_stress() -> None:
+    assert Lexicon().pronunciations("abducted")[1] == ("ax", "b", "d", "ah", "k", "t", "ix", "d")

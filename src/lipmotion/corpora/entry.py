@@ -41,7 +41,7 @@ UNCHECKED = "crops"
 """The array that is not read before it is needed, and has no checksum."""
 LARGEST_FEATURE = 1e3
 """Features are standardised."""
-UTTERANCE_MEMBERS = {
+UTTERANCE_ARRAYS = {
     "audio": ArraySpec(np.int16, "N"),
     "features": ArraySpec(np.float32, "T D", -LARGEST_FEATURE, LARGEST_FEATURE),
     "motion": ArraySpec(np.float32, "F P"),
@@ -107,8 +107,8 @@ def read_utterance(folder: Path) -> Utterance:
     entry = read_entry(folder)
     try:
         channels = tuple(Channel(**channel) for channel in entry["channels"])
-        arrays = {name: _load(folder, name) for name in UTTERANCE_MEMBERS if name != "crops" or entry["crops"]}
-        sizes = checked_sizes(arrays, UTTERANCE_MEMBERS, P=len(channels), F=entry["frames"])
+        arrays = {name: _load(folder, name) for name in UTTERANCE_ARRAYS if name != "crops" or entry["crops"]}
+        sizes = checked_sizes(arrays, UTTERANCE_ARRAYS, P=len(channels), F=entry["frames"])
         audio = Audio(_as_float(arrays["audio"]), entry["audio_rate_hz"])
         expected = int(audio.duration_s * FRAME_RATE_HZ + 1e-9) + 1
         if sizes["T"] != expected:

@@ -54,7 +54,7 @@ def learning_curve(
     """
     listed = tuple(order) if order is not None else shuffled(corpus.required("train"), settings.seed)
     held_out = corpus.required(split)
-    steps = checked_sizes(sizes, len(listed))
+    steps = training_sizes(sizes, len(listed))
     check_training_names(corpus, listed, held_out)
     channels = channels_with_opening(corpus, held_out)
     shares = np.cumsum([0, *steps]) / sum(steps)
@@ -69,7 +69,7 @@ def learning_curve(
     return figures
 
 
-def checked_sizes(sizes: Sequence[int] | None, listed: int) -> list[int]:
+def training_sizes(sizes: Sequence[int] | None, listed: int) -> list[int]:
     """Return the sizes, each once, in rising order; the default ones where none are given.
 
     listed : number of names in the list

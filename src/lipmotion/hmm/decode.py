@@ -96,11 +96,11 @@ def _contexts(hmm: UnitHmm, unit: str, state: int, inventory: Sequence[str]) -> 
     tells all that a path must know, and the search stays exact.
     """
     side = hmm.table.side(unit, state)
-    alike = [k for k in range(hmm.table.count(unit)) if hmm.table.side(unit, k) == side] if side else []
+    same_side = [k for k in range(hmm.table.count(unit)) if hmm.table.side(unit, k) == side] if side else []
     own: list[Neighbour] = [
         neighbour
         for neighbour in inventory
-        if any(hmm.table.density(unit, k, neighbour) != hmm.table.density(unit, k) for k in alike)
+        if any(hmm.table.density(unit, k, neighbour) != hmm.table.density(unit, k) for k in same_side)
     ]
     return own if len(own) == len(inventory) else [*own, None]
 

@@ -223,8 +223,8 @@ class UnitStatistics:
         rows, features = np.concatenate(self._rows), np.concatenate(self._features)
         order = np.argsort(densities, kind="stable")
         visited, starts = np.unique(densities[order], return_index=True)
-        for density, mine in zip(visited, np.split(order, starts[1:]), strict=True):
-            yield int(density), features[rows[mine]], weights[mine]
+        for density, entries in zip(visited, np.split(order, starts[1:]), strict=True):
+            yield int(density), features[rows[entries]], weights[entries]
 
     def log_stay(self) -> NDArray[np.float32]:
         """Return the re-estimated log P(stay in the state) of every state without context [shape=(R,)].

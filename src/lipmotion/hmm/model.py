@@ -94,11 +94,11 @@ def hmm_from_arrays(arrays: Arrays, config: HmmConfig) -> UnitHmm:
         named = checked_arrays(arrays, NAMES)
         units, counts, names, free = (tuple(named[key].tolist()) for key in ("units", "counts", "names", "free"))
         _check_names(units, counts, names, free)
-        found = checked_arrays(arrays, MODELS, **named.sizes, R=sum(counts))
+        stored = checked_arrays(arrays, MODELS, **named.sizes, R=sum(counts))
         table = StateTable(units, counts, names, free)
-        bigram = bigram_from_array(units, found["bigram"])
+        bigram = bigram_from_array(units, stored["bigram"])
         return UnitHmm(
-            config, table, mixtures_from_arrays(found), found["log_stay"], bigram, float(found["typical_fit"][0])
+            config, table, mixtures_from_arrays(stored), stored["log_stay"], bigram, float(stored["typical_fit"][0])
         )
     except (KeyError, ValueError, TypeError, IndexError, OverflowError) as error:
         raise ModelFormatError(f"the phone models are damaged ({error}); train or download the model again") from error
@@ -124,6 +124,6 @@ def _check_names(
 ) -> None:
     if not set(free) <= set(units) or len(set(units)) < len(units) or sum(counts) > len(names):
         raise ValueError(f"{len(names)} states of {len(units)} units, {len(free)} of them silent")
-    wanted = plain_states(units, counts, free).names
-    if names[: len(wanted)] != wanted or len(set(names)) < len(names):
+    required = plain_states(units, counts, free).names
+    if names[: len(required)] != required or len(set(names)) < len(names):
         raise ValueError("the names of the states are not those of the units")

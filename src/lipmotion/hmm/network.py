@@ -49,14 +49,14 @@ class Network:
         beam   : states with a score lower than the best of the frame by more than this are dropped; None: exact
         Raises AlignmentError: no path reaches the end.
         """
-        kept = (
+        cached = (
             log_likelihoods.log_density(0, log_likelihoods.frames, chosen)
             if log_likelihoods.frames <= KEPT_FRAMES
             else None
         )
 
         def log_emission(first: int, end: int) -> NDArray[np.float32]:
-            return log_likelihoods.log_density(first, end, chosen) if kept is None else kept[first:end]
+            return log_likelihoods.log_density(first, end, chosen) if cached is None else cached[first:end]
 
         path, score = best_path(
             log_emission,

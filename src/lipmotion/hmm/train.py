@@ -119,14 +119,14 @@ def train_hmm(
     Raises CorpusError: no utterance, or none long enough for its transcript.
     """
     sequences = [_first_guess(u, inventory) for u in utterances]
-    kept = [i for i, (u, s) in enumerate(zip(utterances, sequences, strict=True)) if _fits(u, s, config)]
-    if not kept:
+    usable = [i for i, (u, s) in enumerate(zip(utterances, sequences, strict=True)) if _fits(u, s, config)]
+    if not usable:
         raise CorpusError(
             f"none of {len(utterances)} utterances has a transcript that fits into its recording; "
             "check that transcripts and recordings belong together"
         )
-    training = _Training([utterances[i] for i in kept], inventory, config, each)
-    done, state = _restored(checkpoint, config) or (0, training.flat_start([sequences[i] for i in kept]))
+    training = _Training([utterances[i] for i in usable], inventory, config, each)
+    done, state = _restored(checkpoint, config) or (0, training.flat_start([sequences[i] for i in usable]))
     stages = training.stages()
     total, first = sum(stage.steps for stage in stages), 0
     for stage in stages:

@@ -54,12 +54,12 @@ def factorial_posteriors(
     """
     order = np.lexsort(logs.pairs.T[::-1])
     logs = logs._replace(pair=logs.pair[:, order], pairs=logs.pairs[order])
-    found = None
+    result = None
     if logs.audio.dtype == np.float32 and numba_works():
-        found = _ForwardBackward.of(audio, visual, logs, stretch, np.dtype(np.float32)).posteriors(LEAST_OVERLAP)
-    found = found or _ForwardBackward.of(audio, visual, logs, stretch, np.dtype(np.float64)).posteriors(0)
-    found = found or _zero_posteriors(audio, visual, logs)
-    return found._replace(pair=found.pair[:, np.argsort(order)])
+        result = _ForwardBackward.of(audio, visual, logs, stretch, np.dtype(np.float32)).posteriors(LEAST_OVERLAP)
+    result = result or _ForwardBackward.of(audio, visual, logs, stretch, np.dtype(np.float64)).posteriors(0)
+    result = result or _zero_posteriors(audio, visual, logs)
+    return result._replace(pair=result.pair[:, np.argsort(order)])
 
 
 def kept_frames(frames: int, frame_bytes: int) -> int:
@@ -112,7 +112,7 @@ class _ForwardBackward(NamedTuple):
         final = np.multiply.outer(*(loop.final.ravel() for loop in self.loops)).astype(last.dtype)
         totals = _Accumulator.of(self.loops, self.logs)
         last_frame = factorial_steps.frame_posteriors(last, final, self.densities[-1])
-        if not totals.take(len(self.logs.audio) - 1, last_frame, 0):
+        if not totals.store(len(self.logs.audio) - 1, last_frame, 0):
             return None
         backward, _ = factorial_steps.times_density(final, self.densities[-1])
         for start, before in zip(reversed(starts), reversed(befores), strict=True):
@@ -123,7 +123,7 @@ class _ForwardBackward(NamedTuple):
                 if t == start:
                     forward, density = before, self.logs.densities(t - 1, t)[0]
                 step = self.steps.backward_step(forward, backward, self.leaving[t - start], *self.moves, density)
-                if not totals.take(t - 1, step.frame, least_overlap):
+                if not totals.store(t - 1, step.frame, least_overlap):
                     return None
                 totals.audio_entered[:] += step.audio_entered
                 totals.visual_entered[:] += step.visual_entered
@@ -165,7 +165,7 @@ class _Accumulator(NamedTuple):
         shapes = [log.shape for log in (logs.audio, logs.visual, logs.pair)]
         return cls(*(np.zeros(shape) for shape in (*shapes, *(loop.enter.shape for loop in loops))))
 
-    def take(self, t: int, frame: factorial_steps.FramePosteriors, least_overlap: float) -> bool:
+    def store(self, t: int, frame: factorial_steps.FramePosteriors, least_overlap: float) -> bool:
         """Store the posteriors of a frame; return whether their overlap is more than ``least_overlap``."""
         self.audio[t], self.visual[t], self.pair[t] = frame.audio, frame.visual, frame.pair
         return frame.overlap > least_overlap
@@ -186,8 +186,8 @@ def _counted(loop: Loop, posterior: Array, entered: Array) -> LoopCounts:
     enter = entered * (loop.leave[:, None] * loop.enter)
     frames = posterior.reshape(-1, *loop.stay.shape)
     gained = frames[-1] - frames[0]
-    behind = np.cumsum(gained[::-1], axis=0)[::-1] - gained
-    left = np.maximum(enter.sum(axis=1) + behind, 0)
+    after = np.cumsum(gained[::-1], axis=0)[::-1] - gained
+    left = np.maximum(enter.sum(axis=1) + after, 0)
     stay = np.maximum(frames[:-1].sum(axis=0) - left, 0)
     return LoopCounts(stay, left[:-1], enter, frames[0])
 

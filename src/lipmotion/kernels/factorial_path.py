@@ -44,7 +44,7 @@ def factorial_best_path(
     for start, before in reversed(befores):
         _, decisions = search.through(start, min(start + stretch, frames), before)
         for t in range(start + len(decisions) - 1, start - 1, -1):
-            path[t - 1] = search.behind(decisions[t - start], *path[t])
+            path[t - 1] = search.previous(decisions[t - start], *path[t])
     return path[:, 0], path[:, 1], best
 
 
@@ -84,7 +84,7 @@ class _LogTransitions(NamedTuple):
             decision[:units][better] = unit
         return after, decision
 
-    def behind(self, state: int, decision: int) -> int:
+    def previous(self, state: int, decision: int) -> int:
         """Return the state one frame before, given the decision."""
         units = len(self.leaving)
         if decision < units:
@@ -116,8 +116,8 @@ class _Search(NamedTuple):
             decisions.append((by_audio, by_visual))
         return score, decisions
 
-    def behind(self, decisions: _Decisions, audio: int, visual: int) -> tuple[int, int]:
+    def previous(self, decisions: _Decisions, audio: int, visual: int) -> tuple[int, int]:
         """Return both states one frame before; the decision of the visual loop was the later one."""
         by_audio, by_visual = decisions
-        visual = self.visual.behind(visual, int(by_visual[visual, audio]))
-        return self.audio.behind(audio, int(by_audio[audio, visual])), visual
+        visual = self.visual.previous(visual, int(by_visual[visual, audio]))
+        return self.audio.previous(audio, int(by_audio[audio, visual])), visual

@@ -1,6 +1,7 @@
-"""What all engines share: the space of motion, the acoustic context, closures, scaling, parameter generation.
+"""Parts that all engines share: motion space, acoustic context, closures, variance scaling, parameter generation.
 
-For an engine of your own (docs/extend/engine.md): ``fit_motion``, ``LearnedMotion``, ``fit_acoustic_context``.
+An engine of your own needs ``fit_motion``, ``LearnedMotion`` and perhaps ``fit_acoustic_context``
+(docs/extend/engine.md).
 """
 
 from lipmotion.motion.arrays import LEARNED_MOTION_ARRAYS, learned_motion_arrays, learned_motion_from_arrays

@@ -1,4 +1,4 @@
-"""The lips close on p, b and m."""
+"""Closures of the lips in p, b and m: the frames in which they may close, and how the mouth closes."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from lipmotion.units import LIP_CLOSING
 
 OPENING = "opening"
 REACH_S = 0.02
-"""The lips may meet this long before or after the phone's own time: alignments are no better."""
+"""Seconds before and after the span of a phone in which the lips may close: the accuracy of alignments."""
 
 
 @dataclass(frozen=True, eq=False)
 class Closure:
-    """How a closed mouth looks.
+    """The opening of closed lips, and how the other dimensions of motion change with the opening.
 
-    column : of the opening in the model's space
-    closed : the opening at which the lips touch, as the tracker sees it
-    follow : float array [shape=(Q,)], what each other dimension does per unit of opening
+    column : of the opening in the motion space
+    closed : the opening at which the lips touch, as the tracker measures it, in eye distances
+    follow : float array [shape=(Q,)], change of each dimension per unit of opening (regression through the mean)
     """
 
     column: int
@@ -30,72 +30,77 @@ class Closure:
     follow: NDArray[np.float64]
 
 
-def closing_spans(units: Timeline[Unit], frames: int, closing_units: Container[str] = ()) -> list[slice]:
-    """Return the frames in which each p, b and m may close the lips.
+def closable_ranges(units: Timeline[Unit], frames: int, closing_units: Container[str] = ()) -> list[slice]:
+    """Return, for each p, b and m, the range of frames at 100 Hz in which it may close the lips.
 
-    closing_units : that close them whichever of their phones is said; they count where no phone is known
+    frames        : length of the recording
+    closing_units : units all of whose phones close the lips; they count where a label has no phone
     """
-    spans = []
+    ranges = []
     for span in units:
         label = span.label
         if label.phone in LIP_CLOSING or (not label.phone and label.unit in closing_units):
             first = max(int(np.ceil((span.start_s - REACH_S) * FRAME_RATE_HZ - 1e-6)), 0)
             stop = min(int(np.floor((span.end_s + REACH_S) * FRAME_RATE_HZ + 1e-6)) + 1, frames)
             if first < stop:
-                spans.append(slice(first, stop))
-    return spans
+                ranges.append(slice(first, stop))
+    return ranges
 
 
-def fit_closure(
+def closure_from_motion(
     values: Sequence[NDArray[np.float64]],
-    seen: Sequence[NDArray[np.bool_]],
+    valid: Sequence[NDArray[np.bool_]],
     timelines: Sequence[Timeline[Unit]],
     column: int,
 ) -> Closure:
-    """Learn from motion in the model's space [each shape=(T, Q)], its frames that were seen, and the phones with it.
+    """Return the closure of the lips, estimated from motion with its phones.
 
+    values    : motion in the motion space [each shape=(T, Q)]
+    valid     : the frames of each that were measured [each shape=(T,)]
+    timelines : the phones of each
+    column    : of the opening
     ``closed`` is the median over all p, b, m of the smallest opening in each; without any, the first percentile.
     """
-    least = [
-        float(x[span][valid[span], column].min())
-        for x, valid, units in zip(values, seen, timelines, strict=True)
-        for span in closing_spans(units, len(x))
-        if valid[span].any()
+    smallest = [
+        float(x[frames][known[frames], column].min())
+        for x, known, units in zip(values, valid, timelines, strict=True)
+        for frames in closable_ranges(units, len(x))
+        if known[frames].any()
     ]
-    everything = np.concatenate([x[valid] for x, valid in zip(values, seen, strict=True)])
-    centred = everything - everything.mean(axis=0)
+    poses = np.concatenate([x[known] for x, known in zip(values, valid, strict=True)])
+    centred = poses - poses.mean(axis=0)
     opening = centred[:, column]
-    closed = float(np.median(least)) if least else float(np.percentile(everything[:, column], 1))
+    closed = float(np.median(smallest)) if smallest else float(np.percentile(poses[:, column], 1))
     return Closure(column, max(closed, 0.0), opening @ centred / max(float(opening @ opening), 1e-12))
 
 
-def closing_frames(
-    closure: Closure, opening: NDArray[np.float64], spans: Sequence[slice], taken: Sequence[int]
+def frames_to_close(
+    closure: Closure, opening: NDArray[np.float64], ranges: Sequence[slice], pinned: Sequence[int]
 ) -> list[int]:
-    """Return the frames in which a trajectory must be made to close: the least open one of each p, b and m.
+    """Return the frames in which the lips must be made to close: the least open frame of each p, b and m.
 
-    opening : [shape=(T,)], as generated
-    spans   : the frames of each, from ``closing_spans``
-    taken   : frames whose opening the user pinned; a phone that holds one is the user's own
-    Phones in which the lips close anyway are left alone.
+    opening : generated opening [shape=(T,)]
+    ranges  : the frames of each p, b and m, from ``closable_ranges``
+    pinned  : frames whose opening the user pinned; a range that contains one is left as the user wants it
+    Ranges in which the lips close without help are left out.
     """
-    frames = []
-    for span in spans:
-        least = span.start + int(opening[span].argmin())
-        if opening[least] > closure.closed and not any(span.start <= frame < span.stop for frame in taken):
-            frames.append(least)
-    return frames
+    closed = []
+    for frames in ranges:
+        smallest = frames.start + int(opening[frames].argmin())
+        if opening[smallest] > closure.closed and not any(frames.start <= frame < frames.stop for frame in pinned):
+            closed.append(smallest)
+    return closed
 
 
-def fit_closure_of(
+def fit_closure(
     names: Sequence[str], values: Sequence[NDArray[np.float64]], examples: Sequence[Example]
 ) -> Closure | None:
-    """Return how the lips of some examples close; None where nothing is called ``opening``.
+    """Return the closure of the lips in some examples, or None where no channel is called ``opening``.
 
-    names  : of the first dimensions of the model's space
-    values : the motion of each example in it [each shape=(T, Q)]
+    names  : of the first dimensions of the motion space
+    values : motion of each example in this space [each shape=(T, Q)]
     """
     if OPENING not in names:
         return None
     masks, timelines = [example.valid for example in examples], [example.speech.units for example in examples]
-    return fit_closure(values, masks, timelines, names.index(OPENING))
+    return closure_from_motion(values, masks, timelines, names.index(OPENING))

@@ -12,25 +12,26 @@ from numpy.typing import NDArray
 from lipmotion.storage.schema import STANDARD, ArraySpec, CheckedArrays
 
 OFFSETS = (-24, -18, -12, -8, -4, 0, 4, 8, 12, 18, 24)
-"""Frames whose features are used, relative to the frame whose motion is predicted: dense near it, 240 ms to both
-sides."""
+"""Frames whose features are used, relative to the frame whose motion is predicted: up to 240 ms before and after it,
+denser near it."""
 SCALE = 12.0
-"""Root mean square length of a row: ridge parameters are relative to it."""
+"""Root mean square length of a reduced feature vector: ridge parameters are relative to it."""
 LEAST_DEVIATION = 1e-3
+"""Added to the standard deviation of every input, so that constant inputs can be standardised."""
 FEATURES = 39
 INPUTS = FEATURES * len(OFFSETS)
 WINDOW = {
     "window": ArraySpec(np.float32, f"2 {INPUTS}", -STANDARD, STANDARD),
     "window_basis": ArraySpec(np.float32, f"{INPUTS} A", -STANDARD, STANDARD),
 }
-"""How a context is stored: means above scales, and the basis."""
+"""Arrays of an acoustic context: ``window`` holds the means in its first row and the scales in its second."""
 
 
 @dataclass(frozen=True, eq=False)
 class AcousticContext:
     """Standardised features at ``OFFSETS`` around a frame, projected on their first F principal components.
 
-    mean, scale : float32 arrays [shape=(D·len(OFFSETS),)]
+    mean, scale : float32 arrays [shape=(D·len(OFFSETS),)], of the standardisation
     basis       : float32 array [shape=(D·len(OFFSETS), F)]
     """
 
@@ -43,15 +44,19 @@ class AcousticContext:
 
         features : of the whole recording [shape=(T, D)]; beyond its ends, the first and last frame are repeated
         """
-        inputs = (_surroundings(features, frames) - self.mean) / self.scale
+        inputs = (_stacked(features, frames) - self.mean) / self.scale
         return np.asarray(inputs @ self.basis, np.float32)
 
 
 def fit_acoustic_context(recordings: Iterable[NDArray[np.float32]], size: int) -> AcousticContext:
-    """Return the acoustic context of some recordings' features [each shape=(T, D)], of ``size`` components at most."""
+    """Return the acoustic context of some recordings: the principal components of all their frames.
+
+    recordings : acoustic features of each [each shape=(T, D)]
+    size       : number of components, or fewer where there are fewer inputs
+    """
     count, total, products = 0, np.zeros(0), np.zeros(0)
     for features in recordings:
-        rows = _surroundings(features, slice(None)).astype(float)
+        rows = _stacked(features, slice(None)).astype(float)
         if not count:
             total, products = np.zeros(rows.shape[1]), np.zeros((rows.shape[1],) * 2)
         count += len(rows)
@@ -68,21 +73,25 @@ def fit_acoustic_context(recordings: Iterable[NDArray[np.float32]], size: int) -
 
 
 def acoustic_context_arrays(context: AcousticContext) -> dict[str, NDArray[Any]]:
-    """Serialise a context; its basis at half precision."""
+    """Serialise a context; the basis is stored at half precision."""
     return {"window": np.stack([context.mean, context.scale]), "window_basis": context.basis.astype(np.float16)}
 
 
-def acoustic_context_from(found: CheckedArrays) -> AcousticContext:
-    """Deserialise a context from arrays as ``WINDOW`` declares them. Raises ValueError: a scale that is not positive."""
-    mean, scale = found["window"]
+def acoustic_context_from(arrays: CheckedArrays) -> AcousticContext:
+    """Deserialise a context from arrays that were checked against ``WINDOW``.
+
+    Raises ValueError: a scale that is not positive, or a column of the basis that is zero.
+    """
+    mean, scale = arrays["window"]
     if not (scale > 0).all():
         raise ValueError("window with a scale that is not more than 0")
-    if not found["window_basis"].any(axis=0).all():
+    if not arrays["window_basis"].any(axis=0).all():
         raise ValueError("window_basis with an axis of zeros")
-    return AcousticContext(mean, scale, found["window_basis"])
+    return AcousticContext(mean, scale, arrays["window_basis"])
 
 
-def _surroundings(features: NDArray[np.float32], frames: NDArray[np.intp] | slice) -> NDArray[np.float32]:
-    wanted = np.arange(len(features))[frames]
-    heard = np.clip(wanted[:, None] + np.array(OFFSETS), 0, len(features) - 1)
-    return features[heard].reshape(len(wanted), -1)
+def _stacked(features: NDArray[np.float32], frames: NDArray[np.intp] | slice) -> NDArray[np.float32]:
+    """Return the features at ``OFFSETS`` around some frames, concatenated [shape=(N, D·len(OFFSETS))]."""
+    centres = np.arange(len(features))[frames]
+    indices = np.clip(centres[:, None] + np.array(OFFSETS), 0, len(features) - 1)
+    return features[indices].reshape(len(centres), -1)

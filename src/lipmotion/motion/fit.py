@@ -1,4 +1,4 @@
-"""Training of what all engines learn of motion beside their statistics."""
+"""Training of the motion space, the closures and the limits of motion: the same for all engines."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.motion.closure import fit_closure_of
+from lipmotion.motion.closure import fit_closure
 from lipmotion.motion.generation import LearnedMotion
 from lipmotion.motion.limits import limits_of
 from lipmotion.motion.space import fit_reduced_motion
@@ -15,13 +15,13 @@ from lipmotion.types import Example
 
 
 def fit_motion(examples: Sequence[Example], components: int) -> tuple[LearnedMotion, list[NDArray[np.float64]]]:
-    """Return the learned motion of some examples, and the motion of each in its space [each shape=(T, Q)].
+    """Return the learned motion of some examples, and the motion of each in the motion space [each shape=(T, Q)].
 
     components : principal components that all point channels are reduced to
-    Limits are those of the valid frames; movements are not scaled.
+    The limits are the extremes of the valid frames; there is no variance scaling.
     Raises CorpusError: no example has valid motion, or the examples have different channels.
     """
     space, values = fit_reduced_motion(examples, components)
-    closure = fit_closure_of(space.direct_names, values, examples)
+    closure = fit_closure(space.direct_names, values, examples)
     valid = np.concatenate([x[example.valid] for x, example in zip(values, examples, strict=True)])
     return LearnedMotion(space, closure, limits_of(valid)), values

@@ -1,4 +1,4 @@
-"""Which part of which unit in which context a frame belongs to."""
+"""Full-context labels of frames: the state, the unit and its neighbours that every frame belongs to."""
 
 from __future__ import annotations
 
@@ -14,31 +14,35 @@ from lipmotion.motion.rest import away_from_speech, speech_intervals
 from lipmotion.types import FRAME_RATE_HZ, Span, Timeline, Unit
 from lipmotion.units import PHONES, SILENCE, UNIT_SETS, UnitSet, is_silent, unknown_phone_message
 
-RESTING = -1
-"""The part of silence that is no part of it."""
+REST_STATE = -1
+"""The number of the one state of the rest pose: silence far from speech."""
 
 
 class FullContextState(NamedTuple):
-    """A part of a unit between its neighbours."""
+    """A state of a unit in the context of its neighbours.
+
+    left, unit, right : names of the unit before, of the unit, and of the unit after
+    state : number of the state within the unit, from 0; ``REST_STATE`` for the rest pose
+    """
 
     left: str
     unit: str
     right: str
-    part: int
+    state: int
 
     @property
     def context(self) -> tuple[str, str, str]:
-        """The unit between its neighbours, what decision trees ask about."""
+        """The unit before, the unit, and the unit after: what the questions of decision trees are about."""
         return self.left, self.unit, self.right
 
 
 @dataclass(frozen=True)
 class StateLayout:
-    """How units are cut into parts.
+    """The number of states of every unit, and their durations.
 
-    speech, silence : parts of a unit, and of one that is silence only; odd numbers
-    edge_s : the parts before and after the middle one last an equal share, but no longer than this: it is the middle of
-             a long sound that gets longer
+    speech, silence : states of a unit of speech, and of a unit that is silence only; odd numbers
+    edge_s : seconds that a state before or after the middle one lasts at most: all states of a short unit last an equal
+             share of it, in a long unit only the middle state becomes longer
     units  : the unit of every phone
     """
 
@@ -47,54 +51,57 @@ class StateLayout:
     edge_s: float
     units: UnitSet = UNIT_SETS["phone"]
 
-    def parts(self, unit: str) -> int:
-        """Return how many parts a unit has."""
+    def states(self, unit: str) -> int:
+        """Return how many states a unit has."""
         return self.silence if self.units.silent(unit) else self.speech
 
-    def name(self, place: FullContextState) -> str:
-        """Return the part alone, as ``speech.2`` or ``silence.6``."""
-        return f"{'silence' if self.units.silent(place.unit) else 'speech'}.{place.part}"
+    def name(self, state: FullContextState) -> str:
+        """Return the name of a state without its context: ``speech.2`` or ``silence.6``, for instance."""
+        return f"{'silence' if self.units.silent(state.unit) else 'speech'}.{state.state}"
 
     @property
     def names(self) -> list[str]:
-        """All parts by name."""
+        """The names of all states without context, those of speech first."""
         kinds = (("speech", self.speech), ("silence", self.silence))
-        return [f"{kind}.{part}" for kind, count in kinds for part in range(count)]
+        return [f"{kind}.{state}" for kind, count in kinds for state in range(count)]
 
     @property
     def rest(self) -> FullContextState:
-        """The place of frames in silence away from speech."""
-        quiet = self.units.unit(SILENCE)
-        return FullContextState(quiet, quiet, quiet, RESTING)
+        """The state of frames in silence away from speech: the rest pose."""
+        silence = self.units.unit(SILENCE)
+        return FullContextState(silence, silence, silence, REST_STATE)
 
     @property
     def rest_s(self) -> float:
-        """The mouth rests in silence this far from speech."""
+        """Seconds: frames in silence further than this from speech are in the state of the rest pose."""
         return self.silence // 2 * self.edge_s
 
 
 def with_neighbours(units: Timeline[Unit]) -> Iterator[tuple[str, Span[Unit], str]]:
-    """Give each span between the phones beside it; beyond the ends lies silence."""
+    """Return, for each span, the phone before it, the span, and the phone after it; silence beyond both ends."""
     phones = [SILENCE, *(span.label.phone for span in units), SILENCE]
     return zip(phones, units, phones[2:], strict=False)
 
 
 def with_unit_names(spans: Timeline[Unit], units: UnitSet = UNIT_SETS["phone"]) -> Timeline[Unit]:
-    """Return the timeline with the unit of each phone named, between its neighbours; units without phones stay."""
-    quiet = units.unit(SILENCE)
-    said = [quiet, *(units.unit_of(span.label) for span in spans), quiet]
-    found = []
-    for before, span, unit, after in zip(said, spans, said[1:], said[2:], strict=False):
-        name = f"{before}-{unit}+{after}" if span.label.phone else unit
-        found.append(replace(span, label=replace(span.label, unit=name)))
-    return Timeline(tuple(found))
+    """Return the timeline with the full-context name of each phone's unit (``sil-p+aa``).
+
+    Where a label has no phone, its unit keeps its name.
+    """
+    silence = units.unit(SILENCE)
+    sequence = [silence, *(units.unit_of(span.label) for span in spans), silence]
+    renamed = []
+    for left, span, unit, right in zip(sequence, spans, sequence[1:], sequence[2:], strict=False):
+        name = f"{left}-{unit}+{right}" if span.label.phone else unit
+        renamed.append(replace(span, label=replace(span.label, unit=name)))
+    return Timeline(tuple(renamed))
 
 
 def full_context_states(units: Timeline[Unit], frames: int, layout: StateLayout) -> list[FullContextState]:
-    """Return the place of every frame [length ``frames``].
+    """Return the full-context state of every frame at 100 Hz [length ``frames``].
 
-    Silence (the phone, whatever its unit) further than ``layout.rest_s`` from speech, and frames outside all units, are
-    ``layout.rest``.
+    Frames in silence (the phone, whatever its unit) further than ``layout.rest_s`` from speech, and frames outside all
+    spans, are in the state ``layout.rest``.
     Raises InputError: a phone outside the inventory.
     """
     for span in units:
@@ -106,19 +113,20 @@ def full_context_states(units: Timeline[Unit], frames: int, layout: StateLayout)
         edges = np.ceil(np.array([span.start_s, span.end_s]) * FRAME_RATE_HZ - 1e-6)
         first, stop = np.clip(edges, 0, frames).astype(int).tolist()
         time_s = np.arange(first, stop) / FRAME_RATE_HZ
-        before, unit, after = map(layout.units.unit, (left, span.label.phone, right))
+        left_unit, unit, right_unit = map(layout.units.unit, (left, span.label.phone, right))
         rests = is_silent(span.label.phone) & away_from_speech(time_s, speech_s, layout.rest_s)
-        part = _parts(time_s, span.start_s, span.end_s, layout.parts(unit), layout.edge_s)
+        state = _states(time_s, span.start_s, span.end_s, layout.states(unit), layout.edge_s)
         for i in np.nonzero(~rests)[0]:
-            result[first + i] = FullContextState(before, unit, after, int(part[i]))
+            result[first + i] = FullContextState(left_unit, unit, right_unit, int(state[i]))
     return result
 
 
-def _parts(time_s: NDArray[np.float64], start_s: float, end_s: float, parts: int, edge_s: float) -> NDArray[np.intp]:
-    step = min((end_s - start_s) / parts, edge_s)
-    half = parts // 2
+def _states(time_s: NDArray[np.float64], start_s: float, end_s: float, states: int, edge_s: float) -> NDArray[np.intp]:
+    """Return the number of the state of a unit at each of some times [shape=(T,)]; the unit has ``states`` states."""
+    step = min((end_s - start_s) / states, edge_s)
+    half = states // 2
     from_start, from_end = (time_s - start_s) / step, (end_s - time_s) / step
     before = np.floor(from_start + 1e-9)
-    after = parts - np.ceil(from_end - 1e-9)
-    part = np.where(from_start < half, before, np.where(from_end <= half + 1e-9, after, half))
-    return np.clip(part, 0, parts - 1).astype(np.intp)
+    after = states - np.ceil(from_end - 1e-9)
+    state = np.where(from_start < half, before, np.where(from_end <= half + 1e-9, after, half))
+    return np.clip(state, 0, states - 1).astype(np.intp)

@@ -1,4 +1,4 @@
-"""From means and precisions to the motion of all channels, for all engines: scaling, pins, closures, limits."""
+"""Generation of motion from predicted means and precisions: variance scaling, pins, closures, limits, all channels."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.kernels.banded import generate
-from lipmotion.motion.closure import OPENING, Closure, closing_frames, closing_spans
+from lipmotion.motion.closure import OPENING, Closure, closable_ranges, frames_to_close
 from lipmotion.motion.limits import MotionLimits
 from lipmotion.motion.space import MotionSpace
 from lipmotion.motion.variance_scaling import VarianceScaling
@@ -27,26 +27,26 @@ from lipmotion.types import (
     frame_of,
 )
 
-STRETCH, MARGIN = 6000, 500
-"""Frames generated at a time, and those around them that are generated again and thrown away: what lies seconds off
-changes nothing, and the memory does not grow with the recording."""
+BLOCK_FRAMES, MARGIN_FRAMES = 6000, 500
+"""Frames of a block, and frames before and after it that are generated with it and dropped: frames that are seconds away
+do not change the result, and the memory does not grow with the recording."""
 DOUBLE_FRAMES = 60_000
 """The motion of recordings beyond ten minutes is kept in single precision, its variance in the model's space."""
 
 Pins = dict[tuple[int, int], float]
-"""Frame and column in the model's space, to the value there."""
+"""Pinned values by frame and dimension of the motion space."""
 Statistics = tuple[NDArray[np.float64], NDArray[np.float64]]
 """Means and precisions of successive frames [each shape=(T, 3, Q)], or values and variances [each shape=(T, Q)]."""
 
 
 @dataclass(frozen=True, eq=False)
 class LearnedMotion:
-    """What every engine learns of motion beside its statistics: the end of the path from speech to motion.
+    """The parts of a model that turn predicted means and precisions into motion; the same for all engines.
 
     space   : the Q dimensions in which motion is modelled
-    closure : how the lips close (None: the motion has no channel ``opening``)
-    limits  : of plausible motion
-    scaling : variance scaling about the rest pose (None: movements stay as they are)
+    closure : of the lips in p, b and m (None: the motion has no channel ``opening``)
+    limits  : of plausible motion in this space
+    scaling : variance scaling about the rest pose (None: movements are not scaled)
     """
 
     space: MotionSpace
@@ -64,28 +64,30 @@ class LearnedMotion:
         close: bool = True,
         closing_units: Container[str] = (),
     ) -> tuple[Motion, NDArray[np.floating[Any]] | ReducedVariance]:
-        """Return the motion of all channels, and its variance [shape=(T, P)], by parameter generation.
+        """Return the motion of all channels at 100 Hz, and its variance [shape=(T, P)], by parameter generation.
 
-        In this order: variance scaling, pins, parameter generation, closures in p, b and m, limits, all channels.
-        statistics    : returns means and precisions of a range of frames [each shape=(N, 3, Q)]
-        frames        : T, of the whole recording
+        The steps are variance scaling, parameter generation with pins, closures in p, b and m, the check of the
+        limits, and the restoration of all channels.
+        statistics    : returns the predicted means and precisions of a range of frames [each shape=(N, 3, Q)]
+        frames        : length of the whole recording, T
         units         : phones in time
+        constraints   : pins of channels that are modelled as they are
         close         : whether the lips are made to meet in every p, b and m
-        closing_units : units without a phone that close the lips as well
+        closing_units : units that close the lips where no phone is known
         Raises InputError: a pin names no channel, lies outside the recording or is not finite.
         Raises ModelFormatError: the motion leaves the limits, so that the model must be damaged.
         """
         pins = resolved_pins(constraints, self.space, frames)
-        closing = closing_spans(units, frames, closing_units) if close else []
-        values, variance = self._generated(statistics, frames, closing, pins)
+        ranges = closable_ranges(units, frames, closing_units) if close else []
+        values, variance = self._generated(statistics, frames, ranges, pins)
         return Motion(values, FRAME_RATE_HZ, self.space.channels), variance
 
     def _generated(
-        self, statistics: Callable[[slice], Statistics], frames: int, closing: Sequence[slice], pins: Pins
+        self, statistics: Callable[[slice], Statistics], frames: int, ranges: Sequence[slice], pins: Pins
     ) -> tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]] | ReducedVariance]:
         """Return values and variance of all channels [each shape=(T, P)], block by block.
 
-        closing : the frames of each phone in which the lips must close
+        ranges : the frames of each p, b and m, of which one must be closed
         """
         space = self.space
         is_long = frames > DOUBLE_FRAMES
@@ -93,19 +95,19 @@ class LearnedMotion:
         motion = np.empty((frames, len(space.channels)), precise)
         spread = np.empty((frames, space.dimensions if is_long else len(space.channels)), precise)
         for inner, outer in generation_blocks(frames):
-            inside = {
+            block_pins = {
                 (frame - outer.start, c): v for (frame, c), v in pins.items() if outer.start <= frame < outer.stop
             }
-            spans = [
-                slice(span.start - outer.start, span.stop - outer.start)
-                for span in closing
-                if outer.start <= span.start and span.stop <= outer.stop
+            block_ranges = [
+                slice(closing.start - outer.start, closing.stop - outer.start)
+                for closing in ranges
+                if outer.start <= closing.start and closing.stop <= outer.stop
             ]
             predicted = statistics(outer)
             if self.scaling is not None:
                 predicted = self.scaling.apply(*predicted)
-            result = _generated(self.closure, predicted, inside, spans)
-            self.limits.check(result[0], self.closure, inside)
+            result = _generated(self.closure, predicted, block_pins, block_ranges)
+            self.limits.check(result[0], self.closure, block_pins)
             kept = slice(inner.start - outer.start, inner.stop - outer.start)
             values, variance = (rows[kept] for rows in result)
             motion[inner], restored = space.restore(values, variance)
@@ -116,39 +118,43 @@ class LearnedMotion:
 
 
 def resolved_pins(constraints: Constraints | None, space: MotionSpace, frames: int) -> Pins:
-    """Return what is pinned, by frame and dimension. Raises InputError: it cannot be."""
+    """Return the pinned values by frame and dimension of the motion space.
+
+    frames : length of the recording
+    Raises InputError: a channel that cannot be pinned, a time outside the recording, or a value that is not possible.
+    """
     names = space.direct_names
     pins: Pins = {}
-    for wanted in constraints.pins if constraints else ():
-        if wanted.channel not in names:
-            raise InputError(f"cannot pin {wanted.channel!r}; channels that can be pinned: {', '.join(names)}")
-        frame = frame_of(wanted.time_s, frames, FRAME_RATE_HZ)
+    for pin in constraints.pins if constraints else ():
+        if pin.channel not in names:
+            raise InputError(f"cannot pin {pin.channel!r}; channels that can be pinned: {', '.join(names)}")
+        frame = frame_of(pin.time_s, frames, FRAME_RATE_HZ)
         if frame is None:
             last_s = (frames - 1) / FRAME_RATE_HZ
-            raise InputError(f"pin at {wanted.time_s} s lies outside the recording (0 to {last_s:.2f} s)")
-        if not np.isfinite(wanted.value):
-            raise InputError(f"pin at {wanted.time_s} s has the value {wanted.value}, required a finite number")
-        column = names.index(wanted.channel)
-        check_magnitude(space.channels[space.direct[column]], wanted.value, wanted.value)
-        never_negative = wanted.channel == OPENING or space.channels[space.direct[column]].unit == WEIGHT
-        if never_negative and wanted.value < 0:
-            raise InputError(f"pin at {wanted.time_s} s sets {wanted.channel} to {wanted.value}, required at least 0")
-        pins[frame, column] = wanted.value
+            raise InputError(f"pin at {pin.time_s} s lies outside the recording (0 to {last_s:.2f} s)")
+        if not np.isfinite(pin.value):
+            raise InputError(f"pin at {pin.time_s} s has the value {pin.value}, required a finite number")
+        column = names.index(pin.channel)
+        check_magnitude(space.channels[space.direct[column]], pin.value, pin.value)
+        never_negative = pin.channel == OPENING or space.channels[space.direct[column]].unit == WEIGHT
+        if never_negative and pin.value < 0:
+            raise InputError(f"pin at {pin.time_s} s sets {pin.channel} to {pin.value}, required at least 0")
+        pins[frame, column] = pin.value
     return pins
 
 
 def generation_blocks(frames: int) -> Iterator[tuple[slice, slice]]:
-    """Give the frames of each stretch, and those with what lies around it; a shorter recording is one stretch."""
-    for start in range(0, frames, STRETCH):
-        stop = min(start + STRETCH, frames)
-        yield slice(start, stop), slice(max(start - MARGIN, 0), min(stop + MARGIN, frames))
+    """Yield the frames of every block, and the same with ``MARGIN_FRAMES`` on both sides, cut at the ends."""
+    for start in range(0, frames, BLOCK_FRAMES):
+        stop = min(start + BLOCK_FRAMES, frames)
+        yield slice(start, stop), slice(max(start - MARGIN_FRAMES, 0), min(stop + MARGIN_FRAMES, frames))
 
 
-def _generated(closure: Closure | None, statistics: Statistics, pins: Pins, closing: Sequence[slice]) -> Statistics:
-    """Return trajectory and variance in the model's space [shape=(T, Q)], lips closed where they must."""
+def _generated(closure: Closure | None, statistics: Statistics, pins: Pins, ranges: Sequence[slice]) -> Statistics:
+    """Return values and variances in the motion space [each shape=(T, Q)], with the lips closed in every range."""
     result = generate(*statistics, pins)
     if closure is not None:
-        _close_lips(closure, closing, statistics, pins, result)
+        _close_lips(closure, ranges, statistics, pins, result)
         opening = result[0][:, closure.column]
         np.maximum(opening, 0, out=opening)  # a smooth curve through a closure may overshoot
     return result
@@ -156,23 +162,27 @@ def _generated(closure: Closure | None, statistics: Statistics, pins: Pins, clos
 
 def _close_lips(
     closure: Closure,
-    spans: Sequence[slice],
+    ranges: Sequence[slice],
     statistics: Statistics,
     pins: Pins,
     result: Statistics,
 ) -> None:
-    """Make the lips meet in every p, b and m (in place); what the user did not pin follows the opening."""
+    """Change values and variances in place so that the lips meet once in every range of frames.
+
+    The opening is generated again with pins at the closed frames; the change of the opening is added to all dimensions
+    that the user did not pin, in the proportions of ``closure.follow``.
+    """
     values, variance = result
     column = closure.column
-    taken = [frame for frame, pinned in pins if pinned == column]
-    frames = closing_frames(closure, values[:, column], spans, taken)
+    pinned = [frame for frame, dimension in pins if dimension == column]
+    frames = frames_to_close(closure, values[:, column], ranges, pinned)
     if not frames:
         return
-    wanted = {(frame, 0): closure.closed for frame in frames}
-    wanted |= {(frame, 0): pins[frame, column] for frame in taken}
+    opening_pins = {(frame, 0): closure.closed for frame in frames}
+    opening_pins |= {(frame, 0): pins[frame, column] for frame in pinned}
     opening = slice(column, column + 1)
-    closing, spread = generate(statistics[0][:, :, opening], statistics[1][:, :, opening], wanted)
+    closed, closed_variance = generate(statistics[0][:, :, opening], statistics[1][:, :, opening], opening_pins)
     follow = closure.follow.copy()
-    follow[[pinned for _, pinned in pins]] = 0
-    values += (closing - values[:, opening]) * follow
-    values[:, opening], variance[:, opening] = closing, spread
+    follow[[dimension for _, dimension in pins]] = 0
+    values += (closed - values[:, opening]) * follow
+    values[:, opening], variance[:, opening] = closed, closed_variance

@@ -14,26 +14,28 @@ from lipmotion.motion.space import MotionSpace
 from lipmotion.types import check_magnitude
 
 Array = NDArray[np.float64]
-WIDEST = 20.0
-"""Motion stays within so many times the span of a model's poses; features unlike any of the training give about 3."""
+LARGEST_EXCESS = 20.0
+"""Motion leaves the limits by at most so many spans of the poses; features unlike all training data give about 3."""
 DEVIATIONS = 3.0
-"""Standard deviations by which motion may leave the poses."""
+"""Standard deviations by which motion may leave the range of the poses."""
 LARGEST_SPREAD = 1000.0
-"""The poses of half of the dimensions span fewer of their own deviations than this: about ten in our models."""
+"""Largest median, over dimensions, of the span of the poses in standard deviations; our models have about 10."""
 LARGEST_OFFSET = 1000.0
-"""The mean of points lies fewer of the largest span of a dimension away from 0."""
+"""Largest magnitude of the mean of the points, in units of the largest span of a dimension."""
 WIDE_OPEN = 5.0
-"""Eye distances: a larger opening is implausible unless the other poses fit to it."""
+"""Eye distances; a larger opening is implausible unless the range of all poses is as large."""
 NEGATIVE_SHARE = 0.05
+"""Share of the span of the opening that may be negative where the opening is larger than ``WIDE_OPEN``."""
 FAR_REST = 3.0
-"""The rest pose lies fewer spans of the poses away from them."""
+"""Largest distance of the rest pose from the range of the poses, in spans of that range."""
 LEAST_SPAN = 1e-3
+"""Smallest span of a dimension, as a share of its largest magnitude or of 1."""
 
 
 class MotionLimits(NamedTuple):
-    """The smallest and largest values of the poses, or of the motion, of a model.
+    """Smallest and largest values of the poses, or of the motion, of a model.
 
-    low, high : [shape=(Q,)]
+    low, high : smallest and largest value of each dimension of the motion space [each shape=(Q,)]
     """
 
     low: Array
@@ -41,22 +43,27 @@ class MotionLimits(NamedTuple):
 
     @property
     def span(self) -> Array:
-        """The difference of both [shape=(Q,)]."""
+        """Largest minus smallest value [shape=(Q,)]."""
         return self.high - self.low
 
-    def widened(self, deviation: NDArray[np.floating]) -> MotionLimits:
-        """Return limits that are farther out by ``DEVIATIONS`` standard deviations on both sides."""
+    def extended(self, deviation: NDArray[np.floating]) -> MotionLimits:
+        """Return limits extended by ``DEVIATIONS`` standard deviations [shape=(Q,)] on both sides."""
         return MotionLimits(self.low - DEVIATIONS * deviation, self.high + DEVIATIONS * deviation)
 
     def check(self, values: Array, closure: Closure | None, pins: Mapping[tuple[int, int], float]) -> None:
-        """Raise ModelFormatError where motion [shape=(T, Q)] leaves the limits, widened by pins, by ``WIDEST`` spans."""
+        """Check that motion is plausible: within ``LARGEST_EXCESS`` spans of the limits.
+
+        values : motion in the motion space [shape=(T, Q)]
+        pins   : values by frame and dimension; the limits are extended to contain them
+        Raises ModelFormatError: the motion is not plausible, so that the model must be damaged.
+        """
         low, high = self.low.copy(), self.high.copy()
         for (_, column), value in pins.items():
             low[column], high[column] = min(low[column], value), max(high[column], value)
         span = _span(low, high)
         if closure is not None:
             span = np.maximum(span, np.abs(closure.follow) * (high - low)[closure.column] if pins else 0)
-        worst = np.maximum(low - values.min(axis=0), values.max(axis=0) - high) / (WIDEST * span)
+        worst = np.maximum(low - values.min(axis=0), values.max(axis=0) - high) / (LARGEST_EXCESS * span)
         if not worst.max() <= 1:
             column = int(worst.argmax())
             raise ModelFormatError(
@@ -67,30 +74,30 @@ class MotionLimits(NamedTuple):
 
 
 def limits_of(poses: NDArray[np.floating]) -> MotionLimits:
-    """Return the smallest and largest values of poses [shape=(N, Q)]."""
+    """Return the limits of some poses [shape=(N, Q)]."""
     return MotionLimits(poses.min(axis=0).astype(float), poses.max(axis=0).astype(float))
 
 
 def check_poses(limits: MotionLimits, space: MotionSpace, closure: Closure | None) -> None:
-    """Raise ValueError where the poses of a model cannot be those of a face, or contradict its space or closure."""
+    """Raise ValueError if the poses of a model cannot be those of a face, or contradict its space or closure."""
     count = len(space.direct)
     for column, channel in enumerate(space.direct):
         check_magnitude(space.channels[channel], float(limits.low[column]), float(limits.high[column]))
     if space.points is not None:
-        largest, moves = float(np.abs(space.points.mean).max()), float(limits.span[count:].max(initial=0.0))
-        if largest > max(WIDE_OPEN, LARGEST_OFFSET * moves):
-            raise ValueError(f"points_mean as large as {largest:g} of points that move by {moves:g}")
+        largest, span = float(np.abs(space.points.mean).max()), float(limits.span[count:].max(initial=0.0))
+        if largest > max(WIDE_OPEN, LARGEST_OFFSET * span):
+            raise ValueError(f"points_mean as large as {largest:g} of points that move by {span:g}")
     if closure is not None:
         _check_opening(float(limits.low[closure.column]), float(limits.high[closure.column]), closure.closed)
 
 
 def check_rest(rest: Array, limits: MotionLimits) -> None:
-    """Raise ValueError where the rest pose [shape=(Q,)] is far from all other poses."""
-    away = np.maximum(limits.low - rest, rest - limits.high) / _span(limits.low, limits.high)
-    column = int(away.argmax())
-    if away[column] > FAR_REST:
+    """Raise ValueError if the rest pose [shape=(Q,)] is far from all other poses."""
+    distance = np.maximum(limits.low - rest, rest - limits.high) / _span(limits.low, limits.high)
+    column = int(distance.argmax())
+    if distance[column] > FAR_REST:
         raise ValueError(
-            f"rest of {rest[column]:g} in dimension {column}, whose poses are {limits.low[column]:g} to "
+            f"rest pose of {rest[column]:g} in dimension {column}, whose poses are {limits.low[column]:g} to "
             f"{limits.high[column]:g}"
         )
 
@@ -101,15 +108,19 @@ def _span(low: Array, high: Array) -> Array:
 
 
 def _check_opening(low: float, high: float, closed: float) -> None:
+    """Raise ValueError if the opening cannot be from ``low`` to ``high``, with lips closed at ``closed``."""
     span = high - low
-    if max(-low, high) > WIDE_OPEN and (low < -NEGATIVE_SHARE * span or low > WIDEST * span):
+    if max(-low, high) > WIDE_OPEN and (low < -NEGATIVE_SHARE * span or low > LARGEST_EXCESS * span):
         raise ValueError(f"poses whose {OPENING} is {low:g} to {high:g}")
-    if closed > max(high + WIDEST * span, WIDE_OPEN):
+    if closed > max(high + LARGEST_EXCESS * span, WIDE_OPEN):
         raise ValueError(f"lips that are closed at {closed:g}, with poses whose {OPENING} is {low:g} to {high:g}")
 
 
 def check_spread(poses: NDArray[np.floating], variances: NDArray[np.floating]) -> None:
-    """Raise ValueError where poses [shape=(N, Q)] span many more of their standard deviations than models do."""
+    """Raise ValueError if poses span many more of their standard deviations than those of trained models.
+
+    poses, variances : means and variances of densities [each shape=(N, Q)]
+    """
     deviation = np.sqrt(variances.mean(axis=0, dtype=float))
     spread = float(np.median(np.ptp(poses, axis=0) / deviation))
     if spread > LARGEST_SPREAD:

@@ -1,4 +1,4 @@
-"""From the camera's frames to those of the models."""
+"""Motion from the frame rate of the camera to that of the models."""
 
 from __future__ import annotations
 
@@ -9,19 +9,21 @@ from numpy.typing import NDArray
 def to_model_frames(
     values: NDArray[np.float64], seen: NDArray[np.bool_], rate_hz: float, frames: int, frame_rate_hz: float
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Return curves at another rate by a cubic spline, and where they rest on frames that were seen.
+    """Return curves at the rate of a model by a cubic spline, and the frames that are valid.
 
-    values : [shape=(T, P)] at ``rate_hz``;  seen : [shape=(T,)]
-    Returns [shape=(frames, P)] at ``frame_rate_hz``, and bool [shape=(frames,)].
-    The spline is C²: linear interpolation would make Δ² zero nearly everywhere. Beyond the last camera frame
-    the last value holds, and counts as unseen from half a camera frame on.
+    values : curves at ``rate_hz`` [shape=(T, P)]
+    seen   : camera frames in which the face was measured [shape=(T,)]
+    Returns curves at ``frame_rate_hz`` [shape=(frames, P)], and whether the nearest camera frame of each was seen
+    [shape=(frames,)].
+    The spline is twice differentiable: with linear interpolation, Δ² would be zero nearly everywhere. After the last
+    camera frame the last value is repeated; half a camera frame later, frames are not valid.
     """
     from scipy.interpolate import CubicSpline
 
     camera_s = np.arange(len(values)) / rate_hz
-    wanted_s = np.arange(frames) / frame_rate_hz
-    inside_s = np.minimum(wanted_s, camera_s[-1])
-    curves = CubicSpline(camera_s, values)(inside_s) if len(values) > 1 else np.repeat(values, frames, axis=0)
-    nearest = np.floor(wanted_s * rate_hz + 0.5).astype(int)
+    model_s = np.arange(frames) / frame_rate_hz
+    clipped_s = np.minimum(model_s, camera_s[-1])
+    curves = CubicSpline(camera_s, values)(clipped_s) if len(values) > 1 else np.repeat(values, frames, axis=0)
+    nearest = np.floor(model_s * rate_hz + 0.5).astype(int)
     valid = seen[np.minimum(nearest, len(seen) - 1)] & (nearest < len(seen))
     return curves, valid

@@ -1,4 +1,4 @@
-"""The rest pose: what counts as silence away from speech, where the mouth rests."""
+"""Silence away from speech, in which the mouth is in its rest pose."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ Array = NDArray[np.float64]
 
 
 def away_from_speech(time_s: Array, speech_s: Iterable[tuple[float, float]], margin_s: float) -> NDArray[np.bool_]:
-    """Return at which times nothing is said, nor has been or will be for ``margin_s`` seconds [shape=(T,)].
+    """Return which times are further than ``margin_s`` seconds from all speech, before and after it [shape=(T,)].
 
-    time_s   : [shape=(T,)];  speech_s : start and end of everything that is said
+    time_s   : times in seconds [shape=(T,)]
+    speech_s : start and end of every interval of speech, in seconds
     """
     away = np.ones(len(time_s), bool)
     for start_s, end_s in speech_s:
@@ -25,5 +26,5 @@ def away_from_speech(time_s: Array, speech_s: Iterable[tuple[float, float]], mar
 
 
 def speech_intervals(units: Timeline[Unit]) -> list[tuple[float, float]]:
-    """Return start and end of every phone that is not silence, in seconds."""
+    """Return start and end, in seconds, of every phone that is not silence."""
     return [(span.start_s, span.end_s) for span in units if not is_silent(span.label.phone)]

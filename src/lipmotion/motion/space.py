@@ -1,4 +1,4 @@
-"""The dimensions in which motion is modelled."""
+"""The motion space: the dimensions in which motion is modelled."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from lipmotion.types import Channel, Example
 
 @dataclass(frozen=True, eq=False)
 class MotionSpace:
-    """Distances as they are, points in their principal components.
+    """The dimensions of motion in a model: distances as they are, points reduced to principal components.
 
     channels : the P channels of the motion
-    direct   : the channels that are modelled as they are [shape=(P',)]
-    points   : the space of all others (None: there are none); Q = P' + its dimensions
+    direct   : int array [shape=(P',)], columns of the channels that are modelled as they are
+    points   : principal components of all other channels, K of them (None: there are no others); Q = P' + K
     """
 
     channels: tuple[Channel, ...]
@@ -34,11 +34,11 @@ class MotionSpace:
 
     @property
     def dimensions(self) -> int:
-        """Q."""
+        """The number of dimensions, Q."""
         return len(self.direct) + (len(self.points.basis) if self.points is not None else 0)
 
     def reduce(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return motion [shape=(T, P)] as the model sees it [shape=(T, Q)]."""
+        """Return motion of the channels [shape=(T, P)] in the motion space [shape=(T, Q)]."""
         direct = values[:, self.direct]
         if self.points is None:
             return direct
@@ -47,7 +47,7 @@ class MotionSpace:
     def restore(
         self, values: NDArray[np.float64], variance: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return values and variances [shape=(T, Q)] as those of the channels [shape=(T, P)]."""
+        """Return values and variances of all channels [each shape=(T, P)] from those in the space [each shape=(T, Q)]."""
         motion, spread = (np.empty((len(values), len(self.channels))) for _ in range(2))
         count = len(self.direct)
         motion[:, self.direct], spread[:, self.direct] = values[:, :count], variance[:, :count]
@@ -58,7 +58,7 @@ class MotionSpace:
 
     @property
     def mixing(self) -> NDArray[np.float64]:
-        """What the variance of each dimension adds to that of each channel [shape=(Q, P)]."""
+        """The matrix from variances of the dimensions to variances of the channels [shape=(Q, P)]."""
         mixing, count = np.zeros((self.dimensions, len(self.channels))), len(self.direct)
         mixing[np.arange(count), self.direct] = 1
         if self.points is not None:
@@ -70,23 +70,27 @@ class MotionSpace:
         return np.setdiff1d(np.arange(len(self.channels)), self.direct)
 
 
-def fit_space(channels: tuple[Channel, ...], seen: NDArray[np.float64], components: int) -> MotionSpace:
-    """Return the space of some motion [shape=(N, P)]: all but the points (``x_17``, ...) are kept as they are."""
+def fit_space(channels: tuple[Channel, ...], poses: NDArray[np.float64], components: int) -> MotionSpace:
+    """Return the motion space of some poses [shape=(N, P)]; all channels but points (``x_17``, ...) stay as they are.
+
+    components : principal components that the points are reduced to
+    """
     is_point = np.array([channel.name[:2] in ("x_", "y_", "z_") for channel in channels])
-    points = fit_pca(seen[:, is_point], components) if is_point.any() else None
+    points = fit_pca(poses[:, is_point], components) if is_point.any() else None
     return MotionSpace(channels, np.nonzero(~is_point)[0].astype(np.intp), points)
 
 
 def fit_reduced_motion(examples: Sequence[Example], components: int) -> tuple[MotionSpace, list[NDArray[np.float64]]]:
-    """Return the space of some examples' motion, and the motion of each in it [each shape=(T, Q)].
+    """Return the motion space of some examples, and the motion of each in it [each shape=(T, Q)].
 
-    Raises CorpusError: no motion was seen, or the examples have different channels.
+    components : principal components that all point channels are reduced to
+    Raises CorpusError: no example has valid motion, or the examples have different channels.
     """
     if not any(dynamics_known(example.valid).any() for example in examples):
         raise CorpusError(f"none of {len(examples)} examples has motion to learn from; prepare a corpus with faces")
-    found = {example.motion.channels for example in examples}
-    if len(found) > 1:
+    channels = {example.motion.channels for example in examples}
+    if len(channels) > 1:
         raise CorpusError("the utterances have different motion channels; train on one kind of corpus at a time")
-    seen = np.concatenate([example.motion.values[example.valid] for example in examples])
-    space = fit_space(found.pop(), seen, components)
+    poses = np.concatenate([example.motion.values[example.valid] for example in examples])
+    space = fit_space(channels.pop(), poses, components)
     return space, [space.reduce(example.motion.values.astype(float)) for example in examples]

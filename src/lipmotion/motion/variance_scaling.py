@@ -1,4 +1,4 @@
-"""Variance scaling: parameter generation alone makes movements smaller than the recorded ones.
+"""Variance scaling: generated movements are made as large as recorded ones; parameter generation alone damps them.
 
 Source: Silén, Helander, Nurminen & Gabbouj 2012. Deviation: scaling is about the rest pose, not about the mean, so that
 a closed mouth stays closed.
@@ -14,34 +14,36 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 LARGEST_FACTOR = 2.0
-"""A dimension that hardly follows speech is not scaled further."""
+"""No factor is larger: a dimension that hardly depends on speech would be scaled too far."""
 LEAST_DEVIATION = 1e-6
 
 
 def scaling_factors(recorded: Sequence[Array], generated: Sequence[Array]) -> Array:
-    """Return the factors by which generated movements have to grow to vary as much as recorded ones [shape=(Q,)].
+    """Return the factors by which generated movements are scaled to vary as much as recorded ones [shape=(Q,)].
 
     recorded, generated : standard deviations within each clip [each shape=(Q,)]; at least one clip
-    The mean over clips of the one divided by that of the other, from 1 to ``LARGEST_FACTOR``.
+    A factor is the mean over clips of the recorded deviations divided by that of the generated ones, from 1 to
+    ``LARGEST_FACTOR``.
     """
     ratio = np.mean(recorded, axis=0) / np.maximum(np.mean(generated, axis=0), LEAST_DEVIATION)
     return np.clip(ratio, 1.0, LARGEST_FACTOR)
 
 
 class VarianceScaling(NamedTuple):
-    """By how much movements away from the rest pose grow, dimension by dimension.
+    """Factors by which movements away from the rest pose are scaled, dimension by dimension.
 
-    factors, rest : from ``scaling_factors``, and the rest pose [shape=(Q,)]
+    factors : from ``scaling_factors`` [shape=(Q,)]
+    rest    : the rest pose [shape=(Q,)]
     """
 
     factors: Array
     rest: Array
 
     def apply(self, means: Array, precisions: Array) -> tuple[Array, Array]:
-        """Return the means and precisions of the larger movements.
+        """Return means and precisions of the scaled movements [each shape=(T, 3, Q)].
 
-        means, precisions : of static value, Δ and Δ² [shape=(T, 3, Q)]
+        means, precisions : of static value, Δ and Δ² [each shape=(T, 3, Q)]
         """
-        grown = means * self.factors
-        grown[:, 0] += self.rest * (1 - self.factors)
-        return grown, precisions / (self.factors * self.factors)
+        scaled = means * self.factors
+        scaled[:, 0] += self.rest * (1 - self.factors)
+        return scaled, precisions / (self.factors * self.factors)

@@ -16,7 +16,7 @@ from lipmotion.units import Lexicon, check_words
 from lipmotion.units.length_limits import LARGEST_TRANSCRIPT
 
 LOG = logging.getLogger("lipmotion")
-MOST_GUESSES = 20
+MOST_WARNINGS = 20
 """Words of which it is said one by one how they were guessed."""
 
 
@@ -30,10 +30,10 @@ def transcribe(
     A warning says if the words are hardly what is said (only where general models listen).
     Raises AlignmentError: the words do not fit into the recording.
     """
-    report_guesses(words or (), lexicon)
+    warn_of_guesses(words or (), lexicon)
     units = phones_in_time(phones, audio, features, words, lexicon)
     if words is not None and phones.kind != "own":
-        report_doubt(audio, units)
+        warn_of_disagreement(audio, units)
     return units
 
 
@@ -57,7 +57,7 @@ def read_transcript(path: Path) -> str:
     return text
 
 
-def report_doubt(audio: Audio, units: Timeline[Unit]) -> None:
+def warn_of_disagreement(audio: Audio, units: Timeline[Unit]) -> None:
     """Warn if the phones of a transcript, aligned, are not what is heard."""
     found = agreement_score(audio, units)
     if found < DOUBTFUL_SCORE:
@@ -69,15 +69,15 @@ def report_doubt(audio: Audio, units: Timeline[Unit]) -> None:
         )
 
 
-def report_guesses(words: Sequence[str], lexicon: Lexicon) -> None:
-    """Warn of every word whose pronunciation is a guess; of many, say the first ``MOST_GUESSES`` and how many more."""
+def warn_of_guesses(words: Sequence[str], lexicon: Lexicon) -> None:
+    """Warn of every word whose pronunciation is a guess; of many, say the first ``MOST_WARNINGS`` and how many more."""
     unknown = [word for word in dict.fromkeys(words) if not lexicon.known(word)]
-    for word in unknown[:MOST_GUESSES]:
+    for word in unknown[:MOST_WARNINGS]:
         guessed = " ".join(lexicon.pronunciations(word)[0])
         LOG.warning(
             "%r is not in the dictionary; read as %r; a lexicon file can say better", *map(shortened, (word, guessed))
         )
-    if len(unknown) > MOST_GUESSES:
+    if len(unknown) > MOST_WARNINGS:
         LOG.warning(
-            "%d more words are not in the dictionary; a lexicon file can say better", len(unknown) - MOST_GUESSES
+            "%d more words are not in the dictionary; a lexicon file can say better", len(unknown) - MOST_WARNINGS
         )

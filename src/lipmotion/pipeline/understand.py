@@ -75,11 +75,11 @@ def recognised_speech(
     if isinstance(engine, RecognisesPhones) and phones.kind != "general":
         found = engine.recognise(learned, speech)
     if found is None:
-        return replace(speech, units=recognise(), said=False)
+        return replace(speech, units=recognise(), units_known=False)
     try:
-        return replace(speech, units=phones.align_phones(audio, features, found), said=False)
+        return replace(speech, units=phones.align_phones(audio, features, found), units_known=False)
     except AlignmentError:
-        return replace(speech, units=recognise(), said=False)
+        return replace(speech, units=recognise(), units_known=False)
 
 
 def _words(transcript: str | Path | None, duration_s: float) -> tuple[str, ...] | None:

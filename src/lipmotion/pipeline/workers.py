@@ -35,7 +35,7 @@ class Workers:
     def __init__(self, ends: Sequence[Any]) -> None:
         self._ends = ends
 
-    def each(self, function: Callable[[GivenT], FoundT], items: Iterable[GivenT], /) -> Iterator[FoundT]:
+    def ordered_map(self, function: Callable[[GivenT], FoundT], items: Iterable[GivenT], /) -> Iterator[FoundT]:
         """Yield the results in the order of the items. Raises CorpusError: a process died."""
         found: dict[int, FoundT] = {}
         wanted = 0
@@ -45,7 +45,7 @@ class Workers:
                 yield found.pop(wanted)
                 wanted += 1
 
-    def as_they_come(self, function: Callable[[GivenT], FoundT], items: Iterable[GivenT]) -> Iterator[FoundT]:
+    def unordered_map(self, function: Callable[[GivenT], FoundT], items: Iterable[GivenT]) -> Iterator[FoundT]:
         """Yield the results in the order in which they are ready. Raises CorpusError: a process died."""
         return (result for _, result in self._numbered(function, items))
 
@@ -73,7 +73,7 @@ class Workers:
 
 
 @contextmanager
-def working(count: int) -> Iterator[Workers]:
+def worker_pool(count: int) -> Iterator[Workers]:
     """Give ``count`` workers; their processes end when the block is left, at once if by an exception.
 
     Matrix products use one thread inside the block and in every worker, so that results do not depend on ``count``.

@@ -53,7 +53,7 @@ def identity_adaptation(warp: float, own_weight: float) -> Adaptation:
 
 
 def adaptation_arrays(adaptation: Adaptation) -> dict[str, NDArray[Any]]:
-    """Return an adaptation serialised as arrays (``ADAPTATION_MEMBERS``)."""
+    """Return an adaptation serialised as arrays (``ADAPTATION_ARRAYS``)."""
     numbers = np.array([adaptation.warp, adaptation.own_weight])
     return {"numbers": numbers, "own": adaptation.own, "general": adaptation.general}
 
@@ -61,8 +61,8 @@ def adaptation_arrays(adaptation: Adaptation) -> dict[str, NDArray[Any]]:
 def adaptation_from_arrays(arrays: Arrays) -> Adaptation:
     """Deserialise an adaptation. Raises ModelFormatError: an array is missing, or cannot be a transform."""
     try:
-        refuse_undeclared(arrays, ADAPTATION_MEMBERS)
-        checked = checked_arrays(arrays, ADAPTATION_MEMBERS)
+        refuse_undeclared(arrays, ADAPTATION_ARRAYS)
+        checked = checked_arrays(arrays, ADAPTATION_ARRAYS)
         warp, own_weight = checked["numbers"].tolist()
         if not 1 / LARGEST_WARP <= warp <= LARGEST_WARP or not 0 <= own_weight <= 1:
             raise ValueError(f"a warp of {warp} and a weight of the own models of {own_weight}")
@@ -71,7 +71,7 @@ def adaptation_from_arrays(arrays: Arrays) -> Adaptation:
         raise ModelFormatError(f"the adaptation is damaged ({error}); adapt the model again") from error
 
 
-ADAPTATION_MEMBERS = {
+ADAPTATION_ARRAYS = {
     "numbers": ArraySpec(np.float64, "2"),
     "own": ArraySpec(np.float64, f"{FEATURES} {FEATURES + 1}", -STANDARD, STANDARD),
     "general": ArraySpec(np.float64, " ".join(map(str, _GENERAL)), -STANDARD, STANDARD),

@@ -244,9 +244,9 @@ def equal_gaussians(x: NDArray[np.float32], count: int) -> Mixtures:
     )
 
 
-def mixtures_from_arrays(found: CheckedArrays) -> Mixtures:
+def mixtures_from_arrays(stored: CheckedArrays) -> Mixtures:
     """Deserialise mixtures, stored as ``MIXTURES``. Raises ValueError: the weights of a density do not sum to 1."""
-    total = np.exp(found["log_weights"]).sum(axis=1)
+    total = np.exp(stored["log_weights"]).sum(axis=1)
     if not ((total > LEAST_WEIGHT) & (total < MOST_WEIGHT)).all():
         raise ValueError("log_weights of a density without a Gaussian of a finite weight, or that do not sum to 1")
-    return Mixtures(*(found[name] for name in MIXTURES))
+    return Mixtures(*(stored[name] for name in MIXTURES))

@@ -233,19 +233,19 @@ TREES = {
 
 def trees_from_arrays(arrays: Arrays) -> dict[str, Tree]:
     """Deserialise trees, by name. Raises KeyError, ValueError: something is missing or inconsistent."""
-    found = checked_arrays(arrays, TREES)
+    stored = checked_arrays(arrays, TREES)
     questions = tuple(
         Question(_STORED_POSITIONS.index(position), name, frozenset(members.split()))
-        for position, name, members in found["questions"].tolist()
+        for position, name, members in stored["questions"].tolist()
     )
-    names, sizes, ends = found["trees"].tolist(), found["sizes"], np.cumsum(found["sizes"])
-    if ends[-1] != found.sizes["S"] or len(set(names)) < len(names):
-        raise ValueError(f"trees of {ends[-1]} nodes with {found.sizes['S']} questions asked, or two of one name")
+    names, sizes, ends = stored["trees"].tolist(), stored["sizes"], np.cumsum(stored["sizes"])
+    if ends[-1] != stored.sizes["S"] or len(set(names)) < len(names):
+        raise ValueError(f"trees of {ends[-1]} nodes with {stored.sizes['S']} questions asked, or two of one name")
     trees = {}
     for name, start, end in zip(names, ends - sizes, ends, strict=True):
-        asked, no = found["asked"][start:end], found["no"][start:end]
+        asked, no = stored["asked"][start:end], stored["no"][start:end]
         _check_nodes(asked, no, len(questions))
-        trees[name] = Tree(questions, asked, no, found["frames"][start:end])
+        trees[name] = Tree(questions, asked, no, stored["frames"][start:end])
     return trees
 
 

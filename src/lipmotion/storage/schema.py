@@ -90,8 +90,8 @@ def checked_arrays(arrays: Arrays, table: Mapping[str, ArraySpec], **sizes: int)
     """
     sizes = checked_sizes(arrays, table, **sizes)
     with np.errstate(over="ignore"):
-        found = {name: arrays[name].astype(member.dtype) for name, member in table.items() if name in arrays}
-    return CheckedArrays(found, sizes)
+        values = {name: arrays[name].astype(member.dtype) for name, member in table.items() if name in arrays}
+    return CheckedArrays(values, sizes)
 
 
 def checked_sizes(arrays: Arrays, table: Mapping[str, ArraySpec], **sizes: int) -> dict[str, int]:

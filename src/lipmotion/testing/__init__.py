@@ -1,4 +1,4 @@
-"""For whoever tests or extends lipmotion: checks of the contracts, synthetic examples, the toy corpus."""
+"""Tools for tests and extensions of lipmotion: checks of the contracts, synthetic examples, the toy corpus."""
 
 from lipmotion.testing.check_engine import ENGINE_CHECKS, TrainedEngine, check_engine
 from lipmotion.testing.check_exporter import check_exporter

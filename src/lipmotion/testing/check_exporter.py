@@ -10,7 +10,7 @@ import numpy as np
 from lipmotion.export.base import MotionFormat
 from lipmotion.testing.contract import require
 from lipmotion.testing.examples import example
-from lipmotion.types import Generation, Trace
+from lipmotion.types import Generation, StateTrace
 
 
 def check_exporter(exporter: MotionFormat) -> None:
@@ -22,7 +22,7 @@ def check_exporter(exporter: MotionFormat) -> None:
     >>> check_exporter(MOTION_FORMATS.load("csv"))
     """
     one = example(("m", "aa"))
-    trace = Trace(("state",), np.zeros(len(one.motion.values), np.intp))
+    trace = StateTrace(("state",), np.zeros(len(one.motion.values), np.intp))
     result = Generation(one.motion, np.zeros_like(one.motion.values), one.speech.units, trace)
     exporter.check(one.motion)
     with TemporaryDirectory() as folder:

@@ -2,7 +2,6 @@
 
 from lipmotion.types.audio import Audio
 from lipmotion.types.configuration import Configuration, Rule, option
-from lipmotion.types.each import ParallelMap
 from lipmotion.types.explanation import (
     ChainPosteriors,
     ChainStates,
@@ -13,9 +12,10 @@ from lipmotion.types.explanation import (
     RegressedMean,
 )
 from lipmotion.types.features import FRAME_RATE_HZ, Features, frame_of
-from lipmotion.types.generation import Constraints, Example, Generation, Pin, ReducedVariance, Speech, Trace
+from lipmotion.types.generation import Constraints, Example, Generation, Pin, ReducedVariance, Speech, StateTrace
 from lipmotion.types.motion import EYE_DISTANCE, GREY, WEIGHT, Channel, Motion, check_curves, check_magnitude
-from lipmotion.types.progress import Item, Monitor, Progress, counted, part_of, silent_monitor
+from lipmotion.types.parallel_map import ParallelMap
+from lipmotion.types.progress import Item, Monitor, Progress, silent_monitor, sub_monitor, with_progress
 from lipmotion.types.timeline import Span, Timeline, Unit
 from lipmotion.types.utterance import Track, Utterance
 
@@ -48,16 +48,16 @@ __all__ = [
     "Rule",
     "Span",
     "Speech",
+    "StateTrace",
     "Timeline",
-    "Trace",
     "Track",
     "Unit",
     "Utterance",
     "check_curves",
     "check_magnitude",
-    "counted",
     "frame_of",
     "option",
-    "part_of",
     "silent_monitor",
+    "sub_monitor",
+    "with_progress",
 ]

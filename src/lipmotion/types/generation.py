@@ -26,7 +26,7 @@ class Speech:
     features: Features
     units: Timeline[Unit]
     log_f0: NDArray[np.float32] | None = None
-    said: bool = True
+    units_known: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,7 @@ class Constraints:
 
 
 @dataclass(frozen=True, eq=False)
-class Trace:
+class StateTrace:
     """Which state of the model stood behind each frame.
 
     states : readable names
@@ -97,7 +97,7 @@ class Generation:
     motion: Motion
     spread: NDArray[np.floating[Any]] | ReducedVariance
     units: Timeline[Unit]
-    trace: Trace
+    trace: StateTrace
 
     @property
     def variance(self) -> NDArray[np.floating[Any]]:
@@ -127,7 +127,9 @@ class Generation:
         motion = self.motion.resampled(rate_hz)
         spread = self._spread_at(motion.time_s)
         nearest = np.minimum(np.round(motion.time_s * self.motion.rate_hz).astype(int), len(self.trace.frames) - 1)
-        return replace(self, motion=motion, spread=spread, trace=Trace(self.trace.states, self.trace.frames[nearest]))
+        return replace(
+            self, motion=motion, spread=spread, trace=StateTrace(self.trace.states, self.trace.frames[nearest])
+        )
 
     def _spread_at(self, time_s: NDArray[np.float64]) -> NDArray[np.floating[Any]] | ReducedVariance:
         if isinstance(self.spread, ReducedVariance):

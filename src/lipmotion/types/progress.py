@@ -47,7 +47,7 @@ def silent_monitor(event: Progress | Item) -> None:
     """Report nothing."""
 
 
-def part_of(monitor: Monitor, start: float, stop: float, prefix: str = "") -> Monitor:
+def sub_monitor(monitor: Monitor, start: float, stop: float, prefix: str = "") -> Monitor:
     """Return a monitor for a part of the work: all of it is what lies between the shares ``start`` and ``stop``.
 
     prefix : comes before the name of every stage
@@ -61,7 +61,7 @@ def part_of(monitor: Monitor, start: float, stop: float, prefix: str = "") -> Mo
     return inside
 
 
-def counted(items: Sequence[ItemT], stage: str, monitor: Monitor) -> Iterator[ItemT]:
+def with_progress(items: Sequence[ItemT], stage: str, monitor: Monitor) -> Iterator[ItemT]:
     """Give the items one by one, reporting how many have been dealt with."""
     for number, item in enumerate(items):
         monitor(Progress(stage, number, len(items), number / len(items)))

@@ -127,9 +127,9 @@ def test_the_gaussian_is_the_most_responsible_one(name, row):
             assert explained.stream == model.chains.streams[stream]
             assert explained.responsibility == pytest.approx(weight.max())
             assert (explained.components, explained.density != "") == (len(weight), True)
-            component, place = np.argwhere(weight == weight.max())[0]
+            component, position = np.argwhere(weight == weight.max())[0]
             assert explained.component == component + 1
-            density = inference.lattice.densities[number][place]
+            density = inference.lattice.densities[number][position]
             columns = group.columns[group.streams.index(stream)]
             mean, variance = (
                 x[density, component, columns].astype(float) for x in (group.mixtures.means, group.mixtures.variances)
@@ -169,7 +169,7 @@ def test_shares_of_regressions_are_posteriors_of_the_visual_chain():
         assert found.channels["opening"].value == pytest.approx(opening)
 
 
-def test_in_silence_away_from_speech_the_mean_is_the_pose_at_rest():
+def test_in_silence_away_from_speech_the_mean_is_the_rest_pose():
     model, inference = fitted("ph-vi-CHMM")
     assert model.away_from_speech(inference.posteriors.chains[0])[5]
     (found,) = explanation("ph-vi-CHMM", 5).regressions

@@ -36,7 +36,7 @@ def generated(spoken: Speech, units: str = "eVis", **options: object) -> Generat
 
 def recognised(units: str = "eVis", **options: object) -> Generation:
     """What it makes of sound alone: the phones of another recogniser, which it does not ask."""
-    return generated(replace(SOUND, units=OTHER_WORDS, said=False), units, **options)
+    return generated(replace(SOUND, units=OTHER_WORDS, units_known=False), units, **options)
 
 
 def spans(units: Timeline[Unit]) -> list[tuple[float, float, str]]:
@@ -58,7 +58,7 @@ def test_words_that_are_known_are_not_recognised() -> None:
 
 def test_sound_alone_is_recognised_whatever_another_recogniser_found() -> None:
     one = recognised()
-    other = generated(replace(SOUND, said=False))
+    other = generated(replace(SOUND, units_known=False))
     assert one.motion.values == pytest.approx(other.motion.values, abs=1e-9)
     assert one.units == other.units
 

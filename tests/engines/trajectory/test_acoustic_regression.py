@@ -16,7 +16,7 @@ from lipmotion.types.progress import silent_monitor
 
 HOW = TrajectoryConfig(
     states=3, silent_states=7, components=2, acoustic_components=20, ridge=10.0, ridge_frames=50.0
-).learning
+).training
 
 
 def moments_of(z, r):
@@ -142,7 +142,7 @@ def test_means_follow_the_sound():
 
 def test_rest_does_not_listen():
     model = fit_trajectory(list(loud_and_soft(12)), HOW, silent_monitor)
-    assert model.emission.hearing.rows[-1] == -1
+    assert model.emission.regression.rows[-1] == -1
     rows = np.full(5, len(model.emission.means) - 1)
     means, _ = model.emission.statistics(rows, np.random.default_rng(0).normal(size=(5, 39)), slice(None))
     assert means == pytest.approx(np.repeat(model.emission.means[-1:], 5, axis=0))

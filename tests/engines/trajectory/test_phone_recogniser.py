@@ -72,7 +72,7 @@ def test_a_recording_shorter_than_any_phone_is_left_to_others(listener):
 def test_a_listener_comes_back_from_arrays(listener):
     arrays = module.recogniser_arrays(listener)
     again = module.recogniser_from_arrays(arrays)
-    assert again.typical == listener.typical
+    assert again.training_score == listener.training_score
     spoken = speech(timeline(SENTENCE), seed=3)
     assert phones(again.phones(spoken)) == phones(listener.phones(spoken))
     assert module.recogniser_from_arrays({"means": np.zeros(3)}) is None
@@ -91,7 +91,7 @@ def test_what_was_trained_is_kept(corpus, listener, tmp_path, monkeypatch):
         module.recogniser_arrays(first).values(), module.recogniser_arrays(again).values(), strict=True
     ):
         assert one.tobytes() == two.tobytes()
-    assert module.recogniser_arrays(first)["joint_typical"] == listener.typical
+    assert module.recogniser_arrays(first)["joint_typical"] == listener.training_score
 
 
 def test_the_engine_listens_if_there_is_speech_enough(monkeypatch):

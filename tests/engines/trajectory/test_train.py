@@ -9,7 +9,7 @@ from lipmotion.motion.frame_labels import FullContextState, StateLayout, full_co
 from lipmotion.testing.examples import examples
 from lipmotion.types.progress import silent_monitor
 
-HOW = replace(TrajectoryConfig(states=3, silent_states=7, components=2, acoustic_regression=False).learning)
+HOW = replace(TrajectoryConfig(states=3, silent_states=7, components=2, acoustic_regression=False).training)
 CUT = HOW.layout
 
 

@@ -75,13 +75,13 @@ def shown_by_opentoonz(text: str) -> list[str]:
     return frames
 
 
-@pytest.mark.parametrize(("form", "read"), [("tsv", read_tsv), ("json", read_json), ("xml", read_xml)])
-@pytest.mark.parametrize("name", NAMES)
-def test_what_is_written_is_read(sheet: CueSheet, form: str, read, name: str) -> None:
-    text = CUE_FORMATS[form](sheet, name)
-    assert read(text) == rows(sheet)
-    assert text.isascii()
-    assert text.endswith("\n")
+def test_what_is_written_is_read(sheet: CueSheet) -> None:
+    for form, read in [("tsv", read_tsv), ("json", read_json), ("xml", read_xml)]:
+        for name in NAMES:
+            text = CUE_FORMATS[form](sheet, name)
+            assert read(text) == rows(sheet)
+            assert text.isascii()
+            assert text.endswith("\n")
 
 
 def test_what_opentoonz_shows_in_every_frame(sheet: CueSheet) -> None:
@@ -126,15 +126,15 @@ def test_nothing_is_one_cue_of_no_length(empty: CueSheet) -> None:
     assert read_xml(CUE_FORMATS["xml"](empty, "")) == [(0.0, 0.0, "X")]
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_metadata(sheet: CueSheet, name: str) -> None:
-    document = json.loads(CUE_FORMATS["json"](sheet, name))
-    assert document["metadata"] == {"soundFile": name, "duration": sheet.duration_s}
-    assert list(document) == ["metadata", "mouthCues"]
-    root = ElementTree.fromstring(CUE_FORMATS["xml"](sheet, name))  # noqa: S314
-    assert float(root.findtext("metadata/duration") or "") == sheet.duration_s
-    said = root.findtext("metadata/soundFile") or ""
-    assert said == name.replace("\x07", "\\x07").replace("\x00", "\\x00")
+def test_metadata(sheet: CueSheet) -> None:
+    for name in NAMES:
+        document = json.loads(CUE_FORMATS["json"](sheet, name))
+        assert document["metadata"] == {"soundFile": name, "duration": sheet.duration_s}
+        assert list(document) == ["metadata", "mouthCues"]
+        root = ElementTree.fromstring(CUE_FORMATS["xml"](sheet, name))  # noqa: S314
+        assert float(root.findtext("metadata/duration") or "") == sheet.duration_s
+        said = root.findtext("metadata/soundFile") or ""
+        assert said == name.replace("\x07", "\\x07").replace("\x00", "\\x00")
 
 
 def test_files(sheet: CueSheet, tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import pytest
 
-from lipmotion.export.cues.sheet import cue_sheet, drawn_shapes, frame_count, start_s
+from lipmotion.export.cues.sheet import cue_frame_count, cue_sheet, drawn_shapes, start_s
 
 RATES = [1, 10, 12, 15, 23.976, 24, 25, 29.97, 30, 48, 50, 59.94, 60]
 
@@ -17,20 +17,20 @@ def test_times_in_hundredths_lead_back_to_their_frames(fps: float) -> None:
     assert max(time_s - frame / fps for frame, time_s in enumerate(times_s)) < 0.0201
 
 
-@pytest.mark.parametrize("fps", [rate for rate in RATES if rate < 50])
-def test_rounding_gives_the_same_frames(fps: float) -> None:
+def test_rounding_gives_the_same_frames() -> None:
     """As in the Blender add-ons."""
-    assert [round(fps * start_s(frame, fps)) for frame in range(5_000)] == list(range(5_000))
+    for fps in [rate for rate in RATES if rate < 50]:
+        assert [round(fps * start_s(frame, fps)) for frame in range(5_000)] == list(range(5_000))
 
 
-@pytest.mark.parametrize("fps", RATES)
-@pytest.mark.parametrize("duration_s", [0.0, 0.004, 0.01, 0.04, 0.0417, 0.05, 0.5, 1.0, 2.975, 3.0, 10.009, 60.0])
-def test_the_last_frame_begins_before_the_end(fps: float, duration_s: float) -> None:
-    frames = frame_count(duration_s, fps)
-    sheet = cue_sheet([(frame, "BC"[frame % 2]) for frame in range(frames)], duration_s, fps, "ABCDEF")
-    assert duration_s - 0.01 < sheet.duration_s <= duration_s
-    assert frames == pytest.approx(duration_s * fps, abs=1.7)
-    assert all(cue.start_s < cue.end_s for cue in sheet.cues) or duration_s < 0.01
+def test_the_last_frame_begins_before_the_end() -> None:
+    for fps in RATES:
+        for duration_s in [0.0, 0.004, 0.01, 0.04, 0.0417, 0.05, 0.5, 1.0, 2.975, 3.0, 10.009, 60.0]:
+            frames = cue_frame_count(duration_s, fps)
+            sheet = cue_sheet([(frame, "BC"[frame % 2]) for frame in range(frames)], duration_s, fps, "ABCDEF")
+            assert duration_s - 0.01 < sheet.duration_s <= duration_s
+            assert frames == pytest.approx(duration_s * fps, abs=1.7)
+            assert all(cue.start_s < cue.end_s for cue in sheet.cues) or duration_s < 0.01
 
 
 def test_no_segments_are_rest() -> None:
@@ -42,3 +42,11 @@ def test_no_segments_are_rest() -> None:
 def test_drawn_shapes() -> None:
     assert drawn_shapes("XG") == "ABCDEFGX"
     assert drawn_shapes("") == "ABCDEF"
+
+
+def test_a_time_in_whole_hundredths_is_not_rounded_up() -> None:
+    for fps, hundredths in ((25, 4), (50, 2), (20, 5)):
+        exact = {frame: frame * hundredths / 100 for frame in range(200)}
+        kept = {frame: time_s for frame, time_s in exact.items() if int(fps * time_s) == frame}
+        assert len(kept) > 150
+        assert [start_s(frame, fps) for frame in kept] == pytest.approx(list(kept.values()))

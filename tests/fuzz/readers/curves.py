@@ -15,7 +15,7 @@ from fuzz.readers.plausible import require, short_speech
 from lipmotion.corpora.facegood import read_channels
 from lipmotion.corpora.source_recordings import MotionFile
 from lipmotion.corpora.store import Corpus
-from lipmotion.pipeline.corpus.supplied_motion import given_track
+from lipmotion.pipeline.corpus.supplied_motion import supplied_track
 from lipmotion.types import WEIGHT
 from robustness.case import npy
 from robustness.motion_cases import GOOD
@@ -46,7 +46,7 @@ def read(folder: Path, good: Good) -> None:
     names = folder / NAMES
     path = folder / VALUES if names.exists() else next(folder.iterdir())
     curves = MotionFile(path, RATE_HZ, read_channels(names)) if names.exists() else MotionFile(path)
-    track = given_track(curves, short_speech(good).duration_s)
+    track = supplied_track(curves, short_speech(good).duration_s)
     require(bool(np.isfinite(track.motion.values).all()), "values that are not finite")
     corpus = Corpus.open(good.corpus)
     utterance = replace(corpus.utterance(corpus.names()[0]), track=track)

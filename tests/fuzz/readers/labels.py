@@ -10,7 +10,7 @@ from lipmotion.corpora.grid import read_aligned_words
 from lipmotion.corpora.labels import read_labels
 from lipmotion.corpora.source_recordings import RecordingFolder, SourceRecording
 from lipmotion.corpora.splits import LISTS, assign_splits
-from lipmotion.pipeline.corpus.supplied_motion import given_phones
+from lipmotion.pipeline.corpus.supplied_motion import supplied_phones
 
 LONG = """File type = "ooTextFile"
 Object class = "TextGrid"
@@ -78,6 +78,6 @@ def read(folder: Path, _: Good) -> None:
 
 def _read_labels(path: Path) -> None:
     labels = read_labels(path)
-    phones = given_phones(SourceRecording("a", path, labels.words, phones=labels.phones), LENGTH_S)
+    phones = supplied_phones(SourceRecording("a", path, labels.words, phones=labels.phones), LENGTH_S)
     for span in phones or ():
         require(0 <= span.start_s <= span.end_s <= LENGTH_S, "a phone outside of the sound")

@@ -78,10 +78,10 @@ DAMAGED = [
 ]
 
 
-@pytest.mark.parametrize("changes", DAMAGED, ids=str)
-def test_damaged_arrays_are_refused(changes):
-    with pytest.raises(ModelFormatError, match="damaged"):
-        joint_from_arrays(changed(**changes), HMM.config)
+def test_damaged_arrays_are_refused():
+    for changes in DAMAGED:
+        with pytest.raises(ModelFormatError, match="damaged"):
+            joint_from_arrays(changed(**changes), HMM.config)
 
 
 def test_another_count_of_states_is_refused():

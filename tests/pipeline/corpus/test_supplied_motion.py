@@ -15,8 +15,8 @@ from lipmotion.errors import InputError, MissingDependencyError
 from lipmotion.export.base import write_motion
 from lipmotion.pipeline.corpus import prepare as module
 from lipmotion.pipeline.corpus.prepare import prepare
-from lipmotion.pipeline.corpus.supplied_motion import digest, given_phones, given_track
-from lipmotion.types import Channel, Generation, Motion, Span, Timeline, Trace, Unit
+from lipmotion.pipeline.corpus.supplied_motion import source_digests, supplied_phones, supplied_track
+from lipmotion.types import Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
 from lipmotion.units import is_silent
 
 CHANNELS = (Channel("jaw", "weight"), Channel("brow", "weight"))
@@ -34,7 +34,7 @@ def write_sound(path: Path, seconds: float = 2.0, seed: int = 0) -> None:
 def write_curves(path: Path, seconds: float = 2.0, rate_hz: float = 60.0, seed: int = 0) -> Motion:
     count = int(seconds * rate_hz)
     motion = Motion(np.random.default_rng(seed).uniform(size=(count, 2)), rate_hz, CHANNELS)
-    trace = Trace(("x",), np.zeros(count, int))
+    trace = StateTrace(("x",), np.zeros(count, int))
     write_motion(path, Generation(motion, motion.values, Timeline(()), trace), source={}, model={})
     return motion
 
@@ -105,9 +105,9 @@ def test_what_does_not_fit_is_listed_and_the_rest_goes_on(studio, tmp_path):
 def test_a_bare_array_at_another_rate_is_noticed(tmp_path):
     np.save(tmp_path / "a.npy", np.zeros((50, 2)))
     curves = MotionFile(tmp_path / "a.npy", 30.0, CHANNELS)
-    assert given_track(curves, 1.7).motion.rate_hz == 30
+    assert supplied_track(curves, 1.7).motion.rate_hz == 30
     with pytest.raises(InputError, match=r"50 frames at 30 Hz last 1\.67 s, the sound lasts 5\.00 s"):
-        given_track(curves, 5.0)
+        supplied_track(curves, 5.0)
 
 
 def recording(phones: Timeline[Unit] | None) -> SourceRecording:
@@ -123,13 +123,13 @@ def test_silence_is_named_as_recognition_names_it():
         *[(0.1, 0.2, "sp"), (0.2, 0.4, "aa"), (0.4, 0.5, "sil"), (0.5, 0.7, "m"), (0.7, 0.8, "sp")],
         *[(0.8, 1.0, "sil"), (1.0, 1.2, "b"), (1.2, float("inf"), "sil")],
     )
-    found = given_phones(recording(labelled), 1.3)
+    found = supplied_phones(recording(labelled), 1.3)
     assert found == spans(
         *[(0.0, 0.2, "sil"), (0.2, 0.4, "aa"), (0.4, 0.5, "sp"), (0.5, 0.7, "m"), (0.7, 1.0, "sil")],
         *[(1.0, 1.2, "b"), (1.2, 1.3, "sil")],
     )
-    assert given_phones(recording(None), 1.3) is None
-    assert "phones_sha256" not in digest(recording(None))
+    assert supplied_phones(recording(None), 1.3) is None
+    assert "phones_sha256" not in source_digests(recording(None))
 
 
 @given(
@@ -141,7 +141,7 @@ def test_phones_tile_the_sound(phones, begin_s, longer_s):
     edges = begin_s + np.cumsum([0, *(length for _, length in phones)])
     labelled = spans(*((a, b, p) for a, b, (p, _) in zip(edges, edges[1:], phones, strict=False)))
     duration_s = max(float(edges[-1]) + longer_s, 0.1)
-    found = given_phones(recording(labelled), duration_s)
+    found = supplied_phones(recording(labelled), duration_s)
     assert found is not None
     assert found[0].start_s == 0
     assert found[-1].end_s == pytest.approx(duration_s)
@@ -155,8 +155,8 @@ def test_phones_tile_the_sound(phones, begin_s, longer_s):
 
 def test_labels_that_go_on_after_the_sound():
     with pytest.raises(InputError, match="are they those of another recording"):
-        given_phones(recording(spans((0, 2, "aa"))), 1.8)
-    assert given_phones(recording(spans((0, 2, "aa"))), 1.95) == spans((0, 1.95, "aa"))
+        supplied_phones(recording(spans((0, 2, "aa"))), 1.8)
+    assert supplied_phones(recording(spans((0, 2, "aa"))), 1.95) == spans((0, 1.95, "aa"))
 
 
 @pytest.mark.long
@@ -192,19 +192,19 @@ def test_facegood_from_recordings_to_figures(recordings: Path, tmp_path: Path) -
 
 def test_a_source_is_not_touched(studio):
     item = replace(recording(spans((0, 1, "aa"))), curves=MotionFile(studio / "a.npz"))
-    assert set(digest(item)) == {"motion_file", "motion_sha256", "phones_sha256"}
-    assert digest(item) == digest(item)
-    assert digest(item) != digest(replace(item, phones=spans((0, 1.001, "aa"))))
+    assert set(source_digests(item)) == {"motion_file", "motion_sha256", "phones_sha256"}
+    assert source_digests(item) == source_digests(item)
+    assert source_digests(item) != source_digests(replace(item, phones=spans((0, 1.001, "aa"))))
 
 
 def test_labels_beyond_what_a_recording_holds(tmp_path):
     spans = tuple(Span(i / 1e5, (i + 1) / 1e5, Unit("p")) for i in range(2000))
     recording = SourceRecording("a", tmp_path / "a.wav", None, phones=Timeline(spans))
     with pytest.raises(InputError, match=r"a\.wav: 2000 units in time, required at most 1200 for 2.00 s of sound"):
-        given_phones(recording, 2.0)
+        supplied_phones(recording, 2.0)
 
 
 def test_labels_that_last_no_time(tmp_path):
     recording = SourceRecording("a", tmp_path / "a.wav", None, phones=Timeline((Span(1.0, 1.0, Unit("p")),) * 3))
     with pytest.raises(InputError, match="none of its 3 labels is a phone that lasts longer than 0 s"):
-        given_phones(recording, 2.0)
+        supplied_phones(recording, 2.0)

@@ -16,7 +16,7 @@ from lipmotion.measures.report import figures_table
 from lipmotion.pipeline.evaluation.evaluate import evaluate
 from lipmotion.pipeline.model import Model
 from lipmotion.testing.toy import toy_motion, toy_sentences
-from lipmotion.types import Channel, Generation, Motion, Speech, Timeline, Trace, Unit, Utterance
+from lipmotion.types import Channel, Generation, Motion, Speech, StateTrace, Timeline, Unit, Utterance
 from lipmotion.units import Lexicon
 
 CONDITIONS = ["audio only", "with transcript"]
@@ -33,7 +33,7 @@ class Medium(Engine[Mapping[float, Motion]]):
     def generate(self, model: Mapping[float, Motion], speech: Speech, _constraints: object = None) -> Generation:
         motion = model[speech.features.duration_s]
         frames = np.zeros(len(motion.values), np.intp)
-        return Generation(motion, np.zeros_like(motion.values), speech.units, Trace(("known",), frames))
+        return Generation(motion, np.zeros_like(motion.values), speech.units, StateTrace(("known",), frames))
 
     def fit(self, examples: object, monitor: object) -> Any: ...
     def trees(self, model: object) -> Any: ...

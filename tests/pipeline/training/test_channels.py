@@ -20,7 +20,7 @@ from lipmotion.pipeline.animate import animate, write
 from lipmotion.pipeline.evaluation.conditions import compared_clips, held_out_recordings
 from lipmotion.pipeline.evaluation.evaluate import evaluate
 from lipmotion.pipeline.model import Model, load_model, save_model
-from lipmotion.pipeline.training.channels import BOTH, EIGENLIPS, GEOMETRY, as_learned, learned_eigenlips
+from lipmotion.pipeline.training.channels import BOTH, EIGENLIPS, GEOMETRY, train_eigenlips, with_visual_channels
 from lipmotion.pipeline.training.train import Run, train
 from lipmotion.speech.recogniser import cached_recogniser
 from lipmotion.testing.toy import toy_utterances
@@ -36,7 +36,7 @@ def utterances() -> list[Utterance]:
 
 @pytest.fixture(scope="module")
 def space(utterances: list[Utterance]) -> Eigenlips:
-    return learned_eigenlips(utterances, 4)
+    return train_eigenlips(utterances, 4)
 
 
 @pytest.fixture(scope="module")
@@ -69,23 +69,23 @@ def test_pictures_are_taken_evenly_from_the_frames_that_are_seen(utterances: lis
         kept.append(pictures[seen])
     everything = np.concatenate(kept)
     places = ((np.arange(50) + 0.5) * len(everything) / 50).astype(int)
-    assert np.array_equal(learned_eigenlips(given, 4, 50).basis, fit_eigenlips(everything[places], 4).basis)
+    assert np.array_equal(train_eigenlips(given, 4, 50).basis, fit_eigenlips(everything[places], 4).basis)
 
 
 def test_an_utterance_that_was_never_seen_gives_no_picture(utterances: list[Utterance]) -> None:
     hidden = replace(
         utterances[1], track=replace(utterances[1].track, seen=np.zeros(len(utterances[1].track.seen), bool))
     )
-    some = learned_eigenlips([utterances[0], hidden, utterances[2]], 3)
-    assert np.array_equal(some.basis, learned_eigenlips([utterances[0], utterances[2]], 3).basis)
+    some = train_eigenlips([utterances[0], hidden, utterances[2]], 3)
+    assert np.array_equal(some.basis, train_eigenlips([utterances[0], utterances[2]], 3).basis)
     with pytest.raises(CorpusError, match="no face is seen in 1 utterances; prepare a corpus of videos with faces"):
-        learned_eigenlips([hidden])
+        train_eigenlips([hidden])
 
 
 def test_motion_has_the_channels_that_are_learned(utterances: list[Utterance], space: Eigenlips) -> None:
     one = utterances[0]
-    assert as_learned(one, GEOMETRY, None) is one
-    pictured, both = (as_learned(one, visual, space).track.motion for visual in (EIGENLIPS, BOTH))
+    assert with_visual_channels(one, GEOMETRY, None) is one
+    pictured, both = (with_visual_channels(one, visual, space).track.motion for visual in (EIGENLIPS, BOTH))
     assert pictured.channels == space.channels
     assert np.array_equal(pictured.values, space.project(crops([one])[0]))
     assert both.channels == (*one.track.motion.channels, *space.channels)
@@ -97,13 +97,13 @@ def test_what_is_missing_is_said(utterances: list[Utterance], space: Eigenlips, 
     blind = replace(utterances[0], track=replace(utterances[0].track, crops=None))
     words = f"{blind.name}: no mouth pictures, which eigenlips need; prepare its video again without --no-crops"
     with pytest.raises(CorpusError, match=words):
-        learned_eigenlips([utterances[1], blind])
+        train_eigenlips([utterances[1], blind])
     with pytest.raises(CorpusError, match=words):
-        as_learned(blind, BOTH, space)
+        with_visual_channels(blind, BOTH, space)
     with pytest.raises(InputError, match="visual 'both' without eigenlips"):
-        as_learned(utterances[0], BOTH, None)
+        with_visual_channels(utterances[0], BOTH, None)
     with pytest.raises(InputError, match="visual is 'pixels', required one of: geometry, eigenlips, both"):
-        as_learned(utterances[0], "pixels", None)
+        with_visual_channels(utterances[0], "pixels", None)
     corpus = Corpus.create(tmp_path / "corpus")
     corpus.add(blind)
     with pytest.raises(CorpusError, match=words):
@@ -116,7 +116,7 @@ def test_pictures_of_two_sizes_are_refused(utterances: list[Utterance]) -> None:
     track = utterances[1].track
     small = replace(utterances[1], track=replace(track, crops=np.asarray(track.crops)[:, ::2]))
     with pytest.raises(CorpusError, match="mouth pictures of 2 sizes"):
-        learned_eigenlips([utterances[0], small])
+        train_eigenlips([utterances[0], small])
 
 
 def test_a_model_of_pictures_draws_mouths_it_has_not_seen(models: dict[str, Path], toy_corpus: Corpus) -> None:

@@ -73,7 +73,7 @@ def events_of(corpus: Corpus, work: Path | None = None) -> list[Progress | Item]
 
 @pytest.mark.long
 def test_stopped_after_any_event(corpus: Corpus, work: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(labels, "AT_A_TIME", 2)
+    monkeypatch.setattr(labels, "UTTERANCES_PER_CHECKPOINT", 2)
     whole = content(run(corpus), tmp_path)
     count = len(events_of(corpus))
     assert count > 15
@@ -150,7 +150,7 @@ def test_threads_of_matrix_products_change_nothing(
 ) -> None:
     """Neither this process's own nor those that the processes it starts would use."""
     whole = content(run(corpus), tmp_path)
-    monkeypatch.setattr(module, "FEWEST", 1)
+    monkeypatch.setattr(module, "UTTERANCES_PER_WORKER", 1)
     monkeypatch.setenv("OMP_NUM_THREADS", str(there))
     with threadpool_limits(here, user_api="blas"):
         assert content(train(corpus, recogniser=CONFIG, run=Run(workers=2))[0], tmp_path) == whole
@@ -164,8 +164,8 @@ def test_in_two_processes(
 ) -> None:
     """The model is the same to the bit, stopped or not."""
     whole = content(run(corpus), tmp_path)
-    monkeypatch.setattr(module, "FEWEST", 1)
-    monkeypatch.setattr(labels, "AT_A_TIME", 2)
+    monkeypatch.setattr(module, "UTTERANCES_PER_WORKER", 1)
+    monkeypatch.setattr(labels, "UTTERANCES_PER_CHECKPOINT", 2)
     before = set(multiprocessing.active_children())
     if stop:
         with pytest.raises(Stopped):

@@ -13,8 +13,8 @@ from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.pipeline.model import Model, save_model
 from lipmotion.pipeline.training import train as module
-from lipmotion.pipeline.training.train import Run, labels_of, model_motion, train
-from lipmotion.pipeline.training.voices import Heard
+from lipmotion.pipeline.training.train import Run, model_motion, phones_of, train
+from lipmotion.pipeline.training.voices import VoiceExample
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.recogniser import Recogniser
 from lipmotion.testing.toy import toy_sentences
@@ -86,11 +86,11 @@ def test_untranscribed_utterances_are_recognised_and_used(toy_corpus: Corpus, tm
     model, report = train(mixed, recogniser=SMALL)
     assert report.used == TRAINED
     found = [
-        span.label.phone for span in labels_of(mixed.utterance("toy05"), Recogniser(model.phones, "own"), Lexicon())
+        span.label.phone for span in phones_of(mixed.utterance("toy05"), Recogniser(model.phones, "own"), Lexicon())
     ]
     known = [
         span.label.phone
-        for span in labels_of(toy_corpus.utterance("toy05"), Recogniser(model.phones, "own"), Lexicon())
+        for span in phones_of(toy_corpus.utterance("toy05"), Recogniser(model.phones, "own"), Lexicon())
     ]
     assert np.mean([phone in found for phone in known]) > 0.8
 
@@ -114,7 +114,7 @@ def test_labelled_phones_are_used_as_they_are(
     assert report.used == TRAINED
     assert report.skipped == {}
     assert set(model.phones.table.units) == set(toy_model.phones.table.units)
-    assert labels_of(given[0], Recogniser(model.phones, "own"), Lexicon()) == given[0].phones
+    assert phones_of(given[0], Recogniser(model.phones, "own"), Lexicon()) == given[0].phones
 
 
 @pytest.mark.long
@@ -124,7 +124,7 @@ def test_labelled_and_transcribed_utterances_together(toy_corpus: Corpus, tmp_pa
     assert (report.used, report.skipped) == (TRAINED, {})
     truth = labelled(toy_corpus.utterance("toy11"))
     assert truth.phones is not None
-    heard = [s.label.phone for s in labels_of(replace(truth, phones=None), Recogniser(model.phones, "own"), Lexicon())]
+    heard = [s.label.phone for s in phones_of(replace(truth, phones=None), Recogniser(model.phones, "own"), Lexicon())]
     assert np.mean([span.label.phone in heard for span in truth.phones]) > 0.8
 
 
@@ -230,10 +230,10 @@ def test_camera_frames_become_model_frames() -> None:
     assert not valid[103:].any()  # half a camera frame after the last one
 
 
-def others() -> Iterator[Heard]:
+def others() -> Iterator[VoiceExample]:
     """Two speakers of whom nothing was seen."""
     for number, sentence in enumerate(toy_sentences(4)):
-        yield Heard(mfcc(sentence.audio), sentence.units, ("bert", "anna")[number % 2])
+        yield VoiceExample(mfcc(sentence.audio), sentence.units, ("bert", "anna")[number % 2])
 
 
 def test_voices_of_others_teach_engines_that_have_a_use_for_them(toy_corpus: Corpus) -> None:

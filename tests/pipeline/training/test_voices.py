@@ -14,7 +14,12 @@ import pytest
 from lipmotion.errors import CorpusError, InputError, MissingDependencyError
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.training import voices as module
-from lipmotion.pipeline.training.voices import heard, is_for_judging, many_voices, recorded_voices
+from lipmotion.pipeline.training.voices import (
+    is_held_out_speaker,
+    recorded_sentences,
+    synthetic_sentences,
+    voice_examples,
+)
 from lipmotion.speech.formant_synthesiser import synthesise
 from lipmotion.speech.mfcc import FEATURES
 from lipmotion.speech.noise import spoken_samples
@@ -45,7 +50,7 @@ def spoken(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("spoken")
 def test_every_text_in_every_voice() -> None:
-    sentences = list(many_voices(TEXTS))
+    sentences = list(synthetic_sentences(TEXTS))
     assert [sentence.name for sentence in sentences] == [
         "flite-low-001",
         "flite-low-002",
@@ -53,12 +58,12 @@ def test_every_text_in_every_voice() -> None:
         "flite-high-002",
     ]
     assert [sentence.speaker for sentence in sentences] == ["anna", "anna", "bert", "bert"]
-    assert [s.name for s in many_voices(TEXTS, VOICES[1:])] == ["flite-high-001", "flite-high-002"]
+    assert [s.name for s in synthetic_sentences(TEXTS, VOICES[1:])] == ["flite-high-001", "flite-high-002"]
 
 
 @pytest.mark.usefixtures("spoken")
 def test_sentences_stand_between_pauses_over_a_faint_noise() -> None:
-    for sentence in many_voices(TEXTS):
+    for sentence in synthetic_sentences(TEXTS):
         first, last = sentence.phones[0], sentence.phones[-1]
         assert first.label == last.label == Unit("sil")
         assert (first.start_s, first.end_s) == (0, 0.25)
@@ -74,7 +79,7 @@ def test_sentences_stand_between_pauses_over_a_faint_noise() -> None:
 def test_pauses_of_the_synthesiser_become_longer(monkeypatch: pytest.MonkeyPatch) -> None:
     phones = [("sil", 0.1), ("b", 0.1), ("iy", 0.2), ("sil", 0.2)]
     monkeypatch.setattr(module, "speak_all", lambda *_: iter([synthesise(phones)]))
-    (sentence,) = many_voices(["Bee"], VOICES[:1])
+    (sentence,) = synthetic_sentences(["Bee"], VOICES[:1])
     assert [span.label.phone for span in sentence.phones] == ["sil", "b", "iy", "sil"]
     assert [span.start_s for span in sentence.phones] == pytest.approx([0, 0.35, 0.45, 0.65])
     assert sentence.phones[-1].end_s == pytest.approx(1.1)
@@ -82,15 +87,15 @@ def test_pauses_of_the_synthesiser_become_longer(monkeypatch: pytest.MonkeyPatch
 
 @pytest.mark.usefixtures("spoken")
 def test_the_same_again_shared_or_not() -> None:
-    shared = many_voices(TEXTS, each=lambda function, items: iter([function(item) for item in list(items)]))
-    for one, other in zip(many_voices(TEXTS), shared, strict=True):
+    shared = synthetic_sentences(TEXTS, each=lambda function, items: iter([function(item) for item in list(items)]))
+    for one, other in zip(synthetic_sentences(TEXTS), shared, strict=True):
         assert np.array_equal(one.audio.samples, other.audio.samples)
         assert one.phones == other.phones
 
 
 @pytest.mark.usefixtures("spoken")
 def test_texts_by_default_say_every_phone_of_the_dictionary() -> None:
-    sentences = list(many_voices(voices=VOICES[:1]))
+    sentences = list(synthetic_sentences(voices=VOICES[:1]))
     said = {span.label.phone for sentence in sentences for span in sentence.phones}
     assert len(sentences) == 60
     assert {"er", "hh", "ng", "oy", "sh", "uh", "zh"} <= said
@@ -99,8 +104,8 @@ def test_texts_by_default_say_every_phone_of_the_dictionary() -> None:
 
 @pytest.mark.usefixtures("spoken")
 def test_models_hear_them() -> None:
-    sentences = list(many_voices(TEXTS))
-    for sentence, (features, units, speaker) in zip(sentences, heard(sentences), strict=True):
+    sentences = list(synthetic_sentences(TEXTS))
+    for sentence, (features, units, speaker) in zip(sentences, voice_examples(sentences), strict=True):
         assert features.values.shape == (int(sentence.audio.duration_s * 100 + 1e-9) + 1, FEATURES)
         assert features.values.mean(axis=0) == pytest.approx(np.zeros(FEATURES), abs=1e-4)
         assert units == sentence.phones
@@ -110,16 +115,18 @@ def test_models_hear_them() -> None:
 def test_without_voices_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "installed_voices", lambda: ())
     with pytest.raises(MissingDependencyError, match="apt install flite festival festvox-us-slt-hts espeak-ng"):
-        next(many_voices(TEXTS))
+        next(synthetic_sentences(TEXTS))
 
 
 def test_sides_never_change() -> None:
     named = {"slt": True, "espeak-f2": True, "espeak-m7": True, "kal": False, "awb": False, "rms": False}
-    assert {speaker: is_for_judging(speaker) for speaker in named} == named
+    assert {speaker: is_held_out_speaker(speaker) for speaker in named} == named
 
 
 def test_a_quarter_is_kept_aside() -> None:
-    assert np.mean([is_for_judging(f"speaker {number}") for number in range(2000)]) == pytest.approx(0.25, abs=0.03)
+    assert np.mean([is_held_out_speaker(f"speaker {number}") for number in range(2000)]) == pytest.approx(
+        0.25, abs=0.03
+    )
 
 
 def write(path: Path, audio: Audio, text: str | None = None) -> None:
@@ -153,7 +160,7 @@ def folder(tmp_path: Path) -> Path:
 def test_recordings_are_aligned(folder: Path, own: Recogniser, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "agreement", lambda *_: 0.0)
     told: list[Item] = []
-    sentences = list(recorded_voices(folder, own, monitor=told.append))  # type: ignore[arg-type]
+    sentences = list(recorded_sentences(folder, own, monitor=told.append))  # type: ignore[arg-type]
     assert [(s.name, s.speaker) for s in sentences] == [("anna-one", "anna"), ("two", "two")]
     for sentence, toy in zip(sentences, toy_sentences(3), strict=False):
         assert [span.label for span in sentence.phones] == [span.label for span in toy.units]
@@ -169,7 +176,7 @@ def test_recordings_are_aligned(folder: Path, own: Recogniser, monkeypatch: pyte
 def test_the_caller_knows_who_speaks(folder: Path, own: Recogniser, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "agreement", lambda *_: 0.0)
     given = {"anna-*": "Anna B.", "t*": "Carl"}
-    assert [s.speaker for s in recorded_voices(folder, own, speakers=given)] == ["Anna B.", "Carl"]
+    assert [s.speaker for s in recorded_sentences(folder, own, speakers=given)] == ["Anna B.", "Carl"]
 
 
 def test_other_words_than_those_said_are_noticed(
@@ -177,7 +184,7 @@ def test_other_words_than_those_said_are_noticed(
 ) -> None:
     monkeypatch.setattr(module, "agreement", lambda *_: -4.3)
     told: list[Item] = []
-    assert list(recorded_voices(folder, own, monitor=told.append)) == []  # type: ignore[arg-type]
+    assert list(recorded_sentences(folder, own, monitor=told.append)) == []  # type: ignore[arg-type]
     assert "agree with the sound at -4.3, required -4.2 or more" in {item.name: item.reason for item in told}["two"]
 
 
@@ -185,7 +192,7 @@ def test_other_words_than_those_said_are_noticed(
 def test_a_folder_without_transcripts(tmp_path: Path, own: Recogniser, toy_sentence: ToySentence, name: str) -> None:
     write(tmp_path / "unsaid.wav", toy_sentence.audio)
     with pytest.raises(CorpusError, match="no such folder" if name else "no recording with a transcript"):
-        next(recorded_voices(tmp_path / name, own))
+        next(recorded_sentences(tmp_path / name, own))
 
 
 @pytest.mark.recordings
@@ -195,7 +202,7 @@ def test_real_recordings(recordings: Path, toy_model: Model) -> None:
         pytest.skip("speech-open is not here")
     told: list[Item] = []
     general = Recogniser(toy_model.phones, "general")
-    sentences = list(recorded_voices(folder, general, speakers={"sense_*": "reader"}, monitor=told.append))  # type: ignore[arg-type]
+    sentences = list(recorded_sentences(folder, general, speakers={"sense_*": "reader"}, monitor=told.append))  # type: ignore[arg-type]
     assert len(sentences) == 11
     assert sum(s.speaker == "reader" for s in sentences) == 5
     assert sorted(item.name for item in told) == ["13697_11991_000000", "common_voice_ja_24511055"]
@@ -206,7 +213,7 @@ def test_real_voices() -> None:
     voices = installed_voices()[-1:]
     if not voices:
         pytest.skip("the synthesisers have no voices")
-    (sentence,) = many_voices(["My baby may be home."], voices)
+    (sentence,) = synthetic_sentences(["My baby may be home."], voices)
     closed = [span.label.phone for span in sentence.phones if span.label.phone in ("m", "b")]
     assert closed == list("mbbmbm")
     assert sentence.phones[0].duration_s >= 0.25
@@ -218,4 +225,4 @@ def test_input_errors_come_through(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(module, "speak_all", fail)
     with pytest.raises(InputError, match="flite failed"):
-        list(many_voices(TEXTS, VOICES))
+        list(synthetic_sentences(TEXTS, VOICES))

@@ -1,1 +1,1 @@
-"""Chains of hidden states that may run apart, speech in one and lips in another (Xie & Liu 2007)."""
+"""Coupled hidden Markov models of speech and lips, and EM conversion from one to the other (Xie & Liu 2007)."""

@@ -45,10 +45,10 @@ Array = NDArray[np.float64]
 @final
 @dataclass(frozen=True)
 class CoupledEngine(Engine[CoupledModel]):
-    """Chains of hidden states for speech and lips, coupled, made motion by expectation over all of their paths.
+    """Coupled hidden Markov models of speech and lips; motion is generated from expectations over all paths.
 
-    Source: Xie & Liu 2007. Beyond the paper: the visual chain emits slope and curvature as well, and its expected
-    precisions and means go through parameter generation (``conversion = trajectory``).
+    Source: Xie & Liu 2007. Beyond the paper: the visual chain also emits slope and curvature (Δ, Δ²), and motion comes
+    from its expected precisions and means by parameter generation (``conversion = trajectory``).
     """
 
     config: CoupledConfig

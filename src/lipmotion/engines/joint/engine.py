@@ -22,7 +22,7 @@ from lipmotion.hmm.multistream.recognise import joint_recogniser
 from lipmotion.hmm.multistream.streams import MOTION, StreamObservations, StreamWeights, stream_observations
 from lipmotion.hmm.multistream.train import TrainingUtterance, train_joint
 from lipmotion.motion.arrays import MOTION_ARRAYS, motion_arrays, motion_from_arrays
-from lipmotion.motion.closure import Closure, fit_closure_of
+from lipmotion.motion.closure import Closure, fit_closure
 from lipmotion.motion.frame_labels import with_unit_names
 from lipmotion.motion.generation import LearnedMotion, Statistics
 from lipmotion.motion.limits import MotionLimits, check_poses, limits_of
@@ -37,8 +37,8 @@ from lipmotion.types import (
     Monitor,
     Rule,
     Speech,
+    StateTrace,
     Timeline,
-    Trace,
     Unit,
     option,
 )
@@ -122,7 +122,7 @@ class JointModel:
     @cached_property
     def limits(self) -> MotionLimits:
         """Between which values motion lies."""
-        return self.poses.widened(self.hmm.models[MOTION].scale.deviation[: self.space.dimensions])
+        return self.poses.extended(self.hmm.models[MOTION].scale.deviation[: self.space.dimensions])
 
     @cached_property
     def motion(self) -> LearnedMotion:
@@ -168,7 +168,7 @@ class JointEngine(Engine[JointModel]):
             raise CorpusError(f"nothing is said in {len(examples)} examples; learn from speech")
         inventory = Inventory(units.units, units.silence[:1] + _also_silent(units), self.config.states)
         hmm = train_joint(utterances, inventory, units.classes(), self.config.joint, monitor)
-        closure = fit_closure_of(space.direct_names, values, examples)
+        closure = fit_closure(space.direct_names, values, examples)
         figures = {f"leaves_{name}": float(part.forest.size) for name, part in hmm.models.items()}
         frames = sum(int(example.valid.sum()) for example in examples)
         return Fit(JointModel(units, space, hmm, closure), {"frames": frames, **figures})
@@ -178,7 +178,7 @@ class JointEngine(Engine[JointModel]):
 
     def generate(self, model: JointModel, speech: Speech, constraints: Constraints | None = None) -> Generation:  # noqa: D102
         observed = self._observed(speech)
-        if self.config.recognise_units and not speech.said:
+        if self.config.recognise_units and not speech.units_known:
             spoken, paths = self._recognised(model, observed, speech.features.duration_s)
         else:
             spoken, paths = speech.units, [_aligned(model, observed, speech.units)]
@@ -194,13 +194,13 @@ class JointEngine(Engine[JointModel]):
             spoken,
             constraints,
             close=self.config.closures,
-            closing_units=model.units.within(LIP_CLOSING),
+            closing_units=model.units.units_within(LIP_CLOSING),
         )
         return Generation(
             motion,
             variance,
             with_unit_names(spoken, model.units),
-            Trace(_sources(model.hmm, paths[0]), paths[0].frames),
+            StateTrace(_sources(model.hmm, paths[0]), paths[0].frames),
         )
 
     def describe(self, model: JointModel) -> str:  # noqa: D102

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.trajectory.emission import AcousticRegression, Emission, add_acoustic_regression
-from lipmotion.engines.trajectory.training_data import TrainingClip, TrainingOptions, rows_of
+from lipmotion.engines.trajectory.training_data import TrainingClip, TrainingOptions, density_rows
 from lipmotion.motion.context_window import AcousticContext, fit_acoustic_context
 from lipmotion.stats.regression import (
     RegressionStatistics,
@@ -42,7 +42,7 @@ def fit_acoustic_regression(emission: Emission, observed: Sequence[TrainingClip]
     coefficients, index = _coefficients(emission, moments, how)
     rows = np.array([-1 if key is None else index[key] for key in owners], np.int32)
     hearing = AcousticRegression(window, coefficients, rows)
-    return replace(emission, hearing=hearing, variances=_variances(emission, hearing, observed, how))
+    return replace(emission, regression=hearing, variances=_variances(emission, hearing, observed, how))
 
 
 _Key = tuple[str, int]
@@ -70,7 +70,7 @@ def _frames(
     keys, of_row = list(numbers), np.array([numbers[key] for key in owners])
     for start in range(0, len(observed), AT_A_TIME):
         block = observed[start : start + AT_A_TIME]
-        rows = np.concatenate([rows_of(emission, one.seen_places, how.layout) for one in block])
+        rows = np.concatenate([density_rows(emission, one.training_states, how.layout) for one in block])
         z = np.concatenate([window(one.features, one.frames) for one in block])
         error = np.concatenate([one.rows for one in block]) - emission.means[rows]
         order = np.argsort(of_row[rows], kind="stable")
@@ -101,9 +101,9 @@ def _variances(
     """Return the variances around means that follow the sound, shrunk towards those of all frames together."""
     squares, counts = np.zeros(emission.means.shape), np.zeros(len(emission.means))
     for one in observed:
-        rows = rows_of(emission, one.seen_places, how.layout)
+        rows = density_rows(emission, one.training_states, how.layout)
         means = emission.means[rows].astype(float)
-        add_acoustic_regression(means, hearing, rows, hearing.window(one.features, one.frames))
+        add_acoustic_regression(means, hearing, rows, hearing.context(one.features, one.frames))
         np.add.at(squares, rows, np.square(one.rows - means))
         np.add.at(counts, rows, 1)
     return _shrunk(emission, squares, counts, how.variance_shrinkage)

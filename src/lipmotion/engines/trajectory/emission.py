@@ -28,7 +28,7 @@ class AcousticRegression:
     rows         : int array [shape=(L,)], the coefficients of each density; -1 marks one that does not listen
     """
 
-    window: AcousticContext
+    context: AcousticContext
     coefficients: NDArray[np.float32]
     rows: NDArray[np.int32]
 
@@ -45,7 +45,7 @@ class Emission:
     forest: Mapping[str, Tree]
     means: NDArray[np.float32]
     variances: NDArray[np.float32]
-    hearing: AcousticRegression | None
+    regression: AcousticRegression | None
 
     @cached_property
     def _first(self) -> dict[str, int]:
@@ -81,8 +81,8 @@ class Emission:
         features : of the whole recording;  heard : the frames of it that are meant
         """
         means, precisions = self.means[rows].astype(float), 1 / self.variances[rows].astype(float)
-        if self.hearing is not None:
-            add_acoustic_regression(means, self.hearing, rows, self.hearing.window(features, heard))
+        if self.regression is not None:
+            add_acoustic_regression(means, self.regression, rows, self.regression.context(features, heard))
         return means, precisions
 
 
@@ -102,12 +102,12 @@ def emission_arrays(emission: Emission) -> dict[str, NDArray[Any]]:
         "means": emission.means.astype(np.float16),
         "variances": emission.variances,
     }
-    if emission.hearing is not None:
-        window = emission.hearing.window
+    if emission.regression is not None:
+        window = emission.regression.context
         arrays |= {
             **acoustic_context_arrays(window),
-            "coefficients": emission.hearing.coefficients.astype(np.float16),
-            "coefficient_rows": emission.hearing.rows,
+            "coefficients": emission.regression.coefficients.astype(np.float16),
+            "coefficient_rows": emission.regression.rows,
         }
     return arrays
 

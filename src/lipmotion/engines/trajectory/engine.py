@@ -25,8 +25,8 @@ from lipmotion.types import (
     Monitor,
     Rule,
     Speech,
+    StateTrace,
     Timeline,
-    Trace,
     Unit,
     option,
 )
@@ -93,7 +93,7 @@ class TrajectoryConfig(Configuration):
         return StateLayout(self.states, self.silent_states, self.edge_s, units)
 
     @property
-    def learning(self) -> TrainingOptions:
+    def training(self) -> TrainingOptions:
         """The options of training. Raises InputError: no such unit set, or a table that is wrong."""
         names = {field.name for field in fields(TrainingOptions)} - {"layout"}
         return TrainingOptions(self.layout(unit_set(self.units)), **{name: getattr(self, name) for name in names})
@@ -119,7 +119,7 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
     def fit(  # noqa: D102
         self, examples: Sequence[Example], monitor: Monitor, checkpoint: Checkpoint = NO_CHECKPOINT
     ) -> Fit[TrajectoryModel]:
-        model = fit_trajectory(examples, self.config.learning, monitor, checkpoint)
+        model = fit_trajectory(examples, self.config.training, monitor, checkpoint)
         frames = sum(int(example.valid.sum()) for example in examples)
         return Fit(model, {"frames": frames, "leaves": len(model.emission.means)})
 
@@ -148,7 +148,7 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
             motion,
             variance,
             with_unit_names(speech.units, model.units),
-            Trace(tuple(model.emission.source(state, layout) for state in distinct), path),
+            StateTrace(tuple(model.emission.source(state, layout) for state in distinct), path),
         )
 
     def describe(self, model: TrajectoryModel) -> str:  # noqa: D102

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from lipmotion.engines.trajectory.emission import EMISSION, Emission, emission_arrays, emission_from_arrays
 from lipmotion.engines.trajectory.phone_recogniser import (
-    LISTENER,
+    JOINT_PREFIX,
     OwnPhoneRecogniser,
     recogniser_arrays,
     recogniser_from_arrays,
@@ -50,7 +50,7 @@ class TrajectoryModel:
     @cached_property
     def limits(self) -> MotionLimits:
         """Limits of plausible motion."""
-        return self.poses.widened(np.sqrt(self.emission.variances[:, 0].max(axis=0)))
+        return self.poses.extended(np.sqrt(self.emission.variances[:, 0].max(axis=0)))
 
     @cached_property
     def motion(self) -> LearnedMotion:
@@ -79,7 +79,9 @@ def model_from_arrays(arrays: Arrays, layout: Callable[[UnitSet], StateLayout], 
     Raises ModelFormatError: something is missing, undeclared, out of place or out of range.
     """
     with format_errors("the trajectory model"):
-        refuse_undeclared(arrays, MOTION_ARRAYS, EMISSION, GAIN, (name for name in arrays if name.startswith(LISTENER)))
+        refuse_undeclared(
+            arrays, MOTION_ARRAYS, EMISSION, GAIN, (name for name in arrays if name.startswith(JOINT_PREFIX))
+        )
         of, space, closure = motion_from_arrays(arrays, units)
         emission = emission_from_arrays(arrays, layout(of), space.dimensions)
         gain = checked_arrays(arrays, GAIN, Q=space.dimensions)["gain"]

@@ -28,13 +28,13 @@ LEAST_MINUTES = 8.0
 """With less speech to learn from, the phones are found better with the help of the models of many voices."""
 LONGEST_S = 120.0
 """Longer recordings are left to the other recogniser, which works block by block."""
-FAMILIAR = -6.0
+SIMILARITY_MARGIN = -6.0
 """A voice is known whose sound the model explains at most this much worse than its training data (mean log density of a
 frame under what fits it best). GRID's s1 in other recordings: -6 to 2; five others of the same studio: -9 to -7."""
-HEARD_FRAMES = 400
+SIMILARITY_FRAMES = 400
 """So many frames, spread evenly, tell whether a voice is known."""
-_STAGE = "joint"
-LISTENER = "joint_"
+_CHECKPOINT = "joint"
+JOINT_PREFIX = "joint_"
 """What the names of its arrays begin with."""
 TYPICAL = {"typical": ArraySpec(np.float64, "1", -1e6, 1e6)}
 
@@ -47,7 +47,7 @@ class OwnPhoneRecogniser:
     """
 
     hmm: JointHmm
-    typical: float
+    training_score: float
 
     def phones(self, speech: Speech) -> Timeline[Unit] | None:
         """Return the phones that were most probably said; None where the voice is not known, or the recording too long.
@@ -56,7 +56,11 @@ class OwnPhoneRecogniser:
         """
         observed = _observed(speech)
         long = observed.frames > LONGEST_S * FRAME_RATE_HZ
-        if long or not speech.features.values.any() or _fit(self.hmm, observed) < self.typical + FAMILIAR:
+        if (
+            long
+            or not speech.features.values.any()
+            or _fit(self.hmm, observed) < self.training_score + SIMILARITY_MARGIN
+        ):
             return None
         try:
             found = joint_recogniser(self.hmm).recognise(observed)
@@ -76,7 +80,7 @@ def fit_phone_recogniser(
     spoken_s = sum(s.duration_s for e in examples for s in e.speech.units if not is_silent(s.label.phone))
     if spoken_s < 60 * LEAST_MINUTES:
         return None
-    kept = checkpoint.load(_STAGE)
+    kept = checkpoint.load(_CHECKPOINT)
     if kept is None:
         hmm = train_joint(
             [_transcribed(example, x) for example, x in zip(examples, values, strict=True)],
@@ -86,20 +90,20 @@ def fit_phone_recogniser(
             monitor,
         )
         kept = joint_arrays(hmm, np.float32)
-        checkpoint.save(_STAGE, kept)
+        checkpoint.save(_CHECKPOINT, kept)
     hmm = joint_from_arrays(kept, CONFIG)
     return OwnPhoneRecogniser(hmm, float(np.mean([_fit(hmm, _observed(example.speech)) for example in examples])))
 
 
 def recogniser_arrays(listener: OwnPhoneRecogniser) -> dict[str, NDArray[Any]]:
     """Return a listener as arrays, at half precision."""
-    arrays = joint_arrays(listener.hmm) | {"typical": np.array([listener.typical])}
-    return {f"{LISTENER}{name}": array for name, array in arrays.items()}
+    arrays = joint_arrays(listener.hmm) | {"typical": np.array([listener.training_score])}
+    return {f"{JOINT_PREFIX}{name}": array for name, array in arrays.items()}
 
 
 def recogniser_from_arrays(arrays: Arrays) -> OwnPhoneRecogniser | None:
     """Return it again, or None. Raises ModelFormatError, KeyError, ValueError: something is missing or damaged."""
-    own = arrays_under(arrays, LISTENER)
+    own = arrays_under(arrays, JOINT_PREFIX)
     if not own:
         return None
     (typical,) = checked_arrays(own, TYPICAL)["typical"].tolist()
@@ -124,6 +128,6 @@ def _fit(hmm: JointHmm, observed: StreamObservations) -> float:
     """Return the mean log density of some frames' features, each under the leaf that fits it best."""
     part = hmm.models[SPEECH]
     rows = hmm.standardise(observed, hmm.config.recognition)[SPEECH]
-    chosen = rows[np.linspace(0, len(rows) - 1, min(len(rows), HEARD_FRAMES)).astype(int)]
+    chosen = rows[np.linspace(0, len(rows) - 1, min(len(rows), SIMILARITY_FRAMES)).astype(int)]
     leaves = np.arange(part.forest.size)
     return float(part.tied.log_density(chosen, leaves, part.scale.log_determinant).max(axis=1).mean())

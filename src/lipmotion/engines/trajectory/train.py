@@ -11,17 +11,17 @@ from lipmotion.engines.trajectory.acoustic_regression import fit_acoustic_regres
 from lipmotion.engines.trajectory.emission import Emission
 from lipmotion.engines.trajectory.model import TrajectoryModel
 from lipmotion.engines.trajectory.phone_recogniser import fit_phone_recogniser
-from lipmotion.engines.trajectory.training_data import TrainingClip, TrainingOptions, rows_of
+from lipmotion.engines.trajectory.training_data import TrainingClip, TrainingOptions, density_rows
 from lipmotion.errors import CorpusError
 from lipmotion.kernels.banded import generate
-from lipmotion.motion.closure import fit_closure_of
+from lipmotion.motion.closure import fit_closure
 from lipmotion.motion.frame_labels import FullContextState, StateLayout, full_context_states
 from lipmotion.motion.space import fit_reduced_motion
 from lipmotion.motion.variance_scaling import scaling_factors
 from lipmotion.stats.delta_windows import dynamics_known, with_dynamics
 from lipmotion.stats.trees import Question, Tree, gaussian_log_likelihood, grow_tree
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
-from lipmotion.types import Example, Monitor, Progress, part_of
+from lipmotion.types import Example, Monitor, Progress, sub_monitor
 
 Array = NDArray[np.float64]
 LEAST_VARIANCE_SHARE, LEAST_VARIANCE = 1e-3, 1e-12
@@ -38,11 +38,11 @@ def fit_trajectory(
     space, values = fit_reduced_motion(examples, how.components)
     listener = None
     if how.joint_recogniser:
-        listener = fit_phone_recogniser(examples, values, part_of(monitor, 0, 0.8), checkpoint)
-    monitor = part_of(monitor, 0.8, 1)
+        listener = fit_phone_recogniser(examples, values, sub_monitor(monitor, 0, 0.8), checkpoint)
+    monitor = sub_monitor(monitor, 0.8, 1)
     observed = [training_clip(example, x, how.layout) for example, x in zip(examples, values, strict=True)]
     quiet = how.layout.units.silence
-    covered = {how.layout.name(place) for one in observed for place in one.seen_places if place.unit not in quiet}
+    covered = {how.layout.name(place) for one in observed for place in one.training_states if place.unit not in quiet}
     if len(covered) < how.layout.speech:
         raise CorpusError(
             f"motion was seen in {len(covered)} of {how.layout.speech} parts of a phone; learn from more speech"
@@ -54,7 +54,7 @@ def fit_trajectory(
         emission = fit_acoustic_regression(emission, observed, how)
     gain = _scaling(emission, observed, how)
     monitor(Progress(_STAGE, 3, 3, 1.0))
-    closure = fit_closure_of(space.direct_names, values, examples)
+    closure = fit_closure(space.direct_names, values, examples)
     return TrajectoryModel(how.layout.units, space, emission, gain, closure, listener)
 
 
@@ -67,7 +67,9 @@ def _scaling(emission: Emission, observed: Sequence[TrainingClip], how: Training
     for one in observed:
         if len(one.frames) < 2:
             continue
-        means, precisions = emission.statistics(rows_of(emission, one.places, how.layout), one.features, slice(None))
+        means, precisions = emission.statistics(
+            density_rows(emission, one.states, how.layout), one.features, slice(None)
+        )
         recorded.append(one.rows[:, 0].std(axis=0))
         generated.append(generate(means, precisions)[0][one.frames].std(axis=0))
     return scaling_factors(recorded, generated) if recorded else np.ones(emission.means.shape[2])
@@ -85,7 +87,7 @@ def training_clip(example: Example, values: Array, layout: StateLayout) -> Train
 def _tied(observed: Sequence[TrainingClip], how: TrainingOptions) -> Emission:
     """Return the Gaussians of all leaves: each mean and variance is drawn towards that of the node above it."""
     moving = np.concatenate(
-        [one.rows[[place != how.layout.rest for place in one.seen_places]] for one in observed], dtype=np.float64
+        [one.rows[[place != how.layout.rest for place in one.training_states]] for one in observed], dtype=np.float64
     )
     centre, overall = moving.mean(axis=0), moving.var(axis=0)
     least = np.maximum(LEAST_VARIANCE_SHARE * overall, LEAST_VARIANCE)
@@ -129,7 +131,7 @@ def _grouped(
     grouped: dict[str, _Contexts] = {name: {} for name in layout.names}
     for one in observed:
         index: dict[FullContextState, list[int]] = {}
-        for number, place in enumerate(one.seen_places):
+        for number, place in enumerate(one.training_states):
             index.setdefault(place, []).append(number)
         for place, numbers in index.items():
             if place == layout.rest:
@@ -167,7 +169,7 @@ def _rest(
     What the mouth did there (breath, a lick of the lips) is no speech.
     """
     poses = [
-        one.rows[number, 0] for one in observed for number, p in enumerate(one.seen_places) if p == how.layout.rest
+        one.rows[number, 0] for one in observed for number, p in enumerate(one.training_states) if p == how.layout.rest
     ]
     if not poses:
         return fallback, overall

@@ -53,17 +53,17 @@ class TrainingClip:
     """
 
     features: NDArray[np.float32]
-    places: list[FullContextState]
+    states: list[FullContextState]
     frames: NDArray[np.intp]
     rows: NDArray[np.float32]
 
     @property
-    def seen_places(self) -> list[FullContextState]:
+    def training_states(self) -> list[FullContextState]:
         """What is said in the frames that were seen [length N]."""
-        return [self.places[frame] for frame in self.frames]
+        return [self.states[frame] for frame in self.frames]
 
 
-def rows_of(emission: Emission, where: Sequence[FullContextState], layout: StateLayout) -> NDArray[np.intp]:
+def density_rows(emission: Emission, where: Sequence[FullContextState], layout: StateLayout) -> NDArray[np.intp]:
     """Return the density of each place [shape=(len(where),)]."""
     distinct = {place: emission.row(place, layout) for place in dict.fromkeys(where)}
     return np.array([distinct[place] for place in where], np.intp)

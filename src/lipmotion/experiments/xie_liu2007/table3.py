@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.errors import InputError
 from lipmotion.experiments.comparison import ClipStatistic, correlation_statistic, distance_statistic, opening_curves
-from lipmotion.experiments.learning_curve import check_training_names, checked_sizes
+from lipmotion.experiments.learning_curve import check_training_names, training_sizes
 from lipmotion.experiments.noise import recordings_in_noise
 from lipmotion.experiments.runner import (
     DEFAULT_SETTINGS,
@@ -136,7 +136,7 @@ def table3(
     listed = tuple(order) if order is not None else shuffled(corpus.required("train"), seed)
     held_out, validation = corpus.required(split), corpus.required("val") if len(mixtures) > 1 else ()
     check_training_names(corpus, listed, (*held_out, *validation))
-    steps = checked_sizes(sizes if sizes is not None else [len(listed)], len(listed))
+    steps = training_sizes(sizes if sizes is not None else [len(listed)], len(listed))
     setup = _TrainingSetup(corpus, names, held_out, validation, options, settings)
     if options.visual != EIGENLIPS:
         channels_with_opening(corpus, held_out)  # before the long work

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from lipmotion.export.cues.costs import frame_costs
 from lipmotion.export.cues.shapes import OPTIONAL, SHAPES, drawn_shape
-from lipmotion.export.cues.sheet import CueSheet, cue_sheet, drawn_shapes, frame_count
+from lipmotion.export.cues.sheet import CueSheet, cue_frame_count, cue_sheet, drawn_shapes
 from lipmotion.kernels.segments import best_segments
 from lipmotion.types import Generation
 
@@ -34,7 +34,7 @@ def choose_cues(
     """
     motion, drawn = generation.motion, drawn_shapes(optional)
     duration_s = max(0.0, (len(motion.values) - 1) / motion.rate_hz, *(span.end_s for span in generation.units))
-    frames = frame_count(duration_s, fps)
+    frames = cue_frame_count(duration_s, fps)
     cost = _costs_of_drawn_shapes(frame_costs(generation, frames, fps), drawn) if frames else np.empty((0, len(drawn)))
     segments = best_segments(cost, hold_frames or default_hold_frames(fps), CHANGE)
     return cue_sheet([(frame, drawn[label]) for frame, label in segments], duration_s, fps, drawn)

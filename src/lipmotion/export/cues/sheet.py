@@ -50,7 +50,7 @@ def start_s(frame: int, fps: float) -> float:
     return (hundredths + (int(fps * (hundredths / 100)) < frame)) / 100
 
 
-def frame_count(duration_s: float, fps: float) -> int:
+def cue_frame_count(duration_s: float, fps: float) -> int:
     """Return the number of frames that begin before the end, which is cut to hundredths of a second."""
     end_s = whole_hundredths(duration_s)
     frames = int(np.ceil(end_s * fps))

@@ -54,15 +54,15 @@ def align(
     states = triphone_states(hmm.inventory, units)
     streams = hmm.standardise(observed, weights)
     log_density = hmm.log_density(streams, hmm.leaves(states.triphones), weights)
-    kept = np.arange(len(states.monophones))
+    chosen = np.arange(len(states.monophones))
     if bounds is not None:
         _check_bounds(bounds, len(units), observed.frames)
-        kept = _states_that_fit(states, np.diff(bounds))
+        chosen = _states_that_fit(states, np.diff(bounds))
         first, end = bounds[states.positions], bounds[states.positions + 1]
         time = np.arange(observed.frames)[:, None]
         log_density[(time < first) | (time >= end)] = -np.inf
-    _check_room(len(units), len(kept), observed.frames)
-    return StatePath(states, kept[_best_path(hmm, log_density[:, kept], states.monophones[kept])])
+    _check_room(len(units), len(chosen), observed.frames)
+    return StatePath(states, chosen[_best_path(hmm, log_density[:, chosen], states.monophones[chosen])])
 
 
 def _check_room(units: int, states: int, frames: int) -> None:
@@ -80,12 +80,12 @@ def _check_bounds(bounds: NDArray[np.intp], units: int, frames: int) -> None:
 
 def _states_that_fit(states: TriphoneStates, lengths: NDArray[np.intp]) -> NDArray[np.intp]:
     """Return the numbers of the states on the path: of a unit with fewer frames than states, one for each frame."""
-    kept = []
+    chosen = []
     for position, length in enumerate(lengths.tolist()):
         of_unit = np.flatnonzero(states.positions == position)
         count = min(length, len(of_unit))
-        kept.append(of_unit[(2 * np.arange(count) + 1) * len(of_unit) // (2 * max(count, 1))])
-    return np.concatenate(kept)
+        chosen.append(of_unit[(2 * np.arange(count) + 1) * len(of_unit) // (2 * max(count, 1))])
+    return np.concatenate(chosen)
 
 
 def _best_path(hmm: JointHmm, log_density: NDArray[np.float64], monophones: NDArray[np.intp]) -> NDArray[np.intp]:

@@ -73,10 +73,10 @@ def joint_from_arrays(arrays: Arrays, config: JointConfig) -> JointHmm:
             raise ValueError("silence did not occur in training")
         if SPEECH not in streams or not set(streams) <= set(STREAMS) or len(set(streams)) < len(streams):
             raise ValueError(f"streams {streams}")
-        found = checked_arrays(arrays, TIMES, U=len(units), R=len(inventory.monophones))
+        stored = checked_arrays(arrays, TIMES, U=len(units), R=len(inventory.monophones))
         models = {name: _stream_model(name, arrays_under(arrays, f"{name}/"), inventory) for name in streams}
-        bigram = bigram_from_array(units, found["bigram"])
-        return JointHmm(config, inventory, models, found["log_stay"], found["durations"], spoken, bigram)
+        bigram = bigram_from_array(units, stored["bigram"])
+        return JointHmm(config, inventory, models, stored["log_stay"], stored["durations"], spoken, bigram)
     except (KeyError, ValueError, TypeError, IndexError, OverflowError) as error:
         raise ModelFormatError(f"the joint model is damaged ({error}); train or download it again") from error
 
@@ -111,10 +111,10 @@ def _stream_model(name: str, arrays: Arrays, inventory: Inventory) -> StreamMode
         forest = Forest(inventory, trees_from_arrays(arrays))
         if list(forest.trees) != list(inventory.trees):
             raise ValueError(f"trees {' '.join(forest.trees)}, required {' '.join(inventory.trees)}")
-        found = checked_arrays(arrays, table, G=forest.size)
-        if name == MOTION and found.sizes["D"] % 3:
-            raise ValueError(f"{found.sizes['D']} dimensions")
-        tied = TiedDensities(mixtures_from_arrays(found), found.arrays.get("voiced"))
-        return StreamModel(StreamScale(found["mean"], found["deviation"]), forest, tied)
+        stored = checked_arrays(arrays, table, G=forest.size)
+        if name == MOTION and stored.sizes["D"] % 3:
+            raise ValueError(f"{stored.sizes['D']} dimensions")
+        tied = TiedDensities(mixtures_from_arrays(stored), stored.arrays.get("voiced"))
+        return StreamModel(StreamScale(stored["mean"], stored["deviation"]), forest, tied)
     except (KeyError, ValueError) as error:
         raise ValueError(f"{name}: {error}") from error

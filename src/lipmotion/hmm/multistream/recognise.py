@@ -140,8 +140,8 @@ def _loop_states(hmm: JointHmm) -> _LoopStates:
     rows = np.stack([leaves_of_all[name] for name in acoustic], axis=1)
     monophones = np.array([inventory.monophones[context[1], state] for context, state in triphones], np.intp)
     different = np.flatnonzero((rows[len(plain) :] != rows[monophones]).any(axis=1))
-    kept = np.concatenate([rows[: len(plain)], rows[len(plain) + different]])
-    distinct, column = np.unique(kept, axis=0, return_inverse=True)
+    combinations = np.concatenate([rows[: len(plain)], rows[len(plain) + different]])
+    distinct, column = np.unique(combinations, axis=0, return_inverse=True)
     leaves = {name: distinct[:, number] for number, name in enumerate(acoustic)}
     return _LoopStates(table.extended(tuple(names[i] for i in different)), leaves, column.reshape(-1))
 

@@ -18,13 +18,13 @@ Array = NDArray[np.float64]
 def generate(mean: Array, precision: Array) -> tuple[Array, Array]:
     """Return trajectory and variance [shape=(T, P)]; see ``kernels.banded.generate``."""
     T, _, P = mean.shape
-    values, variance, lower1, lower2, held = _room(T, P)
+    values, variance, lower1, lower2, previous = _room(T, P)
     bands = np.empty((4, 1, P))
     main, first, second, right = bands
     for t in range(T):
         _assemble(mean, precision, t, bands)
-        _eliminate(main, first, second, right, 0, t, values, variance, lower1, lower2, held)
-    _substitute(values, variance, lower1, lower2, held)
+        _eliminate(main, first, second, right, 0, t, values, variance, lower1, lower2, previous)
+    _substitute(values, variance, lower1, lower2, previous)
     return values[2 : T + 2], variance[2 : T + 2]
 
 
@@ -32,10 +32,10 @@ def generate(mean: Array, precision: Array) -> tuple[Array, Array]:
 def solve(main: Array, first: Array, second: Array, right: Array) -> tuple[Array, Array]:
     """Return solution and diagonal of the inverse [shape=(T, P)]; see ``kernels.banded.solve``."""
     T, P = main.shape
-    values, variance, lower1, lower2, held = _room(T, P)
+    values, variance, lower1, lower2, previous = _room(T, P)
     for t in range(T):
-        _eliminate(main, first, second, right, t, t, values, variance, lower1, lower2, held)
-    _substitute(values, variance, lower1, lower2, held)
+        _eliminate(main, first, second, right, t, t, values, variance, lower1, lower2, previous)
+    _substitute(values, variance, lower1, lower2, previous)
     return values[2 : T + 2], variance[2 : T + 2]
 
 
@@ -61,52 +61,52 @@ def _room(T: int, P: int) -> tuple[Array, Array, Array, Array, Array]:
 def _assemble(mean: Array, precision: Array, t: int, bands: Array) -> None:
     """Fill in one row of the normal equations; Δ and Δ² of the first and last frame have no weight."""
     T = len(mean)
-    before, behind = max(t - 1, 0), min(t + 1, T - 1)
-    here = 1.0 if 0 < t < T - 1 else 0.0
-    was = 1.0 if t > 1 else 0.0
-    comes = 1.0 if t + 2 < T else 0.0
+    before, after = max(t - 1, 0), min(t + 1, T - 1)
+    inner = 1.0 if 0 < t < T - 1 else 0.0
+    has_before = 1.0 if t > 1 else 0.0
+    has_after = 1.0 if t + 2 < T else 0.0
     for c in range(mean.shape[2]):
-        p0, p2 = precision[t, 0, c], precision[t, 2, c] * here
-        p1_before, p2_before = precision[before, 1, c] * was, precision[before, 2, c] * was
-        p1_behind, p2_behind = precision[behind, 1, c] * comes, precision[behind, 2, c] * comes
+        p0, p2 = precision[t, 0, c], precision[t, 2, c] * inner
+        p1_before, p2_before = precision[before, 1, c] * has_before, precision[before, 2, c] * has_before
+        p1_after, p2_after = precision[after, 1, c] * has_after, precision[after, 2, c] * has_after
         w1_before, w2_before = p1_before * mean[before, 1, c], p2_before * mean[before, 2, c]
-        w1_behind, w2_behind = p1_behind * mean[behind, 1, c], p2_behind * mean[behind, 2, c]
-        bands[0, 0, c] = p0 + 4 * p2 + (0.25 * p1_before + p2_before) + (0.25 * p1_behind + p2_behind)
-        bands[1, 0, c] = -2 * (p2 + p2_behind)
-        bands[2, 0, c] = p2_behind - 0.25 * p1_behind
+        w1_after, w2_after = p1_after * mean[after, 1, c], p2_after * mean[after, 2, c]
+        bands[0, 0, c] = p0 + 4 * p2 + (0.25 * p1_before + p2_before) + (0.25 * p1_after + p2_after)
+        bands[1, 0, c] = -2 * (p2 + p2_after)
+        bands[2, 0, c] = p2_after - 0.25 * p1_after
         plain = p0 * mean[t, 0, c] - 2 * (p2 * mean[t, 2, c])
-        bands[3, 0, c] = plain + (0.5 * w1_before + w2_before) + (-0.5 * w1_behind + w2_behind)
+        bands[3, 0, c] = plain + (0.5 * w1_before + w2_before) + (-0.5 * w1_after + w2_after)
 
 
 @compiled
 def _eliminate(
     main: Array, first: Array, second: Array, right: Array, row: int,
-    t: int, x: Array, inverse: Array, lower1: Array, lower2: Array, held: Array,
+    t: int, x: Array, inverse: Array, lower1: Array, lower2: Array, previous: Array,
 ) -> None:  # fmt: skip
     """Factorise one row, and eliminate it from its right-hand side.
 
-    held : of the row before its coupling and second diagonal, and the second diagonal of the row before that
+    previous : of the row before its coupling and second diagonal, and the second diagonal of the row before that
     """
     for c in range(x.shape[1]):
-        pivot = main[row, c] - held[0, c] * lower1[t + 1, c] - held[2, c] * lower2[t, c]
-        coupling = first[row, c] - held[0, c] * lower2[t + 1, c]
+        pivot = main[row, c] - previous[0, c] * lower1[t + 1, c] - previous[2, c] * lower2[t, c]
+        coupling = first[row, c] - previous[0, c] * lower2[t + 1, c]
         x[t + 2, c] = right[row, c] - lower1[t + 1, c] * x[t + 1, c] - lower2[t, c] * x[t, c]
         reciprocal = 1 / pivot
         inverse[t + 2, c] = reciprocal
         lower1[t + 2, c] = coupling * reciprocal
         lower2[t + 2, c] = second[row, c] * reciprocal
-        held[0, c], held[2, c], held[1, c] = coupling, held[1, c], second[row, c]
+        previous[0, c], previous[2, c], previous[1, c] = coupling, previous[1, c], second[row, c]
 
 
 @compiled
-def _substitute(x: Array, variance: Array, lower1: Array, lower2: Array, held: Array) -> None:
+def _substitute(x: Array, variance: Array, lower1: Array, lower2: Array, previous: Array) -> None:
     """Substitute backwards: replace the arrays of ``_room`` by the solution and the diagonal of the inverse."""
-    held[0] = 0  # the inverse between the next row and the one behind it
+    previous[0] = 0  # of the inverse, between the next row and the one after it
     for t in range(len(x) - 3, 1, -1):
         for c in range(x.shape[1]):
             l1, l2 = lower1[t, c], lower2[t, c]
             x[t, c] = x[t, c] * variance[t, c] - l1 * x[t + 1, c] - l2 * x[t + 2, c]
-            across = -(l1 * variance[t + 1, c]) - l2 * held[0, c]
-            far = -(l1 * held[0, c]) - l2 * variance[t + 2, c]
+            across = -(l1 * variance[t + 1, c]) - l2 * previous[0, c]
+            far = -(l1 * previous[0, c]) - l2 * variance[t + 2, c]
             variance[t, c] = variance[t, c] - l1 * across - l2 * far
-            held[0, c] = across
+            previous[0, c] = across

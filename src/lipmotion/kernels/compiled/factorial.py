@@ -44,12 +44,12 @@ def moved_back(after: Array, stay: Array, onward: Array, left: Array) -> Array:
     inner = after.shape[1] - units
     for i in range(len(after)):
         into, out = before[i], after[i]
-        behind = out[units:]
+        next_states = out[units:]
         for j in range(inner):
-            into[j] = stay[j] * out[j] + onward[j] * behind[j]
-        last, out_last, stay_last, mine = into[inner:], out[inner:], stay[inner:], left[i]
+            into[j] = stay[j] * out[j] + onward[j] * next_states[j]
+        last, out_last, stay_last, left_last = into[inner:], out[inner:], stay[inner:], left[i]
         for j in range(units):
-            last[j] = stay_last[j] * out_last[j] + mine[j]
+            last[j] = stay_last[j] * out_last[j] + left_last[j]
     return before
 
 
@@ -123,9 +123,10 @@ def backward(
 
 @compiled_to_rounding
 def _combine(one: Array, weight: float, other: Array, other_weight: float, into: Array) -> None:
-    mine, its = into.dtype.type(weight), into.dtype.type(other_weight)
+    """Fill in the weighted sum of two rows."""
+    first, second = into.dtype.type(weight), into.dtype.type(other_weight)
     for j in range(len(into)):
-        into[j] = mine * one[j] + its * other[j]
+        into[j] = first * one[j] + second * other[j]
 
 
 @compiled_to_rounding
@@ -144,13 +145,14 @@ def _move_along(before: Array, stay: Array, onward: Array, entering: Array, into
     units = len(entering)
     for j in range(units):
         into[j] = stay[j] * before[j] + entering[j]
-    rest, mine, weight = into[units:], before[units:], stay[units:]
+    rest, before_rest, weight = into[units:], before[units:], stay[units:]
     for j in range(len(onward)):
-        rest[j] = weight[j] * mine[j] + onward[j] * before[j]
+        rest[j] = weight[j] * before_rest[j] + onward[j] * before[j]
 
 
 @compiled_to_rounding
 def _emit(prior: Array, own: float, density: Array, least: float, into: Array) -> None:
+    """Fill in a row times the densities of both axes; ``own`` is that of the row."""
     for j in range(len(prior)):
         partly = np.float64(prior[j]) * own
         product = (partly if partly > least else 0.0) * density[j]

@@ -17,8 +17,8 @@ from lipmotion.corpora.entry import quantise, read_entry, write_utterance
 from lipmotion.corpora.source_recordings import RecordingFolder, SourceRecording
 from lipmotion.corpora.store import UTTERANCES, Corpus
 from lipmotion.errors import AlignmentError, CorpusError, ExportError, InputError, MissingDependencyError
-from lipmotion.pipeline.corpus.supplied_motion import DIGESTS, digest, given_phones, given_track
-from lipmotion.pipeline.workers import working
+from lipmotion.pipeline.corpus.supplied_motion import DIGESTS, source_digests, supplied_phones, supplied_track
+from lipmotion.pipeline.workers import worker_pool
 from lipmotion.speech.audio_files import read_audio
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.storage.files import locked, remove_unfinished, sha256_of
@@ -30,7 +30,7 @@ from lipmotion.vision.track import track
 
 RECIPE = "4"
 """Raised whenever the same video would give other numbers: older utterances are then made again."""
-STAGE = "preparing recordings"
+_STAGE = "preparing recordings"
 
 
 @dataclass(frozen=True)
@@ -118,8 +118,8 @@ def prepare(
     with locked(output):
         corpus = Corpus.create(output)
         jobs = [_job(item, directory.resolve(), corpus, packages, crops) for item in found.items]
-        with _listed(corpus), working(min(workers or os.cpu_count() or 1, len(jobs))) as team:
-            outcomes = _heard(found, team.as_they_come(_process, jobs), len(jobs), monitor)
+        with _listed(corpus), worker_pool(min(workers or os.cpu_count() or 1, len(jobs))) as team:
+            outcomes = _heard(found, team.unordered_map(_process, jobs), len(jobs), monitor)
     report = _report(corpus, found, outcomes, time.monotonic() - start_s)
     if not report.prepared and not report.kept:
         if is_new:
@@ -180,7 +180,11 @@ def _process(job: _Job) -> _Outcome:
     name = job.recording.name
     try:
         sound = job.recording.file
-        source = job.source | {"sha256": sha256_of(sound), "bytes": str(sound.stat().st_size)} | digest(job.recording)
+        source = (
+            job.source
+            | {"sha256": sha256_of(sound), "bytes": str(sound.stat().st_size)}
+            | source_digests(job.recording)
+        )
         entry = _kept(job, source)
         if entry is not None:
             return _Outcome(name, kept=True, unseen=int(entry["unseen_frames"]), notes=tuple(entry.get("notes", ())))
@@ -221,13 +225,13 @@ def _utterance(job: _Job, source: dict[str, str]) -> Utterance:
         split=job.recording.split,
         source=source,
         speaker=job.recording.speaker,
-        phones=given_phones(job.recording, audio.duration_s),
+        phones=supplied_phones(job.recording, audio.duration_s),
     )
 
 
 def _track(job: _Job, duration_s: float) -> Track:
     if job.recording.curves is not None:
-        return given_track(job.recording.curves, duration_s)
+        return supplied_track(job.recording.curves, duration_s)
     return track(job.recording.file, crops=job.settings["crops"] == "yes")
 
 
@@ -236,13 +240,13 @@ def _heard(found: RecordingFolder, coming: Iterator[_Outcome], count: int, monit
     for name, problem in found.problems.items():
         monitor(Item(name, "skipped", problem))
     outcomes: list[_Outcome] = []
-    monitor(Progress(STAGE, 0, count, 0.0))
+    monitor(Progress(_STAGE, 0, count, 0.0))
     for outcome in coming:
         outcomes.append(outcome)
         kind = "skipped" if outcome.problem else "kept" if outcome.kept else "prepared"
         unseen = (f"no face in {outcome.unseen} frames, interpolated",) if outcome.unseen else ()
         monitor(Item(outcome.name, kind, outcome.problem or "; ".join((*outcome.notes, *unseen))))
-        monitor(Progress(STAGE, len(outcomes), count, len(outcomes) / count))
+        monitor(Progress(_STAGE, len(outcomes), count, len(outcomes) / count))
     return outcomes
 
 

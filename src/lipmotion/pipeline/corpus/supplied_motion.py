@@ -25,7 +25,7 @@ PHONES_MARGIN_S = 0.1
 """Labels may end this long after the sound: tools round."""
 
 
-def digest(recording: SourceRecording) -> dict[str, str]:
+def source_digests(recording: SourceRecording) -> dict[str, str]:
     """Return what identifies the motion and the phones that came with a recording, if any."""
     found = {}
     if recording.curves is not None:
@@ -37,7 +37,7 @@ def digest(recording: SourceRecording) -> dict[str, str]:
     return found
 
 
-def given_track(curves: MotionFile, duration_s: float) -> Track:
+def supplied_track(curves: MotionFile, duration_s: float) -> Track:
     """Return the motion in a file as a track that was seen everywhere, without mouth images.
 
     duration_s : of the sound that it belongs to
@@ -53,7 +53,7 @@ def given_track(curves: MotionFile, duration_s: float) -> Track:
     return Track(motion, np.ones(len(motion.values), bool))
 
 
-def given_phones(recording: SourceRecording, duration_s: float) -> Timeline[Unit] | None:
+def supplied_phones(recording: SourceRecording, duration_s: float) -> Timeline[Unit] | None:
     """Return the labelled phones of a recording from 0 s to the end of its sound, or None if there are none.
 
     Silence is named as recognition names it: a short one between phones is a pause.

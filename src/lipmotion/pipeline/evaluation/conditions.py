@@ -15,12 +15,23 @@ from lipmotion.engines import Animator
 from lipmotion.errors import AlignmentError, CorpusError
 from lipmotion.measures import curves
 from lipmotion.measures.closures import closed_threshold
-from lipmotion.pipeline.training.channels import GEOMETRY, as_learned
-from lipmotion.pipeline.training.train import labels_of
-from lipmotion.pipeline.transcribe import report_guesses
+from lipmotion.pipeline.training.channels import GEOMETRY, with_visual_channels
+from lipmotion.pipeline.training.train import phones_of
+from lipmotion.pipeline.transcribe import warn_of_guesses
 from lipmotion.pipeline.understand import recognised_speech, speech_of
 from lipmotion.speech.recogniser import Recogniser
-from lipmotion.types import GREY, Monitor, Motion, Speech, Timeline, Unit, Utterance, counted, part_of, silent_monitor
+from lipmotion.types import (
+    GREY,
+    Monitor,
+    Motion,
+    Speech,
+    Timeline,
+    Unit,
+    Utterance,
+    silent_monitor,
+    sub_monitor,
+    with_progress,
+)
 from lipmotion.units import Lexicon, is_silent
 
 ModelT = TypeVar("ModelT")
@@ -54,7 +65,7 @@ class HeldOutRecordings:
     eigenlips: Eigenlips | None = None
 
     @property
-    def pictured(self) -> tuple[str, ...]:
+    def eigenlips_channels(self) -> tuple[str, ...]:
         """The channels that are eigenlips."""
         names = {channel.name for channel in self.eigenlips.channels} if self.eigenlips is not None else ()
         return tuple(name for name in self.channels if name in names)
@@ -88,19 +99,23 @@ def held_out_recordings(
     visual, eigenlips : of the model: which channels it has, and the space of the pictures among them
     """
     lexicon = lexicon or Lexicon()
-    utterances = [as_learned(corpus.utterance(name), visual, eigenlips) for name in corpus.selected(selection)]
-    compared, still = (tuple(channels), ()) if channels is not None else compared_channels(utterances)
-    report_guesses([word for utterance in utterances for word in utterance.words or ()], lexicon)
-    heard = counted(utterances, "finding the phones", part_of(monitor, 0, 0.4))
+    utterances = [
+        with_visual_channels(corpus.utterance(name), visual, eigenlips) for name in corpus.selected(selection)
+    ]
+    compare_with_recorded, still = (tuple(channels), ()) if channels is not None else compared_channels(utterances)
+    warn_of_guesses([word for utterance in utterances for word in utterance.words or ()], lexicon)
+    heard = with_progress(utterances, "finding the phones", sub_monitor(monitor, 0, 0.4))
     reference = [_reference(utterance, phones, lexicon) for utterance in heard]
     threshold = None
-    if OPENING in compared:
+    if OPENING in compare_with_recorded:
         threshold = closed_threshold([_openings(u) for u in _training(corpus, selection.speakers) or utterances])
-    heard = counted(utterances, "recognising the phones", part_of(monitor, 0.4, 0.9))
+    heard = with_progress(utterances, "recognising the phones", sub_monitor(monitor, 0.4, 0.9))
     conditions = {AUDIO_ONLY: [phones.recognise(u.audio, u.features) for u in heard]}
     if all(utterance.words or utterance.phones for utterance in utterances):
         conditions[WITH_TRANSCRIPT] = reference
-    return HeldOutRecordings(utterances, compared, still, threshold, reference, conditions, phones, eigenlips)
+    return HeldOutRecordings(
+        utterances, compare_with_recorded, still, threshold, reference, conditions, phones, eigenlips
+    )
 
 
 def compared_channels(utterances: Sequence[Utterance]) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -133,8 +148,8 @@ def _openings(utterance: Utterance) -> NDArray[np.float64]:
     return np.asarray(utterance.track.motion[OPENING], float)[np.asarray(utterance.track.seen)]
 
 
-def _check_channels(motion: Motion, compared: Sequence[str]) -> None:
-    missing = [name for name in compared if name not in motion.names]
+def _check_channels(motion: Motion, compare_with_recorded: Sequence[str]) -> None:
+    missing = [name for name in compare_with_recorded if name not in motion.names]
     if missing:
         raise CorpusError(
             f"the model has no channels {', '.join(missing[:6])}, which the corpus has: it learned other motion"
@@ -143,7 +158,7 @@ def _check_channels(motion: Motion, compared: Sequence[str]) -> None:
 
 def _reference(utterance: Utterance, phones: Recogniser, lexicon: Lexicon) -> Timeline[Unit]:
     try:
-        return labels_of(utterance, phones, lexicon)
+        return phones_of(utterance, phones, lexicon)
     except AlignmentError as error:
         raise AlignmentError(f"{utterance.name}: {error}; correct its transcript, or leave it out") from error
 
@@ -152,10 +167,12 @@ def compared_clips(
     found: HeldOutRecordings, condition: str, engine: Animator[ModelT], learned: ModelT
 ) -> list[ComparedClip]:
     """Return what an engine makes of recordings, beside the originals. Raises CorpusError: it has other channels."""
-    return compared(found, speech_in(found, condition, engine, learned), engine, learned)
+    return compare_with_recorded(found, speech_of_condition(found, condition, engine, learned), engine, learned)
 
 
-def speech_in(found: HeldOutRecordings, condition: str, engine: Animator[ModelT], learned: ModelT) -> list[Speech]:
+def speech_of_condition(
+    found: HeldOutRecordings, condition: str, engine: Animator[ModelT], learned: ModelT
+) -> list[Speech]:
     """Return all utterances as ``animate`` gives them to an engine under a condition."""
     return [
         _speech(engine, learned, found, utterance, units, condition == WITH_TRANSCRIPT)
@@ -163,12 +180,12 @@ def speech_in(found: HeldOutRecordings, condition: str, engine: Animator[ModelT]
     ]
 
 
-def compared(
+def compare_with_recorded(
     found: HeldOutRecordings, spoken: Sequence[Speech], engine: Animator[ModelT], learned: ModelT
 ) -> list[ComparedClip]:
     """Return the motion that an engine generates for all utterances beside the recorded motion.
 
-    spoken : of ``speech_in``, one for each utterance
+    spoken : of ``speech_of_condition``, one for each utterance
     Raises CorpusError: the engine's model has other channels.
     """
     return [
@@ -194,7 +211,7 @@ def _speech(
 def _clip(
     engine: Animator[ModelT],
     learned: ModelT,
-    compared: Sequence[str],
+    compare_with_recorded: Sequence[str],
     utterance: Utterance,
     heard: Speech,
     reference: Timeline[Unit],
@@ -203,11 +220,13 @@ def _clip(
     seen = np.asarray(utterance.track.seen)
     time_s = (np.arange(len(motion.values)) / motion.rate_hz)[seen]
     generated = engine.generate(learned, heard).motion
-    _check_channels(generated, compared)
+    _check_channels(generated, compare_with_recorded)
     spoken = tuple((s.start_s, s.end_s, s.label.phone) for s in reference if not is_silent(s.label.phone))
     return ComparedClip(
-        original=np.stack([motion[name][seen] for name in compared], axis=1).astype(float),
-        generated=np.stack([np.interp(time_s, generated.time_s, generated[name]) for name in compared], axis=1),
+        original=np.stack([motion[name][seen] for name in compare_with_recorded], axis=1).astype(float),
+        generated=np.stack(
+            [np.interp(time_s, generated.time_s, generated[name]) for name in compare_with_recorded], axis=1
+        ),
         time_s=time_s,
         spoken=spoken,
     )

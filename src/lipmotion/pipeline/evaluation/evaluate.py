@@ -11,9 +11,9 @@ from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.evaluation.conditions import (
     TEST_LIST,
     HeldOutRecordings,
-    compared,
+    compare_with_recorded,
     held_out_recordings,
-    speech_in,
+    speech_of_condition,
 )
 from lipmotion.pipeline.evaluation.figures import figures_of
 from lipmotion.pipeline.model import Model
@@ -79,11 +79,11 @@ def evaluate(
 def _figures_with_and_without_closures(
     found: HeldOutRecordings, condition: str, engine: Animator[ModelT], learned: ModelT, seed: int
 ) -> dict[str, Any]:
-    heard = speech_in(found, condition, engine, learned)
+    heard = speech_of_condition(found, condition, engine, learned)
     figures, unpinned = (
-        figures_of(compared(found, heard, engine, learned), found, seed),
+        figures_of(compare_with_recorded(found, heard, engine, learned), found, seed),
         engine.without_closures() if isinstance(engine, ForcesClosures) else engine,
     )
     if unpinned == engine or found.closed_under is None:
         return figures
-    return figures | {"unpinned": figures_of(compared(found, heard, unpinned, learned), found, seed)}
+    return figures | {"unpinned": figures_of(compare_with_recorded(found, heard, unpinned, learned), found, seed)}

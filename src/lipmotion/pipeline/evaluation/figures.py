@@ -42,7 +42,7 @@ def figures_of(clips: Sequence[ComparedClip], found: HeldOutRecordings, seed: in
         }
         for i, name in enumerate(compared)
     }
-    pictures = {name: per_channel[name] for name in found.pictured}
+    pictures = {name: per_channel[name] for name in found.eigenlips_channels}
     pictured = np.array([name in pictures for name in compared])
     whole = ~pictured if not pictured.all() else pictured
     spread = np.where(whole, np.concatenate(original).std(axis=0), 0)

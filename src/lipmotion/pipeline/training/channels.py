@@ -26,7 +26,7 @@ def check_visual(visual: str) -> None:
         raise InputError(f"visual is {visual!r}, required one of: {', '.join(VISUALS)}")
 
 
-def learned_eigenlips(
+def train_eigenlips(
     utterances: Sequence[Utterance], components: int = COMPONENTS, pictures: int = PICTURES
 ) -> Eigenlips:
     """Return the eigenlips of some utterances, from frames that are seen, spread evenly over all of them.
@@ -49,10 +49,10 @@ def learned_eigenlips(
     return fit_eigenlips(np.concatenate(taken), components)
 
 
-def as_learned(utterance: Utterance, visual: str, eigenlips: Eigenlips | None) -> Utterance:
+def with_visual_channels(utterance: Utterance, visual: str, eigenlips: Eigenlips | None) -> Utterance:
     """Return an utterance whose motion has the channels that are learned, at the camera's rate.
 
-    eigenlips : of ``learned_eigenlips``; the coefficients are not smoothed, and those of unseen frames not meant
+    eigenlips : of ``train_eigenlips``; the coefficients are not smoothed, and those of unseen frames not meant
     Raises InputError: no such ``visual``, or eigenlips are missing. Raises CorpusError: mouth pictures are missing.
     """
     check_visual(visual)

@@ -14,22 +14,25 @@ from lipmotion.errors import AlignmentError, InputError
 from lipmotion.storage.checkpoint import Checkpoint
 from lipmotion.types import Item, Monitor, ParallelMap, Progress, Span, Timeline, Unit, Utterance
 
-AT_A_TIME = 32
+UTTERANCES_PER_CHECKPOINT = 32
 """Utterances that are labelled between one checkpoint and the next."""
-Label = Callable[[Utterance], Timeline[Unit]]
-Labelled = Timeline[Unit] | str
+Labeller = Callable[[Utterance], Timeline[Unit]]
+PhonesOrReason = Timeline[Unit] | str
 """Phones in time, or the reason why there are none."""
 
 
-def labelled(
-    utterances: Sequence[Utterance], label: Label, monitor: Monitor, checkpoint: Checkpoint, each: ParallelMap
-) -> Iterator[tuple[Utterance, Labelled]]:
+def label_utterances(
+    utterances: Sequence[Utterance], label: Labeller, monitor: Monitor, checkpoint: Checkpoint, each: ParallelMap
+) -> Iterator[tuple[Utterance, PhonesOrReason]]:
     """Give every utterance with its phones.
 
     label : gives them; raises AlignmentError or InputError where it cannot
     each  : shares the work
     """
-    parts = [utterances[start : start + AT_A_TIME] for start in range(0, len(utterances), AT_A_TIME)]
+    parts = [
+        utterances[start : start + UTTERANCES_PER_CHECKPOINT]
+        for start in range(0, len(utterances), UTTERANCES_PER_CHECKPOINT)
+    ]
     kept = [checkpoint.load(_stage(number)) for number in range(len(parts))]
     missing = [list(map(_without_pictures, part)) for part, arrays in zip(parts, kept, strict=True) if arrays is None]
     made = iter(each(partial(_all_labelled, label=label), missing))
@@ -55,18 +58,18 @@ def _without_pictures(utterance: Utterance) -> Utterance:
     return replace(utterance, track=replace(utterance.track, crops=None))
 
 
-def _all_labelled(utterances: Sequence[Utterance], label: Label) -> list[Labelled]:
+def _all_labelled(utterances: Sequence[Utterance], label: Labeller) -> list[PhonesOrReason]:
     return [_labelled(utterance, label) for utterance in utterances]
 
 
-def _labelled(utterance: Utterance, label: Label) -> Labelled:
+def _labelled(utterance: Utterance, label: Labeller) -> PhonesOrReason:
     try:
         return label(utterance)
     except (AlignmentError, InputError) as error:
         return str(error)
 
 
-def _packed(found: Sequence[Labelled]) -> dict[str, NDArray[Any]]:
+def _packed(found: Sequence[PhonesOrReason]) -> dict[str, NDArray[Any]]:
     spans = [span for phones in found if not isinstance(phones, str) for span in phones]
     labels = [span.label for span in spans]
     return {
@@ -77,7 +80,7 @@ def _packed(found: Sequence[Labelled]) -> dict[str, NDArray[Any]]:
     }
 
 
-def _unpacked(arrays: Mapping[str, NDArray[Any]]) -> list[Labelled]:
+def _unpacked(arrays: Mapping[str, NDArray[Any]]) -> list[PhonesOrReason]:
     spans = iter(
         Span(start_s, end_s, Unit(*label))
         for (start_s, end_s), label in zip(arrays["times"].tolist(), arrays["labels"].tolist(), strict=True)

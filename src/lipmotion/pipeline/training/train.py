@@ -21,12 +21,12 @@ from lipmotion.hmm.model import HmmConfig, UnitHmm
 from lipmotion.kernels.threads import one_thread
 from lipmotion.motion.resample import to_model_frames
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.pipeline.training.channels import GEOMETRY, as_learned, check_visual, learned_eigenlips
+from lipmotion.pipeline.training.channels import GEOMETRY, check_visual, train_eigenlips, with_visual_channels
 from lipmotion.pipeline.training.fingerprint import fingerprint
-from lipmotion.pipeline.training.labels import labelled
-from lipmotion.pipeline.training.voices import Heard
-from lipmotion.pipeline.transcribe import phones_in_time, report_guesses
-from lipmotion.pipeline.workers import working
+from lipmotion.pipeline.training.labels import label_utterances
+from lipmotion.pipeline.training.voices import VoiceExample
+from lipmotion.pipeline.transcribe import phones_in_time, warn_of_guesses
+from lipmotion.pipeline.workers import worker_pool
 from lipmotion.speech.f0 import log_f0
 from lipmotion.speech.phone_models import train_phone_models
 from lipmotion.speech.recogniser import Recogniser
@@ -45,13 +45,13 @@ from lipmotion.types import (
     Track,
     Unit,
     Utterance,
-    part_of,
     silent_monitor,
+    sub_monitor,
 )
 from lipmotion.units import Lexicon, is_silent
 
 LOG = logging.getLogger("lipmotion")
-FEWEST = 32
+UTTERANCES_PER_WORKER = 32
 """Utterances that are worth a process of their own."""
 
 
@@ -85,7 +85,7 @@ class Run:
     workers: int = 1
 
 
-QUIETLY, TRAINING_LIST = Run(), Selection("train")
+DEFAULT_RUN, TRAINING_LIST = Run(), Selection("train")
 
 
 @one_thread()
@@ -97,8 +97,8 @@ def train(
     recogniser: HmmConfig | None = None,
     lexicon: Lexicon | None = None,
     visual: str = GEOMETRY,
-    voices: Iterable[Heard] = (),
-    run: Run = QUIETLY,
+    voices: Iterable[VoiceExample] = (),
+    run: Run = DEFAULT_RUN,
 ) -> tuple[Model, TrainReport]:
     """Train phone models on what is transcribed, then the motion of everything.
 
@@ -124,18 +124,18 @@ def train(
     engine = engine or engine_named("trajectory", {})
     chosen = corpus.selected(selection)
     recogniser = recogniser or HmmConfig()
-    others = list(examples_of_others(engine, voices, run.monitor))
+    others = list(examples_without_motion(engine, voices, run.monitor))
     utterances = [corpus.utterance(name) for name in chosen]
-    eigenlips = learned_eigenlips(utterances) if visual != GEOMETRY else None
-    utterances = [as_learned(utterance, visual, eigenlips) for utterance in utterances]
+    eigenlips = train_eigenlips(utterances) if visual != GEOMETRY else None
+    utterances = [with_visual_channels(utterance, visual, eigenlips) for utterance in utterances]
     job = fingerprint(corpus, chosen, engine, recogniser, lexicon, visual) if run.work else ""
     checkpoint = Checkpoint(run.work, job) if run.work else NO_CHECKPOINT
-    with working(min(run.workers, len(chosen) // FEWEST)) as team:
-        listening = part_of(run.monitor, 0, 0.9)
+    with worker_pool(min(run.workers, len(chosen) // UTTERANCES_PER_WORKER)) as team:
+        listening = sub_monitor(run.monitor, 0, 0.9)
         phones, examples, skipped = phones_and_examples(
-            utterances, recogniser, lexicon, listening, checkpoint, team.each
+            utterances, recogniser, lexicon, listening, checkpoint, team.ordered_map
         )
-    fit = engine.fit([*examples, *others], part_of(run.monitor, 0.9, 1, "learning motion: "), checkpoint)
+    fit = engine.fit([*examples, *others], sub_monitor(run.monitor, 0.9, 1, "learning motion: "), checkpoint)
     used = tuple(example.name for example in examples)
     about = _about(
         corpus, utterances, "given names" if selection.names is not None else selection.split or "all", len(used)
@@ -162,14 +162,14 @@ def phones_and_examples(
     each : shares the work
     Raises CorpusError: no utterance can be used.
     """
-    learning, finding = part_of(monitor, 0, 0.78, "learning phones: "), part_of(monitor, 0.78, 1)
+    learning, finding = sub_monitor(monitor, 0, 0.78, "learning phones: "), sub_monitor(monitor, 0.78, 1)
     phones = _phones(utterances, lexicon, recogniser, learning, checkpoint, each)
     examples, skipped = _examples(utterances, Recogniser(phones), lexicon, finding, checkpoint, each)
     return phones, examples, skipped
 
 
-def examples_of_others(
-    engine: Engine[Any], voices: Iterable[Heard], monitor: Monitor = silent_monitor
+def examples_without_motion(
+    engine: Engine[Any], voices: Iterable[VoiceExample], monitor: Monitor = silent_monitor
 ) -> Iterator[Example]:
     """Give speech of others as examples in which no motion was seen, by the names of the speakers.
 
@@ -187,7 +187,7 @@ def examples_of_others(
         yield Example(speaker, Speech(features, units), unseen, np.zeros(frames, bool))
 
 
-def labels_of(utterance: Utterance, phones: Recogniser, lexicon: Lexicon) -> Timeline[Unit]:
+def phones_of(utterance: Utterance, phones: Recogniser, lexicon: Lexicon) -> Timeline[Unit]:
     """Return the phones of an utterance: labelled, else aligned if its words are known, else recognised."""
     if utterance.phones is not None:
         return utterance.phones
@@ -218,7 +218,7 @@ def _phones(
         LOG.warning("no transcripts in the corpus: its phones are recognised by the shipped model")
         return load_model().phones
     said = dict.fromkeys(word for _, words in spoken for word in words)
-    report_guesses(tuple(said), lexicon)
+    warn_of_guesses(tuple(said), lexicon)
     runs = {" ".join(run): (run,) for _, found in given for run in found}
     as_words = [(audio, tuple(map(" ".join, found))) for audio, found in given]
     words = Lexicon(lexicon.user | runs)
@@ -248,8 +248,8 @@ def _examples(
 ) -> tuple[list[Example], dict[str, str]]:
     examples: list[Example] = []
     skipped: dict[str, str] = {}
-    label = partial(labels_of, phones=phones, lexicon=lexicon)
-    for utterance, units in labelled(utterances, label, monitor, checkpoint, each):
+    label = partial(phones_of, phones=phones, lexicon=lexicon)
+    for utterance, units in label_utterances(utterances, label, monitor, checkpoint, each):
         if isinstance(units, str):
             skipped[utterance.name] = units
             continue

@@ -35,7 +35,7 @@ from lipmotion.units import SILENCE, Lexicon, is_silent
 SENTENCES = 60
 PAUSE_S, FLOOR_DB = 0.25, 50.0
 """Synthesisers begin at once, out of a silence that no room has: both would shift features normalised per recording."""
-PARTS, JUDGED = 4, 1
+SPEAKER_PARTS, HELD_OUT_PART = 4, 1
 """Speakers fall into so many parts by their names; those in this one are for judging."""
 
 
@@ -53,7 +53,7 @@ class SpokenSentence:
     phones: Timeline[Unit]
 
 
-class Heard(NamedTuple):
+class VoiceExample(NamedTuple):
     """A sentence as models hear it.
 
     features : 39 MFCC a frame, normalised over the sentence
@@ -65,15 +65,15 @@ class Heard(NamedTuple):
     speaker: str
 
 
-def is_for_judging(speaker: str) -> bool:
+def is_held_out_speaker(speaker: str) -> bool:
     """Whether what a speaker says is kept aside to judge models with; about a quarter of all speakers are.
 
     The name alone decides (CRC-32 modulo 4 is 1): no speaker changes sides with what else is installed or recorded.
     """
-    return zlib.crc32(speaker.encode()) % PARTS == JUDGED
+    return zlib.crc32(speaker.encode()) % SPEAKER_PARTS == HELD_OUT_PART
 
 
-def many_voices(
+def synthetic_sentences(
     texts: Sequence[str] | None = None,
     voices: Sequence[SyntheticVoice] | None = None,
     *,
@@ -97,7 +97,7 @@ def many_voices(
         yield from sentences
 
 
-def recorded_voices(
+def recorded_sentences(
     folder: str | Path,
     phones: Recogniser,
     *,
@@ -110,7 +110,7 @@ def recorded_voices(
     phones   : aligns them; of the kind ``general`` where nobody in the folder spoke for its own models
     speakers : patterns of names (``*`` any letters) to who speaks; the first that fits holds. Of others, the
                sub-folder says who speaks, and without any the name is taken: give the speaker of two such recordings,
-               or they may come to be on both sides of ``is_for_judging``
+               or they may come to be on both sides of ``is_held_out_speaker``
     monitor  : is told of those that cannot be used: damaged, or of words that are not what is said, or not English
     Raises CorpusError: there is no such folder, or no recording with a transcript in it.
     """
@@ -133,9 +133,9 @@ def recorded_voices(
         raise CorpusError(f"{root}: no recording with a transcript; put what is said in x.wav into x.txt beside it")
 
 
-def heard(sentences: Iterable[SpokenSentence]) -> Iterator[Heard]:
+def voice_examples(sentences: Iterable[SpokenSentence]) -> Iterator[VoiceExample]:
     """Give sentences as models hear them. Nothing is kept."""
-    return (Heard(mfcc(sentence.audio), sentence.phones, sentence.speaker) for sentence in sentences)
+    return (VoiceExample(mfcc(sentence.audio), sentence.phones, sentence.speaker) for sentence in sentences)
 
 
 def other_voices(
@@ -144,19 +144,19 @@ def other_voices(
     recordings: str | Path | None = None,
     lexicon: Lexicon | None = None,
     monitor: Monitor = silent_monitor,
-) -> Iterator[Heard]:
+) -> Iterator[VoiceExample]:
     """Give what ``train --voices --recordings`` learns from besides a corpus.
 
     synthetic  : all installed voices but those that are for judging
     recordings : a folder of transcribed recordings, aligned by the general phone models
-    Raises MissingDependencyError, CorpusError: as ``many_voices`` and ``recorded_voices``.
+    Raises MissingDependencyError, CorpusError: as ``synthetic_sentences`` and ``recorded_sentences``.
     """
     if recordings is not None:
         general = Recogniser(load_model().phones, "general")
-        yield from heard(recorded_voices(recordings, general, lexicon=lexicon, monitor=monitor))
+        yield from voice_examples(recorded_sentences(recordings, general, lexicon=lexicon, monitor=monitor))
     if synthetic:
-        chosen = [voice for voice in installed_voices() if not is_for_judging(voice.speaker)]
-        yield from heard(many_voices(voices=chosen, lexicon=lexicon))
+        chosen = [voice for voice in installed_voices() if not is_held_out_speaker(voice.speaker)]
+        yield from voice_examples(synthetic_sentences(voices=chosen, lexicon=lexicon))
 
 
 def _in_voice(voice: SyntheticVoice, texts: Sequence[str], lexicon: Lexicon | None) -> list[SpokenSentence]:

@@ -25,19 +25,19 @@ def made(kind, sets, limit, **other):
 @every
 @pytest.mark.parametrize("seen", [True, False])
 def test_posteriors_are_those_of_all_paths(kind, sets, limit, seen):
-    found, data = made(kind, sets, limit), observations(seen=seen)
-    lattice = found.full_lattice
-    result = found.posteriors(found.emission_log_densities(data, lattice), lattice)
-    joint, counts, log_likelihood = oracle.posteriors(found, data)
-    for chain, states in enumerate(found.transitions.product.chain_states):
-        for state in range(found.structure.state_counts[chain]):
+    model, data = made(kind, sets, limit), observations(seen=seen)
+    lattice = model.full_lattice
+    result = model.posteriors(model.emission_log_densities(data, lattice), lattice)
+    joint, counts, log_likelihood = oracle.posteriors(model, data)
+    for chain, states in enumerate(model.transitions.product.chain_states):
+        for state in range(model.structure.state_counts[chain]):
             np.testing.assert_allclose(result.chains[chain][:, state], joint[:, states == state].sum(axis=1), atol=2e-5)
     np.testing.assert_array_equal(result.most_probable, joint.argmax(axis=1))
     assert result.log_likelihood == pytest.approx(log_likelihood, rel=1e-5)
-    product = found.transitions.product
+    product = model.transitions.product
     expected = [counts.get(pair, 0.0) for pair in zip(product.arc_from.tolist(), product.arc_to.tolist(), strict=True)]
     np.testing.assert_allclose(result.transition_counts, expected, atol=5e-5)
-    for number, group in enumerate(found.groups):
+    for number, group in enumerate(model.groups):
         for density in range(group.mixtures.size[0]):
             np.testing.assert_allclose(
                 result.densities[number][:, density], joint[:, group.tie == density].sum(axis=1), atol=2e-5
@@ -46,32 +46,32 @@ def test_posteriors_are_those_of_all_paths(kind, sets, limit, seen):
 
 @every
 def test_the_best_path_is_the_best_of_all(kind, sets, limit):
-    found, data = made(kind, sets, limit), observations()
-    path, score = found.best_path(found.emission_log_densities(data, found.full_lattice), found.full_lattice)
-    best, value = max(oracle.paths(found, data), key=lambda pair: pair[1])
+    model, data = made(kind, sets, limit), observations()
+    path, score = model.best_path(model.emission_log_densities(data, model.full_lattice), model.full_lattice)
+    best, value = max(oracle.paths(model, data), key=lambda pair: pair[1])
     assert tuple(path) == best
     assert score == pytest.approx(value, rel=1e-4)
 
 
 @every
 def test_expected_precisions_and_means(kind, sets, limit):
-    found, data = made(kind, sets, limit), observations()
-    precision, weighted = precision_statistics(found, found.infer(data, found.full_lattice), 1)
+    model, data = made(kind, sets, limit), observations()
+    precision, weighted = precision_statistics(model, model.infer(data, model.full_lattice), 1)
     number = 0 if kind == HMM else 1
-    expected = oracle.component_statistics(found, data, number, 1)
+    expected = oracle.component_statistics(model, data, number, 1)
     np.testing.assert_allclose(precision, expected[0], rtol=1e-4)
     np.testing.assert_allclose(weighted, expected[1], rtol=1e-3, atol=1e-4)
 
 
 def test_decoupled_tables_without_a_limit_are_the_product_of_hmms():
     """γ of each chain, and the likelihood, are those of the chains alone."""
-    found = made(COUPLED, (THREE, TWO), None)
-    product = found.transitions.product
+    model = made(COUPLED, (THREE, TWO), None)
+    product = model.transitions.product
     draw = np.random.default_rng(5)
     own = [draw.uniform(0.2, 0.8, count) for count in product.structure.state_counts]
     advance = tuple(own[c][product.chain_states[c]] for c in range(2))
-    decoupled = Transitions(product, found.transitions.rows, advance)
-    coupled = type(found)(found.streams, decoupled, found.groups)
+    decoupled = Transitions(product, model.transitions.rows, advance)
+    coupled = type(model)(model.streams, decoupled, model.groups)
     data = observations(6)
     result = coupled.posteriors(coupled.emission_log_densities(data, coupled.full_lattice), coupled.full_lattice)
     total = 0.0
@@ -82,9 +82,9 @@ def test_decoupled_tables_without_a_limit_are_the_product_of_hmms():
     assert result.log_likelihood == pytest.approx(total, rel=1e-5)
 
 
-def single_chain(found, chain, advance, data):
+def single_chain(model, chain, advance, data):
     """Posteriors of one chain alone, by dense matrices."""
-    structure, grammar = found.structure, found.transitions.product.grammar
+    structure, grammar = model.structure, model.transitions.product.grammar
     count, states = structure.state_counts[chain], structure.states
     matrix, initial = np.diag(1 - advance), np.zeros(count)
     initial[::states] = grammar.initial[chain] / grammar.initial[chain].sum()
@@ -93,7 +93,7 @@ def single_chain(found, chain, advance, data):
             matrix[state, state + 1] += advance[state]
         else:
             matrix[state, ::states] += advance[state] * grammar.bigrams[chain][state // states]
-    group = found.groups[chain]
+    group = model.groups[chain]
     density = np.exp([[oracle.log_density(group, g, data, t)[0] for g in range(count)] for t in range(data.frames)])
     alpha = [initial * density[0]]
     for row in density[1:]:
@@ -107,13 +107,13 @@ def single_chain(found, chain, advance, data):
 
 def test_a_factorial_hmm_of_one_chain_is_the_hmm():
     """With equal densities of all states of the second chain, the posteriors are those of the first chain alone."""
-    found = made(FACTORIAL, (THREE, TWO), None)
-    group = found.groups[1]
+    model = made(FACTORIAL, (THREE, TWO), None)
+    group = model.groups[1]
     same = group.mixtures.selected(np.zeros(group.mixtures.size[0], np.intp))
-    blind = type(found)(
-        found.streams,
-        found.transitions,
-        (found.groups[0], type(group)(group.streams, group.columns, same, group.weights, group.tie)),
+    blind = type(model)(
+        model.streams,
+        model.transitions,
+        (model.groups[0], type(group)(group.streams, group.columns, same, group.weights, group.tie)),
     )
     data = observations(6)
     result = blind.posteriors(blind.emission_log_densities(data, blind.full_lattice), blind.full_lattice)
@@ -144,21 +144,21 @@ def test_one_gaussian_each_makes_hmm_and_multistream_hmm_the_same():
     assert one.log_likelihood == pytest.approx(other.log_likelihood, rel=1e-6)
 
 
-def test_a_lattice_of_all_units_is_the_whole_and_a_smaller_one_forbids():
-    found, data = made(COUPLED, (THREE, TWO), 1), observations(5)
-    product = found.transitions.product
+def test_a_lattice_of_all_units_is_the_full_one_and_a_smaller_one_excludes_paths():
+    model, data = made(COUPLED, (THREE, TWO), 1), observations(5)
+    product = model.transitions.product
     allowed = np.ones((5, 3), bool)
-    result = found.posteriors(found.emission_log_densities(data, found.full_lattice), found.full_lattice)
-    free = found.lattice(allowed)
-    same = found.posteriors(found.emission_log_densities(data, free), free)
+    result = model.posteriors(model.emission_log_densities(data, model.full_lattice), model.full_lattice)
+    free = model.lattice(allowed)
+    same = model.posteriors(model.emission_log_densities(data, free), free)
     assert same.log_likelihood == pytest.approx(result.log_likelihood, rel=1e-6)
     allowed[:, 1] = False
     allowed[2:, 2] = False
-    part = found.lattice(allowed)
-    less = found.posteriors(found.emission_log_densities(data, part), part)
+    part = model.lattice(allowed)
+    less = model.posteriors(model.emission_log_densities(data, part), part)
     paths = [
         (path, score)
-        for path, score in oracle.paths(found, data)
+        for path, score in oracle.paths(model, data)
         if all(allowed[t, product.joint_states[state].units[0]] for t, state in enumerate(path))
     ]
     assert less.log_likelihood == pytest.approx(np.logaddexp.reduce([score for _, score in paths]), rel=1e-5)

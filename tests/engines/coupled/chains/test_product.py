@@ -36,20 +36,20 @@ def test_joint_states_of_the_papers_systems(system, cross_units, joints):
 @pytest.mark.parametrize("cross_units", [True, False])
 def test_chains_are_never_farther_apart_than_the_limit(limit, cross_units):
     of = structure(states=3, limit=limit, cross_units=cross_units)
-    found = even(of)
-    spread = found.lead.max(axis=0) - found.lead.min(axis=0)
+    reached = even(of)
+    spread = reached.lead.max(axis=0) - reached.lead.min(axis=0)
     assert spread.max() == limit
     if not cross_units:
-        assert not any(any(joint.ahead) for joint in found.joint_states)
+        assert not any(any(joint.ahead) for joint in reached.joint_states)
 
 
 def test_arcs_are_those_of_the_definition():
     """Each chain stays or moves one state on, no skips; a chain that is behind must enter the unit that is begun."""
     of = structure(states=2, limit=1)
-    found = even(of)
-    arcs = set(zip(found.arc_from.tolist(), found.arc_to.tolist(), strict=True))
-    for source, target in product(range(len(found.joint_states)), repeat=2):
-        assert ((source, target) in arcs) is possible(of, found.joint_states[source], found.joint_states[target])
+    reached = even(of)
+    arcs = set(zip(reached.arc_from.tolist(), reached.arc_to.tolist(), strict=True))
+    for source, target in product(range(len(reached.joint_states)), repeat=2):
+        assert ((source, target) in arcs) is possible(of, reached.joint_states[source], reached.joint_states[target])
 
 
 def possible(of, before: JointState, after: JointState) -> bool:
@@ -85,30 +85,30 @@ def fits(of, joint: JointState, sequence, positions, relative=False) -> bool:
 def test_the_next_unit_has_the_probability_of_the_bigram():
     """Whichever chain enters first: P(next unit of the first chain | its last unit) is that of the bigram."""
     of = structure(states=2, limit=1)
-    found = even(of)
-    bigram, last = found.grammar.bigrams[0], of.states - 1
+    reached = even(of)
+    bigram, last = reached.grammar.bigrams[0], of.states - 1
     for unit in range(len(of.units[0])):
-        together = found.joint_states.index(
+        together = reached.joint_states.index(
             JointState((unit, of.corresponding_units[1][unit]), (last, last), (False, False))
         )
-        out = found.arc_from == together
-        both = out & found.moves.all(axis=0)
+        out = reached.arc_from == together
+        both = out & reached.moves.all(axis=0)
         for entered in range(len(of.units[0])):
-            target = found.joint_states.index(
+            target = reached.joint_states.index(
                 JointState((entered, of.corresponding_units[1][entered]), (0, 0), (False, False))
             )
-            assert found.unit_probability[both & (found.arc_to == target)] == pytest.approx(bigram[unit, entered])
-        seen_first = out & ~found.moves[0] & found.moves[1]
-        assert found.unit_probability[seen_first].sum() == pytest.approx(1)
-        for arc in np.flatnonzero(seen_first):
-            waiting = found.joint_states[found.arc_to[arc]]
+            assert reached.unit_probability[both & (reached.arc_to == target)] == pytest.approx(bigram[unit, entered])
+        visual_first = out & ~reached.moves[0] & reached.moves[1]
+        assert reached.unit_probability[visual_first].sum() == pytest.approx(1)
+        for arc in np.flatnonzero(visual_first):
+            waiting = reached.joint_states[reached.arc_to[arc]]
             alike = [u for u in range(len(of.units[0])) if of.corresponding_units[1][u] == waiting.units[1]]
-            assert found.unit_probability[arc] == pytest.approx(bigram[unit, alike].sum())
-            follow = (found.arc_from == found.arc_to[arc]) & found.moves[0] & ~found.moves[1]
+            assert reached.unit_probability[arc] == pytest.approx(bigram[unit, alike].sum())
+            follow = (reached.arc_from == reached.arc_to[arc]) & reached.moves[0] & ~reached.moves[1]
             for after in np.flatnonzero(follow):
-                entered = found.joint_states[found.arc_to[after]].units[0]
+                entered = reached.joint_states[reached.arc_to[after]].units[0]
                 expected = bigram[unit, entered] / bigram[unit, alike].sum()
-                assert found.unit_probability[after] == pytest.approx(expected)
+                assert reached.unit_probability[after] == pytest.approx(expected)
 
 
 @pytest.mark.parametrize("kind", [COUPLED, FACTORIAL])
@@ -121,9 +121,9 @@ def test_probabilities_out_of_every_state_sum_to_one(kind, limit):
 
 def test_one_chain_is_the_hmm_of_its_units():
     of = structure(HMM, (THREE,), states=3, limit=1)
-    found = even(of)
-    assert len(found.joint_states) == 9
-    assert len(found.arc_from) == 9 + 6 + 9  # stay, move within, enter
+    reached = even(of)
+    assert len(reached.joint_states) == 9
+    assert len(reached.arc_from) == 9 + 6 + 9  # stay, move within, enter
 
 
 def test_units_that_correspond_to_the_same_visual_unit_stand_together():
@@ -160,7 +160,7 @@ def test_too_many_joint_states_to_list():
 
 def test_three_chains():
     of = structure(COUPLED, (THREE, TWO, TWO), states=2, limit=1)
-    found = even(of)
-    assert found.moves.shape[0] == 3
-    assert np.abs(found.lead).max() == 1
-    assert len(set(found.joint_states)) == len(found.joint_states)
+    reached = even(of)
+    assert reached.moves.shape[0] == 3
+    assert np.abs(reached.lead).max() == 1
+    assert len(set(reached.joint_states)) == len(reached.joint_states)

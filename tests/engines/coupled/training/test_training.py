@@ -62,11 +62,11 @@ def test_the_likelihood_rises_at_every_step(kind, sets, limit):
 
 
 def test_statistics_of_utterances_are_those_of_all_paths():
-    found = chains()
+    model = chains()
     data = [observations(3, seed=1), observations(4, seed=2)]
-    result = e_step(found, [TrainingUtterance(one, found.full_lattice) for one in data], workers=2)
-    joints = [oracle.posteriors(found, one)[0] for one in data]
-    group, statistics = found.groups[0], result.emissions[0]
+    result = e_step(model, [TrainingUtterance(one, model.full_lattice) for one in data], workers=2)
+    joints = [oracle.posteriors(model, one)[0] for one in data]
+    group, statistics = model.groups[0], result.emissions[0]
     for density in range(group.mixtures.size[0]):
         first = 0
         for one, joint in zip(data, joints, strict=True):
@@ -77,29 +77,29 @@ def test_statistics_of_utterances_are_those_of_all_paths():
 
 
 def test_a_stream_that_was_not_observed_is_not_reestimated():
-    found = chains()
+    model = chains()
     blind = observations(8, seen=False)
-    statistics = e_step(found, [TrainingUtterance(blind, found.full_lattice)])
+    statistics = e_step(model, [TrainingUtterance(blind, model.full_lattice)])
     assert not statistics.emissions[1].products[0].any()
-    better = m_step(found, statistics, FLOORS, streams=(0, 1))
-    np.testing.assert_array_equal(better.groups[1].mixtures.means, found.groups[1].mixtures.means)
-    assert not np.array_equal(better.groups[0].mixtures.means, found.groups[0].mixtures.means)
+    better = m_step(model, statistics, FLOORS, streams=(0, 1))
+    np.testing.assert_array_equal(better.groups[1].mixtures.means, model.groups[1].mixtures.means)
+    assert not np.array_equal(better.groups[0].mixtures.means, model.groups[0].mixtures.means)
 
 
 def test_streams_that_are_not_reestimated_stay():
-    found, data = chains(), observations(12)
-    statistics = e_step(found, [TrainingUtterance(data, found.full_lattice)])
-    better = m_step(found, statistics, FLOORS, streams=(0,), transitions=False)
-    assert better.groups[1] is found.groups[1]
-    assert better.transitions is found.transitions
+    model, data = chains(), observations(12)
+    statistics = e_step(model, [TrainingUtterance(data, model.full_lattice)])
+    better = m_step(model, statistics, FLOORS, streams=(0,), transitions=False)
+    assert better.groups[1] is model.groups[1]
+    assert better.transitions is model.transitions
 
 
 def test_no_recording_has_a_path():
-    found = chains()
+    model = chains()
     data = observations(3)
-    lattice = replace(found.full_lattice, allowed_units=np.zeros((3, 3), bool))
+    lattice = replace(model.full_lattice, allowed_units=np.zeros((3, 3), bool))
     with pytest.raises(InputError, match="labels"):
-        e_step(found, [TrainingUtterance(data, lattice)])
+        e_step(model, [TrainingUtterance(data, lattice)])
 
 
 def test_allowed_units_are_those_of_labels_near_a_frame():
@@ -115,11 +115,11 @@ def test_allowed_units_are_those_of_labels_near_a_frame():
     assert allowed.any(axis=1).all()
 
 
-def test_labels_are_cut_into_equal_parts():
+def test_labels_are_divided_into_equal_parts():
     of = structure(states=3)
-    found = chains(of).transitions.product
-    path = uniform_path(found, Timeline((Span(0.0, 0.06, Unit("uw")), Span(0.06, 0.09, Unit("p")))), 9)
-    states = [found.joint_states[s].states for s in path]
+    product = chains(of).transitions.product
+    path = uniform_path(product, Timeline((Span(0.0, 0.06, Unit("uw")), Span(0.06, 0.09, Unit("p")))), 9)
+    states = [product.joint_states[s].states for s in path]
     assert states == [(0, 0), (0, 0), (1, 1), (1, 1), (2, 2), (2, 2), (0, 0), (1, 1), (2, 2)]
 
 

@@ -1,4 +1,4 @@
-"""Utterances with phone labels in time, and what the labels say of the chains: allowed units, a first path, bigrams."""
+"""Utterances with phone labels in time, and what follows from the labels: allowed units, a first path, bigrams."""
 
 from __future__ import annotations
 

@@ -50,7 +50,7 @@ def train_on_speech(
 ) -> Chains:
     """Return chains whose densities of speech are re-estimated from other speakers as well; all else stays.
 
-    data        : what the chains were trained on; its speech is used again, without its motion
+    data        : what the chains were trained on; its speech is used here too, without its motion
     speech_only : utterances of other speakers; the values of their visual streams are ignored
     report      : is called after every step; while the number of components stays, the weighted log likelihood never
                   falls

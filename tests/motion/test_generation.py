@@ -23,8 +23,8 @@ def whole():
 def test_stretches_change_nothing(whole, stretch, monkeypatch):
     frames = len(SPOKEN.features.values)
     assert frames > 3 * stretch
-    monkeypatch.setattr(module, "STRETCH", stretch)
-    monkeypatch.setattr(module, "MARGIN", 250)
+    monkeypatch.setattr(module, "BLOCK_FRAMES", stretch)
+    monkeypatch.setattr(module, "MARGIN_FRAMES", 250)
     pins = Constraints((Pin(3.3, "opening", 0.2), Pin(5.01, "opening", 0.1)))
     pieces = ENGINE.generate(MODEL, SPOKEN, pins)
     assert pieces.motion.values == pytest.approx(
