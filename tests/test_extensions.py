@@ -59,5 +59,5 @@ def test_what_is_of_another_kind_is_refused(tmp_path, monkeypatch: pytest.Monkey
         engine_named("wrong")
     with pytest.raises(InputError, match="required a class of Face"):
         face_named("wrong")
-    with pytest.raises(ExportError, match="cannot write motion as '.wrong'"):
+    with pytest.raises(ExportError, match=r"cannot write motion as '\.wrong'"):
         check_motion(tmp_path / "a.wrong", example(("aa",)).motion)

@@ -30,27 +30,27 @@ def test_sounds_with_arrays(folder):
     (folder / "test.txt").write_text("two\n")
     found = discover(folder)
     assert found.kind == "FACEGOOD blendshape weights"
-    assert [(item.name, item.split, item.words) for item in found.items] == [
+    assert [(item.name, item.split, item.words) for item in found.recordings] == [
         ("one", "train", ("hello",)),
         ("two", "test", None),
     ]
-    assert found.items[0].file == folder / "one.wav"
-    assert found.items[0].curves == MotionFile(folder / "bs_value_one.npy", 30.0, CHANNELS)
-    assert found.items[0].rights == {"licence": "The MIT License", "attribution": "Copyright (c) Anna"}
-    motion = read_bare_motion(found.items[0].curves)
+    assert found.recordings[0].file == folder / "one.wav"
+    assert found.recordings[0].motion_file == MotionFile(folder / "bs_value_one.npy", 30.0, CHANNELS)
+    assert found.recordings[0].rights == {"licence": "The MIT License", "attribution": "Copyright (c) Anna"}
+    motion = read_bare_motion(found.recordings[0].motion_file)
     assert (motion.rate_hz, motion.channels) == (30.0, CHANNELS)
     np.testing.assert_array_equal(motion.values, np.load(folder / "bs_value_one.npy"))
 
 
 def test_without_a_licence_nothing_is_claimed(folder):
-    assert discover(folder).items[0].rights == {}
+    assert discover(folder).recordings[0].rights == {}
 
 
 def test_an_array_needs_one_sound(folder):
     (folder / "one.wav").rename(folder / "three.wav")
     (folder / "two.flac").touch()
     found = discover(folder)
-    assert found.items == ()
+    assert found.recordings == ()
     assert "0 sounds named one, required one: one.wav" in found.problems["one"]
     assert "2 sounds named two" in found.problems["two"]
 
@@ -114,7 +114,7 @@ def test_two_lists_of_names(folder):
 
 def test_of_a_licence_the_beginning_is_read(folder):
     (folder / "LICENSE").write_text("MIT License\n" + "x" * 20_000 + "\nCopyright (c) nobody\n")
-    rights = discover(folder).items[0].rights
+    rights = discover(folder).recordings[0].rights
     assert rights == {"licence": "MIT License"}
 
 

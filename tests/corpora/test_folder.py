@@ -18,9 +18,9 @@ def test_videos_of_any_kind_are_found(tmp_path):
     touch(tmp_path, "b.MP4", "a.mov", "day 1/c.webm", "notes.pdf", "speech.wav", ".cache/d.mp4", ".part-e.mkv")
     found = discover(tmp_path)
     assert found.kind == "folder of videos"
-    assert [item.name for item in found.items] == ["a", "b", "day 1-c"]
-    assert [item.words for item in found.items] == [None, None, None]
-    assert {item.split for item in found.items} == {"train"}
+    assert [item.name for item in found.recordings] == ["a", "b", "day 1-c"]
+    assert [item.words for item in found.recordings] == [None, None, None]
+    assert {item.split for item in found.recordings} == {"train"}
 
 
 def test_transcripts_lie_beside_the_videos(tmp_path):
@@ -28,7 +28,7 @@ def test_transcripts_lie_beside_the_videos(tmp_path):
     (tmp_path / "a.txt").write_text("﻿Hello, World! It’s 3 o'clock — naïve.\n", encoding="utf-8")
     (tmp_path / "sub" / "b.txt").write_text("Nothing.\n")
     (tmp_path / "c.txt").write_text("\n")
-    words = {item.name: item.words for item in discover(tmp_path).items}
+    words = {item.name: item.words for item in discover(tmp_path).recordings}
     assert words == {"a": ("hello", "world", "it's", "three", "o'clock", "naïve"), "sub-b": ("nothing",), "c": None}
 
 
@@ -36,7 +36,7 @@ def test_a_transcript_without_words_is_reported(tmp_path):
     touch(tmp_path, "a.mp4", "b.mp4")
     (tmp_path / "a.txt").write_text("...")
     found = discover(tmp_path)
-    assert [item.name for item in found.items] == ["b"]
+    assert [item.name for item in found.recordings] == ["b"]
     assert "holds no word" in found.problems["a"]
 
 
@@ -44,21 +44,21 @@ def test_a_transcript_in_another_encoding_is_reported(tmp_path):
     touch(tmp_path, "a.mp4", "b.mp4")
     (tmp_path / "a.txt").write_bytes("naïve".encode("latin-1"))
     found = discover(tmp_path)
-    assert [item.name for item in found.items] == ["b"]
+    assert [item.name for item in found.recordings] == ["b"]
     assert "is not UTF-8 text" in found.problems["a"]
 
 
 def test_videos_of_the_same_name_are_reported(tmp_path):
     touch(tmp_path, "a.mp4", "a.mkv", "b.mp4")
     found = discover(tmp_path)
-    assert [item.name for item in found.items] == ["b"]
+    assert [item.name for item in found.recordings] == ["b"]
     assert "2 recordings share this name" in found.problems["a"]
 
 
 def test_lists_give_the_splits_and_are_not_transcripts(tmp_path):
     touch(tmp_path, "a.mp4", "test.mp4", "sub/b.mp4")
     (tmp_path / "test.txt").write_text("test\n\nsub/b\n")
-    items = {item.name: item for item in discover(tmp_path).items}
+    items = {item.name: item for item in discover(tmp_path).recordings}
     assert {name: item.split for name, item in items.items()} == {"a": "train", "test": "test", "sub-b": "test"}
     assert items["test"].words is None
 
@@ -68,7 +68,7 @@ def test_recordings_outside_of_the_lists_are_left_out(tmp_path):
     (tmp_path / "train.txt").write_text("a\n")
     (tmp_path / "val.txt").write_text("b\nlost\n")
     found = discover(tmp_path)
-    assert {item.name: item.split for item in found.items} == {"a": "train", "b": "val"}
+    assert {item.name: item.split for item in found.recordings} == {"a": "train", "b": "val"}
     assert "in none of the lists" in found.problems["c"]
     assert found.problems["lost"] == "listed in val.txt, but there is no such recording"
 
@@ -108,7 +108,7 @@ def test_sounds_with_motion_beside_them(tmp_path):
     touch(tmp_path, "a.wav", "a.csv", "b.flac", "b.npz", "c.WAV", "c.json", "alone.wav", "d.wav", "d.csv", "d.json")
     found = discover(tmp_path)
     assert found.kind == "folder of sounds with motion"
-    assert [(item.file.name, item.curves and item.curves.file.name) for item in found.items] == [
+    assert [(item.file.name, item.motion_file and item.motion_file.file.name) for item in found.recordings] == [
         ("a.wav", "a.csv"),
         ("b.flac", "b.npz"),
         ("c.WAV", "c.json"),
@@ -120,14 +120,14 @@ def test_a_video_is_tracked_whatever_lies_beside_it(tmp_path):
     touch(tmp_path, "a.mp4", "a.csv", "b.wav", "b.csv")
     found = discover(tmp_path)
     assert found.kind == "folder of videos, and of sounds with motion"
-    assert [item.curves is None for item in found.items] == [True, False]
+    assert [item.motion_file is None for item in found.recordings] == [True, False]
 
 
 def test_a_folder_is_a_speaker(tmp_path):
     touch(tmp_path, "anna/a.mp4", "anna/day 2/a.mp4", "ben/a.mp4", "c.mp4", "ben/s.wav", "ben/s.json")
     (tmp_path / "test.txt").write_text("ben/a\n")
     found = discover(tmp_path)
-    assert [(item.name, item.speaker, item.split) for item in found.items] == [
+    assert [(item.name, item.speaker, item.split) for item in found.recordings] == [
         ("anna-a", "anna", "train"),
         ("anna-day 2-a", "anna", "train"),
         ("ben-a", "ben", "test"),
@@ -139,7 +139,7 @@ def test_a_folder_is_a_speaker(tmp_path):
 def test_names_stay_unique(tmp_path):
     touch(tmp_path, "anna/a.mp4", "anna-a.mp4", "ben/a.mp4")
     found = discover(tmp_path)
-    assert [item.name for item in found.items] == ["ben-a"]
+    assert [item.name for item in found.recordings] == ["ben-a"]
     assert "2 recordings share this name" in found.problems["anna-a"]
 
 
@@ -148,6 +148,6 @@ def test_labels_are_kept_and_bad_ones_are_reported(tmp_path):
     (tmp_path / "a.lab").write_text("0 1000000 t\n1000000 2000000 uw\n")
     (tmp_path / "b.lab").write_text("0 1000000 t\n500000 2000000 uw\n")
     found = discover(tmp_path)
-    assert [item.name for item in found.items] == ["a", "c"]
-    assert [span.label.phone for span in found.items[0].phones] == ["t", "uw"]
+    assert [item.name for item in found.recordings] == ["a", "c"]
+    assert [span.label.phone for span in found.recordings[0].phones] == ["t", "uw"]
     assert "line 2 starts at 0.05 s" in found.problems["b"]

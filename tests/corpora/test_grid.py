@@ -34,12 +34,12 @@ def test_other_names_do_not(name):
 def test_reads_the_layout(grid):
     found = discover(grid)
     assert found.kind == "GRID corpus"
-    assert [item.name for item in found.items] == ["brwa3s", "lgazzp", "swiz9n"]
-    assert found.items[0].words == ("bin", "red")  # what was said, not what the name spells
-    assert found.items[1].words == ("lay", "green", "at", "z", "zero", "please")
-    assert found.items[0].file == grid / "clips" / "brwa3s.mkv"
-    assert {item.split for item in found.items} == {"train"}
-    assert found.items[0].rights["attribution"].startswith("GRID corpus (Cooke, Barker, Cunningham, Shao 2006)")
+    assert [item.name for item in found.recordings] == ["brwa3s", "lgazzp", "swiz9n"]
+    assert found.recordings[0].words == ("bin", "red")  # what was said, not what the name spells
+    assert found.recordings[1].words == ("lay", "green", "at", "z", "zero", "please")
+    assert found.recordings[0].file == grid / "clips" / "brwa3s.mkv"
+    assert {item.split for item in found.recordings} == {"train"}
+    assert found.recordings[0].rights["attribution"].startswith("GRID corpus (Cooke, Barker, Cunningham, Shao 2006)")
     assert found.problems == {}
 
 
@@ -49,14 +49,14 @@ def test_videos_and_times_directly_in_the_folder(tmp_path):
     (tmp_path / "swwp2s.align").write_text("0 9000 sil\n9000 20000 set\n")
     found = discover(tmp_path)
     assert found.kind == "GRID corpus"
-    assert found.items[1].words == ("set",)
+    assert found.recordings[1].words == ("set",)
 
 
 def test_bad_word_times_are_reported_and_the_rest_is_read(grid):
     (grid / "align" / "swiz9n.align").write_text("0 100 set\n100 two white\n")
     (grid / "align" / "lgazzp.align").write_text("0 74500 sil\n")
     found = discover(grid)
-    assert [item.name for item in found.items] == ["brwa3s"]
+    assert [item.name for item in found.recordings] == ["brwa3s"]
     assert "line 2 is '100 two white'; required: start end word" in found.problems["swiz9n"]
     assert "holds no word" in found.problems["lgazzp"]
 
@@ -81,10 +81,10 @@ def test_the_real_thing():
     found = discover(folder)
     assert found.kind == "GRID corpus"
     assert found.problems == {}
-    splits = [item.split for item in found.items]
+    splits = [item.split for item in found.recordings]
     assert {split: splits.count(split) for split in splits} == {"train": 452, "val": 22, "test": 50}
-    assert sum(item.words == words_of_name(item.name) for item in found.items) >= 520
-    assert all(item.words is not None and len(item.words) == 6 for item in found.items)
+    assert sum(item.words == words_of_name(item.name) for item in found.recordings) >= 520
+    assert all(item.words is not None and len(item.words) == 6 for item in found.recordings)
 
 
 @pytest.mark.parametrize(
@@ -94,7 +94,7 @@ def test_the_real_thing():
 def test_speakers_by_their_folders(tmp_path, folder, speaker):
     (tmp_path / folder).mkdir()
     (tmp_path / folder / "brwa3s.mpg").touch()
-    (item,) = discover(tmp_path / folder).items
+    (item,) = discover(tmp_path / folder).recordings
     assert item.speaker == speaker
 
 

@@ -18,14 +18,14 @@ def recordings(count: int) -> RecordingFolder:
 def test_names_elsewhere_are_names_without_a_recording(tmp_path: Path) -> None:
     (tmp_path / "train.txt").write_text("name0\n/etc/passwd\n../name1\n..\nname0\n")
     found = assign_splits(recordings(2), tmp_path)
-    assert [(item.name, item.split) for item in found.items] == [("name0", "train")]
+    assert [(item.name, item.split) for item in found.recordings] == [("name0", "train")]
     assert sorted(found.problems) == ["-etc-passwd", "..", "..-name1", "name1"]
 
 
 def test_long_lists_of_many_recordings(tmp_path: Path) -> None:
     (tmp_path / "train.txt").write_text("".join(f"name{i}\n" for i in range(20_000)))
     found = assign_splits(recordings(5000), tmp_path)
-    assert len(found.items) == 5000
+    assert len(found.recordings) == 5000
     assert len(found.problems) == 15_000
 
 

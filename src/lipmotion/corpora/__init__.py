@@ -1,1 +1,1 @@
-"""Recordings in, and the corpus they become."""
+"""Source recordings in folders, and the corpus that is prepared from them."""

@@ -1,4 +1,4 @@
-"""Which kind of recordings a folder holds."""
+"""Finding the recordings in a folder, with the reader of its kind."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ READERS: Registry[CorpusReader] = Registry(
 
 
 def discover(directory: Path) -> RecordingFolder:
-    """Return what a folder holds, read by the first reader that fits.
+    """Return the recordings in a folder, from the first reader that recognises its kind.
 
     GRID, FACEGOOD, then what installed packages add in alphabetical order, then any folder of videos or sounds.
 
@@ -37,7 +37,7 @@ def discover(directory: Path) -> RecordingFolder:
         raise InputError(f"{directory}: no such folder; give a folder of recordings")
     check_listable(directory)
     found = next(filter(None, (READERS.load(name)(directory) for name in _order())))
-    if not found.items and not found.problems:
+    if not found.recordings and not found.problems:
         raise CorpusError(
             f"{directory}: no videos in it, and no sounds with motion beside them; required: files ending in one of "
             f"{' '.join(sorted(VIDEO_SUFFIXES))}, or a sound and a file of the same name in {' '.join(MOTION_SUFFIXES)}"

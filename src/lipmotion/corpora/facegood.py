@@ -1,4 +1,4 @@
-"""Sounds with bare arrays of blendshape weights, as FACEGOOD-Audio2Face publishes them.
+"""Reader of sounds with bare arrays of blendshape weights, as FACEGOOD-Audio2Face publishes them.
 
 ``NAME.wav``, ``bs_value_NAME.npy`` (frames × channels, 30 a second), and the channels' names in one
 ``*_bs_name.npy``.
@@ -25,11 +25,11 @@ KIND = "FACEGOOD blendshape weights"
 NAMES, VALUES = "*_bs_name.npy", "bs_value_"
 RATE_HZ = 30.0
 LICENCE_START = 10_000
-"""Characters of a licence that say which it is, and whose."""
+"""Characters of a licence file that are read for its name and its owner."""
 
 
 def read_facegood(directory: Path) -> RecordingFolder | None:
-    """Return the recordings of such a folder, or None if it holds no list of names or no arrays.
+    """Return the recordings of such a folder, or None if it has no list of names or no arrays.
 
     Raises InputError: the list of names is damaged, or there are several.
     """
@@ -44,25 +44,27 @@ def read_facegood(directory: Path) -> RecordingFolder | None:
         if path.suffix.lower() in AUDIO_SUFFIXES:
             sounds.setdefault(path.stem, []).append(path)
     ignored, rights = frozenset(directory / name for name in LISTS), _rights(directory)
-    items, problems = [], {}
+    recordings, problems = [], {}
     for path in arrays:
         name = path.stem.removeprefix(VALUES)
-        found = sounds.get(name, [])
+        same_name = sounds.get(name, [])
         try:
-            if len(found) != 1:
-                raise InputError(f"{path}: {len(found)} sounds named {name}, required one: {name}.wav")
-            labels = labels_beside(found[0], ignored=ignored)
-            curves = MotionFile(path, RATE_HZ, channels)
-            items.append(
-                SourceRecording(name, found[0], labels.words, rights=rights, phones=labels.phones, curves=curves)
+            if len(same_name) != 1:
+                raise InputError(f"{path}: {len(same_name)} sounds named {name}, required one: {name}.wav")
+            labels = labels_beside(same_name[0], ignored=ignored)
+            motion_file = MotionFile(path, RATE_HZ, channels)
+            recordings.append(
+                SourceRecording(
+                    name, same_name[0], labels.words, rights=rights, phones=labels.phones, motion_file=motion_file
+                )
             )
         except InputError as error:
             problems[name] = str(error)
-    return assign_splits(RecordingFolder(KIND, tuple(items), problems), directory)
+    return assign_splits(RecordingFolder(KIND, tuple(recordings), problems), directory)
 
 
 def read_channels(path: Path) -> tuple[Channel, ...]:
-    """Return the channels that a list of names gives. Raises InputError: not a row of different texts."""
+    """Return the channels of a file of names. Raises InputError: not a row of different texts."""
     names = _load(path)
     if names.dtype.kind != "U" or names.ndim != 1 or len(set(names.tolist())) != len(names):
         raise InputError(
@@ -71,24 +73,24 @@ def read_channels(path: Path) -> tuple[Channel, ...]:
     return tuple(Channel(str(name), WEIGHT) for name in names)
 
 
-def read_bare_motion(curves: MotionFile) -> Motion:
-    """Return the motion of a bare array.
+def read_bare_motion(file: MotionFile) -> Motion:
+    """Return the motion in a file with a bare array.
 
-    Raises InputError: not an array of numbers, a row of which has one for each channel.
+    Raises InputError: not an array of finite numbers with one column a channel.
     """
-    values = _load(curves.file)
-    if values.dtype.kind not in "fiu" or values.ndim != 2 or values.shape[1] != len(curves.channels):
+    values = _load(file.file)
+    if values.dtype.kind not in "fiu" or values.ndim != 2 or values.shape[1] != len(file.channels):
         raise InputError(
-            f"{curves.file}: an array of {values.dtype} of shape {values.shape}, "
-            f"required numbers of shape (frames, {len(curves.channels)})"
+            f"{file.file}: an array of {values.dtype} of shape {values.shape}, "
+            f"required numbers of shape (frames, {len(file.channels)})"
         )
     if not np.isfinite(values).all():
-        raise InputError(f"{curves.file}: holds values that are not finite; interpolate them first")
-    return Motion(values.astype(np.float64), curves.rate_hz or RATE_HZ, curves.channels)
+        raise InputError(f"{file.file}: holds values that are not finite; interpolate them first")
+    return Motion(values.astype(np.float64), file.rate_hz or RATE_HZ, file.channels)
 
 
 def _load(path: Path) -> NDArray[Any]:
-    """Read an array, never pickled objects; Python 2 wrote sizes as ``116L``, of which NumPy warns."""
+    """Return an array from a file, never pickled objects; NumPy's warning of Python 2's sizes (``116L``) is hidden."""
     check_regular(path, "array")
     try:
         with warnings.catch_warnings():
@@ -99,7 +101,7 @@ def _load(path: Path) -> NDArray[Any]:
 
 
 def _rights(directory: Path) -> dict[str, str]:
-    """Return what a LICENSE file says in its first line, and in the line of its copyright."""
+    """Return the licence and attribution of a LICENSE file: its first line, and its line of the copyright."""
     path = directory / "LICENSE"
     if not path.is_file():
         return {}

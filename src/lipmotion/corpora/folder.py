@@ -1,4 +1,4 @@
-"""A folder of videos, or of sounds with motion beside them; with labels beside both where they are known."""
+"""Reader of folders with videos, or with sounds and motion files; labels beside both where there are any."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ MOTION_SUFFIXES = (".csv", ".json", ".npz")
 def read_folder(directory: Path) -> RecordingFolder:
     """Return the recordings in a folder and its sub-folders: videos, and sounds with a motion file of the same name.
 
-    Beside ``take1.mp4`` may lie what was said: ``take1.txt``, ``take1.TextGrid``, ``take1.lab``.  What lies in a
-    sub-folder ``anna`` is spoken by anna, and is named ``anna-take1``.
+    Transcripts and labels have the name of the recording: ``take1.txt``, ``take1.TextGrid``, ``take1.lab``. Recordings in
+    a sub-folder ``anna`` have the speaker ``anna``, and names as ``anna-take1``.
     """
     by_name: dict[str, list[Path]] = {}
     for path in sorted(directory.rglob("*")):
@@ -32,31 +32,31 @@ def read_folder(directory: Path) -> RecordingFolder:
         if not any(part.startswith(".") for part in inner.parts) and (_has_motion(path) or video_files([path])):
             by_name.setdefault("-".join(inner.with_suffix("").parts), []).append(path)
     lists = frozenset(directory / name for name in LISTS)
-    items, problems = [], {}
+    recordings, problems = [], {}
     for name, paths in by_name.items():
         try:
-            items.append(_recording(name, _only(paths), directory, lists))
+            recordings.append(_recording(name, _only(paths), directory, lists))
         except InputError as error:
             problems[name] = str(error)
-    items.sort(key=lambda item: item.name)
-    return assign_splits(RecordingFolder(_kind(by_name), tuple(items), problems), directory)
+    recordings.sort(key=lambda recording: recording.name)
+    return assign_splits(RecordingFolder(_kind(by_name), tuple(recordings), problems), directory)
 
 
 def _recording(name: str, path: Path, directory: Path, lists: frozenset[Path]) -> SourceRecording:
     labels: RecordingLabels = labels_beside(path, ignored=lists)
-    curves = None
+    motion_file = None
     if _is_sound(path):
         beside = motion_files(path)
         if len(beside) > 1:
             raise InputError(f"{path}: {len(beside)} motion files beside it: {', '.join(map(str, beside))}; keep one")
-        curves = MotionFile(beside[0])
+        motion_file = MotionFile(beside[0])
     folders = path.relative_to(directory).parts[:-1]
     speaker = folders[0] if folders else ""
-    return SourceRecording(name, path, labels.words, speaker=speaker, phones=labels.phones, curves=curves)
+    return SourceRecording(name, path, labels.words, speaker=speaker, phones=labels.phones, motion_file=motion_file)
 
 
 def motion_files(sound: Path) -> list[Path]:
-    """Return the motion files beside a sound that have its name."""
+    """Return the motion files with the name of a sound, beside it."""
     return [path for suffix in MOTION_SUFFIXES if (path := sound.with_suffix(suffix)).is_file()]
 
 
@@ -69,12 +69,14 @@ def _has_motion(path: Path) -> bool:
 
 
 def _only(paths: list[Path]) -> Path:
+    """Return the only path. Raises InputError: there are several."""
     if len(paths) > 1:
         raise InputError(f"{len(paths)} recordings share this name: {', '.join(map(str, paths))}; rename all but one")
     return paths[0]
 
 
 def _kind(by_name: dict[str, list[Path]]) -> str:
+    """Return the kind of folder, in words."""
     sounds = {_is_sound(path) for paths in by_name.values() for path in paths}
     if len(sounds) > 1:
         return BOTH

@@ -16,10 +16,10 @@ RIGHTS = {
 }
 
 SILENCES = frozenset({"sil", "sp"})
-"""Marks of a word-time file that are not words."""
+"""Labels of a word-time file that are not words."""
 WORD = re.compile(r"[^\W\d_]+(?:['-][^\W\d_]+)*")
 LARGEST_ALIGN = 1 << 16
-"""Bytes of a word-time file; GRID's have a hundred."""
+"""Most bytes of a word-time file; GRID's have a hundred."""
 
 COMMANDS = {"b": "bin", "l": "lay", "p": "place", "s": "set"}
 COLOURS = {"b": "blue", "g": "green", "r": "red", "w": "white"}
@@ -31,21 +31,21 @@ NAME = re.compile(r"[blps][bgrw][abiw][a-vx-z][z1-9][anps]")
 
 
 def read_grid(directory: Path) -> RecordingFolder | None:
-    """Return the sentences of a GRID folder, or None if most of its videos are not named like GRID's.
+    """Return the recordings of a GRID folder, or None if most of its videos are not named like GRID's.
 
-    directory : holds clips/ or the videos themselves; align/ or the .align files beside the videos; the lists
+    directory : with clips/ or the videos themselves; align/ or .align files beside the videos; the lists of the splits
     """
     clips = directory / "clips"
     files = video_files((clips if clips.is_dir() else directory).iterdir())
     if 2 * sum(words_of_name(path.stem) is not None for path in files) <= len(files):
         return None
-    items, problems, speaker = [], {}, speaker_of_folder(directory.resolve().name)
+    recordings, problems, speaker = [], {}, speaker_of_folder(directory.resolve().name)
     for path in files:
         try:
-            items.append(SourceRecording(path.stem, path, _words(directory, path), rights=RIGHTS, speaker=speaker))
+            recordings.append(SourceRecording(path.stem, path, _words(directory, path), rights=RIGHTS, speaker=speaker))
         except InputError as error:
             problems[path.stem] = str(error)
-    return assign_splits(RecordingFolder(KIND, tuple(items), problems), directory)
+    return assign_splits(RecordingFolder(KIND, tuple(recordings), problems), directory)
 
 
 def speaker_of_folder(folder: str) -> str:
@@ -66,6 +66,7 @@ def words_of_name(name: str) -> tuple[str, ...] | None:
 
 
 def _words(directory: Path, video: Path) -> tuple[str, ...] | None:
+    """Return the words of a video: from its word-time file, else from its name; None if neither gives them."""
     for folder in (directory / "align", video.parent):
         path = folder / f"{video.stem}.align"
         if path.is_file():

@@ -1,4 +1,4 @@
-"""What every kind of recording comes down to."""
+"""Source recordings: what every reader of a folder returns."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ AUDIO_SUFFIXES = frozenset(f".{name}" for name in "aac aif aiff flac m4a mp3 oga
 
 @dataclass(frozen=True)
 class MotionFile:
-    """Motion in a file of its own.
+    """A file with the motion that goes with a sound.
 
-    file     : what ``animate`` writes (.csv .json .npz), or a bare array of numbers (.npy)
-    rate_hz  : frames per second of a bare array, which does not say; None: the file says
-    channels : those of a bare array; empty: the file says
+    file     : as ``animate`` writes it (.csv .json .npz), or a bare array of numbers (.npy)
+    rate_hz  : frame rate of a bare array; None: the file states it
+    channels : of a bare array; empty: the file states them
     """
 
     file: Path
@@ -32,16 +32,16 @@ class MotionFile:
 
 @dataclass(frozen=True)
 class SourceRecording:
-    """One sentence, heard and seen.
+    """One recorded sentence: sound with motion, or video.
 
-    name    : unique in its folder, usable as a folder's name
-    file    : the video, or the sound that belongs to the curves
-    words   : the transcript, or None where it is not known
-    split   : ``train``, ``val`` or ``test``
-    rights  : licence and attribution, where known
-    speaker : who speaks, empty where it is not known
-    phones  : labelled phones in time, or None
-    curves  : the motion, or None: ``file`` shows the face that is to be tracked
+    name        : unique in its folder, usable as a folder's name
+    file        : the video, or the sound that goes with the motion file
+    words       : the transcript, or None where it is not known
+    split       : ``train``, ``val`` or ``test``
+    rights      : licence and attribution, where known
+    speaker     : name of the speaker, empty where it is not known
+    phones      : labelled phones in time, or None
+    motion_file : the motion; None: the face in ``file`` is to be tracked
     """
 
     name: str
@@ -51,23 +51,23 @@ class SourceRecording:
     rights: dict[str, str] = field(default_factory=dict)
     speaker: str = ""
     phones: Timeline[Unit] | None = None
-    curves: MotionFile | None = None
+    motion_file: MotionFile | None = None
 
 
 @dataclass(frozen=True)
 class RecordingFolder:
-    """All that was found in a folder.
+    """The recordings in a folder.
 
-    kind     : the reader that fitted, in words
-    items    : the recordings, sorted by name
-    problems : what cannot be used, name to reason
+    kind       : the kind of folder, in words
+    recordings : those that can be used, sorted by name
+    problems   : those that cannot be used, name to reason
     """
 
     kind: str
-    items: tuple[SourceRecording, ...]
+    recordings: tuple[SourceRecording, ...]
     problems: dict[str, str] = field(default_factory=dict)
 
 
 def video_files(paths: Iterable[Path]) -> list[Path]:
-    """Return the visible files with a video's suffix, sorted."""
+    """Return the files with the suffix of a video, sorted."""
     return sorted(path for path in paths if path.suffix.lower() in VIDEO_SUFFIXES and path.is_file())

@@ -1,4 +1,4 @@
-"""The lists train.txt, val.txt and test.txt."""
+"""The lists train.txt, val.txt and test.txt, which assign recordings to splits."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from lipmotion.storage.files import read_text_file
 SPLITS = ("train", "val", "test")
 LISTS = tuple(f"{split}.txt" for split in SPLITS)
 LARGEST_LIST = 1 << 24
-"""Bytes of a list of names."""
+"""Most bytes of a list of names."""
 MOST_MISSING = 20_000
-"""Names without a recording that are reported one by one; more of them are the list of another folder."""
+"""Names without a recording that are reported one by one; more of them mean a list of another folder."""
 
 
-def assign_splits(found: RecordingFolder, directory: Path) -> RecordingFolder:
-    """Return the recordings with the splits that the lists in ``directory`` give them.
+def assign_splits(folder: RecordingFolder, directory: Path) -> RecordingFolder:
+    """Return the recordings with the splits of the lists in ``directory``.
 
-    Without lists everything is ``train``. With a train.txt, recordings in no list become problems, for training on
-    them was not asked for; so do names without a recording.
-    Raises CorpusError: a name stands in two lists, or more than ``MOST_MISSING`` names have no recording.
+    Without lists all are ``train``. With a train.txt, recordings that are in no list become problems, because they are
+    not meant for training; so do names without a recording.
+    Raises CorpusError: a name is in two lists, or more than ``MOST_MISSING`` names have no recording.
     """
     split_of = _read_lists(directory)
     rest = None if (directory / "train.txt").is_file() else "train"
-    known = {item.name for item in found.items} | found.problems.keys()
+    known = {recording.name for recording in folder.recordings} | folder.problems.keys()
     problems = {
         name: f"listed in {split}.txt, but there is no such recording"
         for name, split in split_of.items()
@@ -37,17 +37,18 @@ def assign_splits(found: RecordingFolder, directory: Path) -> RecordingFolder:
             f"{directory}: its lists name {len(problems)} recordings that are not in it, at most {MOST_MISSING} may "
             "be missing; are they those of another folder?"
         )
-    items = []
-    for item in found.items:
-        split = split_of.get(item.name, rest)
+    recordings = []
+    for recording in folder.recordings:
+        split = split_of.get(recording.name, rest)
         if split is None:
-            problems[item.name] = f"in none of the lists of {directory} ({', '.join(LISTS)}); add it to one"
+            problems[recording.name] = f"in none of the lists of {directory} ({', '.join(LISTS)}); add it to one"
         else:
-            items.append(replace(item, split=split))
-    return RecordingFolder(found.kind, tuple(items), found.problems | problems)
+            recordings.append(replace(recording, split=split))
+    return RecordingFolder(folder.kind, tuple(recordings), folder.problems | problems)
 
 
 def _read_lists(directory: Path) -> dict[str, str]:
+    """Return the split of every listed name. Raises CorpusError: a name is in two lists."""
     split_of: dict[str, str] = {}
     for split in SPLITS:
         path = directory / f"{split}.txt"

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.stats.pca import principal_axes
 from lipmotion.storage.schema import STANDARD, ArraySpec, CheckedArrays
 
 OFFSETS = (-24, -18, -12, -8, -4, 0, 4, 8, 12, 18, 24)
@@ -65,9 +66,7 @@ def fit_acoustic_context(recordings: Iterable[NDArray[np.float32]], size: int) -
     mean = total / count
     covariance = products / count - np.outer(mean, mean)
     scale = np.sqrt(np.maximum(np.diagonal(covariance), 0)) + LEAST_DEVIATION
-    _, axes = np.linalg.eigh(covariance / np.outer(scale, scale))
-    basis = axes[:, ::-1][:, :size]
-    basis = basis * np.where(basis[np.abs(basis).argmax(axis=0), np.arange(basis.shape[1])] < 0, -1.0, 1.0)
+    basis = principal_axes(covariance / np.outer(scale, scale), size).T
     factor = SCALE / np.sqrt(basis.shape[1])
     return AcousticContext(*(array.astype(np.float32) for array in (mean, scale, basis * factor)))
 

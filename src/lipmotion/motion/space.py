@@ -47,7 +47,10 @@ class MotionSpace:
     def restore(
         self, values: NDArray[np.float64], variance: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return values and variances of all channels [each shape=(T, P)] from those in the space [each shape=(T, Q)]."""
+        """Return values and variances of all channels [each shape=(T, P)].
+
+        values, variance : in the motion space [each shape=(T, Q)]
+        """
         motion, spread = (np.empty((len(values), len(self.channels))) for _ in range(2))
         count = len(self.direct)
         motion[:, self.direct], spread[:, self.direct] = values[:, :count], variance[:, :count]

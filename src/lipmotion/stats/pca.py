@@ -59,15 +59,25 @@ def fit_pca(values: NDArray[Any], components: int) -> Pca:
     elif values.shape[0] < values.shape[1]:
         basis = _of_rows(values - mean, components, least)
     else:
-        basis = _of_columns(values - mean, components, least)
+        centred = values - mean
+        basis = principal_axes(centred.T @ centred, components, least)
+    return Pca(mean, _with_signs(basis))
+
+
+def principal_axes(products: NDArray[np.float64], components: int, least: float = 0.0) -> NDArray[np.float64]:
+    """Return the first principal components [shape=(K, D)] of centred values X, given XᵀX or their covariance.
+
+    products : [shape=(D, D)];  least : largest eigenvalue that rounding alone may produce
+    Signs are those of ``fit_pca``.
+    """
+    squares, vectors = np.linalg.eigh(products)
+    return _with_signs(vectors[:, _largest(squares, components, least)].T)
+
+
+def _with_signs(basis: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return components [shape=(K, D)] with signs such that the entry furthest from 0 is positive."""
     signs = np.sign(basis[np.arange(len(basis)), np.abs(basis).argmax(axis=1)])
-    return Pca(mean, basis * signs[:, None])
-
-
-def _of_columns(centred: NDArray[np.float64], components: int, least: float) -> NDArray[np.float64]:
-    """Return the first components [shape=(K, D)] from the products of the columns of centred values."""
-    squares, vectors = np.linalg.eigh(centred.T @ centred)
-    return vectors[:, _largest(squares, components, least)].T
+    return basis * signs[:, None]
 
 
 def check_orthonormal(name: str, basis: NDArray[Any]) -> None:

@@ -1,4 +1,4 @@
-"""The data that flows. Plain frozen values; nothing here computes more than a look-up."""
+"""Data types of the whole package: frozen values without files, and without computation beyond interpolation."""
 
 from lipmotion.types.audio import Audio
 from lipmotion.types.configuration import Configuration, Rule, option

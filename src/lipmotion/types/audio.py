@@ -1,4 +1,4 @@
-"""Sound as samples."""
+"""Sampled sound."""
 
 from __future__ import annotations
 
@@ -13,7 +13,11 @@ class Audio:
     """One channel of sound.
 
     samples : float32 array [shape=(N,)], full scale is ±1
-    rate_hz : sampling rate
+    rate_hz : samples per second; speech is processed at 16,000
+
+    >>> import numpy as np
+    >>> Audio(np.zeros(8_000, np.float32), 16_000).duration_s
+    0.5
     """
 
     samples: NDArray[np.float32]
@@ -21,5 +25,5 @@ class Audio:
 
     @property
     def duration_s(self) -> float:
-        """Length in seconds."""
+        """Duration in seconds."""
         return len(self.samples) / self.rate_hz

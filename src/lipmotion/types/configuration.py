@@ -1,4 +1,4 @@
-"""Configurations: frozen dataclasses that check themselves, and that are parsed from texts and from model headers."""
+"""Configurations: frozen dataclasses that check their values, parsed from texts and from headers of models."""
 
 from __future__ import annotations
 
@@ -10,18 +10,20 @@ from lipmotion.errors import InputError, shortened
 
 ConfigurationT = TypeVar("ConfigurationT", bound="Configuration")
 LARGEST = 1e6
-"""No number of a configuration is larger."""
+"""Largest absolute value of a number in a configuration."""
 _WORDS = {bool: "true or false", int: "a whole number", float: "a number", str: "text"}
-_TRUTHS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
+_BOOLEANS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
 
 
 @dataclass(frozen=True)
 class Rule:
-    """What the value of an option must satisfy besides its type.
+    """A requirement on the value of an option, besides its type.
 
-    least, above : the smallest value, or a bound that it must exceed
-    odd, power_of_two : of whole numbers
-    choices      : the texts that are allowed; empty: any
+    least        : smallest value that is allowed
+    above        : bound that the value must exceed
+    odd          : only odd numbers are allowed
+    power_of_two : only powers of two are allowed
+    choices      : the texts that are allowed; empty: any text
     """
 
     least: float | None = None
@@ -32,7 +34,7 @@ class Rule:
 
     @property
     def words(self) -> str:
-        """What is required, as the end of a message."""
+        """The requirement in words, as the end of an error message."""
         if self.choices:
             return f"one of: {', '.join(self.choices)}"
         kind = "an odd number" if self.odd else "a power of two" if self.power_of_two else ""
@@ -52,22 +54,22 @@ ANY = Rule()
 
 
 def option(default: Any, rule: Rule) -> Any:
-    """Return a dataclass field with a default and a rule that its values must satisfy."""
+    """Return a dataclass field with a default value and a rule for its values."""
     return field(default=default, metadata={"rule": rule})
 
 
 @dataclass(frozen=True)
 class Configuration:
-    """Base of all configurations: subclasses are frozen dataclasses whose fields have a default each.
+    """Base class of configurations. A subclass is a frozen dataclass; every field is an option and has a default value.
 
-    The type of an option is that of its default: bool, int, float or str. Every value is checked when the configuration
-    is made.
+    The type of an option is that of its default: bool, int, float or str. The values are checked when the configuration
+    is created.
 
-    presets : named combinations of options
-    former  : names that options had before, to their present ones; both are understood
-    gone    : options that no longer exist, and the only value of theirs that is still accepted
-    hints   : names that users might expect, and what to use instead
-    Raises InputError: a value of another type, or one that its rule does not allow.
+    presets : combinations of options by name
+    former  : former names of options, mapped to the present names; both are accepted
+    gone    : options that no longer exist, mapped to the only value that is still accepted
+    hints   : names that users might try, mapped to a text that says what to use instead
+    Raises InputError: a value has another type than its option, or its rule does not allow it.
     """
 
     presets: ClassVar[Mapping[str, Mapping[str, Any]]] = {}
@@ -76,81 +78,83 @@ class Configuration:
     hints: ClassVar[Mapping[str, str]] = {}
 
     def __post_init__(self) -> None:
-        for one in fields(self):
-            check_value(one, getattr(self, one.name))
+        for option_field in fields(self):
+            check_value(option_field, getattr(self, option_field.name))
 
     def check_files(self) -> None:
-        """Raise InputError unless all files that the configuration names can be read: before long work begins."""
+        """Raise InputError if a file that the configuration names cannot be read; called before long work begins."""
 
     @classmethod
     def parsed(cls: type[ConfigurationT], values: Mapping[str, Any]) -> ConfigurationT:
-        """Return the configuration with some options by name, as a model's header or a program gives them.
+        """Return a configuration with some options, by name; all others have their default values.
 
         Raises InputError: unknown option, or a value that is not allowed.
         """
-        known = {one.name for one in fields(cls)}
-        present: dict[str, Any] = {}
+        known = {option_field.name for option_field in fields(cls)}
+        options: dict[str, Any] = {}
         for name, value in values.items():
             if name in cls.gone and name not in known:
                 if value != cls.gone[name]:
-                    raise InputError(f"{name} is {value!r}; this option is gone, required {cls.gone[name]!r}")
+                    raise InputError(f"{name} is {value!r}; this option no longer exists, required {cls.gone[name]!r}")
                 continue
-            now = cls.former.get(name, name)
-            if now not in known:
+            present = cls.former.get(name, name)
+            if present not in known:
                 raise InputError(cls._unknown(name))
-            present[now] = value
-        return cls(**present)
+            options[present] = value
+        return cls(**options)
 
     @classmethod
     def values_of(cls, settings: Sequence[str]) -> dict[str, Any]:
-        """Return options by name from texts ``NAME=VALUE``, each parsed as its type.
+        """Return the values of options, by name, that are parsed from texts ``NAME=VALUE``.
 
-        Raises InputError: no value, unknown option, or a text that is not of the option's type.
+        Raises InputError: a text without value, an unknown option, or a value that is not of the option's type.
         """
-        options = {one.name: one for one in fields(cls)}
-        found = {}
+        options = {option_field.name: option_field for option_field in fields(cls)}
+        values = {}
         for setting in settings:
             name, equals, text = setting.partition("=")
             if not equals:
                 raise InputError(f"the setting {setting!r} has no value; required NAME=VALUE")
-            now = cls.former.get(name, name)
-            if now not in options:
+            present = cls.former.get(name, name)
+            if present not in options:
                 raise InputError(cls._unknown(name))
-            found[now] = _from_text(options[now], text)
-        return found
+            values[present] = _from_text(options[present], text)
+        return values
 
     @classmethod
     def _unknown(cls, name: str) -> str:
+        """Return the message that there is no option of this name."""
         if name in cls.hints:
             return f"no option {name!r}; {cls.hints[name]}"
-        return f"no option {name!r}; there are: {', '.join(one.name for one in fields(cls))}"
+        return f"no option {name!r}; there are: {', '.join(option_field.name for option_field in fields(cls))}"
 
     def as_mapping(self) -> dict[str, Any]:
-        """Return all options by name, as a model's header holds them."""
+        """Return the values of all options, by name, as the header of a model stores them."""
         return asdict(self)
 
 
-def check_value(one: Field[Any], value: Any) -> None:
-    """Raise InputError unless an option may have a value."""
-    kind, rule = _kind(one), one.metadata.get("rule", ANY)
+def check_value(option_field: Field[Any], value: Any) -> None:
+    """Raise InputError unless a value has the type of an option and satisfies its rule."""
+    kind, rule = _kind(option_field), option_field.metadata.get("rule", ANY)
     fits = type(value) is kind or (kind is float and type(value) is int)
     if fits and kind in (int, float) and not -LARGEST <= value <= LARGEST:
-        raise InputError(f"{one.name} is {value}, required at most {LARGEST:g} in size")
+        raise InputError(f"{option_field.name} is {value}, required at most {LARGEST:g} in size")
     if not fits or not rule.allows(value):
-        named = rule.odd or rule.power_of_two or bool(rule.choices)
-        required = rule.words if named and fits else _WORDS[kind] + ("" if named else rule.words)
-        raise InputError(f"{one.name} is {shortened(repr(value))}, required {required}")
+        is_complete = rule.odd or rule.power_of_two or bool(rule.choices)
+        required = rule.words if is_complete and fits else _WORDS[kind] + ("" if is_complete else rule.words)
+        raise InputError(f"{option_field.name} is {shortened(repr(value))}, required {required}")
 
 
-def _from_text(one: Field[Any], text: str) -> Any:
-    kind = _kind(one)
+def _from_text(option_field: Field[Any], text: str) -> Any:
+    """Return the value of an option that a text holds. Raises InputError: a text of another type."""
+    kind = _kind(option_field)
     try:
-        return _TRUTHS[text.lower()] if kind is bool else kind(text)
+        return _BOOLEANS[text.lower()] if kind is bool else kind(text)
     except (ValueError, KeyError) as error:
-        raise InputError(f"{one.name} is {text!r}, required {_WORDS[kind]}") from error
+        raise InputError(f"{option_field.name} is {text!r}, required {_WORDS[kind]}") from error
 
 
-def _kind(one: Field[Any]) -> type[Any]:
-    """Return the type of an option: that of its default."""
-    kind: type[Any] = type(one.default)
+def _kind(option_field: Field[Any]) -> type[Any]:
+    """Return the type of an option: that of its default value."""
+    kind: type[Any] = type(option_field.default)
     return kind

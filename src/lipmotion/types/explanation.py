@@ -1,4 +1,4 @@
-"""Why a frame is what it is, and what chains of states believe over time."""
+"""Explanations of frames, and posterior probabilities of chains of states over time."""
 
 from __future__ import annotations
 
@@ -13,7 +13,10 @@ from lipmotion.types.timeline import Span, Unit
 
 @dataclass(frozen=True)
 class NamedProbability:
-    """Something by name, and its probability."""
+    """A name and a probability: of a state, or of a regression.
+
+    probability : 0 to 1
+    """
 
     name: str
     probability: float
@@ -21,7 +24,7 @@ class NamedProbability:
 
 @dataclass(frozen=True)
 class ChannelValue:
-    """A value of a channel and its standard deviation, in the channel's unit."""
+    """A value of a channel and its standard deviation, both in the unit of the channel."""
 
     value: float
     deviation: float
@@ -29,12 +32,12 @@ class ChannelValue:
 
 @dataclass(frozen=True)
 class ChainStates:
-    """Where one chain of states is in a frame.
+    """Posterior probabilities of the states of one chain in a frame.
 
-    name   : its unit set
-    states : the most probable ones, best first: unit and place, counted from 1 (``b.1``)
-    lead   : probability of every number of states that it is ahead of the first chain (negative: behind); empty for the
-             first, and where chains go their own ways
+    name   : the unit set of the chain
+    states : the most probable states, best first; the name is the unit and the number of the state, from 1 (``b.1``)
+    lead   : asynchrony: probability of each number of states by which the chain is ahead of the first chain (negative:
+             behind it); empty for the first chain, and where the asynchrony is not limited
     """
 
     name: str
@@ -43,19 +46,21 @@ class ChainStates:
 
     @property
     def expected_lead(self) -> float:
-        """How many states it is ahead, on average."""
+        """Expected number of states by which the chain is ahead of the first chain."""
         return sum(states * probability for states, probability in self.lead.items())
 
 
 @dataclass(frozen=True)
 class DominantGaussian:
-    """The mixture component that most of a frame comes from, in one stream.
+    """The mixture component with the largest posterior probability in a frame, in one stream.
 
-    density, component, components : the mixture's name; which of its Gaussians this is, from 1; how many there are
-    responsibility : the posterior probability of this one, among all densities of the stream
-    distance : how far what was observed lies from its mean: root mean square over its dimensions, in standard
-               deviations (None: the stream was not observed)
-    channels : mean and deviation of each motion channel (none of speech)
+    stream     : name of the stream
+    density    : name of the mixture
+    component, components : number of the Gaussian in the mixture, from 1, and how many Gaussians the mixture has
+    responsibility : posterior probability of the component, among all components of the stream
+    distance   : distance of the observation from the mean: root mean square over its dimensions, in standard
+                 deviations (None: the stream was not observed)
+    channels   : mean and standard deviation of each motion channel (empty: a stream of speech)
     """
 
     stream: str
@@ -69,10 +74,11 @@ class DominantGaussian:
 
 @dataclass(frozen=True)
 class RegressedMean:
-    """The mean of a stream where it is not that of a density: it follows what is heard and believed around the frame.
+    """A mean of a stream that is regressed on the acoustic features and posteriors around a frame.
 
-    shares   : how much each regression says, largest first; ``rest`` in silence away from speech
-    channels : what they say together, and its deviation
+    stream   : name of the stream
+    shares   : weight of each regression, largest first; ``rest`` in silence away from speech
+    channels : weighted mean of the regressions, and its standard deviation, by channel
     """
 
     stream: str
@@ -82,14 +88,22 @@ class RegressedMean:
 
 @dataclass(frozen=True)
 class Explanation:
-    """What stands behind one frame of a result.
+    """What determined one frame of generated motion; returned by ``explain``.
 
-    span        : the phone that is said then, its unit, its word (None: there is none)
-    state       : of the model, as in ``Generation.trace``
-    motion      : value of every channel, and the model's own deviation
-    chains      : where each chain is (of engines that have chains)
-    joint       : the most probable state of all chains together (None: they are not listed)
-    gaussians, regressions : what the frame's values come from, stream by stream
+    time_s      : time of the frame in seconds
+    frame       : number of the frame, at 100 Hz
+    span        : phone, unit and word that contain the frame (None: no span contains it)
+    state       : state of the model, as in ``Generation.trace``
+    motion      : value of every channel, and the standard deviation that the model gives it
+    chains      : posterior probabilities of the states of each chain (empty: the engine has no chains)
+    joint       : the most probable joint state of all chains (None: the engine does not list joint states)
+    gaussians   : the dominant Gaussian of each stream
+    regressions : the regressed mean of each stream that has one
+
+    >>> import lipmotion
+    >>> (explanation,) = lipmotion.explain("examples/welcome.flac", at=1.0)
+    >>> explanation.frame, explanation.time_s, sorted(explanation.motion)[:2]
+    (100, 1.0, ['opening', 'outer'])
     """
 
     time_s: float
@@ -105,12 +119,13 @@ class Explanation:
 
 @dataclass(frozen=True, eq=False)
 class ChainPosteriors:
-    """What is believed of one chain over time.
+    """Posterior probabilities of one chain over time, at 100 Hz.
 
-    name, units : its unit set
-    probability : float32 array [shape=(T, U)]
-    leads       : the numbers of states that it may be ahead of the first chain; none of the first
-    lead        : probability of each [shape=(T, len(leads))]
+    name        : name of its unit set
+    units       : names of its U units
+    probability : float32 array [shape=(T, U)], of each unit
+    leads       : asynchronies: numbers of states by which it may be ahead of the first chain; empty for the first chain
+    lead        : float32 array [shape=(T, len(leads))], probability of each asynchrony
     """
 
     name: str

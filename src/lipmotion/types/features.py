@@ -1,4 +1,4 @@
-"""Speech features on the 100 Hz grid."""
+"""Acoustic features, and the frame rate of all models."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 FRAME_RATE_HZ = 100.0
-"""Frame n of every model is centred at n / FRAME_RATE_HZ seconds."""
+"""Frames per second of all models; frame n is centred at n / FRAME_RATE_HZ seconds."""
 
 
 @dataclass(frozen=True, eq=False)
 class Features:
-    """Acoustic features, one row a frame, frame n centred at ``n / FRAME_RATE_HZ`` seconds.
+    """Acoustic features of one recording: mel-frequency cepstral coefficients with Δ and Δ².
 
-    values     : float32 array [shape=(T, 39)], normalised per recording
-    duration_s : length of the recording; T = floor(duration_s * 100) + 1
+    values     : float32 array [shape=(T, 39)], normalised per recording; frame n is centred at n / 100 seconds
+    duration_s : duration of the recording in seconds; T = floor(duration_s * 100) + 1
     """
 
     values: NDArray[np.float32]
@@ -24,6 +24,9 @@ class Features:
 
 
 def frame_of(time_s: float, frames: int, rate_hz: float) -> int | None:
-    """Return the frame nearest to a time, or None where the recording has none."""
+    """Return the frame nearest to a time, or None if the time is outside the recording.
+
+    frames : length of the recording, at ``rate_hz``
+    """
     frame = np.floor(time_s * rate_hz + 0.5)
     return int(frame) if 0 <= frame < frames else None

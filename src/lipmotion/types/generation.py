@@ -1,4 +1,4 @@
-"""What goes into an engine and what comes out of it."""
+"""Input and output of engines: speech, examples, constraints, generated motion."""
 
 from __future__ import annotations
 
@@ -16,11 +16,13 @@ from lipmotion.types.timeline import Timeline, Unit
 
 @dataclass(frozen=True, eq=False)
 class Speech:
-    """One recording as an engine sees it.
+    """Speech of one recording: the input of an engine.
 
-    units  : the phones in time
-    said   : whether these are known (given, labelled, or aligned to known words), not recognised
-    log_f0 : natural logarithm of F0 in Hz, NaN where there is no voice [shape=(T,)], for engines that hear it
+    features    : acoustic features [T frames]
+    units       : the phones in time
+    log_f0      : float32 array [shape=(T,)], natural logarithm of F0 in Hz, NaN in unvoiced frames (None: the engine
+                  does not use F0)
+    units_known : whether the units are given, labelled, or aligned to known words; False: they were recognised
     """
 
     features: Features
@@ -31,10 +33,11 @@ class Speech:
 
 @dataclass(frozen=True, eq=False)
 class Example:
-    """Speech with the motion that went with it.
+    """Speech with the motion that was recorded with it.
 
+    name   : of the utterance
     motion : at 100 Hz, on the frames of ``speech.features``
-    valid  : bool array [shape=(T,)], False where the motion was not seen
+    valid  : bool array [shape=(T,)], False in frames whose motion was not measured
     """
 
     name: str
@@ -45,7 +48,15 @@ class Example:
 
 @dataclass(frozen=True)
 class Pin:
-    """The generated ``channel`` must take ``value`` at ``time_s`` (the nearest 10 ms frame)."""
+    """A value that generated motion must take at a time.
+
+    time_s  : seconds; the value is set in the nearest 10 ms frame
+    channel : name of a channel that is modelled as it is: ``opening``, ``width``, ``outer``, blendshapes
+    value   : in the unit of the channel
+
+    >>> Pin(1.2, "opening", 0.02)
+    Pin(time_s=1.2, channel='opening', value=0.02)
+    """
 
     time_s: float
     channel: str
@@ -54,17 +65,24 @@ class Pin:
 
 @dataclass(frozen=True)
 class Constraints:
-    """What the generated motion must obey exactly."""
+    """Values that generated motion must take exactly.
+
+    >>> import lipmotion
+    >>> closed = lipmotion.Constraints((lipmotion.Pin(0.5, "opening", 0.02),))
+    >>> result = lipmotion.animate("examples/welcome.flac", constraints=closed)
+    >>> round(float(result.motion["opening"][50]), 6)
+    0.02
+    """
 
     pins: tuple[Pin, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
 class StateTrace:
-    """Which state of the model stood behind each frame.
+    """The state of the model in every frame.
 
-    states : readable names
-    frames : int array [shape=(T,)], the index into ``states`` for every frame
+    states : names of the states, for people to read
+    frames : int array [shape=(T,)], index into ``states`` of every frame
     """
 
     states: tuple[str, ...]
@@ -73,10 +91,10 @@ class StateTrace:
 
 @dataclass(frozen=True, eq=False)
 class ReducedVariance:
-    """Variances of P channels that follow from those of fewer dimensions: a long recording's are large.
+    """Variances of P channels, stored as those of Q dimensions to save memory in long recordings.
 
-    reduced : float array [shape=(T, Q)]
-    mixing  : float array [shape=(Q, P)]
+    reduced : float array [shape=(T, Q)], variances of the dimensions
+    mixing  : float array [shape=(Q, P)]; ``reduced @ mixing`` are the variances of the channels
     """
 
     reduced: NDArray[np.floating[Any]]
@@ -85,13 +103,20 @@ class ReducedVariance:
 
 @dataclass(frozen=True, eq=False)
 class Generation:
-    """The result of an engine.
+    """Generated motion, with its variance, its phones in time and its states; returned by ``animate``.
 
-    motion : the trajectory at 100 Hz
-    spread : the model's own posterior variance, in squared channel units: float array [shape=(T, P)], or what it
-             follows from
-    units  : the labels behind it; edit them and generate again
-    trace  : the states behind every frame
+    motion : values of all P channels in T frames at 100 Hz
+    spread : posterior variance of the model, in squared units of the channels: float array [shape=(T, P)], or a
+             ``ReducedVariance``; ``variance`` returns an array for both
+    units  : the phones in time from which the motion was generated; edit them and generate again
+    trace  : the state of the model in every frame
+
+    >>> import lipmotion
+    >>> result = lipmotion.animate("examples/welcome.flac")
+    >>> result.variance.shape == result.motion.values.shape
+    True
+    >>> result.selected(["opening"]).resampled(30).motion.names
+    ('opening',)
     """
 
     motion: Motion
@@ -101,17 +126,17 @@ class Generation:
 
     @property
     def variance(self) -> NDArray[np.floating[Any]]:
-        """The variance of every channel in every frame [shape=(T, P)]; of a long recording, it is computed anew."""
+        """Variance of every channel in every frame [shape=(T, P)]; in long recordings, computed at every access."""
         return self.variance_of(slice(None))
 
     def variance_of(self, frames: slice) -> NDArray[np.floating[Any]]:
-        """Return the variance of every channel in some frames."""
+        """Return the variance of every channel in a range of N frames [shape=(N, P)]."""
         if isinstance(self.spread, ReducedVariance):
             return self.spread.reduced[frames] @ self.spread.mixing
         return self.spread[frames]
 
     def selected(self, names: Sequence[str]) -> Generation:
-        """Return the result with these channels only, in this order. Raises InputError: no such channel."""
+        """Return the generation with some channels only, in the given order. Raises InputError: no such channel."""
         columns = [self.motion.column(name) for name in names]
         channels = tuple(self.motion.channels[column] for column in columns)
         motion = Motion(self.motion.values[:, columns], self.motion.rate_hz, channels)
@@ -120,7 +145,7 @@ class Generation:
         return replace(self, motion=motion, spread=self.spread[:, columns])
 
     def resampled(self, rate_hz: float) -> Generation:
-        """Return the same result at another rate: values between frames, the state of the nearest frame.
+        """Return the generation at another frame rate: interpolated values, and the state of the nearest frame.
 
         Raises InputError: the rate is not more than 0.
         """

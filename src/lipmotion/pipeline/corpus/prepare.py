@@ -113,11 +113,11 @@ def prepare(
         raise InputError(f"{workers} processes, required at least 1; leave it out for one a core")
     check_apart((), [Source(directory, "folder of recordings")], folders=[output])
     found = discover(directory)
-    packages = package_versions() if any(item.curves is None for item in found.items) else {}
+    packages = package_versions() if any(item.motion_file is None for item in found.recordings) else {}
     is_new = not is_folder(output)
     with locked(output):
         corpus = Corpus.create(output)
-        jobs = [_job(item, directory.resolve(), corpus, packages, crops) for item in found.items]
+        jobs = [_job(item, directory.resolve(), corpus, packages, crops) for item in found.recordings]
         with _listed(corpus), worker_pool(min(workers or os.cpu_count() or 1, len(jobs))) as team:
             outcomes = _heard(found, team.unordered_map(_process, jobs), len(jobs), monitor)
     report = _report(corpus, found, outcomes, time.monotonic() - start_s)
@@ -152,7 +152,7 @@ def _job(recording: SourceRecording, directory: Path, corpus: Corpus, packages: 
     name = recording.name
     if _is_taken(corpus.folder(name), recording.file, collection):
         name = f"{collection.replace('/', '-')}-{name}"
-    if recording.curves is None:
+    if recording.motion_file is None:
         settings = {"tracker": f"mediapipe {packages['mediapipe']}", "crops": "yes" if crops else "no"}
     else:
         settings, packages = {"tracker": "none: motion was given"}, {"av": metadata.version("av")}
@@ -230,8 +230,8 @@ def _utterance(job: _Job, source: dict[str, str]) -> Utterance:
 
 
 def _track(job: _Job, duration_s: float) -> Track:
-    if job.recording.curves is not None:
-        return supplied_track(job.recording.curves, duration_s)
+    if job.recording.motion_file is not None:
+        return supplied_track(job.recording.motion_file, duration_s)
     return track(job.recording.file, crops=job.settings["crops"] == "yes")
 
 

@@ -28,9 +28,9 @@ PHONES_MARGIN_S = 0.1
 def source_digests(recording: SourceRecording) -> dict[str, str]:
     """Return what identifies the motion and the phones that came with a recording, if any."""
     found = {}
-    if recording.curves is not None:
-        found["motion_file"] = recording.curves.file.name
-        found["motion_sha256"] = sha256_of(recording.curves.file)
+    if recording.motion_file is not None:
+        found["motion_file"] = recording.motion_file.file.name
+        found["motion_sha256"] = sha256_of(recording.motion_file.file)
     if recording.phones is not None:
         text = "\n".join(f"{span.start_s!r} {span.end_s!r} {span.label.phone}" for span in recording.phones)
         found["phones_sha256"] = hashlib.sha256(text.encode()).hexdigest()
