@@ -35,7 +35,7 @@ def test_the_former_name_of_the_option_still_works(run: RunCommand, toy_model_fi
 def test_the_chains_of_a_coupled_model(run: RunCommand, coupled_model_file: Path) -> None:
     done = run("info", coupled_model_file, "--structure")
     assert (done.code, done.err) == (0, [])
-    assert done.out[0].startswith("coupled: chains whose moves depend on all chains")
+    assert done.out[0].startswith("coupled: chains whose transitions depend on all chains")
     assert "  asynchrony: up to 1 state(s) apart" in done.out
     assert "chain 2: 2vis, 2 units of 3 states" in done.out
     assert any(line.startswith("stream geometry: ") and "6 densities of 1 Gaussian" in line for line in done.out)

@@ -58,9 +58,14 @@ def _header(name: str, *messages: str, **header: object) -> None:
 
 _header("a newer version", "model version 9, this lipmotion reads version 3; upgrade lipmotion", version=9)
 _header("another format", *NO_MODEL, format="other")
-_header("an unknown engine", *DAMAGED, "no engine 'quantum'; there are: trajectory", engine="quantum")
-_header("an engine that is a list", *DAMAGED, engine=[])
-_header("an unknown option", *DAMAGED, "unexpected keyword argument", configuration={"colour": 1})
+_header(
+    "an unknown engine",
+    "no engine 'quantum'; there are: trajectory",
+    "install the package that adds it",
+    engine="quantum",
+)
+_header("an engine that is a list", "no engine []; there are: trajectory", engine=[])
+_header("an unknown option", *DAMAGED, "no option 'colour'", configuration={"colour": 1})
 _header("an option that is a text", *DAMAGED, configuration={"states": "5"})
 _header("an option of NaN", *NO_MODEL, "the number NaN, required a finite one", configuration={"edge_s": float("nan")})
 _header("more parts than the model has", *DAMAGED, configuration={"states": 9})
@@ -138,7 +143,7 @@ for _member, _remake in {
 _changed_array("coupled: a bigram times 1000", "engine/chain_0/bigram", lambda a: a * 1000, of="coupled")
 _changed_array("coupled: a scale times 1000", "engine/visual_0/scale", lambda a: a * 1000, of="coupled")
 _changed_array("coupled: NaN in rest", "engine/rest", lambda a: a * np.nan, of="coupled")
-_changed_array("coupled: rest times 1000", "engine/rest", lambda a: a * 1000, *DAMAGED, "rest of", of="coupled")
+_changed_array("coupled: rest times 1000", "engine/rest", lambda a: a * 1000, *DAMAGED, "rest pose of", of="coupled")
 _changed_array("coupled: one state less", "engine/chain_0/advance", lambda a: a[:1], of="coupled")
 _changed_array("coupled: a transposed basis", "engine/around/basis", lambda a: a.T, of="coupled")
 _changed_array(

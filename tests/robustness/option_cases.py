@@ -69,7 +69,7 @@ _option("--posteriors as .jpg", 7, ("unknown format '.jpg'; required: .png",), "
 
 for _name, _options, _messages in [
     ("--set without a value", ("--set", "states"), "the setting 'states' has no value; required NAME=VALUE"),
-    ("--set of an unknown option", ("--set", "part=5"), "has no option 'part'; there are: parts"),
+    ("--set of an unknown option", ("--set", "part=5"), "no option 'part'; there are: states"),
     ("--set of a text instead of a number", ("--set", "states=many"), "states is 'many', required a whole number"),
     ("--set of a number out of range", ("--set", "states=4"), "states is 4, required an odd number from 1"),
     ("--system of another engine", ("--system", "ph-HMM"), "add --engine coupled"),
