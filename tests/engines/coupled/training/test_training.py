@@ -10,7 +10,7 @@ from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM,
 from lipmotion.engines.coupled.config import CoupledConfig
 from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.engines.coupled.training.alignment import AlignedUtterance, allowed_units, uniform_path
-from lipmotion.engines.coupled.training.em_steps import TrainingUtterance, e_step, m_step, variance_floors
+from lipmotion.engines.coupled.training.em_steps import LatticeUtterance, e_step, m_step, variance_floors
 from lipmotion.engines.coupled.training.fit import fit_coupled, frames_away_from_speech
 from lipmotion.engines.coupled.training.train import MixtureSchedule, train_chains
 from lipmotion.errors import InputError
@@ -64,7 +64,7 @@ def test_the_likelihood_rises_at_every_step(kind, sets, limit):
 def test_statistics_of_utterances_are_those_of_all_paths():
     model = chains()
     data = [observations(3, seed=1), observations(4, seed=2)]
-    result = e_step(model, [TrainingUtterance(one, model.full_lattice) for one in data], workers=2)
+    result = e_step(model, [LatticeUtterance(one, model.full_lattice) for one in data], workers=2)
     joints = [oracle.posteriors(model, one)[0] for one in data]
     group, statistics = model.groups[0], result.emissions[0]
     for density in range(group.mixtures.size[0]):
@@ -79,7 +79,7 @@ def test_statistics_of_utterances_are_those_of_all_paths():
 def test_a_stream_that_was_not_observed_is_not_reestimated():
     model = chains()
     blind = observations(8, seen=False)
-    statistics = e_step(model, [TrainingUtterance(blind, model.full_lattice)])
+    statistics = e_step(model, [LatticeUtterance(blind, model.full_lattice)])
     assert not statistics.emissions[1].products[0].any()
     better = m_step(model, statistics, FLOORS, streams=(0, 1))
     np.testing.assert_array_equal(better.groups[1].mixtures.means, model.groups[1].mixtures.means)
@@ -88,7 +88,7 @@ def test_a_stream_that_was_not_observed_is_not_reestimated():
 
 def test_streams_that_are_not_reestimated_stay():
     model, data = chains(), observations(12)
-    statistics = e_step(model, [TrainingUtterance(data, model.full_lattice)])
+    statistics = e_step(model, [LatticeUtterance(data, model.full_lattice)])
     better = m_step(model, statistics, FLOORS, streams=(0,), transitions=False)
     assert better.groups[1] is model.groups[1]
     assert better.transitions is model.transitions
@@ -99,7 +99,7 @@ def test_no_recording_has_a_path():
     data = observations(3)
     lattice = replace(model.full_lattice, allowed_units=np.zeros((3, 3), bool))
     with pytest.raises(InputError, match="labels"):
-        e_step(model, [TrainingUtterance(data, lattice)])
+        e_step(model, [LatticeUtterance(data, lattice)])
 
 
 def test_allowed_units_are_those_of_labels_near_a_frame():

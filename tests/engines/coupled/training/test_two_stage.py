@@ -15,7 +15,7 @@ from lipmotion.engines.coupled.config import CoupledConfig
 from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.engines.coupled.model import CoupledModel
 from lipmotion.engines.coupled.training.alignment import AlignedUtterance
-from lipmotion.engines.coupled.training.em_steps import e_step, training_utterance, variance_floors
+from lipmotion.engines.coupled.training.em_steps import e_step, lattice_utterance, variance_floors
 from lipmotion.engines.coupled.training.speech_only import SpeechOnlySchedule, train_on_speech
 from lipmotion.engines.coupled.training.train import MixtureSchedule, TrainingStep, train_chains
 from lipmotion.stats.mixture import Mixtures
@@ -99,7 +99,7 @@ def speech_posteriors(chains: Chains, one: AlignedUtterance) -> np.ndarray:
 
     Its states are the joint ones, its emissions those of speech, its moves the coupled ones.
     """
-    lattice, mixtures = training_utterance(chains, one).lattice, chains.groups[0].mixtures
+    lattice, mixtures = lattice_utterance(chains, one).lattice, chains.groups[0].mixtures
     x, product = one.observations.streams[0], chains.transitions.product
     log = np.full((len(x), len(mixtures.means)), -np.inf)
     for frame, density in np.ndindex(log.shape):
@@ -199,8 +199,8 @@ def test_motion_of_the_first_stage_is_ignored() -> None:
 
 def test_a_weight_is_how_often_an_utterance_counts() -> None:
     chains, (one,) = trained(), aligned(examples(1))
-    twice = e_step(chains, [training_utterance(chains, one)] * 2)
-    heavy = e_step(chains, [training_utterance(chains, one, 2.0)])
+    twice = e_step(chains, [lattice_utterance(chains, one)] * 2)
+    heavy = e_step(chains, [lattice_utterance(chains, one, 2.0)])
     assert heavy.frames == twice.frames
     assert heavy.log_likelihood == pytest.approx(twice.log_likelihood)
     assert heavy.transition_counts == pytest.approx(twice.transition_counts, abs=1e-5)

@@ -31,7 +31,7 @@ FLOOR_SHARE, LEAST_VARIANCE = 0.01, 1e-4
 
 
 @dataclass(frozen=True, eq=False)
-class TrainingUtterance:
+class LatticeUtterance:
     """The observations of an utterance, and the joint states that it may be in.
 
     weight : how often the utterance counts
@@ -42,13 +42,13 @@ class TrainingUtterance:
     weight: float = 1.0
 
 
-def training_utterance(chains: Chains, utterance: AlignedUtterance, weight: float = 1.0) -> TrainingUtterance:
+def lattice_utterance(chains: Chains, utterance: AlignedUtterance, weight: float = 1.0) -> LatticeUtterance:
     """Return an utterance with the joint states that its phone labels allow.
 
     weight : how often the utterance counts
     """
     allowed = allowed_units(chains.structure, utterance.phones, utterance.observations.frames)
-    return TrainingUtterance(utterance.observations, chains.lattice(allowed), weight)
+    return LatticeUtterance(utterance.observations, chains.lattice(allowed), weight)
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +80,7 @@ class ChainStatistics:
         )
 
 
-def e_step(chains: Chains, utterances: Sequence[TrainingUtterance], workers: int = 1) -> ChainStatistics:
+def e_step(chains: Chains, utterances: Sequence[LatticeUtterance], workers: int = 1) -> ChainStatistics:
     """Return the sufficient statistics of utterances under the chains.
 
     workers : number of threads; the result does not depend on it
@@ -135,7 +135,7 @@ def variance_floors(observations: Sequence[AudioVisualObservations]) -> tuple[Si
     return tuple(floors)
 
 
-def _batch_statistics(job: tuple[Chains, Sequence[TrainingUtterance]]) -> ChainStatistics:
+def _batch_statistics(job: tuple[Chains, Sequence[LatticeUtterance]]) -> ChainStatistics:
     chains, utterances = job
     emission_statistics = tuple(zero_emission_statistics(group) for group in chains.groups)
     transition_counts = np.zeros(chains.transitions.statistic_count)

@@ -18,9 +18,9 @@ from lipmotion.engines.coupled.chains.transitions import Transitions, initial_tr
 from lipmotion.engines.coupled.training.alignment import AlignedUtterance, estimated_grammar, uniform_path
 from lipmotion.engines.coupled.training.em_steps import (
     ChainStatistics,
-    TrainingUtterance,
+    LatticeUtterance,
+    lattice_utterance,
     m_step,
-    training_utterance,
 )
 from lipmotion.stats.mixture import Mixtures
 from lipmotion.units import most_similar_phone
@@ -46,7 +46,7 @@ def initial_chains(
     limited = replace(structure, limit=min(1, structure.states - 1)) if structure.limit is None else structure
     transitions = initial_transitions(reachable(limited, estimated_grammar(limited, data)))
     chains = _untrained_chains(streams, transitions, data, weights)
-    utterances = [training_utterance(chains, utterance) for utterance in data]
+    utterances = [lattice_utterance(chains, utterance) for utterance in data]
     paths = [uniform_path(transitions.product, utterance.phones, utterance.observations.frames) for utterance in data]
     for _ in range(1 + VITERBI_STEPS):
         chains, transitions = _reestimated_along(chains, transitions, utterances, paths, floors)
@@ -92,7 +92,7 @@ def _standard_normals(count: int, size: int) -> Mixtures:
 def _reestimated_along(
     chains: Chains,
     transitions: Transitions,
-    utterances: Sequence[TrainingUtterance],
+    utterances: Sequence[LatticeUtterance],
     paths: Sequence[Index],
     floors: Sequence[Single],
 ) -> tuple[Chains, Transitions]:
@@ -143,7 +143,7 @@ def _with_borrowed_densities(
     return replace(group, mixtures=group.mixtures.selected(source))
 
 
-def _best_path(chains: Chains, utterance: TrainingUtterance) -> Index:
+def _best_path(chains: Chains, utterance: LatticeUtterance) -> Index:
     emissions = chains.emission_log_densities(utterance.observations, utterance.lattice)
     return chains.best_path(emissions, utterance.lattice)[0]
 

@@ -16,12 +16,12 @@ from lipmotion.engines.coupled.chains.model import Chains
 from lipmotion.engines.coupled.chains.structures import HMM
 from lipmotion.engines.coupled.conversion.em import without_visual_streams
 from lipmotion.engines.coupled.training.alignment import AlignedUtterance
-from lipmotion.engines.coupled.training.em_steps import training_utterance, variance_floors
+from lipmotion.engines.coupled.training.em_steps import lattice_utterance, variance_floors
 from lipmotion.engines.coupled.training.train import (
     Report,
-    baum_welch,
     component_counts,
     no_report,
+    train_to_convergence,
     with_split_components,
 )
 
@@ -58,7 +58,7 @@ def train_on_speech(
     """
     floors = variance_floors([utterance.observations for utterance in data])
     utterances = [
-        training_utterance(
+        lattice_utterance(
             chains, replace(utterance, observations=without_visual_streams(utterance.observations)), weight
         )
         for group, weight in ((data, 1.0), (speech_only, schedule.weight))
@@ -67,7 +67,7 @@ def train_on_speech(
     present = component_counts(chains)
     most = present if chains.structure.kind == HMM else (max(schedule.mixtures, present[0]), *present[1:])
     while True:
-        chains, statistics = baum_welch(
+        chains, statistics = train_to_convergence(
             chains, utterances, floors, schedule.most_steps, report, workers, speech_only=True
         )
         if component_counts(chains) == most:

@@ -15,10 +15,10 @@ from lipmotion.engines.coupled.chains.structures import Structure
 from lipmotion.engines.coupled.training.alignment import AlignedUtterance
 from lipmotion.engines.coupled.training.em_steps import (
     ChainStatistics,
-    TrainingUtterance,
+    LatticeUtterance,
     e_step,
+    lattice_utterance,
     m_step,
-    training_utterance,
     variance_floors,
 )
 from lipmotion.engines.coupled.training.initialisation import initial_chains
@@ -95,9 +95,9 @@ def growing_chains(
     """
     floors = variance_floors([utterance.observations for utterance in data])
     chains = initial_chains(structure, streams, data, schedule.weights, floors)
-    utterances = [training_utterance(chains, utterance) for utterance in data]
+    utterances = [lattice_utterance(chains, utterance) for utterance in data]
     while True:
-        chains, statistics = baum_welch(chains, utterances, floors, schedule.most_steps, report, workers)
+        chains, statistics = train_to_convergence(chains, utterances, floors, schedule.most_steps, report, workers)
         yield chains
         counts = component_counts(chains)
         if all(count >= most for count, most in zip(counts, schedule.mixtures, strict=True)):
@@ -105,9 +105,9 @@ def growing_chains(
         chains = with_split_components(chains, schedule.mixtures, statistics)
 
 
-def baum_welch(
+def train_to_convergence(
     chains: Chains,
-    utterances: Sequence[TrainingUtterance],
+    utterances: Sequence[LatticeUtterance],
     floors: Sequence[Single],
     most_steps: int,
     report: Report,
