@@ -1,4 +1,4 @@
-"""One utterance on disk: a folder of arrays that can be memory-mapped, and a JSON description."""
+"""One utterance of a corpus on disk: a folder of arrays that can be memory-mapped, and a JSON description."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ ENTRY = "entry.json"
 KEYS = frozenset(
     "name words split audio_rate_hz duration_s rate_hz frames unseen_frames channels crops source settings".split()
 )
-"""What every description holds. ``speaker`` and ``phones`` came with version 2 of the corpus; without them: unknown.
-``checksums`` came later; without them, only arrays that cannot be are noticed."""
+"""The keys of every description. ``speaker`` and ``phones`` came with version 2 of the corpus; without them both are
+unknown. ``checksums`` came later; without them, only impossible arrays are noticed."""
 UNCHECKED = "crops"
-"""The array that is not read before it is needed, and has no checksum."""
+"""The array that is read only where it is used, and has no checksum."""
 LARGEST_FEATURE = 1e3
-"""Features are standardised."""
+"""No feature has a larger magnitude; features are standardised."""
 UTTERANCE_ARRAYS = {
     "audio": ArraySpec(np.int16, "N"),
     "features": ArraySpec(np.float32, "T D", -LARGEST_FEATURE, LARGEST_FEATURE),
@@ -48,28 +48,28 @@ UTTERANCE_ARRAYS = {
     "seen": ArraySpec(np.bool_, "F"),
     "crops": ArraySpec(np.uint8, "F H W 3", optional=True),
 }
-"""How an utterance is stored: N samples, T frames of sound, F of motion."""
+"""The arrays of an utterance: N samples, T frames of sound, F frames of motion."""
 FULL_SCALE = 32_768
-"""16-bit samples per unit of amplitude: recordings of 16 bits come back exactly."""
+"""16-bit steps per unit of amplitude: 16-bit recordings are kept exactly."""
 LARGEST_NUMBER = 1e9
 """No utterance has more seconds or frames, nor more frames a second."""
 
 
 def quantise(audio: Audio) -> Audio:
-    """Return the sound as a corpus keeps it, in 16 bits, so that its features can be computed again from there."""
+    """Return sound quantised to 16 bits, as a corpus stores it: features computed of it can be computed again."""
     return Audio(_as_float(_as_int16(audio.samples)), audio.rate_hz)
 
 
 def is_utterance_name(name: str) -> bool:
-    """Whether an utterance can be named so: as a visible folder, and nowhere else."""
+    """Return whether an utterance can have this name: that of a visible folder, without other folders before it."""
     return bool(name) and name == Path(name).name and not name.startswith(".") and "\0" not in name
 
 
 def write_utterance(folder: Path, utterance: Utterance, settings: dict[str, str]) -> None:
-    """Write one utterance; ``folder`` appears whole, in the place of one that is there.
+    """Write one utterance; ``folder`` appears complete, and replaces an existing one.
 
-    settings : what the result depends on besides the source; kept to see whether it is up to date
-    Raises InputError: the name cannot be a folder's, or the motion is none of a face.
+    settings : what the utterance depends on besides its source; they tell later whether it is up to date
+    Raises InputError: the name cannot be a folder's, or the motion cannot be that of a face.
     Raises ExportError: it cannot be written.
     """
     if not is_utterance_name(utterance.name):
@@ -85,7 +85,7 @@ def write_utterance(folder: Path, utterance: Utterance, settings: dict[str, str]
 
 
 def read_entry(folder: Path) -> dict[str, Any]:
-    """Return the description of an utterance. Raises CorpusError: missing or damaged."""
+    """Return the description of an utterance, checked. Raises CorpusError: missing or damaged."""
     try:
         entry = from_json(read_text_file(folder / ENTRY, "description"))
     except (OSError, ValueError, RecursionError) as error:
@@ -100,7 +100,7 @@ def read_entry(folder: Path) -> dict[str, Any]:
 
 
 def read_utterance(folder: Path) -> Utterance:
-    """Return one utterance, its features and mouth images left on disk until they are used.
+    """Return one utterance; its features and mouth pictures stay on disk until they are used.
 
     Raises CorpusError: missing or damaged.
     """
@@ -170,14 +170,14 @@ def _checksum(array: NDArray[Any]) -> int:
 
 
 def _check_sums(arrays: Mapping[str, NDArray[Any]], checksums: Mapping[str, int]) -> None:
-    """Raise ValueError where an array holds other bytes than were written."""
+    """Raise ValueError if an array does not have the bytes that were written."""
     for name, checksum in checksums.items():
         if name in arrays and _checksum(arrays[name]) != checksum:
             raise ValueError(f"{name} holds other bytes than were written")
 
 
 def _check_entry(entry: dict[str, Any]) -> None:
-    """Raise ValueError for values that a description cannot have."""
+    """Raise ValueError for impossible values in a description."""
     fitting = {
         "name": isinstance(entry["name"], str),
         "speaker": isinstance(entry.get("speaker", ""), str),
@@ -216,14 +216,14 @@ def _timeline(rows: Any) -> Timeline[Unit] | None:
 
 
 def _load(folder: Path, name: str) -> NDArray[Any]:
-    """Map an array into memory: a file shorter than its header says is noticed before anything is allocated."""
+    """Return an array, memory-mapped: a file shorter than its header says is noticed before anything is allocated."""
     path = folder / f"{name}.npy"
     check_regular(path, "array")
     try:
         array: NDArray[Any] = np.lib.format.open_memmap(path, mode="r")
     except (OSError, ValueError):
         raise
-    except Exception as error:  # the header is read as a piece of Python, which fails in many ways
+    except Exception as error:  # the header is parsed as Python, which can fail in many ways
         raise ValueError(f"{path.name}: not an array ({type(error).__name__}: {error})") from error
     return array
 

@@ -73,20 +73,20 @@ def read_channels(path: Path) -> tuple[Channel, ...]:
     return tuple(Channel(str(name), WEIGHT) for name in names)
 
 
-def read_bare_motion(file: MotionFile) -> Motion:
+def read_bare_motion(motion_file: MotionFile) -> Motion:
     """Return the motion in a file with a bare array.
 
     Raises InputError: not an array of finite numbers with one column a channel.
     """
-    values = _load(file.file)
-    if values.dtype.kind not in "fiu" or values.ndim != 2 or values.shape[1] != len(file.channels):
+    values = _load(motion_file.file)
+    if values.dtype.kind not in "fiu" or values.ndim != 2 or values.shape[1] != len(motion_file.channels):
         raise InputError(
-            f"{file.file}: an array of {values.dtype} of shape {values.shape}, "
-            f"required numbers of shape (frames, {len(file.channels)})"
+            f"{motion_file.file}: an array of {values.dtype} of shape {values.shape}, "
+            f"required numbers of shape (frames, {len(motion_file.channels)})"
         )
     if not np.isfinite(values).all():
-        raise InputError(f"{file.file}: holds values that are not finite; interpolate them first")
-    return Motion(values.astype(np.float64), file.rate_hz or RATE_HZ, file.channels)
+        raise InputError(f"{motion_file.file}: holds values that are not finite; interpolate them first")
+    return Motion(values.astype(np.float64), motion_file.rate_hz or RATE_HZ, motion_file.channels)
 
 
 def _load(path: Path) -> NDArray[Any]:

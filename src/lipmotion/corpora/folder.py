@@ -23,8 +23,8 @@ MOTION_SUFFIXES = (".csv", ".json", ".npz")
 def read_folder(directory: Path) -> RecordingFolder:
     """Return the recordings in a folder and its sub-folders: videos, and sounds with a motion file of the same name.
 
-    Transcripts and labels have the name of the recording: ``take1.txt``, ``take1.TextGrid``, ``take1.lab``. Recordings in
-    a sub-folder ``anna`` have the speaker ``anna``, and names as ``anna-take1``.
+    Transcripts and labels have the name of the recording: ``take1.txt``, ``take1.TextGrid``, ``take1.lab``. Recordings
+    in a sub-folder ``anna`` have the speaker ``anna``, and names as ``anna-take1``.
     """
     by_name: dict[str, list[Path]] = {}
     for path in sorted(directory.rglob("*")):

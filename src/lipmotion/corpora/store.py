@@ -16,7 +16,8 @@ from lipmotion.types import Utterance
 
 FORMAT = "lipmotion.corpus"
 VERSION = 2
-"""2: speakers, labelled phones, motion of any kind. Version 1 is read: its speakers and phones are unknown."""
+"""Version 2 has speakers, labelled phones and motion of any kind. Version 1 can be read; its speakers and phones are
+unknown."""
 READ_VERSIONS = (1, 2)
 MANIFEST = "corpus.json"
 UTTERANCES = "utterances"
@@ -40,7 +41,7 @@ class Selection:
 
 
 class Corpus:
-    """Prepared recordings. Reading needs neither OpenCV nor MediaPipe.
+    """Prepared recordings on disk. Reading them needs neither OpenCV nor MediaPipe.
 
     path : the folder
     Open one with ``Corpus.open``, make or extend one with ``Corpus.create``.
@@ -64,7 +65,7 @@ class Corpus:
 
     @classmethod
     def create(cls, path: Path) -> Corpus:
-        """Return a corpus to add to: the one that is there, or a new one in a folder that is new or empty.
+        """Return a corpus to add to: an existing one, or a new one in a new or empty folder.
 
         Raises CorpusError: the folder holds something else. Raises ExportError: it cannot be created.
         """
@@ -82,19 +83,19 @@ class Corpus:
 
     @property
     def splits(self) -> dict[str, int]:
-        """How many utterances there are of train, val and test."""
+        """The number of utterances of train, val and test."""
         return {split: len(self.names(split)) for split in SPLITS}
 
     @property
     def speakers(self) -> dict[str, tuple[int, float]]:
-        """How many utterances, and how many seconds, there are of each speaker, sorted; "" where it is not known."""
+        """The number of utterances and of seconds of each speaker, sorted by name; "" where the speaker is unknown."""
         spoken: dict[str, list[float]] = {}
         for entry in self._index.values():
             spoken.setdefault(entry.get("speaker", ""), []).append(float(entry["duration_s"]))
         return {speaker: (len(seconds), sum(seconds)) for speaker, seconds in sorted(spoken.items())}
 
     def names(self, split: str | None = None, speakers: Sequence[str] = ()) -> tuple[str, ...]:
-        """Return the names of all utterances, or of one split, or of some speakers, sorted."""
+        """Return the sorted names of the utterances of one split or of all, and of some speakers or of all."""
         return tuple(
             sorted(
                 name
@@ -104,7 +105,7 @@ class Corpus:
         )
 
     def required(self, split: str | None, speakers: Sequence[str] = ()) -> tuple[str, ...]:
-        """Return the names of one split, or of all, of some speakers or of all.
+        """Return the same names as ``names``, at least one.
 
         Raises CorpusError: there are none, or no such speaker.
         """
@@ -128,7 +129,7 @@ class Corpus:
         return tuple(selection.names)
 
     def summary(self) -> dict[str, str]:
-        """Return what a user wants to know of the corpus, by name."""
+        """Return a description of the corpus for users, by keyword."""
         seconds = sum(float(entry["duration_s"]) for entry in self._index.values())
         frames = sum(int(entry["frames"]) for entry in self._index.values())
         unseen = sum(int(entry["unseen_frames"]) for entry in self._index.values())
@@ -150,7 +151,7 @@ class Corpus:
         }
 
     def folder(self, name: str) -> Path:
-        """Return where an utterance of this name is, or would be."""
+        """Return the folder of an utterance of this name, whether or not it exists."""
         return self.path / UTTERANCES / name
 
     def utterance(self, name: str) -> Utterance:
@@ -164,9 +165,9 @@ class Corpus:
         return read_utterance(self.folder(name))
 
     def add(self, utterance: Utterance, settings: dict[str, str] | None = None) -> None:
-        """Write one utterance, in the place of one of the same name, and list it.
+        """Write one utterance, replace one of the same name, and add it to the manifest.
 
-        settings : what it depends on besides its source
+        settings : as of ``write_utterance``
         Raises InputError: its name cannot be a folder's. Raises ExportError: it cannot be written.
         """
         folder = self.folder(utterance.name)
@@ -175,7 +176,7 @@ class Corpus:
         self._write_manifest()
 
     def refresh(self) -> None:
-        """List the utterances that are on disk: several processes may have written them."""
+        """Write the manifest anew from the utterances on disk: several processes may have written them."""
         folders = sorted(path for path in (self.path / UTTERANCES).iterdir() if path.is_dir())
         whole = [path for path in folders if not path.name.startswith(".")]
         self._index = {path.name: _summary(read_entry(path)) for path in whole}
@@ -183,7 +184,7 @@ class Corpus:
 
     def _write_manifest(self) -> None:
         content = {"format": FORMAT, "version": VERSION, "utterances": self._index}
-        with whole_file(self.path / MANIFEST, follow=False) as unfinished:  # nothing leads out of a corpus
+        with whole_file(self.path / MANIFEST, follow=False) as unfinished:  # a link must not lead out of a corpus
             text = as_json(content, indent=1, sort_keys=True, ensure_ascii=False)
             unfinished.write_text(text + "\n", encoding="utf-8")
 
@@ -211,11 +212,11 @@ def _motion(entry: dict[str, Any]) -> str:
 def _read_manifest(path: Path) -> dict[str, dict[str, Any]]:
     try:
         content = from_json(read_text_file(path, "manifest"))
-        found, version = content["format"], content["version"]
+        format_name, version = content["format"], content["version"]
     except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise CorpusError(f"{path.parent}: not a corpus (no readable {MANIFEST}); give a prepared corpus") from error
-    if found != FORMAT:
-        raise CorpusError(f"{path}: format is {found!r}, required {FORMAT!r}; give a prepared corpus")
+    if format_name != FORMAT:
+        raise CorpusError(f"{path}: format is {format_name!r}, required {FORMAT!r}; give a prepared corpus")
     if version not in READ_VERSIONS:
         raise CorpusError(
             f"{path}: corpus version {version}, this lipmotion reads versions up to {VERSION}; "

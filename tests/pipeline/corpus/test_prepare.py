@@ -56,7 +56,7 @@ def tracked(monkeypatch) -> list[str]:
         return Track(Motion(np.ones((25, 1)), 25.0, (Channel("opening"),)), np.arange(25) > 1, images, notes)
 
     monkeypatch.setattr(module, "track", track)
-    monkeypatch.setattr(module, "versions", lambda: {"mediapipe": "0", "opencv": "4", "av": "1"})
+    monkeypatch.setattr(module, "package_versions", lambda: {"mediapipe": "0", "opencv": "4", "av": "1"})
     return asked
 
 
@@ -168,7 +168,7 @@ def test_missing_packages_are_said_at_once(studio, tmp_path, monkeypatch):
     def missing() -> dict[str, str]:
         raise MissingDependencyError("pip install")
 
-    monkeypatch.setattr(module, "versions", missing)
+    monkeypatch.setattr(module, "package_versions", missing)
     with pytest.raises(MissingDependencyError):
         prepare(studio, tmp_path / "corpus")
     assert not (tmp_path / "corpus").exists()

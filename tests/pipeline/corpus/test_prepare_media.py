@@ -67,7 +67,7 @@ def test_variable_frame_rate_with_subtitles_and_a_cover(recordings: Path, tmp_pa
 
 
 def test_many_useless_files_are_each_told_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("lipmotion.pipeline.corpus.prepare.versions", lambda: {"mediapipe": "1"})
+    monkeypatch.setattr("lipmotion.pipeline.corpus.prepare.package_versions", lambda: {"mediapipe": "1"})
     names = [f"clip{number:03d}" for number in range(300)]
     (tmp_path / "clips").mkdir()
     for name in names:

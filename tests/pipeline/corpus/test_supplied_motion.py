@@ -46,7 +46,7 @@ def studio(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     def missing() -> dict[str, str]:
         raise MissingDependencyError("pip install")
 
-    monkeypatch.setattr(module, "versions", missing)
+    monkeypatch.setattr(module, "package_versions", missing)
     folder = tmp_path / "studio"
     (folder / "anna").mkdir(parents=True)
     for seed, (name, suffix) in enumerate((("a", ".npz"), ("b", ".json"), ("anna/c", ".csv"))):
@@ -191,7 +191,7 @@ def test_facegood_from_recordings_to_figures(recordings: Path, tmp_path: Path) -
 
 
 def test_a_source_is_not_touched(studio):
-    item = replace(recording(spans((0, 1, "aa"))), curves=MotionFile(studio / "a.npz"))
+    item = replace(recording(spans((0, 1, "aa"))), motion_file=MotionFile(studio / "a.npz"))
     assert set(source_digests(item)) == {"motion_file", "motion_sha256", "phones_sha256"}
     assert source_digests(item) == source_digests(item)
     assert source_digests(item) != source_digests(replace(item, phones=spans((0, 1.001, "aa"))))

@@ -44,7 +44,7 @@ def spoken(monkeypatch: pytest.MonkeyPatch) -> None:
             phones = [phone for word in words_of(text) for phone in Lexicon().pronunciations(word)[0]]
             yield synthesise([(phone, 0.12) for phone in phones], pitch_hz=100 if voice.name == "low" else 200)
 
-    monkeypatch.setattr(module, "speak_all", say)
+    monkeypatch.setattr(module, "speak_sentences", say)
     monkeypatch.setattr(module, "installed_voices", lambda: tuple(VOICES))
 
 
@@ -78,7 +78,7 @@ def test_sentences_stand_between_pauses_over_a_faint_noise() -> None:
 @pytest.mark.usefixtures("spoken")
 def test_pauses_of_the_synthesiser_become_longer(monkeypatch: pytest.MonkeyPatch) -> None:
     phones = [("sil", 0.1), ("b", 0.1), ("iy", 0.2), ("sil", 0.2)]
-    monkeypatch.setattr(module, "speak_all", lambda *_: iter([synthesise(phones)]))
+    monkeypatch.setattr(module, "speak_sentences", lambda *_: iter([synthesise(phones)]))
     (sentence,) = synthetic_sentences(["Bee"], VOICES[:1])
     assert [span.label.phone for span in sentence.phones] == ["sil", "b", "iy", "sil"]
     assert [span.start_s for span in sentence.phones] == pytest.approx([0, 0.35, 0.45, 0.65])
@@ -158,7 +158,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def test_recordings_are_aligned(folder: Path, own: Recogniser, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "agreement", lambda *_: 0.0)
+    monkeypatch.setattr(module, "agreement_score", lambda *_: 0.0)
     told: list[Item] = []
     sentences = list(recorded_sentences(folder, own, monitor=told.append))  # type: ignore[arg-type]
     assert [(s.name, s.speaker) for s in sentences] == [("anna-one", "anna"), ("two", "two")]
@@ -174,7 +174,7 @@ def test_recordings_are_aligned(folder: Path, own: Recogniser, monkeypatch: pyte
 
 
 def test_the_caller_knows_who_speaks(folder: Path, own: Recogniser, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "agreement", lambda *_: 0.0)
+    monkeypatch.setattr(module, "agreement_score", lambda *_: 0.0)
     given = {"anna-*": "Anna B.", "t*": "Carl"}
     assert [s.speaker for s in recorded_sentences(folder, own, speakers=given)] == ["Anna B.", "Carl"]
 
@@ -182,7 +182,7 @@ def test_the_caller_knows_who_speaks(folder: Path, own: Recogniser, monkeypatch:
 def test_other_words_than_those_said_are_noticed(
     folder: Path, own: Recogniser, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(module, "agreement", lambda *_: -4.3)
+    monkeypatch.setattr(module, "agreement_score", lambda *_: -4.3)
     told: list[Item] = []
     assert list(recorded_sentences(folder, own, monitor=told.append)) == []  # type: ignore[arg-type]
     assert "agree with the sound at -4.3, required -4.2 or more" in {item.name: item.reason for item in told}["two"]
@@ -223,6 +223,6 @@ def test_input_errors_come_through(monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(*_: object) -> Sayings:
         raise InputError("flite failed")
 
-    monkeypatch.setattr(module, "speak_all", fail)
+    monkeypatch.setattr(module, "speak_sentences", fail)
     with pytest.raises(InputError, match="flite failed"):
         list(synthetic_sentences(TEXTS, VOICES))

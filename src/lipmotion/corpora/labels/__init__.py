@@ -1,4 +1,4 @@
-"""What was said in a recording, from the text files that lie beside it."""
+"""Transcripts and labels of a recording, from text files beside it."""
 
 from lipmotion.corpora.labels.label_files import RecordingLabels, labels_beside, read_labels
 from lipmotion.corpora.labels.plain_text import check_plain_text

@@ -1,4 +1,4 @@
-"""The label files of one recording: what kind each is follows from its content."""
+"""The label files of one recording; the kind of each is recognised by its content."""
 
 from __future__ import annotations
 
@@ -16,18 +16,19 @@ from lipmotion.units import phone_named, words_of
 from lipmotion.units.length_limits import LARGEST_TRANSCRIPT
 
 FOR_WORDS = (".txt", ".TextGrid", ".textgrid", ".lab")
-"""Where words are looked for: a plain text before labels in time, which may say other things than words."""
+"""Suffixes in whose files words are searched, in order: plain text first, as labels in time may not be words."""
 FOR_PHONES = (".TextGrid", ".textgrid", ".lab", ".txt")
+"""Suffixes in whose files phones are searched, in order."""
 LARGEST_LABELS = 1 << 24
-"""Bytes of a file of labels: a day's."""
+"""Most bytes of a label file: labels of a day."""
 
 
 @dataclass(frozen=True)
 class RecordingLabels:
-    """What label files say of a recording.
+    """The transcript and the phones of a recording, from its label files.
 
     words  : the transcript, lower case, or None
-    phones : phones in time, one after the other without gaps, or None; the last may end at infinity
+    phones : phones in time without gaps, or None; the end of the last may be infinite
     """
 
     words: tuple[str, ...] | None = None
@@ -35,9 +36,9 @@ class RecordingLabels:
 
 
 def labels_beside(recording: Path, *, ignored: frozenset[Path] = frozenset()) -> RecordingLabels:
-    """Return what the files beside a recording say that have its name: ``.txt``, ``.TextGrid``, ``.lab``.
+    """Return the labels from the files beside a recording that have its name: ``.txt``, ``.TextGrid``, ``.lab``.
 
-    ignored : files that are something else (the lists of the splits)
+    ignored : files that are no labels (the lists of the splits)
     Raises InputError: one of them cannot be read.
     """
     found: dict[str, tuple[Path, RecordingLabels]] = {}
@@ -53,7 +54,7 @@ def labels_beside(recording: Path, *, ignored: frozenset[Path] = frozenset()) ->
 def read_labels(path: Path) -> RecordingLabels:
     """Return the words and phones of one file: a TextGrid, labels with times, or plain text.
 
-    Raises InputError: not text, damaged, overlapping, or with labels that are no phones among phones.
+    Raises InputError: not text, damaged, overlapping labels, or labels among phones that are no phones.
     """
     text = _text(path)
     if is_textgrid(text):
@@ -72,7 +73,7 @@ def read_labels(path: Path) -> RecordingLabels:
 
 
 def _chosen(tiers: list[LabelTier], where: str) -> RecordingLabels:
-    """Return the phones of the one tier that has them, and the words of the tier named so, else of the first other."""
+    """Return the phones of the only tier of phones, and the words of the tier named so, else of the first other."""
     phones = [tier for tier in tiers if holds_phones(tier)]
     if len(phones) > 1:
         raise InputError(f"{where}: {phones[0].name} and {phones[1].name} both hold phones; keep one")
@@ -88,6 +89,7 @@ def _chosen(tiers: list[LabelTier], where: str) -> RecordingLabels:
 
 
 def _text(path: Path) -> str:
+    """Return the text of a label file, in UTF-8 or UTF-16. Raises InputError: it is not such a text, or too large."""
     try:
         size = path.stat().st_size
         if size > LARGEST_LABELS:

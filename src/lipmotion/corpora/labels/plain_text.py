@@ -1,4 +1,4 @@
-"""Files that would pass as plain text, but hold more than words."""
+"""Checks that a plain text holds words alone, not labels, subtitles or markup."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from lipmotion.corpora.labels.timed_lines import parse_timed_lines
 from lipmotion.errors import InputError, shortened
 
 MASTER = "#!MLF!#"
-"""How the HTK files begin that hold the labels of many recordings."""
+"""The start of HTK's master label files, which hold the labels of many recordings."""
 MARKUP = re.compile(r'\{\\rtf|<[!?a-zA-Z]|\{\s*"|\[\s*[\[{]')
-"""How word processors' files, HTML, XML and JSON begin."""
+"""The start of RTF, HTML, XML and JSON."""
 CUE = re.compile(r"^.{0,40}\d\s*-->\s*\d", re.MULTILINE)
 """The times of a subtitle."""
 LINES_JUDGED = 1000
-"""Lines of a text that tell whether it holds times."""
+"""Lines of a text that are judged for whether they hold times."""
 NUMBERED = re.compile(r"[-+.]?\d|nan\b|[-+]?inf\b")
 TIME = re.compile(r"(?<![\w.])(?:\d*\.\d+|\d{5,})(?![\w.])")
 """Seconds with decimals, or a number that counts parts of a second."""
 
 
 def check_plain_text(text: str, where: str) -> None:
-    """Raise InputError unless a text is words alone: what stands in labels and subtitles besides would be read as such.
+    """Raise InputError unless a text is words alone: times and marks of labels and subtitles would be read as words.
 
     where : the file's name, for messages
     """
@@ -53,19 +53,19 @@ def check_no_labels(text: str, where: str) -> None:
 
 
 def _seems_timed(text: str) -> bool:
-    """Whether most of the first lines begin with a number, some with a time, or every other one holds two times."""
-    lines = numbered = timed = twice = 0
+    """Return whether most of the first lines begin with a number and some with a time, or half hold two times."""
+    lines = numbered = timed = with_two = 0
     for line in islice(_body(text), LINES_JUDGED):
         lines += 1
         numbered += NUMBERED.match(line) is not None
         times = sum(1 for _, _ in zip(TIME.finditer(line), "12", strict=False))
         timed += TIME.match(line) is not None
-        twice += times > 1
-    return lines > 1 and ((2 * numbered > lines and timed > 0) or 2 * twice >= lines)
+        with_two += times > 1
+    return lines > 1 and ((2 * numbered > lines and timed > 0) or 2 * with_two >= lines)
 
 
 def _body(text: str) -> Iterator[str]:
-    """Give the lines that are not blank; of a file with a header, as ESPS writes it, those after its end."""
+    """Yield the lines that are not blank; of a file with a header, as of ESPS, those after the header."""
     header = re.search(r"^#$", text[:2000], re.MULTILINE)
     for line in StringIO(text[header.end() if header else 0 :]):
         if line.strip():

@@ -1,4 +1,4 @@
-"""Praat TextGrids, long and short text form."""
+"""Praat TextGrids, in long and short text form."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ from lipmotion.errors import InputError, shortened
 TOKEN = re.compile(
     r'"(?P<text>[^"]*)"|![^\n]*|<(?P<flag>\w+)>|(?<!\S)(?P<number>[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?)(?!\S)'
 )
-"""What Praat itself reads: texts in quotes, flags, numbers that stand alone. All else (``xmin =``) is decoration."""
+"""What Praat itself reads: texts in quotes, flags, and numbers between blanks. All else (``xmin =``) is ignored."""
 MARK = re.compile(r'\s*(?:File type\s*=\s*)?"?oo(Text|Binary)File')
 LONGEST_COUNT = 18
-"""Digits of a count."""
+"""Most digits of a count."""
 INTERVALS, POINTS = "IntervalTier", "TextTier"
 
 
 class _DamagedError(Exception):
-    """The file ends too early, or holds something else than is wanted."""
+    """The file ends too early, or another token was expected."""
 
 
 def is_textgrid(text: str) -> bool:
-    """Whether a text begins as Praat's files do."""
+    """Return whether a text begins as Praat's files do."""
     return MARK.match(text) is not None
 
 
 def parse_interval_tiers(text: str, where: str) -> list[LabelTier]:
-    """Return the interval tiers of a TextGrid; point tiers are passed over.
+    """Return the interval tiers of a TextGrid; point tiers are ignored.
 
     where : the file's name, for messages
     Raises InputError: not a whole TextGrid.
@@ -63,6 +63,7 @@ def parse_interval_tiers(text: str, where: str) -> list[LabelTier]:
 
 
 def _tokens(text: str) -> Iterator[tuple[str, str]]:
+    """Yield kind (text, flag, number) and value of every token."""
     at = 0
     while match := TOKEN.search(text, at):
         at = match.end()
@@ -74,7 +75,7 @@ def _tokens(text: str) -> Iterator[tuple[str, str]]:
 
 
 def _text_end(text: str, at: int) -> int:
-    """Return where a text in quotes ends whose second quote ends at ``at``: a quote in it is written twice."""
+    """Return the end of a text in quotes, from the end of its second quote: quotes in it are written twice."""
     while text[at : at + 1] == '"':
         closing = text.find('"', at + 1)
         if closing < 0:
@@ -92,7 +93,7 @@ def _label(tokens: Iterator[tuple[str, str]], kind: str, place: str, where: str)
 
 
 def _pass_range(tokens: Iterator[tuple[str, str]]) -> None:
-    """Pass over where a file or a tier begins and ends."""
+    """Skip the start and end time of a file or a tier."""
     for _ in range(2):
         _take(tokens, "number")
 
@@ -105,6 +106,7 @@ def _count(tokens: Iterator[tuple[str, str]]) -> int:
 
 
 def _take(tokens: Iterator[tuple[str, str]], wanted: str) -> str:
+    """Return the value of the next token. Raises _DamagedError: it is of another kind."""
     kind, value = next(tokens, ("the end of the file", ""))
     if kind != wanted:
         raise _DamagedError(f"there stands {kind} {' '.join(value[:40].split())}".rstrip() + f", required a {wanted}")

@@ -1,4 +1,4 @@
-"""Labels as they stand in a file, and the phones or words that they are."""
+"""Tiers of labels as in a file, and the phones or words that they stand for."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from lipmotion.types import Span, Timeline, Unit
 from lipmotion.units import PHONES, SILENCE, is_silent, phone_named, with_reduced_vowels, words_of
 
 SILENCES = frozenset(["", *"sil sp spn pau ssil nsn h# #h # _ - silence <sil> <p:> {sil} [sil] <eps>".split()])
-"""What other tools call silence, pauses and noise that is not speech."""
+"""Labels of other tools for silence, pauses and noise that is not speech."""
 PHONES_SHARE = 0.75
-"""Labels of which this share are phones are phones, and the others are mistakes."""
+"""A tier of which this share of the labels are phones is one of phones; the other labels are errors."""
 ROUNDING_S = 1e-3
-"""Times are written with three digits or more."""
+"""Times may differ by this much: they are written with three digits or more."""
 IN_CONTEXT = re.compile(r"[^-+]*-([^-+]+)\+.*")
-"""HTK's and HTS's names of a phone between its neighbours: ``t-iy+n``, ``x^sil-hh+iy=t@...``."""
+"""Triphones and full-context labels of HTK and HTS: ``t-iy+n``, ``x^sil-hh+iy=t@...``."""
 STATE_NUMBER = re.compile(r"\[(\d{1,9})\]$")
 MOST_LABELS = 250_000
-"""Labels of a file: those of phones in five hours of speech."""
+"""Most labels of a file: phones of five hours of speech."""
 REDUCED_VOWELS = frozenset({"ax", "axr", "ix"})
 
 
 @dataclass(frozen=True, slots=True)
 class TimedLabel:
-    """One label: its time, its text, and where it stands (for messages). An unknown end is infinite."""
+    """One label: its time, its text, and its position in the file, for messages. An unknown end is infinite."""
 
     start_s: float
     end_s: float
@@ -38,7 +38,7 @@ class TimedLabel:
 
 @dataclass(frozen=True)
 class LabelTier:
-    """Labels that belong together, and what to call them in messages."""
+    """A series of labels, and its name for messages."""
 
     name: str
     labels: tuple[TimedLabel, ...]
@@ -51,7 +51,7 @@ def check_count(count: int, where: str) -> None:
 
 
 def required_time(text: str, place: str, where: str) -> float:
-    """Return a number that stands for a time. Raises InputError: it is not finite."""
+    """Return a time from its text. Raises InputError: it is not finite."""
     time = float(text)
     if not math.isfinite(time):
         raise InputError(f"{where}: {place} has the time {shortened(text)}, required a finite one")
@@ -59,7 +59,7 @@ def required_time(text: str, place: str, where: str) -> float:
 
 
 def holds_phones(tier: LabelTier) -> bool:
-    """Whether a tier says by its name that it holds phones, or nearly all that is spoken in it are phones."""
+    """Return whether a tier's name says that it holds phones, or most of its labels other than silence are phones."""
     spoken = [label for label in tier.labels if not _is_silence(label.text)]
     if not spoken or is_named_as_words(tier):
         return False
@@ -69,16 +69,16 @@ def holds_phones(tier: LabelTier) -> bool:
 
 
 def is_named_as_words(tier: LabelTier) -> bool:
-    """Whether a tier's name says that it holds words."""
+    """Return whether a tier's name says that it holds words."""
     return re.search(r"\bwords?\b|transcript|\bort", tier.name.lower()) is not None
 
 
 def tier_words(tier: LabelTier, where: str) -> tuple[str, ...]:
     """Return the words of a tier, silence left out. Raises InputError: labels overlap, or there is no word."""
     _check_order(tier, where)
-    said = " ".join(label.text for label in tier.labels if not _is_silence(label.text))
+    text = " ".join(label.text for label in tier.labels if not _is_silence(label.text))
     try:
-        return words_of(said)
+        return words_of(text)
     except InputError as error:
         raise InputError(f"{where}: {tier.name} holds no word; remove the file if the words are not known") from error
 
@@ -86,8 +86,8 @@ def tier_words(tier: LabelTier, where: str) -> tuple[str, ...]:
 def phone_timeline(tier: LabelTier, words: LabelTier | None, where: str) -> Timeline[Unit]:
     """Return the phones of a tier in time.
 
-    words : the words of the same recording in time, if known: where the phones mark no stress, the lexicon's rule
-            says word by word which vowels are reduced
+    words : the words of the same recording in time, or None; if the phones have no stress marks, the lexicon's rule
+            reduces the vowels of each word
     Raises InputError: a label that is no phone, or labels that overlap or leave a gap.
     """
     _check_order(tier, where)
@@ -108,6 +108,7 @@ def phone_timeline(tier: LabelTier, words: LabelTier | None, where: str) -> Time
 
 
 def _check_order(tier: LabelTier, where: str) -> None:
+    """Raise InputError for labels that overlap or end before they start."""
     end_s = 0.0
     for label in tier.labels:
         if label.end_s < label.start_s:
@@ -127,11 +128,13 @@ def _is_silence(text: str) -> bool:
 
 
 def _inner(text: str) -> str | None:
+    """Return the phone in the middle of a triphone or full-context label; None for other labels."""
     match = IN_CONTEXT.fullmatch(text)
     return match[1] if match else None
 
 
 def _phone(text: str) -> str | None:
+    """Return the phone that a label stands for, or None."""
     text = STATE_NUMBER.sub("", text)
     name = phone_named(text) or phone_named(_inner(text) or "")
     return SILENCE if name is None and _is_silence(text) else name
@@ -147,7 +150,7 @@ def _required_phone(label: TimedLabel, where: str) -> str:
 
 
 def _without_states(labels: Sequence[TimedLabel]) -> list[TimedLabel]:
-    """Return whole phones where a file labels their states: ``...[2]``, ``...[3]``, ... are one phone."""
+    """Return labels of whole phones: labels of the states of a phone (``...[2]``, ``...[3]``, ...) become one."""
     whole: list[TimedLabel] = []
     last = -1
     for label in labels:
@@ -163,7 +166,7 @@ def _without_states(labels: Sequence[TimedLabel]) -> list[TimedLabel]:
 
 
 def _reduced(labels: Sequence[TimedLabel], phones: Sequence[str], words: LabelTier) -> list[str]:
-    """Return the phones, unstressed vowels reduced in every word by the lexicon's rule."""
+    """Return the phones with the unstressed vowels of every word reduced by the lexicon's rule."""
     result = list(phones)
     middles_s = [(label.start_s + label.end_s) / 2 for label in labels]
     in_time = sorted(range(len(labels)), key=middles_s.__getitem__)

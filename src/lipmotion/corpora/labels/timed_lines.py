@@ -1,4 +1,4 @@
-"""Labels a line: HTK, Audacity."""
+"""Label files with one label a line: HTK's and Audacity's."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from lipmotion.corpora.labels.tier import MOST_LABELS, LabelTier, TimedLabel, ch
 from lipmotion.errors import InputError
 
 TICKS_PER_S = 10_000_000
-"""HTK counts in 100 ns."""
+"""HTK's unit of time is 100 ns."""
 SHORTEST_TICKS = 10_000
-"""Whole numbers under a millisecond are not times: "20 30 people" is a sentence."""
+"""Whole numbers below a millisecond are not taken as times: "20 30 people" is a sentence."""
 WHOLE = re.compile(r"(\d+)\s+(\d+)\s+(\S+)(?:\s.*)?")
 STARTS = re.compile(r"(\d+)\s+([^\d\s]\S*)")
 SECONDS = re.compile(r"([-+]?\d*\.\d+)\s+([-+]?\d*\.\d+)(?:\s+(.*))?")
 
 
 def parse_timed_lines(text: str, where: str) -> LabelTier | None:
-    """Return the labels of a file whose lines hold times, or None if they do not.
+    """Return the labels of a text whose lines hold times, or None if they do not.
 
-    HTK's ``start end label`` in 100 ns (further columns are passed over), or ``start label``, a label then lasting to
-    the next one's start; Audacity's ``start end label`` in seconds.  The first line decides which.
+    HTK's lines are ``start end label`` in 100 ns (further columns are ignored), or ``start label``, where each label
+    ends where the next one starts; Audacity's are ``start end label`` in seconds. The first line decides which.
     Raises InputError: a later line is of another form, with its number.
     """
     first = next((line for _, line in _lines(text)), "")
@@ -41,7 +41,7 @@ def parse_timed_lines(text: str, where: str) -> LabelTier | None:
 
 
 def _lines(text: str) -> Iterator[tuple[int, str]]:
-    """Give the number and the text of every line that is not blank, nor one of Audacity's pitch ranges."""
+    """Yield number and text of every line, except blank ones and Audacity's pitch ranges."""
     for number, line in enumerate(StringIO(text), 1):
         stripped = line.strip()
         if stripped and not stripped.startswith("\\"):
