@@ -1,16 +1,16 @@
 """Speech in, lip motion out.
 
-    >>> import lipmotion
-    >>> result = lipmotion.animate("hello.wav", transcript="Hello there")
-    >>> result.motion["opening"]
-    >>> lipmotion.write(result, ["hello.mp4", "hello.json"], speech="hello.wav")
+>>> import lipmotion
+>>> result = lipmotion.animate("examples/welcome.flac")
+>>> opening = result.motion["opening"]  # 100 values a second, in distances between the outer eye corners
+>>> lipmotion.write(result, ["welcome.mp4", "welcome.json"], speech="examples/welcome.flac")  # doctest: +SKIP
 
-Names are imported when they are first used: ``import lipmotion`` alone costs nothing.
+A name is imported when it is first used, so that ``import lipmotion`` alone is fast.
 """
 
 from __future__ import annotations
 
-TYPE_CHECKING = False  # as in typing, which takes longer to import than Ctrl-C should wait for an answer
+TYPE_CHECKING = False  # as in typing, whose import would delay the answer to Ctrl-C
 if TYPE_CHECKING:
     from lipmotion.corpora.store import Corpus, Selection
     from lipmotion.engines import engine_named

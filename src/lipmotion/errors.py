@@ -1,22 +1,22 @@
-"""Every error that lipmotion raises on purpose.
+"""The errors that lipmotion raises on purpose.
 
-A message says what was found, what is required and what to do next. ``exit_code`` is what the
-command line returns for the class; 2 is kept for a wrong command line and 1 for a bug.
+A message says what is wrong, what is required and what to do next. ``exit_code`` is the exit code of the command line
+for each class; exit code 2 means a wrong command line, exit code 1 a bug.
 """
 
 from __future__ import annotations
 
 SHOWN = 80
-"""Letters of a text from outside that a message repeats."""
+"""Largest number of characters of a text from a user that a message repeats."""
 
 
 def shortened(text: str) -> str:
-    """Return a text, or its beginning, as a message repeats it."""
+    """Return a text, or its first ``SHOWN`` characters and ``...``, for a message."""
     return text if len(text) <= SHOWN else text[:SHOWN] + "..."
 
 
 class LipMotionError(Exception):
-    """Base of all errors raised on purpose."""
+    """Base class of all errors that are raised on purpose."""
 
     exit_code = 1
 
@@ -28,7 +28,7 @@ class InputError(LipMotionError, ValueError):
 
 
 class CorpusError(LipMotionError):
-    """A corpus is missing, incomplete, or has nothing that fits the request."""
+    """A corpus is missing or incomplete, or contains nothing that can be used for the task."""
 
     exit_code = 4
 
@@ -40,18 +40,18 @@ class AlignmentError(LipMotionError):
 
 
 class ModelFormatError(LipMotionError):
-    """A model file is not one, is damaged, or has an unknown version."""
+    """A file is not a model, or it is damaged, or its version is unknown."""
 
     exit_code = 6
 
 
 class ExportError(LipMotionError):
-    """An output could not be written, or its format is unknown."""
+    """An output cannot be written, or its format is unknown."""
 
     exit_code = 7
 
 
 class MissingDependencyError(LipMotionError, ImportError):
-    """An optional package is needed for this and is not installed."""
+    """An optional package is required and not installed."""
 
     exit_code = 8

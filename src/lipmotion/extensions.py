@@ -1,7 +1,8 @@
-"""What installed packages add: engines, faces, motion formats and corpus readers, through Python entry points.
+"""Registries of extensions: engines, faces, motion formats and corpus readers that installed packages add.
 
-A package declares in its ``pyproject.toml``, for instance, ``[project.entry-points."lipmotion.engines"]`` with
-``ridge = "my_package:RidgeEngine"``; once it is installed, the name works wherever a built-in one does.
+A package declares extensions as Python entry points in its ``pyproject.toml``: for instance, in the table
+``[project.entry-points."lipmotion.engines"]``, ``ridge = "my_package:RidgeEngine"``. When the package is installed,
+the name can be used wherever the name of a built-in engine can be used.
 """
 
 from __future__ import annotations
@@ -19,11 +20,11 @@ ExtensionT = TypeVar("ExtensionT")
 
 @dataclass(frozen=True)
 class Registry(Generic[ExtensionT]):
-    """Extensions of one kind by name: the built-in ones, then those of installed packages.
+    """Extensions of one kind by name: built-in ones, and those of installed packages.
 
-    kind     : what one of them is called in messages, as ``engine``
-    group    : the group of entry points that packages use, as ``lipmotion.engines``
-    built_in : name to ``module:attribute``; a package cannot replace them
+    kind     : the word for such an extension in messages: ``engine``, for instance
+    group    : the group of the entry points: ``lipmotion.engines``, for instance
+    built_in : ``module:attribute`` of each built-in extension, by name; a package cannot replace it
     """
 
     kind: str
@@ -32,18 +33,18 @@ class Registry(Generic[ExtensionT]):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """All names: built-in ones in their order, then those of installed packages in alphabetical order."""
+        """All names: first the built-in ones, then those of installed packages in alphabetical order."""
         return (*self.built_in, *sorted(set(self._installed) - set(self.built_in)))
 
     def load(self, name: str) -> ExtensionT:
-        """Import and return an extension.
+        """Import an extension and return it.
 
-        Raises InputError: there is none of that name, or the package that adds it cannot be imported.
+        Raises InputError: no extension has this name, or the package that adds it cannot be imported.
         """
         if name in self.built_in:
             module, _, attribute = self.built_in[name].partition(":")
-            found: ExtensionT = getattr(import_module(module), attribute)
-            return found
+            extension: ExtensionT = getattr(import_module(module), attribute)
+            return extension
         if name not in self._installed:
             raise InputError(f"no {self.kind} {name!r}; there are: {', '.join(self.names)}")
         entry = self._installed[name]

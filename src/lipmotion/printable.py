@@ -1,4 +1,4 @@
-"""Text that comes from elsewhere, as a terminal may be given it."""
+"""Texts from files and users, made safe for a terminal."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ _UNPRINTABLE = re.compile(
     "[\x00-\x1f\x7f-\x9f\xad\u061c\u180e\u200b\u200e\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb\ud800-\udfff"
     "\U000e0000-\U000e0fff]"
 )
-"""What a terminal obeys instead of showing it, or shows as nothing: control characters of both sets, ends of lines,
-changes of direction, half characters. Not the joiners that some scripts and emoji need."""
+"""Characters that control a terminal or are invisible: both sets of control characters, line ends, changes of
+direction, surrogates. The joiners that some scripts and emoji need are not among them."""
 
 
 def printable(text: object) -> str:
-    """Return text as one line that a terminal can only show: ``\\x1b``, ``\\n``, ``\\u202e`` for what it would obey."""
-    return _UNPRINTABLE.sub(lambda found: found[0].encode("unicode_escape").decode("ascii"), str(text))
+    """Return a text as one line that cannot control a terminal: ``\\x1b``, ``\\n``, ``\\u202e`` for such characters."""
+    return _UNPRINTABLE.sub(lambda match: match[0].encode("unicode_escape").decode("ascii"), str(text))

@@ -1,4 +1,4 @@
-"""Unit models that are known, and utterances that they say."""
+"""Known unit models, and utterances drawn from them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ UNITS = ("a", "b", "c", "d", "e")
 def random_hmm(
     seed: int, units: Sequence[str] = ("a", "b"), states: int = 3, contexts: int = 0, config: HmmConfig | None = None
 ) -> UnitHmm:
-    """Return models with nothing in common but their names; some states in context have densities of their own."""
+    """Return models with random densities; some states in context have densities of their own."""
     draw = np.random.default_rng(seed)
     names = (SILENCE, PAUSE, *units)
     table = plain_states(names, tuple(1 if unit == PAUSE else states for unit in names), (SILENCE, PAUSE))
@@ -48,7 +48,7 @@ def random_hmm(
 
 @dataclass(frozen=True, eq=False)
 class Speaker:
-    """Says units whose states all sound different: 4 features, the first one the loudness.
+    """A speaker of units whose states all have different features: 4 features, the first one the loudness.
 
     means : [shape=(3, 4)] of the three states of each unit
     """
@@ -79,7 +79,7 @@ def speaker(seed: int = 0, spread: float = 0.4) -> Speaker:
 
 
 def known_hmm(who: Speaker, sentences: Sequence[Sequence[str]] = (), config: HmmConfig | None = None) -> UnitHmm:
-    """Return the models that a speaker speaks by."""
+    """Return the models from which a speaker's utterances are drawn."""
     names = (SILENCE, PAUSE, *UNITS)
     table = plain_states(names, tuple(1 if unit == PAUSE else 3 for unit in names), (SILENCE, PAUSE))
     sounds = [who.means[SILENCE if unit == PAUSE else unit][state] for unit in names for state in range(3)]
@@ -98,7 +98,7 @@ def sentences(seed: int, count: int, words: int = 4) -> list[tuple[tuple[str, ..
 
 
 def recordings(seed: int, count: int, who: Speaker, pauses: bool = False):
-    """Return utterances with their transcripts, the units that were said in each, and where they begin."""
+    """Return utterances with their transcripts, the units spoken in each, and their first frames."""
     draw = np.random.default_rng([seed, 3])
     transcribed, said, edges = [], [], []
     for number, words in enumerate(sentences(seed, count)):

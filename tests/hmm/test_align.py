@@ -13,8 +13,8 @@ def test_chains_name_states_in_context_and_fall_back_where_unseen():
     chain = state_sequence(hmm, ("sil", "a", "b", "sp", "a"))
     names = [name for name, _ in chain.names]
     assert names[3:6] == ["a.0<sil", "a.1", "a.2>b"]
-    assert names[6:9] == ["b.0<a", "b.1", "b.2>sil"]  # a pause is silence to its neighbours
-    assert names[10:] == ["a.0<sil", "a.1", "a.2>sil"]  # and so is what lies beyond the end
+    assert names[6:9] == ["b.0<a", "b.1", "b.2>sil"]  # as a neighbour, a pause is silence
+    assert names[10:] == ["a.0<sil", "a.1", "a.2>sil"]  # as beyond the end
     assert chain.positions.tolist() == [0] * 3 + [1] * 3 + [2] * 3 + [3] + [4] * 3
     for name, density, plain in zip(names, chain.densities, chain.plain, strict=True):
         own = name if name in hmm.table.names else name.split("<")[0].split(">")[0]

@@ -18,7 +18,7 @@ def decoded(hmm, features, inventory=INVENTORY):
 
 
 def own_score(hmm, features, units, bounds) -> float:
-    """The best score of units that begin where they were found."""
+    """Return the best score of units with the bounds that were recognised."""
     cuts = (
         durations
         for durations in sequences.segmentations(len(features), sum(hmm.table.count(unit) for unit in units))
@@ -31,7 +31,7 @@ def own_score(hmm, features, units, bounds) -> float:
 @pytest.mark.parametrize("contexts", [0, 6])
 @pytest.mark.parametrize("seed", range(3))
 def test_no_sequence_of_units_is_better(seed, contexts, states, frames):
-    """Every unit pays the bigram exactly once, whatever its context."""
+    """The bigram of every unit counts exactly once, in any context."""
     hmm = random_hmm(seed, states=states, contexts=contexts)
     features = np.random.default_rng([seed, frames]).normal(0, 1.5, (frames, 2)).astype(np.float32)
     counts = dict.fromkeys(INVENTORY, states)
@@ -44,7 +44,7 @@ def test_no_sequence_of_units_is_better(seed, contexts, states, frames):
 def test_units_of_one_state(seed):
     hmm = random_hmm(seed, states=1)
     features = np.random.default_rng(seed).normal(0, 1.5, (5, 2)).astype(np.float32)
-    candidates = [  # a unit right behind itself is the same path as one that lasts longer
+    candidates = [  # a unit after itself is the same path as one that lasts longer
         units
         for units in sequences.sequences(INVENTORY, dict.fromkeys(INVENTORY, 1), 5)
         if all(unit != following for unit, following in pairwise(units))
@@ -88,7 +88,7 @@ def test_silence_alone_is_silence_however_unlikely_it_is_to_follow_itself():
 
 @pytest.mark.parametrize("silent", [3, 4])
 def test_short_silence_at_the_start_is_not_priced_out(silent):
-    """Nobody says silence after silence; a recording that begins in silence does not say so either."""
+    """Silence never follows silence, nor the silence before a recording that begins in silence."""
     who = speaker(spread=2.0)
     said = [(SILENCE, *(unit for word in words for unit in word), SILENCE) for words in sentences(1, 400)]
     hmm = known_hmm(who, said, HmmConfig(mixtures=1, bigram_weight=8.0))

@@ -1,4 +1,4 @@
-"""Single steps of training: the E-step against enumeration, and what the M-step makes of it."""
+"""Single steps of training: the E-step against enumeration, and the models of the M-step."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -25,7 +25,7 @@ def step(hmm, data, said):
 
 
 def disturbed(seed: int, spread: float):
-    """A speaker's data, and models that are off the mark."""
+    """Return a speaker's data, models with disturbed parameters, and the units of every utterance."""
     who, draw = speaker(seed, spread), np.random.default_rng(seed)
     transcribed, said, _ = recordings(seed, 15, who, pauses=True)
     hmm = known_hmm(who)
@@ -37,7 +37,7 @@ def disturbed(seed: int, spread: float):
 @pytest.mark.parametrize("spread", [0.4, 1.0, 2.0])
 @pytest.mark.parametrize("seed", range(3))
 def test_no_iteration_lowers_the_likelihood(seed, spread):
-    """The tolerance, per frame, pays for single precision and for posteriors that are left out."""
+    """The tolerance, per frame, is for single precision and for posteriors that are left out."""
     hmm, data, said = disturbed(seed, spread)
     for _ in range(3):  # 1, 2 and 4 Gaussians
         figures = []
@@ -123,7 +123,7 @@ def test_order_of_utterances_changes_nothing():
 
 def test_an_utterance_too_short_for_its_units_counts_for_nothing():
     hmm, data, said = disturbed(8, 1.0)
-    floor = replace(hmm, config=replace(hmm.config, variance_floor=1e-9))  # the floor looks at all data
+    floor = replace(hmm, config=replace(hmm.config, variance_floor=1e-9))  # the floor depends on all data
     better, log_likelihood = step(floor, data, said)
     same, figure = step(floor, [*data, data[0][:10]], [*said, said[0]])
     assert figure == pytest.approx(log_likelihood, abs=1e-9)
@@ -139,7 +139,7 @@ def test_the_old_models_stay_as_they_were():
 
 
 def test_no_state_may_last_longer_than_its_limit():
-    """Else the closure of a stop takes the silence before it for its own."""
+    """Otherwise the closure of a stop absorbs the silence before it."""
     who = speaker(1)
     data = [np.repeat(who.say(np.random.default_rng(n), ("sil", "a", "sil"))[0], 12, axis=0) for n in range(3)]
     hmm = known_hmm(who)
@@ -150,7 +150,7 @@ def test_no_state_may_last_longer_than_its_limit():
 
 
 def coarticulated(count: int):
-    """Utterances in which the start of ``a`` depends on the unit before it."""
+    """Return models, utterances in which the start of ``a`` depends on the unit before it, and their units."""
     who = speaker(1)
     transcribed, said, _ = recordings(1, count, who)
     data = []

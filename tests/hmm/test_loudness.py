@@ -34,7 +34,7 @@ def test_the_shortest_recordings_and_those_that_never_change(frames):
 
 
 def stranger():
-    """A voice that sounds more like the models' silence than like any of their units, and is as loud as theirs."""
+    """A speaker whose units are more similar to the models' silence than to their units, and as loud as these."""
     who = speaker(spread=2.0)
     features, edges = who.say(np.random.default_rng(3), (SILENCE, "a", "b", SILENCE))
     spoken = slice(edges[1], edges[3])
@@ -47,8 +47,10 @@ def stranger():
 def test_loud_frames_are_not_aligned_with_silence():
     hmm, features, edges, loud = stranger()
     units = (SILENCE, "a", "b", SILENCE)
-    evidence = log_likelihoods_of(hmm, features)
-    without, bounds = (align_units(hmm, given, units) for given in (evidence, penalise_silence(hmm, evidence, loud)))
+    log_likelihoods = log_likelihoods_of(hmm, features)
+    without, bounds = (
+        align_units(hmm, given, units) for given in (log_likelihoods, penalise_silence(hmm, log_likelihoods, loud))
+    )
     assert without[3] - without[1] < 8
     assert (bounds[1], bounds[3]) == (edges[1], edges[3])
 
@@ -56,9 +58,10 @@ def test_loud_frames_are_not_aligned_with_silence():
 def test_loud_frames_are_not_chosen_as_pauses():
     hmm, features, _, loud = stranger()
     words = ((("a",),), (("b",),))
-    evidence = log_likelihoods_of(hmm, features)
+    log_likelihoods = log_likelihoods_of(hmm, features)
     free, bound = (
-        choose_pronunciations(hmm, given, words, PAUSE) for given in (evidence, penalise_silence(hmm, evidence, loud))
+        choose_pronunciations(hmm, given, words, PAUSE)
+        for given in (log_likelihoods, penalise_silence(hmm, log_likelihoods, loud))
     )
     assert PAUSE in [unit for part in free for unit in part.units]
     assert PAUSE not in [unit for part in bound for unit in part.units]
@@ -67,9 +70,9 @@ def test_loud_frames_are_not_chosen_as_pauses():
 def test_no_loud_frames_change_nothing():
     hmm, features, _, loud = stranger()
     units = (SILENCE, "a", "b", SILENCE)
-    evidence = log_likelihoods_of(hmm, features)
-    unchanged = penalise_silence(hmm, evidence, loud & False)
-    assert np.array_equal(align_units(hmm, unchanged, units), align_units(hmm, evidence, units))
+    log_likelihoods = log_likelihoods_of(hmm, features)
+    unchanged = penalise_silence(hmm, log_likelihoods, loud & False)
+    assert np.array_equal(align_units(hmm, unchanged, units), align_units(hmm, log_likelihoods, units))
 
 
 def test_quiet_frames_are_far_under_the_loud_ones_and_away_from_them():

@@ -22,7 +22,7 @@ CONFIG = HmmConfig(mixtures=2, context_frames=20)
 
 @pytest.fixture(scope="module", params=[0, 4])
 def trained(request):
-    """Models, who was heard, the utterances, the units that were said in them, where each begins, and the log."""
+    """Models, the speaker, the utterances, their units, the first frames of these, and the log."""
     log: list[tuple[str, float]] = []
     who = speaker(request.param)
     corpus = recordings(request.param, 30, who, pauses=True)
@@ -58,7 +58,7 @@ def test_pauses_are_found_where_they_were_made(trained):
 
 
 def test_pauses_are_found_at_the_first_choice_already(monkeypatch):
-    """A pause sounds like silence before any was heard; else a unit beside it learns to sound like both."""
+    """A pause has the density of silence before any is chosen; otherwise a unit beside it learns both sounds."""
     chosen = []
 
     def choose(*arguments):
@@ -124,7 +124,7 @@ def test_names_of_units_change_nothing():
 
 
 def test_the_pronunciation_said_is_learned():
-    """Half of the time a word is said in another way than the dictionary's first."""
+    """Half of the time a word is not pronounced as the first variant of the lexicon."""
     who, draw = speaker(5), np.random.default_rng(5)
     variants = (("a", "b"), ("c", "b"))
     transcribed, said = [], []
@@ -140,7 +140,7 @@ def test_the_pronunciation_said_is_learned():
 
 
 def test_clicks_in_the_silence_behind_the_last_word_do_not_become_part_of_it():
-    """One word is only ever said last: nothing but its sound tells it from the silence that always follows it."""
+    """One word always comes last: only its sound distinguishes it from the silence that always follows it."""
     who, draw = speaker(6), np.random.default_rng(6)
     transcribed, said, edges = [], [], []
     for number, sentence in enumerate(sentences(6, 30, words=3)):
@@ -171,7 +171,7 @@ def test_no_state_lasts_longer_than_it_may(trained):
         free = name.split(".")[0] in (SILENCE, PAUSE)
         assert frames <= (LONGEST_SILENCE if free else LONGEST_STATE) * 1.001
     units = [sum(lasting[f"{unit}.{state}"] for state in range(3)) for unit in UNITS]
-    assert np.mean(units) == pytest.approx(9, abs=0.6)  # each state was said for 2, 3 or 4 frames
+    assert np.mean(units) == pytest.approx(9, abs=0.6)  # each state lasts 2, 3 or 4 frames
 
 
 def test_the_bigram_is_that_of_what_was_said_pauses_being_silence(trained):

@@ -17,7 +17,7 @@ def network_posteriors(log_emission, emission, arc_from, arc_log, arc_start, log
 
 
 def arrays_of(arcs: dict, states: int) -> dict:
-    """Arcs by source and target as the kernels want them."""
+    """Return arcs, given as log probabilities by (source, target), as arrays for the kernels."""
     ordered = sorted(arcs, key=lambda arc: arc[1])
     return {
         "arc_from": np.array([source for source, _ in ordered], np.intp),
@@ -27,7 +27,7 @@ def arrays_of(arcs: dict, states: int) -> dict:
 
 
 def random_network(seed: int, states: int, densities: int, density_of_arcs: float):
-    """A network with loops and random arcs, as the kernel wants it, and its arcs by source and target."""
+    """Return a network with loops and random arcs as arrays, and its arcs by (source, target)."""
     draw = np.random.default_rng(seed)
     arcs = {}
     for target in range(states):
@@ -41,7 +41,10 @@ def random_network(seed: int, states: int, densities: int, density_of_arcs: floa
 
 
 def phone_loop(seed: int, units: int = 11, states: int = 3):
-    """Every unit behind every other: what has blocks. Its last unit has one state, and no arcs in but two."""
+    """Return a loop in which every unit may follow every other, which has blocks.
+
+    Its last unit has one state, and only two arcs lead to it.
+    """
     draw = np.random.default_rng(seed)
     counts = [states] * (units - 1) + [1]
     firsts = np.append(0, np.cumsum(counts))

@@ -8,7 +8,7 @@ from lipmotion.kernels.arcs import arc_layout, arc_weights
 
 
 def arcs_in(layout):
-    """Every arc of a layout as (arc, source, target), states as they were."""
+    """Return every arc of a layout as (arc, source, target), with the states' own numbers."""
     order = layout.order
     for target, source, length, first in layout.runs:
         for i in range(length):

@@ -17,7 +17,7 @@ def statistics(seed: int, frames: int, channels: int = 2) -> tuple[np.ndarray, n
 
 
 def dense(mean, precision, pins=()) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Trajectory and variance of every channel; pins are (frame, channel, value)."""
+    """Return trajectory and variance of every channel; pins are (frame, channel, value)."""
     return [
         trajectories.generate(mean[:, :, c], precision[:, :, c], [(t, v) for t, channel, v in pins if channel == c])
         for c in range(mean.shape[2])
@@ -70,7 +70,7 @@ def test_pins_at_the_ends_and_side_by_side_are_exact(frames):
     values, _ = solve(bands)
     assert [values[t, 1] for t in frames] == [value for _, _, value in pins]
     assert values[:, 1] == pytest.approx(dense(mean, precision, pins)[1][0], abs=1e-10)
-    assert values[:, 0] == pytest.approx(dense(mean, precision)[0][0], abs=1e-10)  # the other channel is left alone
+    assert values[:, 0] == pytest.approx(dense(mean, precision)[0][0], abs=1e-10)  # the other channel does not change
 
 
 @given(seed=SEEDS, frames=LENGTHS)
@@ -110,7 +110,7 @@ def test_inputs_stay_as_they_were():
 
 
 def forms(monkeypatch, compute) -> list:
-    """What NumPy and what the compiled form give."""
+    """Return the results of NumPy and of the compiled form."""
     results = []
     for compiled in (False, True):
         monkeypatch.setattr(banded, "compiled_pays", lambda _, compiled=compiled: compiled)

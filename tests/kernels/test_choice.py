@@ -8,7 +8,7 @@ from lipmotion.kernels import choice
 
 @pytest.fixture
 def unused(monkeypatch) -> None:
-    """A process that has done nothing yet, where numba could be imported but was not."""
+    """A process that has used no kernel yet, in which numba can be imported but was not."""
     monkeypatch.setattr(choice, "_requested_s", [0.0])
     monkeypatch.setattr(choice, "numba_works", lambda: True)
     monkeypatch.delitem(sys.modules, "numba", raising=False)

@@ -19,7 +19,7 @@ SHARED = settings(deadline=None, max_examples=20, suppress_health_check=[HealthC
 
 @pytest.fixture(params=["numpy", "compiled"], autouse=True)
 def form(request, monkeypatch) -> str:
-    """Everything holds for both forms."""
+    """Every test runs with both forms, NumPy and compiled."""
     if request.param == "compiled":
         pytest.importorskip("numba")
     monkeypatch.setattr(factorial, "numba_works", lambda: request.param == "compiled")
@@ -70,16 +70,16 @@ def test_loops_of_any_shape_agree_with_the_enumeration(shapes):
 
 @pytest.mark.parametrize("precision", [np.float32, np.float64])
 def test_agrees_with_the_network_of_all_joint_states(precision):
-    audio, visual, evidence = random_model(2, 40, ((3, 5), (2, 4)), 5.0, 20)
-    evidence = FactorialLogLikelihoods(*(part.astype(precision) for part in evidence[:3]), evidence.pairs)
-    found = factorial_posteriors(audio, visual, evidence)
-    log_density, initial, final = oracle.joint_logs(audio, visual, evidence)
+    audio, visual, logs = random_model(2, 40, ((3, 5), (2, 4)), 5.0, 20)
+    logs = FactorialLogLikelihoods(*(part.astype(precision) for part in logs[:3]), logs.pairs)
+    found = factorial_posteriors(audio, visual, logs)
+    log_density, initial, final = oracle.joint_logs(audio, visual, logs)
     arcs = sorted(oracle.joint_arcs(audio, visual).items(), key=lambda item: item[0][1])
     sources, targets = np.array([arc for arc, _ in arcs]).T
-    logs = np.log([probability for _, probability in arcs])
+    arc_logs = np.log([probability for _, probability in arcs])
     states = np.arange(log_density.shape[1])
     starts = np.searchsorted(targets, states)
-    joint, _, log_likelihood = network_posteriors(log_density, states, sources, logs, starts, initial, final)
+    joint, _, log_likelihood = network_posteriors(log_density, states, sources, arc_logs, starts, initial, final)
     joint = joint.reshape(40, 15, 8)
     tolerance = 1e-9 if precision is np.float64 else 2e-5
     assert found.audio == pytest.approx(joint.sum(axis=2), abs=tolerance)
@@ -88,27 +88,27 @@ def test_agrees_with_the_network_of_all_joint_states(precision):
 
 
 def test_beside_a_single_state_a_loop_is_a_plain_hidden_markov_model():
-    audio, visual, evidence = random_model(3, 30, ((3, 4), (1, 1)), pairs=0)
+    audio, visual, logs = random_model(3, 30, ((3, 4), (1, 1)), pairs=0)
     visual = Loop(*(np.ones_like(part) for part in visual))._replace(leave=np.zeros(1))
-    found = factorial_posteriors(audio, visual, evidence)
+    found = factorial_posteriors(audio, visual, logs)
     arcs = {}
     for source, target, *_, probability in oracle.steps(audio):
         arcs[target, source] = arcs.get((target, source), 0.0) + probability
-    (targets, sources), logs = np.array(sorted(arcs)).T, np.log([arcs[arc] for arc in sorted(arcs)])
+    (targets, sources), arc_logs = np.array(sorted(arcs)).T, np.log([arcs[arc] for arc in sorted(arcs)])
     states = np.arange(12)
     ends = np.log(audio.initial).ravel(), np.log(audio.final).ravel()
     starts = np.searchsorted(targets, states)
-    posterior, _, log_likelihood = network_posteriors(evidence.audio, states, sources, logs, starts, *ends)
+    posterior, _, log_likelihood = network_posteriors(logs.audio, states, sources, arc_logs, starts, *ends)
     assert found.audio == pytest.approx(posterior, abs=1e-10)
     assert found.visual == pytest.approx(np.ones((30, 1)))
-    assert found.log_likelihood == pytest.approx(log_likelihood + evidence.visual.sum(), abs=1e-8)
+    assert found.log_likelihood == pytest.approx(log_likelihood + logs.visual.sum(), abs=1e-8)
 
 
 @pytest.mark.parametrize("precision", [np.float32, np.float64])
 def test_posteriors_sum_to_one_and_counts_are_as_many_as_steps(precision):
-    audio, visual, evidence = random_model(4, 150, ((3, 6), (3, 4)), 20.0, 10)
-    evidence = FactorialLogLikelihoods(*(part.astype(precision) for part in evidence[:3]), evidence.pairs)
-    found = factorial_posteriors(audio, visual, evidence)
+    audio, visual, logs = random_model(4, 150, ((3, 6), (3, 4)), 20.0, 10)
+    logs = FactorialLogLikelihoods(*(part.astype(precision) for part in logs[:3]), logs.pairs)
+    found = factorial_posteriors(audio, visual, logs)
     tolerance = 1e-9 if precision is np.float64 else 1e-4
     for posterior, counts in ((found.audio, found.audio_counts), (found.visual, found.visual_counts)):
         assert posterior.sum(axis=1) == pytest.approx(np.ones(150), abs=1e-6)
@@ -131,35 +131,35 @@ def test_frames_computed_twice_change_nothing(stretch):
 @given(seed=SEEDS)
 @SHARED
 def test_masked_states_and_pairs_agree_with_the_enumeration(seed):
-    audio, visual, evidence = random_model(seed, 4, pairs=4)
+    audio, visual, logs = random_model(seed, 4, pairs=4)
     draw = np.random.default_rng([seed, 4])
-    masked = [np.where(draw.random(part.shape) < 0.3, -np.inf, part) for part in evidence[:3]]
-    agree((audio, visual, FactorialLogLikelihoods(*masked, evidence.pairs)))
+    masked = [np.where(draw.random(part.shape) < 0.3, -np.inf, part) for part in logs[:3]]
+    agree((audio, visual, FactorialLogLikelihoods(*masked, logs.pairs)))
 
 
 def test_a_pair_of_its_own_density_may_be_where_both_states_are_masked():
-    audio, visual, evidence = random_model(6, 3, pairs=1)
-    a, v = evidence.pairs[0]
-    evidence.audio[1, a], evidence.visual[1, v] = -np.inf, -np.inf
-    agree((audio, visual, evidence))
-    evidence.audio[1], evidence.visual[1] = -np.inf, -np.inf
-    agree((audio, visual, evidence))
+    audio, visual, logs = random_model(6, 3, pairs=1)
+    a, v = logs.pairs[0]
+    logs.audio[1, a], logs.visual[1, v] = -np.inf, -np.inf
+    agree((audio, visual, logs))
+    logs.audio[1], logs.visual[1] = -np.inf, -np.inf
+    agree((audio, visual, logs))
 
 
-def test_impossible_evidence_says_so():
-    audio, visual, evidence = random_model(7, 5, pairs=0)
-    evidence.visual[3] = -np.inf
-    found = factorial_posteriors(audio, visual, evidence)
+def test_a_recording_without_a_path_has_probability_0():
+    audio, visual, logs = random_model(7, 5, pairs=0)
+    logs.visual[3] = -np.inf
+    found = factorial_posteriors(audio, visual, logs)
     assert found.log_likelihood == -np.inf
     assert not any(part.any() for part in (*found[:3], *found.audio_counts, *found.visual_counts))
-    assert factorial_best_path(audio, visual, evidence)[2] == -np.inf
+    assert factorial_best_path(audio, visual, logs)[2] == -np.inf
 
 
 @pytest.mark.parametrize("spread", [5.0, 100.0, 1e3])
 def test_single_precision_is_close_however_loud(spread):
-    audio, visual, evidence = random_model(8, 60, ((3, 8), (3, 5)), spread, 30)
-    single = FactorialLogLikelihoods(*(part.astype(np.float32) for part in evidence[:3]), evidence.pairs)
-    double = FactorialLogLikelihoods(*(part.astype(np.float64) for part in single[:3]), evidence.pairs)
+    audio, visual, logs = random_model(8, 60, ((3, 8), (3, 5)), spread, 30)
+    single = FactorialLogLikelihoods(*(part.astype(np.float32) for part in logs[:3]), logs.pairs)
+    double = FactorialLogLikelihoods(*(part.astype(np.float64) for part in single[:3]), logs.pairs)
     found, wanted = (factorial_posteriors(audio, visual, given) for given in (single, double))
     assert found.audio == pytest.approx(wanted.audio, abs=1e-4)
     assert found.pair == pytest.approx(wanted.pair, abs=1e-4)
@@ -169,23 +169,23 @@ def test_single_precision_is_close_however_loud(spread):
 
 @pytest.mark.parametrize("third", [-60.0, -66.0, -200.0])
 def test_a_unit_far_behind_comes_back_in_single_precision(third):
-    """Evidence speaks 72 nats against a unit, later 85 against the other; a third, worse, is never so far behind."""
+    """Log densities are 72 nats lower for a unit, later 85 for another; a third, worse one never differs so much."""
     audio, visual, _ = random_model(9, 1, ((2, 3), (1, 1)), pairs=0)
     same = np.full((2, 3), 0.5)
     audio = audio._replace(
         stay=same, onward=same[:1], leave=same[0], enter=np.eye(3), initial=same / 3, final=same + 0.5
     )
     log_density = np.repeat([[-72.0, 0, third] * 2, [0, -85.0, third] * 2], 20, axis=0) / 20
-    evidence = FactorialLogLikelihoods.of(log_density.astype(np.float32), np.zeros((40, 1), np.float32))
-    found = factorial_posteriors(audio, visual, evidence)
+    logs = FactorialLogLikelihoods.of(log_density.astype(np.float32), np.zeros((40, 1), np.float32))
+    found = factorial_posteriors(audio, visual, logs)
     assert found.audio[:, ::3].sum(axis=1) == pytest.approx(np.ones(40), abs=1e-4)
 
 
 @given(seed=SEEDS, frames=st.integers(1, 4), stretch=st.integers(1, 5))
 @SHARED
 def test_the_best_path_is_the_best_of_all(seed, frames, stretch):
-    audio, visual, evidence = random_model(seed, frames)
-    log_density, *ends = oracle.joint_logs(audio, visual, evidence)
+    audio, visual, logs = random_model(seed, frames)
+    log_density, *ends = oracle.joint_logs(audio, visual, logs)
     ways = {}
     for (a, b, *_, p), (c, d, *_, q) in product(oracle.steps(audio), oracle.steps(visual)):
         arc = a * visual.stay.size + c, b * visual.stay.size + d
@@ -194,6 +194,6 @@ def test_the_best_path_is_the_best_of_all(seed, frames, stretch):
     scores = {
         path: path_score(path, log_density, states, ways, *ends) for path in product(states.tolist(), repeat=frames)
     }
-    one, other, score = factorial_best_path(audio, visual, evidence, stretch)
+    one, other, score = factorial_best_path(audio, visual, logs, stretch)
     assert score == pytest.approx(max(scores.values()), abs=1e-9)
     assert scores[tuple((one * visual.stay.size + other).tolist())] == pytest.approx(score, abs=1e-9)

@@ -12,7 +12,7 @@ from oracles import chains
 
 
 def padded(seed: int, sizes: list[tuple[int, int]], padding: float = 0.0):
-    """Random chains of (frames, states) as the kernel wants them, and one by one as the oracle does."""
+    """Return random chains of given frames and states, padded for the kernel, and one by one for the oracle."""
     draw = np.random.default_rng(seed)
     T, S = (max(size[axis] for size in sizes) for axis in range(2))
     log_emission = np.full((T, len(sizes), S), padding)
@@ -56,7 +56,9 @@ def test_posteriors_of_every_frame_sum_to_one(seed, loudness):
     posterior, stay, _ = chain_posteriors(log_emission * loudness, *rest)
     for u, frames in enumerate((60, 31, 7)):
         assert posterior[:frames, u].sum(axis=1) == pytest.approx(np.ones(frames), abs=1e-6)
-        assert stay[u].sum() == pytest.approx(frames - (7, 5, 7)[u], abs=1e-6)  # what is not a move is a stay
+        assert stay[u].sum() == pytest.approx(
+            frames - (7, 5, 7)[u], abs=1e-6
+        )  # all other transitions are of states to themselves
 
 
 def test_too_short_an_utterance_has_no_path_and_harms_no_other():

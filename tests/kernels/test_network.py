@@ -14,7 +14,7 @@ SHARED = settings(deadline=None, max_examples=30, suppress_health_check=[HealthC
 
 @pytest.fixture(params=["numpy", "compiled"], autouse=True)
 def form(request, monkeypatch) -> None:
-    """Everything holds for both forms."""
+    """Every test runs with both forms, NumPy and compiled."""
     if request.param == "compiled":
         pytest.importorskip("numba")
     monkeypatch.setattr(network, "numba_works", lambda: request.param == "compiled")
@@ -118,7 +118,7 @@ def test_inputs_stay_as_they_were():
 
 
 def chained(seed: int, frames: int, spread: float, chains: int = 2):
-    """A loop of phones whose densities are products: expectation, factors, and the density of each place in each."""
+    """Return a loop of phones whose densities are products: the network, the factors, and the column of each place."""
     arrays, _ = phone_loop(seed)
     expectation = ForwardBackwardNetwork.of(**{name: values for name, values in arrays.items() if name != "emission"})
     draw = np.random.default_rng([seed, 2])
@@ -186,7 +186,7 @@ def test_chains_that_allow_nothing_together_have_no_path():
 
 @pytest.mark.parametrize(("against", "frames"), [(3.0, 40), (20.0, 3), (100.0, 3)])
 def test_a_state_far_behind_comes_back_in_single_precision(against, frames):
-    """Evidence speaks for a state up to 300 nats, and then more for another that cannot be reached from it."""
+    """Log densities favour a state by up to 300 nats, and then more another one that cannot be reached from it."""
     arcs = {(0, 0): 0.0, (1, 1): 0.0}
     expectation = ForwardBackwardNetwork.of(**arrays_of(arcs, 2), log_initial=np.log([0.5, 0.5]), log_final=np.zeros(2))
     log_emission = np.zeros((3 * frames, 2), np.float32)
@@ -212,7 +212,7 @@ def test_recordings_left_by_single_precision_spoil_no_others():
 
 @pytest.mark.parametrize("seed", range(4))
 def test_other_probabilities_on_the_same_arcs(seed):
-    """Nothing of the old ones is left: blocks, runs, and beginnings."""
+    """No old probability is left, in blocks, runs and beginnings."""
     (old, _), (new, _) = phone_loop(seed), phone_loop(seed + 10)
     log_emission = np.random.default_rng(seed).normal(0, 2, (30, len(old["emission"])))
     columns, frames = np.arange(len(old["emission"])), np.array([30])

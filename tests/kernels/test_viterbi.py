@@ -14,13 +14,13 @@ def random_emission(seed: int, frames: int, densities: int) -> np.ndarray:
 
 
 def asked(log_emission: np.ndarray):
-    """Return the densities as the kernel asks for them, and how many frames there are."""
+    """Return the function of log densities that the kernel takes, and the number of frames."""
     return lambda first, end: log_emission[first:end], len(log_emission)
 
 
 @pytest.fixture(params=["numpy", "compiled"], autouse=True)
 def form(request, monkeypatch) -> None:
-    """Everything holds for both forms."""
+    """Every test runs with both forms, NumPy and compiled."""
     if request.param == "compiled":
         pytest.importorskip("numba")
     monkeypatch.setattr(viterbi, "compiled_pays", lambda _: request.param == "compiled")
@@ -67,7 +67,7 @@ def test_blocks_change_nothing(seed, frames, block):
 
 
 def left_to_right(states: int) -> dict:
-    """A chain of states in which the first must begin and the last must end."""
+    """Return a chain of states, with paths from the first to the last."""
     nowhere = np.full(states, -np.inf, np.float32)
     first, last = nowhere.copy(), nowhere.copy()
     first[0] = last[-1] = 0
@@ -107,7 +107,7 @@ def test_hours_lose_no_precision():
 
 
 def both(monkeypatch, log_emission: np.ndarray, arrays: dict, beam: float | None = None) -> list:
-    """What NumPy and what the compiled form find."""
+    """Return the paths and scores of NumPy and of the compiled form."""
     pytest.importorskip("numba")
     found = []
     for compiled in (False, True):
@@ -143,7 +143,7 @@ def test_a_wide_beam_drops_nothing_and_a_narrow_one_the_better_late_path():
     chain["arc_from"], chain["arc_start"] = (
         np.array([0, 1], np.intp),
         np.array([0, 1], np.intp),
-    )  # two loops, no way over
+    )  # two loops, no arc between them
     chain["arc_log"] = np.zeros(2, np.float32)
     log_emission = np.array([[0, -10], [0, 0], [-30, 0]], np.float32)
     assert viterbi.best_path(*asked(log_emission), NetworkArrays(**chain))[0].tolist() == [1, 1, 1]

@@ -34,7 +34,7 @@ def test_the_seed_decides():
 
 
 def test_clips_are_drawn_whole_and_together():
-    """Every clip has its own value, generated and original alike: a draw that parted them would show."""
+    """Every clip has its own value, generated and original alike, so clips that were drawn separately would differ."""
     values = [np.full((3, 1), float(n)) for n in range(5)]
     assert bootstrap_interval(mean_distance, values, values, seed=0, draws=50) == (0, 0)
 

@@ -18,7 +18,7 @@ FRAMES = st.lists(st.integers(0, 14), max_size=5, unique=True).map(lambda frames
 
 
 def opening(closed: list[int], frames: int = 30) -> np.ndarray:
-    """Open at 1, closed at 0 in the frames given."""
+    """Return an opening of 1, and of 0 (closed) in given frames."""
     curve = np.ones(frames)
     curve[closed] = 0
     return curve
@@ -43,7 +43,7 @@ def test_matching_is_one_to_one_and_nearest_first(generated, original):
     pairs = match_closings(generated, original)
     assert len({g for g, _ in pairs}) == len({o for _, o in pairs}) == len(pairs)
     for g in generated:
-        for o in original:  # no two would rather have each other
+        for o in original:  # no two closings are nearer to each other than to their partners
             rivals = [abs(a - b) for a, b in pairs if g == a or o == b]
             assert abs(g - o) > 2 or (rivals and min(rivals) <= abs(g - o))
 

@@ -58,7 +58,7 @@ def test_a_constant_correlates_with_nothing(value, other, frames):
 
 
 def test_pooled_means_are_those_of_all_frames_and_per_clip_of_each():
-    """Two clips, each perfectly followed, at two rest poses of which one is generated wrong."""
+    """Two clips with correlation 1 each, at two rest poses, one of which is generated wrong."""
     original = [column(0, 1, 0, 1), column(10, 11, 10, 11)]
     generated = [column(0, 1, 0, 1), column(0, 1, 0, 1)]
     assert per_clip_correlation(generated, original)[0] == pytest.approx(1)
@@ -139,7 +139,7 @@ def test_lag_looks_at_the_first_channel():
 
 
 def test_channels_that_move():
-    """Judged beside those of the same unit, over all clips together."""
+    """They are compared with channels of the same unit, over all clips together."""
     wave = np.sin(np.arange(50) / 5)[:, None]
     clips = [wave * (1, 0.5, 0.009, 0, 90) + (0, 0, 0, 7, 0), np.tile([0, 0, 0, 7, 0.0], (9, 1))]
     assert moving(clips, ["m", "m", "m", "m", "degrees"]).tolist() == [True, True, False, False, True]

@@ -13,7 +13,7 @@ REACH = 40
 
 
 def wave(start: float, count: int = 300, seed: int = 0) -> NDArray[np.float64]:
-    """A band-limited random curve, read from any place on."""
+    """Return a band-limited random curve, from any start on."""
     draw = np.random.default_rng(seed)
     time = start + np.arange(count)
     return sum(

@@ -6,7 +6,7 @@ from lipmotion.measures.report import figures_table
 
 
 def figures():
-    """Figures that are all different, and every number of them as it should be printed."""
+    """Figures that are all different, and the text of every number."""
     numbers, printed = count(1), []
 
     def figure(form: str, scale: float = 0.001):

@@ -36,10 +36,10 @@ def test_the_lips_meet_in_every_p_b_and_m_that_the_user_left_alone(units, pins):
     wanted = [(frame, value) for frame, value in pins if frame < len(talk.features.values)]
     constraints = Constraints(tuple(Pin(frame / 100, "opening", value) for frame, value in wanted))
     opening = ENGINE.generate(MODEL, talk, constraints).motion["opening"]
-    taken = {frame for frame, _ in wanted}
-    for span in closable_ranges(units, len(opening)):
-        if not taken & set(range(span.start, span.stop)):
-            assert opening[span].min() <= MODEL.closure.closed + 1e-12
+    pinned = {frame for frame, _ in wanted}
+    for frames in closable_ranges(units, len(opening)):
+        if not pinned & set(range(frames.start, frames.stop)):
+            assert opening[frames].min() <= MODEL.closure.closed + 1e-12
     assert opening.min() >= 0
 
 
@@ -47,9 +47,9 @@ def test_closures_can_be_left_to_the_model():
     pure = engine_named("trajectory", {"closures": False})
     talk = speech(spoken(("aa", "p", "aa"), (12, 3, 12)))
     free, closed = (engine.generate(MODEL, talk).motion["opening"] for engine in (pure, ENGINE))
-    span = closable_ranges(talk.units, len(free))[0]
-    assert free[span].min() > MODEL.closure.closed
-    assert closed[span].min() <= MODEL.closure.closed
+    frames = closable_ranges(talk.units, len(free))[0]
+    assert free[frames].min() > MODEL.closure.closed
+    assert closed[frames].min() <= MODEL.closure.closed
 
 
 def test_what_is_pinned_does_not_follow_the_closure():

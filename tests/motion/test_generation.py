@@ -1,4 +1,4 @@
-"""Long recordings are generated stretch by stretch; nobody can tell."""
+"""Long recordings are generated block by block."""
 
 import numpy as np
 import pytest
@@ -19,17 +19,17 @@ def whole():
     return ENGINE.generate(MODEL, SPOKEN, Constraints((Pin(3.3, "opening", 0.2), Pin(5.01, "opening", 0.1))))
 
 
-@pytest.mark.parametrize("stretch", [97, 250, 400])
-def test_stretches_change_nothing(whole, stretch, monkeypatch):
+@pytest.mark.parametrize("frames_per_block", [97, 250, 400])
+def test_blocks_change_nothing(whole, frames_per_block, monkeypatch):
     frames = len(SPOKEN.features.values)
-    assert frames > 3 * stretch
-    monkeypatch.setattr(module, "BLOCK_FRAMES", stretch)
+    assert frames > 3 * frames_per_block
+    monkeypatch.setattr(module, "BLOCK_FRAMES", frames_per_block)
     monkeypatch.setattr(module, "MARGIN_FRAMES", 250)
     pins = Constraints((Pin(3.3, "opening", 0.2), Pin(5.01, "opening", 0.1)))
     pieces = ENGINE.generate(MODEL, SPOKEN, pins)
     assert pieces.motion.values == pytest.approx(
         whole.motion.values, abs=1e-7
-    )  # what is heard is summed in single precision
+    )  # the acoustic regression is computed in single precision
     assert pieces.variance == pytest.approx(whole.variance, abs=1e-9)
     assert np.array_equal(pieces.trace.frames, whole.trace.frames)
     assert pieces.motion["opening"][330] == 0.2

@@ -95,7 +95,7 @@ def test_points_far_from_the_face() -> None:
 
 def test_rest_is_near_the_poses() -> None:
     check_rest(np.array([0.0, 0.45]), REACH)
-    with pytest.raises(ValueError, match=r"rest of 550 in dimension 1, whose poses are 0.5 to 0.6"):
+    with pytest.raises(ValueError, match=r"rest pose of 550 in dimension 1, whose poses are 0.5 to 0.6"):
         check_rest(np.array([0.0, 550.0]), REACH)
 
 

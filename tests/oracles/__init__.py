@@ -1,1 +1,1 @@
-"""Slow, readable twins of the fast code: they try everything, and share no line with what they check."""
+"""Oracles for tests: slow, readable computations by enumeration, independent of the code that they check."""

@@ -1,4 +1,4 @@
-"""Affine transforms of features, one frame, Gaussian and row at a time."""
+"""Affine transforms of features, computed for one frame, Gaussian and row at a time."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ def log_gaussian(x: np.ndarray, mean: np.ndarray, variance: np.ndarray) -> float
 
 
 def log_likelihood(mixtures: Mixtures, features: np.ndarray, densities: np.ndarray, transform: np.ndarray) -> float:
-    """Return the log density of frames before the transform, each under its own mixture behind it."""
+    """Return the log density of features before the transform, each frame under its own mixture after the transform."""
     total = len(features) * np.log(abs(np.linalg.det(transform[:, :-1])))
     for x, density in zip(features, densities, strict=True):
-        heard = transform[:, :-1] @ x + transform[:, -1]
+        current = transform[:, :-1] @ x + transform[:, -1]
         total += np.log(
             sum(
-                np.exp(weight + log_gaussian(heard, mean, variance))
+                np.exp(weight + log_gaussian(current, mean, variance))
                 for weight, mean, variance in zip(
                     mixtures.log_weights[density], mixtures.means[density], mixtures.variances[density], strict=True
                 )
@@ -30,15 +30,15 @@ def log_likelihood(mixtures: Mixtures, features: np.ndarray, densities: np.ndarr
 def statistics(
     mixtures: Mixtures, features: np.ndarray, densities: np.ndarray, transform: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the quadratic and the linear sums [shapes=(D, D + 1, D + 1), (D, D + 1)]."""
+    """Return the quadratic and the linear statistics [shapes=(D, D + 1, D + 1), (D, D + 1)]."""
     size = features.shape[1]
     quadratic, linear = np.zeros((size, size + 1, size + 1)), np.zeros((size, size + 1))
     for x, density in zip(features, densities, strict=True):
-        heard, extended = transform[:, :-1] @ x + transform[:, -1], np.append(x, 1)
+        current, extended = transform[:, :-1] @ x + transform[:, -1], np.append(x, 1)
         shares = np.array(
             [
                 np.exp(mixtures.log_weights[density, m])
-                * np.exp(log_gaussian(heard, mixtures.means[density, m], mixtures.variances[density, m]))
+                * np.exp(log_gaussian(current, mixtures.means[density, m], mixtures.variances[density, m]))
                 for m in range(mixtures.size[1])
             ]
         )

@@ -14,7 +14,7 @@ def chain_paths(frames: int, states: int):
 
 
 def path_log_probability(path, log_emission, log_stay, log_move) -> float:
-    """Return the log probability of one path together with what it emits, and of leaving the chain at its end."""
+    """Return the log probability of one path and its emissions, with that of leaving the chain at its end."""
     total = sum(log_emission[frame, state] for frame, state in enumerate(path))
     total += sum(log_stay[before] if after == before else log_move[before] for before, after in pairwise(path))
     return total + log_move[path[-1]]

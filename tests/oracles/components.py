@@ -1,4 +1,4 @@
-"""Principal components by the singular value decomposition of everything."""
+"""Principal components by singular value decomposition of all values."""
 
 from __future__ import annotations
 
@@ -14,6 +14,6 @@ def components(values: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def share(values: np.ndarray, basis: np.ndarray) -> float:
-    """Return how much of the variance a basis holds."""
+    """Return the share of the variance that a basis explains."""
     centred = values - values.mean(axis=0)
     return sum(float(np.square(centred @ row).sum()) for row in basis) / float(np.square(centred).sum())

@@ -6,12 +6,12 @@ import numpy as np
 
 
 def log_gaussian(x, mean, variance):
-    """Log density of a diagonal Gaussian."""
+    """Return the log density of a diagonal Gaussian."""
     return float(-0.5 * np.sum(np.log(2 * np.pi * variance) + (x - mean) ** 2 / variance))
 
 
 def log_density(group, density, observations, frame):
-    """Log density of a frame under one density of a group, all of its streams, weighted and where seen."""
+    """Return the log density of a frame under one density of a group: of all its observed streams, weighted."""
     mixtures, terms = group.mixtures, []
     for component in range(mixtures.log_weights.shape[1]):
         total = float(mixtures.log_weights[density, component])
@@ -27,7 +27,7 @@ def log_density(group, density, observations, frame):
 
 
 def paths(chains, observations):
-    """Give every path of joint states that is possible, with the log of its probability and the densities along it."""
+    """Give every possible path of joint states, with its log probability and the densities along it."""
     found = chains.transitions.product
     arcs = dict(
         zip(zip(found.arc_from.tolist(), found.arc_to.tolist(), strict=True), chains.transitions.arc_log, strict=True)

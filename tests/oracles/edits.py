@@ -1,4 +1,4 @@
-"""The cheapest match of two sequences, by trying all."""
+"""The cheapest alignment of two sequences, by trying all."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 
 def least_cost(found: Sequence[str], wanted: Sequence[str], cost: Callable[[str, str], float], gap: float) -> float:
-    """Return what the cheapest match costs: pairs in order, a gap for every element that has no partner."""
+    """Return the cost of the cheapest alignment: of pairs in order, and a gap for every element without a partner."""
     if not found or not wanted:
         return gap * (len(found) + len(wanted))
     return min(

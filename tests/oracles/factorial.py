@@ -8,7 +8,7 @@ from oracles import networks
 
 
 def steps(loop):
-    """Give every way of a loop from one frame to the next: states, what is counted, its position, and probability."""
+    """Give every transition of a loop: its states, the name and the position of its count, and its probability."""
     n, units = loop.stay.shape
     for state, unit in product(range(n), range(units)):
         here = state * units + unit
@@ -29,23 +29,23 @@ def joint_arcs(audio, visual):
     return arcs
 
 
-def joint_logs(audio, visual, evidence):
+def joint_logs(audio, visual, logs):
     """Return log densities [shape=(T, Na·Nv)] and log probabilities of beginning and ending in joint states."""
-    log_density = evidence.audio[:, :, None].astype(float) + evidence.visual[:, None, :]
-    for position, (a, b) in enumerate(evidence.pairs):
-        log_density[:, a, b] = evidence.pair[:, position]
+    log_density = logs.audio[:, :, None].astype(float) + logs.visual[:, None, :]
+    for position, (a, b) in enumerate(logs.pairs):
+        log_density[:, a, b] = logs.pair[:, position]
     with np.errstate(divide="ignore"):
         ends = [np.log(np.outer(getattr(audio, end), getattr(visual, end))).ravel() for end in ("initial", "final")]
     return log_density.reshape(len(log_density), -1), *ends
 
 
-def posteriors(audio, visual, evidence):
-    """Return joint posteriors [shape=(T, Na, Nv)], counts of each loop by what is counted, and the log likelihood."""
-    log_density, initial, final = joint_logs(audio, visual, evidence)
+def posteriors(audio, visual, logs):
+    """Return joint posteriors [shape=(T, Na, Nv)], the counts of each loop by name, and the log likelihood."""
+    log_density, initial, final = joint_logs(audio, visual, logs)
     arcs = joint_arcs(audio, visual)
-    logs = {arc: float(np.log(probability)) for arc, probability in arcs.items()}
+    arc_logs = {arc: float(np.log(probability)) for arc, probability in arcs.items()}
     states = np.arange(log_density.shape[1])
-    posterior, followed, log_likelihood = networks.posteriors(log_density, states, logs, initial, final)
+    posterior, followed, log_likelihood = networks.posteriors(log_density, states, arc_logs, initial, final)
     counts = [
         {name: np.zeros_like(getattr(loop, name)) for name in ("stay", "onward", "enter")} for loop in (audio, visual)
     ]

@@ -1,4 +1,4 @@
-"""Joint models by the book: densities term by term, recognition and posteriors by trying everything."""
+"""Multi-stream models: densities term by term, recognition and posteriors by enumeration."""
 
 from itertools import pairwise
 
@@ -17,33 +17,33 @@ def mixture(x, weights, means, variances) -> float:
     )
 
 
-def stream_density(part, leaf, value, known) -> float:
+def stream_density(model, leaf, value, known) -> float:
     """Return the log density of one frame of one stream, in the units it was observed in."""
-    mixtures, voiced = part.tied.mixtures, part.tied.voiced
+    mixtures, voiced = model.tied.mixtures, model.tied.voiced
     if not known:
         return 0.0 if voiced is None else float(np.log(1 - voiced[leaf]))
-    means = mixtures.means[leaf] * part.scale.deviation + part.scale.mean
-    found = mixture(value, mixtures.log_weights[leaf], means, mixtures.variances[leaf] * part.scale.deviation**2)
+    means = mixtures.means[leaf] * model.scale.deviation + model.scale.mean
+    found = mixture(value, mixtures.log_weights[leaf], means, mixtures.variances[leaf] * model.scale.deviation**2)
     return found if voiced is None else found + float(np.log(voiced[leaf]))
 
 
-def log_density(hmm, observed, place, frame, weights) -> float:
+def log_density(hmm, observed, state, frame, weights) -> float:
     """Return the weighted sum of all streams' log densities of a state in its context."""
     total = 0.0
     for name, weight in weights:
         if weight and name in hmm.models and name in observed.streams:
-            stream, part = observed.streams[name], hmm.models[name]
-            leaf = part.forest.leaf(place)
-            total += weight * stream_density(part, leaf, stream.values[frame], stream.known[frame])
+            stream, model = observed.streams[name], hmm.models[name]
+            leaf = model.forest.leaf(state)
+            total += weight * stream_density(model, leaf, stream.values[frame], stream.known[frame])
     return total
 
 
 def score(hmm, densities, units, lengths) -> float:
-    """Return the log probability of units whose states last so many frames, as recognition pays for it.
+    """Return the log probability of units whose states last so many frames, with the scores of recognition.
 
-    densities : of a place and a frame
-    Silence lies around; an utterance that begins in silence pays its insertion only, one that ends in another unit pays
-    the silence after it.
+    densities : of a state and a frame
+    Silence precedes and follows the utterance. One that begins in silence has the insertion penalty of it only;
+    one that ends in another unit has the score of the silence after it.
     """
     silence, inventory = hmm.inventory.silence, hmm.inventory
 
@@ -54,11 +54,11 @@ def score(hmm, densities, units, lengths) -> float:
     total += sum(price(unit, following) for unit, following in pairwise(units))
     total += price(units[-1], silence) if units[-1] != silence else 0.0
     frame, lasting = 0, iter(lengths)
-    around = (silence, *units, silence)
+    neighbours = (silence, *units, silence)
     for position, unit in enumerate(units):
         for state in range(inventory.count(unit)):
-            place, length = ((around[position], unit, around[position + 2]), state), next(lasting)
-            total += sum(densities(place, t) for t in range(frame, frame + length))
+            triphone, length = ((neighbours[position], unit, neighbours[position + 2]), state), next(lasting)
+            total += sum(densities(triphone, t) for t in range(frame, frame + length))
             stay = hmm.log_stay[inventory.monophones[unit, state]]
             total += (length - 1) * stay + np.log(1 - np.exp(stay))
             frame += length
@@ -66,7 +66,7 @@ def score(hmm, densities, units, lengths) -> float:
 
 
 def everything(hmm, densities, frames, candidates):
-    """Give score, units and lengths of everything that may have been said."""
+    """Give score, units and durations of every possible unit sequence."""
     for units in candidates:
         for lengths in segmentations(frames, sum(hmm.inventory.count(unit) for unit in units)):
             yield score(hmm, densities, units, lengths), units, lengths

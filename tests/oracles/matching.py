@@ -13,7 +13,7 @@ def matchings(generated, original, reach: int):
 
 
 def nearest_first(generated, original, reach: int) -> tuple[int, ...]:
-    """Return how many pairs lie 0, 1, ... ``reach`` apart where as many as possible are as near as possible."""
+    """Return how many pairs are 0, 1, … ``reach`` apart, in the matching with most pairs at the least distances."""
     return max(
         tuple(sum(abs(g - o) == distance for g, o in chosen) for distance in range(reach + 1))
         for chosen in matchings(generated, original, reach)

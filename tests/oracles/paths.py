@@ -8,7 +8,7 @@ import numpy as np
 def path_score(path, log_emission, emission, arcs, log_initial, log_final) -> float:
     """Return the log probability of one path.
 
-    arcs : dict of (source, target) to log probability; what is not in it cannot be
+    arcs : log probability by (source, target); other arcs are impossible
     """
     score = log_initial[path[0]] + log_final[path[-1]]
     score += sum(log_emission[frame, emission[state]] for frame, state in enumerate(path))

@@ -8,7 +8,7 @@ from oracles.paths import path_score
 
 
 def path_posterior(log_emission, emission, arcs, log_initial, log_final):
-    """Return the probability of every path that there is, and the log likelihood."""
+    """Return the posterior of every possible path, and the log likelihood."""
     paths = list(product(range(len(emission)), repeat=len(log_emission)))
     scores = np.array([path_score(p, log_emission, emission, arcs, log_initial, log_final) for p in paths])
     total = np.logaddexp.reduce(scores)

@@ -4,7 +4,7 @@ from itertools import groupby, pairwise, product
 
 
 def is_division(found, frames: int, hold: int) -> bool:
-    """Whether segments begin at 0, follow one another, differ from their neighbours and keep the hold."""
+    """Return whether segments begin at 0, last ``hold`` frames at least, and differ from their neighbours."""
     starts = [first for first, _ in found]
     longs = [end - start for start, end in pairwise([*starts, frames])]
     return (
@@ -15,14 +15,14 @@ def is_division(found, frames: int, hold: int) -> bool:
 
 
 def division_cost(found, cost, change: float) -> float:
-    """Return what segments cost, change by change and frame by frame."""
+    """Return the cost of segments, of all changes and frames."""
     ends = [first for first, _ in found[1:]] + [len(cost)]
     inside = sum(cost[first:end, label].sum() for (first, label), end in zip(found, ends, strict=True))
     return float(inside + change * (len(found) - 1))
 
 
 def best_division(cost, hold: int, change: float):
-    """Return the best of all segmentations that keep the hold, and its cost."""
+    """Return the best of all divisions into segments of ``hold`` frames at least, and its cost."""
     frames, labels = cost.shape
     every = []
     for labelling in product(range(labels), repeat=frames):

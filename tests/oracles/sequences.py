@@ -4,7 +4,7 @@ from itertools import combinations, pairwise, product
 
 
 def segmentations(frames: int, states: int):
-    """Give every way to cut frames into so many runs, none empty, as their lengths."""
+    """Give the durations of every division of frames into ``states`` runs, none empty."""
     for cuts in combinations(range(1, frames), states - 1):
         edges = (0, *cuts, frames)
         yield tuple(stop - start for start, stop in pairwise(edges))
@@ -21,9 +21,9 @@ def sequences(inventory, counts: dict[str, int], frames: int):
 def score(hmm, features, units, durations, silence: str = "sil") -> float:
     """Return the log probability of units whose states last ``durations`` frames.
 
-    Silence lies around the recording. Every unit pays its bigram once, given the one before it; where the
-    recording begins in silence, that silence only pays its insertion; where it ends in a unit, the silence
-    behind it pays as well.
+    Silence precedes and follows the recording. Every unit has its bigram once, given the one before it; where the
+    recording begins in silence, that silence has the insertion penalty only; where it ends in another unit, the
+    score of the silence after it is added.
     """
     config = hmm.config
 
@@ -33,11 +33,11 @@ def score(hmm, features, units, durations, silence: str = "sil") -> float:
     total = config.insertion if units[0] == silence else price(silence, units[0])
     total += sum(price(unit, following) for unit, following in pairwise(units))
     total += price(units[-1], silence) if units[-1] != silence else 0.0
-    around = (silence, *units, silence)
+    neighbours = (silence, *units, silence)
     frame, lasting = 0, iter(durations)
     for position, unit in enumerate(units):
         for state in range(hmm.table.count(unit)):
-            neighbour = hmm.table.neighbour(around[position], unit, around[position + 2], state)
+            neighbour = hmm.table.neighbour(neighbours[position], unit, neighbours[position + 2], state)
             density, count = hmm.table.density(unit, state, neighbour), next(lasting)
             total += float(hmm.mixtures.log_likelihood(features[frame : frame + count])[:, density].sum())
             total += (count - 1) * hmm.stay(unit, state) + hmm.move(unit, state)
@@ -55,7 +55,7 @@ def boundaries(hmm, units, durations) -> list[int]:
 
 
 def best(hmm, features, candidates, silence: str = "sil"):
-    """Return the best of some unit sequences, its boundaries and its score (None, None, -inf: none fits)."""
+    """Return the best of some unit sequences, its bounds and its score (None, None, -inf: none fits)."""
     found = (None, None, float("-inf"))
     for units in candidates:
         for durations in segmentations(len(features), sum(hmm.table.count(unit) for unit in units)):

@@ -1,10 +1,10 @@
-"""Parameter generation with the matrices of the textbook, dense."""
+"""Parameter generation with dense matrices."""
 
 import numpy as np
 
 
 def window_matrix(frames: int) -> np.ndarray:
-    """Return W [shape=(3 T, T)]: static rows, then Δ = (-½, 0, ½), then Δ² = (1, -2, 1); rows that stick out are 0."""
+    """Return W [shape=(3 T, T)]: static rows, then Δ = (-½, 0, ½), then Δ² = (1, -2, 1); 0 at both ends."""
     static, slope, bend = np.eye(frames), np.zeros((frames, frames)), np.zeros((frames, frames))
     for t in range(1, frames - 1):
         slope[t, t - 1], slope[t, t + 1] = -0.5, 0.5

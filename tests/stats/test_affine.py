@@ -68,7 +68,7 @@ def test_statistics_are_those_of_the_sums_written_out(seed: int) -> None:
 
 
 def test_the_objective_has_the_slope_of_the_likelihood() -> None:
-    """Where the posteriors were computed, both rise alike in every direction."""
+    """At the transform of the posteriors, the gradients of both are equal."""
     draw = np.random.default_rng(5)
     mixtures, transform = random_mixtures(draw), random_transform(draw)
     features, densities = spoken(draw, mixtures, 20)

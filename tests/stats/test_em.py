@@ -10,7 +10,7 @@ from lipmotion.stats.em import run_em
 
 @dataclass(frozen=True)
 class Half:
-    """Statistics of a model that is moved half way to 1 by every step; its log likelihood is what is left."""
+    """The statistics of a model that every step moves half way to 1; minus the distance is its log likelihood."""
 
     model: float
 

@@ -23,14 +23,14 @@ def random_mixtures(seed: int, densities: int = 3, components: int = 2, dimensio
 
 
 def random_data(seed: int, frames: int = 200) -> tuple[np.ndarray, np.ndarray]:
-    """Two clouds, and how much of each frame a density accounts for."""
+    """Return frames of two clusters, and the posterior of a density in each."""
     draw = np.random.default_rng([seed, 7])
     centres = draw.normal(0, 2, (2, 3))[draw.integers(2, size=frames)]
     return (centres + draw.normal(0, 0.7, (frames, 3))).astype(np.float32), draw.random(frames).astype(np.float32)
 
 
 def component_logs(mixtures: Mixtures, density: int, x: np.ndarray) -> np.ndarray:
-    """The same as ``log_components`` by SciPy [shape=(T, M)]."""
+    """Return ``log_components`` computed by SciPy [shape=(T, M)]."""
     rows = zip(mixtures.log_weights[density], mixtures.means[density], mixtures.variances[density], strict=True)
     return np.stack([w + multivariate_normal(mean, np.diag(var)).logpdf(x) for w, mean, var in rows], axis=1)
 

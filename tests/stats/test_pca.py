@@ -48,7 +48,7 @@ def test_a_line_is_one_component():
 
 
 def spectrum(seed: int, count: int, dimensions: int) -> np.ndarray:
-    """Numbers whose components have clearly different variances, and some noise."""
+    """Return values whose components have clearly different variances, with some noise."""
     draw = np.random.default_rng(seed)
     scores = draw.normal(0, 1, (count, 8)) * 10 * 0.7 ** np.arange(8)
     return scores @ draw.normal(0, 1, (8, dimensions)) + 0.01 * draw.normal(0, 1, (count, dimensions)) + 5

@@ -5,7 +5,7 @@ from lipmotion.stats.rounding import varies
 
 
 def rounded(value: float, seed: int = 0) -> np.ndarray:
-    """A constant as another processor may compute it."""
+    """Return a constant with the rounding errors of another processor."""
     return value * (1 + 1e-7 * np.random.default_rng(seed).uniform(-1, 1, size=(500, 1)))
 
 

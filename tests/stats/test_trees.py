@@ -13,13 +13,13 @@ from lipmotion.stats.trees import (
 )
 
 UNITS = ("a", "b", "c", "d")
-QUESTIONS = [Question(place, unit, frozenset([unit])) for place in range(3) for unit in UNITS]
-QUESTIONS += [Question(place, "early", frozenset("ab")) for place in range(3)]
+QUESTIONS = [Question(position, unit, frozenset([unit])) for position in range(3) for unit in UNITS]
+QUESTIONS += [Question(position, "early", frozenset("ab")) for position in range(3)]
 CONTEXTS = list(product(UNITS, repeat=3))
 
 
 def statistics_of(values):
-    """Count, sum and sum of squares of each context's values [each shape=(N, D)]."""
+    """Return count, sum and sum of squares of each context's values [each shape=(N, D)]."""
     return np.array([np.concatenate([[len(x)], x.sum(axis=0), (x * x).sum(axis=0)]) for x in values])
 
 
@@ -92,7 +92,7 @@ def test_every_context_finds_a_leaf_even_one_of_unknown_names():
 def test_a_context_never_seen_is_treated_like_those_that_answer_alike():
     seen = [context for context in CONTEXTS if context[0] != "b"]
     values = [x for x, c in zip(sample(lambda c: 5.0 * (c[0] in "ab")), CONTEXTS, strict=True) if c[0] != "b"]
-    questions = [q for q in QUESTIONS if q.name == "early"]  # the only ones that know b
+    questions = [q for q in QUESTIONS if q.name == "early"]  # the only ones about b
     tree = grow_tree(
         seen, statistics_of(values), questions, gaussian_log_likelihood, parameters=4, factor=1.0, least=10.0
     )
@@ -138,7 +138,7 @@ def test_damaged_trees_are_refused(key, change):
 
 
 def spaces_of(values):
-    """Count, count of those with a value, their sum and sum of squares [each of ``values``: shape=(N,), NaN: none]."""
+    """Return the number of values, of those that are not NaN, and their sums and sums of squares."""
     found = []
     for x in values:
         known = x[~np.isnan(x)]
@@ -180,7 +180,7 @@ def test_frames_that_are_all_alike_gain_no_more_than_the_least_variance_allows()
 
 @pytest.mark.parametrize("seed", range(20))
 def test_of_questions_that_split_alike_the_first_is_asked_however_sums_are_rounded(seed):
-    """Their gains differ by rounding when their answers stand in other rows of a matrix product."""
+    """Their gains differ by rounding when their answers are in other rows of a matrix product."""
     values = sample(lambda context: 5.0 if context[0] in "ab" else 0.0, seed=seed)
     alike = [Question(0, str(number), frozenset("ab")) for number in range(40)]
     others = [Question(0, f"not {number}", frozenset("cdefgh")) for number in range(40)]

@@ -45,7 +45,7 @@ def test_a_file_appears_when_it_is_whole(tmp_path: Path) -> None:
 
 
 def fail(context: AbstractContextManager[Path], error: BaseException) -> None:
-    """Write half of something, then fail."""
+    """Write a part of the content, then fail."""
     with context as unfinished:
         (unfinished / "entry.json" if unfinished.is_dir() else unfinished).write_text("half")
         raise error
@@ -163,7 +163,7 @@ def test_what_a_killed_process_left_of_a_target_is_removed_with_the_next(tmp_pat
         assert len(names(tmp_path)) == 0
         other.touch()
         mine.touch()
-        with whole_file(target) as same:  # a process that lives is left alone
+        with whole_file(target) as same:  # the file of a running process is not removed
             same.touch()
         assert mine.exists()
     assert names(tmp_path) == ["motion.json", "other.json"]
@@ -187,7 +187,7 @@ def test_a_folder_is_held_by_one_process_and_let_go_of_when_it_is_killed(tmp_pat
         with pytest.raises(ExportError, match=rf"work: another lipmotion \(process {process.pid}\) is at work on it"):
             locked(folder).__enter__()
         process.kill()
-    assert names(folder) == [LOCK]  # it stays, and does not block
+    assert names(folder) == [LOCK]  # the file stays, but is not locked
     with locked(folder):
         assert (folder / LOCK).read_text() == str(os.getpid())
     assert names(folder) == []
@@ -282,7 +282,7 @@ def test_two_outputs_that_are_one(tmp_path: Path) -> None:
 
 
 def interrupted(folder: Path, step: int) -> bool:
-    """Hold a folder for a moment, with an interrupt at a step of doing so; whether there were as many steps."""
+    """Lock and release a folder with an interrupt at one step of it; return whether there were as many steps."""
     seen = 0
 
     def trace(frame: FrameType, event: str, _: object) -> Callable[..., object] | None:

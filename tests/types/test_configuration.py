@@ -48,7 +48,7 @@ class Example(Configuration):
         ({"free": None}, "free is None, required text"),
         ({"no": 1}, "no option 'no'; there are: count, odd, mixtures, weight, kind, on, free"),
         ({"amount": 1}, "no option 'amount'; say count"),
-        ({"steps": 3}, "steps is 3; this option is gone, required 0"),
+        ({"steps": 3}, "steps is 3; this option no longer exists, required 0"),
     ],
 )
 def test_a_value_that_is_not_allowed(values: dict[str, Any], words: str) -> None:

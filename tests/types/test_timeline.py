@@ -36,7 +36,7 @@ def test_rounding_is_not_an_overlap() -> None:
     ("edges_s", "message"),
     [
         ([(1, 0.5)], r"'at 1' ends at 0.5 s, before its start at 1 s"),
-        ([(0, 1), (0.9, 2)], r"'at 0.9' starts at 0.9 s, before the one ahead of it ends \(1 s\)"),
+        ([(0, 1), (0.9, 2)], r"'at 0.9' starts at 0.9 s, before the previous span ends \(1 s\)"),
         ([(1, 2), (0, 0.5)], r"'at 0' starts at 0 s"),
         ([(NAN, 1)], "ends at 1 s"),
         ([(0, NAN)], "ends at nan s"),

@@ -28,8 +28,8 @@ from lipmotion.types import (
 )
 
 BLOCK_FRAMES, MARGIN_FRAMES = 6000, 500
-"""Frames of a block, and frames before and after it that are generated with it and then dropped: frames that are seconds
-away do not change the result, and the memory does not grow with the recording."""
+"""Frames of a block, and frames before and after it that are generated with it and then dropped: frames that are
+seconds away do not change the result, and the memory does not grow with the recording."""
 DOUBLE_FRAMES = 60_000
 """The motion of recordings beyond ten minutes is kept in single precision, its variance in the model's space."""
 

@@ -1,4 +1,4 @@
-"""Movement as named curves."""
+"""Motion: named curves over time."""
 
 from __future__ import annotations
 
@@ -12,25 +12,25 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError, shortened
 
 EYE_DISTANCE = "eye_distance"
-"""The unit of all tracked distances: that between the outer eye corners."""
+"""The unit of all tracked lengths: the distance between the outer eye corners."""
 WEIGHT = "weight"
-"""The unit of blendshapes: 0 is absent, 1 is whole; never less than 0."""
+"""The unit of blendshapes: 0 is no effect, 1 the full effect; never negative."""
 GREY = "grey"
-"""The unit of eigenlips: coefficients of an orthonormal basis of pictures in grey levels, 0 to 255."""
+"""The unit of eigenlips: coefficients of an orthonormal basis of mouth pictures in grey levels, 0 to 255."""
 LARGEST = {EYE_DISTANCE: 1e4, WEIGHT: 255.0, GREY: 1e5}
-"""Values beyond these are of nothing that moves in a face, even where a table without units holds pixels."""
+"""Largest plausible magnitude of motion of a face, by unit; values in pixels, in files without units, are allowed."""
 LARGEST_OTHER = 1e6
-
+"""The same for all other units."""
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
-"""A spreadsheet runs a field as a formula that begins with one of these, wide forms of them included."""
+"""First characters of a field that a spreadsheet executes as a formula; full-width forms count as well."""
 
 
 @dataclass(frozen=True)
 class Channel:
-    """One curve: its name and the unit of its values.
+    """Name and unit of one curve.
 
-    Raises InputError: the name is what a spreadsheet takes for a formula.
+    Raises InputError: a spreadsheet would execute the name as a formula.
     """
 
     name: str
@@ -46,12 +46,19 @@ class Channel:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Movement, one row a frame, frame n at ``n / rate_hz`` seconds.
+    """Motion: P curves in T frames; frame n is at ``n / rate_hz`` seconds.
 
-    values   : float array [shape=(T, P)], in single precision where it is long
+    values   : float array [shape=(T, P)], each column in the unit of its channel; single precision in long recordings
     rate_hz  : frames per second
-    channels : the P curves
-    Raises InputError: the shapes do not fit, two channels share a name, or the rate is not positive.
+    channels : name and unit of each of the P curves
+    Raises InputError: shapes that do not fit, two channels of one name, or a rate that is not positive.
+
+    >>> import numpy as np
+    >>> motion = Motion(np.array([[0.0], [0.1], [0.2]]), 25.0, (Channel("opening"),))
+    >>> motion["opening"].tolist(), motion.time_s.tolist()
+    ([0.0, 0.1, 0.2], [0.0, 0.04, 0.08])
+    >>> motion.resampled(50.0).values[:, 0].tolist()
+    [0.0, 0.05, 0.1, 0.15000000000000002, 0.2]
     """
 
     values: NDArray[np.floating[Any]]
@@ -77,58 +84,61 @@ class Motion:
         return np.arange(len(self.values)) / self.rate_hz
 
     def __getitem__(self, name: str) -> NDArray[np.floating[Any]]:
-        """Return one channel's curve [shape=(T,)]. Raises InputError: no such channel."""
+        """Return the curve of one channel [shape=(T,)]. Raises InputError: no such channel."""
         curve: NDArray[np.floating[Any]] = self.values[:, self.column(name)]
         return curve
 
     def column(self, name: str) -> int:
-        """Return which column of ``values`` a channel is. Raises InputError: no such channel."""
+        """Return the column of a channel in ``values``. Raises InputError: no such channel."""
         if name not in self.names:
             some = ", ".join(self.names[:6]) + (", ..." if len(self.names) > 6 else "")
             raise InputError(f"no motion channel {name!r} among {len(self.names)}: {some}")
         return self.names.index(name)
 
     def at(self, time_s: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the values at other times [shape=(len(time_s), P)].
+        """Return the values at some times in seconds [shape=(len(time_s), P)].
 
-        Linear between frames, as every figure is computed (docs: measures); constant beyond both ends.
+        Linear interpolation between frames, as for every figure in docs/measures.md; constant beyond both ends.
         """
         return between_frames(self.values, self.rate_hz, time_s)
 
     def resampled(self, rate_hz: float) -> Motion:
-        """Return the same curves at another rate, over the same duration (linear between frames).
+        """Return the motion at another frame rate, over the same duration, by linear interpolation.
 
-        Raises InputError: the rate is not more than 0.
+        Raises InputError: the rate is not positive.
         """
         if not 0 < rate_hz < float("inf"):
-            raise InputError(f"motion rate is {rate_hz} Hz, required more than 0")
+            raise InputError(f"motion rate is {rate_hz} Hz, required more than 0 and finite")
         count = int(np.floor((len(self.values) - 1) / self.rate_hz * rate_hz + 1e-9)) + 1
         return Motion(self.at(np.arange(count) / rate_hz), rate_hz, self.channels)
 
 
 def between_frames(rows: NDArray[np.floating[Any]], rate_hz: float, time_s: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return rows [shape=(T, N)], one a frame, at other times, as ``Motion.at`` does [shape=(len(time_s), N)]."""
+    """Return rows at some times in seconds, by linear interpolation [shape=(len(time_s), N)].
+
+    rows : one a frame, at ``rate_hz`` [shape=(T, N)]; constant beyond both ends
+    """
     position = np.clip(np.asarray(time_s) * rate_hz, 0, len(rows) - 1)
     low = np.minimum(position.astype(int), max(len(rows) - 2, 0))
     high = np.minimum(low + 1, len(rows) - 1)
-    share = (position - low)[:, None]
-    values: NDArray[np.float64] = (1 - share) * rows[low] + share * rows[high]
+    fraction = (position - low)[:, None]
+    values: NDArray[np.float64] = (1 - fraction) * rows[low] + fraction * rows[high]
     return values
 
 
 def check_curves(motion: Motion) -> None:
-    """Raise InputError where a curve is not finite, or larger than anything in a face."""
+    """Raise InputError if a curve has values that are not finite, or larger than plausible motion of a face."""
     if len(motion.values):
-        ends = zip(motion.channels, motion.values.min(axis=0).tolist(), motion.values.max(axis=0).tolist(), strict=True)
-        for channel, low, high in ends:
+        smallest, largest = motion.values.min(axis=0).tolist(), motion.values.max(axis=0).tolist()
+        for channel, low, high in zip(motion.channels, smallest, largest, strict=True):
             check_magnitude(channel, low, high)
 
 
 def check_magnitude(channel: Channel, low: float, high: float) -> None:
-    """Raise InputError where a curve from ``low`` to ``high`` is none of a face."""
+    """Raise InputError if values of a channel from ``low`` to ``high`` are larger than plausible motion of a face."""
     largest = LARGEST.get(channel.unit, LARGEST_OTHER)
     if not -largest <= low <= high <= largest:
         raise InputError(
             f"{channel.name!r} goes from {low:g} to {high:g} {channel.unit}, required within ±{largest:g}; "
-            "say its unit in a .json, or scale it"
+            "write its unit into a .json, or scale it"
         )

@@ -1,4 +1,4 @@
-"""What long work says of itself while it goes on."""
+"""Reports of the progress of long work, and monitors, the functions that receive them."""
 
 from __future__ import annotations
 
@@ -11,12 +11,13 @@ ItemT = TypeVar("ItemT")
 
 @dataclass(frozen=True)
 class Progress:
-    """Where the work stands.
+    """A report of the progress of long work.
 
-    stage  : what is being done, in plain words
-    step, steps : how many parts of this stage are done, of how many
-    share  : how much of the whole work is done, 0 to 1
-    figure : of the last step (in training, the mean log likelihood a frame), or None
+    stage  : what is being done, in words
+    step   : number of steps of this stage that are done
+    steps  : number of all steps of this stage
+    share  : share of the whole work that is done, 0 to 1
+    figure : result of the last step, or None (in training: the mean log likelihood per frame)
     """
 
     stage: str
@@ -28,10 +29,11 @@ class Progress:
 
 @dataclass(frozen=True)
 class Item:
-    """What became of one recording.
+    """A report that the work on one recording is finished.
 
-    outcome : ``prepared``, ``kept`` (was there already) or ``skipped``
-    reason  : why it was skipped, or what else there is to know of it
+    name    : of the recording
+    outcome : ``prepared``, ``kept`` (it was prepared before) or ``skipped``
+    reason  : why it was skipped, or remarks on it
     """
 
     name: str
@@ -40,29 +42,30 @@ class Item:
 
 
 Monitor = Callable[[Progress | Item], None]
-"""Called with everything that is worth telling, in the order in which it happens."""
+"""A function that long work calls with its reports, in their order."""
 
 
 def silent_monitor(event: Progress | Item) -> None:
-    """Report nothing."""
+    """Ignore all reports."""
 
 
 def sub_monitor(monitor: Monitor, start: float, stop: float, prefix: str = "") -> Monitor:
-    """Return a monitor for a part of the work: all of it is what lies between the shares ``start`` and ``stop``.
+    """Return a monitor for a part of the work, which passes its reports on to the monitor of the whole.
 
-    prefix : comes before the name of every stage
+    start, stop : shares of the whole work at which the part begins and ends, 0 to 1
+    prefix      : put before the name of every stage
     """
 
-    def inside(event: Progress | Item) -> None:
+    def report(event: Progress | Item) -> None:
         if isinstance(event, Progress):
             event = replace(event, stage=prefix + event.stage, share=start + event.share * (stop - start))
         monitor(event)
 
-    return inside
+    return report
 
 
 def with_progress(items: Sequence[ItemT], stage: str, monitor: Monitor) -> Iterator[ItemT]:
-    """Give the items one by one, reporting how many have been dealt with."""
+    """Yield the items one by one, and report after each how many of them are done."""
     for number, item in enumerate(items):
         monitor(Progress(stage, number, len(items), number / len(items)))
         yield item

@@ -1,4 +1,4 @@
-"""Labels in time."""
+"""Labels in time: spans, units of speech, timelines."""
 
 from __future__ import annotations
 
@@ -13,7 +13,14 @@ LabelT = TypeVar("LabelT")
 
 @dataclass(frozen=True, slots=True)
 class Span(Generic[LabelT]):
-    """A label that holds from ``start_s`` (included) to ``end_s`` (excluded)."""
+    """A label that applies from ``start_s`` (included) to ``end_s`` (excluded).
+
+    start_s, end_s : seconds
+    label          : in a generation, a ``Unit``
+
+    >>> Span(0.25, 0.75, Unit("aa")).duration_s
+    0.5
+    """
 
     start_s: float
     end_s: float
@@ -21,16 +28,20 @@ class Span(Generic[LabelT]):
 
     @property
     def duration_s(self) -> float:
-        """Length in seconds."""
+        """Duration in seconds."""
         return self.end_s - self.start_s
 
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """What is spoken in one span: a phone, the model unit it resolved to, and its word.
+    """The phone of one span, the unit of the model that represents it, and its word.
 
-    phone : empty where a model recognised its own unit, which several phones share: which of them it was is not known
-    unit  : between its neighbours (``sil-p+aa``); alone (``bilabial``) where there is no phone
+    phone : one of the 47 phones of the inventory; empty where a model recognised a unit that several phones share
+    unit  : full-context name of the unit (``sil-p+aa``), or its name alone (``bilabial``) where there is no phone
+    word  : the word that contains the phone; empty where it is not known
+
+    >>> Unit("p", "sil-p+l", "please")
+    Unit(phone='p', unit='sil-p+l', word='please')
     """
 
     phone: str
@@ -40,9 +51,13 @@ class Unit:
 
 @dataclass(frozen=True)
 class Timeline(Generic[LabelT]):
-    """Spans in order, without overlap; gaps are allowed.
+    """Spans in order of time, without overlap; gaps are allowed.
 
     Raises InputError: a span ends before it starts, or two spans overlap.
+
+    >>> timeline = Timeline((Span(0.0, 0.5, Unit("sil")), Span(0.5, 0.6, Unit("p"))))
+    >>> len(timeline), timeline[1].label.phone, timeline.shifted(1.0)[1].start_s
+    (2, 'p', 1.5)
     """
 
     spans: tuple[Span[LabelT], ...]
@@ -54,7 +69,7 @@ class Timeline(Generic[LabelT]):
                 raise InputError(f"span {span.label!r} ends at {span.end_s} s, before its start at {span.start_s} s")
             if span.start_s < end_s - 1e-9:
                 raise InputError(
-                    f"span {span.label!r} starts at {span.start_s} s, before the one ahead of it ends ({end_s} s)"
+                    f"span {span.label!r} starts at {span.start_s} s, before the previous span ends ({end_s} s)"
                 )
             end_s = span.end_s
 
@@ -68,5 +83,5 @@ class Timeline(Generic[LabelT]):
         return self.spans[position]
 
     def shifted(self, offset_s: float) -> Timeline[LabelT]:
-        """Return the same labels, every time moved by ``offset_s`` seconds."""
+        """Return the timeline with ``offset_s`` seconds added to all times."""
         return Timeline(tuple(replace(s, start_s=s.start_s + offset_s, end_s=s.end_s + offset_s) for s in self.spans))

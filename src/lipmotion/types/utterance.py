@@ -1,4 +1,4 @@
-"""One recorded sentence of a corpus."""
+"""One recorded sentence of a corpus, and the motion of the face in it."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from lipmotion.types.timeline import Timeline, Unit
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """How a face moved: followed through a video, or given as curves.
+    """Motion of the face in one recording: tracked in a video, or supplied as curves.
 
-    motion   : any channels, at the rate they were recorded. Of a video: ``opening``, ``width``, ``outer`` and the lip
-               and jaw points (``x_17``, ``y_17``, ``z_17``: face-mesh point 17), head motion removed, lengths in eye
-               distances
-    seen     : bool array [shape=(T,)], False where the face cannot be measured (motion interpolated there); given
-               curves are seen everywhere
-    crops    : uint8 array [shape=(T, 56, 72, 3)], RGB mouth images, or None
-    notes    : what a user should know of the video, in words (cuts, damage, a covered mouth)
+    motion : at the frame rate of the recording. Of a video: ``opening``, ``width``, ``outer`` and the lip and jaw
+             points (``x_17``, ``y_17``, ``z_17``: face-mesh point 17) without head motion, in eye distances; supplied
+             curves may have any channels
+    seen   : bool array [shape=(T,)], False in frames where the face was not measured and the motion is interpolated;
+             True everywhere for supplied curves
+    crops  : uint8 array [shape=(T, 56, 72, 3)], RGB pictures of the mouth, or None
+    notes  : remarks on the video for the user, in words (cuts, damage, a covered mouth)
     """
 
     motion: Motion
@@ -34,13 +34,17 @@ class Track:
 
 @dataclass(frozen=True, eq=False)
 class Utterance:
-    """One recorded sentence: sound, features, motion, and what was said.
+    """One recorded sentence: sound, acoustic features, motion, transcript.
 
-    words   : the transcript, or None where it is not known
-    split   : ``train``, ``val`` or ``test``
-    source  : where it came from (file, sizes, licence, ...)
-    speaker : who speaks, empty where it is not known
-    phones  : labelled phones in time, from 0 s to the end of the sound, or None where there are no such labels
+    name     : unique in its corpus
+    audio    : the sound, at 16 kHz
+    features : acoustic features of the sound, at 100 Hz
+    track    : motion of the face
+    words    : the transcript in lower case, or None if it is not known
+    split    : ``train``, ``val`` or ``test``
+    source   : file, digest, licence, attribution and software of the recording, by name
+    speaker  : name of the speaker; empty if it is not known
+    phones   : labelled phones in time, from 0 s to the end of the sound, or None if there are no labels
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Joint models that are known, and utterances in which all streams tell of the same units."""
+"""Known multi-stream models, and utterances in which all streams depend on the same units."""
 
 from itertools import product
 
@@ -23,7 +23,7 @@ from lipmotion.stats.mixture import Mixtures
 
 UNITS = ("a", "b", "c", "d")
 NAMES = ("sil", "sp", *UNITS, "x")
-"""``x`` is never said."""
+"""``x`` never occurs in utterances."""
 CLASSES = {"early": frozenset("ab"), "late": frozenset("cdx"), "silence": frozenset({"sil", "sp"})}
 DIMENSIONS = {SPEECH: 3, **dict.fromkeys(F0_STREAMS, 1), MOTION: 6}
 
@@ -38,7 +38,7 @@ def config(**changes) -> JointConfig:
 
 
 def observed(draw: np.random.Generator, frames: int, streams=STREAMS) -> StreamObservations:
-    """Noise in all streams, some of it without a value."""
+    """Return noise in all streams, with some frames without a value."""
     found = {}
     for name in streams:
         known = draw.random(frames) < (1.0 if name == SPEECH else 0.7)
@@ -49,7 +49,7 @@ def observed(draw: np.random.Generator, frames: int, streams=STREAMS) -> StreamO
 def random_joint(
     seed: int, units=("a", "b"), states: int = 3, streams=STREAMS, components: int = 2, **changes
 ) -> JointHmm:
-    """Return models with nothing in common; trees ask about random things."""
+    """Return models with random densities, and trees with random questions."""
     draw = np.random.default_rng(seed)
     known = inventory(states, ("sil", "sp", *units))
     sides = [name for name in known.names if name != "sp"]
@@ -101,7 +101,7 @@ VOICED = ("a", "b", "d")
 
 
 def say(draw: np.random.Generator, units, unseen: bool = True) -> TrainingUtterance:
-    """Return an utterance of some units, silence around them; each is coloured by its left neighbour."""
+    """Return an utterance of some units, with silence at both ends; each unit depends on its left neighbour."""
     said = ("sil", *units, "sil")
     speech, pitch, opening, edges = [], [], [], [0]
     before = "sil"

@@ -14,7 +14,7 @@ WEIGHTS = StreamWeights(1, 0.5, 0.2, 1, 0.7)
 
 
 def slow_scores(hmm, data, units, weights):
-    """Give the score of every segmentation: emissions and transitions."""
+    """Give the score (emissions and transitions) and the durations of every segmentation."""
     states = triphone_states(hmm.inventory, units)
     density = np.array(
         [[slow.log_density(hmm, data, state, t, weights) for state in states.triphones] for t in range(data.frames)]

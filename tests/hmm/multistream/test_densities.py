@@ -18,12 +18,12 @@ from oracles import joint as slow
 @pytest.mark.parametrize("name", STREAMS)
 def test_densities_are_those_of_the_formulas(name, components):
     hmm = random_joint(1, components=components)
-    part, data = hmm.models[name], observed(np.random.default_rng(2), 12)
+    model, data = hmm.models[name], observed(np.random.default_rng(2), 12)
     leaves = np.array([2, 0, 2, 1])
-    found = part.tied.log_density(part.scale.standardise(data.streams[name]), leaves, part.scale.log_determinant)
+    found = model.tied.log_density(model.scale.standardise(data.streams[name]), leaves, model.scale.log_determinant)
     stream = data.streams[name]
     expected = [
-        [slow.stream_density(part, leaf, stream.values[t], stream.known[t]) for leaf in leaves] for t in range(12)
+        [slow.stream_density(model, leaf, stream.values[t], stream.known[t]) for leaf in leaves] for t in range(12)
     ]
     assert found == pytest.approx(np.array(expected), abs=1e-3)
 
@@ -31,17 +31,17 @@ def test_densities_are_those_of_the_formulas(name, components):
 @pytest.mark.parametrize("components", [1, 2])
 def test_voiced_and_unvoiced_together_are_everything(components):
     hmm = random_joint(3, components=components)
-    part = hmm.models["f0"]
+    model = hmm.models["f0"]
     grid = np.linspace(-40, 40, 200_001)
-    leaves = np.arange(part.forest.size)
+    leaves = np.arange(model.forest.size)
 
     def density(values, known):
-        rows = part.scale.standardise(Stream(values[:, None], np.full(len(values), known)))
-        return np.exp(part.tied.log_density(rows, leaves, part.scale.log_determinant).astype(float))
+        rows = model.scale.standardise(Stream(values[:, None], np.full(len(values), known)))
+        return np.exp(model.tied.log_density(rows, leaves, model.scale.log_determinant).astype(float))
 
     voiced = density(grid, True).sum(axis=0) * (grid[1] - grid[0])
     unvoiced = density(np.zeros(1), False)[0]
-    assert voiced == pytest.approx(part.tied.voiced, abs=1e-3)
+    assert voiced == pytest.approx(model.tied.voiced, abs=1e-3)
     assert voiced + unvoiced == pytest.approx(np.ones(len(leaves)), abs=1e-3)
 
 

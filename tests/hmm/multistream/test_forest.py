@@ -23,12 +23,12 @@ def test_every_unit_that_is_spoken_has_a_leaf_of_its_own():
     assert forest.leaf((("b", "a", "b"), 1)) == leaves["a"]
 
 
-def places(unit_names=NAMES):
+def triphones(unit_names=NAMES):
     return [((a, b, c), s) for a, b, c in product(SIDES, unit_names, SIDES) for s in range(KNOWN.count(b))]
 
 
 def tied(stream, mean_of, seen, classes=CLASSES, has_spaces=False):
-    means = np.array([mean_of(*place) for place in seen])[:, None]
+    means = np.array([mean_of(*state) for state in seen])[:, None]
     sums = GaussianStatistics.zeros(len(seen), 1, 1)
     sums.add(np.arange(len(seen)), 20.0 * np.concatenate([np.ones((len(seen), 2)), means, means**2 + 0.1], axis=1))
     return grow_forest(
@@ -38,7 +38,7 @@ def tied(stream, mean_of, seen, classes=CLASSES, has_spaces=False):
 
 
 def test_units_and_contexts_that_were_never_seen_resolve_by_class():
-    seen = [place for place in places() if place[0][1] != "x" and place[0][0] != "c"]
+    seen = [state for state in triphones() if state[0][1] != "x" and state[0][0] != "c"]
     forest = tied("motion", lambda context, _: float(context[1] in "cdx") + 5.0 * (context[0] in "cdx"), seen)
     assert forest.leaf((("a", "x", "a"), 1)) == forest.leaf((("a", "d", "a"), 1)) != forest.leaf((("a", "b", "a"), 1))
     assert forest.leaf((("x", "a", "a"), 1)) == forest.leaf((("d", "a", "a"), 1)) != forest.leaf((("b", "a", "a"), 1))
@@ -48,22 +48,22 @@ def test_units_and_contexts_that_were_never_seen_resolve_by_class():
 
 
 @pytest.mark.parametrize("stream", STREAMS)
-def test_what_is_heard_depends_on_one_neighbour_at_most(stream):
+def test_acoustic_streams_depend_on_one_neighbour_at_most(stream):
     hmm = random_joint(0, ("a", "b", "c"))
     forest, units = hmm.models[stream].forest, hmm.inventory.names
     sides = [name for name in units if name != "sp"]
 
-    def differs(unit, state, place):
+    def differs(unit, state, position):
         found = set()
         for other in sides:
             context = ["sil", unit, "sil"]
-            context[place] = other
+            context[position] = other
             found.add(forest.leaf((tuple(context), state)))
         return len(found) > 1
 
     left = {state for unit, state in hmm.inventory.monophones if unit not in ("sil", "sp") and differs(unit, state, 0)}
     right = {state for unit, state in hmm.inventory.monophones if unit not in ("sil", "sp") and differs(unit, state, 2)}
-    silent = any(differs("sil", state, place) for state in range(3) for place in (0, 2))
+    silent = any(differs("sil", state, position) for state in range(3) for position in (0, 2))
     expected = ({0}, {2}, False) if stream in ACOUSTIC_STREAMS else ({0, 1, 2}, {0, 1, 2}, True)
     assert (left, right, silent) == expected
 

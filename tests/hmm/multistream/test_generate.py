@@ -103,12 +103,12 @@ def test_mixtures_take_sides():
 def test_the_densities_are_those_of_the_leaves_in_units_of_the_motion(components):
     hmm = random_joint(1, components=components, states=2)
     path = align(hmm, observed(np.random.default_rng(2), 9), ("sil", "a", "b"))
-    found, part = densities_of_path(hmm, path), hmm.models[MOTION]
-    leaves = part.forest.leaves(path.states.triphones)[path.frames]
+    found, model = densities_of_path(hmm, path), hmm.models[MOTION]
+    leaves = model.forest.leaves(path.states.triphones)[path.frames]
     middle = 4
-    wanted = part.tied.mixtures.means[leaves[middle]] * part.scale.deviation + part.scale.mean
+    wanted = model.tied.mixtures.means[leaves[middle]] * model.scale.deviation + model.scale.mean
     assert found.means[middle] == pytest.approx(wanted.reshape(components, 3, 2))
-    variance = part.tied.mixtures.variances[leaves[middle]] * part.scale.deviation**2
+    variance = model.tied.mixtures.variances[leaves[middle]] * model.scale.deviation**2
     assert found.precisions[middle] == pytest.approx(1 / variance.reshape(components, 3, 2), rel=1e-6)
     assert (found.precisions[[0, -1], :, 1:] == 0).all()
 

@@ -19,13 +19,13 @@ from oracles.sequences import sequences
 
 WEIGHTS = StreamWeights(0.8, 0.5, 1.0, 0.3, 0.0)
 SOFT = StreamWeights(0.1, 0.1, 0.05, 0, 0)
-"""Nothing is certain."""
+"""Small weights: no unit is certain."""
 
 
 def slow_densities(hmm, data, weights):
     @cache
-    def density(place, frame):
-        return slow.log_density(hmm, data, place, frame, weights)
+    def density(state, frame):
+        return slow.log_density(hmm, data, state, frame, weights)
 
     return density
 
@@ -130,25 +130,27 @@ def test_the_same_seed_draws_the_same():
 
 
 def test_speech_alone_is_the_plain_model():
-    """The densities of all contexts, written out by name, in the models that the project had before."""
+    """The densities of all contexts, by name, in plain unit models."""
     hmm = random_joint(8, streams=(SPEECH,))
-    known, part = hmm.inventory, hmm.models[SPEECH]
+    known, model = hmm.inventory, hmm.models[SPEECH]
     names, leaves = [], []
     for unit, state in known.monophones:
         names.append(f"{unit}.{state}")
-        leaves.append(part.forest.leaf((("sil", unit, "sil"), state)))
+        leaves.append(model.forest.leaf((("sil", unit, "sil"), state)))
     for unit, state in known.monophones:
         side = known.side(unit, state)
         for neighbour in ("sil", "a", "b") if side else ():
             context = (neighbour, unit, "sil") if side < 0 else ("sil", unit, neighbour)
             names.append(f"{unit}.{state}{'<' if side < 0 else '>'}{neighbour}")
-            leaves.append(part.forest.leaf((context, state)))
+            leaves.append(model.forest.leaf((context, state)))
     table = StateTable(known.names, tuple(map(known.count, known.names)), tuple(names), known.free)
     config = HmmConfig(bigram_weight=hmm.config.bigram_weight, insertion=hmm.config.insertion)
-    plain = UnitHmm(config, table, part.tied.mixtures.selected(np.array(leaves)), hmm.log_stay, hmm.bigram)
+    plain = UnitHmm(config, table, model.tied.mixtures.selected(np.array(leaves)), hmm.log_stay, hmm.bigram)
     data = observed(np.random.default_rng(9), 60, (SPEECH,))
-    rows = part.scale.standardise(data.streams[SPEECH])
-    units, bounds = decode_units(unit_loop(plain, ["sil", "a", "b"]), log_likelihoods_of(plain, part.tied.values(rows)))
+    rows = model.scale.standardise(data.streams[SPEECH])
+    units, bounds = decode_units(
+        unit_loop(plain, ["sil", "a", "b"]), log_likelihoods_of(plain, model.tied.values(rows))
+    )
     said = JointRecogniser(hmm).recognise(data)
     assert tuple(s.unit for s in said) == units
     assert [s.first for s in said] == bounds[:-1].tolist()

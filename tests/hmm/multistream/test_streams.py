@@ -17,7 +17,7 @@ def test_f0_has_a_slope_only_where_all_frames_of_the_window_are_voiced():
     assert streams["f0_curvature"].values[2, 0] == pytest.approx(0.2)
 
 
-def test_motion_says_nothing_beside_frames_that_were_not_seen():
+def test_motion_is_unknown_beside_frames_that_were_not_measured():
     motion = np.arange(14.0).reshape(7, 2) ** 2
     seen = np.ones(7, bool)
     seen[3], motion[3] = False, NAN
@@ -42,7 +42,7 @@ def test_what_does_not_fit_is_refused(given):
         stream_observations(np.zeros((5, 3)), **given)
 
 
-def test_an_utterance_is_heard_at_least():
+def test_an_utterance_has_speech():
     with pytest.raises(InputError, match="required speech"):
         StreamObservations({"motion": Stream(np.zeros((3, 3)), np.ones(3, bool))})
 

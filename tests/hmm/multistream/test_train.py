@@ -60,11 +60,13 @@ def test_posteriors_are_those_of_all_paths(components):
     draw = np.random.default_rng(0)
     observed = StreamObservations({name: s for name, s in noise(draw, 7).streams.items() if name != "f0_slope"})
     units = ("a", "sp", "b")
-    sentences = prepare_utterances(hmm, [(observed, units)])
-    (found,) = state_posteriors(hmm, sentences)
-    places = [sentences.triphones[i] for i in sentences.items[0].triphones]
-    density = [[slow.log_density(hmm, observed, place, t, hmm.config.training) for place in places] for t in range(7)]
-    rows = sentences.items[0].monophones
+    prepared = prepare_utterances(hmm, [(observed, units)])
+    (found,) = state_posteriors(hmm, prepared)
+    triphones = [prepared.triphones[i] for i in prepared.items[0].triphones]
+    density = [
+        [slow.log_density(hmm, observed, state, t, hmm.config.training) for state in triphones] for t in range(7)
+    ]
+    rows = prepared.items[0].monophones
     expected, stay, log_likelihood = chains.chain_posteriors(np.array(density), hmm.log_stay[rows], hmm.log_move[rows])
     assert found.states == pytest.approx(expected, abs=1e-4)
     assert found.states.sum(axis=1) == pytest.approx(np.ones(7), abs=1e-9)
@@ -93,9 +95,9 @@ def test_a_stream_without_weight_is_as_good_as_absent():
 def test_a_step_improves_on_what_was_found():
     hmm = random_joint(2, units=("a", "b", "c", "d"), components=1)
     data = [(noise(np.random.default_rng(i), 40), ("sil", "a", "c", "sil")) for i in range(4)]
-    sentences, figures = prepare_utterances(hmm, data), []
+    prepared, figures = prepare_utterances(hmm, data), []
     for _ in range(4):
-        expected = accumulate_statistics(hmm, sentences)
+        expected = accumulate_statistics(hmm, prepared)
         figures.append(expected.mean_log_likelihood)
         hmm = reestimated_hmm(hmm, expected)
     assert (np.diff(figures) > 0).all()
@@ -144,7 +146,7 @@ def test_streams_and_units_that_are_missing_here_and_there():
     hmm, _ = trained([deaf, pause, *TRAIN[1:8]])
     assert set(hmm.models) == set(STREAMS)
     assert hmm.spoken == ("sil", "a", "b", "c", "d")
-    path = align(hmm, HELD_OUT[0].observed, ("sil", "x", "sil"))  # never heard
+    path = align(hmm, HELD_OUT[0].observed, ("sil", "x", "sil"))  # not in the training
     assert len(path.frames) == HELD_OUT[0].observed.frames
     assert np.isfinite(hmm.durations).all()
 
@@ -160,7 +162,7 @@ def test_nothing_that_is_switched_on_was_observed():
     deaf = [replace(u, observed=StreamObservations({"speech": u.observed.streams["speech"]})) for u in TRAIN[:3]]
     with pytest.raises(InputError, match="switched on are motion"):
         trained(deaf, training=MOTION_ONLY)
-    hmm, _ = trained([*TRAIN[:6], deaf[0]], training=MOTION_ONLY)  # where some have it, the others do no harm
+    hmm, _ = trained([*TRAIN[:6], deaf[0]], training=MOTION_ONLY)  # utterances without motion change nothing
     assert np.isfinite(hmm.durations).all()
 
 
