@@ -1,4 +1,4 @@
-"""Speech to motion. Engines never see files or pixels."""
+"""Engines: methods that learn and generate motion from speech. They do not read files."""
 
 from lipmotion.engines.base import Animator, Engine, Fit
 from lipmotion.engines.registry import ENGINES, engine_from_settings, engine_named

@@ -1,4 +1,4 @@
-"""The interface of engines: five members that every engine has, and protocols for what only some can do."""
+"""The interface of engines: the members of every engine, and protocols for abilities that only some engines have."""
 
 from __future__ import annotations
 
@@ -38,35 +38,37 @@ class Fit(Generic[ModelT]):
 
 
 class Animator(ABC, Generic[ModelT]):
-    """A method that learns motion from examples and generates it from speech.
+    """A method that learns motion from examples and generates motion from speech.
 
-    Baselines that are only compared stop here; an ``Engine`` can be configured, saved and loaded as well.
+    Baselines of experiments need no more than this; an ``Engine`` also has a configuration, and its models can be saved
+    and loaded.
     """
 
     @abstractmethod
     def fit(self, examples: Sequence[Example], monitor: Monitor, checkpoint: Checkpoint = NO_CHECKPOINT) -> Fit[ModelT]:
-        """Return a model trained on speech with its motion.
+        """Return a model that is trained on speech with its motion, and figures of the training.
 
-        examples   : frames in which ``Example.valid`` is False must not change the model
-        monitor    : called with the progress of training
-        checkpoint : stores finished stages of long training; a run that continues from it gives the same bytes
+        examples   : speech with motion; frames in which ``Example.valid`` is False must not change the model
+        monitor    : called with reports of progress
+        checkpoint : stores finished stages of long training; training that continues from it gives the same bytes
         Raises CorpusError: no example, no valid motion in speech, or examples of different channels.
         """
 
     @abstractmethod
     def generate(self, model: ModelT, speech: Speech, constraints: Constraints | None = None) -> Generation:
-        """Return the motion of one recording: a row for each feature frame, at 100 Hz, with variances and trace.
+        """Return the motion of one recording, one row for each frame of ``speech.features``, with variances and trace.
 
+        constraints : values that the motion must take
         Raises InputError: a pin names no channel, lies outside the recording or is not finite; an unknown phone.
         """
 
 
 class Engine(Animator[ModelT]):
-    """An engine: a configuration, training, generation, and the model as arrays.
+    """An engine: a configuration, training, generation, and serialisation of models.
 
-    A subclass is a frozen dataclass with the one field ``config``; it holds no state. Give it a ``name``, which model
-    files store, and the class of its ``Config``; an entry point of the group ``lipmotion.engines`` makes it known under
-    that name (docs/extend/engine.md). ``lipmotion.testing.check_engine`` tests the contract.
+    A subclass is a frozen dataclass with a single field, ``config``; it holds no other state. ``name`` is stored in
+    model files; ``Config`` is the class of the configuration. An entry point of the group ``lipmotion.engines``
+    registers the engine under its name (docs/extend/engine.md). ``lipmotion.testing.check_engine`` tests the contract.
     """
 
     name: ClassVar[str]
@@ -75,7 +77,7 @@ class Engine(Animator[ModelT]):
 
     @abstractmethod
     def to_arrays(self, model: ModelT) -> dict[str, NDArray[Any]]:
-        """Serialise a model: arrays of numbers or of fixed-width text by name."""
+        """Serialise a model: arrays of numbers, or of text of fixed width, by name."""
 
     @abstractmethod
     def from_arrays(self, arrays: Arrays) -> ModelT:
@@ -87,20 +89,20 @@ class Engine(Animator[ModelT]):
 
 @runtime_checkable
 class WantsF0(Protocol):
-    """An engine that may need the fundamental frequency."""
+    """An engine that can use the fundamental frequency, F0."""
 
     @property
     def wants_f0(self) -> bool:
-        """Whether ``Speech.log_f0`` must be given, in training and in generation."""
+        """Whether training and generation need ``Speech.log_f0``."""
 
 
 @runtime_checkable
 class TrainsOnSpeechAlone(Protocol):
-    """An engine that also learns from speech without motion: of other speakers, for instance."""
+    """An engine that can also be trained on speech without motion: of other speakers, for instance."""
 
     @property
     def trains_on_speech_alone(self) -> bool:
-        """Whether ``fit`` takes examples none of whose frames is valid."""
+        """Whether ``fit`` accepts examples without any valid frame."""
 
 
 @runtime_checkable
@@ -108,9 +110,9 @@ class RecognisesPhones(Protocol):
     """An engine whose models can recognise phones."""
 
     def recognise(self, model: Any, speech: Speech) -> Timeline[Unit] | None:
-        """Return the phones recognised by a model; None where it was not trained on this voice.
+        """Return the phones in time that a model recognises, or None if it was not trained on this voice.
 
-        speech : ``units`` are empty
+        speech : its ``units`` are empty
         """
 
 
@@ -119,15 +121,18 @@ class ForcesClosures(Protocol):
     """An engine that makes the lips meet in p, b and m."""
 
     def without_closures(self) -> Animator[Any]:
-        """Return the engine that forces no closures, for models that it trained; itself, if it never forces any."""
+        """Return the engine without forced closures, for the same models; itself, if it forces none."""
 
 
 @runtime_checkable
 class Explains(Protocol):
-    """An engine that says more of a frame than its trace."""
+    """An engine that explains a frame in more detail than by its trace."""
 
     def explain(self, model: Any, speech: Speech, frames: Sequence[int]) -> tuple[Explanation, ...]:
-        """Return an explanation of each of some frames, numbered from 0 to T - 1, of what ``generate`` returns."""
+        """Return an explanation of each of some frames of the motion that ``generate`` returns.
+
+        frames : numbers from 0 to T - 1
+        """
 
 
 @runtime_checkable
@@ -135,27 +140,27 @@ class HasPosteriors(Protocol):
     """An engine with chains of hidden states."""
 
     def posteriors(self, model: Any, speech: Speech) -> tuple[ChainPosteriors, ...]:
-        """Return the posterior probabilities of the units of every chain in every frame."""
+        """Return, for every chain, the posterior probability of each of its units in every frame."""
 
 
 @runtime_checkable
 class Describes(Protocol):
-    """An engine whose models can be printed."""
+    """An engine that can describe its models as text."""
 
     def describe(self, model: Any) -> str:
-        """Return the parts of a model as text: its decision trees, its chains."""
+        """Return a text that describes the parts of a model: its decision trees, its chains."""
 
 
-def explain_by_trace(result: Generation, frame: int) -> Explanation:
-    """Return an explanation of one frame from the motion, variances, units and trace of a result."""
-    motion, trace = result.motion, result.trace
+def explain_by_trace(generation: Generation, frame: int) -> Explanation:
+    """Return an explanation of one frame of generated motion, from its values, variances, units and trace."""
+    motion, trace = generation.motion, generation.trace
     time_s = frame / motion.rate_hz
-    deviations = np.sqrt(result.variance_of(slice(frame, frame + 1))[0]).tolist()
+    deviations = np.sqrt(generation.variance_of(slice(frame, frame + 1))[0]).tolist()
     values = zip(motion.names, motion.values[frame].tolist(), deviations, strict=True)
     return Explanation(
         time_s,
         frame,
-        next((span for span in result.units if span.start_s <= time_s < span.end_s), None),
+        next((span for span in generation.units if span.start_s <= time_s < span.end_s), None),
         trace.states[trace.frames[frame]],
         {name: ChannelValue(value, deviation) for name, value, deviation in values},
     )

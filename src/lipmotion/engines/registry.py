@@ -1,4 +1,4 @@
-"""Engines by name: the built-in ones, and those of installed packages."""
+"""The registry of engines: built-in ones, and those of installed packages."""
 
 from __future__ import annotations
 
@@ -23,13 +23,17 @@ ENGINES: Registry[type[Engine[Any]]] = Registry(
 def engine_named(name: str, configuration: Mapping[str, Any] | None = None) -> Engine[Any]:
     """Return an engine with its configuration.
 
-    name          : ``trajectory``, ``coupled``, ``joint``, or one that an installed package adds
-    configuration : options by name; all others have their defaults
+    name          : ``trajectory``, ``coupled``, ``joint``, or the name of an engine of an installed package
+    configuration : values of options, by name; all others have their default values
     Raises InputError: no such engine or option, or a value that is not allowed.
+
+    >>> engine = engine_named("trajectory", {"components": 8})
+    >>> engine.name, engine.config.components, engine.config.states
+    ('trajectory', 8, 5)
     """
     chosen = _class_of(name)
     try:
-        return _made(chosen, chosen.Config.parsed(configuration or {}))
+        return _create(chosen, chosen.Config.parsed(configuration or {}))
     except InputError as error:
         raise InputError(f"engine {name!r}: {error}") from error
 
@@ -37,11 +41,11 @@ def engine_named(name: str, configuration: Mapping[str, Any] | None = None) -> E
 def engine_from_settings(
     name: str, *, preset: str | None = None, units: str | None = None, settings: Sequence[str] = ()
 ) -> Engine[Any]:
-    """Return an engine configured by texts, as a command line gives them.
+    """Return an engine whose configuration is parsed from texts, as on the command line.
 
-    preset   : a named combination of options, as ``ph-vi-CHMM`` of the engine ``coupled``
-    units    : the unit set, of engines with an option ``units``
-    settings : ``NAME=VALUE`` for any option of the configuration; these override the others
+    preset   : a named combination of options: ``ph-vi-CHMM`` of the engine ``coupled``, for instance
+    units    : the unit set, for engines with an option ``units``
+    settings : ``NAME=VALUE`` for any options; these override preset and units
     Raises InputError: no such engine, preset, unit set or option, or a value that is not allowed.
     """
     chosen = _class_of(name)
@@ -50,7 +54,7 @@ def engine_from_settings(
         if units is not None:
             options |= chosen.Config.values_of([f"units={units}"])
         options |= chosen.Config.values_of(settings)
-        engine = _made(chosen, chosen.Config.parsed(options))
+        engine = _create(chosen, chosen.Config.parsed(options))
         engine.config.check_files()
     except InputError as error:
         raise InputError(f"engine {name!r}: {error}") from error
@@ -58,7 +62,7 @@ def engine_from_settings(
 
 
 def _class_of(name: str) -> type[Engine[Any]]:
-    """Return the class of an engine. Raises InputError: none of that name, or what a package adds is no engine."""
+    """Return the class of an engine. Raises InputError: no engine of that name, or an extension that is not an Engine."""
     chosen = ENGINES.load(name)
     if not (isinstance(chosen, type) and issubclass(chosen, Engine)):
         raise InputError(
@@ -67,13 +71,14 @@ def _class_of(name: str) -> type[Engine[Any]]:
     return chosen
 
 
-def _made(chosen: type[Engine[Any]], config: Any) -> Engine[Any]:
-    make: Any = chosen  # every engine is a dataclass of one field
-    made: Engine[Any] = make(config)
-    return made
+def _create(chosen: type[Engine[Any]], config: Any) -> Engine[Any]:
+    constructor: Any = chosen  # every engine is a dataclass with one field
+    engine: Engine[Any] = constructor(config)
+    return engine
 
 
 def _preset(chosen: type[Engine[Any]], name: str, preset: str) -> Mapping[str, Any]:
+    """Return the options of a preset. Raises InputError: the engine has no such preset."""
     presets = chosen.Config.presets
     if preset in presets:
         return presets[preset]

@@ -24,7 +24,7 @@ def factorial_best_path(
     """
     frames = len(logs.audio)
     stretch = stretch or math.isqrt(max(frames - 1, 0)) + 1
-    search = _Search(_LogTransitions.of(audio), _LogTransitions.of(visual), logs)
+    search = _FactorialSearch(_LogTransitions.of(audio), _LogTransitions.of(visual), logs)
     with np.errstate(divide="ignore"):
         initial, final = (
             np.add.outer(*(np.log(getattr(loop, name).ravel()) for loop in (audio, visual)))
@@ -92,7 +92,7 @@ class _LogTransitions(NamedTuple):
         return state - units if decision > units else state
 
 
-class _Search(NamedTuple):
+class _FactorialSearch(NamedTuple):
     """The search in both loops for one recording."""
 
     audio: _LogTransitions

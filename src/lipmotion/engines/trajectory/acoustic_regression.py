@@ -1,4 +1,4 @@
-"""Learning how the mouth follows the sound around a frame."""
+"""Training of the regression of means on the acoustic features around a frame."""
 
 from __future__ import annotations
 
@@ -20,99 +20,111 @@ from lipmotion.stats.regression import (
 )
 
 Array = NDArray[np.float64]
-MOST = 170
-"""A node needs at least one part in so many of all frames, or the model gets large: 450 regressions instead of 200
-gained 0.001 on the validation list."""
-AT_A_TIME = 64
-"""Examples whose frames are sorted by what they belong to before they are added up."""
+SMALLEST_SHARE = 170
+"""A node with a regression of its own has at least 1/170 of all frames; more regressions make the model larger: 450
+instead of 200 gained 0.001 on the validation list."""
+CLIPS_PER_BLOCK = 64
+"""Examples of a block; the frames of a block are sorted by the node whose regression they belong to."""
 
 
-def fit_acoustic_regression(emission: Emission, observed: Sequence[TrainingClip], how: TrainingOptions) -> Emission:
-    """Return the same densities with means that follow the sound, and variances around these.
+def fit_acoustic_regression(emission: Emission, clips: Sequence[TrainingClip], options: TrainingOptions) -> Emission:
+    """Return the densities with means that are regressed on acoustic features, and variances around these means.
 
-    A linear regression on the sound around the frame is learned from all frames, one for each node of the trees with
-    enough of them, drawn towards that of the node above it: so a state with little data listens as its relatives do.
+    Every node of the trees with enough frames has a linear regression on the features around the frame, shrunk towards
+    that of its parent node, so that states with few frames share the regression of their relatives.
     """
-    window = fit_acoustic_context((one.features for one in observed), how.acoustic_components)
-    owners = _owners(emission, how)
-    axes, outputs = window.basis.shape[1], emission.means[0].size
-    moments = {key: zero_statistics(axes, outputs) for key in dict.fromkeys(owners) if key is not None}
-    for key, z, error in _frames(emission, observed, how, window, owners):
-        moments[key].add(z, error)
-    coefficients, index = _coefficients(emission, moments, how)
-    rows = np.array([-1 if key is None else index[key] for key in owners], np.int32)
-    hearing = AcousticRegression(window, coefficients, rows)
-    return replace(emission, regression=hearing, variances=_variances(emission, hearing, observed, how))
+    context = fit_acoustic_context((clip.features for clip in clips), options.acoustic_components)
+    owners = _owners(emission, options)
+    components, outputs = context.basis.shape[1], emission.means[0].size
+    statistics = {node: zero_statistics(components, outputs) for node in dict.fromkeys(owners) if node is not None}
+    for node, z, error in _frames(emission, clips, options, context, owners):
+        statistics[node].add(z, error)
+    coefficients, index = _coefficients(emission, statistics, options)
+    rows = np.array([-1 if node is None else index[node] for node in owners], np.int32)
+    regression = AcousticRegression(context, coefficients, rows)
+    return replace(emission, regression=regression, variances=_variances(emission, regression, clips, options))
 
 
-_Key = tuple[str, int]
-"""A tree and a node of it."""
+_Node = tuple[str, int]
+"""A node of a tree: name of the tree, number of the node."""
 
 
-def _owners(emission: Emission, how: TrainingOptions) -> list[_Key | None]:
-    """Return, density by density, the node whose regression it uses; rest uses none."""
-    least = max(how.ridge_frames, sum(float(tree.frames[0]) for tree in emission.forest.values()) / MOST)
-    found: list[_Key | None] = []
+def _owners(emission: Emission, options: TrainingOptions) -> list[_Node | None]:
+    """Return, for every density, the node whose regression it uses; None for the rest pose."""
+    least = max(options.ridge_frames, sum(float(tree.frames[0]) for tree in emission.forest.values()) / SMALLEST_SHARE)
+    owners: list[_Node | None] = []
     for name, tree in emission.forest.items():
-        found += [(name, regression_node(tree, tree.path_to(int(leaf)), least)) for leaf in tree.leaves]
-    return [*found, None]
+        owners += [(name, regression_node(tree, tree.path_to(int(leaf)), least)) for leaf in tree.leaves]
+    return [*owners, None]
 
 
 def _frames(
     emission: Emission,
-    observed: Sequence[TrainingClip],
-    how: TrainingOptions,
-    window: AcousticContext,
-    owners: Sequence[_Key | None],
-) -> Iterator[tuple[_Key, NDArray[np.float32], NDArray[np.float32]]]:
-    """Give, for each node with a regression, what is heard and how far the motion is from its density's mean."""
-    numbers = {key: number for number, key in enumerate(dict.fromkeys(owners))}
-    keys, of_row = list(numbers), np.array([numbers[key] for key in owners])
-    for start in range(0, len(observed), AT_A_TIME):
-        block = observed[start : start + AT_A_TIME]
-        rows = np.concatenate([density_rows(emission, one.training_states, how.layout) for one in block])
-        z = np.concatenate([window(one.features, one.frames) for one in block])
-        error = np.concatenate([one.rows for one in block]) - emission.means[rows]
+    clips: Sequence[TrainingClip],
+    options: TrainingOptions,
+    context: AcousticContext,
+    owners: Sequence[_Node | None],
+) -> Iterator[tuple[_Node, NDArray[np.float32], NDArray[np.float32]]]:
+    """Yield, block by block, the frames of each node with a regression.
+
+    Each item is the node, the reduced features around its frames [shape=(N, F)], and the motion in these frames minus
+    the mean of its density [shape=(N, 3·Q)].
+    """
+    numbers = {node: number for number, node in enumerate(dict.fromkeys(owners))}
+    keys, of_row = list(numbers), np.array([numbers[node] for node in owners])
+    for start in range(0, len(clips), CLIPS_PER_BLOCK):
+        block = clips[start : start + CLIPS_PER_BLOCK]
+        rows = np.concatenate([density_rows(emission, clip.training_states, options.layout) for clip in block])
+        z = np.concatenate([context(clip.features, clip.frames) for clip in block])
+        error = np.concatenate([clip.rows for clip in block]) - emission.means[rows]
         order = np.argsort(of_row[rows], kind="stable")
         z, error = z[order], error[order].reshape(len(order), -1).astype(np.float32)
-        found, first = np.unique(of_row[rows][order], return_index=True)
-        for number, begin, end in zip(found, first, [*first[1:], len(order)], strict=True):
-            key = keys[number]
-            if key is not None:
-                yield key, z[begin:end], error[begin:end]
+        present, first = np.unique(of_row[rows][order], return_index=True)
+        for number, begin, end in zip(present, first, [*first[1:], len(order)], strict=True):
+            node = keys[number]
+            if node is not None:
+                yield node, z[begin:end], error[begin:end]
 
 
 def _coefficients(
-    emission: Emission, moments: dict[_Key, RegressionStatistics], how: TrainingOptions
-) -> tuple[NDArray[np.float32], dict[_Key, int]]:
-    every = list(moments.values())
-    shared = ridge(sum(every[1:], every[0]), np.zeros_like(every[0].targets), how.shared_ridge)
-    found: dict[_Key, Array] = {}
+    emission: Emission, statistics: dict[_Node, RegressionStatistics], options: TrainingOptions
+) -> tuple[NDArray[np.float32], dict[_Node, int]]:
+    """Return the coefficients of all regressions [shape=(R, F, 3·Q)], and the number of the regression of each node."""
+    all_statistics = list(statistics.values())
+    total = sum(all_statistics[1:], all_statistics[0])
+    shared = ridge(total, np.zeros_like(all_statistics[0].targets), options.shared_ridge)
+    matrices: dict[_Node, Array] = {}
     for name, tree in emission.forest.items():
-        own = {node: moments[tree_name, node] for tree_name, node in moments if tree_name == name}
-        found |= {(name, node): matrix for node, matrix in fit_tree_regressions(tree, own, shared, how.ridge).items()}
-    index = {key: number for number, key in enumerate(found)}
-    return np.array(list(found.values()), np.float32), index
+        own = {node: statistics[tree_name, node] for tree_name, node in statistics if tree_name == name}
+        matrices |= {(name, node): matrix for node, matrix in fit_tree_regressions(tree, own, shared, options.ridge).items()}
+    index = {node: number for number, node in enumerate(matrices)}
+    return np.array(list(matrices.values()), np.float32), index
 
 
 def _variances(
-    emission: Emission, hearing: AcousticRegression, observed: Sequence[TrainingClip], how: TrainingOptions
+    emission: Emission, regression: AcousticRegression, clips: Sequence[TrainingClip], options: TrainingOptions
 ) -> NDArray[np.float32]:
-    """Return the variances around means that follow the sound, shrunk towards those of all frames together."""
+    """Return the variances around the regressed means, shrunk towards those of all frames together."""
     squares, counts = np.zeros(emission.means.shape), np.zeros(len(emission.means))
-    for one in observed:
-        rows = density_rows(emission, one.training_states, how.layout)
+    for clip in clips:
+        rows = density_rows(emission, clip.training_states, options.layout)
         means = emission.means[rows].astype(float)
-        add_acoustic_regression(means, hearing, rows, hearing.context(one.features, one.frames))
-        np.add.at(squares, rows, np.square(one.rows - means))
+        add_acoustic_regression(means, regression, rows, regression.context(clip.features, clip.frames))
+        np.add.at(squares, rows, np.square(clip.rows - means))
         np.add.at(counts, rows, 1)
-    return _shrunk(emission, squares, counts, how.variance_shrinkage)
+    return _shrunk(emission, squares, counts, options.variance_shrinkage)
 
 
 def _shrunk(emission: Emission, squares: Array, counts: Array, strength: float) -> NDArray[np.float32]:
+    """Return the variances of all densities [shape=(L, 3, Q)], shrunk towards their prior.
+
+    squares  : sums of squared deviations from the regressed means [shape=(L, 3, Q)]
+    counts   : frames of each density [shape=(L,)]
+    strength : weight of the prior, in frames
+    """
     before = emission.variances.astype(float)
     ratio = squares[:-1].sum(axis=0) / np.maximum((before[:-1] * counts[:-1, None, None]).sum(axis=0), 1e-30)
-    prior = before * np.clip(ratio, 0, 1)  # what the density had, less what listening explains on the average
+    prior = before * np.clip(ratio, 0, 1)  # variances without regression, reduced by the mean share that it explains
     after = (squares + strength * prior) / (counts + strength)[:, None, None]
-    after[-1] = before[-1]  # rest
+    after[-1] = before[-1]  # the rest pose has no regression
     return np.maximum(after, 1e-3 * before).astype(np.float32)

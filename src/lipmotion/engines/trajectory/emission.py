@@ -1,4 +1,4 @@
-"""How the mouth moves in every tied state: a Gaussian whose mean may follow the sound around the frame."""
+"""Emission densities of motion: a Gaussian for each tied state, whose mean may be regressed on acoustic features."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class AcousticRegression:
-    """Linear regressions of motion on the sound around a frame.
+    """Linear regressions of the means of motion on the acoustic features around a frame.
 
-    window       : what is heard [F numbers a frame]
-    coefficients : float32 array [shape=(R, F, 3·Q)]
-    rows         : int array [shape=(L,)], the coefficients of each density; -1 marks one that does not listen
+    context      : reduces the features around a frame to F numbers
+    coefficients : float32 array [shape=(R, F, 3·Q)], of R regressions
+    rows         : int array [shape=(L,)], number of the regression of each density; -1: its mean is constant
     """
 
     context: AcousticContext
@@ -37,9 +37,9 @@ class AcousticRegression:
 class Emission:
     """Densities of static value, Δ and Δ² (Q dimensions each) of all tied states.
 
-    forest    : a tree for every part of speech and of silence (``StateLayout.names``)
-    means, variances : float32 arrays [shape=(L, 3, Q)], leaf by leaf, tree by tree; the last is that of rest
-    hearing   : how the means follow the sound (None: they do not)
+    forest     : a decision tree for every state of speech and of silence (``StateLayout.names``)
+    means, variances : float32 arrays [shape=(L, 3, Q)], leaf by leaf, tree by tree; the last row is the rest pose
+    regression : regression of the means on acoustic features (None: the means are constant)
     """
 
     forest: Mapping[str, Tree]
@@ -56,56 +56,62 @@ class Emission:
     def _rank(self) -> dict[str, NDArray[np.intp]]:
         return {name: np.cumsum(tree.asked < 0) - 1 for name, tree in self.forest.items()}
 
-    def row(self, place: FullContextState, layout: StateLayout) -> int:
-        """Return the density of a place."""
-        if place == layout.rest:
+    def row(self, state: FullContextState, layout: StateLayout) -> int:
+        """Return the number of the density of a full-context state: its row in ``means``."""
+        if state == layout.rest:
             return len(self.means) - 1
-        name = layout.name(place)
-        leaf = self.forest[name].path(place.context)[-1]
+        name = layout.name(state)
+        leaf = self.forest[name].path(state.context)[-1]
         return self._first[name] + int(self._rank[name][leaf])
 
-    def source(self, place: FullContextState, layout: StateLayout) -> str:
-        """Return what the density of a place rests on, in words."""
-        if place == layout.rest:
+    def source(self, state: FullContextState, layout: StateLayout) -> str:
+        """Return the origin of the density of a state, in words: its tree, its leaf, and the frames of the leaf."""
+        if state == layout.rest:
             return "rest"
-        name = layout.name(place)
+        name = layout.name(state)
         tree = self.forest[name]
-        leaf = tree.path(place.context)[-1]
-        left, unit, right = place.context
+        leaf = tree.path(state.context)[-1]
+        left, unit, right = state.context
         return f"{left}-{unit}+{right} {name}: {tree.name(leaf)} ({tree.frames[leaf]:.0f} frames)"
 
-    def statistics(self, rows: NDArray[np.intp], features: NDArray[np.float32], heard: slice) -> tuple[Array, Array]:
-        """Return means and precisions [each shape=(T, 3, Q)] of successive frames.
+    def statistics(self, rows: NDArray[np.intp], features: NDArray[np.float32], frames: slice) -> tuple[Array, Array]:
+        """Return means and precisions [each shape=(N, 3, Q)] of N successive frames.
 
-        rows     : the density of each [shape=(T,)]
-        features : of the whole recording;  heard : the frames of it that are meant
+        rows     : the density of each frame [shape=(N,)]
+        features : acoustic features of the whole recording [shape=(T, D)]
+        frames   : the N frames of the recording
         """
         means, precisions = self.means[rows].astype(float), 1 / self.variances[rows].astype(float)
         if self.regression is not None:
-            add_acoustic_regression(means, self.regression, rows, self.regression.context(features, heard))
+            add_acoustic_regression(means, self.regression, rows, self.regression.context(features, frames))
         return means, precisions
 
 
 def add_acoustic_regression(
-    means: Array, hearing: AcousticRegression, rows: NDArray[np.intp], z: NDArray[np.float32]
+    means: Array, regression: AcousticRegression, rows: NDArray[np.intp], z: NDArray[np.float32]
 ) -> None:
-    """Add to means [shape=(T, 3, Q)] what the sound around each frame [shape=(T, F)] says (in place)."""
-    used = hearing.rows[rows]
+    """Add the regressions on the acoustic features to constant means, in place.
+
+    means : of N frames [shape=(N, 3, Q)]
+    rows  : the density of each frame [shape=(N,)]
+    z     : reduced acoustic features around each frame [shape=(N, F)]
+    """
+    used = regression.rows[rows]
     for row in np.unique(used[used >= 0]):
         frames = np.nonzero(used == row)[0]
-        means[frames] += (z[frames] @ hearing.coefficients[row]).reshape(len(frames), *means.shape[1:])
+        means[frames] += (z[frames] @ regression.coefficients[row]).reshape(len(frames), *means.shape[1:])
 
 
 def emission_arrays(emission: Emission) -> dict[str, NDArray[Any]]:
-    """Return the densities as arrays; means and coefficients at half precision."""
+    """Serialise the densities; means and coefficients are stored at half precision."""
     arrays = tree_arrays(emission.forest) | {
         "means": emission.means.astype(np.float16),
         "variances": emission.variances,
     }
     if emission.regression is not None:
-        window = emission.regression.context
+        context = emission.regression.context
         arrays |= {
-            **acoustic_context_arrays(window),
+            **acoustic_context_arrays(context),
             "coefficients": emission.regression.coefficients.astype(np.float16),
             "coefficient_rows": emission.regression.rows,
         }
@@ -113,32 +119,37 @@ def emission_arrays(emission: Emission) -> dict[str, NDArray[Any]]:
 
 
 def emission_from_arrays(arrays: Arrays, layout: StateLayout, dimensions: int) -> Emission:
-    """Return the densities again. Raises KeyError, ValueError: something is missing, out of place or out of range."""
+    """Deserialise the densities.
+
+    layout     : the states of phones and silences
+    dimensions : of the motion space, Q
+    Raises KeyError, ValueError: an array is missing, or has a wrong shape, type or range.
+    """
     forest = trees_from_arrays(arrays)
     if len(forest) != layout.speech + layout.silence or list(forest) != layout.names:
         raise ValueError(
-            f"trees for {len(forest)} parts, required {layout.speech} of speech and {layout.silence} of silence"
+            f"trees for {len(forest)} states, required {layout.speech} of speech and {layout.silence} of silence"
         )
     leaves = sum(len(tree.leaves) for tree in forest.values()) + 1
-    found = checked_arrays(arrays, DENSITIES, L=leaves, Q=dimensions)
-    check_spread(found["means"][:, 0], found["variances"][:, 0])
-    hearing = _hearing(arrays, leaves, dimensions) if HEARING.keys() & arrays.keys() else None
-    return Emission(forest, found["means"], found["variances"], hearing)
+    densities = checked_arrays(arrays, DENSITIES, L=leaves, Q=dimensions)
+    check_spread(densities["means"][:, 0], densities["variances"][:, 0])
+    regression = _regression_from_arrays(arrays, leaves, dimensions) if REGRESSION.keys() & arrays.keys() else None
+    return Emission(forest, densities["means"], densities["variances"], regression)
 
 
 DENSITIES = {"means": ArraySpec(np.float32, "L 3 Q"), "variances": ArraySpec(np.float32, "L 3 Q", POSITIVE)}
-HEARING = {
+REGRESSION = {
     **WINDOW,
     "coefficients": ArraySpec(np.float32, "C A V"),
     "coefficient_rows": ArraySpec(np.int32, "L", -1, 1e6),
 }
-EMISSION = (*TREES, *DENSITIES, *HEARING)
-"""How they are stored: L leaves and C regressions."""
+EMISSION = (*TREES, *DENSITIES, *REGRESSION)
+"""Names of the arrays of ``emission_arrays``: L densities, C regressions on A components."""
 
 
-def _hearing(arrays: Arrays, leaves: int, dimensions: int) -> AcousticRegression:
-    found = checked_arrays(arrays, HEARING, L=leaves, V=3 * dimensions)
-    rows = found["coefficient_rows"]
-    if rows.max() >= found.sizes["C"]:
-        raise ValueError(f"a density that follows regression {rows.max()} of {found.sizes['C']}")
-    return AcousticRegression(acoustic_context_from(found), found["coefficients"], rows)
+def _regression_from_arrays(arrays: Arrays, leaves: int, dimensions: int) -> AcousticRegression:
+    stored = checked_arrays(arrays, REGRESSION, L=leaves, V=3 * dimensions)
+    rows = stored["coefficient_rows"]
+    if rows.max() >= stored.sizes["C"]:
+        raise ValueError(f"a density that uses regression {rows.max()} of {stored.sizes['C']}")
+    return AcousticRegression(acoustic_context_from(stored), stored["coefficients"], rows)

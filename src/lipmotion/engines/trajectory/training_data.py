@@ -1,4 +1,4 @@
-"""What training works with."""
+"""Options and data of the training of the trajectory engine."""
 
 from __future__ import annotations
 
@@ -14,17 +14,18 @@ from lipmotion.motion.frame_labels import FullContextState, StateLayout
 
 @dataclass(frozen=True)
 class TrainingOptions:
-    """How motion is learned.
+    """Options of the training, from a ``TrajectoryConfig``.
 
-    layout     : the states of phones and silences
-    components : dimensions that all point channels (``x_17``, ...) are reduced to
-    tree_factor: what a split of a tree must gain, in units of its description length
-    least_frames : frames that a leaf must have
-    shrinkage, variance_shrinkage : frames that the mean, and the variance, of the node above count for
+    layout       : the states of phones and silences
+    components   : principal components that all point channels (``x_17``, ...) are reduced to
+    tree_factor  : gain that a split of a decision tree must have, in units of its description length
+    least_frames : smallest number of frames of a leaf
+    shrinkage, variance_shrinkage : weights, in frames, of the mean and of the variance of the parent node
     acoustic_regression : regress the means on the acoustic features around the frame
     acoustic_components : principal components that these features are reduced to
-    ridge, shared_ridge : how strongly a regression is drawn towards the one above it, and the shared one towards none
-    ridge_frames : frames that a node must have for a regression of its own
+    ridge, shared_ridge : ridge parameters: of a regression towards that of the parent node, and of the regression that
+                   all nodes share towards zero
+    ridge_frames : smallest number of frames of a node with a regression of its own
     joint_recogniser : train the joint model as well
     """
 
@@ -44,12 +45,12 @@ class TrainingOptions:
 
 @dataclass(frozen=True, eq=False)
 class TrainingClip:
-    """One example.
+    """One example, prepared for training.
 
-    features : [shape=(T, D)]
-    places   : what is said in each frame [length T]
-    frames   : int array [shape=(N,)], those that were seen with both neighbours
-    rows     : float32 array [shape=(N, 3, Q)], static value, Δ and Δ² there
+    features : acoustic features [shape=(T, D)]
+    states   : full-context state of each frame [length T]
+    frames   : int array [shape=(N,)], the frames that are valid and have valid neighbours
+    rows     : float32 array [shape=(N, 3, Q)], static value, Δ and Δ² of the motion in these frames
     """
 
     features: NDArray[np.float32]
@@ -59,11 +60,11 @@ class TrainingClip:
 
     @property
     def training_states(self) -> list[FullContextState]:
-        """What is said in the frames that were seen [length N]."""
+        """Full-context state of each frame of ``frames`` [length N]."""
         return [self.states[frame] for frame in self.frames]
 
 
-def density_rows(emission: Emission, where: Sequence[FullContextState], layout: StateLayout) -> NDArray[np.intp]:
-    """Return the density of each place [shape=(len(where),)]."""
-    distinct = {place: emission.row(place, layout) for place in dict.fromkeys(where)}
-    return np.array([distinct[place] for place in where], np.intp)
+def density_rows(emission: Emission, states: Sequence[FullContextState], layout: StateLayout) -> NDArray[np.intp]:
+    """Return the number of the density of each state [shape=(len(states),)]."""
+    distinct = {state: emission.row(state, layout) for state in dict.fromkeys(states)}
+    return np.array([distinct[state] for state in states], np.intp)

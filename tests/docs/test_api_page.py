@@ -1,0 +1,47 @@
+"""docs/api.md, run from top to bottom."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from lipmotion.corpora.store import Corpus
+
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
+BLOCKS = re.findall(r"^```python\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
+
+
+def test_every_block_of_the_page_runs(toy_corpus: Corpus, tmp_path: Path) -> None:
+    shutil.copytree(ROOT / "examples", tmp_path / "examples")
+    shutil.copytree(toy_corpus.path, tmp_path / "my-corpus")
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", "\n".join(BLOCKS)],
+        cwd=tmp_path,
+        env=os.environ | {"NUMBA_DISABLE_PERFORMANCE_WARNINGS": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert len(done.stdout.splitlines()) > len(BLOCKS)
+    assert {"welcome.json", "welcome.csv", "welcome.tsv", "small.lipmotion"} <= {p.name for p in tmp_path.iterdir()}
+
+
+def test_every_section_has_a_block() -> None:
+    sections = PAGE.split("\n## ")[1:]
+    assert len(sections) >= 9
+    assert [section.splitlines()[0] for section in sections if "```python" not in section] == []
+
+
+@pytest.mark.parametrize("section", PAGE.split("\n## ")[1:], ids=lambda section: section.splitlines()[0])
+def test_a_section_uses_the_modules_that_its_title_names(section: str) -> None:
+    title, text = section.split("\n", 1)
+    modules = [name for name in re.findall(r"`(lipmotion[\w.]*)`", title) if name != "lipmotion"]
+    assert [name for name in modules if name not in text] == []
