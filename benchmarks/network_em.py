@@ -25,14 +25,14 @@ def em_step(
     network: Network,
     data: Sequence[NDArray[np.float32]],
     floor: NDArray[np.float32],
-    each: ParallelMap = map,
+    parallel_map: ParallelMap = map,
 ) -> tuple[Mixtures, Network, float]:
     """Take one step of expectation and maximisation.
 
     mixtures : the densities that ``network.emission`` counts; several states may share one
     data     : features of every recording [shape=(T, D)]
     floor    : [shape=(D,)], least variance
-    each     : shares the work between processes or threads; the result is the same to the bit
+    parallel_map : distributes the work; the result is the same to the bit
     Returns better densities, the network with better arcs and beginnings, and the mean log likelihood per frame under
     the old ones. Where recordings may end is not learned. A recording without a path is left out.
     Raises InputError: a recording without frames, or of another dimension than the densities, or none that has a path.
@@ -44,7 +44,7 @@ def em_step(
     model = _Model(mixtures.quadratic(used), columns, prepared)
     jobs = ((model, [data[i] for i in batch]) for batch in _batches([len(x) for x in data], model.form.constant.size))
     total: _Statistics | None = None
-    for statistics in each(_accumulated, jobs):
+    for statistics in parallel_map(_accumulated, jobs):
         total = statistics if total is None else total.plus(statistics)
     if total is None or not total.frames:
         raise InputError(f"none of {len(data)} recordings has a path through the network; check its arcs and ends")

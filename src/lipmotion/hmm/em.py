@@ -33,13 +33,13 @@ def baum_welch(
     sequences: Sequence[tuple[str, ...]],
     steps: int = 1,
     after_step: AfterStep = no_report,
-    each: ParallelMap = map,
+    parallel_map: ParallelMap = map,
 ) -> EmResult[UnitHmm, UnitStatistics]:
     """Take some steps of embedded Baum–Welch: re-estimate all densities, and the durations of all states.
 
     data      : features of every utterance [shape=(T, D)]
     sequences : the units spoken in each
-    each      : shares the work; the result is the same to the bit
+    parallel_map : distributes the work; the result is the same to the bit
     Returns the re-estimated models, and the mean log likelihood per frame before every step.
     An utterance too short for its units is left out.
     """
@@ -48,7 +48,9 @@ def baum_welch(
         mixtures = reestimated_mixtures(model, statistics, data)
         return replace(model, mixtures=mixtures, log_stay=statistics.log_stay())
 
-    return run_em(hmm, lambda model: accumulate_statistics(model, data, sequences, each), maximise, steps, after_step)
+    return run_em(
+        hmm, lambda model: accumulate_statistics(model, data, sequences, parallel_map), maximise, steps, after_step
+    )
 
 
 def adapt_contexts(
@@ -57,7 +59,7 @@ def adapt_contexts(
     sequences: Sequence[tuple[str, ...]],
     steps: int = 1,
     after_step: AfterStep = no_report,
-    each: ParallelMap = map,
+    parallel_map: ParallelMap = map,
 ) -> EmResult[UnitHmm, UnitStatistics]:
     """Take some steps of adapting the states in context to their data, with the states without context as their prior.
 
@@ -72,7 +74,9 @@ def adapt_contexts(
                 mixtures.map_update(density, x, weights, int(parents[density]), model.config.relevance)
         return replace(model, mixtures=mixtures)
 
-    return run_em(hmm, lambda model: accumulate_statistics(model, data, sequences, each), maximise, steps, after_step)
+    return run_em(
+        hmm, lambda model: accumulate_statistics(model, data, sequences, parallel_map), maximise, steps, after_step
+    )
 
 
 def reestimated_mixtures(hmm: UnitHmm, statistics: UnitStatistics, data: Sequence[NDArray[np.float32]]) -> Mixtures:
@@ -90,14 +94,19 @@ def reestimated_mixtures(hmm: UnitHmm, statistics: UnitStatistics, data: Sequenc
 
 
 def accumulate_statistics(
-    hmm: UnitHmm, data: Sequence[NDArray[np.float32]], sequences: Sequence[tuple[str, ...]], each: ParallelMap = map
+    hmm: UnitHmm,
+    data: Sequence[NDArray[np.float32]],
+    sequences: Sequence[tuple[str, ...]],
+    parallel_map: ParallelMap = map,
 ) -> UnitStatistics:
     """Return the sufficient statistics of utterances for every state (the E-step). Parameters as ``baum_welch``."""
     statistics = UnitStatistics(hmm)
     states = [sum(hmm.table.count(unit) for unit in sequence) for sequence in sequences]
     groups = list(batches([len(x) for x in data], states))
     jobs = (_Batch(hmm, [data[i] for i in batch], [sequences[i] for i in batch]) for batch in groups)
-    for batch, (of_utterances, log_likelihood, frames) in zip(groups, each(_batch_statistics, jobs), strict=True):
+    for batch, (of_utterances, log_likelihood, frames) in zip(
+        groups, parallel_map(_batch_statistics, jobs), strict=True
+    ):
         for i, of_utterance in zip(batch, of_utterances, strict=True):
             statistics.add(data[i], of_utterance)
         statistics.add_log_likelihood(log_likelihood, frames)

@@ -108,14 +108,14 @@ def train_hmm(
     config: HmmConfig,
     monitor: Monitor,
     checkpoint: Checkpoint = NO_CHECKPOINT,
-    each: ParallelMap = map,
+    parallel_map: ParallelMap = map,
 ) -> UnitHmm:
     """Return models of all units in the transcripts.
 
     Stages: flat start with the first pronunciations; choice of pronunciations and pauses; mixtures by
     splitting; the choice again; states in context. Each stage is embedded Baum–Welch over whole utterances.
     checkpoint : after every step, all that the next one needs is stored there
-    each       : shares the work; the result is the same to the bit
+    parallel_map : distributes the work; the result is the same to the bit
     Raises CorpusError: no utterance, or none long enough for its transcript.
     """
     sequences = [_first_guess(u, inventory) for u in utterances]
@@ -125,7 +125,7 @@ def train_hmm(
             f"none of {len(utterances)} utterances has a transcript that fits into its recording; "
             "check that transcripts and recordings belong together"
         )
-    training = _Training([utterances[i] for i in usable], inventory, config, each)
+    training = _Training([utterances[i] for i in usable], inventory, config, parallel_map)
     done, state = _restored(checkpoint, config) or (0, training.flat_start([sequences[i] for i in usable]))
     stages = training.stages()
     total, first = sum(stage.steps for stage in stages), 0
@@ -185,9 +185,14 @@ class _Training:
         utterances: Sequence[TranscribedUtterance],
         inventory: UnitInventory,
         config: HmmConfig,
-        each: ParallelMap,
+        parallel_map: ParallelMap,
     ) -> None:
-        self._utterances, self._inventory, self._config, self._each = utterances, inventory, config, each
+        self._utterances, self._inventory, self._config, self._parallel_map = (
+            utterances,
+            inventory,
+            config,
+            parallel_map,
+        )
         self._data = [utterance.features for utterance in utterances]
 
     def flat_start(self, sequences: Sequence[tuple[str, ...]]) -> _State:
@@ -219,7 +224,7 @@ class _Training:
         def after_step(_: int, hmm: UnitHmm, statistics: UnitStatistics) -> None:
             report(replace(state, hmm=hmm), statistics.mean_log_likelihood)
 
-        result = baum_welch(state.hmm, self._data, state.sequences, steps, after_step, self._each)
+        result = baum_welch(state.hmm, self._data, state.sequences, steps, after_step, self._parallel_map)
         return replace(state, hmm=result.model)
 
     def _adapt(self, state: _State, steps: int, report: _Report) -> _State:
@@ -232,7 +237,7 @@ class _Training:
         def after_step(_: int, hmm: UnitHmm, statistics: UnitStatistics) -> None:
             report(replace(state, hmm=hmm), statistics.mean_log_likelihood)
 
-        result = adapt_contexts(state.hmm, self._data, state.sequences, steps, after_step, self._each)
+        result = adapt_contexts(state.hmm, self._data, state.sequences, steps, after_step, self._parallel_map)
         return replace(state, hmm=result.model)
 
     def _choose_with_pause(self, state: _State) -> tuple[_State, None]:
@@ -245,7 +250,7 @@ class _Training:
             )
             for start in range(0, len(state.sequences), AT_A_TIME)
         )
-        chosen = self._each(partial(_chosen_sequences, inventory=self._inventory), jobs)
+        chosen = self._parallel_map(partial(_chosen_sequences, inventory=self._inventory), jobs)
         return replace(state, sequences=tuple(units for sequences in chosen for units in sequences)), None
 
     def _add_contexts(self, state: _State) -> tuple[_State, float]:
