@@ -267,7 +267,7 @@ _label_file("a tier of a billion labels", ".TextGrid", '"ooTextFile"\n"TextGrid"
 _label_file("half a tier", ".TextGrid", '"ooTextFile"\n"TextGrid"\n0 1 <exists> 0.5\n', "is damaged")
 _label_file("times of NaN", ".TextGrid", '"ooTextFile"\n"TextGrid"\n0 nan <exists> 1\n', "is damaged")
 _label_file("times of 1e999", ".TextGrid", '"ooTextFile"\n"TextGrid"\n0 1 <exists> 1e999\n', "is damaged")
-_label_file("phones that overlap", ".lab", "0 2000000 p\n1000000 3000000 aa\n", "before the previous span ends")
+_label_file("phones that overlap", ".lab", "0 2000000 p\n1000000 3000000 aa\n", "before the one ahead of it ends")
 _label_file("phones with a gap", ".lab", "0 1000000 p\n2000000 3000000 aa\n", "without a gap: label silence as sil")
 _label_file("an unknown phone", ".lab", "0 1000000 p\n1000000 2000000 aa\n2000000 3000000 b\n3000000 4000000 qq\n",
           "line 4 is 'qq', which is no phone")  # fmt: skip

@@ -38,7 +38,12 @@ def _json(name: str, text: str | dict[str, object], code: int, *messages: str) -
         return bench.animate(None, "--units", bench.file("units.json", content))
 
 
-_json("units that overlap", {"units": [_unit(0, 0.5), _unit(0.4, 0.6)]}, 3, "starts at 0.4 s, before the one ahead")
+_json(
+    "units that overlap",
+    {"units": [_unit(0, 0.5), _unit(0.4, 0.6)]},
+    3,
+    "starts at 0.4 s, before the previous span ends",
+)
 _json("a unit that ends before it starts", {"units": [_unit(0.5, 0.4)]}, 3, "before its start at 0.5 s")
 _json("a unit before 0 s", {"units": [_unit(-1, 0.4)]}, 3, "lasts from -1.0 to 0.4 s, required: finite times from 0")
 _json("a unit at NaN s", {"units": [_unit(float("nan"), 0.4)]}, 3, "lasts from nan to 0.4 s, required: finite")
