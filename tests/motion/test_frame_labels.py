@@ -81,7 +81,7 @@ def test_silence_rests_away_from_speech_only():
     assert rests[: 60 - margin].all()
     assert not rests[60 - margin : 70 + margin].any()
     assert rests[70 + margin :].all()
-    assert (where[50].unit, where[50].right) == ("sil", "aa")
+    assert (states[50].unit, states[50].right) == ("sil", "aa")
 
 
 def test_short_silence_between_words_never_rests():
@@ -91,7 +91,7 @@ def test_short_silence_between_words_never_rests():
 
 def test_frames_outside_all_units_rest():
     states = full_context_states(spans((0.1, 0.2, "aa"), (0.3, 0.4, "t")), 60, LAYOUT)
-    assert [frame for frame in range(60) if where[frame] != REST] == [*range(10, 20), *range(30, 40)]
+    assert [frame for frame in range(60) if states[frame] != REST] == [*range(10, 20), *range(30, 40)]
 
 
 def test_frames_belong_to_the_unit_that_has_begun():

@@ -62,7 +62,7 @@ def engine_from_settings(
 
 
 def _class_of(name: str) -> type[Engine[Any]]:
-    """Return the class of an engine. Raises InputError: no engine of that name, or an extension that is not an Engine."""
+    """Return the class of an engine. Raises InputError: no such engine, or an extension that is not an ``Engine``."""
     chosen = ENGINES.load(name)
     if not (isinstance(chosen, type) and issubclass(chosen, Engine)):
         raise InputError(

@@ -1,4 +1,4 @@
-"""The joint model as a recogniser of the voices that it knows."""
+"""The joint model as a recogniser of phones, for the speakers of its training."""
 
 from dataclasses import replace
 
@@ -31,57 +31,57 @@ def corpus():
 
 
 @pytest.fixture(scope="module")
-def listener(corpus):
+def recogniser(corpus):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "LEAST_MINUTES", 0.1)
         return fitted(corpus)
 
 
-def test_with_little_speech_there_is_none(corpus):
+def test_too_little_speech_gives_no_recogniser(corpus):
     assert fitted(corpus) is None
 
 
-def test_phones_of_a_known_voice_are_found(listener):
+def test_phones_of_a_speaker_of_the_training_are_recognised(recogniser):
     spoken = speech(timeline(SENTENCE), seed=77)
-    found = listener.phones(replace(spoken, units=Timeline(())))
+    found = recogniser.phones(replace(spoken, units=Timeline(())))
     assert phones(found) == ["sil", *SENTENCE, "sil"]
     for span, true in zip(found, spoken.units, strict=True):
         assert abs(span.start_s - true.start_s) < 0.03
     assert found[-1].end_s == spoken.features.duration_s
 
 
-def test_a_voice_that_is_not_known_is_left_to_others(listener):
+def test_another_speaker_is_left_to_the_shared_recogniser(recogniser):
     spoken = speech(timeline(SENTENCE))
     strange = np.random.default_rng(0).normal(0, 3, spoken.features.values.shape).astype(np.float32)
-    assert listener.phones(replace(spoken, features=Features(strange, spoken.features.duration_s))) is None
+    assert recogniser.phones(replace(spoken, features=Features(strange, spoken.features.duration_s))) is None
 
 
-def test_digital_silence_and_long_recordings_are_left_to_others(listener, monkeypatch):
+def test_digital_silence_and_long_recordings_are_left_to_the_shared_recogniser(recogniser, monkeypatch):
     spoken = speech(timeline(SENTENCE))
     quiet = Features(np.zeros_like(spoken.features.values), spoken.features.duration_s)
-    assert listener.phones(replace(spoken, features=quiet)) is None
+    assert recogniser.phones(replace(spoken, features=quiet)) is None
     monkeypatch.setattr(module, "LONGEST_S", 1.0)
-    assert listener.phones(spoken) is None
+    assert recogniser.phones(spoken) is None
 
 
-def test_a_recording_shorter_than_any_phone_is_left_to_others(listener):
+def test_a_recording_shorter_than_any_phone_is_left_to_the_shared_recogniser(recogniser):
     spoken = speech(timeline(SENTENCE))
-    assert listener.phones(replace(spoken, features=Features(spoken.features.values[:2], 0.01))) is None
+    assert recogniser.phones(replace(spoken, features=Features(spoken.features.values[:2], 0.01))) is None
 
 
-def test_a_listener_comes_back_from_arrays(listener):
-    arrays = module.recogniser_arrays(listener)
+def test_a_recogniser_is_deserialised(recogniser):
+    arrays = module.recogniser_arrays(recogniser)
     again = module.recogniser_from_arrays(arrays)
-    assert again.training_score == listener.training_score
+    assert again.training_score == recogniser.training_score
     spoken = speech(timeline(SENTENCE), seed=3)
-    assert phones(again.phones(spoken)) == phones(listener.phones(spoken))
+    assert phones(again.phones(spoken)) == phones(recogniser.phones(spoken))
     assert module.recogniser_from_arrays({"means": np.zeros(3)}) is None
     for name in arrays:
         with pytest.raises((ModelFormatError, KeyError, ValueError)):
             module.recogniser_from_arrays({key: array for key, array in arrays.items() if key != name})
 
 
-def test_what_was_trained_is_kept(corpus, listener, tmp_path, monkeypatch):
+def test_a_trained_recogniser_is_kept_in_the_checkpoint(corpus, recogniser, tmp_path, monkeypatch):
     monkeypatch.setattr(module, "LEAST_MINUTES", 0.1)
     checkpoint = Checkpoint(tmp_path, "one")
     first = fitted(corpus, checkpoint)
@@ -91,18 +91,18 @@ def test_what_was_trained_is_kept(corpus, listener, tmp_path, monkeypatch):
         module.recogniser_arrays(first).values(), module.recogniser_arrays(again).values(), strict=True
     ):
         assert one.tobytes() == two.tobytes()
-    assert module.recogniser_arrays(first)["joint_typical"] == listener.training_score
+    assert module.recogniser_arrays(first)["joint_typical"] == recogniser.training_score
 
 
-def test_the_engine_listens_if_there_is_speech_enough(monkeypatch):
+def test_the_engine_recognises_phones_if_there_is_enough_speech(monkeypatch):
     monkeypatch.setattr(module, "LEAST_MINUTES", 0.1)
     engine = engine_named("trajectory", {"components": 2, "acoustic_components": 20})
     corpus = examples(10)
     model = engine.fit(corpus, silent_monitor).model
     spoken = example(SENTENCE, seed=50).speech
-    heard = engine.listen(model, spoken)
-    assert phones(heard) == ["sil", *SENTENCE, "sil"]
+    recognised = engine.recognise(model, spoken)
+    assert phones(recognised) == ["sil", *SENTENCE, "sil"]
     back = engine.from_arrays(engine.to_arrays(model))
-    assert phones(engine.listen(back, spoken)) == phones(heard)
-    deaf = engine_named("trajectory", {"components": 2, "acoustic_components": 20, "joint_recogniser": False})
-    assert deaf.listen(deaf.fit(corpus, silent_monitor).model, spoken) is None
+    assert phones(engine.recognise(back, spoken)) == phones(recognised)
+    without = engine_named("trajectory", {"components": 2, "acoustic_components": 20, "joint_recogniser": False})
+    assert without.recognise(without.fit(corpus, silent_monitor).model, spoken) is None

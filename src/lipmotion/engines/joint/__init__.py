@@ -1,1 +1,1 @@
-"""One model of speech, F0 and motion (Hofer 2008)."""
+"""The joint engine: one model of speech, F0 and motion (Hofer 2008)."""

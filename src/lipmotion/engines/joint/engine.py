@@ -1,4 +1,4 @@
-"""The joint engine: one model of five streams, after Hofer 2008."""
+"""The joint engine: one hidden Markov model of five streams, of speech, F0 and motion, after Hofer 2008."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ from lipmotion.types import (
 from lipmotion.units import LIP_CLOSING, UnitSet, unit_set
 
 PREFIX = "joint_"
-"""What the names of the joint model's own arrays begin with."""
+"""Prefix of the names of the arrays of the joint model."""
 
 
 COUNT = Rule(least=1)
@@ -53,20 +53,20 @@ COUNT = Rule(least=1)
 
 @dataclass(frozen=True)
 class JointEngineConfig(Configuration):
-    """How the joint engine models speech, F0 and motion.
+    """Options of the joint engine.
 
-    units      : what is modelled: a unit set's name, or a table's (docs/unit-sets.md)
-    states     : states per unit, left to right, no skips
+    units      : name of a unit set, or path of a table of units (docs/unit-sets.md)
+    states     : states per unit, left to right, without skips
     mixtures, motion_mixtures : Gaussians per state of speech, and of motion (powers of two)
     components : principal components that all point channels are reduced to
     f0         : model the three streams of F0 (False: their weights are 0 everywhere)
     motion_in_training : give the motion stream weight 1 when states are aligned in training (False: weight 0)
-    recognise_units : recognise the model's own units by its own bigram where neither words nor units are given (False:
-                 take the phones that the shared recogniser finds). Given units or words always win
-    paths      : generate from so many state sequences, sampled from their posterior, instead of the best one, wherever
-                 units are recognised; needs ``recognise_units``
+    recognise_units : where neither words nor units are given, recognise the units of the model by its own bigram
+                 (False: use the phones of the shared recogniser)
+    paths      : number of state sequences, sampled from their posterior, from which motion is generated where units are
+                 recognised; 1: the best sequence. More than 1 needs ``recognise_units``
     seed       : of the sampling
-    closures   : make the lips meet in every p, b and m, and in every recognised unit of these alone
+    closures   : make the lips meet in every p, b and m, and in every recognised unit that has no other phones
     """
 
     units: str = "phone"
@@ -94,16 +94,16 @@ class JointEngineConfig(Configuration):
         unit_set(self.units)
 
     @property
-    def joint(self) -> JointConfig:
-        """How the model is built, trained and used."""
+    def hmm(self) -> JointConfig:
+        """Configuration of the joint model: its states and mixtures, and the stream weights."""
         f0 = float(self.f0)
-        heard = StreamWeights(f0=f0, f0_slope=f0, f0_curvature=f0, motion=0.0)
+        recognition = StreamWeights(f0=f0, f0_slope=f0, f0_curvature=f0, motion=0.0)
         return JointConfig(
             states=self.states,
             mixtures=self.mixtures,
             motion_mixtures=self.motion_mixtures,
             training=StreamWeights(f0=f0, f0_slope=f0, f0_curvature=f0, motion=float(self.motion_in_training)),
-            recognition=heard,
+            recognition=recognition,
         )
 
 
@@ -111,7 +111,10 @@ class JointEngineConfig(Configuration):
 class JointModel:
     """A joint model with the space of its motion.
 
-    closure : how the lips close (None: the motion has no opening)
+    units   : the unit of every phone
+    space   : the Q dimensions in which motion is modelled
+    hmm     : the joint model
+    closure : of the lips in p, b and m (None: the motion has no channel ``opening``)
     """
 
     units: UnitSet
@@ -121,30 +124,30 @@ class JointModel:
 
     @cached_property
     def limits(self) -> MotionLimits:
-        """Between which values motion lies."""
+        """Limits of plausible motion."""
         return self.poses.extended(self.hmm.models[MOTION].scale.deviation[: self.space.dimensions])
 
     @cached_property
     def motion(self) -> LearnedMotion:
-        """The end of the path from speech to motion."""
+        """Motion space, closure and limits, which turn predicted means into motion."""
         return LearnedMotion(self.space, self.closure, self.limits)
 
     @property
     def poses(self) -> MotionLimits:
-        """Between which values the means of all states lie."""
-        part, Q = self.hmm.models[MOTION], self.space.dimensions
-        means = part.tied.mixtures.means[:, :, :Q].reshape(-1, Q)
-        return limits_of(means * part.scale.deviation[:Q] + part.scale.mean[:Q])
+        """Smallest and largest means of all states [each shape=(Q,)]."""
+        stream, Q = self.hmm.models[MOTION], self.space.dimensions
+        means = stream.tied.mixtures.means[:, :, :Q].reshape(-1, Q)
+        return limits_of(means * stream.scale.deviation[:Q] + stream.scale.mean[:Q])
 
 
 @final
 @dataclass(frozen=True)
 class JointEngine(Engine[JointModel]):
-    """One model of speech, F0 and motion: recognition or alignment by the heard streams, generation by motion.
+    """One model of speech, F0 and motion: speech and F0 recognise or align, motion generates.
 
-    Source: Hofer 2008, §4 and §5.  Deviations: training starts from phones in time (aligned or labelled), not from
-    nothing; the trees of what is heard ask for one neighbour, those of motion for both; unless it ``recognises``, the
-    phones of sound alone are those of the shared recogniser.
+    Source: Hofer 2008, §4 and §5.  Deviations: training starts from phones in time (aligned or labelled), not from a
+        utterances = [self._training_utterance(one, x, units) for one, x in zip(examples, values, strict=True)]
+    set, phones of untranscribed speech are those of the shared recogniser.
     """
 
     config: JointEngineConfig
@@ -159,17 +162,17 @@ class JointEngine(Engine[JointModel]):
         self,
         examples: Sequence[Example],
         monitor: Monitor,
-        checkpoint: Checkpoint = NO_CHECKPOINT,  # noqa: ARG002 - a matter of two minutes
+        checkpoint: Checkpoint = NO_CHECKPOINT,  # noqa: ARG002 - training takes two minutes
     ) -> Fit[JointModel]:
         units = unit_set(self.config.units)
         space, values = fit_reduced_motion(examples, self.config.components)
-        utterances = [self._transcribed(one, x, units) for one, x in zip(examples, values, strict=True)]
+        utterances = [self._training_utterance(example, x, units) for example, x in zip(examples, values, strict=True)]
         if all(set(utterance.units) <= set(units.silence) for utterance in utterances):
-            raise CorpusError(f"nothing is said in {len(examples)} examples; learn from speech")
-        inventory = Inventory(units.units, units.silence[:1] + _also_silent(units), self.config.states)
-        hmm = train_joint(utterances, inventory, units.classes(), self.config.joint, monitor)
+            raise CorpusError(f"no speech in {len(examples)} examples; train on speech")
+        inventory = Inventory(units.units, units.silence[:1] + _further_silence(units), self.config.states)
+        hmm = train_joint(utterances, inventory, units.classes(), self.config.hmm, monitor)
         closure = fit_closure(space.direct_names, values, examples)
-        figures = {f"leaves_{name}": float(part.forest.size) for name, part in hmm.models.items()}
+        figures = {f"leaves_{name}": float(stream.forest.size) for name, stream in hmm.models.items()}
         frames = sum(int(example.valid.sum()) for example in examples)
         return Fit(JointModel(units, space, hmm, closure), {"frames": frames, **figures})
 
@@ -177,11 +180,11 @@ class JointEngine(Engine[JointModel]):
         return replace(self, config=replace(self.config, closures=False))
 
     def generate(self, model: JointModel, speech: Speech, constraints: Constraints | None = None) -> Generation:  # noqa: D102
-        observed = self._observed(speech)
+        observations = self._observations(speech)
         if self.config.recognise_units and not speech.units_known:
-            spoken, paths = self._recognised(model, observed, speech.features.duration_s)
+            units, paths = self._recognised(model, observations, speech.features.duration_s)
         else:
-            spoken, paths = speech.units, [_aligned(model, observed, speech.units)]
+            units, paths = speech.units, [_aligned(model, observations, speech.units)]
         densities = densities_of_path(model.hmm, paths[0]) if len(paths) == 1 else densities_of_paths(model.hmm, paths)
         means, precisions = single_gaussians(densities)
 
@@ -191,7 +194,7 @@ class JointEngine(Engine[JointModel]):
         motion, variance = model.motion.generate(
             statistics,
             len(speech.features.values),
-            spoken,
+            units,
             constraints,
             close=self.config.closures,
             closing_units=model.units.units_within(LIP_CLOSING),
@@ -199,8 +202,8 @@ class JointEngine(Engine[JointModel]):
         return Generation(
             motion,
             variance,
-            with_unit_names(spoken, model.units),
-            StateTrace(_sources(model.hmm, paths[0]), paths[0].frames),
+            with_unit_names(units, model.units),
+            StateTrace(_density_names(model.hmm, paths[0]), paths[0].frames),
         )
 
     def describe(self, model: JointModel) -> str:  # noqa: D102
@@ -214,7 +217,7 @@ class JointEngine(Engine[JointModel]):
         with format_errors("the joint model"):
             refuse_undeclared(arrays, MOTION_ARRAYS, (name for name in arrays if name.startswith(PREFIX)))
             units, space, closure = motion_from_arrays(arrays, self.config.units)
-            hmm = joint_from_arrays(arrays_under(arrays, PREFIX), self.config.joint)
+            hmm = joint_from_arrays(arrays_under(arrays, PREFIX), self.config.hmm)
             if set(hmm.inventory.names) != set(units.units):
                 raise ValueError(f"the units {' '.join(hmm.inventory.names)}, required {' '.join(units.units)}")
             if MOTION not in hmm.models or len(hmm.models[MOTION].scale.mean) != 3 * space.dimensions:
@@ -223,40 +226,43 @@ class JointEngine(Engine[JointModel]):
             check_poses(model.poses, space, closure)
             return model
 
-    def _observed(
-        self, speech: Speech, motion: NDArray[np.float64] | None = None, seen: NDArray[np.bool_] | None = None
+    def _observations(
+        self, speech: Speech, motion: NDArray[np.float64] | None = None, valid: NDArray[np.bool_] | None = None
     ) -> StreamObservations:
         f0 = speech.log_f0 if self.config.f0 else None
-        return stream_observations(np.asarray(speech.features.values), f0, motion, seen)
+        return stream_observations(np.asarray(speech.features.values), f0, motion, valid)
 
-    def _transcribed(self, example: Example, values: NDArray[np.float64], units: UnitSet) -> TrainingUtterance:
-        observed = self._observed(example.speech, values, example.valid)
-        said, bounds = units_in_frames(example.speech.units, observed.frames, units.silence[0], units.unit_of)
-        return TrainingUtterance(observed, said, bounds)
+    def _training_utterance(self, example: Example, values: NDArray[np.float64], units: UnitSet) -> TrainingUtterance:
+        observations = self._observations(example.speech, values, example.valid)
+        sequence, bounds = units_in_frames(example.speech.units, observations.frames, units.silence[0], units.unit_of)
+        return TrainingUtterance(observations, sequence, bounds)
 
     def _recognised(
-        self, model: JointModel, observed: StreamObservations, duration_s: float
+        self, model: JointModel, observations: StreamObservations, duration_s: float
     ) -> tuple[Timeline[Unit], list[StatePath]]:
+        """Return the recognised units in time, and the state sequences from which motion is generated."""
         recogniser = joint_recogniser(model.hmm)
-        said = recogniser.recognise(observed)
-        spoken = units_in_time(said, duration_s, model.units.label)
+        segments = recogniser.recognise(observations)
+        units = units_in_time(segments, duration_s, model.units.label)
         if self.config.paths > 1:
-            return spoken, recogniser.sampled_paths(observed, self.config.paths, self.config.seed)
-        bounds = np.array([*(one.first for one in said), observed.frames])
-        return spoken, [align(model.hmm, observed, [one.unit for one in said], bounds)]
+            return units, recogniser.sampled_paths(observations, self.config.paths, self.config.seed)
+        bounds = np.array([*(segment.first for segment in segments), observations.frames])
+        return units, [align(model.hmm, observations, [segment.unit for segment in segments], bounds)]
 
 
-def _also_silent(units: UnitSet) -> tuple[str, ...]:
+def _further_silence(units: UnitSet) -> tuple[str, ...]:
+    """Return all units of a unit set that are silence only, but the first."""
     return tuple(unit for unit in units.silence[1:] if units.silent(unit))
 
 
-def _aligned(model: JointModel, observed: StreamObservations, units: Timeline[Unit]) -> StatePath:
-    said, bounds = units_in_frames(units, observed.frames, model.units.silence[0], model.units.unit_of)
-    return align(model.hmm, observed, said, bounds)
+def _aligned(model: JointModel, observations: StreamObservations, units: Timeline[Unit]) -> StatePath:
+    """Return the best state sequence within the times of given units."""
+    sequence, bounds = units_in_frames(units, observations.frames, model.units.silence[0], model.units.unit_of)
+    return align(model.hmm, observations, sequence, bounds)
 
 
-def _sources(hmm: JointHmm, path: StatePath) -> tuple[str, ...]:
-    """Return what stands behind every state of a path, in words."""
+def _density_names(hmm: JointHmm, path: StatePath) -> tuple[str, ...]:
+    """Return, for every state of a path, its name and the name of its density of motion."""
     forest = hmm.models[MOTION].forest
     return tuple(
         f"{left}-{unit}+{right}.{state}: {forest.name(forest.leaf(((left, unit, right), state)))}"

@@ -20,7 +20,7 @@ from lipmotion.stats.regression import (
 )
 
 Array = NDArray[np.float64]
-SMALLEST_SHARE = 170
+SHARE_DIVISOR = 170
 """A node with a regression of its own has at least 1/170 of all frames; more regressions make the model larger: 450
 instead of 200 gained 0.001 on the validation list."""
 CLIPS_PER_BLOCK = 64
@@ -51,7 +51,7 @@ _Node = tuple[str, int]
 
 def _owners(emission: Emission, options: TrainingOptions) -> list[_Node | None]:
     """Return, for every density, the node whose regression it uses; None for the rest pose."""
-    least = max(options.ridge_frames, sum(float(tree.frames[0]) for tree in emission.forest.values()) / SMALLEST_SHARE)
+    least = max(options.ridge_frames, sum(float(tree.frames[0]) for tree in emission.forest.values()) / SHARE_DIVISOR)
     owners: list[_Node | None] = []
     for name, tree in emission.forest.items():
         owners += [(name, regression_node(tree, tree.path_to(int(leaf)), least)) for leaf in tree.leaves]
@@ -71,7 +71,7 @@ def _frames(
     the mean of its density [shape=(N, 3·Q)].
     """
     numbers = {node: number for number, node in enumerate(dict.fromkeys(owners))}
-    keys, of_row = list(numbers), np.array([numbers[node] for node in owners])
+    nodes, of_row = list(numbers), np.array([numbers[node] for node in owners])
     for start in range(0, len(clips), CLIPS_PER_BLOCK):
         block = clips[start : start + CLIPS_PER_BLOCK]
         rows = np.concatenate([density_rows(emission, clip.training_states, options.layout) for clip in block])
@@ -81,7 +81,7 @@ def _frames(
         z, error = z[order], error[order].reshape(len(order), -1).astype(np.float32)
         present, first = np.unique(of_row[rows][order], return_index=True)
         for number, begin, end in zip(present, first, [*first[1:], len(order)], strict=True):
-            node = keys[number]
+            node = nodes[number]
             if node is not None:
                 yield node, z[begin:end], error[begin:end]
 
@@ -96,7 +96,8 @@ def _coefficients(
     matrices: dict[_Node, Array] = {}
     for name, tree in emission.forest.items():
         own = {node: statistics[tree_name, node] for tree_name, node in statistics if tree_name == name}
-        matrices |= {(name, node): matrix for node, matrix in fit_tree_regressions(tree, own, shared, options.ridge).items()}
+        fitted = fit_tree_regressions(tree, own, shared, options.ridge)
+        matrices |= {(name, node): matrix for node, matrix in fitted.items()}
     index = {node: number for number, node in enumerate(matrices)}
     return np.array(list(matrices.values()), np.float32), index
 

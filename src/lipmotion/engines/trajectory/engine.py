@@ -37,24 +37,24 @@ POSITIVE, ODD = Rule(above=0), Rule(least=1, odd=True)
 
 @dataclass(frozen=True)
 class TrajectoryConfig(Configuration):
-    """How the trajectory engine models motion (chosen on the validation list; see docs/decisions/0009).
+    """Options of the trajectory engine; the default values were chosen on the validation list (docs/decisions/0009).
 
     states, silent_states : states of a phone, and of a silence; odd numbers
     edge_s     : longest duration of a state before or after the middle one, seconds
     components : principal components that all point channels are reduced to
-    tree_factor: what a split of a decision tree must gain, in units of its description length
-    least_frames : frames that a leaf of a tree must have
-    shrinkage, variance_shrinkage : frames that the mean, and the variance, of the parent node count for
+    tree_factor : gain that a split of a decision tree must have, in units of its description length
+    least_frames : smallest number of frames of a leaf of a tree
+    shrinkage, variance_shrinkage : weights, in frames, of the mean and of the variance of the parent node
     acoustic_regression : regress the means on the acoustic features around the frame (False: plain Gaussians)
     acoustic_components : principal components that the acoustic features around a frame are reduced to
-    ridge, shared_ridge : ridge parameters: of a regression towards that of the parent node, and of the one that all
-                 share towards zero
-    ridge_frames : frames that a node must have for a regression of its own
-    variance_scaling : scale movements to the variance of the recorded ones
+    ridge, shared_ridge : ridge parameters: of a regression towards that of the parent node, and of the regression that
+                 all nodes share towards zero
+    ridge_frames : smallest number of frames of a node with a regression of its own
+    variance_scaling : scale generated movements to the variance of recorded ones
     closures   : make the lips meet in every p, b and m, whatever their units are
-    joint_recogniser : train the joint model as well, where there is enough speech: it recognises the phones of voices
-                 that it was trained on
-    units      : what is modelled: a unit set's name, or a table's (docs/unit-sets.md); training reads the table
+    joint_recogniser : train the joint model as well, where there is enough speech: it recognises the phones of
+                 speakers that it was trained on
+    units      : name of a unit set, or path of a table of units (docs/unit-sets.md), which training reads
     """
 
     states: int = option(5, ODD)
@@ -94,7 +94,7 @@ class TrajectoryConfig(Configuration):
 
     @property
     def training(self) -> TrainingOptions:
-        """The options of training. Raises InputError: no such unit set, or a table that is wrong."""
+        """The options of the training. Raises InputError: no such unit set, or a table with errors."""
         names = {field.name for field in fields(TrainingOptions)} - {"layout"}
         return TrainingOptions(self.layout(unit_set(self.units)), **{name: getattr(self, name) for name in names})
 

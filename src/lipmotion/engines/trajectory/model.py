@@ -30,14 +30,14 @@ from lipmotion.units import UnitSet
 
 @dataclass(frozen=True, eq=False)
 class TrajectoryModel:
-    """Statistics of motion for every part of every unit in context.
+    """Full-context hidden Markov models of motion.
 
     units    : the unit of every phone
     space    : the Q dimensions in which motion is modelled
     emission : densities of all tied states
-    variance_factors : of variance scaling about the rest pose [shape=(Q,)]
-    closure  : how the lips close (None: the motion has no opening)
-    phone_recogniser : recognises the phones of voices that it was trained on (None: there was too little speech)
+    variance_factors : factors of variance scaling about the rest pose [shape=(Q,)]
+    closure  : of the lips in p, b and m (None: the motion has no channel ``opening``)
+    phone_recogniser : recognises the phones of speakers that it was trained on (None: there was too little speech)
     """
 
     units: UnitSet
@@ -54,40 +54,39 @@ class TrajectoryModel:
 
     @cached_property
     def motion(self) -> LearnedMotion:
-        """The end of the path from speech to motion."""
+        """Motion space, closure, limits and variance scaling, which turn predicted means into motion."""
         scaling = VarianceScaling(self.variance_factors, self.emission.means[-1, 0])
         return LearnedMotion(self.space, self.closure, self.limits, scaling)
 
     @property
     def poses(self) -> MotionLimits:
-        """Smallest and largest means of all states."""
+        """Smallest and largest means of all states [each shape=(Q,)]."""
         return limits_of(self.emission.means[:, 0])
 
 
 def model_arrays(model: TrajectoryModel) -> dict[str, NDArray[Any]]:
     """Serialise a model."""
     arrays = motion_arrays(model.units, model.space, model.closure) | {"gain": model.variance_factors}
-    heard = recogniser_arrays(model.phone_recogniser) if model.phone_recogniser is not None else {}
-    return arrays | emission_arrays(model.emission) | heard
+    recogniser = recogniser_arrays(model.phone_recogniser) if model.phone_recogniser is not None else {}
+    return arrays | emission_arrays(model.emission) | recogniser
 
 
 def model_from_arrays(arrays: Arrays, layout: Callable[[UnitSet], StateLayout], units: str) -> TrajectoryModel:
     """Deserialise a model.
 
     layout : returns the states of phones and silences, for a unit set
-    units : the name of its unit set; the set itself is in the arrays
-    Raises ModelFormatError: something is missing, undeclared, out of place or out of range.
+    units  : name of the unit set; the set itself is in the arrays
+    Raises ModelFormatError: an array is missing or undeclared, or has a wrong shape, type or range.
     """
     with format_errors("the trajectory model"):
-        refuse_undeclared(
-            arrays, MOTION_ARRAYS, EMISSION, GAIN, (name for name in arrays if name.startswith(JOINT_PREFIX))
-        )
-        of, space, closure = motion_from_arrays(arrays, units)
-        emission = emission_from_arrays(arrays, layout(of), space.dimensions)
-        gain = checked_arrays(arrays, GAIN, Q=space.dimensions)["gain"]
-        model = TrajectoryModel(of, space, emission, gain, closure, recogniser_from_arrays(arrays))
+        joint = (name for name in arrays if name.startswith(JOINT_PREFIX))
+        refuse_undeclared(arrays, MOTION_ARRAYS, EMISSION, VARIANCE_FACTORS, joint)
+        unit_set, space, closure = motion_from_arrays(arrays, units)
+        emission = emission_from_arrays(arrays, layout(unit_set), space.dimensions)
+        factors = checked_arrays(arrays, VARIANCE_FACTORS, Q=space.dimensions)["gain"]
+        model = TrajectoryModel(unit_set, space, emission, factors, closure, recogniser_from_arrays(arrays))
         check_poses(model.poses, space, closure)
         return model
 
 
-GAIN = {"gain": ArraySpec(np.float64, "Q", POSITIVE, 10)}
+VARIANCE_FACTORS = {"gain": ArraySpec(np.float64, "Q", POSITIVE, 10)}

@@ -1,4 +1,4 @@
-"""The joint model finds the phones of voices that it knows."""
+"""Recognition of phones by the joint model, for speakers that it was trained on."""
 
 from __future__ import annotations
 
@@ -25,109 +25,114 @@ from lipmotion.units import UNIT_SETS, is_silent
 PHONES = UNIT_SETS["phone"]
 CONFIG = JointConfig(mixtures=16)
 LEAST_MINUTES = 8.0
-"""With less speech to learn from, the phones are found better with the help of the models of many voices."""
+"""Smallest amount of speech for training; with less, the models of many voices recognise phones better."""
 LONGEST_S = 120.0
-"""Longer recordings are left to the other recogniser, which works block by block."""
+"""Longer recordings are left to the shared recogniser, which works block by block."""
 SIMILARITY_MARGIN = -6.0
-"""A voice is known whose sound the model explains at most this much worse than its training data (mean log density of a
-frame under what fits it best). GRID's s1 in other recordings: -6 to 2; five others of the same studio: -9 to -7."""
+"""A speaker counts as one of the training if the speaker similarity score exceeds that of the training data plus this.
+Scores minus that of the training data, measured: GRID's s1 in other recordings -6 to 2; five other speakers of the same
+studio -9 to -7."""
 SIMILARITY_FRAMES = 400
-"""So many frames, spread evenly, tell whether a voice is known."""
+"""Frames, spread evenly over a recording, from which the speaker similarity score is computed."""
 _CHECKPOINT = "joint"
+"""Name of the stage in a checkpoint."""
 JOINT_PREFIX = "joint_"
-"""What the names of its arrays begin with."""
-TYPICAL = {"typical": ArraySpec(np.float64, "1", -1e6, 1e6)}
+"""Prefix of the names of the arrays of the recogniser."""
+SCORE = {"typical": ArraySpec(np.float64, "1", -1e6, 1e6)}
 
 
 @dataclass(frozen=True, eq=False)
 class OwnPhoneRecogniser:
     """The joint model as a recogniser of phones.
 
-    typical : how well it explains its training data
+    hmm            : the joint model; recognition uses its streams of speech and F0
+    training_score : mean speaker similarity score of its training data
     """
 
     hmm: JointHmm
     training_score: float
 
     def phones(self, speech: Speech) -> Timeline[Unit] | None:
-        """Return the phones that were most probably said; None where the voice is not known, or the recording too long.
+        """Return the most probable phones in time, or None.
 
-        They are placed as this model hears them, which is not how the recogniser places those of a transcript.
+        None: the speaker is not one of the training, the recording is too long, or it is shorter than any phone. The
+        boundaries are those of this model; they differ from those of the recogniser that aligns transcripts.
         """
-        observed = _observed(speech)
-        long = observed.frames > LONGEST_S * FRAME_RATE_HZ
-        if (
-            long
-            or not speech.features.values.any()
-            or _fit(self.hmm, observed) < self.training_score + SIMILARITY_MARGIN
-        ):
+        observations = _observations(speech)
+        if observations.frames > LONGEST_S * FRAME_RATE_HZ or not speech.features.values.any():
+            return None
+        if _similarity_score(self.hmm, observations) < self.training_score + SIMILARITY_MARGIN:
             return None
         try:
-            found = joint_recogniser(self.hmm).recognise(observed)
+            segments = joint_recogniser(self.hmm).recognise(observations)
         except AlignmentError:  # shorter than any phone
             return None
-        return units_in_time(found, speech.features.duration_s)
+        return units_in_time(segments, speech.features.duration_s)
 
 
 def fit_phone_recogniser(
     examples: Sequence[Example], values: Sequence[NDArray[np.float64]], monitor: Monitor, checkpoint: Checkpoint
 ) -> OwnPhoneRecogniser | None:
-    """Return a listener trained on sound and motion; None where there is too little, or nothing is said.
+    """Return a recogniser of phones that is trained on sound and motion, or None if there is too little speech.
 
-    values : every example's motion in the model's space [each shape=(T, Q)]
-    Source: Hofer 2008, §4 to §6: all streams are trained together; only the heard ones recognise.
+    values : motion of each example in the motion space [each shape=(T, Q)]
+    Source: Hofer 2008, §4 to §6: all streams are trained together; those of speech and F0 are used in recognition.
     """
     spoken_s = sum(s.duration_s for e in examples for s in e.speech.units if not is_silent(s.label.phone))
     if spoken_s < 60 * LEAST_MINUTES:
         return None
-    kept = checkpoint.load(_CHECKPOINT)
-    if kept is None:
+    arrays = checkpoint.load(_CHECKPOINT)
+    if arrays is None:
         hmm = train_joint(
-            [_transcribed(example, x) for example, x in zip(examples, values, strict=True)],
+            [_training_utterance(example, x) for example, x in zip(examples, values, strict=True)],
             Inventory(PHONES.units, PHONES.silence, CONFIG.states),
             PHONES.classes(),
             CONFIG,
             monitor,
         )
-        kept = joint_arrays(hmm, np.float32)
-        checkpoint.save(_CHECKPOINT, kept)
-    hmm = joint_from_arrays(kept, CONFIG)
-    return OwnPhoneRecogniser(hmm, float(np.mean([_fit(hmm, _observed(example.speech)) for example in examples])))
+        arrays = joint_arrays(hmm, np.float32)
+        checkpoint.save(_CHECKPOINT, arrays)
+    hmm = joint_from_arrays(arrays, CONFIG)
+    scores = [_similarity_score(hmm, _observations(example.speech)) for example in examples]
+    return OwnPhoneRecogniser(hmm, float(np.mean(scores)))
 
 
-def recogniser_arrays(listener: OwnPhoneRecogniser) -> dict[str, NDArray[Any]]:
-    """Return a listener as arrays, at half precision."""
-    arrays = joint_arrays(listener.hmm) | {"typical": np.array([listener.training_score])}
+def recogniser_arrays(recogniser: OwnPhoneRecogniser) -> dict[str, NDArray[Any]]:
+    """Serialise a recogniser, at half precision."""
+    arrays = joint_arrays(recogniser.hmm) | {"typical": np.array([recogniser.training_score])}
     return {f"{JOINT_PREFIX}{name}": array for name, array in arrays.items()}
 
 
 def recogniser_from_arrays(arrays: Arrays) -> OwnPhoneRecogniser | None:
-    """Return it again, or None. Raises ModelFormatError, KeyError, ValueError: something is missing or damaged."""
+    """Deserialise a recogniser; None if the arrays contain none.
+
+    Raises ModelFormatError, KeyError, ValueError: an array is missing, or has a wrong shape, type or range.
+    """
     own = arrays_under(arrays, JOINT_PREFIX)
     if not own:
         return None
-    (typical,) = checked_arrays(own, TYPICAL)["typical"].tolist()
-    hmm = joint_from_arrays({name: array for name, array in own.items() if name not in TYPICAL}, CONFIG)
+    (score,) = checked_arrays(own, SCORE)["typical"].tolist()
+    hmm = joint_from_arrays({name: array for name, array in own.items() if name not in SCORE}, CONFIG)
     if set(hmm.inventory.names) != set(PHONES.units):
         raise ValueError(f"the units {' '.join(hmm.inventory.names)}, required {' '.join(PHONES.units)}")
-    return OwnPhoneRecogniser(hmm, typical)
+    return OwnPhoneRecogniser(hmm, score)
 
 
-def _observed(speech: Speech) -> StreamObservations:
+def _observations(speech: Speech) -> StreamObservations:
     return stream_observations(np.asarray(speech.features.values), speech.log_f0)
 
 
-def _transcribed(example: Example, values: NDArray[np.float64]) -> TrainingUtterance:
+def _training_utterance(example: Example, values: NDArray[np.float64]) -> TrainingUtterance:
     speech = example.speech
-    observed = stream_observations(np.asarray(speech.features.values), speech.log_f0, values, example.valid)
-    units, bounds = units_in_frames(speech.units, observed.frames, PHONES.silence[0], PHONES.unit_of)
-    return TrainingUtterance(observed, units, bounds)
+    observations = stream_observations(np.asarray(speech.features.values), speech.log_f0, values, example.valid)
+    units, bounds = units_in_frames(speech.units, observations.frames, PHONES.silence[0], PHONES.unit_of)
+    return TrainingUtterance(observations, units, bounds)
 
 
-def _fit(hmm: JointHmm, observed: StreamObservations) -> float:
-    """Return the mean log density of some frames' features, each under the leaf that fits it best."""
+def _similarity_score(hmm: JointHmm, observations: StreamObservations) -> float:
+    """Return the speaker similarity score: the mean over frames of the log density of the leaf that fits best."""
     part = hmm.models[SPEECH]
-    rows = hmm.standardise(observed, hmm.config.recognition)[SPEECH]
+    rows = hmm.standardise(observations, hmm.config.recognition)[SPEECH]
     chosen = rows[np.linspace(0, len(rows) - 1, min(len(rows), SIMILARITY_FRAMES)).astype(int)]
     leaves = np.arange(part.forest.size)
     return float(part.tied.log_density(chosen, leaves, part.scale.log_determinant).max(axis=1).mean())

@@ -1,4 +1,4 @@
-"""Learning how the mouth moves in every part of every unit in context."""
+"""Training of the trajectory engine: decision trees, emission densities, variance scaling."""
 
 from __future__ import annotations
 
@@ -25,154 +25,163 @@ from lipmotion.types import Example, Monitor, Progress, sub_monitor
 
 Array = NDArray[np.float64]
 LEAST_VARIANCE_SHARE, LEAST_VARIANCE = 1e-3, 1e-12
-"""No variance falls under this share of the overall one, nor under this: some dimensions never move."""
+"""Smallest variance: a share of the variance of all frames, and a constant for dimensions that never move."""
 
 
 def fit_trajectory(
-    examples: Sequence[Example], how: TrainingOptions, monitor: Monitor, checkpoint: Checkpoint = NO_CHECKPOINT
+    examples: Sequence[Example], options: TrainingOptions, monitor: Monitor, checkpoint: Checkpoint = NO_CHECKPOINT
 ) -> TrajectoryModel:
-    """Return densities of the motion for every part of a phone in context, tied by decision trees.
+    """Return a model of the motion: densities of full-context states, tied by decision trees.
 
-    Raises CorpusError: no example with motion that was seen in speech, or examples of different channels.
+    Raises CorpusError: no example with valid motion in speech, or examples of different channels.
     """
-    space, values = fit_reduced_motion(examples, how.components)
-    listener = None
-    if how.joint_recogniser:
-        listener = fit_phone_recogniser(examples, values, sub_monitor(monitor, 0, 0.8), checkpoint)
+    space, values = fit_reduced_motion(examples, options.components)
+    phone_recogniser = None
+    if options.joint_recogniser:
+        phone_recogniser = fit_phone_recogniser(examples, values, sub_monitor(monitor, 0, 0.8), checkpoint)
     monitor = sub_monitor(monitor, 0.8, 1)
-    observed = [training_clip(example, x, how.layout) for example, x in zip(examples, values, strict=True)]
-    quiet = how.layout.units.silence
-    covered = {how.layout.name(place) for one in observed for place in one.training_states if place.unit not in quiet}
-    if len(covered) < how.layout.speech:
+    clips = [training_clip(example, x, options.layout) for example, x in zip(examples, values, strict=True)]
+    layout = options.layout
+    states = (state for clip in clips for state in clip.training_states)
+    covered = {layout.name(state) for state in states if state.unit not in layout.units.silence}
+    if len(covered) < layout.speech:
         raise CorpusError(
-            f"motion was seen in {len(covered)} of {how.layout.speech} parts of a phone; learn from more speech"
+            f"motion was seen in {len(covered)} of {layout.speech} states of a phone; learn from more speech"
         )
     monitor(Progress(_STAGE, 1, 3, 0.1))
-    emission = _tied(observed, how)
-    if how.acoustic_regression:
+    emission = _fit_emission(clips, options)
+    if options.acoustic_regression:
         monitor(Progress(_STAGE, 2, 3, 0.3))
-        emission = fit_acoustic_regression(emission, observed, how)
-    gain = _scaling(emission, observed, how)
+        emission = fit_acoustic_regression(emission, clips, options)
+    factors = _scaling_factors(emission, clips, options)
     monitor(Progress(_STAGE, 3, 3, 1.0))
     closure = fit_closure(space.direct_names, values, examples)
-    return TrajectoryModel(how.layout.units, space, emission, gain, closure, listener)
+    return TrajectoryModel(options.layout.units, space, emission, factors, closure, phone_recogniser)
 
 
 _STAGE = "trees"
+"""Name of this stage in reports of progress."""
 
 
-def _scaling(emission: Emission, observed: Sequence[TrainingClip], how: TrainingOptions) -> Array:
-    """Return the factors of variance scaling [shape=(Q,)]; 1 where no example is long enough to vary."""
+def _scaling_factors(emission: Emission, clips: Sequence[TrainingClip], options: TrainingOptions) -> Array:
+    """Return the factors of variance scaling [shape=(Q,)]; 1 where no example has two valid frames."""
     recorded, generated = [], []
-    for one in observed:
-        if len(one.frames) < 2:
+    for clip in clips:
+        if len(clip.frames) < 2:
             continue
         means, precisions = emission.statistics(
-            density_rows(emission, one.states, how.layout), one.features, slice(None)
+            density_rows(emission, clip.states, options.layout), clip.features, slice(None)
         )
-        recorded.append(one.rows[:, 0].std(axis=0))
-        generated.append(generate(means, precisions)[0][one.frames].std(axis=0))
+        recorded.append(clip.rows[:, 0].std(axis=0))
+        generated.append(generate(means, precisions)[0][clip.frames].std(axis=0))
     return scaling_factors(recorded, generated) if recorded else np.ones(emission.means.shape[2])
 
 
 def training_clip(example: Example, values: Array, layout: StateLayout) -> TrainingClip:
-    """Return what training needs of an example, whose motion in the model's space is ``values`` [shape=(T, Q)]."""
+    """Return an example prepared for training.
+
+    values : its motion in the motion space [shape=(T, Q)]
+    """
     frames = np.nonzero(dynamics_known(example.valid))[0]
-    where = full_context_states(example.speech.units, len(values), layout)
+    states = full_context_states(example.speech.units, len(values), layout)
     features = np.asarray(example.speech.features.values)
     dynamics = with_dynamics(values)[frames].astype(np.float32)
-    return TrainingClip(features, where, frames, dynamics)
+    return TrainingClip(features, states, frames, dynamics)
 
 
-def _tied(observed: Sequence[TrainingClip], how: TrainingOptions) -> Emission:
-    """Return the Gaussians of all leaves: each mean and variance is drawn towards that of the node above it."""
+def _fit_emission(clips: Sequence[TrainingClip], options: TrainingOptions) -> Emission:
+    """Return the Gaussians of all leaves; each mean and variance is shrunk towards that of its parent node."""
+    rest = options.layout.rest
     moving = np.concatenate(
-        [one.rows[[place != how.layout.rest for place in one.training_states]] for one in observed], dtype=np.float64
+        [clip.rows[[state != rest for state in clip.training_states]] for clip in clips], dtype=np.float64
     )
     centre, overall = moving.mean(axis=0), moving.var(axis=0)
     least = np.maximum(LEAST_VARIANCE_SHARE * overall, LEAST_VARIANCE)
     scale = np.sqrt(np.maximum(overall, least))
-    grouped = _grouped(observed, how.layout, centre, scale)
-    forest = {name: _grown(contexts, 2 * overall.size, how) for name, contexts in grouped.items()}
+    grouped = _context_moments(clips, options.layout, centre, scale)
+    forest = {name: _grow_tree(contexts, 2 * overall.size, options) for name, contexts in grouped.items()}
     leaves = [
         gaussian
         for name, tree in forest.items()
-        for gaussian in _leaf_gaussians(tree, grouped[name], overall.size, how)
+        for gaussian in _leaf_gaussians(tree, grouped[name], overall.size, options)
     ]
-    means, variances = (np.array(part).reshape(-1, *overall.shape) for part in zip(*leaves, strict=True))
-    rest_mean, rest_variance = _rest(observed, how, centre, overall)
+    means, variances = (np.array(rows).reshape(-1, *overall.shape) for rows in zip(*leaves, strict=True))
+    rest_mean, rest_variance = _rest_gaussian(clips, options, centre, overall)
     means = np.concatenate([means * scale + centre, rest_mean[None]])
     variances = np.concatenate([variances * scale * scale, rest_variance[None]])
     return Emission(forest, means.astype(np.float32), np.maximum(variances, least).astype(np.float32), None)
 
 
-def _grown(contexts: _Contexts, parameters: int, how: TrainingOptions) -> Tree:
-    """Return the tree of one part; a single leaf where the part was never seen."""
-    unseen = {how.layout.rest.context: np.zeros(1 + parameters)}
+def _grow_tree(contexts: _Contexts, parameters: int, options: TrainingOptions) -> Tree:
+    """Return the decision tree of one state; a single leaf where no training frame is in this state."""
+    empty = {options.layout.rest.context: np.zeros(1 + parameters)}
     return grow_tree(
-        list(contexts or unseen),
-        np.array(list((contexts or unseen).values())),
-        [Question(place, *named) for place in range(3) for named in how.layout.units.classes().items()],
+        list(contexts or empty),
+        np.array(list((contexts or empty).values())),
+        [Question(place, *unit_class) for place in range(3) for unit_class in options.layout.units.classes().items()],
         gaussian_log_likelihood,
         parameters=parameters,
-        factor=how.tree_factor,
-        least=how.least_frames,
+        factor=options.tree_factor,
+        least=options.least_frames,
     )
 
 
 _Contexts = dict[tuple[str, str, str], Array]
-"""Count, sums and sums of squares of the frames of every context."""
+"""Count, sums and sums of squares of the frames of every context [each shape=(1 + 2·3·Q,)]."""
 
 
-def _grouped(
-    observed: Sequence[TrainingClip], layout: StateLayout, centre: Array, scale: Array
+def _context_moments(
+    clips: Sequence[TrainingClip], layout: StateLayout, centre: Array, scale: Array
 ) -> dict[str, _Contexts]:
-    """Return the moments of the standardised frames of every context, part by part."""
+    """Return the moments of the standardised frames of every context, for each state by name."""
     grouped: dict[str, _Contexts] = {name: {} for name in layout.names}
-    for one in observed:
+    for clip in clips:
         index: dict[FullContextState, list[int]] = {}
-        for number, place in enumerate(one.training_states):
-            index.setdefault(place, []).append(number)
-        for place, numbers in index.items():
-            if place == layout.rest:
+        for number, state in enumerate(clip.training_states):
+            index.setdefault(state, []).append(number)
+        for state, numbers in index.items():
+            if state == layout.rest:
                 continue
-            rows = ((one.rows[numbers] - centre) / scale).reshape(len(numbers), -1)
+            rows = ((clip.rows[numbers] - centre) / scale).reshape(len(numbers), -1)
             moments = np.concatenate([[len(rows)], rows.sum(axis=0), (rows * rows).sum(axis=0)])
-            contexts = grouped[layout.name(place)]
-            contexts[place.context] = contexts.get(place.context, 0) + moments
+            contexts = grouped[layout.name(state)]
+            contexts[state.context] = contexts.get(state.context, 0) + moments
     return grouped
 
 
-def _leaf_gaussians(tree: Tree, contexts: _Contexts, size: int, how: TrainingOptions) -> list[tuple[Array, Array]]:
+def _leaf_gaussians(tree: Tree, contexts: _Contexts, size: int, options: TrainingOptions) -> list[tuple[Array, Array]]:
     """Return mean and variance [each shape=(3·Q,)] of every leaf, in standardised units."""
     totals = np.zeros((len(tree.asked), 1 + 2 * size))
-    above = np.full(len(tree.asked), -1)
+    parents = np.full(len(tree.asked), -1)
     for context, moments in contexts.items():
         path = tree.path(context)
         totals[path] += moments
-        above[path[1:]] = path[:-1]
+        parents[path[1:]] = path[:-1]
     means, variances = np.zeros((len(tree.asked), size)), np.ones((len(tree.asked), size))
-    for node, (total, parent) in enumerate(zip(totals, above, strict=True)):
+    for node, (total, parent) in enumerate(zip(totals, parents, strict=True)):
         count, sums, squares = total[0], total[1 : 1 + size], total[1 + size :]
         mean, variance = (means[parent], variances[parent]) if parent >= 0 else (np.zeros(size), np.ones(size))
-        means[node] = (sums + how.shrinkage * mean) / (count + how.shrinkage)
-        around = squares - 2 * means[node] * sums + count * means[node] ** 2
-        variances[node] = (around + how.variance_shrinkage * variance) / (count + how.variance_shrinkage)
+        means[node] = (sums + options.shrinkage * mean) / (count + options.shrinkage)
+        deviations = squares - 2 * means[node] * sums + count * means[node] ** 2
+        variances[node] = (deviations + options.variance_shrinkage * variance) / (count + options.variance_shrinkage)
     return [(means[leaf], variances[leaf]) for leaf in tree.leaves]
 
 
-def _rest(
-    observed: Sequence[TrainingClip], how: TrainingOptions, fallback: Array, overall: Array
+def _rest_gaussian(
+    clips: Sequence[TrainingClip], options: TrainingOptions, fallback: Array, overall: Array
 ) -> tuple[Array, Array]:
-    """Return the median pose of silence away from speech, and a variance that holds it still.
+    """Return mean and variance [each shape=(3, Q)] of the rest pose: the median pose in silence away from speech.
 
-    What the mouth did there (breath, a lick of the lips) is no speech.
+    Movements in these frames (breath, a lick of the lips) are not speech: Δ and Δ² have mean 0 and a small variance.
     """
     poses = [
-        one.rows[number, 0] for one in observed for number, p in enumerate(one.training_states) if p == how.layout.rest
+        clip.rows[number, 0]
+        for clip in clips
+        for number, state in enumerate(clip.training_states)
+        if state == options.layout.rest
     ]
     if not poses:
         return fallback, overall
     mean = np.zeros_like(overall)
     mean[0] = np.median(poses, axis=0)
-    return mean, how.variance_shrinkage * overall / (len(poses) + how.variance_shrinkage)
+    return mean, options.variance_shrinkage * overall / (len(poses) + options.variance_shrinkage)
