@@ -33,7 +33,7 @@ class TimedLabel:
     start_s: float
     end_s: float
     text: str
-    place: str
+    position: str
 
 
 @dataclass(frozen=True)
@@ -94,8 +94,8 @@ def phone_timeline(tier: LabelTier, words: LabelTier | None, where: str) -> Time
     for before, label in zip(tier.labels, tier.labels[1:], strict=False):
         if label.start_s > before.end_s + ROUNDING_S:
             raise InputError(
-                f"{where}: {label.place} starts at {label.start_s:g} s, the one before it ends at {before.end_s:g} s; "
-                "phones must follow each other without a gap: label silence as sil"
+                f"{where}: {label.position} starts at {label.start_s:g} s, the one before it ends at {before.end_s:g} "
+                "s; phones must follow each other without a gap: label silence as sil"
             )
     labels = _without_states(tier.labels)
     phones = [_required_phone(label, where) for label in labels]
@@ -113,12 +113,12 @@ def _check_order(tier: LabelTier, where: str) -> None:
     for label in tier.labels:
         if label.end_s < label.start_s:
             raise InputError(
-                f"{where}: {label.place} ends at {label.end_s:g} s, before its start at {label.start_s:g} s"
+                f"{where}: {label.position} ends at {label.end_s:g} s, before its start at {label.start_s:g} s"
             )
         if label.start_s < end_s - ROUNDING_S:
             raise InputError(
-                f"{where}: {label.place} starts at {label.start_s:g} s, before the one ahead of it ends ({end_s:g} s); "
-                "labels must not overlap"
+                f"{where}: {label.position} starts at {label.start_s:g} s, before the one ahead of it ends ({end_s:g} "
+                "s); labels must not overlap"
             )
         end_s = label.end_s
 
@@ -144,7 +144,7 @@ def _required_phone(label: TimedLabel, where: str) -> str:
     phone = _phone(label.text)
     if phone is None:
         raise InputError(
-            f"{where}: {label.place} is {label.text[:40]!r}, which is no phone; the phones are: {' '.join(PHONES)}"
+            f"{where}: {label.position} is {label.text[:40]!r}, which is no phone; the phones are: {' '.join(PHONES)}"
         )
     return phone
 
@@ -158,9 +158,9 @@ def _without_states(labels: Sequence[TimedLabel]) -> list[TimedLabel]:
         state = int(match[1]) if match else -1
         name = STATE_NUMBER.sub("", label.text)
         if whole and state > last >= 0 and whole[-1].text == name:
-            whole[-1] = TimedLabel(whole[-1].start_s, label.end_s, name, whole[-1].place)
+            whole[-1] = TimedLabel(whole[-1].start_s, label.end_s, name, whole[-1].position)
         else:
-            whole.append(TimedLabel(label.start_s, label.end_s, name, label.place))
+            whole.append(TimedLabel(label.start_s, label.end_s, name, label.position))
         last = state
     return whole
 
