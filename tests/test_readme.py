@@ -1,4 +1,4 @@
-"""What the README says, done."""
+"""What the README and the first steps say, done."""
 
 from __future__ import annotations
 
@@ -12,16 +12,22 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
-README = (ROOT / "README.md").read_text(encoding="utf-8")
+README, START = ((ROOT / page).read_text(encoding="utf-8") for page in ("README.md", "docs/start.md"))
+PAGES = pytest.mark.parametrize("page", [README, START], ids=["README", "start"])
 
 
-def blocks(language: str) -> list[str]:
-    return re.findall(rf"```{language}\n(.*?)```", README, flags=re.DOTALL)
+def blocks(page: str, language: str) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", page, flags=re.DOTALL)
 
 
-def commands(first_word: str) -> list[list[str]]:
-    lines = [line.split("#")[0] for block in blocks("sh") for line in block.splitlines()]
+def commands(page: str, first_word: str) -> list[list[str]]:
+    lines = [line.split("#")[0] for block in blocks(page, "sh") for line in block.splitlines()]
     return [shlex.split(line) for line in lines if line.startswith(first_word)]
+
+
+def needs_training(command: list[str]) -> bool:
+    """Return whether a command uses recordings, a corpus or a model of one's own."""
+    return any(word.startswith(("my-", "me.")) for word in command)
 
 
 def run(command: list[str], folder: Path) -> str:
@@ -39,28 +45,38 @@ def checkout(tmp_path: Path) -> Path:
 
 
 def test_make_targets_exist() -> None:
-    targets = [command[1] for command in commands("make")]
+    targets = [command[1] for command in commands(README, "make")]
     assert targets == ["demo", "test"]
     for target in targets:
         assert "lipmotion" in run(["make", "-n", target], ROOT) or target == "test"
 
 
 @pytest.mark.long
-def test_commands_of_use(checkout: Path) -> None:
-    used = [command for command in commands("lipmotion") if "examples/welcome.flac" in command or command[1] == "info"]
-    assert len(used) == 3
+@pytest.mark.parametrize(
+    ("page", "verbs", "written"),
+    [
+        (README, ["animate", "cues", "cite"], {"welcome.mp4", "welcome.json", "welcome.tsv"}),
+        (START, ["animate", "animate", "info"], {"welcome.mp4", "welcome.json", "welcome.csv"}),
+    ],
+    ids=["README", "start"],
+)
+def test_commands_of_use(page: str, verbs: list[str], written: set[str], checkout: Path) -> None:
+    used = [command for command in commands(page, "lipmotion") if not needs_training(command)]
+    assert [command[1] for command in used] == verbs
     for command in used:
         run(command, checkout)
-    assert {"welcome.mp4", "welcome.json", "welcome.csv"} <= {path.name for path in checkout.iterdir()}
+    assert written <= {path.name for path in checkout.iterdir()}
 
 
-def test_python_example(checkout: Path) -> None:
-    (example,) = blocks("python")
+@PAGES
+def test_python_example(page: str, checkout: Path) -> None:
+    (example,) = blocks(page, "python")
     (checkout / "example.py").write_text(example)
-    said = run([sys.executable, "example.py"], checkout)
-    assert re.search(r"\d+ frames, widest 0\.\d\d at \d\.\d\d s", said)
-    assert "behind 1.00 s stands" in said
+    printed = run([sys.executable, "example.py"], checkout)
+    assert re.search(r"\d+ frames, widest 0\.\d\d at \d\.\d\d s", printed)
+    assert ("the state at 1.00 s is" in printed) == (page is START)
     assert (checkout / "edited.mp4").stat().st_size > 10_000
+    assert (checkout / "edited.json").stat().st_size > 10_000
 
 
 @pytest.mark.long
@@ -72,11 +88,14 @@ def test_training_on_own_recordings(checkout: Path) -> None:
     (checkout / "my-recordings").mkdir()
     write_toy_recordings(checkout / "my-recordings")
     shutil.copy(checkout / "examples" / "welcome.flac", checkout / "speech.wav")  # the content decides, not the name
-    used = [command for command in commands("lipmotion") if command not in commands("lipmotion")[:3]]
-    assert [command[1] for command in used] == ["corpus", "train", "animate"]
-    for command in used:
-        run(command, checkout)
+    used = [command for command in commands(README, "lipmotion") if needs_training(command)]
+    assert [command[1] for command in used] == ["corpus", "train", "animate", "evaluate"]
+    outputs = [run(command, checkout) for command in used]
     assert (checkout / "speech.mp4").stat().st_size > 10_000
-    figures = re.search(r"`(lipmotion evaluate me[^`]*)`", README)
-    assert figures is not None
-    assert "audio only" in run(shlex.split(figures[1]), checkout)
+    assert "audio only" in outputs[-1]
+    measured = re.search(r"`(lipmotion evaluate me[^`]*)`", START)
+    assert measured is not None
+    assert [
+        *(command for command in commands(START, "lipmotion") if needs_training(command)),
+        shlex.split(measured[1]),
+    ] == used

@@ -1,0 +1,118 @@
+"""Links of all Markdown files resolve, every page is in the index, and names of modules and options are present ones."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from collections.abc import Iterator
+from dataclasses import fields
+from itertools import chain
+from pathlib import Path
+
+import pytest
+
+from lipmotion.engines import ENGINES
+
+ROOT = Path(__file__).parents[2]
+DOCS, INDEX = ROOT / "docs", ROOT / "docs" / "index.md"
+PAGES = sorted(
+    path
+    for path in chain(ROOT.glob("*.md"), *((ROOT / folder).rglob("*.md") for folder in ("docs", "tests", "examples")))
+    if "build" not in path.parts
+)
+CODE_ROOTS = (ROOT, ROOT / "src" / "lipmotion", ROOT / "tests")
+
+
+def without_code(text: str) -> str:
+    """Return Markdown without its blocks and spans of code, whose brackets are no links."""
+    text = re.sub(r"^( *)```.*?^\1```", "", text, flags=re.MULTILINE | re.DOTALL)
+    return re.sub(r"`[^`\n]*`", "", text)
+
+
+def links(text: str) -> Iterator[str]:
+    """Give the targets of all links and pictures of a page."""
+    yield from re.findall(r"\]\(([^()\s]+)\)", without_code(text))
+
+
+def anchors(page: Path) -> set[str]:
+    """Return the names that the headings of a page have on the web."""
+    lines = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL).splitlines()
+    titles = [line.lstrip("#").strip().lower() for line in lines if re.match(r"#+ ", line)]
+    return {
+        re.sub(r"[^\w\- ]", "", re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", title)).replace(" ", "-") for title in titles
+    }
+
+
+def broken(text: str, page: Path) -> list[str]:
+    """Return the relative links that lead nowhere, in a text that stands at ``page``."""
+    found = []
+    for target in links(text):
+        if re.match(r"[a-z]+:", target):
+            continue
+        path, _, anchor = target.partition("#")
+        file = (page.parent / path).resolve() if path else page
+        inside = file.is_relative_to(ROOT)
+        if not inside or not file.exists() or (anchor and anchor not in anchors(file)):
+            found.append(target)
+    return found
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_relative_links_resolve(page: Path) -> None:
+    assert broken(page.read_text(encoding="utf-8"), page) == []
+
+
+def test_a_broken_link_is_found() -> None:
+    text = "[a](gone.md) [b](index.md#gone) [c](/etc) `[d](code.md)` ![e](images/welcome.png) [f](index.md#results)"
+    assert broken(text, INDEX) == ["gone.md", "index.md#gone", "/etc"]
+
+
+def test_the_index_links_every_page() -> None:
+    linked = {(DOCS / target.partition("#")[0]).resolve() for target in links(INDEX.read_text(encoding="utf-8"))}
+    assert [str(page.relative_to(ROOT)) for page in DOCS.rglob("*.md") if page not in {*linked, INDEX}] == []
+
+
+def test_the_readme_leads_to_the_index() -> None:
+    assert "docs/index.md" in set(links((ROOT / "README.md").read_text(encoding="utf-8")))
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_named_files_of_the_source_exist(page: Path) -> None:
+    """Paths such as `speech/mfcc.py` and `hmm/` in spans of code: of the package, of the tests, or of the repository."""
+    if page.parent == DOCS / "extend":
+        return
+    named = re.findall(r"`((?:[a-z_0-9]+/)+(?:[a-z_0-9]+\.py)?|[a-z_0-9]+\.py)`", page.read_text(encoding="utf-8"))
+    first = {path.name for root in CODE_ROOTS for path in root.iterdir()}
+    missing = [name for name in named if not any((root / name).exists() for root in CODE_ROOTS)]
+    assert [name for name in missing if name.endswith(".py") or name.split("/")[0] in first] == []
+
+
+def test_no_page_uses_a_former_name_of_an_option() -> None:
+    configurations = [ENGINES.load(name).Config for name in ENGINES.built_in]
+    present = {field.name for config in configurations for field in fields(config)}
+    former = {old for config in configurations for old in config.former} - present - {*ENGINES.built_in}
+    assert {"listens", "follows", "full_range", "crosses", "recognises"} <= former
+    setting = re.compile(rf"`(?:--set )?({'|'.join(sorted(former))})`|\b({'|'.join(sorted(former))}) ?= ?\w")
+    found = {
+        f"{page.relative_to(ROOT)}: {match.group()}"
+        for page in PAGES
+        if page.name not in ("0012-the-house.md", "CHANGELOG.md")
+        for match in setting.finditer(page.read_text(encoding="utf-8"))
+    }
+    assert found == set()
+
+
+def test_readme_is_short() -> None:
+    text = re.sub(r"!\[[^]]*\]\([^)]*\)", "", (ROOT / "README.md").read_text(encoding="utf-8"))
+    text = re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", text)
+    assert len([word for word in text.split() if re.search(r"\w", word)]) <= 600
+
+
+def test_no_package_registry_and_no_absolute_path_is_named() -> None:
+    listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=False)
+    if listed.returncode:
+        pytest.skip("not a git repository")
+    endings = {".md", ".toml", ".cff", ".yml", ".yaml", ".in", ".txt", ".bib"}
+    texts = [ROOT / name for name in listed.stdout.splitlines() if Path(name).suffix in endings]
+    hosts = re.compile(r"py" + r"pi\.org|python" + r"hosted\.org|registry\.npm" + r"js|/ho" + r"me/\w|/ro" + r"ot/")
+    assert [path.name for path in texts if path.is_file() and hosts.search(path.read_text(encoding="utf-8"))] == []
