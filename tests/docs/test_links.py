@@ -1,4 +1,4 @@
-"""Links of all Markdown files resolve, every page is in the index, and names of modules and options are present ones."""
+"""Links of all Markdown files resolve, the index has every page, and names of modules and options are present ones."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def test_the_readme_leads_to_the_index() -> None:
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_named_files_of_the_source_exist(page: Path) -> None:
-    """Paths such as `speech/mfcc.py` and `hmm/` in spans of code: of the package, of the tests, or of the repository."""
+    """Paths such as `speech/mfcc.py` in spans of code: of the package, of the tests, or of the repository."""
     if page.parent == DOCS / "extend":
         return
     named = re.findall(r"`((?:[a-z_0-9]+/)+(?:[a-z_0-9]+\.py)?|[a-z_0-9]+\.py)`", page.read_text(encoding="utf-8"))

@@ -108,13 +108,13 @@ def full_context_states(units: Timeline[Unit], frames: int, layout: StateLayout)
         if span.label.phone not in PHONES:
             raise InputError(unknown_phone_message(span.label.phone, f" at {span.start_s} s"))
     result = [layout.rest] * frames
-    speech_s = speech_intervals(units)
+    away = away_from_speech(np.arange(frames) / FRAME_RATE_HZ, speech_intervals(units), layout.rest_s)
     for left, span, right in with_neighbours(units):
         edges = np.ceil(np.array([span.start_s, span.end_s]) * FRAME_RATE_HZ - 1e-6)
         first, stop = np.clip(edges, 0, frames).astype(int).tolist()
         time_s = np.arange(first, stop) / FRAME_RATE_HZ
         left_unit, unit, right_unit = map(layout.units.unit, (left, span.label.phone, right))
-        rests = is_silent(span.label.phone) & away_from_speech(time_s, speech_s, layout.rest_s)
+        rests = is_silent(span.label.phone) & away[first:stop]
         state = _states(time_s, span.start_s, span.end_s, layout.states(unit), layout.edge_s)
         for i in np.nonzero(~rests)[0]:
             result[first + i] = FullContextState(left_unit, unit, right_unit, int(state[i]))

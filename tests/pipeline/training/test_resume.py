@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from lipmotion.corpora.store import Corpus
+from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.pipeline.model import Model, save_model
 from lipmotion.pipeline.training import labels
@@ -130,7 +130,7 @@ def test_another_job_starts_over(corpus: Corpus, work: Path, tmp_path: Path, wha
     elif what == "lexicon":
         options["lexicon"] = Lexicon({"papa": (("p", "ae", "p", "ax"),)})
     else:
-        options["names"] = corpus.names("train")[:4]
+        options["selection"] = Selection(names=corpus.names("train")[:4])
     expected = content(train(corpus, **options)[0], tmp_path)  # type: ignore[arg-type]
     assert content(train(corpus, **options, run=Run(work=work))[0], tmp_path) == expected  # type: ignore[arg-type]
 

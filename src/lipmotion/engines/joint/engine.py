@@ -146,8 +146,8 @@ class JointEngine(Engine[JointModel]):
     """One model of speech, F0 and motion: speech and F0 recognise or align, motion generates.
 
     Source: Hofer 2008, §4 and §5.  Deviations: training starts from phones in time (aligned or labelled), not from a
-        utterances = [self._training_utterance(one, x, units) for one, x in zip(examples, values, strict=True)]
-    set, phones of untranscribed speech are those of the shared recogniser.
+    flat start; trees of speech and F0 ask about one neighbour, those of motion about both; unless ``recognise_units``
+    is set, phones of untranscribed speech are those of the shared recogniser.
     """
 
     config: JointEngineConfig
