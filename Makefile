@@ -3,6 +3,7 @@
 # make test-all   the other tests: mutations, kills, real recordings, copies of the repository; then make test-portable
 # make test-portable   the numeric tests as other processors would run them
 # make check  lint, types, import contracts
+# make coverage   the tests of `make test`, and which lines and branches they reach
 # make fuzz   changed input for every reader, MINUTES=10 in all; READER=name: that one only; SEED=1: other input
 # make bench  the speed figures of the README
 # make model  trains and measures the model that ships with the package (needs GRID speaker s1)
@@ -19,7 +20,7 @@ READER ?=
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
 SOURCES := $(shell find src -type f -not -name '*.pyc') pyproject.toml README.md
-.PHONY: demo test test-all test-portable check fuzz bench model requirements clean
+.PHONY: demo test test-all test-portable check coverage fuzz bench model requirements clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/core
@@ -40,6 +41,12 @@ check: $(VENV)/dev
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+coverage: $(VENV)/dev
+	$(BIN)/python -m coverage erase
+	$(BIN)/python -m coverage run -m pytest -n $(WORKERS) -m "not long"
+	$(BIN)/python -m coverage combine --quiet
+	$(BIN)/python -m coverage report
 
 fuzz: $(VENV)/dev
 	mkdir -p $(BUILD)
