@@ -88,5 +88,5 @@ def test_a_damaged_adaptation(changes: dict[str, bytes | None], adapted_file: Pa
 
 @pytest.mark.parametrize("given", [[], "one.wav", Path("one.wav"), Audio(np.zeros(16_000, np.float32), 16_000)])
 def test_a_list_of_recordings_is_required(toy_model: Model, given: object) -> None:
-    with pytest.raises(InputError, match="required: a list of one recording or more"):
+    with pytest.raises(InputError, match="required: one or more recordings of the speaker"):
         adapt(toy_model, given)

@@ -122,7 +122,7 @@ def test_a_signal_that_another_thread_takes_waits_until_a_process_has_started(nu
     before = signal.signal(number, lambda *_: seen.append("answered"))
     other.start()
     try:
-        with module._signals_held():
+        with module._signals_delayed():
             os.kill(os.getpid(), number)
             time.sleep(0.2)  # long enough to be answered, were it not held back
             seen.append("started")

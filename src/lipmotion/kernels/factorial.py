@@ -18,8 +18,8 @@ from lipmotion.kernels.loops import Array, FactorialLogLikelihoods, FrameDensity
 
 ROOM_BYTES = 2**27
 """Memory for the forward probabilities that are stored at once: of as many frames as fit in, but of √T at least."""
-LEAST_OVERLAP = 1e-20
-"""In single precision: least sum of forward times backward probabilities, each of sum 1; below, both may be wrong."""
+LEAST_OVERLAP = {np.dtype(np.float32): 1e-20, np.dtype(np.float64): 1e-110}
+"""By precision: least sum of forward times backward probabilities, each of sum 1; below, what was set to 0 may count."""
 
 
 class FactorialPosteriors(NamedTuple):
@@ -47,18 +47,19 @@ def factorial_posteriors(
     logs    : log densities of the recording
     stretch : frames whose forward probabilities are stored at once; those of the others are computed twice;
         None: √T, or as many as ``ROOM_BYTES`` hold
-    Exact but for paths that were 320 nats below a frame's best.  Log densities in single precision are processed in
-    single precision where that is possible (compiled, and without loss), which takes half the time.
+    Log densities in single precision are processed in single precision where that is possible (compiled, and without
+    loss), which takes half the time. Where double precision loses paths that count, because they were some 320 nats
+    below a frame's best, the recording is processed in logarithms (``factorial_logs``).
     Source: Ghahramani & Jordan (1997), "Factorial hidden Markov models", appendix B.
     Cost: time O(T·Na·Nv·(Ua + Uv)), memory O(stretch + T/stretch) times Na·Nv.
     """
     order = np.lexsort(logs.pairs.T[::-1])
     logs = logs._replace(pair=logs.pair[:, order], pairs=logs.pairs[order])
     result = None
-    if logs.audio.dtype == np.float32 and numba_works():
-        result = _ForwardBackward.of(audio, visual, logs, stretch, np.dtype(np.float32)).posteriors(LEAST_OVERLAP)
-    result = result or _ForwardBackward.of(audio, visual, logs, stretch, np.dtype(np.float64)).posteriors(0)
-    result = result or _zero_posteriors(audio, visual, logs)
+    for kind, least_overlap in LEAST_OVERLAP.items():
+        if result is None and (kind == np.float64 or (logs.audio.dtype == kind and numba_works())):
+            result = _ForwardBackward.of(audio, visual, logs, stretch, kind).posteriors(least_overlap)
+    result = result or _posteriors_in_logs(audio, visual, logs) or _zero_posteriors(audio, visual, logs)
     return result._replace(pair=result.pair[:, np.argsort(order)])
 
 
@@ -112,7 +113,7 @@ class _ForwardBackward(NamedTuple):
         final = np.multiply.outer(*(loop.final.ravel() for loop in self.loops)).astype(last.dtype)
         totals = _Accumulator.of(self.loops, self.logs)
         last_frame = factorial_steps.frame_posteriors(last, final, self.densities[-1])
-        if not totals.store(len(self.logs.audio) - 1, last_frame, 0):
+        if not totals.store(len(self.logs.audio) - 1, last_frame, least_overlap):
             return None
         backward, _ = factorial_steps.times_density(final, self.densities[-1])
         for start, before in zip(reversed(starts), reversed(befores), strict=True):
@@ -176,6 +177,50 @@ class _Accumulator(NamedTuple):
             _counted(loops[1], self.visual, self.visual_entered),
         )
         return FactorialPosteriors(self.audio, self.visual, self.pair, *counts, log_likelihood)
+
+
+def _posteriors_in_logs(audio: Loop, visual: Loop, logs: FactorialLogLikelihoods) -> FactorialPosteriors | None:
+    """Return the posteriors, computed in logarithms; None: there is no path."""
+    from lipmotion.kernels.factorial_logs import LogForwardBackward
+
+    steps, frames = LogForwardBackward.of(audio, visual, logs), len(logs.audio)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        initial, final = (
+            np.add.outer(*(np.log(getattr(loop, name).ravel()) for loop in (audio, visual)))
+            for name in ("initial", "final")
+        )
+    stretch = kept_frames(frames, initial.nbytes)
+    starts = range(0, frames, stretch)
+
+    def forward_of(start: int, before: Array | None) -> list[Array]:
+        """Return the log forward probabilities of a stretch."""
+        found: list[Array] = []
+        for t in range(start, min(start + stretch, frames)):
+            before = initial + steps.log_density(0) if before is None else steps.forward(before, t)
+            found.append(before)
+        return found
+
+    befores: list[Array | None] = [None]
+    for start in starts:
+        stretch_forward = forward_of(start, befores[-1])
+        befores.append(stretch_forward[-1])
+    totals = _Accumulator.of((audio, visual), logs)
+    last = steps.frame(stretch_forward[-1], final)
+    if not math.isfinite(last.overlap):
+        return None
+    totals.store(frames - 1, last, -math.inf)
+    backward = final + steps.log_density(frames - 1)
+    for start, before in zip(reversed(starts), reversed(befores[:-1]), strict=True):
+        forward = forward_of(start, before)
+        for t in range(start + len(forward) - 1, start - 1, -1):
+            if t == frames - 1:
+                continue
+            step = steps.back(forward[t - start], backward, t)
+            totals.store(t, step.frame, -math.inf)
+            totals.audio_entered[:] += step.audio_entered
+            totals.visual_entered[:] += step.visual_entered
+            backward = step.backward
+    return totals.result((audio, visual), last.overlap)
 
 
 def _counted(loop: Loop, posterior: Array, entered: Array) -> LoopCounts:

@@ -1,1 +1,1 @@
-"""The main path: recordings to a corpus, a corpus to a model, speech to motion and files."""
+"""The main functions: recordings to a corpus, a corpus to a model, speech to motion and to files."""

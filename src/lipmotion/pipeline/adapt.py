@@ -1,4 +1,4 @@
-"""A model and untranscribed recordings of a voice to a model that hears this voice better."""
+"""Speaker adaptation: ``adapt(model, recordings) → model``, from recordings without transcripts."""
 
 from __future__ import annotations
 
@@ -16,18 +16,24 @@ from lipmotion.types import Audio
 
 @one_thread()
 def adapt(model: Model | str | Path | None, recordings: Sequence[str | Path | Audio]) -> Model:
-    """Return a model whose phone models are adapted to one voice; it recognises and aligns with them from then on.
+    """Return a model whose phone models are adapted to one speaker, for recognition and alignment.
 
-    model      : from ``load_model``, or its file; None: the one that ships. An earlier adaptation is forgotten
-    recordings : of the voice alone: audio or video files, or samples at 16 kHz; what is said need not be known
+    model      : from ``load_model``, or the path of a model file; None: the shipped model. The new adaptation replaces
+                 an earlier one
+    recordings : of this speaker alone: audio or video files, or samples at 16 kHz; transcripts are not needed
     Raises InputError: no recording, one that cannot be read, or too little speech in them.
     Raises MissingDependencyError: pocketsphinx is not installed.
+    Source: Gales 1998, constrained maximum-likelihood linear regression (``speech.adaptation_estimation``).
+
+    >>> import lipmotion
+    >>> adapted = lipmotion.adapt(None, ["examples/welcome.flac"])
+    >>> adapted.about["adapted"]
+    {'recordings': 1, 'speech_s': 4.4}
     """
     if isinstance(recordings, str | Path | Audio) or not len(recordings):
-        raise InputError("required: a list of one recording or more of the voice to adapt to")
+        raise InputError("recordings are not a list, or it is empty; required: one or more recordings of the speaker")
     chosen = model if isinstance(model, Model) else load_model(model)
-    found = estimate_adaptation(
-        chosen.phones, [one if isinstance(one, Audio) else read_audio(Path(one)) for one in recordings]
-    )
-    about = {**chosen.about, "adapted": {"recordings": len(recordings), "speech_s": round(found.speech_s, 1)}}
-    return replace(chosen, about=about, adaptation=found.adaptation)
+    sounds = [recording if isinstance(recording, Audio) else read_audio(Path(recording)) for recording in recordings]
+    estimated = estimate_adaptation(chosen.phones, sounds)
+    about = {**chosen.about, "adapted": {"recordings": len(recordings), "speech_s": round(estimated.speech_s, 1)}}
+    return replace(chosen, about=about, adaptation=estimated.adaptation)

@@ -1,4 +1,4 @@
-"""Speech to motion, and motion to files: the main job."""
+"""Speech to motion: ``animate(speech) → generation``; motion to files: ``write(generation, files)``."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from lipmotion.types import Constraints, Generation
 
 VIDEO_SUFFIX = ".mp4"
 SOUND_RATE_HZ = 48_000
-"""The sound track of a rendered video."""
+"""Sampling rate of the sound track of a drawn video."""
 SLOWEST_HZ, FASTEST_HZ = 1.0, 1000.0
-"""Frame rates that files are written at; a mistyped one must not fill the memory."""
+"""Smallest and largest frame rate of a file; a mistyped rate must not fill the memory."""
 
 
 @one_thread()
@@ -32,19 +32,22 @@ def animate(
     transcript: str | Path | None = None,
     constraints: Constraints | None = None,
 ) -> Generation:
-    """Return the lip motion that goes with speech.
+    """Return lip motion for speech: values of all channels at 100 Hz, variances, phones in time, and states.
 
-    speech      : an audio or video file, samples at 16 kHz, or a ``SpeechRequest``, which says what else is known
-    model       : from ``load_model``, or its file; the shipped one by default
-    transcript  : what is said, if known, or a Path to a text file: short for a request with this transcript
-    constraints : values that the motion must take
+    speech      : an audio or video file, samples at 16 kHz, or a ``SpeechRequest`` with all that is known of it
+    model       : from ``load_model``, or the path of a model file; None: the shipped model
+    transcript  : the spoken words, or a Path of a text file; the same as a ``SpeechRequest`` with this transcript
+    constraints : values that the motion must take exactly
     Raises InputError: the recording, the transcript or a constraint is not usable.
-    Raises AlignmentError: the transcript does not fit into the recording.
+    Raises AlignmentError: the transcript cannot be aligned with the recording.
+    Source: Hofer, Yamagishi & Shimodaira 2008 (``engines.trajectory``, the engine of the shipped model).
 
     >>> import lipmotion
     >>> result = lipmotion.animate("examples/welcome.flac", transcript=Path("examples/welcome.txt"))
     >>> result.motion.rate_hz, result.motion.names[:3]
     (100.0, ('opening', 'width', 'outer'))
+    >>> result.units[1].label.word
+    'please'
     """
     chosen = model if isinstance(model, Model) else load_model(model)
     return chosen.engine.generate(chosen.learned, understand(chosen, request_of(speech, transcript)), constraints)
@@ -61,25 +64,33 @@ def write(
     fps: float = 25.0,
     face: str = "portrait",
 ) -> None:
-    """Write one result to one or several files, each in the format of its suffix.
+    """Write generated motion to one or several files, each in the format of its suffix.
 
-    outputs  : ``.json``, ``.csv``, ``.npz`` (motion) or ``.mp4`` (the drawn face, with sound)
-    speech   : the recording it came from; a video needs it
-    model    : what made the result; motion files then name its corpus and licence
-    channels : those to write to motion files, in this order; all by default
-    rate_hz  : frames per second of motion files; the model's own 100 by default
-    fps      : frames per second of videos
-    face     : which face videos show: ``portrait``, or one that an installed package adds
+    generation : from ``animate``
+    outputs  : paths of files: ``.json``, ``.csv``, ``.npz`` (motion) or ``.mp4`` (a drawn face, with sound)
+    speech   : the recording that was animated; a video needs it for its sound
+    model    : the model that generated the motion; motion files then name its corpus and licence
+    channels : channels of motion files, in this order; None: all
+    rate_hz  : frames per second of motion files, 1 to 1000; None: the 100 of the model
+    fps      : frames per second of videos, 1 to 1000
+    face     : the face of videos: ``portrait``, or the name of a face of an installed package
     Raises ExportError: unknown suffix, no such folder, or a file that cannot be written.
-    Raises InputError: a frame rate that is not from 1 to 1000, or an unknown channel or face.
-    All of that is checked before the first file is written.
+    Raises InputError: a frame rate out of its range, or an unknown channel or face.
+    The arguments are checked before the first file is written.
+
+    >>> import lipmotion, tempfile
+    >>> result = lipmotion.animate("examples/welcome.flac")
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     lipmotion.write(result, Path(folder) / "welcome.csv", rate_hz=25, channels=["opening", "width"])
+    ...     print((Path(folder) / "welcome.csv").read_text().splitlines()[0])
+    time_s,opening,width
     """
     paths = [Path(output) for output in ([outputs] if isinstance(outputs, str | Path) else outputs)]
     check_outputs(paths, speech, rate_hz=rate_hz, fps=fps, face=face)
     videos = [path for path in paths if path.suffix.lower() == VIDEO_SUFFIX]
     if videos and "opening" not in generation.motion.names:
         raise ExportError(f"{videos[0]}: the motion has no channel 'opening' to draw a face from; write motion files")
-    drawn = face_named(face)
+    drawn_face = face_named(face)
     written = generation.selected(channels) if channels is not None else generation
     if rate_hz is not None:
         written = written.resampled(rate_hz)
@@ -88,7 +99,7 @@ def write(
             check_motion(path, written.motion)
     for path in paths:
         if path.suffix.lower() == VIDEO_SUFFIX:
-            _write_video(generation, path, Path(str(speech)), fps, drawn)
+            _write_video(generation, path, Path(str(speech)), fps, drawn_face)
         else:
             _write_motion(written, path, speech, model)
 
@@ -101,7 +112,10 @@ def check_outputs(
     fps: float = 25.0,
     face: str = "portrait",
 ) -> None:
-    """Raise ExportError or InputError unless every output can be written: before work begins, not after it."""
+    """Raise ExportError or InputError if an output cannot be written; called before long work begins.
+
+    outputs, speech, rate_hz, fps, face : as of ``write``
+    """
     for hertz in (fps, rate_hz):
         if hertz is not None and not SLOWEST_HZ <= hertz <= FASTEST_HZ:
             raise InputError(f"the frame rate is {hertz}, required {SLOWEST_HZ:.0f} to {FASTEST_HZ:.0f} a second")

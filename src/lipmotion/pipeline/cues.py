@@ -1,4 +1,4 @@
-"""Results to held mouth shapes, and those to files: for 2D animators."""
+"""Mouth shapes for 2D animation: ``cues(generation) → cue sheet``; cue sheets to files: ``write_cues``."""
 
 from __future__ import annotations
 
@@ -13,24 +13,29 @@ from lipmotion.storage.files import as_text, check_distinct, check_target
 from lipmotion.types import Generation
 
 FASTEST_FPS = 60.0
-"""Cue files count in hundredths of a second: at more frames than this, two of them could have one name."""
+"""Largest frame rate: times in cue files are in hundredths of a second, and two frames must not share one."""
 
 
 def cues(
     generation: Generation, *, fps: float = 24.0, hold_frames: int | None = None, shapes: str = OPTIONAL
 ) -> CueSheet:
-    """Return the mouth shapes of a result for 2D animation, each held long enough.
+    """Return the mouth shapes of generated motion for 2D animation, each held for a least number of frames.
 
+    generation  : from ``animate``; without a channel ``opening``, shapes are chosen from the phones alone
     fps         : frames per second of the animation, 1 to 60
-    hold_frames : frames that every shape is held at least; by default as long as two at 24 a second
-    shapes      : which of the optional shapes ``G``, ``H`` and ``X`` the character has, besides A to F
-    Where the motion has no channel ``opening``, the phones decide alone.
+    hold_frames : smallest number of frames of a shape; None: as many as last two frames at 24 frames per second
+    shapes      : the optional shapes among ``G``, ``H`` and ``X`` that the character has, besides A to F
     Raises InputError: an argument out of its range.
-    Raises ExportError: a result without phones, or with values that are not finite.
+    Raises ExportError: the generation has no phones, or has values that are not finite.
+
+    >>> import lipmotion
+    >>> sheet = lipmotion.cues(lipmotion.animate("examples/welcome.flac"))
+    >>> sheet.cues[0]
+    Span(start_s=0.0, end_s=0.5, label='X')
     """
     check_cue_options(fps, hold_frames, shapes)
     if len(generation.motion.values) and not len(generation.units):
-        raise ExportError("the result has no phones, and cues need them; take it from lipmotion.animate")
+        raise ExportError("the generation has no phones, and cues need them; use one of lipmotion.animate")
     if not np.isfinite(generation.motion.values).all():
         raise ExportError("the motion has values that are not finite; interpolate them first")
     return choose_cues(generation, fps, hold_frames, shapes)
@@ -39,12 +44,21 @@ def cues(
 def write_cues(
     sheet: CueSheet, outputs: str | Path | Sequence[str | Path], *, speech: str | Path = "", form: str | None = None
 ) -> None:
-    """Write cues to one or several files, each in the format of its suffix.
+    """Write a cue sheet to one or several files, each in the format of its suffix.
 
-    outputs : ``.tsv``, ``.xml``, ``.json`` (Rhubarb's) or ``.dat`` (Moho's)
-    speech  : the recording they came from: ``.xml`` and ``.json`` name it
-    form    : ``tsv``, ``xml``, ``json`` or ``dat``, whatever the suffix
-    Raises ExportError: unknown format, no such folder, or a file that cannot be written; before the first is written.
+    sheet   : from ``cues``
+    outputs : paths of files: ``.tsv``, ``.xml``, ``.json`` (formats of Rhubarb) or ``.dat`` (Moho)
+    speech  : the recording that was animated; ``.xml`` and ``.json`` files name it
+    form    : ``tsv``, ``xml``, ``json`` or ``dat``: the format of all files; None: that of the suffix
+    Raises ExportError: unknown format, no such folder, or a file that cannot be written.
+    Formats and folders are checked before the first file is written.
+
+    >>> import lipmotion, tempfile
+    >>> sheet = lipmotion.cues(lipmotion.animate("examples/welcome.flac"))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     lipmotion.write_cues(sheet, Path(folder) / "welcome.tsv")
+    ...     print((Path(folder) / "welcome.tsv").read_text().splitlines()[0].split())
+    ['0.00', 'X']
     """
     paths = [Path(output) for output in ([outputs] if isinstance(outputs, str | Path) else outputs)]
     check_cue_outputs(paths, speech, form)
@@ -53,12 +67,15 @@ def write_cues(
 
 
 def cue_text(sheet: CueSheet, *, speech: str | Path = "", form: str = "tsv") -> str:
-    """Return what ``write_cues`` would write."""
+    """Return the text of the file that ``write_cues`` would write.
+
+    speech : the recording that was animated;  form : ``tsv``, ``xml``, ``json`` or ``dat``
+    """
     return CUE_FORMATS[form](sheet, as_text(speech))
 
 
 def check_cue_options(fps: float, hold_frames: int | None, shapes: str) -> None:
-    """Raise InputError unless cues can be chosen so."""
+    """Raise InputError if an argument of ``cues`` is out of its range."""
     if not 1 <= fps <= FASTEST_FPS:
         raise InputError(f"the frame rate is {fps}, required 1 to {FASTEST_FPS:.0f} a second")
     if hold_frames is not None and hold_frames < 1:
@@ -68,7 +85,7 @@ def check_cue_options(fps: float, hold_frames: int | None, shapes: str) -> None:
 
 
 def check_cue_outputs(outputs: Sequence[Path], speech: str | Path, form: str | None) -> None:
-    """Raise ExportError unless every output can be written."""
+    """Raise ExportError if an output of ``write_cues`` cannot be written."""
     if form is not None and form not in CUE_FORMATS:
         raise ExportError(f"unknown cue format {form!r}; required one of: {' '.join(CUE_FORMATS)}")
     check_distinct(outputs)

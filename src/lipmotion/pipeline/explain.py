@@ -1,4 +1,4 @@
-"""What determined a frame: ``explain(speech, at=…) → explanations``, and explanations as text and JSON."""
+"""Explanations of frames: ``explain(speech, at=…) → explanations``, and their text and JSON."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ from lipmotion.types import (
 )
 
 LINE = 110
-"""Letters of a line of text, its name aside."""
+"""Width of the text of a row, without its name, in characters."""
 SHOWN = 6
-"""Channels in a line of text; points are left out where there is anything else."""
+"""Largest number of channels in a text; points are left out if there are other channels."""
 
 
 @one_thread()
@@ -45,13 +45,14 @@ def explain(
 
     speech, transcript : as of ``animate``
     at    : one or several times, in seconds; the nearest 10 ms frame of each is explained
-    model : from ``load_model``, or its file; None: the shipped one
+    model : from ``load_model``, or the path of a model file; None: the shipped model
     Raises InputError: a time lies outside the recording; else as ``animate``.
+    Raises AlignmentError: the transcript cannot be aligned with the recording.
 
     >>> import lipmotion
-    >>> (found,) = lipmotion.explain("examples/welcome.flac", at=1.0)
-    >>> found.frame
-    100
+    >>> first, second = lipmotion.explain("examples/welcome.flac", at=[0.0, 1.0])
+    >>> first.state, second.frame
+    ('rest', 100)
     """
     chosen = model if isinstance(model, Model) else load_model(model)
     request = request_of(speech, transcript)
@@ -59,14 +60,15 @@ def explain(
     times = [at] if isinstance(at, int | float) else at
     count = frame_count(audio.samples)
     frames = [_frame(time_s, count) for time_s in times]
-    known = understand(chosen, replace(request, recording=audio))
+    understood = understand(chosen, replace(request, recording=audio))
     if isinstance(chosen.engine, Explains):
-        return chosen.engine.explain(chosen.learned, known, frames)
-    result = chosen.engine.generate(chosen.learned, known)
-    return tuple(explain_by_trace(result, frame) for frame in frames)
+        return chosen.engine.explain(chosen.learned, understood, frames)
+    generation = chosen.engine.generate(chosen.learned, understood)
+    return tuple(explain_by_trace(generation, frame) for frame in frames)
 
 
 def _frame(time_s: float, frames: int) -> int:
+    """Return the frame nearest to a time. Raises InputError: the time lies outside the recording."""
     frame = frame_of(time_s, frames, FRAME_RATE_HZ)
     if frame is None:
         raise InputError(f"{time_s} s lies outside the recording (0 to {(frames - 1) / FRAME_RATE_HZ:.2f} s)")
@@ -74,7 +76,7 @@ def _frame(time_s: float, frames: int) -> int:
 
 
 def explanation_document(explanation: Explanation) -> dict[str, Any]:
-    """Return an explanation as JSON holds it (docs/explain.md)."""
+    """Return an explanation as an object of JSON (docs/explain.md)."""
     document = asdict(explanation)
     for written, chain in zip(document["chains"], explanation.chains, strict=True):
         if chain.lead:
@@ -83,7 +85,7 @@ def explanation_document(explanation: Explanation) -> dict[str, Any]:
 
 
 def explanation_text(explanation: Explanation) -> str:
-    """Return an explanation as lines for people to read."""
+    """Return an explanation as lines of text for people to read."""
     rows = list(_rows(explanation))
     width = max(len(name) for name, _ in rows) + 2
     lines = [f"{explanation.time_s:.2f} s (frame {explanation.frame})"]
@@ -107,7 +109,7 @@ def _rows(explanation: Explanation) -> Iterator[tuple[str, str]]:
         yield f"Gaussian of {gaussian.stream}", _gaussian(gaussian)
         yield from _values(gaussian.channels)
     for regression in explanation.regressions:
-        yield f"mean of {regression.stream}", _followed(regression)
+        yield f"mean of {regression.stream}", _regression(regression)
         yield from _values(regression.channels)
     values = _values(explanation.motion)
     yield "generated", next(values)[1]
@@ -123,8 +125,8 @@ def _phone(explanation: Explanation) -> str:
     return f"{phone}{word}, {span.start_s:.2f} to {span.end_s:.2f} s, modelled by {span.label.unit}"
 
 
-def _listed(found: Sequence[NamedProbability]) -> str:
-    return "   ".join(f"{one.name} {one.probability:.2f}" for one in found)
+def _listed(probabilities: Sequence[NamedProbability]) -> str:
+    return "   ".join(f"{item.name} {item.probability:.2f}" for item in probabilities)
 
 
 def _lead(chain: ChainStates, first: str) -> str:
@@ -141,7 +143,7 @@ def _gaussian(gaussian: DominantGaussian) -> str:
     return f"{gaussian.density}{number}, responsible for {gaussian.responsibility:.2f}{distance}"
 
 
-def _followed(regression: RegressedMean) -> str:
+def _regression(regression: RegressedMean) -> str:
     if regression.shares[0].name == "rest":
         return "the rest pose: silence away from speech"
     return f"regression on the acoustic features and posteriors around the frame: {_listed(regression.shares)}"

@@ -1,4 +1,4 @@
-"""A trained model as one value and as one file."""
+"""Trained models: as a value, and as a file."""
 
 from __future__ import annotations
 
@@ -28,14 +28,19 @@ SHIPPED = "grid-s1.lipmotion"
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """Everything that speech needs to become motion.
+    """A trained model: phone models, and an engine with its model of motion.
 
-    phones     : the acoustic models
-    engine     : with its configuration
-    learned    : what the engine learned
-    about      : corpus, split, seed, versions, licence, attribution: whatever a user must know
-    adaptation : how it hears the voice that it was adapted to, if it was
-    eigenlips  : the space of mouth pictures, if their coefficients are among what was learned
+    phones     : phone models for recognition and alignment
+    engine     : the engine, with its configuration
+    learned    : the engine's model of motion
+    about      : corpus, split, seed, versions, licence, attribution, by name: the information for users
+    adaptation : adaptation of the phone models to a speaker (None: not adapted)
+    eigenlips  : principal components of mouth pictures (None: the channels do not contain their coefficients)
+
+    >>> import lipmotion
+    >>> model = lipmotion.load_model()
+    >>> model.engine.name, model.visual, model.about["corpus"]
+    ('trajectory', 'geometry', ['The GRID audiovisual sentence corpus (zenodo.org/record/3625687)'])
     """
 
     phones: UnitHmm
@@ -47,14 +52,20 @@ class Model:
 
     @property
     def visual(self) -> str:
-        """Which channels were learned: one of ``visual.VISUALS``."""
+        """The kind of channels of the model: ``geometry``, ``eigenlips`` or ``both``."""
         return str(self.about.get("visual", GEOMETRY if self.eigenlips is None else EIGENLIPS))
 
 
 def save_model(model: Model, path: str | Path) -> None:
-    """Write a model: a zip of plain arrays and a JSON header, never pickle.
+    """Write a model to a file: a zip of plain arrays and a JSON header (docs/formats.md), never pickle.
 
     Raises ExportError: the file cannot be written.
+
+    >>> import lipmotion, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     lipmotion.save_model(lipmotion.load_model(), Path(folder) / "copy.lipmotion")
+    ...     lipmotion.load_model(Path(folder) / "copy.lipmotion").engine.name
+    'trajectory'
     """
     arrays = {f"phones/{key}": array for key, array in hmm_arrays(model.phones).items()}
     arrays |= {f"engine/{key}": array for key, array in model.engine.to_arrays(model.learned).items()}
@@ -74,9 +85,15 @@ def save_model(model: Model, path: str | Path) -> None:
 
 
 def load_model(path: str | Path | None = None) -> Model:
-    """Return a model; the one that ships with the package by default.
+    """Return the model in a file.
 
-    Raises InputError: no such file.  Raises ModelFormatError: not a model, damaged, or of a newer version.
+    path : of a file that ``save_model`` or ``lipmotion train`` wrote; None: the model that ships with the package
+    Raises InputError: no such file.
+    Raises ModelFormatError: the file is not a model, is damaged, or has another version.
+
+    >>> import lipmotion
+    >>> lipmotion.load_model().about["licence"]
+    ['CC BY 4.0']
     """
     if path is None:
         return _shipped()
@@ -87,7 +104,7 @@ def load_model(path: str | Path | None = None) -> Model:
 
 
 def read_header(path: Path) -> dict[str, Any]:
-    """Return what a model file says of itself. Raises as ``load_model``."""
+    """Return the header of a model file. Raises as ``load_model``."""
     if not path.is_file():
         raise InputError(f"{path}: no such model")
     try:
@@ -107,7 +124,7 @@ def read_header(path: Path) -> dict[str, Any]:
 
 
 def shipped_path() -> Path:
-    """Return where the model that ships with the package lies."""
+    """Return the path of the model that ships with the package."""
     return Path(str(resources.files("lipmotion") / "models" / SHIPPED))
 
 
@@ -128,9 +145,9 @@ def _read(path: Path) -> Model:
     arrays: dict[str, dict[str, NDArray[Any]]] = {}
     try:
         stored = read_archive(path)
-        for part in _PARTS:
-            arrays[part] = arrays_under(stored, f"{part}/")
-        refuse_undeclared(stored, (f"{part}/{key}" for part, own in arrays.items() for key in own))
+        for folder in _FOLDERS:
+            arrays[folder] = arrays_under(stored, f"{folder}/")
+        refuse_undeclared(stored, (f"{folder}/{key}" for folder, inner in arrays.items() for key in inner))
         engine = engine_named(header["engine"], _options(header, "configuration"))
         config = HmmConfig.parsed(_options(header, "recogniser"))
         phones = hmm_from_arrays(arrays["phones"], config)
@@ -150,12 +167,14 @@ def _read(path: Path) -> Model:
 
 
 def _options(header: Mapping[str, Any], key: str) -> Mapping[str, Any]:
-    """Return a configuration in a header. Raises KeyError, TypeError: there is none."""
+    """Return the options of a configuration in a header. Raises KeyError, TypeError: the header has none."""
     options: Any = header[key]
     if not isinstance(options, dict):
         raise TypeError(f"{key} is {options!r}, required options by name")
     return options
 
 
-_PARTS = ("phones", "engine", "adaptation", "eigenlips")
+_FOLDERS = ("phones", "engine", "adaptation", "eigenlips")
+"""Prefixes of the names of all arrays."""
 _OWN_KEYS = ("format", "version", "engine", "configuration", "recogniser")
+"""Keys of the header that are not part of ``Model.about``."""

@@ -1,4 +1,4 @@
-"""Posterior probabilities of the chains of a model while speech becomes motion, and their picture."""
+"""Posterior probabilities of the chains of a model over time, and their picture."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SUFFIX = ".png"
 
 @one_thread()
 def animate_with_posteriors(speech: SpeechInput, *, model: Model) -> tuple[Generation, tuple[ChainPosteriors, ...]]:
-    """Return what ``animate`` returns, and the posterior probabilities of the units of every chain of the model.
+    """Return generated motion as ``animate`` does, and the posterior probabilities of every chain of the model.
 
     Raises InputError: as ``animate``, or the model's engine has no chains of states.
     """
@@ -30,19 +30,19 @@ def animate_with_posteriors(speech: SpeechInput, *, model: Model) -> tuple[Gener
             f"the engine {engine.name!r} has no chains of states whose posteriors could be shown; give a model that "
             f"was trained with --engine {' or '.join(having)}"
         )
-    known = understand(model, request_of(speech))
-    return engine.generate(learned, known), engine.posteriors(learned, known)
+    understood = understand(model, request_of(speech))
+    return engine.generate(learned, understood), engine.posteriors(learned, understood)
 
 
 def check_picture(path: Path, speech: Path | None = None) -> None:
-    """Raise ExportError unless a picture can be written there."""
+    """Raise ExportError if a picture cannot be written to a path."""
     if path.suffix.lower() != SUFFIX:
         raise ExportError(f"{path}: unknown format {path.suffix!r}; required: {SUFFIX}")
     check_target(path, speech)
 
 
-def write_posteriors(path: Path, generation: Generation, beliefs: tuple[ChainPosteriors, ...]) -> None:
-    """Write a picture of the posteriors of chains over time (docs/explain.md).
+def write_posteriors(path: Path, generation: Generation, posteriors: tuple[ChainPosteriors, ...]) -> None:
+    """Write a picture of the posterior probabilities of chains over time (docs/explain.md).
 
     Raises ExportError: another suffix, or the file cannot be written.
     """
@@ -50,4 +50,4 @@ def write_posteriors(path: Path, generation: Generation, beliefs: tuple[ChainPos
 
     check_picture(path)
     with whole_file(path) as unfinished:
-        draw_posteriors(generation, beliefs).save(unfinished, optimize=True)
+        draw_posteriors(generation, posteriors).save(unfinished, optimize=True)

@@ -1,4 +1,4 @@
-"""What is known of a recording before it is animated: one value instead of many arguments."""
+"""Requests: a recording, with all that its user knows of it."""
 
 from __future__ import annotations
 
@@ -12,18 +12,20 @@ from lipmotion.units import Lexicon
 
 @dataclass(frozen=True, eq=False)
 class SpeechRequest:
-    """A recording, and what its user knows of it.
+    """A recording, with all that its user knows of it: the input of ``animate`` and ``explain``.
 
     recording  : an audio or video file, or samples at 16 kHz
-    transcript : what is said, or a Path to a text file: phones are then aligned instead of recognised
-    units      : phones in time, for instance edited ones of an earlier result: nothing is recognised then
-    lexicon    : pronunciations of words that the dictionary does not have
-    recogniser : ``own``: the phone models of the animating model; ``general``: those of many voices; ``auto``: both,
-                 the own ones as far as the similarity of the speaker allows
+    transcript : the spoken words, or a Path of a text file; with a transcript, phones are aligned instead of recognised
+    units      : phones in time, for instance those of an earlier generation, edited; with units, phones are neither
+                 recognised nor aligned
+    lexicon    : pronunciations of words, ahead of those of the dictionary
+    recogniser : ``own``: the phone models of the model; ``general``: those of many voices; ``auto``: both, weighted by
+                 the speaker similarity score
 
-    >>> request = SpeechRequest("hello.wav", transcript="Hello there")
-    >>> request.recogniser
-    'auto'
+    >>> import lipmotion
+    >>> request = lipmotion.SpeechRequest("examples/welcome.flac", recogniser="general")
+    >>> lipmotion.animate(request).units[0].label.phone
+    'sil'
     """
 
     recording: str | Path | Audio
@@ -34,13 +36,13 @@ class SpeechRequest:
 
 
 SpeechInput = str | Path | Audio | SpeechRequest
-"""What ``animate`` and ``explain`` take: a recording alone, or with what is known of it."""
+"""A recording alone, or a request."""
 
 
 def request_of(speech: SpeechInput, transcript: str | Path | None = None) -> SpeechRequest:
-    """Return the request for a recording, or the request itself, with a transcript where one is given.
+    """Return a request for a recording, or the given request; with the transcript, if one is given.
 
-    Raises InputError: a request that has a transcript, and another one.
+    Raises InputError: a transcript is given, and the request has one already.
     """
     if not isinstance(speech, SpeechRequest):
         return SpeechRequest(speech, transcript)

@@ -1,4 +1,4 @@
-"""Recordings to phones in time: with a transcript by alignment, without one by recognition."""
+"""Phones in time of recordings: by forced alignment of a transcript, or by recognition."""
 
 from __future__ import annotations
 
@@ -17,18 +17,20 @@ from lipmotion.units.length_limits import LARGEST_TRANSCRIPT
 
 LOG = logging.getLogger("lipmotion")
 MOST_WARNINGS = 20
-"""Words of which it is said one by one how they were guessed."""
+"""Largest number of guessed pronunciations that are reported one by one."""
 
 
 def transcribe(
     phones: Recogniser, audio: Audio, features: Features, words: Sequence[str] | None, lexicon: Lexicon
 ) -> Timeline[Unit]:
-    """Return the phones of a recording.
+    """Return the phones in time of a recording, with warnings for the user.
 
+    phones   : the recogniser
     features : of the audio, from ``mfcc``
-    words    : what is said in it, lower case, or None
-    A warning says if the words are hardly what is said (only where general models listen).
-    Raises AlignmentError: the words do not fit into the recording.
+    words    : the spoken words in lower case, or None
+    Warnings are logged for guessed pronunciations and, with general phone models, for words that do not agree with the
+    sound.
+    Raises AlignmentError: the words cannot be aligned with the recording.
     """
     warn_of_guesses(words or (), lexicon)
     units = phones_in_time(phones, audio, features, words, lexicon)
@@ -40,7 +42,7 @@ def transcribe(
 def phones_in_time(
     phones: Recogniser, audio: Audio, features: Features, words: Sequence[str] | None, lexicon: Lexicon
 ) -> Timeline[Unit]:
-    """Return the same without a word about guesses, for many recordings."""
+    """Return the phones in time of a recording as ``transcribe`` does, without warnings."""
     if words is None:
         return phones.recognise(audio, features)
     check_words(words, audio.duration_s)
@@ -48,7 +50,7 @@ def phones_in_time(
 
 
 def read_transcript(path: Path) -> str:
-    """Return the text of a file.
+    """Return the text of a transcript file.
 
     Raises InputError: no such file, larger than ``LARGEST_TRANSCRIPT``, not UTF-8 text, or labels in time.
     """
@@ -58,19 +60,19 @@ def read_transcript(path: Path) -> str:
 
 
 def warn_of_disagreement(audio: Audio, units: Timeline[Unit]) -> None:
-    """Warn if the phones of a transcript, aligned, are not what is heard."""
-    found = agreement_score(audio, units)
-    if found < DOUBTFUL_SCORE:
+    """Log a warning if the aligned phones of a transcript do not agree with the sound."""
+    score = agreement_score(audio, units)
+    if score < DOUBTFUL_SCORE:
         LOG.warning(
             "the transcript seems not to be what is said (its phones agree with the sound at %.1f, required %.1f or "
             "more); check it, or leave it out",
-            found,
+            score,
             DOUBTFUL_SCORE,
         )
 
 
 def warn_of_guesses(words: Sequence[str], lexicon: Lexicon) -> None:
-    """Warn of every word whose pronunciation is a guess; of many, say the first ``MOST_WARNINGS`` and how many more."""
+    """Log a warning for every word whose pronunciation is a guess; after ``MOST_WARNINGS``, for how many more."""
     unknown = [word for word in dict.fromkeys(words) if not lexicon.known(word)]
     for word in unknown[:MOST_WARNINGS]:
         guessed = " ".join(lexicon.pronunciations(word)[0])

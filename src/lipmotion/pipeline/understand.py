@@ -1,4 +1,4 @@
-"""Recordings as engines take them: acoustic features, phones in time, F0."""
+"""Recordings to the input of engines: acoustic features, phones in time, F0."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ from lipmotion.types import Audio, Features, Speech, Timeline, Unit
 from lipmotion.units import Lexicon, check_phones, check_text, words_of
 
 LATE_S = 0.1
-"""Units may end this long after the sound: editors round."""
+"""Seconds by which given units may end after the sound; editing programs round times."""
 LOG = logging.getLogger("lipmotion")
 
 
 def understand(model: Model, request: SpeechRequest) -> Speech:
-    """Return the speech of a request as the engine of a model takes it: features, phones in time, F0 if wanted.
+    """Return the speech of a request as input of a model's engine: features, phones in time, and F0 if it is needed.
 
     Raises InputError: the recording, the transcript or the units are not usable, or there is no such recogniser.
-    Raises AlignmentError: the transcript does not fit into the recording.
+    Raises AlignmentError: the transcript cannot be aligned with the recording.
     """
     audio = analysed(audio_of(request))
     phones = cached_recogniser(model.phones, request.recogniser, model.adaptation)
@@ -53,7 +53,7 @@ def audio_of(request: SpeechRequest) -> Audio:
 
 
 def speech_of(engine: Animator[Any], audio: Audio, features: Features, units: Timeline[Unit]) -> Speech:
-    """Return features with phones in time, and with the F0 of the recording where the engine wants it."""
+    """Return speech of features and phones in time, with the F0 of the recording if the engine needs it."""
     return Speech(features, units, log_f0(audio) if isinstance(engine, WantsF0) and engine.wants_f0 else None)
 
 
@@ -65,25 +65,28 @@ def recognised_speech(
     phones: Recogniser,
     recognise: Callable[[], Timeline[Unit]],
 ) -> Speech:
-    """Return a recording whose words are not known, with recognised phones in time.
+    """Return the speech of a recording whose words are not known, with recognised phones in time.
 
-    They are those that the engine's own model recognises, if it was trained on this voice, placed in time by ``phones``
-    as the phones of the training were; else those that ``recognise`` returns.
+    learned   : the engine's model of motion
+    phones    : the recogniser
+    recognise : returns phones in time, for speakers that the engine does not recognise itself
+    If the engine's own model recognises phones of this speaker, these are aligned by ``phones``, as the phones of the
+    training were; else the result of ``recognise`` is used.
     """
     speech = speech_of(engine, audio, features, Timeline(()))
-    found = None
+    recognised = None
     if isinstance(engine, RecognisesPhones) and phones.kind != "general":
-        found = engine.recognise(learned, speech)
-    if found is None:
+        recognised = engine.recognise(learned, speech)
+    if recognised is None:
         return replace(speech, units=recognise(), units_known=False)
     try:
-        return replace(speech, units=phones.align_phones(audio, features, found), units_known=False)
+        return replace(speech, units=phones.align_phones(audio, features, recognised), units_known=False)
     except AlignmentError:
         return replace(speech, units=recognise(), units_known=False)
 
 
 def _words(transcript: str | Path | None, duration_s: float) -> tuple[str, ...] | None:
-    """Return what is said. Raises AlignmentError: a text that is too long for the recording."""
+    """Return the words of a transcript. Raises AlignmentError: a text that is too long for the recording."""
     text = read_transcript(transcript) if isinstance(transcript, Path) else transcript
     if text is None:
         return None
@@ -92,6 +95,7 @@ def _words(transcript: str | Path | None, duration_s: float) -> tuple[str, ...] 
 
 
 def _check_units(units: Timeline[Unit], duration_s: float) -> None:
+    """Raise InputError if given units are empty or too many; log a warning if they end after the recording."""
     if not len(units):
         raise InputError(
             "the units are an empty list (a .csv has none); give those of a .json or .npz, or leave them out"
@@ -99,7 +103,7 @@ def _check_units(units: Timeline[Unit], duration_s: float) -> None:
     check_phones(len(units), duration_s)
     if units[-1].end_s > duration_s + LATE_S:
         LOG.warning(
-            "the units go on to %.2f s, the recording ends at %.2f s: are they those of another?",
+            "the units go on to %.2f s, the recording ends at %.2f s: are they those of another recording?",
             units[-1].end_s,
             duration_s,
         )

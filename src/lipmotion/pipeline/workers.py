@@ -1,7 +1,7 @@
-"""Processes that share a long job, and end with it however it ends.
+"""Worker processes that share a long job, and that end when it ends, for whatever reason.
 
-Not ``concurrent.futures``: where a process is killed while it sends a large result, that waits for the rest for ever.
-Here every worker has a pipe of its own, whose end is noticed.
+``concurrent.futures`` is not used: if a process is killed while it sends a large result, it waits for the rest forever.
+Here every worker has a pipe of its own, and the end of a pipe is detected.
 """
 
 from __future__ import annotations
@@ -21,60 +21,60 @@ from typing import Any, TypeVar
 from lipmotion.errors import CorpusError
 from lipmotion.kernels.threads import one_thread
 
-GivenT = TypeVar("GivenT")
-FoundT = TypeVar("FoundT")
+ItemT = TypeVar("ItemT")
+ResultT = TypeVar("ResultT")
 
 
 class Workers:
-    """Calls functions of modules, which must not depend on anything but their argument.
+    """Applies functions to items in worker processes, or in this process if there are none.
 
-    With one worker, in this process. Otherwise a script must be guarded by ``if __name__ == "__main__":``.
-    Take all results before asking for others.
+    A function must be defined in a module and depend on its argument alone. With worker processes, a script must be
+    guarded by ``if __name__ == "__main__":``. All results of a call must be taken before the next call.
     """
 
     def __init__(self, ends: Sequence[Any]) -> None:
         self._ends = ends
 
-    def ordered_map(self, function: Callable[[GivenT], FoundT], items: Iterable[GivenT], /) -> Iterator[FoundT]:
+    def ordered_map(self, function: Callable[[ItemT], ResultT], items: Iterable[ItemT], /) -> Iterator[ResultT]:
         """Yield the results in the order of the items. Raises CorpusError: a process died."""
-        found: dict[int, FoundT] = {}
-        wanted = 0
+        waiting: dict[int, ResultT] = {}
+        following = 0
         for number, result in self._numbered(function, items):
-            found[number] = result
-            while wanted in found:
-                yield found.pop(wanted)
-                wanted += 1
+            waiting[number] = result
+            while following in waiting:
+                yield waiting.pop(following)
+                following += 1
 
-    def unordered_map(self, function: Callable[[GivenT], FoundT], items: Iterable[GivenT]) -> Iterator[FoundT]:
+    def unordered_map(self, function: Callable[[ItemT], ResultT], items: Iterable[ItemT]) -> Iterator[ResultT]:
         """Yield the results in the order in which they are ready. Raises CorpusError: a process died."""
         return (result for _, result in self._numbered(function, items))
 
-    def _numbered(self, function: Callable[[GivenT], FoundT], items: Iterable[GivenT]) -> Iterator[tuple[int, FoundT]]:
+    def _numbered(self, function: Callable[[ItemT], ResultT], items: Iterable[ItemT]) -> Iterator[tuple[int, ResultT]]:
         if not self._ends:
             yield from enumerate(map(function, items))
             return
-        left, busy = enumerate(items), dict[Any, int]()
+        remaining, busy = enumerate(items), dict[Any, int]()
 
-        def occupy(end: Any) -> None:
-            for number, item in islice(left, 1):
+        def send_next(end: Any) -> None:
+            for number, item in islice(remaining, 1):
                 _send(end, (function, item))
                 busy[end] = number
 
         for end in self._ends:
-            occupy(end)
+            send_next(end)
         while busy:
             for end in pipes.wait(list(busy)):
                 number = busy.pop(end)
-                good, result = _received(end)
-                occupy(end)
-                if not good:
+                succeeded, result = _received(end)
+                send_next(end)
+                if not succeeded:
                     raise result
                 yield number, result
 
 
 @contextmanager
 def worker_pool(count: int) -> Iterator[Workers]:
-    """Give ``count`` workers; their processes end when the block is left, at once if by an exception.
+    """Provide ``count`` workers; their processes end when the block is left, immediately if by an exception.
 
     Matrix products use one thread inside the block and in every worker, so that results do not depend on ``count``.
     """
@@ -87,12 +87,12 @@ def worker_pool(count: int) -> Iterator[Workers]:
 
 @contextmanager
 def _worker() -> Iterator[Any]:
-    """Start a process; give this process's end of the pipe to it."""
+    """Start a worker process; provide this process's end of the pipe to it."""
     context = multiprocessing.get_context("spawn")
     here, there = context.Pipe()
     process = context.Process(target=_work, args=(there,), daemon=True)
     try:
-        with _signals_held():
+        with _signals_delayed():
             process.start()
         there.close()  # the process alone has it: when it ends, so does the pipe
         yield here
@@ -100,7 +100,7 @@ def _worker() -> Iterator[Any]:
         _kill(process)
         raise
     finally:
-        here.close()  # no more work for it
+        here.close()  # tells the worker to end
         if process.pid is not None:
             process.join()
 
@@ -132,49 +132,49 @@ def _died() -> CorpusError:
 
 
 @contextmanager
-def _signals_held() -> Iterator[None]:
-    """Hold Ctrl-C and ``kill`` back for a moment, and from processes that are started meanwhile for ever.
+def _signals_delayed() -> Iterator[None]:
+    """Delay Ctrl-C and ``kill`` inside the block, and block them forever in processes that are started inside it.
 
-    The terminal sends Ctrl-C to all of them, but only the first one, which ends the others, should act on it. A mask
-    alone does not hold them back here: any other thread, such as those of a BLAS, takes them, and Python answers in
-    this one.
+    The terminal sends Ctrl-C to all processes, but only the first one, which ends the others, should act on it. A mask
+    alone does not delay the signals in this process: another thread, for instance of a BLAS, receives them, and Python
+    runs their handlers in this one.
     """
     if sys.platform == "win32":
         yield
         return
     from multiprocessing import resource_tracker
 
-    resource_tracker.ensure_running()  # else it starts with the first process, and lets go of the signals
+    resource_tracker.ensure_running()  # else it starts with the first process, and unblocks the signals
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
-    came: list[int] = []
-    answers = _answered_by(lambda number, _: came.append(number))
+    received: list[int] = []
+    handlers = _handled_by(lambda number, _: received.append(number))
     try:
         yield
     finally:
-        for number, answer in answers.items():
-            signal.signal(number, answer)
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
-        for number in came[:1]:
+        for number in received[:1]:
             signal.raise_signal(number)
 
 
-def _answered_by(handler: Callable[[int, Any], None]) -> dict[int, Any]:
-    """Answer signals that are not ignored by ``handler``; return what answered them before.
+def _handled_by(handler: Callable[[int, Any], None]) -> dict[int, Any]:
+    """Set the handler of the signals that are not ignored, and return the previous handlers.
 
-    Only the main thread may; in others, nothing changes.
+    Only the main thread may do so; in other threads, nothing changes.
     """
     if threading.current_thread() is not threading.main_thread():
         return {}
     old: dict[int, Any] = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    old = {number: answer for number, answer in old.items() if answer not in (None, signal.SIG_IGN)}
+    old = {number: previous for number, previous in old.items() if previous not in (None, signal.SIG_IGN)}
     for number in old:
         signal.signal(number, handler)
     return old
 
 
 def _work(end: Any) -> None:
-    """Do what is asked for until the pipe ends."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # where signals cannot be held back
+    """Apply the functions that come through the pipe to their items, until the pipe ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # where signals cannot be delayed
     threading.Thread(target=_end_with_parent, daemon=True).start()
     with one_thread():
         while True:
@@ -183,13 +183,14 @@ def _work(end: Any) -> None:
             except EOFError:
                 return
             try:
-                answer = True, function(item)
+                outcome = True, function(item)
             except Exception as error:
-                answer = False, error
-            end.send(answer)
+                outcome = False, error
+            end.send(outcome)
 
 
 def _end_with_parent() -> None:
+    """Wait until the parent process ends, and end this process."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         parent.join()

@@ -1,1 +1,1 @@
-"""A corpus to a model."""
+"""Training: a corpus to a model."""

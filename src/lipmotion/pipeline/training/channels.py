@@ -1,4 +1,4 @@
-"""What of a face is learned: how points move, what the mouth looks like, or both."""
+"""The channels of a model: tracked or supplied channels, eigenlips, or both."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from lipmotion.types import Motion, Track, Utterance
 
 GEOMETRY, EIGENLIPS, BOTH = "geometry", "eigenlips", "both"
 VISUALS = (GEOMETRY, EIGENLIPS, BOTH)
-"""The channels that were tracked or given; the coefficients of mouth pictures; these after those."""
+"""Tracked or supplied channels; coefficients of mouth pictures (eigenlips); the former followed by the latter."""
 PICTURES = 980
-"""Frames that eigenlips are learned from. Source: Xie & Liu 2007, §5."""
+"""Number of mouth pictures that eigenlips are trained on. Source: Xie & Liu 2007, §5."""
 
 
 def check_visual(visual: str) -> None:
-    """Raise InputError unless it is one of ``VISUALS``."""
+    """Raise InputError if ``visual`` is not one of ``VISUALS``."""
     if visual not in VISUALS:
         raise InputError(f"visual is {visual!r}, required one of: {', '.join(VISUALS)}")
 
@@ -29,43 +29,47 @@ def check_visual(visual: str) -> None:
 def train_eigenlips(
     utterances: Sequence[Utterance], components: int = COMPONENTS, pictures: int = PICTURES
 ) -> Eigenlips:
-    """Return the eigenlips of some utterances, from frames that are seen, spread evenly over all of them.
+    """Return the eigenlips of some utterances, trained on mouth pictures that are spread evenly over all seen frames.
 
-    Raises CorpusError: an utterance without mouth pictures, or none with a frame that is seen.
+    components : principal components per colour
+    pictures   : number of mouth pictures
+    Raises CorpusError: an utterance has no mouth pictures, or no utterance has a seen frame.
     """
-    seen = [np.flatnonzero(utterance.track.seen) for utterance in utterances]
-    ends = np.cumsum([len(frames) for frames in seen])
+    seen_frames = [np.flatnonzero(utterance.track.seen) for utterance in utterances]
+    ends = np.cumsum([len(frames) for frames in seen_frames])
     chosen = evenly_spaced(pictures, int(ends[-1]) if len(ends) else 0)
     if not len(chosen):
         raise CorpusError(f"no face is seen in {len(utterances)} utterances; prepare a corpus of videos with faces")
-    parts = np.split(chosen, np.searchsorted(chosen, ends[:-1]))
-    taken = [
-        _crops(utterance)[frames[part - (end - len(frames))]]
-        for utterance, frames, part, end in zip(utterances, seen, parts, ends, strict=True)
+    by_utterance = np.split(chosen, np.searchsorted(chosen, ends[:-1]))
+    crops = [
+        _crops(utterance)[frames[numbers - (end - len(frames))]]
+        for utterance, frames, numbers, end in zip(utterances, seen_frames, by_utterance, ends, strict=True)
     ]
-    sizes = {some.shape[1:] for some in taken}
+    sizes = {array.shape[1:] for array in crops}
     if len(sizes) > 1:
         raise CorpusError(f"mouth pictures of {len(sizes)} sizes; prepare all recordings again with one lipmotion")
-    return fit_eigenlips(np.concatenate(taken), components)
+    return fit_eigenlips(np.concatenate(crops), components)
 
 
 def with_visual_channels(utterance: Utterance, visual: str, eigenlips: Eigenlips | None) -> Utterance:
-    """Return an utterance whose motion has the channels that are learned, at the camera's rate.
+    """Return an utterance whose motion has the channels of ``visual``, at the frame rate of the camera.
 
-    eigenlips : of ``train_eigenlips``; the coefficients are not smoothed, and those of unseen frames not meant
+    visual    : one of ``VISUALS``
+    eigenlips : from ``train_eigenlips``. Coefficients are not smoothed; those of unseen frames are without meaning
     Raises InputError: no such ``visual``, or eigenlips are missing. Raises CorpusError: mouth pictures are missing.
     """
     check_visual(visual)
     if visual == GEOMETRY:
         return utterance
     if eigenlips is None:
-        raise InputError(f"visual {visual!r} without eigenlips; required: those of learned_eigenlips, or of the model")
+        raise InputError(f"visual {visual!r} without eigenlips; required: those of train_eigenlips, or of the model")
     return replace(
         utterance, track=_with_eigenlips(utterance.track, eigenlips.project(_crops(utterance)), visual, eigenlips)
     )
 
 
 def _with_eigenlips(track: Track, coefficients: NDArray[np.float32], visual: str, eigenlips: Eigenlips) -> Track:
+    """Return a track whose channels are eigenlips, after those of the track if ``visual`` is ``BOTH``."""
     values, channels = coefficients.astype(float), eigenlips.channels
     if visual == BOTH:
         values = np.concatenate([track.motion.values, values], axis=1)
@@ -74,6 +78,7 @@ def _with_eigenlips(track: Track, coefficients: NDArray[np.float32], visual: str
 
 
 def _crops(utterance: Utterance) -> NDArray[np.uint8]:
+    """Return the mouth pictures of an utterance. Raises CorpusError: it has none."""
     crops = utterance.track.crops
     if crops is None:
         raise CorpusError(

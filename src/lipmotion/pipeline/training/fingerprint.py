@@ -1,4 +1,4 @@
-"""One short text for everything that training depends on: what an earlier run left is used only if it is the same."""
+"""Digest of all input of a training: a checkpoint is used only if its digest is the same."""
 
 from __future__ import annotations
 
@@ -18,13 +18,17 @@ from lipmotion.storage.files import sha256_of
 from lipmotion.units import Lexicon
 
 PICTURES = "crops.npy"
-"""A large file of an utterance, which only eigenlips are learned from."""
+"""File of the mouth pictures of an utterance: large, and needed for eigenlips only."""
 
 
 def fingerprint(
     corpus: Corpus, names: Sequence[str], engine: Engine[Any], recogniser: HmmConfig, lexicon: Lexicon, visual: str
 ) -> str:
-    """Return a digest of the utterances' content, the configuration, the user's words, and what computes."""
+    """Return a digest of utterances, configurations, the user's lexicon, versions of software, and the processor.
+
+    names  : of the utterances of the corpus
+    visual : kind of the channels; without eigenlips, mouth pictures are not part of the digest
+    """
     digest = hashlib.sha256()
     job = {
         "engine": [engine.name, engine.config.as_mapping()],

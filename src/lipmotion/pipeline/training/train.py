@@ -1,4 +1,4 @@
-"""A corpus to a model: ``train(corpus) → model``."""
+"""Training: ``train(corpus) → model``."""
 
 from __future__ import annotations
 
@@ -52,16 +52,16 @@ from lipmotion.units import Lexicon, is_silent
 
 LOG = logging.getLogger("lipmotion")
 UTTERANCES_PER_WORKER = 32
-"""Utterances that are worth a process of their own."""
+"""Smallest number of utterances for which a further process is started."""
 
 
 @dataclass(frozen=True)
 class TrainReport:
-    """What training used and found.
+    """Report of a training.
 
-    used     : names of the utterances behind the motion
-    skipped  : utterances left out, name to reason
-    figures  : of the engine's training, by name
+    used     : names of the utterances that were used
+    skipped  : reason for every utterance that was not used, by name
+    figures  : figures of the engine's training, by name
     """
 
     used: tuple[str, ...]
@@ -71,13 +71,16 @@ class TrainReport:
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """How long work is run, which changes nothing of its result.
+    """Options of the execution of long work; the result does not depend on them.
 
-    monitor : called with the progress, and with the utterances that are left out
+    monitor : called with reports of progress, and with the utterances that are not used
     work    : a folder for checkpoints, from which the same call continues after it was stopped
-              (``storage.files.unfinished_work`` makes one); the model is the same to the byte
-    workers : processes that share the work, fewer if the corpus is small. With more than one, a script must call under
-              ``if __name__ == "__main__":``, as for every process pool
+              (``storage.files.unfinished_work`` creates one); the model is the same to the byte. None: no checkpoints
+    workers : number of processes, fewer if the corpus is small. With more than one, a script must be guarded by
+              ``if __name__ == "__main__":``
+
+    >>> Run(workers=2).workers
+    2
     """
 
     monitor: Monitor = silent_monitor
@@ -100,22 +103,37 @@ def train(
     voices: Iterable[VoiceExample] = (),
     run: Run = DEFAULT_RUN,
 ) -> tuple[Model, TrainReport]:
-    """Train phone models on what is transcribed, then the motion of everything.
+    """Return a model that is trained on a corpus, and a report of the training.
 
+    Phone models are trained on all transcribed or labelled utterances, then the engine is trained on the motion of all
+    utterances.
     corpus     : from ``prepare``
-    selection  : the utterances to train on; the list ``train`` by default
-    engine     : with its configuration; the trajectory engine by default
-    recogniser : configuration of the phone models
-    visual     : ``geometry``: the channels that were tracked or given; ``eigenlips``: principal components of the mouth
-                 pictures (docs/eigenlips.md); ``both``
+    selection  : the utterances; by default those of the list ``train``
+    engine     : the engine, with its configuration; None: the trajectory engine
+    recogniser : configuration of the phone models; None: the default one
+    lexicon    : pronunciations of words, ahead of those of the dictionary
+    visual     : ``geometry``: tracked or supplied channels; ``eigenlips``: principal components of mouth pictures
+                 (docs/eigenlips.md); ``both``
     voices     : speech of other speakers, without motion, for the second stage of training
                  (``pipeline.training.voices``); only for engines that ``TrainsOnSpeechAlone``
-    run        : monitor, checkpoints and processes: the model does not depend on any of them
-    Phones that are labelled are taken as they are. Utterances without a transcript are recognised, by the phone models
-    of the others or, where there are none, by those of the shipped model.
-    Nothing here is random: the same corpus gives the same model.
-    Raises CorpusError: no such utterances, or nothing in them to learn from.
-    Raises InputError: no such ``visual``, or voices and an engine that has no use for them.
+    run        : monitor, checkpoints and processes; the model does not depend on them
+    Labelled phones are used as they are. The phones of utterances without transcript are recognised, by the phone
+    models of the other utterances or, if there are none, by those of the shipped model.
+    Training draws no random numbers: the same corpus gives the same model.
+    Raises CorpusError: no such utterances, or none that can be used.
+    Raises InputError: no such ``visual``, or ``voices`` for an engine that is not trained on speech alone.
+    Source: of the engines; of the two stages of training, Xie & Liu 2007, §3.4.
+
+    >>> import lipmotion, tempfile
+    >>> from lipmotion.testing import toy_utterances
+    >>> folder = tempfile.TemporaryDirectory()
+    >>> corpus = lipmotion.Corpus.create(Path(folder.name) / "toy")
+    >>> for utterance in toy_utterances(3):
+    ...     corpus.add(utterance)
+    >>> model, report = lipmotion.train(corpus, recogniser=HmmConfig(mixtures=1, iterations=1))
+    >>> model.engine.name, report.used
+    ('trajectory', ('toy00', 'toy01'))
+    >>> folder.cleanup()
     """
     check_visual(visual)
     if run.work is not None:
@@ -124,26 +142,26 @@ def train(
     engine = engine or engine_named("trajectory", {})
     chosen = corpus.selected(selection)
     recogniser = recogniser or HmmConfig()
-    others = list(examples_without_motion(engine, voices, run.monitor))
+    speech_examples = list(examples_without_motion(engine, voices, run.monitor))
     utterances = [corpus.utterance(name) for name in chosen]
     eigenlips = train_eigenlips(utterances) if visual != GEOMETRY else None
     utterances = [with_visual_channels(utterance, visual, eigenlips) for utterance in utterances]
     job = fingerprint(corpus, chosen, engine, recogniser, lexicon, visual) if run.work else ""
     checkpoint = Checkpoint(run.work, job) if run.work else NO_CHECKPOINT
     with worker_pool(min(run.workers, len(chosen) // UTTERANCES_PER_WORKER)) as team:
-        listening = sub_monitor(run.monitor, 0, 0.9)
+        monitor = sub_monitor(run.monitor, 0, 0.9)
         phones, examples, skipped = phones_and_examples(
-            utterances, recogniser, lexicon, listening, checkpoint, team.ordered_map
+            utterances, recogniser, lexicon, monitor, checkpoint, team.ordered_map
         )
-    fit = engine.fit([*examples, *others], sub_monitor(run.monitor, 0.9, 1, "learning motion: "), checkpoint)
+    fit = engine.fit([*examples, *speech_examples], sub_monitor(run.monitor, 0.9, 1, "learning motion: "), checkpoint)
     used = tuple(example.name for example in examples)
     about = _about(
         corpus, utterances, "given names" if selection.names is not None else selection.split or "all", len(used)
     )
     if selection.speakers and selection.names is None:
         about["speakers"] = sorted(set(selection.speakers))
-    if others:
-        about["voices"] = sorted({example.name for example in others})
+    if speech_examples:
+        about["voices"] = sorted({example.name for example in speech_examples})
     if eigenlips is not None:
         about |= {"visual": visual, "eigenlips": eigenlips.summary}
     return Model(phones, engine, fit.model, about, eigenlips=eigenlips), TrainReport(used, skipped, fit.figures)
@@ -157,23 +175,23 @@ def phones_and_examples(
     checkpoint: Checkpoint,
     each: ParallelMap,
 ) -> tuple[UnitHmm, list[Example], dict[str, str]]:
-    """Return phone models of what is transcribed, every utterance ready for an engine, and why others are left out.
+    """Return phone models, the examples for an engine, and the reason for every utterance that is not used.
 
-    each : shares the work
+    each : applies a function to many items, perhaps in several processes
     Raises CorpusError: no utterance can be used.
     """
-    learning, finding = sub_monitor(monitor, 0, 0.78, "learning phones: "), sub_monitor(monitor, 0.78, 1)
-    phones = _phones(utterances, lexicon, recogniser, learning, checkpoint, each)
-    examples, skipped = _examples(utterances, Recogniser(phones), lexicon, finding, checkpoint, each)
+    training, labelling = sub_monitor(monitor, 0, 0.78, "learning phones: "), sub_monitor(monitor, 0.78, 1)
+    phones = _train_phone_models(utterances, lexicon, recogniser, training, checkpoint, each)
+    examples, skipped = _examples(utterances, Recogniser(phones), lexicon, labelling, checkpoint, each)
     return phones, examples, skipped
 
 
 def examples_without_motion(
     engine: Engine[Any], voices: Iterable[VoiceExample], monitor: Monitor = silent_monitor
 ) -> Iterator[Example]:
-    """Give speech of others as examples in which no motion was seen, by the names of the speakers.
+    """Yield speech without motion as examples without valid frames; their names are those of the speakers.
 
-    Raises InputError: the engine has no use for them.
+    Raises InputError: the engine is not trained on speech alone.
     """
     for number, (features, units, speaker) in enumerate(voices, start=1):
         if not (isinstance(engine, TrainsOnSpeechAlone) and engine.trains_on_speech_alone):
@@ -181,14 +199,14 @@ def examples_without_motion(
                 f"the engine {engine.name!r} does not learn from other voices without motion; use one that does "
                 "(--engine coupled), or leave the voices out"
             )
-        monitor(Progress("hearing other voices", number, number, 0.0))
+        monitor(Progress("aligning other voices", number, number, 0.0))
         frames = len(features.values)
-        unseen = Motion(np.zeros((frames, 0)), FRAME_RATE_HZ, ())
-        yield Example(speaker, Speech(features, units), unseen, np.zeros(frames, bool))
+        no_motion = Motion(np.zeros((frames, 0)), FRAME_RATE_HZ, ())
+        yield Example(speaker, Speech(features, units), no_motion, np.zeros(frames, bool))
 
 
 def phones_of(utterance: Utterance, phones: Recogniser, lexicon: Lexicon) -> Timeline[Unit]:
-    """Return the phones of an utterance: labelled, else aligned if its words are known, else recognised."""
+    """Return the phones in time of an utterance: labelled, or aligned if its words are known, or recognised."""
     if utterance.phones is not None:
         return utterance.phones
     features = Features(np.asarray(utterance.features.values), utterance.features.duration_s)
@@ -196,7 +214,7 @@ def phones_of(utterance: Utterance, phones: Recogniser, lexicon: Lexicon) -> Tim
 
 
 def model_motion(track: Track, frames: int) -> tuple[Motion, Any]:
-    """Return tracked motion on ``frames`` model frames, and where it rests on seen camera frames."""
+    """Return tracked motion in ``frames`` frames at 100 Hz, and the frames in which it is valid [shape=(frames,)]."""
     motion = track.motion
     values, valid = to_model_frames(
         np.asarray(motion.values, float), np.asarray(track.seen), motion.rate_hz, frames, FRAME_RATE_HZ
@@ -204,7 +222,7 @@ def model_motion(track: Track, frames: int) -> tuple[Motion, Any]:
     return replace(motion, values=values, rate_hz=FRAME_RATE_HZ), valid
 
 
-def _phones(
+def _train_phone_models(
     utterances: Sequence[Utterance],
     lexicon: Lexicon,
     config: HmmConfig,
@@ -212,29 +230,37 @@ def _phones(
     checkpoint: Checkpoint,
     each: ParallelMap,
 ) -> UnitHmm:
-    spoken = [(u.audio, u.words) for u in utterances if u.phones is None and u.words and _can_be_said(u.words, lexicon)]
-    given = [(u.audio, _runs(u.phones)) for u in utterances if u.phones is not None]
-    if not spoken and not given:
+    """Return phone models of all transcribed or labelled utterances, or those of the shipped model."""
+    transcribed = [
+        (utterance.audio, utterance.words)
+        for utterance in utterances
+        if utterance.phones is None and utterance.words and _are_pronounceable(utterance.words, lexicon)
+    ]
+    labelled = [
+        (utterance.audio, _phone_runs(utterance.phones)) for utterance in utterances if utterance.phones is not None
+    ]
+    if not transcribed and not labelled:
         LOG.warning("no transcripts in the corpus: its phones are recognised by the shipped model")
         return load_model().phones
-    said = dict.fromkeys(word for _, words in spoken for word in words)
-    warn_of_guesses(tuple(said), lexicon)
-    runs = {" ".join(run): (run,) for _, found in given for run in found}
-    as_words = [(audio, tuple(map(" ".join, found))) for audio, found in given]
-    words = Lexicon(lexicon.user | runs)
-    return train_phone_models([*spoken, *as_words], words, config, monitor, checkpoint, each)
+    vocabulary = dict.fromkeys(word for _, words in transcribed for word in words)
+    warn_of_guesses(tuple(vocabulary), lexicon)
+    pronunciations = {" ".join(run): (run,) for _, runs in labelled for run in runs}
+    as_words = [(audio, tuple(map(" ".join, runs))) for audio, runs in labelled]
+    lexicon = Lexicon(lexicon.user | pronunciations)
+    return train_phone_models([*transcribed, *as_words], lexicon, config, monitor, checkpoint, each)
 
 
-def _runs(phones: Timeline[Unit]) -> list[tuple[str, ...]]:
-    """Return the phones spoken between one silence and the next: each is a word that can be said in one way."""
+def _phone_runs(phones: Timeline[Unit]) -> list[tuple[str, ...]]:
+    """Return the sequences of phones between silences; each is used as a word with one pronunciation."""
     names = (span.label.phone for span in phones)
     return [tuple(run) for silent, run in groupby(names, key=is_silent) if not silent]
 
 
-def _can_be_said(words: Sequence[str], lexicon: Lexicon) -> bool:
+def _are_pronounceable(words: Sequence[str], lexicon: Lexicon) -> bool:
+    """Return whether all words have a pronunciation."""
     try:
         return all(lexicon.pronunciations(word) for word in words)
-    except InputError:  # a word of another script; the utterance is reported when it is aligned
+    except InputError:  # a word in another script; the utterance is reported when it is aligned
         return False
 
 
@@ -246,16 +272,17 @@ def _examples(
     checkpoint: Checkpoint,
     each: ParallelMap,
 ) -> tuple[list[Example], dict[str, str]]:
+    """Return the examples for an engine, and the reason for every utterance that is not used."""
     examples: list[Example] = []
     skipped: dict[str, str] = {}
-    label = partial(phones_of, phones=phones, lexicon=lexicon)
-    for utterance, units in label_utterances(utterances, label, monitor, checkpoint, each):
+    labeller = partial(phones_of, phones=phones, lexicon=lexicon)
+    for utterance, units in label_utterances(utterances, labeller, monitor, checkpoint, each):
         if isinstance(units, str):
             skipped[utterance.name] = units
             continue
         motion, valid = model_motion(utterance.track, len(utterance.features.values))
-        heard = Speech(utterance.features, units, log_f0(utterance.audio))
-        examples.append(Example(utterance.name, heard, motion, valid))
+        speech = Speech(utterance.features, units, log_f0(utterance.audio))
+        examples.append(Example(utterance.name, speech, motion, valid))
     if not examples:
         name, reason = next(iter(skipped.items()))
         raise CorpusError(f"none of {len(skipped)} utterances could be used; the first, {name}: {reason}")
@@ -263,7 +290,7 @@ def _examples(
 
 
 def _about(corpus: Corpus, utterances: Sequence[Utterance], split: str, used: int) -> dict[str, Any]:
-    """Return the header's part that users must know, attribution above all."""
+    """Return the part of the header of a model that is for users: corpus, licence, attribution, versions."""
     sources = [utterance.source for utterance in utterances]
     minutes = sum(utterance.audio.duration_s for utterance in utterances) / 60
     return {

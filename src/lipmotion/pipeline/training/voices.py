@@ -1,6 +1,6 @@
-"""Speech of many speakers with its phones in time: what acoustic models learn from before they see a face.
+"""Speech of other speakers with phones in time, without motion: training data of acoustic models.
 
-Source: Xie & Liu 2007, §3.4, first stage of the training: audio of many speakers, no video.
+Source: Xie & Liu 2007, §3.4: a stage of the training uses audio of many speakers, without video.
 """
 
 from __future__ import annotations
@@ -33,18 +33,22 @@ from lipmotion.types import Audio, Features, Item, Monitor, ParallelMap, Span, T
 from lipmotion.units import SILENCE, Lexicon, is_silent
 
 SENTENCES = 60
+"""Number of sentences that every synthetic voice speaks by default."""
 PAUSE_S, FLOOR_DB = 0.25, 50.0
-"""Synthesisers begin at once, out of a silence that no room has: both would shift features normalised per recording."""
+"""Silence before and after a synthetic sentence in seconds, and its noise in decibels under the speech: synthesisers begin
+immediately, and after digital silence, which would shift features that are normalised per recording."""
 SPEAKER_PARTS, HELD_OUT_PART = 4, 1
-"""Speakers fall into so many parts by their names; those in this one are for judging."""
+"""Speakers are divided into this number of parts by their names; those of this part are held out."""
 
 
 @dataclass(frozen=True, eq=False)
 class SpokenSentence:
-    """A sentence by a speaker.
+    """A sentence of a speaker.
 
-    name   : of the sentence and the voice, unique
-    phones : in time, from 0 s to the end of the sound, each with its word
+    name    : unique name of the sentence and the voice
+    speaker : name of the speaker
+    audio   : the sound, at 16 kHz
+    phones  : phones in time, from 0 s to the end of the sound, each with its word
     """
 
     name: str
@@ -54,10 +58,11 @@ class SpokenSentence:
 
 
 class VoiceExample(NamedTuple):
-    """A sentence as models hear it.
+    """A sentence of a speaker as training data: acoustic features and phones in time.
 
-    features : 39 MFCC a frame, normalised over the sentence
-    units    : its phones in time
+    features : 39 coefficients a frame at 100 Hz, normalised over the sentence
+    units    : phones in time
+    speaker  : name of the speaker
     """
 
     features: Features
@@ -66,9 +71,9 @@ class VoiceExample(NamedTuple):
 
 
 def is_held_out_speaker(speaker: str) -> bool:
-    """Whether what a speaker says is kept aside to judge models with; about a quarter of all speakers are.
+    """Return whether the speech of a speaker is held out, to evaluate models; it is for about a quarter of all speakers.
 
-    The name alone decides (CRC-32 modulo 4 is 1): no speaker changes sides with what else is installed or recorded.
+    It depends on the name alone (CRC-32 modulo 4 is 1), not on the other voices that are installed or recorded.
     """
     return zlib.crc32(speaker.encode()) % SPEAKER_PARTS == HELD_OUT_PART
 
@@ -80,20 +85,22 @@ def synthetic_sentences(
     lexicon: Lexicon | None = None,
     each: ParallelMap = map,
 ) -> Iterator[SpokenSentence]:
-    """Give every text in every voice, voice by voice: flite, festival, espeak-ng, as far as they are installed.
+    """Yield every text in every synthetic voice, voice by voice: of flite, festival and espeak-ng, if installed.
 
-    texts  : the first 60 of ``prompts`` by default, which say every phone of the dictionary
-    voices : all that are installed by default
-    each   : shares the work, a voice at a time; the same arguments give the same samples
-    A pause of 0.25 s is put before and after each, and white noise 50 dB under the speech throughout.
+    texts   : None: the first 60 of ``prompts``, which contain every phone of the dictionary
+    voices  : None: all that are installed
+    lexicon : pronunciations of words, ahead of those of the dictionary
+    each    : applies a function to many items, here voices, perhaps in several processes
+    Every sentence gets 0.25 s of silence before and after it, and white noise 50 dB under the speech. The same arguments
+    give the same samples.
     Raises MissingDependencyError: no synthesiser is installed. Raises InputError: as ``speech.voices.speak_sentences``.
     """
     chosen = installed_voices() if voices is None else tuple(voices)
     if not chosen:
         packages = " ".join(synthesiser.package for synthesiser in SYNTHESISERS.values())
         raise MissingDependencyError(f"no speech synthesiser is installed; install one or more: apt install {packages}")
-    said = [prompt.text for prompt in prompts(count=SENTENCES).chosen] if texts is None else list(texts)
-    for sentences in each(partial(_in_voice, texts=said, lexicon=lexicon), chosen):
+    spoken = [prompt.text for prompt in prompts(count=SENTENCES).chosen] if texts is None else list(texts)
+    for sentences in each(partial(_sentences_of_voice, texts=spoken, lexicon=lexicon), chosen):
         yield from sentences
 
 
@@ -105,36 +112,40 @@ def recorded_sentences(
     lexicon: Lexicon | None = None,
     monitor: Monitor = silent_monitor,
 ) -> Iterator[SpokenSentence]:
-    """Give the recordings of a folder, and of its sub-folders, that have a transcript beside them, phones aligned.
+    """Yield the transcribed recordings of a folder and of its sub-folders, with aligned phones.
 
-    phones   : aligns them; of the kind ``general`` where nobody in the folder spoke for its own models
-    speakers : patterns of names (``*`` any letters) to who speaks; the first that fits holds. Of others, the
-               sub-folder says who speaks, and without any the name is taken: give the speaker of two such recordings,
-               or they may come to be on both sides of ``is_held_out_speaker``
-    monitor  : is told of those that cannot be used: damaged, or of words that are not what is said, or not English
-    Raises CorpusError: there is no such folder, or no recording with a transcript in it.
+    folder   : recordings with transcripts beside them
+    phones   : the recogniser that aligns; of the kind ``general`` for speakers on whom its own models were not trained
+    speakers : name of the speaker, by pattern of the name of a recording (``*`` stands for any text); the first that
+               fits counts. For other recordings, the speaker is the name of the sub-folder, or the name of the recording
+               if it is in no sub-folder. Name the speaker of several such recordings, or some of them may be held out
+               (``is_held_out_speaker``) and others not
+    lexicon  : pronunciations of words, ahead of those of the dictionary
+    monitor  : called with the recordings that cannot be used: damaged, or with a transcript that does not agree with
+               the sound
+    Raises CorpusError: no such folder, or no recording with a transcript in it.
     """
     root, lexicon = Path(folder), lexicon or Lexicon()
     if not root.is_dir():
         raise CorpusError(f"{root}: no such folder; give one of recordings with a .txt, .lab or .TextGrid beside them")
     check_listable(root)
-    found = False
+    is_any_transcribed = False
     for path in sorted(path for path in root.rglob("*") if path.suffix.lower() in AUDIO_SUFFIXES):
         name = "-".join(path.relative_to(root).with_suffix("").parts)
         speaker = _speaker(name, path.relative_to(root), speakers or {})
         try:
             words = labels_beside(path).words
             if words is not None:
-                found = True
+                is_any_transcribed = True
                 yield SpokenSentence(name, speaker, *_aligned(path, words, phones, lexicon))
         except (AlignmentError, InputError) as error:
             monitor(Item(name, "skipped", str(error)))
-    if not found:
+    if not is_any_transcribed:
         raise CorpusError(f"{root}: no recording with a transcript; put what is said in x.wav into x.txt beside it")
 
 
 def voice_examples(sentences: Iterable[SpokenSentence]) -> Iterator[VoiceExample]:
-    """Give sentences as models hear them. Nothing is kept."""
+    """Yield sentences as training data; features are computed when an item is taken, and not kept."""
     return (VoiceExample(mfcc(sentence.audio), sentence.phones, sentence.speaker) for sentence in sentences)
 
 
@@ -145,10 +156,12 @@ def other_voices(
     lexicon: Lexicon | None = None,
     monitor: Monitor = silent_monitor,
 ) -> Iterator[VoiceExample]:
-    """Give what ``train --voices --recordings`` learns from besides a corpus.
+    """Yield the training data of ``lipmotion train --voices --recordings``, besides the corpus.
 
-    synthetic  : all installed voices but those that are for judging
-    recordings : a folder of transcribed recordings, aligned by the general phone models
+    synthetic  : include sentences of all installed synthetic voices but those of held-out speakers
+    recordings : a folder of transcribed recordings, which are aligned by the general phone models
+    lexicon    : pronunciations of words, ahead of those of the dictionary
+    monitor    : called with the recordings that cannot be used
     Raises MissingDependencyError, CorpusError: as ``synthetic_sentences`` and ``recorded_sentences``.
     """
     if recordings is not None:
@@ -159,16 +172,16 @@ def other_voices(
         yield from voice_examples(synthetic_sentences(voices=chosen, lexicon=lexicon))
 
 
-def _in_voice(voice: SyntheticVoice, texts: Sequence[str], lexicon: Lexicon | None) -> list[SpokenSentence]:
+def _sentences_of_voice(voice: SyntheticVoice, texts: Sequence[str], lexicon: Lexicon | None) -> list[SpokenSentence]:
     name = f"{voice.synthesiser}-{voice.name}"
     return [
-        SpokenSentence(f"{name}-{number:03d}", voice.speaker, *_in_a_room(audio, units, number))
+        SpokenSentence(f"{name}-{number:03d}", voice.speaker, *_with_pauses_and_noise(audio, units, number))
         for number, (audio, units) in enumerate(speak_sentences(texts, voice, lexicon), start=1)
     ]
 
 
-def _in_a_room(audio: Audio, units: Timeline[Unit], seed: int) -> tuple[Audio, Timeline[Unit]]:
-    """Return the sentence between two pauses, over a faint noise."""
+def _with_pauses_and_noise(audio: Audio, units: Timeline[Unit], seed: int) -> tuple[Audio, Timeline[Unit]]:
+    """Return a sentence with silence before and after it, and with white noise."""
     pause = np.zeros(round(PAUSE_S * audio.rate_hz), np.float32)
     longer = Audio(np.concatenate([pause, audio.samples, pause]), audio.rate_hz)
     spoken = list(units.shifted(PAUSE_S))
@@ -182,17 +195,19 @@ def _in_a_room(audio: Audio, units: Timeline[Unit], seed: int) -> tuple[Audio, T
 
 
 def _speaker(name: str, inner: Path, speakers: Mapping[str, str]) -> str:
+    """Return the speaker of a recording, from its name and its path within the folder."""
     given = (speaker for pattern, speaker in speakers.items() if fnmatchcase(name, pattern))
     return next(given, inner.parts[0] if len(inner.parts) > 1 else name)
 
 
 def _aligned(path: Path, words: Sequence[str], phones: Recogniser, lexicon: Lexicon) -> tuple[Audio, Timeline[Unit]]:
+    """Return the sound of a recording and its aligned phones. Raises InputError: they do not agree."""
     audio = read_audio(path)
     units = phones_in_time(phones, audio, mfcc(audio), words, lexicon)
-    found = agreement_score(audio, units)
-    if found < DOUBTFUL_SCORE:
+    score = agreement_score(audio, units)
+    if score < DOUBTFUL_SCORE:
         raise InputError(
-            f"its transcript seems not to be what is said (its phones agree with the sound at {found:.1f}, required "
+            f"its transcript seems not to be what is said (its phones agree with the sound at {score:.1f}, required "
             f"{DOUBTFUL_SCORE} or more); check it"
         )
     return audio, units
