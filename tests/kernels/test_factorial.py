@@ -2,7 +2,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import example, given, HealthCheck, settings
 from hypothesis import strategies as st
 
 from kernels.networks import network_posteriors
@@ -57,6 +57,8 @@ def agree(model, tolerance=1e-9, **options) -> None:
     assert found.log_likelihood == pytest.approx(log_likelihood, abs=1e-8)
 
 
+@example(seed=131, frames=4, spread=300.0)  # all paths are lost in double precision
+@example(seed=1052, frames=4, spread=300.0)  # a path of posterior 3e-5 is
 @given(seed=SEEDS, frames=st.integers(1, 4), spread=st.sampled_from([0.1, 2.0, 20.0, 300.0]))
 @SHARED
 def test_agrees_with_the_enumeration_of_all_joint_paths(seed, frames, spread):
