@@ -187,7 +187,7 @@ def test_a_full_disk_stops_it(studio, tmp_path, monkeypatch):
 @pytest.mark.usefixtures("tracked")
 def test_an_interrupted_run_goes_on_where_it_stopped(studio, tmp_path, monkeypatch):
     prepare(studio, tmp_path / "whole", workers=1)
-    good = module.track
+    good = module.track  # type: ignore[attr-defined]
 
     def interrupted(path: Path, *, crops: bool = True) -> Track:
         if path.stem == "b":

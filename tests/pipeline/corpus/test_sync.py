@@ -10,6 +10,7 @@ import pytest
 
 from lipmotion.corpora.entry import read_entry
 from lipmotion.corpora.store import Corpus
+from lipmotion.measures.offset import best_offset
 from lipmotion.pipeline.corpus import sync as module
 from lipmotion.pipeline.corpus.sync import clip_scores, offsets, sync
 from lipmotion.speech.audio_files import read_audio
@@ -134,7 +135,7 @@ def test_other_speakers_on_video(recordings: Path, tmp_path: Path, late_s: float
         audio = Audio(np.ascontiguousarray(sound), RATE_HZ)
         one = Utterance(path.stem, audio, mfcc(audio), track(path, crops=False), None, "test", {"collection": "others"})
         corpus.add(one)
-        found = module.offset(clip_scores(one), 100.0)
+        found = best_offset(clip_scores(one), 100.0)
         assert not found.known or found.late_s == pytest.approx(late_s, abs=0.05)
     assert sum(clip.known for clip in offsets(corpus).clips.values()) >= 4
     assert offsets(corpus).collections["others"].late_s == pytest.approx(late_s, abs=0.02)

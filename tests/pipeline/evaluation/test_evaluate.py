@@ -11,6 +11,7 @@ import pytest
 
 from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines import Engine
+from lipmotion.engines.trajectory.engine import TrajectoryEngine
 from lipmotion.errors import AlignmentError, CorpusError
 from lipmotion.measures.report import figures_table
 from lipmotion.pipeline.evaluation.evaluate import evaluate
@@ -138,6 +139,7 @@ def test_figures_without_pins_are_those_of_the_engine_without_them(
 def test_figures_of_a_trained_engine_without_pins(
     toy_model: Model, toy_corpus: Corpus, figures: dict[str, Any]
 ) -> None:
+    assert isinstance(toy_model.engine, TrajectoryEngine)
     free = evaluate(replace(toy_model, engine=toy_model.engine.without_closures()), toy_corpus)
     assert {name: one["unpinned"] for name, one in figures["conditions"].items()} == free["conditions"]
 

@@ -249,7 +249,7 @@ def test_voices_of_others_teach_engines_that_have_a_use_for_them(toy_corpus: Cor
     assert model.about["utterances"] == 4
     assert report.used == TRAINED[:4]
     assert "voices" not in alone.about
-    assert {"hearing other voices", "learning motion: more speech"} <= set(stages)
+    assert {"aligning other voices", "learning motion: more speech"} <= set(stages)
     speech, lips = ([one.learned.chains.groups[group].mixtures.means for one in (model, alone)] for group in (0, 1))
     assert np.abs(speech[0] - speech[1]).max() > 0.1
     assert lips[0].tobytes() == lips[1].tobytes()

@@ -1,4 +1,4 @@
-"""Recordings to a corpus: ``prepare(recordings) → corpus``."""
+"""Preparation: ``prepare(recordings) → corpus``."""
 
 from __future__ import annotations
 
@@ -29,22 +29,23 @@ from lipmotion.vision.packages import package_versions
 from lipmotion.vision.track import track
 
 RECIPE = "4"
-"""Raised whenever the same video would give other numbers: older utterances are then made again."""
+"""Version of the preparation, increased when the same video gives other values; older utterances are then replaced."""
 _STAGE = "preparing recordings"
+"""Name of the stage in reports of progress."""
 
 
 @dataclass(frozen=True)
 class PrepareReport:
-    """What became of the recordings.
+    """Report of a preparation.
 
-    corpus   : the corpus's folder
-    kind     : what the recordings were taken for
-    prepared : names of the utterances made now
-    kept     : names of those that were there already, from the same source with the same settings
-    failed   : recordings that could not be used, name to reason
-    unseen   : utterances with frames without a face, name to the number of those frames
-    seconds  : wall time
-    notes    : what is odd about a video (cuts, damage, a covered mouth), name to remarks
+    corpus   : folder of the corpus
+    kind     : layout in which the recordings were read
+    prepared : names of the utterances that were prepared
+    kept     : names of the utterances that were prepared before, from the same source with the same settings
+    failed   : reason for every recording that cannot be used, by name
+    unseen   : number of frames without a face of every utterance that has any, by name
+    seconds  : duration of the preparation
+    notes    : remarks on videos (cuts, damage, a covered mouth), by name
     """
 
     corpus: Path
@@ -62,13 +63,13 @@ class PrepareReport:
         return {"prepared": len(self.prepared), "kept": len(self.kept), "skipped": len(self.failed)}
 
     def __str__(self) -> str:
-        counts = ", ".join(f"{count} {what}" for what, count in self.counts.items())
+        counts = ", ".join(f"{count} {outcome}" for outcome, count in self.counts.items())
         return f"{self.corpus}: {counts} ({self.kind})"
 
 
 @dataclass(frozen=True)
 class _Job:
-    """One recording, the folder it becomes, and what is known of it beforehand."""
+    """One recording, the folder of its utterance, its source and the settings of the preparation."""
 
     recording: SourceRecording
     folder: Path
@@ -78,6 +79,8 @@ class _Job:
 
 @dataclass(frozen=True)
 class _Outcome:
+    """Outcome of the preparation of one recording; ``problem`` is empty if it succeeded."""
+
     name: str
     kept: bool = False
     unseen: int = 0
@@ -93,34 +96,39 @@ def prepare(
     crops: bool = True,
     monitor: Monitor = silent_monitor,
 ) -> PrepareReport:
-    """Turn a folder of recordings into a corpus, or add them to one.
+    """Create a corpus from a folder of recordings, or add the recordings to a corpus; return a report.
 
-    directory : GRID's or FACEGOOD's layout, or any folder of videos or of sounds with motion (docs/corpora.md)
-    output    : the corpus; utterances in it that are up to date are kept, so a stopped run goes on where it stopped
-    workers   : processes, by default one a core. With more than one, a script must call this under
-                ``if __name__ == "__main__":``, as for every process pool
-    crops     : keep the mouth images
-    monitor   : hears how far it is, and what becomes of every recording
-    A recording that cannot be used is reported and left out. The corpus does not depend on ``workers``, nor on how
-    often it was interrupted.
-    Raises InputError, CorpusError: no recordings, none of them usable, or ``output`` is something else.
+    directory : folder in the layout of GRID or FACEGOOD, or any folder of videos, or of sounds with motion
+                (docs/corpora.md)
+    output    : folder of the corpus; utterances that are up to date are kept, so that a stopped preparation continues
+    workers   : number of processes; None: one for each core. With more than one, a script must be guarded by
+                ``if __name__ == "__main__":``
+    crops     : store the mouth pictures, which eigenlips need
+    monitor   : called with reports of progress, and with the outcome of every recording
+    Recordings that cannot be used are reported and left out. The corpus depends neither on ``workers`` nor on
+    interruptions.
+    Raises InputError, CorpusError: no recordings, none that can be used, or ``output`` is not a corpus.
     Raises MissingDependencyError: there are videos, and MediaPipe or OpenCV is not installed.
-    Raises ExportError: the disk is full, or another process is preparing into the same corpus.
+    Raises ExportError: the disk is full, or another process is preparing the same corpus.
+
+    >>> import lipmotion
+    >>> lipmotion.prepare("my-recordings", "my-corpus").counts  # doctest: +SKIP
+    {'prepared': 12, 'kept': 0, 'skipped': 0}
     """
     directory, output = Path(directory), Path(output)
     start_s = time.monotonic()
     if workers is not None and workers < 1:
         raise InputError(f"{workers} processes, required at least 1; leave it out for one a core")
     check_apart((), [Source(directory, "folder of recordings")], folders=[output])
-    found = discover(directory)
-    packages = package_versions() if any(item.motion_file is None for item in found.recordings) else {}
+    folder = discover(directory)
+    packages = package_versions() if any(item.motion_file is None for item in folder.recordings) else {}
     is_new = not is_folder(output)
     with locked(output):
         corpus = Corpus.create(output)
-        jobs = [_job(item, directory.resolve(), corpus, packages, crops) for item in found.recordings]
-        with _listed(corpus), worker_pool(min(workers or os.cpu_count() or 1, len(jobs))) as team:
-            outcomes = _heard(found, team.unordered_map(_process, jobs), len(jobs), monitor)
-    report = _report(corpus, found, outcomes, time.monotonic() - start_s)
+        jobs = [_job(item, directory.resolve(), corpus, packages, crops) for item in folder.recordings]
+        with _refreshed(corpus), worker_pool(min(workers or os.cpu_count() or 1, len(jobs))) as team:
+            outcomes = _collected(folder, team.unordered_map(_process, jobs), len(jobs), monitor)
+    report = _report(corpus, folder, outcomes, time.monotonic() - start_s)
     if not report.prepared and not report.kept:
         if is_new:
             shutil.rmtree(output)
@@ -131,13 +139,13 @@ def prepare(
     return report
 
 
-def _report(corpus: Corpus, found: RecordingFolder, outcomes: list[_Outcome], seconds: float) -> PrepareReport:
+def _report(corpus: Corpus, folder: RecordingFolder, outcomes: list[_Outcome], seconds: float) -> PrepareReport:
     outcomes = sorted(outcomes, key=lambda outcome: outcome.name)
     good = [outcome for outcome in outcomes if not outcome.problem]
-    problems = found.problems | {outcome.name: outcome.problem for outcome in outcomes if outcome.problem}
+    problems = folder.problems | {outcome.name: outcome.problem for outcome in outcomes if outcome.problem}
     return PrepareReport(
         corpus=corpus.path,
-        kind=found.kind,
+        kind=folder.kind,
         prepared=tuple(outcome.name for outcome in good if not outcome.kept),
         kept=tuple(outcome.name for outcome in good if outcome.kept),
         failed=dict(sorted(problems.items())),
@@ -168,7 +176,7 @@ def _job(recording: SourceRecording, directory: Path, corpus: Corpus, packages: 
 
 
 def _is_taken(folder: Path, video: Path, collection: str) -> bool:
-    """Is this name another recording's, from another folder? (GRID's speakers share their file names.)"""
+    """Return whether a folder holds an utterance of another recording (speakers of GRID share file names)."""
     try:
         source = read_entry(folder).get("source", {})
     except CorpusError:
@@ -177,6 +185,7 @@ def _is_taken(folder: Path, video: Path, collection: str) -> bool:
 
 
 def _process(job: _Job) -> _Outcome:
+    """Prepare one recording, unless its utterance is up to date; return the outcome."""
     name = job.recording.name
     try:
         sound = job.recording.file
@@ -185,32 +194,32 @@ def _process(job: _Job) -> _Outcome:
             | {"sha256": sha256_of(sound), "bytes": str(sound.stat().st_size)}
             | source_digests(job.recording)
         )
-        entry = _kept(job, source)
+        entry = _up_to_date(job, source)
         if entry is not None:
             return _Outcome(name, kept=True, unseen=int(entry["unseen_frames"]), notes=tuple(entry.get("notes", ())))
         utterance = _utterance(job, source)
         write_utterance(job.folder, utterance, job.settings)
     except (MissingDependencyError, ExportError):
-        raise  # every other recording would fail in the same way
+        raise  # all other recordings would fail in the same way
     except (InputError, AlignmentError) as error:
         return _Outcome(name, problem=str(error))
-    except Exception as error:  # one strange file must not stop the rest
+    except Exception as error:  # one damaged file must not stop the others
         return _Outcome(name, problem=f"{job.recording.file}: {type(error).__name__}: {error}")
     return _Outcome(name, unseen=int((~utterance.track.seen).sum()), notes=utterance.track.notes)
 
 
-def _kept(job: _Job, source: dict[str, str]) -> dict[str, Any] | None:
-    """Return the description of an utterance that is up to date, None if there is none."""
+def _up_to_date(job: _Job, source: dict[str, str]) -> dict[str, Any] | None:
+    """Return the description of the utterance if it is up to date, or None."""
     try:
         entry = read_entry(job.folder)
     except CorpusError:
         return None
     words = None if job.recording.words is None else list(job.recording.words)
     digests = [source.get(key) for key in DIGESTS]
-    wanted = (digests, words, job.recording.split, job.recording.speaker, job.settings)
-    made_of = [entry["source"].get(key) for key in DIGESTS]
-    found = (made_of, entry["words"], entry["split"], entry.get("speaker", ""), entry["settings"])
-    return entry if found == wanted else None
+    required = (digests, words, job.recording.split, job.recording.speaker, job.settings)
+    stored_digests = [entry["source"].get(key) for key in DIGESTS]
+    stored = (stored_digests, entry["words"], entry["split"], entry.get("speaker", ""), entry["settings"])
+    return entry if stored == required else None
 
 
 def _utterance(job: _Job, source: dict[str, str]) -> Utterance:
@@ -235,24 +244,24 @@ def _track(job: _Job, duration_s: float) -> Track:
     return track(job.recording.file, crops=job.settings["crops"] == "yes")
 
 
-def _heard(found: RecordingFolder, coming: Iterator[_Outcome], count: int, monitor: Monitor) -> list[_Outcome]:
-    """Return all outcomes; each is reported as soon as it is known."""
-    for name, problem in found.problems.items():
+def _collected(folder: RecordingFolder, outcomes: Iterator[_Outcome], count: int, monitor: Monitor) -> list[_Outcome]:
+    """Return all outcomes; each is reported to the monitor as soon as it is known."""
+    for name, problem in folder.problems.items():
         monitor(Item(name, "skipped", problem))
-    outcomes: list[_Outcome] = []
+    collected: list[_Outcome] = []
     monitor(Progress(_STAGE, 0, count, 0.0))
-    for outcome in coming:
-        outcomes.append(outcome)
+    for outcome in outcomes:
+        collected.append(outcome)
         kind = "skipped" if outcome.problem else "kept" if outcome.kept else "prepared"
         unseen = (f"no face in {outcome.unseen} frames, interpolated",) if outcome.unseen else ()
         monitor(Item(outcome.name, kind, outcome.problem or "; ".join((*outcome.notes, *unseen))))
-        monitor(Progress(_STAGE, len(outcomes), count, len(outcomes) / count))
-    return outcomes
+        monitor(Progress(_STAGE, len(collected), count, len(collected) / count))
+    return collected
 
 
 @contextmanager
-def _listed(corpus: Corpus) -> Iterator[None]:
-    """Whatever happens inside, have the corpus list what is finished, and leave nothing that is not."""
+def _refreshed(corpus: Corpus) -> Iterator[None]:
+    """At the end of the block, also after an error, list the finished utterances and remove unfinished ones."""
     try:
         yield
     except ExportError as error:

@@ -1,4 +1,4 @@
-"""Sentences to record: those that say most of what a model has not heard, first."""
+"""Sentences to record for training, in an order that covers most units early."""
 
 from __future__ import annotations
 
@@ -19,17 +19,18 @@ from lipmotion.pipeline.transcribe import read_transcript
 from lipmotion.units import SILENCE, VISEME_OF, Lexicon, is_silent, words_of
 
 SHIPPED = "english.txt"
-PHONE, DIPHONE, BESIDE = "phone", "diphone", "beside"
-WORTH = {PHONE: 8.0, DIPHONE: 2.0, BESIDE: 1.0}
-"""What each unit is worth when it is first said: a phone; a phone after a phone; a phone beside a viseme class. The
-engines fall back from the last to the first, so the more general ones must not be missing."""
+PHONE, DIPHONE, CONTEXT = "phone", "diphone", "beside"
+WEIGHTS = {PHONE: 8.0, DIPHONE: 2.0, CONTEXT: 1.0}
+"""Weight of the first occurrence of each kind of unit: a phone; a phone after a phone; a phone beside a viseme class.
+The engines back off from the last kind to the first, so the more general kinds must be covered."""
 
 UnitName = tuple[str, ...]
+"""The kind of a unit, and its phones or classes."""
 
 
 @dataclass(frozen=True)
 class Prompt:
-    """A sentence, and how many phones and diphones are covered once it has been recorded."""
+    """A sentence, and the number of phones and diphones that are covered after it has been recorded."""
 
     text: str
     phones: int
@@ -38,11 +39,12 @@ class Prompt:
 
 @dataclass(frozen=True)
 class Prompts:
-    """The sentences to record, in this order.
+    """The sentences to record, and statistics of all sentences.
 
-    phones, diphones : how many there are in all sentences together, and in what is recorded already
-    sentences        : how many were there to choose from
-    left_out         : sentences that were not, to the word that is neither in the dictionary nor in the lexicon
+    chosen           : the sentences to record, in this order
+    phones, diphones : number of different phones and diphones in all sentences and in the existing corpus
+    sentences        : number of sentences among which was chosen
+    left_out         : sentences that cannot be used, with the word that is neither in the dictionary nor in the lexicon
     """
 
     chosen: tuple[Prompt, ...]
@@ -55,11 +57,12 @@ class Prompts:
 def prompts(
     text: str | Path | None = None, *, count: int = 50, have: Corpus | None = None, lexicon: Lexicon | None = None
 ) -> Prompts:
-    """Return the sentences that cover most units for the time it takes to say them.
+    """Return the sentences that cover most units for the time it takes to speak them.
 
-    text  : a file with a sentence a line; the list in the package by default
-    count : at most so many; fewer where further ones would add nothing
-    have  : a corpus whose units need not be said again; its utterances without words or phones do not count
+    text    : a file with a sentence a line; None: the list in the package
+    count   : largest number of sentences; fewer are returned if further ones would cover nothing new
+    have    : a corpus whose units count as covered; its utterances without words or phones are ignored
+    lexicon : pronunciations of words, ahead of those of the dictionary
     Raises InputError: no such file, no sentence that can be used, or a count under 1.
     Source: greedy weighted set cover (Chvátal 1979), gains recomputed only where they may matter (Minoux 1978).
     """
@@ -69,17 +72,17 @@ def prompts(
     path = Path(text) if text is not None else Path(str(resources.files("lipmotion") / "prompts" / SHIPPED))
     usable, left_out = _pronounced(_lines(path), lexicon)
     if not usable:
-        some = f"; {next(iter(left_out.values()))!r} is not in the dictionary: --lexicon" if left_out else ""
-        raise InputError(f"{path}: no sentence to choose from{some}; required: a sentence a line")
+        reason = f"; {next(iter(left_out.values()))!r} is not in the dictionary: --lexicon" if left_out else ""
+        raise InputError(f"{path}: no sentence to choose from{reason}; required: a sentence a line")
     index: dict[UnitName, int] = {}
     units = [_numbered(units_of(phones), index) for phones in usable.values()]
-    known = _numbered({unit for run in _recorded(have, lexicon) for unit in units_of(run)}, index) if have else None
-    worth = np.array([WORTH[name[0]] for name in index])
-    if known is not None:
-        worth[known] = 0
+    recorded = _numbered({unit for run in _recorded(have, lexicon) for unit in units_of(run)}, index) if have else None
+    weights = np.array([WEIGHTS[name[0]] for name in index])
+    if recorded is not None:
+        weights[recorded] = 0
     costs = [len(phones) for phones in usable.values()]
-    order = greedy_cover(units, costs, worth.copy(), count)
-    covered = worth == 0
+    order = greedy_cover(units, costs, weights.copy(), count)
+    covered = weights == 0
     is_phone, is_diphone = (np.array([name[0] == kind for name in index]) for kind in (PHONE, DIPHONE))
     chosen, sentences = [], list(usable)
     for number in order:
@@ -89,38 +92,41 @@ def prompts(
 
 
 def units_of(phones: Sequence[str]) -> set[UnitName]:
-    """Return the units in phones that are said between two silences; silence counts as a neighbour only."""
-    around = [SILENCE, *phones, SILENCE]
-    units: set[UnitName] = {(DIPHONE, left, right) for left, right in pairwise(around)}
-    for left, phone, right in zip(around, phones, around[2:], strict=False):
-        units |= {(PHONE, phone), (BESIDE, f"[{VISEME_OF[left]}]-{phone}"), (BESIDE, f"{phone}+[{VISEME_OF[right]}]")}
+    """Return the units in a sequence of phones between two silences; silence counts as a neighbour only."""
+    sequence = [SILENCE, *phones, SILENCE]
+    units: set[UnitName] = {(DIPHONE, left, right) for left, right in pairwise(sequence)}
+    for left, phone, right in zip(sequence, phones, sequence[2:], strict=False):
+        contexts = (f"[{VISEME_OF[left]}]-{phone}", f"{phone}+[{VISEME_OF[right]}]")
+        units |= {(PHONE, phone), *((CONTEXT, context) for context in contexts)}
     return units
 
 
 def greedy_cover(
-    sets: Sequence[NDArray[np.intp]], costs: Sequence[float], worth: NDArray[np.float64], count: int
+    sets: Sequence[NDArray[np.intp]], costs: Sequence[float], weights: NDArray[np.float64], count: int
 ) -> list[int]:
-    """Return which sets to take, in order: each time the one that adds most worth for its cost.
+    """Return the numbers of the sets to take, in order: each time the set that adds most weight for its cost.
 
-    sets  : the elements of each, as indices into ``worth``
-    worth : of each element [shape=(E,)]; becomes 0 where it is taken
-    What a set adds only ever shrinks, so one that still leads after its gain was recomputed is the best of all.
+    sets    : elements of each set, as indices into ``weights``
+    costs   : of each set
+    weights : of each element [shape=(E,)]; set to 0 for the elements that are covered
+    count   : largest number of sets
+    The gain of a set never increases, so a set that is still first after its gain was recomputed is the best of all.
     """
     queue = [
-        (-float(worth[elements].sum()) / cost, i) for i, (elements, cost) in enumerate(zip(sets, costs, strict=True))
+        (-float(weights[elements].sum()) / cost, i) for i, (elements, cost) in enumerate(zip(sets, costs, strict=True))
     ]
     heapq.heapify(queue)
     taken: list[int] = []
     while queue and len(taken) < count:
         _, i = heapq.heappop(queue)
-        now = (-float(worth[sets[i]].sum()) / costs[i], i)
-        if queue and now > queue[0]:
-            heapq.heappush(queue, now)
-        elif now[0] == 0:
+        recomputed = (-float(weights[sets[i]].sum()) / costs[i], i)
+        if queue and recomputed > queue[0]:
+            heapq.heappush(queue, recomputed)
+        elif recomputed[0] == 0:
             break
         else:
             taken.append(i)
-            worth[sets[i]] = 0
+            weights[sets[i]] = 0
     return taken
 
 
@@ -130,7 +136,7 @@ def _lines(path: Path) -> list[str]:
 
 
 def _pronounced(lines: Iterable[str], lexicon: Lexicon) -> tuple[dict[str, tuple[str, ...]], dict[str, str]]:
-    """Return sentences with their phones, and those with a word that nobody says how to pronounce."""
+    """Return the phones of the sentences that can be used, and the unknown word of every other sentence."""
     usable: dict[str, tuple[str, ...]] = {}
     left_out: dict[str, str] = {}
     for line in lines:
@@ -147,7 +153,7 @@ def _pronounced(lines: Iterable[str], lexicon: Lexicon) -> tuple[dict[str, tuple
 
 
 def _recorded(corpus: Corpus, lexicon: Lexicon) -> Iterator[tuple[str, ...]]:
-    """Give the phones that a corpus holds, from silence to silence."""
+    """Yield the sequences of phones between silences in the utterances of a corpus."""
     for name in corpus.names():
         entry = read_entry(corpus.folder(name))
         if entry.get("phones"):
@@ -158,4 +164,5 @@ def _recorded(corpus: Corpus, lexicon: Lexicon) -> Iterator[tuple[str, ...]]:
 
 
 def _numbered(units: set[UnitName], index: dict[UnitName, int]) -> NDArray[np.intp]:
+    """Return the numbers of some units, adding new ones to the index."""
     return np.array([index.setdefault(unit, len(index)) for unit in sorted(units)], np.intp)

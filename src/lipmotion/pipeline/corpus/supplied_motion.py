@@ -1,4 +1,4 @@
-"""What comes with a recording instead of being found in it: motion curves, phones in time."""
+"""Motion curves and labelled phones that are supplied with a recording."""
 
 from __future__ import annotations
 
@@ -18,29 +18,30 @@ from lipmotion.types import Span, Timeline, Track, Unit
 from lipmotion.units import PAUSE, SILENCE, check_phones, is_silent
 
 DIGESTS = ("sha256", "motion_sha256", "phones_sha256")
-"""What the source of an utterance says of its contents; another content is prepared again."""
+"""Keys of the digests in the source of an utterance; if a digest changes, the recording is prepared again."""
 CURVES_MARGIN_S, CURVES_MARGIN_SHARE = 0.5, 0.02
-"""Curves may be this much shorter or longer than their sound; at another frame rate they are not."""
+"""Largest difference of duration between curves and sound: seconds, or share of the sound. It is larger where the frame
+rate of the curves is wrong."""
 PHONES_MARGIN_S = 0.1
-"""Labels may end this long after the sound: tools round."""
+"""Seconds by which labels may end after the sound; labelling programs round times."""
 
 
 def source_digests(recording: SourceRecording) -> dict[str, str]:
-    """Return what identifies the motion and the phones that came with a recording, if any."""
-    found = {}
+    """Return file name and digests of the motion and of the phones that are supplied with a recording, by key."""
+    digests = {}
     if recording.motion_file is not None:
-        found["motion_file"] = recording.motion_file.file.name
-        found["motion_sha256"] = sha256_of(recording.motion_file.file)
+        digests["motion_file"] = recording.motion_file.file.name
+        digests["motion_sha256"] = sha256_of(recording.motion_file.file)
     if recording.phones is not None:
         text = "\n".join(f"{span.start_s!r} {span.end_s!r} {span.label.phone}" for span in recording.phones)
-        found["phones_sha256"] = hashlib.sha256(text.encode()).hexdigest()
-    return found
+        digests["phones_sha256"] = hashlib.sha256(text.encode()).hexdigest()
+    return digests
 
 
 def supplied_track(curves: MotionFile, duration_s: float) -> Track:
-    """Return the motion in a file as a track that was seen everywhere, without mouth images.
+    """Return the motion in a file as a track that is valid in all frames, without mouth pictures.
 
-    duration_s : of the sound that it belongs to
+    duration_s : of the sound
     Raises InputError: not a motion file, or of another length than the sound.
     """
     motion = read_bare_motion(curves) if curves.channels else read_motion(curves.file)[0]
@@ -54,10 +55,11 @@ def supplied_track(curves: MotionFile, duration_s: float) -> Track:
 
 
 def supplied_phones(recording: SourceRecording, duration_s: float) -> Timeline[Unit] | None:
-    """Return the labelled phones of a recording from 0 s to the end of its sound, or None if there are none.
+    """Return the labelled phones of a recording, from 0 s to the end of its sound, or None if it has no labels.
 
-    Silence is named as recognition names it: a short one between phones is a pause.
-    Raises InputError: the labels go on after the sound, or are more than it can hold.
+    duration_s : of the sound
+    Silence has the phone that recognition gives it: short silence between phones is a pause.
+    Raises InputError: the labels end after the sound, or are too many for it.
     """
     if recording.phones is None:
         return None
@@ -76,19 +78,20 @@ def supplied_phones(recording: SourceRecording, duration_s: float) -> Timeline[U
     before = Span(0.0, clipped[0].start_s, Unit(SILENCE))
     after = Span(clipped[-1].end_s, duration_s, Unit(SILENCE))
     whole = _merged([span for span in (before, *clipped, after) if span.duration_s > 0])
-    if _spoken(recording.phones) and not _spoken(whole):
+    if _contain_speech(recording.phones) and not _contain_speech(whole):
         raise InputError(
             f"{recording.file}: none of its {len(recording.phones)} labels is a phone that lasts longer than 0 s"
         )
-    return Timeline(tuple(_named(span, inside=0 < i < len(whole) - 1) for i, span in enumerate(whole)))
+    return Timeline(tuple(_with_silence_named(span, inside=0 < i < len(whole) - 1) for i, span in enumerate(whole)))
 
 
-def _spoken(spans: Iterable[Span[Unit]]) -> bool:
+def _contain_speech(spans: Iterable[Span[Unit]]) -> bool:
+    """Return whether any label is not silence."""
     return any(not is_silent(span.label.phone) for span in spans)
 
 
 def _merged(spans: list[Span[Unit]]) -> list[Span[Unit]]:
-    """Return the spans, neighbouring silences made one."""
+    """Return the spans, with neighbouring silences merged into one."""
     merged: list[Span[Unit]] = []
     for span in spans:
         if merged and is_silent(span.label.phone) and is_silent(merged[-1].label.phone):
@@ -98,7 +101,11 @@ def _merged(spans: list[Span[Unit]]) -> list[Span[Unit]]:
     return merged
 
 
-def _named(span: Span[Unit], *, inside: bool) -> Span[Unit]:
+def _with_silence_named(span: Span[Unit], *, inside: bool) -> Span[Unit]:
+    """Return a span; silence gets the phone of a pause or of longer silence.
+
+    inside : whether the span is between phones
+    """
     if not is_silent(span.label.phone):
         return span
     return replace(span, label=Unit(PAUSE if inside and span.duration_s < SHORT_PAUSE_S else SILENCE))

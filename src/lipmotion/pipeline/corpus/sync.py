@@ -1,4 +1,4 @@
-"""Are sound and lips of a corpus in step: ``offsets(corpus) → how late``, ``sync(corpus)`` puts it right."""
+"""Synchronisation of sound and motion: ``offsets(corpus)`` measures the offset, ``sync(corpus)`` removes it."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ from lipmotion.storage.files import locked
 from lipmotion.types import FRAME_RATE_HZ, Audio, Timeline, Unit, Utterance
 
 REACH_S = 0.4
-"""Offsets are looked for this far either way."""
+"""Largest offset that is considered, in seconds, in both directions."""
 OPENING = "opening"
 """The channel that is compared with the sound."""
 REMOVED_MS = "offset_removed_ms"
-"""The key of an utterance's source that tells by how much its sound was moved."""
+"""Key in the source of an utterance: milliseconds by which its sound was moved."""
 LEAST_MOVE_S = 0.005
-"""Sound is not moved by less."""
+"""Smallest offset in seconds that is removed."""
 
 
 @dataclass(frozen=True)
 class CorpusOffsets:
-    """How late the sound of a corpus is, now.
+    """Offsets of the sound of a corpus from the motion.
 
-    clips       : by utterance
-    collections : by collection and speaker (one camera set-up, as a rule), all the clips together
-    members     : the utterances of each collection
+    clips       : offset of every utterance, by name
+    collections : offset of all utterances of a collection and a speaker together (as a rule, of one camera set-up)
+    members     : names of the utterances of every collection
     """
 
     clips: Mapping[str, Offset]
@@ -42,10 +42,10 @@ class CorpusOffsets:
     members: Mapping[str, tuple[str, ...]]
 
     def lines(self) -> list[str]:
-        """Return what a user wants to know, one line a collection."""
-        return [f"{name or 'corpus'}: {self._told(name)}" for name in sorted(self.collections)]
+        """Return the offsets as text for users, one line a collection."""
+        return [f"{name or 'corpus'}: {self._line(name)}" for name in sorted(self.collections)]
 
-    def _told(self, collection: str) -> str:
+    def _line(self, collection: str) -> str:
         pooled, clips = self.collections[collection], {name: self.clips[name] for name in self.members[collection]}
         known = {name: clip for name, clip in clips.items() if clip.known}
         if not pooled.known:
@@ -61,7 +61,7 @@ class CorpusOffsets:
 
 
 def clip_scores(utterance: Utterance) -> NDArray[np.float64]:
-    """Return how well sound and lips agree at every shift of up to ``REACH_S`` [shape=(81,)]."""
+    """Return the agreement of sound and motion at every shift of up to ``REACH_S`` seconds [shape=(81,)]."""
     motion = utterance.track.motion
     predicted = predicted_opening_speed(utterance.features)
     opening, valid = to_model_frames(
@@ -75,9 +75,10 @@ def clip_scores(utterance: Utterance) -> NDArray[np.float64]:
 
 
 def offsets(corpus: Corpus) -> CorpusOffsets:
-    """Return how late the sound of each utterance and of each collection is; only those with an ``opening`` count.
+    """Return the offset of the sound of each utterance and of each collection.
 
-    The zero is that of the GRID corpus, whose lips the map behind it knows.
+    Utterances without the channel ``opening`` are ignored.
+    Offset zero is that of the GRID corpus, on which the prediction of lip speed was trained.
     Raises CorpusError: an utterance is damaged.
     """
     scores: dict[str, NDArray[np.float64]] = {}
@@ -99,28 +100,30 @@ def offsets(corpus: Corpus) -> CorpusOffsets:
 
 @one_thread()
 def sync(corpus: Corpus) -> dict[str, float]:
-    """Move the sound of each collection by its offset, where that is known; return the seconds, by collection.
+    """Move the sound of each collection by its offset, if it is known; return the offsets in seconds, by collection.
 
-    The track stays; features are computed again. Sound that was late loses its beginning, sound that was early is
-    preceded by its own beginning mirrored. The moves are kept in each utterance's source (``offset_removed_ms``).
+    The motion is not changed; features are computed again. Late sound loses its beginning, early sound is preceded by
+    its own beginning in reverse. The source of each utterance records the moves (``offset_removed_ms``).
     Raises CorpusError: an utterance is damaged. Raises ExportError: it cannot be written, or another process
-    is at work on the corpus.
+    is changing the corpus.
     """
     with locked(corpus.path):
-        found = offsets(corpus)
-        moved = {name: pooled.late_s for name, pooled in found.collections.items() if _is_worth_moving(pooled)}
+        measured = offsets(corpus)
+        moved = {name: pooled.late_s for name, pooled in measured.collections.items() if _is_worth_moving(pooled)}
         for collection, late_s in moved.items():
-            for name in found.members[collection]:
+            for name in measured.members[collection]:
                 settings = read_entry(corpus.folder(name))["settings"]
                 corpus.add(_moved(corpus.utterance(name), late_s), settings)
     return moved
 
 
 def _is_worth_moving(pooled: Offset) -> bool:
+    """Return whether an offset is known, large enough, and significantly different from zero."""
     return pooled.known and abs(pooled.late_s) >= LEAST_MOVE_S and (pooled.low_s > 0 or pooled.high_s < 0)
 
 
 def _moved(utterance: Utterance, late_s: float) -> Utterance:
+    """Return an utterance whose sound and labels are ``late_s`` seconds earlier."""
     audio = utterance.audio
     shift = min(round(late_s * audio.rate_hz), len(audio.samples) - WINDOW)
     samples = audio.samples[shift:] if shift > 0 else np.pad(audio.samples, (-shift, 0), mode="reflect")
@@ -132,13 +135,13 @@ def _moved(utterance: Utterance, late_s: float) -> Utterance:
 
 
 def _phones_moved(phones: Timeline[Unit], late_s: float) -> Timeline[Unit]:
-    """Return labels in time that begin with the sound again."""
+    """Return labels that are ``late_s`` seconds earlier and begin at 0 s."""
     spans = [replace(span, start_s=max(span.start_s, 0.0)) for span in phones.shifted(-late_s) if span.end_s > 0]
     return Timeline((replace(spans[0], start_s=0.0), *spans[1:]))
 
 
 def _group(utterance: Utterance) -> str:
-    """Return the collection; speakers of one are recorded apart, as a rule."""
+    """Return collection and speaker of an utterance; speakers are recorded separately, as a rule."""
     collection = utterance.source.get("collection", "")
     return f"{collection} {utterance.speaker}".strip()
 

@@ -1,1 +1,1 @@
-"""A model and held-out recordings to figures."""
+"""Evaluation: a model and held-out recordings to figures."""

@@ -1,4 +1,4 @@
-"""Held-out recordings, the conditions in which they are animated, and generated beside recorded motion."""
+"""Held-out recordings, the conditions under which they are animated, and pairs of recorded and generated motion."""
 
 from __future__ import annotations
 
@@ -39,20 +39,21 @@ OPENING = "opening"
 TEST_LIST = Selection("test")
 AUDIO_ONLY, WITH_TRANSCRIPT = "audio only", "with transcript"
 DISTANCES = (OPENING, "width", "outer")
-"""The channels compared where faces were tracked; all others are of points near these."""
+"""The channels that are compared where faces were tracked; the other channels are points, which move with these."""
 
 
 @dataclass(frozen=True, eq=False)
 class HeldOutRecordings:
-    """Recordings to compare generated motion with, and their phones in time.
+    """Recordings with which generated motion is compared, and their phones in time.
 
-    channels   : names of the channels that are compared
-    still      : names of those left out because they do not move
-    closed_under : the opening under which the mouth is closed; None where there is no opening
-    reference  : the phones of every utterance: labelled, else aligned, else recognised
-    conditions : the phones that an engine is given, by condition: ``audio only``, ``with transcript``
-    phones     : the recogniser that found them
-    eigenlips  : the space of mouth pictures, if coefficients in it are compared
+    utterances   : the recordings
+    channels     : names of the channels that are compared
+    still        : names of the channels that are left out because they do not move
+    closed_under : the opening under which the mouth counts as closed, in eye distances (None: no channel ``opening``)
+    reference    : phones in time of every utterance: labelled, or aligned, or recognised
+    conditions   : phones in time that the engine is given, by condition: ``audio only``, ``with transcript``
+    phones       : the recogniser of these phones
+    eigenlips    : principal components of mouth pictures (None: their coefficients are not compared)
     """
 
     utterances: Sequence[Utterance]
@@ -66,14 +67,19 @@ class HeldOutRecordings:
 
     @property
     def eigenlips_channels(self) -> tuple[str, ...]:
-        """The channels that are eigenlips."""
+        """Names of the compared channels that are eigenlips."""
         names = {channel.name for channel in self.eigenlips.channels} if self.eigenlips is not None else ()
         return tuple(name for name in self.channels if name in names)
 
 
 @dataclass(frozen=True, eq=False)
 class ComparedClip:
-    """One utterance: original and generated curves at the recording's own rate, frames without a face left out."""
+    """Recorded and generated motion of one utterance, in the N frames of the recording in which the face was measured.
+
+    original, generated : values of the compared channels [each shape=(N, P)]
+    time_s : time of every frame in seconds [shape=(N,)]
+    spoken : start and end in seconds, and phone, of every phone that is not silence
+    """
 
     original: NDArray[np.float64]
     generated: NDArray[np.float64]
@@ -92,34 +98,33 @@ def held_out_recordings(
     visual: str = GEOMETRY,
     eigenlips: Eigenlips | None = None,
 ) -> HeldOutRecordings:
-    """Return held-out recordings with the phones that ``phones`` aligns and recognises in them. Raises as ``evaluate``.
+    """Return held-out recordings with aligned and recognised phones. Raises as ``evaluate``.
 
-    selection : the list ``test`` by default
-    channels : compare these, whether they move or not
-    visual, eigenlips : of the model: which channels it has, and the space of the pictures among them
+    phones    : the recogniser
+    selection : the utterances; by default those of the list ``test``
+    channels  : the channels to compare, whether they move or not; None: from ``compared_channels``
+    visual, eigenlips : of the model: the kind of its channels, and its principal components of mouth pictures
     """
     lexicon = lexicon or Lexicon()
     utterances = [
         with_visual_channels(corpus.utterance(name), visual, eigenlips) for name in corpus.selected(selection)
     ]
-    compare_with_recorded, still = (tuple(channels), ()) if channels is not None else compared_channels(utterances)
+    compared, still = (tuple(channels), ()) if channels is not None else compared_channels(utterances)
     warn_of_guesses([word for utterance in utterances for word in utterance.words or ()], lexicon)
-    heard = with_progress(utterances, "finding the phones", sub_monitor(monitor, 0, 0.4))
-    reference = [_reference(utterance, phones, lexicon) for utterance in heard]
+    aligned = with_progress(utterances, "phones: alignment", sub_monitor(monitor, 0, 0.4))
+    reference = [_reference(utterance, phones, lexicon) for utterance in aligned]
     threshold = None
-    if OPENING in compare_with_recorded:
-        threshold = closed_threshold([_openings(u) for u in _training(corpus, selection.speakers) or utterances])
-    heard = with_progress(utterances, "recognising the phones", sub_monitor(monitor, 0.4, 0.9))
-    conditions = {AUDIO_ONLY: [phones.recognise(u.audio, u.features) for u in heard]}
+    if OPENING in compared:
+        threshold = closed_threshold([_openings(u) for u in _training_list(corpus, selection.speakers) or utterances])
+    recognised = with_progress(utterances, "phones: recognition", sub_monitor(monitor, 0.4, 0.9))
+    conditions = {AUDIO_ONLY: [phones.recognise(u.audio, u.features) for u in recognised]}
     if all(utterance.words or utterance.phones for utterance in utterances):
         conditions[WITH_TRANSCRIPT] = reference
-    return HeldOutRecordings(
-        utterances, compare_with_recorded, still, threshold, reference, conditions, phones, eigenlips
-    )
+    return HeldOutRecordings(utterances, compared, still, threshold, reference, conditions, phones, eigenlips)
 
 
 def compared_channels(utterances: Sequence[Utterance]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the channels to compare, and those left out because they are still.
+    """Return the names of the channels to compare, and of those that are left out because they do not move.
 
     All eigenlips are compared, whether they move or not: their figures are means over a known number.
     Raises CorpusError: the utterances have different channels, or nothing moves.
@@ -128,9 +133,9 @@ def compared_channels(utterances: Sequence[Utterance]) -> tuple[tuple[str, ...],
     if any(utterance.track.motion.channels != channels for utterance in utterances):
         raise CorpusError("the utterances have different motion channels; evaluate one kind, with --speaker or --split")
     names = utterances[0].track.motion.names
-    pictured = tuple(channel.name for channel in channels if channel.unit == GREY)
+    eigenlips = tuple(channel.name for channel in channels if channel.unit == GREY)
     if set(names) >= set(DISTANCES):
-        return (*DISTANCES, *pictured), ()
+        return (*DISTANCES, *eigenlips), ()
     originals = [np.asarray(utterance.track.motion.values, float) for utterance in utterances]
     moves = curves.moving(originals, [channel.unit for channel in channels])
     moves |= np.array([channel.unit == GREY for channel in channels])
@@ -140,19 +145,21 @@ def compared_channels(utterances: Sequence[Utterance]) -> tuple[tuple[str, ...],
     return moving, tuple(name for name in names if name not in moving)
 
 
-def _training(corpus: Corpus, speakers: Sequence[str]) -> list[Utterance]:
+def _training_list(corpus: Corpus, speakers: Sequence[str]) -> list[Utterance]:
     return [corpus.utterance(name) for name in corpus.names("train", speakers)]
 
 
 def _openings(utterance: Utterance) -> NDArray[np.float64]:
+    """Return the opening in all frames in which the face was measured [shape=(N,)]."""
     return np.asarray(utterance.track.motion[OPENING], float)[np.asarray(utterance.track.seen)]
 
 
-def _check_channels(motion: Motion, compare_with_recorded: Sequence[str]) -> None:
-    missing = [name for name in compare_with_recorded if name not in motion.names]
+def _check_channels(motion: Motion, compared: Sequence[str]) -> None:
+    """Raise CorpusError if generated motion lacks a channel that is compared."""
+    missing = [name for name in compared if name not in motion.names]
     if missing:
         raise CorpusError(
-            f"the model has no channels {', '.join(missing[:6])}, which the corpus has: it learned other motion"
+            f"the model has no channels {', '.join(missing[:6])}, which the corpus has: it was trained on other motion"
         )
 
 
@@ -164,69 +171,74 @@ def _reference(utterance: Utterance, phones: Recogniser, lexicon: Lexicon) -> Ti
 
 
 def compared_clips(
-    found: HeldOutRecordings, condition: str, engine: Animator[ModelT], learned: ModelT
+    recordings: HeldOutRecordings, condition: str, engine: Animator[ModelT], learned: ModelT
 ) -> list[ComparedClip]:
-    """Return what an engine makes of recordings, beside the originals. Raises CorpusError: it has other channels."""
-    return compare_with_recorded(found, speech_of_condition(found, condition, engine, learned), engine, learned)
+    """Return recorded and generated motion of all utterances under a condition.
+
+    learned : the engine's model of motion
+    Raises CorpusError: the model has other channels.
+    """
+    speech = speech_of_condition(recordings, condition, engine, learned)
+    return compare_with_recorded(recordings, speech, engine, learned)
 
 
 def speech_of_condition(
-    found: HeldOutRecordings, condition: str, engine: Animator[ModelT], learned: ModelT
+    recordings: HeldOutRecordings, condition: str, engine: Animator[ModelT], learned: ModelT
 ) -> list[Speech]:
-    """Return all utterances as ``animate`` gives them to an engine under a condition."""
+    """Return the speech of all utterances under a condition, as ``animate`` gives it to the engine."""
     return [
-        _speech(engine, learned, found, utterance, units, condition == WITH_TRANSCRIPT)
-        for utterance, units in zip(found.utterances, found.conditions[condition], strict=True)
+        _speech(engine, learned, recordings, utterance, units, condition == WITH_TRANSCRIPT)
+        for utterance, units in zip(recordings.utterances, recordings.conditions[condition], strict=True)
     ]
 
 
 def compare_with_recorded(
-    found: HeldOutRecordings, spoken: Sequence[Speech], engine: Animator[ModelT], learned: ModelT
+    recordings: HeldOutRecordings, speech: Sequence[Speech], engine: Animator[ModelT], learned: ModelT
 ) -> list[ComparedClip]:
-    """Return the motion that an engine generates for all utterances beside the recorded motion.
+    """Return recorded and generated motion of all utterances.
 
-    spoken : of ``speech_of_condition``, one for each utterance
-    Raises CorpusError: the engine's model has other channels.
+    speech  : from ``speech_of_condition``, one for each utterance
+    learned : the engine's model of motion
+    Raises CorpusError: the model has other channels.
     """
     return [
-        _clip(engine, learned, found.channels, utterance, speech, reference)
-        for utterance, speech, reference in zip(found.utterances, spoken, found.reference, strict=True)
+        _clip(engine, learned, recordings.channels, utterance, spoken, reference)
+        for utterance, spoken, reference in zip(recordings.utterances, speech, recordings.reference, strict=True)
     ]
 
 
 def _speech(
     engine: Animator[ModelT],
     learned: ModelT,
-    found: HeldOutRecordings,
+    recordings: HeldOutRecordings,
     utterance: Utterance,
     units: Timeline[Unit],
-    said: bool,
+    with_transcript: bool,
 ) -> Speech:
-    """Return an utterance as ``animate`` hears it."""
-    if said:
+    """Return the speech of an utterance as ``animate`` gives it to the engine."""
+    if with_transcript:
         return speech_of(engine, utterance.audio, utterance.features, units)
-    return recognised_speech(engine, learned, utterance.audio, utterance.features, found.phones, lambda: units)
+    return recognised_speech(engine, learned, utterance.audio, utterance.features, recordings.phones, lambda: units)
 
 
 def _clip(
     engine: Animator[ModelT],
     learned: ModelT,
-    compare_with_recorded: Sequence[str],
+    channels: Sequence[str],
     utterance: Utterance,
-    heard: Speech,
+    speech: Speech,
     reference: Timeline[Unit],
 ) -> ComparedClip:
+    """Return recorded and generated motion of one utterance."""
     motion = utterance.track.motion
     seen = np.asarray(utterance.track.seen)
     time_s = (np.arange(len(motion.values)) / motion.rate_hz)[seen]
-    generated = engine.generate(learned, heard).motion
-    _check_channels(generated, compare_with_recorded)
+    generated = engine.generate(learned, speech).motion
+    _check_channels(generated, channels)
     spoken = tuple((s.start_s, s.end_s, s.label.phone) for s in reference if not is_silent(s.label.phone))
     return ComparedClip(
-        original=np.stack([motion[name][seen] for name in compare_with_recorded], axis=1).astype(float),
-        generated=np.stack(
-            [np.interp(time_s, generated.time_s, generated[name]) for name in compare_with_recorded], axis=1
-        ),
+        original=np.stack([motion[name][seen] for name in channels], axis=1).astype(float),
+        generated=np.stack([np.interp(time_s, generated.time_s, generated[name]) for name in channels], axis=1),
         time_s=time_s,
         spoken=spoken,
     )

@@ -1,4 +1,4 @@
-"""A model against held-out recordings: ``evaluate(model, corpus) → figures``."""
+"""Evaluation: ``evaluate(model, corpus) → figures``."""
 
 from __future__ import annotations
 
@@ -36,24 +36,38 @@ def evaluate(
     seed: int = 0,
     monitor: Monitor = silent_monitor,
 ) -> dict[str, Any]:
-    """Return all figures of docs/measures.md: audio only and, where there are transcripts, with them.
+    """Return the figures of docs/measures.md, by name: from audio only and, if all have transcripts, with them.
 
-    selection : the utterances to compare; the list ``test`` by default
-    recogniser : as in ``animate``
-    monitor  : hears how far it is
+    selection  : the utterances to compare; by default those of the list ``test``
+    lexicon    : pronunciations of words, ahead of those of the dictionary
+    recogniser : ``own``, ``general`` or ``auto``, as in ``SpeechRequest``
+    seed       : of the bootstrap interval
+    monitor    : called with reports of progress
 
-    Compared are the lip distances or, in a corpus without them, every channel that moves in the recordings; beside
-    them, or in their place, the eigenlips of a model that has some. Figures of closing, and of silence, need the
-    channel ``opening``. What cannot be computed is None.
-    Where the engine makes lips meet in p, b and m, ``unpinned`` holds the same figures of what it makes without that.
-    The reference for what is speech and where its p, b, m are is the labelled phones, else the forced alignment, or
-    recognition where nothing is transcribed. The mouth counts as closed relative to the corpus's own training list
-    (without one: to the split itself).
-    Raises CorpusError: no utterances of this split, or a model without the channels compared.
-    Raises AlignmentError: a transcript does not fit into its recording.
+    Compared are the lip distances or, in a corpus without them, every channel that moves in the recordings; in addition
+    or instead, the eigenlips of the model. Figures of closures and of silence need the channel ``opening``. Figures
+    that cannot be computed are None.
+    If the engine makes the lips meet in p, b and m, ``unpinned`` holds the figures of its motion without that.
+    The reference for speech and for p, b and m are the labelled phones, or the forced alignment, or the recognised
+    phones of utterances without transcript. The threshold of a closed mouth is computed from the corpus's training
+    list (without one: from the selection).
+    Raises CorpusError: no such utterances, or a model without the compared channels.
+    Raises AlignmentError: a transcript cannot be aligned with its recording.
+    Source: docs/measures.md; correlation and distance: Xie & Liu 2007, Eqs. 20 and 21.
+
+    >>> import lipmotion, tempfile
+    >>> from pathlib import Path
+    >>> from lipmotion.testing import toy_utterances
+    >>> folder = tempfile.TemporaryDirectory()
+    >>> corpus = lipmotion.Corpus.create(Path(folder.name) / "toy")
+    >>> corpus.add(toy_utterances(1)[0])
+    >>> figures = lipmotion.evaluate(lipmotion.load_model(), corpus, selection=lipmotion.Selection(None))
+    >>> figures["clips"], sorted(figures["conditions"])
+    (1, ['audio only', 'with transcript'])
+    >>> folder.cleanup()
     """
     phones = cached_recogniser(model.phones, recogniser, model.adaptation)
-    found = held_out_recordings(
+    recordings = held_out_recordings(
         corpus,
         phones,
         selection=selection,
@@ -64,12 +78,12 @@ def evaluate(
     )
     figures = {
         "split": "given names" if selection.names is not None else selection.split or "all",
-        "clips": len(found.utterances),
-        "closed_under": found.closed_under,
-        "still_channels": list(found.still),
+        "clips": len(recordings.utterances),
+        "closed_under": recordings.closed_under,
+        "still_channels": list(recordings.still),
         "conditions": {
-            name: _figures_with_and_without_closures(found, name, model.engine, model.learned, seed)
-            for name in found.conditions
+            name: _figures_with_and_without_closures(recordings, name, model.engine, model.learned, seed)
+            for name in recordings.conditions
         },
     }
     plain: dict[str, Any] = nan_as_null(figures)
@@ -77,13 +91,13 @@ def evaluate(
 
 
 def _figures_with_and_without_closures(
-    found: HeldOutRecordings, condition: str, engine: Animator[ModelT], learned: ModelT, seed: int
+    recordings: HeldOutRecordings, condition: str, engine: Animator[ModelT], learned: ModelT, seed: int
 ) -> dict[str, Any]:
-    heard = speech_of_condition(found, condition, engine, learned)
-    figures, unpinned = (
-        figures_of(compare_with_recorded(found, heard, engine, learned), found, seed),
-        engine.without_closures() if isinstance(engine, ForcesClosures) else engine,
-    )
-    if unpinned == engine or found.closed_under is None:
+    """Return the figures of one condition; if the engine forces closures, ``unpinned`` holds those without them."""
+    speech = speech_of_condition(recordings, condition, engine, learned)
+    figures = figures_of(compare_with_recorded(recordings, speech, engine, learned), recordings, seed)
+    unpinned = engine.without_closures() if isinstance(engine, ForcesClosures) else engine
+    if unpinned == engine or recordings.closed_under is None:
         return figures
-    return figures | {"unpinned": figures_of(compare_with_recorded(found, heard, unpinned, learned), found, seed)}
+    clips = compare_with_recorded(recordings, speech, unpinned, learned)
+    return figures | {"unpinned": figures_of(clips, recordings, seed)}

@@ -1,4 +1,4 @@
-"""The figures of docs/measures.md, of generated beside recorded clips."""
+"""The figures of docs/measures.md, from recorded and generated motion."""
 
 from __future__ import annotations
 
@@ -18,15 +18,17 @@ from lipmotion.units import VISEMES
 
 BILABIAL = VISEMES["bi"]
 SILENCE_MARGIN_S = 0.3
-"""The mouth may still close, or already open, this close to speech."""
+"""Seconds before and after speech in which the mouth may still close or already open."""
 
 
-def figures_of(clips: Sequence[ComparedClip], found: HeldOutRecordings, seed: int) -> dict[str, Any]:
-    """Return the figures of one condition; NaN where there is none.
+def figures_of(clips: Sequence[ComparedClip], recordings: HeldOutRecordings, seed: int) -> dict[str, Any]:
+    """Return the figures of one condition, by name; figures that cannot be computed are NaN.
 
-    Channels in grey levels are summed up apart: as ``eigenlips``, or as the whole where there are no others.
+    recordings : of the clips
+    seed       : of the bootstrap interval
+    Eigenlips have figures of their own, ``eigenlips``; without other channels, these are also the overall figures.
     """
-    compared, threshold = found.channels, found.closed_under
+    compared, threshold = recordings.channels, recordings.closed_under
     generated, original = [clip.generated for clip in clips], [clip.original for clip in clips]
     rate_hz = float(1 / np.median(np.diff(clips[0].time_s)))
     acc, clip_acc = curves.pooled_correlation(generated, original), curves.per_clip_correlation(generated, original)
@@ -42,35 +44,35 @@ def figures_of(clips: Sequence[ComparedClip], found: HeldOutRecordings, seed: in
         }
         for i, name in enumerate(compared)
     }
-    pictures = {name: per_channel[name] for name in found.eigenlips_channels}
-    pictured = np.array([name in pictures for name in compared])
-    whole = ~pictured if not pictured.all() else pictured
-    spread = np.where(whole, np.concatenate(original).std(axis=0), 0)
+    eigenlips = {name: per_channel[name] for name in recordings.eigenlips_channels}
+    is_eigenlips = np.array([name in eigenlips for name in compared])
+    overall = ~is_eigenlips if not is_eigenlips.all() else is_eigenlips
+    spread = np.where(overall, np.concatenate(original).std(axis=0), 0)
     leading = compared.index(OPENING) if OPENING in compared else int(spread.argmax())
     figures = {
-        "channels": {name: row for name, row in per_channel.items() if name not in pictures},
-        "acc": float(acc[whole].mean()),
-        "amse": curves.mean_distance(_columns(generated, whole), _columns(original, whole)),
+        "channels": {name: row for name, row in per_channel.items() if name not in eigenlips},
+        "acc": float(acc[overall].mean()),
+        "amse": curves.mean_distance(_columns(generated, overall), _columns(original, overall)),
         "leading": compared[leading],
         "lag_ms": curves.lag_ms(_column(generated, leading), _column(original, leading), rate_hz),
     }
-    if pictures:
-        amse = curves.mean_distance(_columns(generated, pictured), _columns(original, pictured))
-        figures["eigenlips"] = _means(list(pictures.values())) | {"amse": amse, "channels": pictures}
+    if eigenlips:
+        amse = curves.mean_distance(_columns(generated, is_eigenlips), _columns(original, is_eigenlips))
+        figures["eigenlips"] = _means(list(eigenlips.values())) | {"amse": amse, "channels": eigenlips}
     if threshold is None:
         return figures
     return figures | _opening_figures(clips, compared.index(OPENING), threshold, rate_hz, seed)
 
 
 def _means(rows: Sequence[Mapping[str, float]]) -> dict[str, Any]:
-    """Return the mean of each figure over channels. Source: Xie & Liu 2007, Eq. 21, of the correlation."""
+    """Return the mean of each figure over channels. Source: Xie & Liu 2007, Eq. 21, for the correlation."""
     return {figure: float(np.mean([row[figure] for row in rows])) for figure in rows[0]}
 
 
 def _opening_figures(
     clips: Sequence[ComparedClip], column: int, threshold: float, rate_hz: float, seed: int
 ) -> dict[str, Any]:
-    """Return what only the opening of the mouth can tell."""
+    """Return the figures of the channel ``opening``: its interval, closures, and silence."""
     generated, original = [clip.generated[:, column] for clip in clips], [clip.original[:, column] for clip in clips]
     bilabial = [_on_kept_frames(clip, BILABIAL, rate_hz) for clip in clips]
     other_s = sum(end - start for clip in clips for start, end, phone in clip.spoken if phone not in BILABIAL)
@@ -86,7 +88,7 @@ def _opening_figures(
 
 
 def _on_kept_frames(clip: ComparedClip, phones: Sequence[str], rate_hz: float) -> list[tuple[float, float]]:
-    """Return when some phones are said, on a clock that stands still while no face is seen."""
+    """Return start and end, in seconds, of some phones, on a clock that stops where the face was not measured."""
     clock_s = np.arange(len(clip.time_s)) / rate_hz
     return [
         (float(np.interp(start_s, clip.time_s, clock_s)), float(np.interp(end_s, clip.time_s, clock_s)))
@@ -108,7 +110,7 @@ def _acc(generated: curves.Clips, original: curves.Clips) -> float:
 
 
 def _silence(clips: Sequence[ComparedClip], values: curves.Clips) -> dict[str, float]:
-    """Return mean and standard deviation of the opening in silence away from speech."""
+    """Return mean and standard deviation of the opening in silence away from speech, and the number of its frames."""
     quiet = np.concatenate(
         [
             v[away_from_speech(clip.time_s, _speech_s(clip), SILENCE_MARGIN_S)]

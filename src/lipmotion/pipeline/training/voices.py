@@ -35,8 +35,8 @@ from lipmotion.units import SILENCE, Lexicon, is_silent
 SENTENCES = 60
 """Number of sentences that every synthetic voice speaks by default."""
 PAUSE_S, FLOOR_DB = 0.25, 50.0
-"""Silence before and after a synthetic sentence in seconds, and its noise in decibels under the speech: synthesisers begin
-immediately, and after digital silence, which would shift features that are normalised per recording."""
+"""Seconds of silence before and after a synthetic sentence, and its noise in decibels under the speech. Synthesisers
+begin at once, and after digital silence: both would shift features that are normalised per recording."""
 SPEAKER_PARTS, HELD_OUT_PART = 4, 1
 """Speakers are divided into this number of parts by their names; those of this part are held out."""
 
@@ -71,7 +71,7 @@ class VoiceExample(NamedTuple):
 
 
 def is_held_out_speaker(speaker: str) -> bool:
-    """Return whether the speech of a speaker is held out, to evaluate models; it is for about a quarter of all speakers.
+    """Return whether the speech of a speaker is held out to evaluate models; about a quarter of all speakers are.
 
     It depends on the name alone (CRC-32 modulo 4 is 1), not on the other voices that are installed or recorded.
     """
@@ -91,8 +91,8 @@ def synthetic_sentences(
     voices  : None: all that are installed
     lexicon : pronunciations of words, ahead of those of the dictionary
     each    : applies a function to many items, here voices, perhaps in several processes
-    Every sentence gets 0.25 s of silence before and after it, and white noise 50 dB under the speech. The same arguments
-    give the same samples.
+    Every sentence gets 0.25 s of silence before and after it, and white noise 50 dB under the speech. The same
+    arguments give the same samples.
     Raises MissingDependencyError: no synthesiser is installed. Raises InputError: as ``speech.voices.speak_sentences``.
     """
     chosen = installed_voices() if voices is None else tuple(voices)
@@ -117,8 +117,8 @@ def recorded_sentences(
     folder   : recordings with transcripts beside them
     phones   : the recogniser that aligns; of the kind ``general`` for speakers on whom its own models were not trained
     speakers : name of the speaker, by pattern of the name of a recording (``*`` stands for any text); the first that
-               fits counts. For other recordings, the speaker is the name of the sub-folder, or the name of the recording
-               if it is in no sub-folder. Name the speaker of several such recordings, or some of them may be held out
+               fits counts. For other recordings, the speaker is the name of the sub-folder, or of the recording if it
+               is in no sub-folder. Name the speaker of several such recordings, or some of them may be held out
                (``is_held_out_speaker``) and others not
     lexicon  : pronunciations of words, ahead of those of the dictionary
     monitor  : called with the recordings that cannot be used: damaged, or with a transcript that does not agree with
