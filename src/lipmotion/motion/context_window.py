@@ -66,7 +66,7 @@ def fit_acoustic_context(recordings: Iterable[NDArray[np.float32]], size: int) -
     mean = total / count
     covariance = products / count - np.outer(mean, mean)
     scale = np.sqrt(np.maximum(np.diagonal(covariance), 0)) + LEAST_DEVIATION
-    basis = principal_axes(covariance / np.outer(scale, scale), size).T
+    basis = np.ascontiguousarray(principal_axes(covariance / np.outer(scale, scale), size).T)  # stored in this order
     factor = SCALE / np.sqrt(basis.shape[1])
     return AcousticContext(*(array.astype(np.float32) for array in (mean, scale, basis * factor)))
 
