@@ -2,13 +2,14 @@ from __future__ import annotations
 
 import ast
 import inspect
+from typing import Any
 
 import pytest
 
 from lipmotion import errors
 from lipmotion.errors import InputError, LipMotionError, MissingDependencyError
 
-CLASSES = [value for _, value in inspect.getmembers(errors, inspect.isclass)]
+CLASSES: list[Any] = [value for _, value in inspect.getmembers(errors, inspect.isclass)]
 EXIT_CODES = {
     "InputError": 3,
     "CorpusError": 4,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from importlib import metadata
+from pathlib import Path
 
 import pytest
 
@@ -49,7 +50,7 @@ def test_built_in_extensions_are_of_their_kinds() -> None:
     assert all(callable(READERS.load(name)) for name in READERS.built_in)
 
 
-def test_what_is_of_another_kind_is_refused(tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_of_another_kind_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for group in ("lipmotion.engines", "lipmotion.faces", "lipmotion.exporters"):
         point = metadata.EntryPoint("wrong", "json:dumps", group)
         for registry in (ENGINES, FACES, MOTION_FORMATS):

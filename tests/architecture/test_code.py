@@ -53,7 +53,9 @@ def pickled(text: str) -> Iterator[int]:
             modules = {alias.name for alias in node.names} | {getattr(node, "module", "")}
             if modules & PICKLES:
                 yield node.lineno
-        loads = isinstance(node, ast.Call) and ast.unparse(node.func) in ("np.load", "np.lib.format.read_array")
+        if not isinstance(node, ast.Call):
+            continue
+        loads = ast.unparse(node.func) in ("np.load", "np.lib.format.read_array")
         if loads and "allow_pickle=False" not in ast.unparse(node):
             yield node.lineno
 
@@ -81,7 +83,9 @@ def by_chance(text: str) -> Iterator[int]:
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.Import) and any(alias.name == "random" for alias in node.names):
             yield node.lineno
-        drawn = isinstance(node, ast.Call) and re.fullmatch(r"np\.random\.\w+", ast.unparse(node.func))
+        if not isinstance(node, ast.Call):
+            continue
+        drawn = re.fullmatch(r"np\.random\.\w+", ast.unparse(node.func))
         if drawn and (ast.unparse(node.func) != "np.random.default_rng" or not node.args):
             yield node.lineno
 

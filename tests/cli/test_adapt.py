@@ -49,7 +49,7 @@ def test_what_cannot_be_adapted_to(
     path = tmp_path / "other.wav"
     if isinstance(content, bytes):
         path.write_bytes(content)
-    elif content is not None:
+    elif isinstance(content, np.ndarray):
         sound(path, content)
     done = run("adapt", path, "--model", toy_model_file, "-o", "voice.lipmotion")
     assert is_one_error(done, 3)

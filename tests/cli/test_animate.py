@@ -126,7 +126,7 @@ def test_files_that_are_not_what_they_should_be(
     (here / "empty.txt").touch()
     (here / "lexicon.txt").write_text("bin B IH N\nbam B Q\n")
     before = sorted(here.iterdir())
-    for options, code, words in [
+    wrong: list[tuple[list[object], int, str]] = [
         (["--transcript", "latin.txt"], 3, "latin.txt: not a readable UTF-8 transcript"),
         (["--transcript", "empty.txt"], 3, "holds no word"),
         (["--lexicon", "lexicon.txt"], 3, "lexicon.txt, line 2: unknown phone 'Q'"),
@@ -137,7 +137,8 @@ def test_files_that_are_not_what_they_should_be(
         ),
         (["--model", toy_speech], 6, "not a lipmotion model"),
         (["--model", "empty.txt"], 6, "not a lipmotion model"),
-    ]:
+    ]
+    for options, code, words in wrong:
         done = run(*basics, "-o", "a.json", *options)
         assert is_one_error(done, code), done
         assert words in done.err[0]

@@ -132,6 +132,7 @@ def test_warnings_are_status_lines_too(run: RunCommand, basics: tuple[object, ..
     handlers = list(logging.getLogger().handlers)
     done = run(*basics, "--machine-readable", "--transcript", "see bimab papa mama")
     (said,) = [event["log"] for event in events(done) if event["type"] == "log"]
+    assert isinstance(said, dict)
     assert said["level"] == "Warning"
     assert "'bimab' is not in the dictionary" in said["message"]
     assert logging.getLogger().handlers == handlers

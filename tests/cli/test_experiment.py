@@ -71,8 +71,8 @@ def test_a_program_reads_them(run: RunCommand, toy_corpus: Corpus) -> None:
 @pytest.mark.long
 def test_table3_of_some_systems(run: RunCommand, toy_corpus: Corpus, here: Path) -> None:
     (here / "order.txt").write_text("\n".join(toy_corpus.names("train")))
-    chosen = ("--systems", "ph-MSHMM;loudness", "--states", "2", "--mixtures", "1", "--order", "order.txt")
-    chosen = (*chosen, "--sizes", "8,3", "--noise", "white", "--snr", "5", "--plots", "pictures", "--workers", "1")
+    few = ("--systems", "ph-MSHMM;loudness", "--states", "2", "--mixtures", "1", "--order", "order.txt")
+    chosen = (*few, "--sizes", "8,3", "--noise", "white", "--snr", "5", "--plots", "pictures", "--workers", "1")
     done = run("experiment", "table3", toy_corpus.path, *chosen, "-o", "a.json")
     assert (done.code, done.err) == (0, [])
     figures = json.loads((here / "a.json").read_text())

@@ -66,9 +66,11 @@ def test_large_arrays_stay_on_disk(corpus):
 
 
 def test_sixteen_bit_sound_is_kept_exactly():
-    samples = np.array([-32768, -1, 0, 1, 32767], np.float32) / 32768
+    samples = np.array([-32768, -1, 0, 1, 32767], np.float32) / np.float32(32768)
     np.testing.assert_array_equal(quantise(Audio(samples, 16_000)).samples, samples)
-    np.testing.assert_array_equal(quantise(Audio(np.float32([1.0, -1.5]), 16_000)).samples, [32767 / 32768, -1])
+    np.testing.assert_array_equal(
+        quantise(Audio(np.array([1.0, -1.5], np.float32), 16_000)).samples, [32767 / 32768, -1]
+    )
 
 
 def test_names_and_splits(corpus):

@@ -131,7 +131,7 @@ def test_a_motion_without_opening_is_refused():
 def test_values_that_are_not_finite_are_refused(channel):
     curves = {"opening": [0.0, 0.1], channel: [0.5, np.nan]}
     with pytest.raises(InputError, match=f"'{channel}' has values that are not finite"):
-        mouth_poses(motion(**curves), NOTHING_SAID, 25)
+        mouth_poses(motion(**curves), NOTHING_SAID, 25)  # type: ignore[arg-type]
 
 
 def test_no_frames_no_rate_and_no_size_are_refused():

@@ -14,7 +14,7 @@ from lipmotion.testing.examples import timeline
 def test_it_is_farther_than_the_margin_from_every_interval(edges: list[int], margin: int) -> None:
     edges = sorted(edges)[: len(edges) // 2 * 2]
     speech = list(zip(edges[::2], edges[1::2], strict=True))
-    times = np.arange(400) + 0.5
+    times = np.arange(400, dtype=float) + 0.5
     wanted = np.ones(400, bool)
     for start, end in speech:
         wanted &= (times < start - margin) | (times > end + margin)

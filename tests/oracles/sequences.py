@@ -1,6 +1,7 @@
 """Recognition by trying every unit sequence with every segmentation."""
 
 from itertools import combinations, pairwise, product
+from typing import Any
 
 
 def segmentations(frames: int, states: int):
@@ -56,7 +57,7 @@ def boundaries(hmm, units, durations) -> list[int]:
 
 def best(hmm, features, candidates, silence: str = "sil"):
     """Return the best of some unit sequences, its bounds and its score (None, None, -inf: none fits)."""
-    found = (None, None, float("-inf"))
+    found: tuple[Any, Any, float] = (None, None, float("-inf"))
     for units in candidates:
         for durations in segmentations(len(features), sum(hmm.table.count(unit) for unit in units)):
             total = score(hmm, features, units, durations, silence)

@@ -18,7 +18,7 @@ def environment(changes: dict[str, str]) -> dict[str, str]:
     """Return the environment of a process with changes; processor features unknown to NumPy are left out of them."""
     import numpy as np
 
-    known = set(np._core._multiarray_umath.__cpu_dispatch__)
+    known = set(np._core._multiarray_umath.__cpu_dispatch__)  # type: ignore[attr-defined]
     changes = dict(changes)
     if wanted := changes.get("NPY_DISABLE_CPU_FEATURES"):
         changes["NPY_DISABLE_CPU_FEATURES"] = " ".join(name for name in wanted.split() if name in known)

@@ -6,6 +6,7 @@ import os
 import socket
 import struct
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from PIL import Image
@@ -16,7 +17,7 @@ from speech.sound import tone, write_constant_flac, write_pictures, write_sound,
 GROUP = "recordings"
 NO_RECORDING = ("not a readable recording", "give an audio or video file")
 CUT = ("cut short: it states 3", "s of sound and holds")
-CONTAINERS = {
+CONTAINERS: dict[str, tuple[str, dict[float, Any]]] = {
     "wav": ("pcm_s16le", {0.6: (0,), 0.004: (3, "holds", "required at least 100 ms")}),
     "flac": ("flac", {0.6: (0, *CUT), 0.01: (3, *NO_RECORDING)}),
     "mp3": ("libmp3lame", {0.6: (0, *CUT), 0.01: (3, *NO_RECORDING)}),

@@ -57,7 +57,7 @@ def at_frames(hertz: Array) -> Array:
 @pytest.mark.parametrize("n", [0, 1, 5, 9, 10])
 def test_correlations_are_their_slow_twin(n: int) -> None:
     samples = voice(np.linspace(90, 200, 1700)) + noise(1700) / 20
-    fast = correlations(samples, slice(0, 11), 1e-5)[n]
+    fast = correlations(samples, slice(0, 11), 1e-5)[n]  # type: ignore[arg-type]
     x = f0_oracle.frame(samples.astype(float), n)
     silence = 1e-5 + f0_oracle.frication(samples.astype(float), n)
     slow = [f0_oracle.correlation(x, int(lag), silence) for lag in lags()[1::2]]

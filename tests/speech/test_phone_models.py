@@ -21,7 +21,7 @@ def sentences() -> list[ToySentence]:
 
 
 def test_training_is_reported_and_does_not_get_worse(sentences: list[ToySentence]) -> None:
-    steps: list[tuple[str, float]] = []
+    steps: list[tuple[str, float | None]] = []
     spoken = [(sentence.audio, sentence.words) for sentence in sentences[:4]]
     hmm = train_phone_models(spoken, Lexicon(), SMALL, lambda event: steps.append((event.stage, event.figure)))
     assert {"flat start", "pronunciations"} <= {step for step, _ in steps}

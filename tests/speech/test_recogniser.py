@@ -13,6 +13,7 @@ from lipmotion.hmm.model import UnitHmm
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.speech import recogniser as module
 from lipmotion.speech.audio_files import read_audio
+from lipmotion.speech.combined_phones import combined_log_likelihoods
 from lipmotion.speech.formant_synthesiser import synthesise
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.recogniser import (
@@ -196,7 +197,7 @@ def test_the_own_models_are_weighted_by_the_speaker_similarity(
 ) -> None:
     monkeypatch.setattr(module, "FEW_GAUSSIANS", 0)
     weights = []
-    real = module.combined_log_likelihoods
+    real = combined_log_likelihoods
     monkeypatch.setattr(module, "combined_log_likelihoods", lambda *given: weights.append(given[2]) or real(*given))
     middle = (FULL_WEIGHT_SCORE + NO_WEIGHT_SCORE) / 2
     for score, weight in (

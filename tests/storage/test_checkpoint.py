@@ -2,15 +2,17 @@ from __future__ import annotations
 
 import logging
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from lipmotion.errors import ExportError
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
 
-ARRAYS = {
-    "single": np.float32([[1 / 3, np.nan], [-0.0, np.inf]]),
+ARRAYS: dict[str, NDArray[Any]] = {
+    "single": np.array([[1 / 3, np.nan], [-0.0, np.inf]], np.float32),
     "double": np.array([np.pi, np.nextafter(1, 2)]),
     "names": np.array(["b.0<ih", "ä"]),
     "count": np.array(7),

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager
 from pathlib import Path
 from types import FrameType
+from typing import Any
 
 import pytest
 
@@ -285,7 +286,7 @@ def interrupted(folder: Path, step: int) -> bool:
     """Lock and release a folder with an interrupt at one step of it; return whether there were as many steps."""
     seen = 0
 
-    def trace(frame: FrameType, event: str, _: object) -> Callable[..., object] | None:
+    def trace(frame: FrameType, event: str, _: object) -> Any:
         nonlocal seen
         if frame.f_code.co_filename != files.__file__:
             return None

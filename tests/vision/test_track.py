@@ -21,7 +21,7 @@ def face(opening: float) -> NDArray[np.float64]:
     """A face of 60 px between the eyes, as the face mesh gives it [shape=(N, 3)]."""
     points = np.random.default_rng(11).uniform(0, 48, (len(TRACKED_POINTS), 3))
     points[[COLUMN[33], COLUMN[263], COLUMN[10], COLUMN[168]]] = [[2, 20, 0], [62, 20, 0], [32, 2, 5], [32, 20, 0]]
-    points[[COLUMN[13], COLUMN[14]], :2] = [[32, 40], [32, 40 + 60 * opening]]
+    points[[COLUMN[13], COLUMN[14]], :2] = [[32.0, 40.0], [32.0, 40 + 60 * opening]]
     return points
 
 
@@ -192,6 +192,7 @@ class TestRealRecordings:
         result = track(recordings / "grid-s1" / "clips" / "bbizzn.mkv")
         assert np.flatnonzero(~result.seen).tolist() == list(range(12))
         np.testing.assert_array_equal(result.motion.values[:12], np.tile(result.motion.values[12], (12, 1)))
+        assert result.crops is not None
         np.testing.assert_array_equal(result.crops[0], result.crops[12])
 
     def test_nothing_is_printed(self, recordings: Path):

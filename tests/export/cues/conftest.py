@@ -13,7 +13,9 @@ def timeline(phones: Sequence[tuple[str, float]]) -> Timeline[Unit]:
     """Return a timeline of phones, each with its duration in seconds."""
     ends = list(accumulate(duration_s for _, duration_s in phones))
     starts = [0.0, *ends[:-1]]
-    return Timeline(tuple(Span(*times, Unit(phone)) for *times, (phone, _) in zip(starts, ends, phones, strict=True)))
+    return Timeline(
+        tuple(Span(start, end, Unit(phone)) for start, end, (phone, _) in zip(starts, ends, phones, strict=True))
+    )
 
 
 def result(units: Timeline[Unit], motion: Motion | None = None) -> Generation:

@@ -44,7 +44,7 @@ def read_tsv(text: str) -> list[Row]:
     """Split at tabs; a cue ends where the next begins, the last line only ends."""
     lines = [line.split("\t") for line in text.splitlines()]
     times = [float(time) for time, _ in lines]
-    return [(*span, shape) for *span, (_, shape) in zip(times, times[1:], lines, strict=False)]
+    return [(start, end, shape) for start, end, (_, shape) in zip(times, times[1:], lines, strict=False)]
 
 
 def read_json(text: str) -> list[Row]:
