@@ -37,7 +37,6 @@ class Medium(Engine[Mapping[float, Motion]]):
         return Generation(motion, np.zeros_like(motion.values), speech.units, StateTrace(("known",), frames))
 
     def fit(self, examples: object, monitor: object) -> Any: ...
-    def trees(self, model: object) -> Any: ...
     def to_arrays(self, model: object) -> Any: ...
     def from_arrays(self, arrays: object) -> Any: ...
 
@@ -49,7 +48,7 @@ class Shut(Medium):
         result = super().generate(model, speech)
         return replace(result, motion=replace(result.motion, values=result.motion.values * (0.0, 1.0, 1.0)))
 
-    def unpinned(self) -> Medium:
+    def without_closures(self) -> Medium:
         return Medium(self.config)
 
 
