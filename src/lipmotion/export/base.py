@@ -75,6 +75,15 @@ def read_motion(path: str | Path) -> tuple[Motion, Timeline[Unit]]:
     """Return the motion and the units of a motion file; a ``.csv`` has no units, so its timeline is empty.
 
     Raises InputError: unknown suffix, no such file, or not a motion file.
+
+    >>> import lipmotion, tempfile
+    >>> from pathlib import Path
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "welcome.npz"
+    ...     lipmotion.write(lipmotion.animate("examples/welcome.flac"), path)
+    ...     motion, units = read_motion(path)
+    >>> motion.rate_hz, units[0].label.phone
+    (100.0, 'sil')
     """
     path = Path(path)
     read = None

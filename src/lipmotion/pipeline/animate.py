@@ -43,6 +43,7 @@ def animate(
     Source: Hofer, Yamagishi & Shimodaira 2008 (``engines.trajectory``, the engine of the shipped model).
 
     >>> import lipmotion
+    >>> from pathlib import Path
     >>> result = lipmotion.animate("examples/welcome.flac", transcript=Path("examples/welcome.txt"))
     >>> result.motion.rate_hz, result.motion.names[:3]
     (100.0, ('opening', 'width', 'outer'))
@@ -79,6 +80,7 @@ def write(
     The arguments are checked before the first file is written.
 
     >>> import lipmotion, tempfile
+    >>> from pathlib import Path
     >>> result = lipmotion.animate("examples/welcome.flac")
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     lipmotion.write(result, Path(folder) / "welcome.csv", rate_hz=25, channels=["opening", "width"])

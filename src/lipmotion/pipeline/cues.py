@@ -54,6 +54,7 @@ def write_cues(
     Formats and folders are checked before the first file is written.
 
     >>> import lipmotion, tempfile
+    >>> from pathlib import Path
     >>> sheet = lipmotion.cues(lipmotion.animate("examples/welcome.flac"))
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     lipmotion.write_cues(sheet, Path(folder) / "welcome.tsv")

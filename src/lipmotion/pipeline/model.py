@@ -39,8 +39,8 @@ class Model:
 
     >>> import lipmotion
     >>> model = lipmotion.load_model()
-    >>> model.engine.name, model.visual, model.about["corpus"]
-    ('trajectory', 'geometry', ['The GRID audiovisual sentence corpus (zenodo.org/record/3625687)'])
+    >>> model.engine.name, model.visual, model.adaptation is None
+    ('trajectory', 'geometry', True)
     """
 
     phones: UnitHmm
@@ -62,6 +62,7 @@ def save_model(model: Model, path: str | Path) -> None:
     Raises ExportError: the file cannot be written.
 
     >>> import lipmotion, tempfile
+    >>> from pathlib import Path
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     lipmotion.save_model(lipmotion.load_model(), Path(folder) / "copy.lipmotion")
     ...     lipmotion.load_model(Path(folder) / "copy.lipmotion").engine.name

@@ -46,6 +46,11 @@ class Lexicon:
     """Pronunciations of words.
 
     user : the user's pronunciations, which replace those of the dictionary
+
+    >>> Lexicon().pronunciations("boat")
+    (('b', 'ow', 't'),)
+    >>> Lexicon({"zenodo": (("z", "eh", "n", "ow", "d", "ow"),)}).known("zenodo")
+    True
     """
 
     user: dict[str, tuple[Pronunciation, ...]] = field(default_factory=dict)

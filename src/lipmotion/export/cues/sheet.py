@@ -18,6 +18,10 @@ class CueSheet:
     cues  : shapes without gaps from 0 to the end, at least one; times are whole hundredths of a second
     fps   : the frame rate that they were chosen for; ``int(fps * start_s)`` is a cue's first frame, the first is 0
     drawn : the shapes that the character has
+
+    >>> sheet = CueSheet(Timeline((Span(0.0, 0.5, "X"), Span(0.5, 0.62, "A"))), fps=24.0, drawn="ABCDEFX")
+    >>> sheet.duration_s, sheet.rest
+    (0.62, 'X')
     """
 
     cues: Timeline[str]

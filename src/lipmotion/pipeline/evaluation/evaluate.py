@@ -60,7 +60,7 @@ def evaluate(
     >>> from lipmotion.testing import toy_utterances
     >>> folder = tempfile.TemporaryDirectory()
     >>> corpus = lipmotion.Corpus.create(Path(folder.name) / "toy")
-    >>> corpus.add(toy_utterances(1)[0])
+    >>> corpus.add(toy_utterances(3)[0])
     >>> figures = lipmotion.evaluate(lipmotion.load_model(), corpus, selection=lipmotion.Selection(None))
     >>> figures["clips"], sorted(figures["conditions"])
     (1, ['audio only', 'with transcript'])

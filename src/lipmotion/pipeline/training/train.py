@@ -125,6 +125,8 @@ def train(
     Source: of the engines; of the two stages of training, Xie & Liu 2007, §3.4.
 
     >>> import lipmotion, tempfile
+    >>> from pathlib import Path
+    >>> from lipmotion.hmm.model import HmmConfig
     >>> from lipmotion.testing import toy_utterances
     >>> folder = tempfile.TemporaryDirectory()
     >>> corpus = lipmotion.Corpus.create(Path(folder.name) / "toy")
@@ -132,7 +134,7 @@ def train(
     ...     corpus.add(utterance)
     >>> model, report = lipmotion.train(corpus, recogniser=HmmConfig(mixtures=1, iterations=1))
     >>> model.engine.name, report.used
-    ('trajectory', ('toy00', 'toy01'))
+    ('trajectory', ('toy00',))
     >>> folder.cleanup()
     """
     check_visual(visual)

@@ -1,0 +1,53 @@
+"""The examples in docstrings run from the root of the repository, with the shipped model and examples/welcome.flac."""
+
+from __future__ import annotations
+
+import doctest
+import inspect
+import time
+from collections.abc import Iterator
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+import lipmotion
+
+ROOT = Path(__file__).parents[2]
+LONGEST_S = 2.0
+"""Largest processor time of the examples of one docstring."""
+
+
+def homes() -> Iterator[tuple[str, object, str]]:
+    """Yield the name, the value and the module of everything public."""
+    for name in lipmotion.__all__:
+        value = inspect.unwrap(getattr(lipmotion, name))
+        yield name, value, value.__module__
+
+
+def documented() -> dict[str, doctest.DocTest]:
+    """Return the docstrings with examples of all public names, their modules and the package, by name."""
+    finder = doctest.DocTestFinder(exclude_empty=True)
+    modules = [import_module(name) for name in sorted({"lipmotion", *(home for _, _, home in homes())})]
+    tests = [test for module in modules for test in finder.find(module, module.__name__)]
+    for name, value, home in homes():  # the finder does not look behind decorators
+        tests += finder.find(value, f"{home}.{name}", import_module(home))
+    return {test.name: test for test in tests if test.examples}
+
+
+EXAMPLES = documented()
+
+
+@pytest.mark.parametrize("name", sorted(EXAMPLES))
+def test_the_examples_of_a_docstring_run(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    lipmotion.animate("examples/welcome.flac")  # the first use loads and compiles
+    reports: list[str] = []
+    start_s = time.process_time()
+    result = doctest.DocTestRunner(verbose=False).run(EXAMPLES[name], out=reports.append)
+    assert result.failed == 0, "".join(reports)
+    assert time.process_time() - start_s < LONGEST_S
+
+
+def test_every_public_name_has_an_example() -> None:
+    assert [name for name, _, home in homes() if f"{home}.{name}" not in EXAMPLES] == []
