@@ -5,7 +5,7 @@
 # make check  lint, types, import contracts
 # make coverage   the tests of `make test`, and which lines and branches they reach
 # make fuzz   changed input for every reader, MINUTES=10 in all; READER=name: that one only; SEED=1: other input
-# make bench  the speed figures of the README
+# make bench  the speed figures of docs/results/figures.md
 # make model  trains and measures the model that ships with the package (needs GRID speaker s1)
 # make requirements  renews the pinned requirements (needs uv)
 

@@ -30,8 +30,8 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 PACKAGE = Path("src") / "lipmotion"
-PARTS = (".ci", "CHANGELOG.md", "LICENSE", "Makefile", "README.md", "benchmarks", "docs", "examples", "pyproject.toml",
-         "requirements", "scripts", "src", "tests")  # fmt: skip
+PARTS = (".ci", "CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "Makefile", "README.md", "SECURITY.md",
+         "benchmarks", "docs", "examples", "pyproject.toml", "requirements", "scripts", "src", "tests")  # fmt: skip
 """What tests may look at, as far as the tree has it."""
 ALL = ("tests",)
 SHARED = "shared"

@@ -35,12 +35,14 @@ class Package:
     def __init__(self, page: str, folder: Path) -> None:
         text = (PAGES / page).read_text(encoding="utf-8")
         blocks = dict(enumerate(re.findall(r"^```(?:python|toml)\n(.*?)^```", text, re.MULTILINE | re.DOTALL)))
-        self.check = blocks[1]
+        self.check = "\n".join(block for block in blocks.values() if "check_" in block or "CHECKS" in block)
+        if "CHECKS" in self.check:
+            self.check += "\nfor promise in ENGINE_CHECKS:\n    test_promise(promise)\n"
         (module,) = set(re.findall(r"^`(\w+)\.py`", text, re.MULTILINE))
         self.sources, self.installed = folder / "sources", folder / "installed"
         self.sources.mkdir(parents=True)
         (self.sources / f"{module}.py").write_text(blocks[0], encoding="utf-8")
-        project = blocks[2]
+        project = next(block for block in blocks.values() if "entry-points" in block)
         if "[project]" not in project:
             project = PROJECT.format(name=module, entry=project, module=module)
         (self.sources / "pyproject.toml").write_text(project, encoding="utf-8")

@@ -108,6 +108,14 @@ def test_readme_is_short() -> None:
     assert len([word for word in text.split() if re.search(r"\w", word)]) <= 600
 
 
+def test_the_figures_of_the_readme_stand_in_the_results() -> None:
+    section = (ROOT / "README.md").read_text(encoding="utf-8").split("## How good it is")[1].split("\n## ")[0]
+    given = set(re.findall(r"\b0\.\d+", section))
+    results = (DOCS / "results" / "figures.md").read_text(encoding="utf-8")
+    assert len(given) >= 6
+    assert given - set(re.findall(r"\b0\.\d+", results)) == set()
+
+
 def test_no_package_registry_and_no_absolute_path_is_named() -> None:
     listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=False)
     if listed.returncode:
