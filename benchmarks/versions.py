@@ -1,7 +1,7 @@
-"""``python benchmarks/versions.py OLD NEW [--repeats 7]``: start-up and ``animate`` of two trees of this project, in turn.
+"""``python benchmarks/versions.py OLD NEW [--repeats 7]``: start-up and ``animate`` of two checkouts of this project.
 
-OLD and NEW are checkouts; each job runs in a process of its own with the tree's ``src`` first on the path, old and new in
-turn, so that a noisy machine slows both. Printed are medians of wall-clock seconds, and the ratio new to old.
+Each job runs in a process of its own with the tree's ``src`` first on the path, old and new in turn, so that a noisy
+machine slows both. Printed are medians of wall-clock seconds, and the ratio of new to old.
 """
 
 from __future__ import annotations

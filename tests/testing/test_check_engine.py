@@ -11,8 +11,14 @@ import pytest
 
 from lipmotion.engines.base import Engine, Fit
 from lipmotion.errors import CorpusError, InputError, ModelFormatError
-from lipmotion.motion import fit_motion, learned_motion_arrays, learned_motion_from_arrays, with_unit_names
-from lipmotion.storage.schema import ArraySpec, checked_arrays, format_errors
+from lipmotion.motion import (
+    LEARNED_MOTION_ARRAYS,
+    fit_motion,
+    learned_motion_arrays,
+    learned_motion_from_arrays,
+    with_unit_names,
+)
+from lipmotion.storage.schema import ArraySpec, checked_arrays, format_errors, refuse_undeclared
 from lipmotion.testing import ENGINE_CHECKS, ContractError, TrainedEngine, check_engine
 from lipmotion.types import Configuration, Generation, Rule, StateTrace, option
 
@@ -57,6 +63,7 @@ class MeanPoses(Engine[Any]):
     def from_arrays(self, arrays: Any) -> Any:
         motion = learned_motion_from_arrays(arrays)
         with format_errors("the model"):
+            refuse_undeclared(arrays, LEARNED_MOTION_ARRAYS, MEANS)
             means = checked_arrays(arrays, MEANS, N=256, Q=motion.space.dimensions)["means"]
         return motion, means
 

@@ -105,5 +105,7 @@ class LogForwardBackward(NamedTuple):
         audio_entered = np.logaddexp.reduce(before[-units_audio:, None] + moved[None, :units_audio], axis=2)
         leaving = self.audio.forward(before)[:, -units_visual:]
         visual_entered = np.logaddexp.reduce(leaving[:, :, None] + backward[:, None, :units_visual], axis=0)
-        entered = (np.exp(np.minimum(logs - frame.overlap, LARGEST_EXPONENT)) for logs in (audio_entered, visual_entered))
+        entered = (
+            np.exp(np.minimum(logs - frame.overlap, LARGEST_EXPONENT)) for logs in (audio_entered, visual_entered)
+        )
         return LogStep(frame, beta + self.log_density(t), *entered)

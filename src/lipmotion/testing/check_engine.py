@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from lipmotion.engines.base import Describes, Engine, Explains, ForcesClosures, HasPosteriors
-from lipmotion.errors import CorpusError, InputError, LipMotionError, ModelFormatError
+from lipmotion.errors import CorpusError, InputError, ModelFormatError
 from lipmotion.testing.contract import ContractError, require, require_error
 from lipmotion.testing.examples import CHANNELS, RATE_HZ, example, examples, motion, speech, timeline
 from lipmotion.types import (
@@ -63,7 +63,7 @@ def check_engine(engine: Engine[Any]) -> None:
             check(trained)
         except ContractError as error:
             raise ContractError(f"{name}: {error}") from error
-        except LipMotionError as error:
+        except Exception as error:
             raise ContractError(f"{name}: the engine raises {type(error).__name__}: {error}") from error
 
 
@@ -171,13 +171,18 @@ def a_model_comes_back_from_arrays(trained: TrainedEngine) -> None:
 
 
 def damaged_arrays_are_format_errors(trained: TrainedEngine) -> None:
-    """An array is missing, or cut short."""
+    """An array is missing, unknown, cut short, or lacks a column."""
     engine, arrays = trained.engine, trained.engine.to_arrays(trained.model)
     for name in arrays:
         missing: Mapping[str, Any] = {key: array for key, array in arrays.items() if key != name}
         require_error(ModelFormatError, partial(engine.from_arrays, missing), f"{name!r} missing")
         short = arrays | {name: arrays[name][:-1]}
         require_error(ModelFormatError, partial(engine.from_arrays, short), f"{name!r} cut short")
+        if arrays[name].ndim > 1:
+            narrow = arrays | {name: arrays[name][..., :-1]}
+            require_error(ModelFormatError, partial(engine.from_arrays, narrow), f"{name!r} without a column")
+    stray = arrays | {"an array of nobody": np.zeros(3)}
+    require_error(ModelFormatError, partial(engine.from_arrays, stray), "an unknown array")
 
 
 def every_phone_can_be_said(trained: TrainedEngine) -> None:
