@@ -19,7 +19,7 @@ from lipmotion.kernels.loops import Array, FactorialLogLikelihoods, FrameDensity
 ROOM_BYTES = 2**27
 """Memory for the forward probabilities that are stored at once: of as many frames as fit in, but of √T at least."""
 LEAST_OVERLAP: dict[np.dtype[Any], float] = {np.dtype(np.float32): 1e-20, np.dtype(np.float64): 1e-110}
-"""By precision: least sum of forward times backward probabilities, each of sum 1; below, what was set to 0 may count."""
+"""By precision: least sum of forward times backward probabilities, each of sum 1; below, values set to 0 may count."""
 
 
 class FactorialPosteriors(NamedTuple):
