@@ -10,7 +10,7 @@ from lipmotion.errors import InputError
 
 
 @pytest.mark.parametrize("name", sorted(ENGINES.names))
-def test_an_engine_of_which_nothing_is_said_is_as_it_is(name: str) -> None:
+def test_an_engine_without_settings_has_its_default_configuration(name: str) -> None:
     assert engine_from_settings(name) == engine_named(name, {})
 
 
@@ -41,7 +41,7 @@ def test_settings_are_of_the_option_s_kind_and_have_the_last_word() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "told", "words"),
+    ("name", "arguments", "words"),
     [
         ("joined", {}, "no engine 'joined'; there are: trajectory, coupled, joint"),
         ("trajectory", {"preset": "ph-HMM"}, "add --engine coupled"),
@@ -64,7 +64,7 @@ def test_settings_are_of_the_option_s_kind_and_have_the_last_word() -> None:
         ("trajectory", {"settings": ["units=evis"]}, "no unit set 'evis'"),
     ],
 )
-def test_what_cannot_be_asked_for(name: str, told: dict[str, object], words: str) -> None:
+def test_arguments_that_are_not_allowed(name: str, arguments: dict[str, object], words: str) -> None:
     with pytest.raises(InputError) as error:
-        engine_from_settings(name, **told)  # type: ignore[arg-type]
+        engine_from_settings(name, **arguments)  # type: ignore[arg-type]
     assert words in str(error.value)

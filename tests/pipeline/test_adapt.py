@@ -28,14 +28,14 @@ def adapted_file(adapted: Model, tmp_path_factory: pytest.TempPathFactory) -> Pa
     return path
 
 
-def test_only_what_is_heard_changes(toy_model: Model, adapted: Model) -> None:
+def test_only_the_adaptation_changes(toy_model: Model, adapted: Model) -> None:
     assert toy_model.adaptation is None
     assert adapted.adaptation is not None
     assert adapted.phones is toy_model.phones
     assert adapted.learned is toy_model.learned
-    told = dict(adapted.about)
-    assert told.pop("adapted")["recordings"] == 2
-    assert told == toy_model.about
+    about = dict(adapted.about)
+    assert about.pop("adapted")["recordings"] == 2
+    assert about == toy_model.about
 
 
 def test_it_is_used_from_then_on(toy_model: Model, adapted: Model, toy_speech: Path, monkeypatch) -> None:
@@ -50,7 +50,9 @@ def test_it_is_used_from_then_on(toy_model: Model, adapted: Model, toy_speech: P
     assert len(used) == 2
 
 
-def test_saved_and_loaded_it_hears_the_same(adapted: Model, adapted_file: Path, toy_speech: Path) -> None:
+def test_a_saved_and_loaded_adaptation_gives_the_same_phones(
+    adapted: Model, adapted_file: Path, toy_speech: Path
+) -> None:
     again = load_model(adapted_file)
     assert again.adaptation is not None
     assert np.array_equal(again.adaptation.own, adapted.adaptation.own)

@@ -106,14 +106,14 @@ def test_what_came_out_can_be_passed_back(move: Animate) -> None:
 def test_edited_units_change_the_motion_where_they_are(move: Animate, toy_sentence: ToySentence) -> None:
     """``see`` becomes ``saw``: the mouth opens there, and nowhere else."""
     spans = toy_sentence.units.spans
-    place = next(number for number, span in enumerate(spans) if span.label.phone == "iy")
-    wider = [*spans[:place], replace(spans[place], label=Unit("aa")), *spans[place + 1 :]]
+    position = next(number for number, span in enumerate(spans) if span.label.phone == "iy")
+    wider = [*spans[:position], replace(spans[position], label=Unit("aa")), *spans[position + 1 :]]
     before, after = move(units=toy_sentence.units), move(units=Timeline(tuple(wider)))
-    inside = frames_of(spans[place])
+    inside = frames_of(spans[position])
     assert after.motion["opening"][inside].max() > 1.3 * before.motion["opening"][inside].max()
     far = inside.stop + 40
     assert after.motion.values[far:] == pytest.approx(before.motion.values[far:], abs=5e-3)
-    assert after.units.spans[place].label.phone == "aa"
+    assert after.units.spans[position].label.phone == "aa"
 
 
 def test_units_need_no_recogniser(move: Animate) -> None:
@@ -153,7 +153,7 @@ def test_a_pin_that_cannot_be_met(move: Animate, pin: Pin, message: str) -> None
         move(constraints=Constraints((pin,)))
 
 
-def test_a_lexicon_says_how_words_are_said(
+def test_a_lexicon_gives_pronunciations(
     move: Animate, caplog: pytest.LogCaptureFixture, toy_sentence: ToySentence
 ) -> None:
     lexicon = Lexicon({"zyzzy": (("s", "iy"),)})

@@ -23,7 +23,7 @@ ENGINES = ("toy_model", "joint_model", "coupled_model", "pictured_model")
 
 @pytest.fixture(autouse=True)
 def quiet() -> Iterator[None]:
-    """What overflows is told by what comes of it."""
+    """An overflow is detected by its consequences."""
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")
         yield

@@ -53,14 +53,14 @@ def test_from_videos_to_figures(some_of_grid: Path, tmp_path: Path) -> None:
     figures = evaluate(load_model(tmp_path / "s1.lipmotion"), corpus, selection=Selection("test"))
 
     # With 80 of 452 clips: 0.82 and 0.87 were measured; the bars leave room for another tracker build.
-    heard, read = figures["conditions"]["audio only"], figures["conditions"]["with transcript"]
-    assert heard["channels"]["opening"]["acc"] > 0.74
-    assert read["channels"]["opening"]["acc"] > 0.80
-    assert abs(read["lag_ms"]) < 20
-    for condition in (heard, read):
+    audio_only, transcribed = figures["conditions"]["audio only"], figures["conditions"]["with transcript"]
+    assert audio_only["channels"]["opening"]["acc"] > 0.74
+    assert transcribed["channels"]["opening"]["acc"] > 0.80
+    assert abs(transcribed["lag_ms"]) < 20
+    for condition in (audio_only, transcribed):
         assert condition["silence"]["generated"]["mean"] < 0.02
         assert condition["silence"]["generated"]["std"] < 0.015
-    assert read["closures_p_b_m"]["recall"] > 0.9
+    assert transcribed["closures_p_b_m"]["recall"] > 0.9
     assert "CC BY 4.0" in " ".join(model.about["attribution"])
 
 

@@ -78,8 +78,8 @@ def test_a_transcript_of_something_else_is_doubted(
     transcribe(Recogniser(toy_model.phones, "auto"), audio, features, WRONG, Lexicon())
     (record,) = caplog.records
     assert (record.name, record.levelname) == ("lipmotion", "WARNING")
-    told = r"the transcript seems not to be what is said \(.* at -\d+\.\d, required -4\.2 or more\); check it, or .*"
-    assert re.fullmatch(told, record.getMessage())
+    message = r"the transcript seems not to be what is said \(.* at -\d+\.\d, required -4\.2 or more\); check it, or .*"
+    assert re.fullmatch(message, record.getMessage())
 
 
 def test_the_right_one_is_not(
@@ -110,7 +110,7 @@ def test_it_says_what_is_wrong(phones: Recogniser, audio: Audio, features: Featu
         transcribe(phones, audio, features, ("five",) * 60, Lexicon())
 
 
-def test_of_many_guesses_some_are_told(caplog: pytest.LogCaptureFixture) -> None:
+def test_of_many_guesses_some_are_reported_one_by_one(caplog: pytest.LogCaptureFixture) -> None:
     warn_of_guesses([f"bimab{'ab' * i}" for i in range(MOST_WARNINGS + 7)], Lexicon())
     *each, last = [record.getMessage() for record in caplog.records]
     assert len(each) == MOST_WARNINGS

@@ -18,12 +18,12 @@ from lipmotion.types import Speech, Timeline, Unit
 
 
 @dataclass(frozen=True)
-class Listening(Engine[Any]):
+class RecognisingEngine(Engine[Any]):
     """Recognises the phones that it is given."""
 
     config: Any = None
     found: Timeline[Unit] | None = None
-    name: ClassVar[str] = "listening"
+    name: ClassVar[str] = "recognising"
     wants_f0: ClassVar[bool] = True  # type: ignore[misc]
 
     def recognise(self, model: object, speech: Speech) -> Timeline[Unit] | None:  # noqa: ARG002
@@ -39,15 +39,17 @@ class Listening(Engine[Any]):
 RECOGNISED: Timeline[Unit] = Timeline(())
 
 
-def heard(engine: Engine[Any], model: Model, sentence: ToySentence, kind: str = "own") -> Speech:
+def recognised(engine: Engine[Any], model: Model, sentence: ToySentence, kind: str = "own") -> Speech:
     phones, features = Recogniser(model.phones, kind), mfcc(sentence.audio)
     return recognised_speech(engine, None, sentence.audio, features, phones, lambda: RECOGNISED)
 
 
-def test_what_the_engine_hears_is_placed_as_in_training(toy_model: Model, toy_sentence: ToySentence) -> None:
+def test_phones_that_the_engine_recognises_are_aligned_as_in_training(
+    toy_model: Model, toy_sentence: ToySentence
+) -> None:
     """Its phones, with the times of forced alignment, and no words."""
     late = toy_sentence.units.shifted(0.07)
-    speech = heard(Listening(found=late), toy_model, toy_sentence)
+    speech = recognised(RecognisingEngine(found=late), toy_model, toy_sentence)
     assert [s.label.phone for s in speech.units] == [s.label.phone for s in toy_sentence.units]
     assert {s.label.word for s in speech.units} == {""}
     aligned = Recogniser(toy_model.phones, "own").align_phones(toy_sentence.audio, mfcc(toy_sentence.audio), late)
@@ -57,27 +59,29 @@ def test_what_the_engine_hears_is_placed_as_in_training(toy_model: Model, toy_se
 
 
 def test_the_recogniser_says_what_the_engine_does_not_know(toy_model: Model, toy_sentence: ToySentence) -> None:
-    assert heard(Listening(), toy_model, toy_sentence).units is RECOGNISED
+    assert recognised(RecognisingEngine(), toy_model, toy_sentence).units is RECOGNISED
 
 
 def test_general_models_alone_are_taken_by_their_word(toy_model: Model, toy_sentence: ToySentence) -> None:
-    assert heard(Listening(found=toy_sentence.units), toy_model, toy_sentence, "general").units is RECOGNISED
+    assert (
+        recognised(RecognisingEngine(found=toy_sentence.units), toy_model, toy_sentence, "general").units is RECOGNISED
+    )
 
 
 def test_phones_that_do_not_fit_are_not_taken(toy_model: Model, toy_sentence: ToySentence) -> None:
     spans = toy_sentence.units.spans[1:-1]
     crowd = [span for n in range(30) for span in Timeline(spans).shifted(3.0 * n)]
-    assert heard(Listening(found=Timeline(tuple(crowd))), toy_model, toy_sentence).units is RECOGNISED
+    assert recognised(RecognisingEngine(found=Timeline(tuple(crowd))), toy_model, toy_sentence).units is RECOGNISED
 
 
 def test_f0_is_computed_for_engines_that_want_it(toy_sentence: ToySentence) -> None:
     features = mfcc(toy_sentence.audio)
-    found = speech_of(Listening(), toy_sentence.audio, features, toy_sentence.units).log_f0
+    found = speech_of(RecognisingEngine(), toy_sentence.audio, features, toy_sentence.units).log_f0
     assert found is not None
     np.testing.assert_array_equal(found, log_f0(toy_sentence.audio))
 
     @dataclass(frozen=True)
-    class Deaf(Listening):
+    class Deaf(RecognisingEngine):
         wants_f0: ClassVar[bool] = False  # type: ignore[misc]
 
     assert speech_of(Deaf(), toy_sentence.audio, features, toy_sentence.units).log_f0 is None

@@ -56,7 +56,7 @@ def test_words_that_are_known_are_not_recognised() -> None:
     assert own.units == shared.units
 
 
-def test_sound_alone_is_recognised_whatever_another_recogniser_found() -> None:
+def test_untranscribed_speech_is_recognised_whatever_the_given_units() -> None:
     one = recognised()
     other = generated(replace(SOUND, units_known=False))
     assert one.motion.values == pytest.approx(other.motion.values, abs=1e-9)

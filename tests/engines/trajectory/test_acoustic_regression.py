@@ -14,7 +14,7 @@ from lipmotion.stats.trees import Question, Tree
 from lipmotion.testing.examples import examples
 from lipmotion.types.progress import silent_monitor
 
-HOW = TrajectoryConfig(
+OPTIONS = TrajectoryConfig(
     states=3, silent_states=7, components=2, acoustic_components=20, ridge=10.0, ridge_frames=50.0
 ).training
 
@@ -77,7 +77,7 @@ def test_moments_add_up():
     assert halves.targets == pytest.approx(whole.targets, rel=1e-5)
 
 
-def test_the_window_hears_features_around_a_frame_and_no_further():
+def test_the_context_uses_features_around_a_frame_and_no_further():
     draw = np.random.default_rng(0)
     recordings = [draw.normal(size=(80, 3)).astype(np.float32) for _ in range(4)]
     window = fit_acoustic_context(recordings, 10)
@@ -122,8 +122,8 @@ def error(model, corpus):
     for one in corpus:
         rows = np.array(
             [
-                model.emission.row(p, HOW.layout)
-                for p in full_context_states(one.speech.units, len(one.valid), HOW.layout)
+                model.emission.row(p, OPTIONS.layout)
+                for p in full_context_states(one.speech.units, len(one.valid), OPTIONS.layout)
             ]
         )
         means, _ = model.emission.statistics(rows, one.speech.features.values, slice(None))
@@ -133,15 +133,15 @@ def error(model, corpus):
 
 def test_means_follow_the_sound():
     corpus = list(loud_and_soft(16))
-    deaf, listening = (
-        fit_trajectory(corpus[:12], replace(HOW, acoustic_regression=on), silent_monitor) for on in (False, True)
+    plain, regressed = (
+        fit_trajectory(corpus[:12], replace(OPTIONS, acoustic_regression=on), silent_monitor) for on in (False, True)
     )
-    assert error(listening, corpus[12:]) < 0.75 * error(deaf, corpus[12:])
-    assert listening.emission.variances[:-1, 0, 0].mean() < deaf.emission.variances[:-1, 0, 0].mean()
+    assert error(regressed, corpus[12:]) < 0.75 * error(plain, corpus[12:])
+    assert regressed.emission.variances[:-1, 0, 0].mean() < plain.emission.variances[:-1, 0, 0].mean()
 
 
-def test_rest_does_not_listen():
-    model = fit_trajectory(list(loud_and_soft(12)), HOW, silent_monitor)
+def test_the_rest_pose_has_no_regression():
+    model = fit_trajectory(list(loud_and_soft(12)), OPTIONS, silent_monitor)
     assert model.emission.regression.rows[-1] == -1
     rows = np.full(5, len(model.emission.means) - 1)
     means, _ = model.emission.statistics(rows, np.random.default_rng(0).normal(size=(5, 39)), slice(None))

@@ -101,7 +101,7 @@ def test_an_edited_unit_changes_the_motion_around_it_only():
     talk, other = (speech(timeline(("t", "aa", phone, "aa", "t", "s"))) for phone in ("iy", "uw"))
     one, two = (ENGINE.generate(MODEL, s).motion["width"] for s in (talk, other))
     assert np.abs(one - two)[80:90].max() > 0.05
-    assert one[:50] == pytest.approx(two[:50], abs=1e-4)  # a quarter of a second of sound is heard around a frame
+    assert one[:50] == pytest.approx(two[:50], abs=1e-4)  # the acoustic context reaches a quarter of a second
     assert one[-50:] == pytest.approx(two[-50:], abs=1e-4)
 
 

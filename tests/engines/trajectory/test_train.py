@@ -9,22 +9,22 @@ from lipmotion.motion.frame_labels import FullContextState, StateLayout, full_co
 from lipmotion.testing.examples import examples
 from lipmotion.types.progress import silent_monitor
 
-HOW = replace(TrajectoryConfig(states=3, silent_states=7, components=2, acoustic_regression=False).training)
-CUT = HOW.layout
+OPTIONS = replace(TrajectoryConfig(states=3, silent_states=7, components=2, acoustic_regression=False).training)
+LAYOUT = OPTIONS.layout
 
 
 def fit(corpus, **changes):
-    return fit_trajectory(corpus, replace(HOW, **changes), silent_monitor)
+    return fit_trajectory(corpus, replace(OPTIONS, **changes), silent_monitor)
 
 
 def frames_by_density(corpus, emission):
-    """Static, Δ and Δ² of the opening in all frames that have them, by the density of their place."""
+    """Static, Δ and Δ² of the opening in all frames that have them, by the density of their state."""
     found: dict[int, list[list[float]]] = {}
     for example in corpus:
         x = example.motion["opening"]
-        for t, place in list(enumerate(full_context_states(example.speech.units, len(x), CUT)))[1:-1]:
+        for t, state in list(enumerate(full_context_states(example.speech.units, len(x), LAYOUT)))[1:-1]:
             row = [x[t], (x[t + 1] - x[t - 1]) / 2, x[t + 1] - 2 * x[t] + x[t - 1]]
-            found.setdefault(emission.row(place, CUT), []).append(row)
+            found.setdefault(emission.row(state, LAYOUT), []).append(row)
     return {density: np.array(rows) for density, rows in found.items()}
 
 
@@ -53,7 +53,7 @@ def test_shrinkage_draws_leaves_together():
 def test_trees_tell_apart_what_moves_apart():
     emission = fit(examples(12)).emission
     middle = {
-        phone: emission.means[emission.row(FullContextState("t", phone, "s", 1), CUT), 0, 0]
+        phone: emission.means[emission.row(FullContextState("t", phone, "s", 1), LAYOUT), 0, 0]
         for phone in ("aa", "iy", "uw", "p")
     }
     assert middle["aa"] > middle["iy"] + 0.1
@@ -76,25 +76,25 @@ def test_a_channel_that_never_moves_keeps_a_variance():
         example.motion.values[:, 1] = 0.0
     emission = fit(corpus, acoustic_regression=True, acoustic_components=20).emission
     assert (emission.variances >= LEAST_VARIANCE / 1e4).all()
-    rows = np.array([emission.row(place, CUT) for place in full_context_states(corpus[0].speech.units, 99, CUT)])
+    rows = np.array([emission.row(state, LAYOUT) for state in full_context_states(corpus[0].speech.units, 99, LAYOUT)])
     for statistic in emission.statistics(rows, corpus[0].speech.features.values, slice(0, 99)):
         assert np.isfinite(statistic).all()
 
 
-def test_the_source_of_a_place_says_what_its_density_rests_on():
+def test_the_source_of_a_state_names_the_leaf_of_its_density():
     emission = fit(examples(6)).emission
-    said = emission.source(FullContextState("t", "aa", "p", 1), CUT)
+    said = emission.source(FullContextState("t", "aa", "p", 1), LAYOUT)
     assert said.startswith("t-aa+p speech.1: ")
     assert said.endswith(" frames)")
-    assert emission.source(CUT.rest, CUT) == "rest"
+    assert emission.source(LAYOUT.rest, LAYOUT) == "rest"
 
 
-def test_phones_never_heard_resolve_like_those_of_their_class():
+def test_phones_without_training_frames_resolve_like_those_of_their_class():
     emission = fit(examples(8)).emission
     for phone in ("zh", "oy", "em"):
-        assert 0 <= emission.row(FullContextState("zh", phone, "ng", 2), CUT) < len(emission.means) - 1
-    assert emission.row(FullContextState("t", "sp", "t", 6), CUT) == emission.row(
-        FullContextState("t", "sil", "t", 6), CUT
+        assert 0 <= emission.row(FullContextState("zh", phone, "ng", 2), LAYOUT) < len(emission.means) - 1
+    assert emission.row(FullContextState("t", "sp", "t", 6), LAYOUT) == emission.row(
+        FullContextState("t", "sil", "t", 6), LAYOUT
     )
 
 

@@ -108,11 +108,11 @@ def test_the_mouth_rests_in_silence_whatever_its_unit(name):
 
 def test_silence_that_is_a_closed_mouth_is_cut_as_speech():
     layout = StateLayout(3, 7, 0.1, unit_set("2vis"))
-    where = full_context_states(timeline(("p", "aa")), 141, layout)
-    assert {place.unit for place in where} == {"open", "closed"}
-    assert {layout.name(place) for place in where if place != layout.rest} == {"speech.0", "speech.1", "speech.2"}
-    assert where[0] == where[-1] == layout.rest
-    assert layout.rest not in where[60:80]
+    states = full_context_states(timeline(("p", "aa")), 141, layout)
+    assert {state.unit for state in states} == {"open", "closed"}
+    assert {layout.name(state) for state in states if state != layout.rest} == {"speech.0", "speech.1", "speech.2"}
+    assert states[0] == states[-1] == layout.rest
+    assert layout.rest not in states[60:80]
 
 
 def test_lips_that_meet_between_others_do_not_rest():

@@ -84,7 +84,7 @@ def test_recordings_become_a_corpus(studio, tmp_path):
 
 
 @pytest.mark.usefixtures("tracked")
-def test_what_is_odd_about_a_video_is_told_and_kept(studio, tmp_path):
+def test_remarks_on_a_video_are_reported_and_kept(studio, tmp_path):
     speak(studio / "cut.mp4", 9)
     for _ in range(2):  # prepared, then kept
         report = prepare(studio, tmp_path / "corpus", workers=1)
@@ -164,7 +164,7 @@ def test_nothing_usable(tmp_path):
         prepare(tmp_path / "studio", tmp_path / "corpus", workers=1)
 
 
-def test_missing_packages_are_said_at_once(studio, tmp_path, monkeypatch):
+def test_missing_packages_are_reported_at_once(studio, tmp_path, monkeypatch):
     def missing() -> dict[str, str]:
         raise MissingDependencyError("pip install")
 
@@ -226,7 +226,7 @@ def test_another_speaker_may_use_the_same_names(studio, tmp_path):
 
 
 @pytest.mark.usefixtures("tracked")
-def test_what_becomes_of_every_recording_is_told_at_once(studio, tmp_path, capsys):
+def test_the_outcome_of_every_recording_is_reported_at_once(studio, tmp_path, capsys):
     speak(studio / "broken.mp4", 5)
     (studio / "empty.mp4").touch()
     prepare(studio, tmp_path / "corpus", workers=1, crops=False)
@@ -276,11 +276,11 @@ from pathlib import Path
 from lipmotion.pipeline.corpus.prepare import prepare
 from lipmotion.types import Item
 
-heard = []
+items = []
 
 def hold(event):
-    heard.append(isinstance(event, Item))
-    if sum(heard) == 2:
+    items.append(isinstance(event, Item))
+    if sum(items) == 2:
         print("two are done", flush=True)
         time.sleep(600)
 

@@ -66,13 +66,13 @@ def test_variable_frame_rate_with_subtitles_and_a_cover(recordings: Path, tmp_pa
     assert np.array_equal(varied.audio.samples, plain.audio.samples)
 
 
-def test_many_useless_files_are_each_told_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_each_of_many_unusable_files_is_reported_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("lipmotion.pipeline.corpus.prepare.package_versions", lambda: {"mediapipe": "1"})
     names = [f"clip{number:03d}" for number in range(300)]
     (tmp_path / "clips").mkdir()
     for name in names:
         (tmp_path / "clips" / f"{name}.mp4").write_bytes(b"not a video")
-    told: list[Item] = []
+    items: list[Item] = []
     with pytest.raises(
         CorpusError, match=r"none of 300 recordings is usable; the first, clip000: .*not a readable"
     ) as e:
@@ -80,8 +80,8 @@ def test_many_useless_files_are_each_told_once(tmp_path: Path, monkeypatch: pyte
             tmp_path / "clips",
             tmp_path / "corpus",
             workers=1,
-            monitor=lambda event: told.append(event) if isinstance(event, Item) else None,
+            monitor=lambda event: items.append(event) if isinstance(event, Item) else None,
         )
     assert len(str(e.value)) < 500
-    assert [item.name for item in told] == names
+    assert [item.name for item in items] == names
     assert not (tmp_path / "corpus").exists()

@@ -89,8 +89,8 @@ def test_a_text_of_ones_own(tmp_path):
     assert found.left_out == {"Two qwrtzx.": "qwrtzx"}
     assert found.sentences == 3
     assert [prompt.text for prompt in found.chosen] == ["Two.", "Tea for two.", "Two two."]
-    told = prompts(path, lexicon=Lexicon({"qwrtzx": (("zh", "oy"),)}))
-    assert (told.left_out, told.sentences) == ({}, 4)
+    with_lexicon = prompts(path, lexicon=Lexicon({"qwrtzx": (("zh", "oy"),)}))
+    assert (with_lexicon.left_out, with_lexicon.sentences) == ({}, 4)
 
 
 def test_what_is_recorded_is_not_asked_for_again(toy_corpus: Corpus, tmp_path: Path):

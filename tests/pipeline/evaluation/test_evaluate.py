@@ -205,14 +205,14 @@ def test_without_transcripts_there_is_audio_only(toy_model: Model, toy_corpus: C
     assert list(evaluate(toy_model, untold)["conditions"]) == ["audio only"]
 
 
-def test_a_lexicon_says_how_words_are_said(toy_model: Model, toy_corpus: Corpus, tmp_path: Path) -> None:
+def test_a_lexicon_gives_pronunciations(toy_model: Model, toy_corpus: Corpus, tmp_path: Path) -> None:
     renamed = [
         replace(u, words=tuple({"papa": "日本"}.get(word, word) for word in u.words or ()))
         for u in held_out(toy_corpus)
     ]
     corpus = corpus_of(renamed, tmp_path)
-    told = evaluate(toy_model, corpus, lexicon=Lexicon({"日本": (("p", "aa", "p", "ax"),)}))
-    assert told["conditions"]["with transcript"]["acc"] > 0.9
+    with_lexicon = evaluate(toy_model, corpus, lexicon=Lexicon({"日本": (("p", "aa", "p", "ax"),)}))
+    assert with_lexicon["conditions"]["with transcript"]["acc"] > 0.9
 
 
 def test_guessed_words_are_reported(

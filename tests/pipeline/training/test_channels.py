@@ -68,8 +68,8 @@ def test_pictures_are_taken_evenly_from_the_frames_that_are_seen(utterances: lis
         given.append(replace(utterance, track=replace(utterance.track, crops=pictures, seen=seen)))
         kept.append(pictures[seen])
     everything = np.concatenate(kept)
-    places = ((np.arange(50) + 0.5) * len(everything) / 50).astype(int)
-    assert np.array_equal(train_eigenlips(given, 4, 50).basis, fit_eigenlips(everything[places], 4).basis)
+    frames = ((np.arange(50) + 0.5) * len(everything) / 50).astype(int)
+    assert np.array_equal(train_eigenlips(given, 4, 50).basis, fit_eigenlips(everything[frames], 4).basis)
 
 
 def test_an_utterance_that_was_never_seen_gives_no_picture(utterances: list[Utterance]) -> None:
@@ -93,7 +93,7 @@ def test_motion_has_the_channels_that_are_learned(utterances: list[Utterance], s
     assert pictured.rate_hz == both.rate_hz == one.track.motion.rate_hz
 
 
-def test_what_is_missing_is_said(utterances: list[Utterance], space: Eigenlips, tmp_path: Path) -> None:
+def test_what_is_missing_is_reported(utterances: list[Utterance], space: Eigenlips, tmp_path: Path) -> None:
     blind = replace(utterances[0], track=replace(utterances[0].track, crops=None))
     words = f"{blind.name}: no mouth pictures, which eigenlips need; prepare its video again without --no-crops"
     with pytest.raises(CorpusError, match=words):

@@ -29,14 +29,14 @@ class Stopped(Exception):  # noqa: N818
 
 
 def stopping_after(events: int) -> Monitor:
-    heard: list[object] = []
+    reports: list[object] = []
 
-    def hear(event: Progress | Item) -> None:
-        heard.append(event)
-        if len(heard) == events:
+    def monitor(event: Progress | Item) -> None:
+        reports.append(event)
+        if len(reports) == events:
             raise Stopped
 
-    return hear
+    return monitor
 
 
 @pytest.fixture
@@ -106,7 +106,7 @@ def test_what_is_done_is_not_done_again(corpus: Corpus, work: Path) -> None:
     assert again[0].share >= 0.8
 
 
-def test_left_out_utterances_are_told_again(corpus: Corpus, work: Path) -> None:
+def test_unused_utterances_are_reported_again(corpus: Corpus, work: Path) -> None:
     first, second = ([e for e in events_of(corpus, work) if isinstance(e, Item)] for _ in range(2))
     assert first == second
     assert [(item.name, item.outcome) for item in first] == [("toy02", "skipped")]

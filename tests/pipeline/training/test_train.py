@@ -96,7 +96,7 @@ def test_untranscribed_utterances_are_recognised_and_used(toy_corpus: Corpus, tm
 
 
 def labelled(utterance: Utterance) -> Utterance:
-    """The true phones in the place of the words."""
+    """The true phones instead of the words."""
     (units,) = (s.units for s in toy_sentences(12) if s.name == utterance.name)
     phones = Timeline(tuple(replace(s, label=Unit(s.label.phone)) for s in units))
     return replace(utterance, words=None, phones=phones)
@@ -124,8 +124,10 @@ def test_labelled_and_transcribed_utterances_together(toy_corpus: Corpus, tmp_pa
     assert (report.used, report.skipped) == (TRAINED, {})
     truth = labelled(toy_corpus.utterance("toy11"))
     assert truth.phones is not None
-    heard = [s.label.phone for s in phones_of(replace(truth, phones=None), Recogniser(model.phones, "own"), Lexicon())]
-    assert np.mean([span.label.phone in heard for span in truth.phones]) > 0.8
+    recognised = [
+        s.label.phone for s in phones_of(replace(truth, phones=None), Recogniser(model.phones, "own"), Lexicon())
+    ]
+    assert np.mean([span.label.phone in recognised for span in truth.phones]) > 0.8
 
 
 def test_one_speaker(toy_corpus: Corpus, tmp_path: Path) -> None:

@@ -103,7 +103,7 @@ def test_texts_by_default_say_every_phone_of_the_dictionary() -> None:
 
 
 @pytest.mark.usefixtures("spoken")
-def test_models_hear_them() -> None:
+def test_sentences_become_training_data() -> None:
     sentences = list(synthetic_sentences(TEXTS))
     for sentence, (features, units, speaker) in zip(sentences, voice_examples(sentences), strict=True):
         assert features.values.shape == (int(sentence.audio.duration_s * 100 + 1e-9) + 1, FEATURES)
@@ -159,14 +159,14 @@ def folder(tmp_path: Path) -> Path:
 
 def test_recordings_are_aligned(folder: Path, own: Recogniser, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "agreement_score", lambda *_: 0.0)
-    told: list[Item] = []
-    sentences = list(recorded_sentences(folder, own, monitor=told.append))  # type: ignore[arg-type]
+    items: list[Item] = []
+    sentences = list(recorded_sentences(folder, own, monitor=items.append))  # type: ignore[arg-type]
     assert [(s.name, s.speaker) for s in sentences] == [("anna-one", "anna"), ("two", "two")]
     for sentence, toy in zip(sentences, toy_sentences(3), strict=False):
         assert [span.label for span in sentence.phones] == [span.label for span in toy.units]
         late_s = [a.start_s - b.start_s for a, b in zip(sentence.phones, toy.units, strict=True)]
         assert np.median(np.abs(late_s)) < 0.04  # the toy model is a crude one
-    assert sorted((item.name, item.outcome) for item in told) == [
+    assert sorted((item.name, item.outcome) for item in items) == [
         ("broken", "skipped"),
         ("too long", "skipped"),
         ("unsayable", "skipped"),
@@ -179,13 +179,13 @@ def test_the_caller_knows_who_speaks(folder: Path, own: Recogniser, monkeypatch:
     assert [s.speaker for s in recorded_sentences(folder, own, speakers=given)] == ["Anna B.", "Carl"]
 
 
-def test_other_words_than_those_said_are_noticed(
+def test_a_transcript_of_other_words_is_detected(
     folder: Path, own: Recogniser, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(module, "agreement_score", lambda *_: -4.3)
-    told: list[Item] = []
-    assert list(recorded_sentences(folder, own, monitor=told.append)) == []  # type: ignore[arg-type]
-    assert "agree with the sound at -4.3, required -4.2 or more" in {item.name: item.reason for item in told}["two"]
+    items: list[Item] = []
+    assert list(recorded_sentences(folder, own, monitor=items.append)) == []  # type: ignore[arg-type]
+    assert "agree with the sound at -4.3, required -4.2 or more" in {item.name: item.reason for item in items}["two"]
 
 
 @pytest.mark.parametrize("name", ["nothing", ""])
@@ -200,12 +200,12 @@ def test_real_recordings(recordings: Path, toy_model: Model) -> None:
     folder = recordings / "speech-open"
     if not folder.is_dir():
         pytest.skip("speech-open is not here")
-    told: list[Item] = []
+    items: list[Item] = []
     general = Recogniser(toy_model.phones, "general")
-    sentences = list(recorded_sentences(folder, general, speakers={"sense_*": "reader"}, monitor=told.append))  # type: ignore[arg-type]
+    sentences = list(recorded_sentences(folder, general, speakers={"sense_*": "reader"}, monitor=items.append))  # type: ignore[arg-type]
     assert len(sentences) == 11
     assert sum(s.speaker == "reader" for s in sentences) == 5
-    assert sorted(item.name for item in told) == ["13697_11991_000000", "common_voice_ja_24511055"]
+    assert sorted(item.name for item in items) == ["13697_11991_000000", "common_voice_ja_24511055"]
 
 
 @pytest.mark.skipif(not any(map(shutil.which, ("flite", "festival", "espeak-ng"))), reason="no synthesiser is here")
