@@ -1,6 +1,6 @@
 """Speech of other speakers with phones in time, without motion: training data of acoustic models.
 
-Source: Xie & Liu 2007, §3.4: a stage of the training uses audio of many speakers, without video.
+Source: Xie & Liu 2007, §3.4: the first stage of the training uses audio of many speakers, without video.
 """
 
 from __future__ import annotations
