@@ -96,6 +96,7 @@ def faceless(path: Path) -> None:
     write_mp4(path, [np.full((120, 160, 3), 128, np.uint8)] * 25, fps=25, audio=sound)
 
 
+@pytest.mark.long
 @pytest.mark.video
 def test_videos_that_cannot_be_used(run_outside: RunCommand, here: Path, bad_speech: dict[str, Path]) -> None:
     """Videos without a face, without sound, or empty: each is named, and no corpus is made of them."""

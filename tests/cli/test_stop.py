@@ -148,6 +148,7 @@ def test_training_stopped_in_the_middle_goes_on(
     assert sorted(path.name for path in here.iterdir()) == ["m.lipmotion", "whole.lipmotion"]
 
 
+@pytest.mark.long
 def test_a_second_signal_later_ends_the_program() -> None:
     """A second signal ends the program at once, even where the first one was swallowed."""
     program = (

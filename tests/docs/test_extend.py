@@ -84,6 +84,7 @@ def test_what_a_page_writes_keeps_its_contract(page: str, tmp_path: Path) -> Non
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.long
 def test_an_installed_engine_trains_saves_loads_and_animates(
     toy_corpus: Corpus, recording: Path, tmp_path: Path
 ) -> None:
@@ -104,6 +105,7 @@ def test_an_installed_engine_trains_saves_loads_and_animates(
     assert "no engine 'ridge'; there are: trajectory, coupled, joint; install the package" in missing.stderr
 
 
+@pytest.mark.long
 def test_an_installed_face_and_format_work_from_the_command_line(recording: Path, tmp_path: Path) -> None:
     face, table = Package("face.md", tmp_path / "face"), Package("exporter.md", tmp_path / "table")
     face.lipmotion("animate", recording, "-o", tmp_path / "a.mp4", "--face", "bar")

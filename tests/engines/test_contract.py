@@ -30,7 +30,10 @@ def engine_called(name: str) -> TrainedEngine:
     return TrainedEngine(engine_named(*SYSTEMS[name]))
 
 
-@pytest.fixture(params=SYSTEMS)
+OTHERS = [pytest.param(name, marks=pytest.mark.long) for name in SYSTEMS if name not in ENGINES.built_in]
+
+
+@pytest.fixture(params=[*ENGINES.built_in, *OTHERS])
 def trained(request) -> TrainedEngine:
     return engine_called(request.param)
 
@@ -98,7 +101,7 @@ def test_every_frame_has_an_explanation(trained):
 
 @settings(deadline=None, max_examples=25)
 @given(data=st.data())
-@pytest.mark.parametrize("name", SYSTEMS)
+@pytest.mark.parametrize("name", [*ENGINES.built_in, *OTHERS])
 def test_pins_are_exact(name, data):
     trained = engine_called(name)
     spoken = speech(timeline(("p", "aa", "m")))
@@ -153,7 +156,7 @@ def test_a_phone_outside_the_inventory_is_an_input_error(trained):
         trained.generate(speech(timeline(("aa", "xx"))))
 
 
-@pytest.mark.parametrize("name", SYSTEMS)
+@pytest.mark.parametrize("name", [*ENGINES.built_in, *OTHERS])
 def test_nothing_to_learn_from_is_a_corpus_error(name):
     engine = engine_named(*SYSTEMS[name])
     unseen = [replace(e, valid=np.zeros_like(e.valid)) for e in examples(2)]

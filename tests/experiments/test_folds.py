@@ -61,6 +61,7 @@ def test_what_was_done(figures: dict[str, Any]) -> None:
     assert json.loads(json.dumps(figures, allow_nan=False))
 
 
+@pytest.mark.long
 def test_figures_are_of_all_clips_as_one_split(figures: dict[str, Any], by_hand: list[ComparedClip]) -> None:
     generated = np.concatenate([clip.generated[:, 0] for clip in by_hand])
     original = np.concatenate([clip.original[:, 0] for clip in by_hand])

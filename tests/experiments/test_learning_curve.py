@@ -45,6 +45,7 @@ def test_each_size_once_the_smallest_first(figures: dict[str, Any]) -> None:
     assert json.loads(json.dumps(figures, allow_nan=False))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("row", [0, 1])
 def test_a_row_is_what_train_and_evaluate_say(
     row: int, figures: dict[str, Any], toy_corpus: Corpus, order: tuple[str, ...]

@@ -42,6 +42,7 @@ def test_what_was_found_once(folder: Path, worker: Worker) -> None:
     _check(worker, folder.parent.name, picked_up(folder))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("name", "flood"), FLOODS, ids=lambda part: part)
 def test_a_flood_that_was_found_once(name: str, flood: str, worker: Worker) -> None:
     _check(worker, name, FLOODS[name, flood]())

@@ -26,6 +26,7 @@ def test_the_interval_holds_the_figure_itself(seed):
     assert high - low < 0.3
 
 
+@pytest.mark.long
 def test_the_seed_decides():
     generated, original = clips(1)
     one = bootstrap_interval(acc, generated, original, seed=5, draws=100)

@@ -33,6 +33,7 @@ def noisy():
     return corpus
 
 
+@pytest.mark.long
 def test_the_full_range_is_nearer_to_the_original(noisy):
     engines = [
         engine_named("trajectory", {**OPTIONS, "variance_scaling": on, "closures": False}) for on in (False, True)

@@ -68,6 +68,7 @@ def test_a_model_without_it_is_written_as_before(toy_model_file: Path) -> None:
     assert load_model(toy_model_file).adaptation is None
 
 
+@pytest.mark.long
 def test_an_earlier_adaptation_is_forgotten(adapted: Model, toy_model: Model, toy_speech: Path) -> None:
     again, fresh = (adapt(model, [toy_speech]) for model in (adapted, toy_model))
     assert np.array_equal(again.adaptation.own, fresh.adaptation.own)

@@ -48,6 +48,7 @@ def absurd(model: Model, sentence: ToySentence, damages: tuple[str, ...]) -> tup
     return found, refusals, harmless
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ENGINES[:3])
 def test_damaged_arrays_of_an_engine(name: str, toy_sentence: ToySentence, request: pytest.FixtureRequest) -> None:
     found, refusals, harmless = absurd(request.getfixturevalue(name), toy_sentence, QUICK)

@@ -65,6 +65,7 @@ def large(_: int) -> bytes:
     return bytes(50_000_000)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("_", range(5))
 def test_a_worker_that_is_ended_while_it_sends_does_not_block(_: int) -> None:
     """Its result is larger than the pipe holds, so it is sending when the block is left."""

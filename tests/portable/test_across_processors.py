@@ -41,6 +41,7 @@ def test_everything_is_compared(both):
     assert all(any(part in name for name in here) for part in TOLERANCES)
 
 
+@pytest.mark.long
 def test_numbers_are_within_the_tolerance(both):
     here, there = both
     for name, values in here.items():

@@ -49,7 +49,13 @@ _json("a unit before 0 s", {"units": [_unit(-1, 0.4)]}, 3, "lasts from -1.0 to 0
 _json("a unit at NaN s", {"units": [_unit(float("nan"), 0.4)]}, 3, "lasts from nan to 0.4 s, required: finite")
 _json("a unit that ends at NaN s", {"units": [_unit(0.1, float("nan"))]}, 3, "ends at nan s")
 _json("a unit without an end", {"units": [_unit(0.1, float("inf"))]}, 3, "to inf s, required: finite times")
-_json("a unit that ends in a million years", {"units": [_unit(0, 3e13)]}, 0, "the units go on to", "those of another?")
+_json(
+    "a unit that ends in a million years",
+    {"units": [_unit(0, 3e13)]},
+    0,
+    "the units go on to",
+    "those of another recording?",
+)
 _json("an unknown phone", {"units": [_unit(0, 0.4, "qq")]}, 3, "unknown phone 'qq' at 0.0 s; the phones:")
 _json("a phone that is a list", {"units": [_unit(0, 0.4, ["p"])]}, 3, "unknown phone", "the phones:")
 _json("a time that is a text", {"units": [_unit("soon", 0.4)]}, 3, *DAMAGED)

@@ -36,6 +36,7 @@ def fit(model: Model, found: EstimatedAdaptation, audio: Audio) -> float:
     return model.phones.fit(adapted) + log_determinant(found.adaptation.own)
 
 
+@pytest.mark.long
 def test_the_speaker_of_the_training_has_full_weight_and_changes_little(
     toy_model: Model, voice: list[Audio], same_speaker: EstimatedAdaptation
 ) -> None:
@@ -65,6 +66,7 @@ def test_a_short_recording_moves_features_deltas_and_their_deltas_apart(toy_mode
     assert np.abs(own[:, :-1][~between]).sum() > 39
 
 
+@pytest.mark.long
 def test_much_speech_moves_them_together(
     same_speaker: EstimatedAdaptation, toy_model: Model, voice: list[Audio]
 ) -> None:
@@ -74,6 +76,7 @@ def test_much_speech_moves_them_together(
     assert np.abs(long.adaptation.own[:13, 13:39]).max() > 1e-3
 
 
+@pytest.mark.long
 def test_the_same_recordings_give_the_same_adaptation(
     toy_model: Model, voice: list[Audio], same_speaker: EstimatedAdaptation
 ) -> None:

@@ -188,6 +188,7 @@ def test_blocks_join_without_a_seam(monkeypatch: pytest.MonkeyPatch, block: int)
     assert found(samples) == pytest.approx(whole, rel=1e-4, nan_ok=True)
 
 
+@pytest.mark.long
 def test_memory_beside_the_result_is_bounded() -> None:
     samples = noise(20 * 60 * RATE_HZ)
     log_f0(Audio(samples[:RATE_HZ], RATE_HZ))

@@ -75,6 +75,7 @@ def test_blocks_join_without_a_seam(monkeypatch: pytest.MonkeyPatch) -> None:
     assert features(samples) == pytest.approx(whole, abs=1e-4)
 
 
+@pytest.mark.long
 def test_memory_beside_the_result_is_bounded() -> None:
     samples = noise(20 * 60 * RATE_HZ)
     tracemalloc.start()

@@ -148,6 +148,7 @@ def test_the_gaussian_is_the_most_responsible_one(name, row):
                 assert value.deviation == pytest.approx(np.sqrt(variance[column]) * visual.deviation[column])
 
 
+@pytest.mark.long
 def test_densities_are_named_by_the_states_that_have_them():
     assert explanation("ph-vi-CHMM", 64).gaussians[0].density == "t.2"
     assert explanation("ph-vi-CHMM", 64).gaussians[1].density.startswith("al.")

@@ -94,6 +94,7 @@ def test_a_trained_recogniser_is_kept_in_the_checkpoint(corpus, recogniser, tmp_
     assert module.recogniser_arrays(first)["joint_typical"] == recogniser.training_score
 
 
+@pytest.mark.long
 def test_the_engine_recognises_phones_if_there_is_enough_speech(monkeypatch):
     monkeypatch.setattr(module, "LEAST_MINUTES", 0.1)
     engine = engine_named("trajectory", {"components": 2, "acoustic_components": 20})

@@ -61,6 +61,7 @@ def test_the_rows_are_those_of_the_paper(figures: dict[str, Any]) -> None:
     assert json.loads(json.dumps(figures, allow_nan=False))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("system", ENGINE_SETTINGS)
 def test_a_row_is_what_train_and_evaluate_say(system: str, figures: dict[str, Any], toy_corpus: Corpus) -> None:
     engine = engine_named("trajectory", ENGINE_SETTINGS[system] | {"units": "eVis", "closures": False})

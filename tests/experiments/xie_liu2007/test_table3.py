@@ -77,6 +77,7 @@ def test_every_size_condition_and_system(figures: dict[str, Any]) -> None:
     assert json.loads(json.dumps(figures, allow_nan=False))
 
 
+@pytest.mark.long
 def test_a_row_is_what_train_and_evaluate_say(figures: dict[str, Any], toy_corpus: Corpus) -> None:
     wanted = evaluate(train(toy_corpus, recogniser=PHONE_MODELS)[0], toy_corpus)
     for condition, expected_figures in wanted["conditions"].items():
@@ -156,6 +157,7 @@ def test_the_text_names_every_system(figures: dict[str, Any]) -> None:
     assert any(line.split()[-3:] == ["clean", "0", "dB"] for line in lines)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("visual", ["eigenlips", "both"])
 def test_eigenlips(visual: str, toy_corpus: Corpus) -> None:
     options = ComparisonOptions(systems=["trajectory HMM"], states=2, mixtures=[1], visual=visual)

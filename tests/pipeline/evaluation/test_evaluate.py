@@ -189,6 +189,7 @@ def test_other_lists_and_all(toy_model: Model, toy_corpus: Corpus) -> None:
     assert (everything["split"], everything["clips"]) == ("all", 12)
 
 
+@pytest.mark.long
 def test_the_seed_decides(toy_model: Model, toy_corpus: Corpus) -> None:
     one, two, other = (
         evaluate(toy_model, toy_corpus, selection=Selection(None), seed=seed)["conditions"]["audio only"]

@@ -93,6 +93,7 @@ def test_the_same_again_shared_or_not() -> None:
         assert one.phones == other.phones
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("spoken")
 def test_texts_by_default_say_every_phone_of_the_dictionary() -> None:
     sentences = list(synthetic_sentences(voices=VOICES[:1]))

@@ -138,6 +138,7 @@ def test_frames_away_from_speech_are_silence():
     assert away[116:].all()
 
 
+@pytest.mark.long
 def test_training_gives_the_same_bytes_again():
     models = [fit_coupled(examples(4), CoupledConfig(mixtures=2), silent_monitor) for _ in range(2)]
     for one, other in zip(models[0].chains.groups, models[1].chains.groups, strict=True):

@@ -155,6 +155,7 @@ def test_a_step_is_that_of_the_split_model() -> None:
     assert found.selected(others).means.tobytes() == before.selected(others).means.tobytes()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", STRUCTURES)
 def test_every_step_raises_the_likelihood(kind: str) -> None:
     steps: list[TrainingStep] = []
