@@ -28,10 +28,10 @@ demo: $(VENV)/core
 	$(BIN)/lipmotion animate examples/welcome.flac --transcript examples/welcome.txt -o $(BUILD)/welcome.mp4 $(BUILD)/welcome.json
 
 test: $(VENV)/dev
-	$(BIN)/python -m pytest -n $(WORKERS) -m "not long"
+	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal -m "not long"
 
 test-all: $(VENV)/dev test-portable
-	$(BIN)/python -m pytest -n $(WORKERS) -m long
+	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal -m long
 
 test-portable: $(VENV)/dev
 	PYTHONPATH=tests $(BIN)/python -m portable.run
@@ -44,7 +44,7 @@ check: $(VENV)/dev
 
 coverage: $(VENV)/dev
 	$(BIN)/python -m coverage erase
-	$(BIN)/python -m coverage run -m pytest -n $(WORKERS) -m "not long"
+	$(BIN)/python -m coverage run -m pytest -n $(WORKERS) --dist worksteal -m "not long"
 	$(BIN)/python -m coverage combine --quiet
 	$(BIN)/python -m coverage report
 

@@ -12,6 +12,8 @@ import pytest
 
 from portable.settings import BEFORE_AVX, environment
 
+pytestmark = pytest.mark.long
+
 TESTS = Path(__file__).parents[1]
 TOLERANCES = {"features of": 1e-4, "F0 of": 1e-4, "the shipped model": 1e-5, "trained here": 1e-3}
 """Features are in standard deviations, F0 is a logarithm, motion is in eye distances."""
@@ -33,7 +35,6 @@ def both(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, np.ndarray
     return here, there
 
 
-@pytest.mark.long
 def test_everything_is_compared(both):
     here, there = both
     assert here.keys() == there.keys()
@@ -41,7 +42,6 @@ def test_everything_is_compared(both):
     assert all(any(part in name for name in here) for part in TOLERANCES)
 
 
-@pytest.mark.long
 def test_numbers_are_within_the_tolerance(both):
     here, there = both
     for name, values in here.items():

@@ -107,6 +107,7 @@ def test_opus_made_from_16_khz_keeps_its_time(tmp_path: Path, original: Samples,
     assert abs(late_by(audio.samples, original)[0]) <= MS
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("rate_hz", [8000, 11_025, 22_050, 32_000, 96_000, 192_000, 384_000])
 @pytest.mark.parametrize(("suffix", "codec"), [("wav", "pcm_s16le"), ("flac", "flac")])
 def test_any_rate(tmp_path: Path, original: Samples, suffix: str, codec: str, rate_hz: int) -> None:
@@ -116,6 +117,7 @@ def test_any_rate(tmp_path: Path, original: Samples, suffix: str, codec: str, ra
     assert alike > 0.999
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("channels", range(1, 9))
 @pytest.mark.parametrize(("suffix", "codec"), [("wav", "pcm_s16le"), ("flac", "flac"), ("m4a", "aac")])
 def test_one_to_eight_channels(tmp_path: Path, original: Samples, suffix: str, codec: str, channels: int) -> None:
@@ -330,6 +332,7 @@ def peak(path: Path) -> tuple[str, int]:
     return " ".join(said), int(taken_mb)
 
 
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform != "linux", reason="memory is counted as Linux does")
 @pytest.mark.parametrize("name", STAMPS_S)
 def test_holes_are_bounded_all_together(tmp_path: Path, name: str) -> None:
