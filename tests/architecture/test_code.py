@@ -14,7 +14,7 @@ from lipmotion.cli import command_line
 SOURCE = Path(__file__).parents[2] / "src" / "lipmotion"
 EMPTY_NAMES = {"utils", "util", "helpers", "helper", "common", "core", "misc"}
 """Module names without meaning."""
-LONGEST_MODULE, LONGEST_VERB = 400, 65
+LONGEST_MODULE, LONGEST_VERB = 400, 70
 VERBS = {verb.__name__.rpartition(".")[2] for verb in command_line.VERBS}
 PICKLES = {"pickle", "shelve", "marshal", "joblib", "dill"}
 Definition = ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef

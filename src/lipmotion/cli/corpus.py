@@ -31,7 +31,12 @@ def run_prepare(options: argparse.Namespace) -> None:
     from lipmotion.cli.progress import reporting
     from lipmotion.pipeline.corpus.prepare import prepare
 
-    given = {"workers": options.workers, "crops": options.crops}
     with reporting(options) as report:
-        done = prepare(options.recordings, options.output, **given, monitor=report.receive)
+        done = prepare(
+            options.recordings,
+            options.output,
+            workers=options.workers,
+            crops=options.crops,
+            monitor=report.receive,
+        )
         report.finish(str(done), corpus=str(done.corpus), kind=done.kind, **done.counts)

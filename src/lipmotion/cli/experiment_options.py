@@ -4,11 +4,17 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from lipmotion.cli.figures import add_figures_arguments, report_figures
 from lipmotion.cli.options import add_workers, worker_count
 from lipmotion.cli.paths import add_input
+
+if TYPE_CHECKING:
+    from lipmotion.corpora.store import Corpus
+    from lipmotion.experiments.runner import ExperimentSettings
+    from lipmotion.types import Monitor
+    from lipmotion.units import Lexicon
 
 
 def add_experiment_arguments(parser: argparse.ArgumentParser) -> None:
@@ -20,15 +26,15 @@ def add_experiment_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run_experiment(
     options: argparse.Namespace,
-    experiment: Callable[..., dict[str, Any]],
+    experiment: Callable[[Corpus, ExperimentSettings], dict[str, Any]],
     table: Callable[[dict[str, Any]], str],
 ) -> None:
-    """Call ``experiment(corpus, settings=...)`` and print its table."""
+    """Call ``experiment(corpus, settings)`` and print its table."""
     from lipmotion.corpora.store import Corpus
     from lipmotion.experiments.runner import ExperimentSettings
 
-    def compute(**given: Any) -> dict[str, Any]:
-        settings = ExperimentSettings(workers=worker_count(options), **given)
-        return experiment(Corpus.open(options.corpus), settings=settings)
+    def compute(lexicon: Lexicon | None, monitor: Monitor) -> dict[str, Any]:
+        settings = ExperimentSettings(lexicon=lexicon, workers=worker_count(options), monitor=monitor)
+        return experiment(Corpus.open(options.corpus), settings)
 
     report_figures(options, compute, table)

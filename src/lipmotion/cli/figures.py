@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from lipmotion.cli.options import add_machine_readable
 from lipmotion.cli.paths import add_output
 from lipmotion.cli.speech import add_lexicon_argument
+
+if TYPE_CHECKING:
+    from lipmotion.types import Monitor
+    from lipmotion.units import Lexicon
 
 Figures = dict[str, Any]
 
@@ -22,10 +26,10 @@ def add_figures_arguments(parser: argparse.ArgumentParser) -> None:
 
 def report_figures(
     options: argparse.Namespace,
-    compute: Callable[..., Figures],
+    compute: Callable[[Lexicon | None, Monitor], Figures],
     table: Callable[[Figures], str],
 ) -> None:
-    """Call ``compute(lexicon=..., monitor=...)``, write its figures, and print their table."""
+    """Call ``compute(lexicon, monitor)``, write its figures, and print their table."""
     from lipmotion.cli.progress import reporting
     from lipmotion.storage.files import check_target, whole_file
     from lipmotion.storage.json_text import as_json, nan_as_null
@@ -35,7 +39,7 @@ def report_figures(
         if options.output:
             check_target(options.output)
         lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
-        figures = compute(lexicon=lexicon, monitor=report.receive)
+        figures = compute(lexicon, report.receive)
         if options.output:
             with whole_file(options.output) as unfinished:
                 unfinished.write_text(as_json(nan_as_null(figures), indent=1) + "\n")

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import argparse
-from functools import partial
+from typing import TYPE_CHECKING, Any
 
 from lipmotion.cli.experiment_options import add_experiment_arguments, run_experiment
+
+if TYPE_CHECKING:
+    from lipmotion.corpora.store import Corpus
+    from lipmotion.experiments.runner import ExperimentSettings
 
 
 def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -22,4 +26,7 @@ def run(options: argparse.Namespace) -> None:
     """Call ``experiment.folds`` and print its table."""
     from lipmotion.experiments.folds import folds, table
 
-    run_experiment(options, partial(folds, count=options.folds), table)
+    def experiment(corpus: Corpus, settings: ExperimentSettings) -> dict[str, Any]:
+        return folds(corpus, count=options.folds, settings=settings)
+
+    run_experiment(options, experiment, table)

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from lipmotion.cli.experiment_options import add_experiment_arguments, run_experiment
 from lipmotion.cli.options import list_or_all, numbers
 from lipmotion.cli.paths import add_input
+
+if TYPE_CHECKING:
+    from lipmotion.corpora.store import Corpus
+    from lipmotion.experiments.runner import ExperimentSettings
 
 
 def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -25,11 +29,11 @@ def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 def run(options: argparse.Namespace) -> None:
     """Call ``experiment.learning_curve`` and print its table."""
     from lipmotion.corpora.splits import read_names
-    from lipmotion.corpora.store import Corpus
     from lipmotion.experiments.learning_curve import learning_curve, table
 
-    def experiment(corpus: Corpus, **given: Any) -> dict[str, Any]:
+    def experiment(corpus: Corpus, settings: ExperimentSettings) -> dict[str, Any]:
         order = read_names(options.order) if options.order else None
-        return learning_curve(corpus, order=order, sizes=options.sizes, split=list_or_all(options.split), **given)
+        split = list_or_all(options.split)
+        return learning_curve(corpus, order=order, sizes=options.sizes, split=split, settings=settings)
 
     run_experiment(options, experiment, table)

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from lipmotion.cli.experiment_options import add_experiment_arguments, run_experiment
 from lipmotion.cli.options import list_or_all, numbers
 from lipmotion.cli.paths import add_input, add_output
 from lipmotion.cli.train import VISUAL
 
-OPTIONS = ("systems", "states", "mixtures", "visual", "transcripts")
-"""Options that are fields of ``ComparisonOptions``."""
+if TYPE_CHECKING:
+    from lipmotion.corpora.store import Corpus
+    from lipmotion.experiments.runner import ExperimentSettings
 
 
 def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -48,18 +49,29 @@ def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 def run(options: argparse.Namespace) -> None:
     """Call ``experiment.table3`` and print its table."""
     from lipmotion.corpora.splits import read_names
-    from lipmotion.corpora.store import Corpus
     from lipmotion.experiments.noise import read_talkers
     from lipmotion.experiments.xie_liu2007.table3 import ComparisonOptions, NoiseConditions, table3
     from lipmotion.experiments.xie_liu2007.table3_text import table
 
-    def experiment(corpus: Corpus, **given: Any) -> dict[str, Any]:
+    def experiment(corpus: Corpus, settings: ExperimentSettings) -> dict[str, Any]:
         kinds = tuple(kind for kind in options.noise.split(",") if kind)
         talkers = tuple(read_talkers(options.talkers)) if options.talkers else ()
-        chosen = {name: getattr(options, name) for name in OPTIONS}
-        order = read_names(options.order) if options.order else None
-        noise = NoiseConditions(kinds, tuple(map(float, options.snr)), talkers)
-        given |= {"order": order, "sizes": options.sizes, "plots": options.plots}
-        return table3(corpus, ComparisonOptions(**chosen, noise=noise), split=list_or_all(options.split), **given)
+        compared = ComparisonOptions(
+            systems=options.systems,
+            states=options.states,
+            mixtures=options.mixtures,
+            visual=options.visual,
+            transcripts=options.transcripts,
+            noise=NoiseConditions(kinds, tuple(map(float, options.snr)), talkers),
+        )
+        return table3(
+            corpus,
+            compared,
+            split=list_or_all(options.split),
+            order=read_names(options.order) if options.order else None,
+            sizes=options.sizes,
+            plots=options.plots,
+            settings=settings,
+        )
 
     run_experiment(options, experiment, table)

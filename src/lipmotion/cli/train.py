@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
 
 from lipmotion.cli.options import add_machine_readable, add_workers, list_or_all, worker_count
 from lipmotion.cli.paths import add_input, add_output
@@ -50,13 +49,19 @@ def run(options: argparse.Namespace) -> None:
     with reporting(options) as report:
         lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
         engine = engine_from_settings(options.engine, preset=options.system, units=options.units, settings=options.set)
-        more: dict[str, Any] = {"recordings": options.recordings, "lexicon": lexicon, "monitor": report.receive}
-        chosen = {"engine": engine, "visual": options.visual, "lexicon": lexicon}
-        chosen |= {"selection": Selection(list_or_all(options.split), tuple(options.speaker))}
-        chosen |= {"voices": other_voices(synthetic=options.voices, **more)}
+        voices = other_voices(
+            synthetic=options.voices, recordings=options.recordings, lexicon=lexicon, monitor=report.receive
+        )
         with unfinished_work(options.output) as work:
-            run_settings = Run(report.receive, work, worker_count(options))
-            model, result = train(Corpus.open(options.corpus), **chosen, run=run_settings)
+            model, result = train(
+                Corpus.open(options.corpus),
+                selection=Selection(list_or_all(options.split), tuple(options.speaker)),
+                engine=engine,
+                lexicon=lexicon,
+                visual=options.visual,
+                voices=voices,
+                run=Run(report.receive, work, worker_count(options)),
+            )
             save_model(model, options.output)
         figures = {"used": len(result.used), "minutes": model.about["minutes"], "skipped": len(result.skipped)}
         text = ", ".join(f"{value} {name}" for name, value in figures.items())

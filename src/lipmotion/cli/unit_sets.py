@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import argparse
-from functools import partial
+from typing import TYPE_CHECKING, Any
 
 from lipmotion.cli.experiment_options import add_experiment_arguments, run_experiment
 from lipmotion.cli.options import list_or_all
+
+if TYPE_CHECKING:
+    from lipmotion.corpora.store import Corpus
+    from lipmotion.experiments.runner import ExperimentSettings
 
 
 def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -22,5 +26,7 @@ def run(options: argparse.Namespace) -> None:
     """Call ``experiment.unit_sets`` and print its table."""
     from lipmotion.experiments.hofer2008.unit_sets import table, unit_sets
 
-    chosen = {"split": list_or_all(options.split), "closures": options.closures}
-    run_experiment(options, partial(unit_sets, **chosen), table)
+    def experiment(corpus: Corpus, settings: ExperimentSettings) -> dict[str, Any]:
+        return unit_sets(corpus, split=list_or_all(options.split), closures=options.closures, settings=settings)
+
+    run_experiment(options, experiment, table)
