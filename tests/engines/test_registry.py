@@ -68,3 +68,28 @@ def test_arguments_that_are_not_allowed(name: str, arguments: dict[str, object],
     with pytest.raises(InputError) as error:
         engine_from_settings(name, **arguments)  # type: ignore[arg-type]
     assert words in str(error.value)
+
+
+FORMER = {
+    "trajectory": {"parts": 7, "silent_parts": 9, "listens": False, "axes": 20, "full_range": False, "joint": False},
+    "coupled": {
+        "crosses": False,
+        "more_mixtures": 2,
+        "more_steps": 3,
+        "more_weight": 0.5,
+        "follows": False,
+        "full_range": False,
+    },
+    "joint": {"sees": False, "recognises": True},
+}
+
+
+@pytest.mark.parametrize("name", FORMER)
+def test_former_names_of_options_are_understood(name: str) -> None:
+    config = engine_named(name, FORMER[name]).config
+    assert [getattr(config, config.former[option]) for option in FORMER[name]] == list(FORMER[name].values())
+    assert set(FORMER[name]) == set(config.former)
+    assert (
+        engine_from_settings(name, settings=[f"{option}={value}" for option, value in FORMER[name].items()]).config
+        == config
+    )

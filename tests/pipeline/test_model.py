@@ -199,3 +199,14 @@ def test_a_package_without_a_model_says_so(monkeypatch: pytest.MonkeyPatch, tmp_
     monkeypatch.setattr(module, "_shipped", module._shipped.__wrapped__)
     with pytest.raises(ModelFormatError, match="the package holds no model; install it again, or give one"):
         animate(Audio(np.zeros(16_000, np.float32), 16_000))
+
+
+def test_a_model_with_the_former_names_of_options_is_read(toy_model_file: Path, tmp_path: Path) -> None:
+    former = {
+        "parts": 5, "silent_parts": 13, "listens": True, "axes": 150, "full_range": True, "joint": True,
+        "trajectory_steps": 0,
+    }  # fmt: skip
+    model = load_model(with_header(toy_model_file, tmp_path / "m.lipmotion", configuration=former))
+    assert model.engine == load_model(toy_model_file).engine
+    with pytest.raises(ModelFormatError, match="trajectory_steps is 3; this option no longer exists, required 0"):
+        load_model(with_header(toy_model_file, tmp_path / "n.lipmotion", configuration={"trajectory_steps": 3}))
