@@ -1,10 +1,10 @@
 # make demo   installs, then turns a spoken sentence into an animated face with the model in the package
-# make test   installs everything, then runs the tests that take no seconds
+# make test   installs everything, then runs the quick tests (under three minutes)
 # make test-all   the other tests: mutations, kills, real recordings, copies of the repository; then make test-portable
 # make test-portable   the numeric tests as other processors would run them
 # make check  lint, types, import contracts
 # make coverage   the tests of `make test`, and which lines and branches they reach
-# make fuzz   changed input for every reader, MINUTES=10 in all; READER=name: that one only; SEED=1: other input
+# make fuzz   mutated input for every reader, MINUTES=10 in all; READER=name: that one only; SEED=1: other input
 # make bench  the speed figures of docs/results/figures.md
 # make model  trains and measures the model that ships with the package (needs GRID speaker s1)
 # make requirements  renews the pinned requirements (needs uv)

@@ -52,3 +52,14 @@ def test_what_cannot_be_explained(
 
 def test_a_time_is_needed(run: RunCommand, coupled_model_file: Path, toy_speech: Path) -> None:
     assert run("explain", coupled_model_file, toy_speech).code == 2
+
+
+def test_without_a_model_it_is_the_shipped_one_and_the_former_order_is_understood(
+    run: RunCommand, toy_model_file: Path, toy_speech: Path
+) -> None:
+    shipped, named, former = (
+        run("explain", *order, "--at", "0.5")
+        for order in ([toy_speech], [toy_speech, "--model", toy_model_file], [toy_model_file, toy_speech])
+    )
+    assert shipped.code == named.code == former.code == 0
+    assert former.out == named.out != shipped.out

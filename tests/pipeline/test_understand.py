@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
+import pytest
 
 from lipmotion.engines import Engine
+from lipmotion.errors import InputError
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.understand import recognised_speech, speech_of
+from lipmotion.pipeline.request import SpeechRequest
+from lipmotion.pipeline.understand import recognised_speech, speech_of, understand
 from lipmotion.speech.f0 import log_f0
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.recogniser import Recogniser
@@ -85,3 +89,10 @@ def test_f0_is_computed_for_engines_that_want_it(toy_sentence: ToySentence) -> N
         wants_f0: ClassVar[bool] = False  # type: ignore[misc]
 
     assert speech_of(Deaf(), toy_sentence.audio, features, toy_sentence.units).log_f0 is None
+
+
+def test_the_name_of_a_file_is_no_transcript(toy_model: Model, toy_sentence: ToySentence, tmp_path: Path) -> None:
+    (tmp_path / "words.txt").write_text("papa", encoding="utf-8")
+    request = SpeechRequest(toy_sentence.audio, transcript=str(tmp_path / "words.txt"))
+    with pytest.raises(InputError, match="is the name of a file; give Path"):
+        understand(toy_model, request)

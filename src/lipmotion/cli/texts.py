@@ -13,7 +13,7 @@ def text_or_file_content(argument: str) -> str:
     Raises InputError: the argument looks like a file name but no such file exists, or the file is not UTF-8 text.
     """
     path = Path(argument)
-    looks_like_path = path.suffix == ".txt" and " " not in argument
+    looks_like_path = " " not in argument and path.suffix[1:].isalpha()
     return read_transcript(path) if looks_like_path or _file_exists(path) else argument
 
 

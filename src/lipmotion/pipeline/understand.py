@@ -90,6 +90,8 @@ def _words(transcript: str | Path | None, duration_s: float) -> tuple[str, ...] 
     text = read_transcript(transcript) if isinstance(transcript, Path) else transcript
     if text is None:
         return None
+    if text is transcript and "." in text and not any(map(str.isspace, text)) and Path(text).is_file():
+        raise InputError(f"the transcript {text!r} is the name of a file; give Path({text!r}), or the words themselves")
     check_text(text, duration_s)
     return words_of(text)
 

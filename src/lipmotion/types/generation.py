@@ -101,7 +101,7 @@ class ReducedVariance:
     mixing: NDArray[np.floating[Any]]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Generation:
     """Generated motion, with its variance, its phones in time and its states; returned by ``animate``.
 
@@ -123,6 +123,12 @@ class Generation:
     spread: NDArray[np.floating[Any]] | ReducedVariance
     units: Timeline[Unit]
     trace: StateTrace
+
+    def __repr__(self) -> str:
+        frames, channels = self.motion.values.shape
+        return (
+            f"Generation({frames} frames at {self.motion.rate_hz:g} Hz, {channels} channels, {len(self.units)} units)"
+        )
 
     @property
     def variance(self) -> NDArray[np.floating[Any]]:
