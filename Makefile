@@ -42,9 +42,10 @@ check: $(VENV)/dev
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+# without the tests of full disks: the files of coverage itself would not fit
 coverage: $(VENV)/dev
 	$(BIN)/python -m coverage erase
-	$(BIN)/python -m coverage run -m pytest -n $(WORKERS) --dist worksteal -m "not long"
+	$(BIN)/python -m coverage run -m pytest -n $(WORKERS) --dist worksteal -m "not long" --ignore tests/cli/test_full_disk.py
 	$(BIN)/python -m coverage combine --quiet
 	$(BIN)/python -m coverage report
 

@@ -12,7 +12,7 @@ import pytest
 from lipmotion.engines import Engine
 from lipmotion.errors import InputError
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.request import SpeechRequest
+from lipmotion.pipeline.request import SpeechRequest, request_of
 from lipmotion.pipeline.understand import recognised_speech, speech_of, understand
 from lipmotion.speech.f0 import log_f0
 from lipmotion.speech.mfcc import mfcc
@@ -96,3 +96,10 @@ def test_the_name_of_a_file_is_no_transcript(toy_model: Model, toy_sentence: Toy
     request = SpeechRequest(toy_sentence.audio, transcript=str(tmp_path / "words.txt"))
     with pytest.raises(InputError, match="is the name of a file; give Path"):
         understand(toy_model, request)
+
+
+def test_a_transcript_beside_a_request_is_taken_if_there_is_no_other() -> None:
+    assert request_of(SpeechRequest("a.wav"), "papa").transcript == "papa"
+    assert request_of("a.wav", "papa").transcript == "papa"
+    with pytest.raises(InputError, match="give one"):
+        request_of(SpeechRequest("a.wav", "mama"), "papa")
