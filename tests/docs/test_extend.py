@@ -77,6 +77,7 @@ def recording(toy_sentence: ToySentence, tmp_path_factory: pytest.TempPathFactor
     return path
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("page", ["engine.md", "face.md", "exporter.md"])
 def test_what_a_page_writes_keeps_its_contract(page: str, tmp_path: Path) -> None:
     package = Package(page, tmp_path)
