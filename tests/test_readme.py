@@ -55,7 +55,7 @@ def test_make_targets_exist() -> None:
 @pytest.mark.parametrize(
     ("page", "verbs", "written"),
     [
-        (README, ["animate", "cues", "cite"], {"welcome.mp4", "welcome.json", "welcome.tsv"}),
+        (README, ["animate", "cues", "explain", "cite"], {"welcome.mp4", "welcome.json", "welcome.tsv"}),
         (START, ["animate", "animate", "info"], {"welcome.mp4", "welcome.json", "welcome.csv"}),
     ],
     ids=["README", "start"],
