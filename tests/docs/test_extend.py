@@ -7,14 +7,11 @@ import re
 import shutil
 import subprocess
 import sys
-import wave
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from lipmotion.corpora.store import Corpus
-from lipmotion.testing.toy import ToySentence
 
 PAGES = Path(__file__).parents[2] / "docs" / "extend"
 PROJECT = """[build-system]
@@ -66,17 +63,6 @@ class Package:
         return done.stdout
 
 
-@pytest.fixture(scope="module")
-def recording(toy_sentence: ToySentence, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("recording") / "speech.wav"
-    with wave.open(str(path), "wb") as file:
-        file.setnchannels(1)
-        file.setsampwidth(2)
-        file.setframerate(toy_sentence.audio.rate_hz)
-        file.writeframes(np.round(toy_sentence.audio.samples * 32767).astype("<i2").tobytes())
-    return path
-
-
 @pytest.mark.long
 @pytest.mark.parametrize("page", ["engine.md", "face.md", "exporter.md"])
 def test_what_a_page_writes_keeps_its_contract(page: str, tmp_path: Path) -> None:
@@ -87,15 +73,15 @@ def test_what_a_page_writes_keeps_its_contract(page: str, tmp_path: Path) -> Non
 
 @pytest.mark.long
 def test_an_installed_engine_trains_saves_loads_and_animates(
-    toy_corpus: Corpus, recording: Path, tmp_path: Path
+    toy_corpus: Corpus, toy_speech: Path, tmp_path: Path
 ) -> None:
     package, model = Package("engine.md", tmp_path / "package"), tmp_path / "ridge.lipmotion"
     package.lipmotion("train", toy_corpus.path, "-o", model, "--engine", "ridge", "--set", "penalty=500")
     assert "penalty=500.0" in package.lipmotion("info", model)
-    package.lipmotion("animate", recording, "--model", model, "-o", tmp_path / "a.csv")
+    package.lipmotion("animate", toy_speech, "--model", model, "-o", tmp_path / "a.csv")
     lines = (tmp_path / "a.csv").read_text(encoding="utf-8").splitlines()
     assert lines[0].startswith("time_s,opening,width,outer")
-    package.lipmotion("explain", model, recording, "--at", "1.0")
+    package.lipmotion("explain", model, toy_speech, "--at", "1.0")
     missing = subprocess.run(
         [sys.executable, "-m", "lipmotion.cli.main", "info", "--trees", str(model)],
         capture_output=True,
@@ -107,13 +93,13 @@ def test_an_installed_engine_trains_saves_loads_and_animates(
 
 
 @pytest.mark.long
-def test_an_installed_face_and_format_work_from_the_command_line(recording: Path, tmp_path: Path) -> None:
+def test_an_installed_face_and_format_work_from_the_command_line(toy_speech: Path, tmp_path: Path) -> None:
     face, table = Package("face.md", tmp_path / "face"), Package("exporter.md", tmp_path / "table")
-    face.lipmotion("animate", recording, "-o", tmp_path / "a.mp4", "--face", "bar")
+    face.lipmotion("animate", toy_speech, "-o", tmp_path / "a.mp4", "--face", "bar")
     assert (tmp_path / "a.mp4").stat().st_size > 1000
-    table.lipmotion("animate", recording, "-o", tmp_path / "a.tab", "--channels", "opening,width")
+    table.lipmotion("animate", toy_speech, "-o", tmp_path / "a.tab", "--channels", "opening,width")
     code = f"import lipmotion; print(lipmotion.read_motion({str(tmp_path / 'a.tab')!r})[0].names)"
     assert table.run("-c", code).stdout.strip() == "('opening', 'width')"
-    unknown = face.run("-m", "lipmotion.cli.main", "animate", recording, "-o", tmp_path / "b.mp4", "--face", "rab")
+    unknown = face.run("-m", "lipmotion.cli.main", "animate", toy_speech, "-o", tmp_path / "b.mp4", "--face", "rab")
     assert "no face 'rab'; there are: portrait, bar" in unknown.stderr
     assert not (tmp_path / "b.mp4").exists()

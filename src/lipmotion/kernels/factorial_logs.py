@@ -7,13 +7,14 @@ states in the same frame, for numbers of double precision.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
 from lipmotion.kernels.factorial_steps import FramePosteriors
 from lipmotion.kernels.loops import Array, FactorialLogLikelihoods, Loop
 
+TransitionsT = TypeVar("TransitionsT", bound="LogTransitions")
 LARGEST_EXPONENT = 700.0
 """Expected transitions are divided by the probability of the transition: the quotient must stay finite."""
 
@@ -38,7 +39,7 @@ class LogTransitions(NamedTuple):
     leaving: Array
 
     @classmethod
-    def of(cls, loop: Loop) -> LogTransitions:
+    def of(cls: type[TransitionsT], loop: Loop) -> TransitionsT:
         """Return the transitions of a loop."""
         with np.errstate(divide="ignore"):
             leaving = np.log(loop.leave)[:, None] + np.log(loop.enter)

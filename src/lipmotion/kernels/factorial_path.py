@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.kernels.factorial_logs import LogTransitions
 from lipmotion.kernels.loops import Array, FactorialLogLikelihoods, Index, Loop
 
 
@@ -24,7 +25,7 @@ def factorial_best_path(
     """
     frames = len(logs.audio)
     stretch = stretch or math.isqrt(max(frames - 1, 0)) + 1
-    search = _FactorialSearch(_LogTransitions.of(audio), _LogTransitions.of(visual), logs)
+    search = _FactorialSearch(_ViterbiTransitions.of(audio), _ViterbiTransitions.of(visual), logs)
     with np.errstate(divide="ignore"):
         initial, final = (
             np.add.outer(*(np.log(getattr(loop, name).ravel()) for loop in (audio, visual)))
@@ -52,20 +53,10 @@ _Decisions = tuple[NDArray[Any], NDArray[Any]]
 """For each loop, the decision at each joint state [shape=(N, M)], the loop's own states along axis 0."""
 
 
-class _LogTransitions(NamedTuple):
-    """Log probabilities of a loop, as ``loops.LoopTransitions``."""
+class _ViterbiTransitions(LogTransitions):
+    """Log transition probabilities of a loop, and the best of the transitions into each state."""
 
-    stay: Array
-    onward: Array
-    leaving: Array
-
-    @classmethod
-    def of(cls, loop: Loop) -> _LogTransitions:
-        with np.errstate(divide="ignore"):
-            leaving = np.log(loop.leave)[:, None] + np.log(loop.enter)
-            return cls(np.log(loop.stay.ravel()), np.log(loop.onward.ravel()), leaving)
-
-    def forward(self, score: Array) -> tuple[Array, NDArray[Any]]:
+    def best_forward(self, score: Array) -> tuple[Array, NDArray[Any]]:
         """Return the best scores one frame on, along axis 0, and the decisions.
 
         A decision is U for staying, U + 1 for the next state, else the unit that was left.
@@ -95,8 +86,8 @@ class _LogTransitions(NamedTuple):
 class _FactorialSearch(NamedTuple):
     """The search in both loops for one recording."""
 
-    audio: _LogTransitions
-    visual: _LogTransitions
+    audio: _ViterbiTransitions
+    visual: _ViterbiTransitions
     logs: FactorialLogLikelihoods
 
     def log_density(self, t: int) -> Array:
@@ -110,8 +101,8 @@ class _FactorialSearch(NamedTuple):
         """Return the scores after the frames of a stretch, and the decisions of each frame."""
         decisions = []
         for t in range(start, stop):
-            score, by_audio = self.audio.forward(score)
-            turned, by_visual = self.visual.forward(np.ascontiguousarray(score.T))
+            score, by_audio = self.audio.best_forward(score)
+            turned, by_visual = self.visual.best_forward(np.ascontiguousarray(score.T))
             score = turned.T + self.log_density(t)
             decisions.append((by_audio, by_visual))
         return score, decisions
