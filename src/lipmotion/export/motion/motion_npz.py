@@ -20,7 +20,8 @@ from lipmotion.types import Generation, Motion, Timeline, Unit
 def write(path: Path, generation: Generation, source: Mapping[str, str], model: Mapping[str, str]) -> None:
     """Write the arrays ``values`` [shape=(T, P)] and ``document``, the JSON document without its values."""
     document = as_json({**header(generation), **units_and_origin(generation, source, model)}, ensure_ascii=False)
-    np.savez(path, values=generation.motion.values, document=np.array(document))
+    with path.open("wb") as file:  # given a path, NumPy would add a suffix of its own
+        np.savez(file, values=generation.motion.values, document=np.array(document))
 
 
 def read(path: Path) -> tuple[Motion, Timeline[Unit]]:

@@ -1,0 +1,91 @@
+"""The checks of faces and motion formats: each fails for something that breaks it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lipmotion.errors import InputError
+from lipmotion.export.base import MOTION_FORMATS, MotionFormat
+from lipmotion.faces import Face, face_named
+from lipmotion.testing import ContractError, check_exporter, check_face
+
+
+class Bars(Face):
+    """A small face that keeps the contract."""
+
+    def render(self, motion: Any, units: Any, *, fps: float = 25.0) -> Iterator[Any]:  # noqa: ARG002
+        if not fps > 0 or not np.isfinite(motion.values).all():
+            raise InputError("not drawable")
+        for value in motion.resampled(fps)["opening"]:
+            yield np.full((64, 64, 3), int(np.clip(value, 0, 1) * 255), np.uint8)
+
+
+def draw(frames: Callable[[list[Any]], list[Any]], *, checked: bool = True) -> Face:
+    """Return the face with other frames."""
+
+    class Changed(Bars):
+        def render(self, motion: Any, units: Any, *, fps: float = 25.0) -> Iterator[Any]:
+            if not checked:
+                motion, fps = replace(motion, values=np.nan_to_num(motion.values)), max(fps, 1.0)
+            return iter(frames(list(super().render(motion, units, fps=fps))))
+
+    return Changed()
+
+
+def test_faces_that_keep_the_contract() -> None:
+    check_face(Bars())
+    check_face(face_named("portrait"))
+
+
+@pytest.mark.parametrize(
+    ("face", "words"),
+    [
+        (draw(lambda frames: frames[1:]), "frames, required"),
+        (draw(lambda frames: [frame[:63] for frame in frames]), "H and W even"),
+        (draw(lambda frames: [frame.astype(float) for frame in frames]), "not uint8"),
+        (draw(lambda frames: [frames[0]] * len(frames)), "does not move"),
+        (draw(lambda frames: [np.random.default_rng().integers(0, 255, x.shape).astype(np.uint8) for x in frames]),
+         "other pixels"),
+        (draw(lambda frames: frames, checked=False), "not finite: no error"),
+    ],
+)  # fmt: skip
+def test_faces_that_break_it(face: Face, words: str) -> None:
+    with pytest.raises(ContractError, match=words):
+        check_face(face)
+
+
+@pytest.mark.parametrize("name", MOTION_FORMATS.built_in)
+def test_formats_that_keep_the_contract(name: str) -> None:
+    check_exporter(MOTION_FORMATS.load(name))
+
+
+def nothing(path: Path, *_: Any) -> None:
+    """Write an empty file."""
+    path.write_bytes(b"")
+
+
+def by_chance(path: Path, *_: Any) -> None:
+    """Write other bytes each time."""
+    path.write_bytes(np.random.default_rng().bytes(16))
+
+
+def test_formats_that_break_it() -> None:
+    npz = MOTION_FORMATS.load("npz")
+
+    def wrong(path: Path) -> Any:
+        motion, units = npz.read(path)  # type: ignore[misc]
+        return replace(motion, values=motion.values + 0.01), units
+
+    for broken, words in (
+        (MotionFormat(nothing), "no file, or an empty one"),
+        (MotionFormat(by_chance), "other bytes"),
+        (MotionFormat(npz.write, wrong), "values come back that differ"),
+    ):
+        with pytest.raises(ContractError, match=words):
+            check_exporter(broken)
