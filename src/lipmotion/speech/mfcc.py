@@ -191,8 +191,8 @@ def _log_power(power: NDArray[np.float32]) -> NDArray[np.float32]:
 @cache
 def _filters(warp: float) -> NDArray[np.float32]:
     """Return triangular filters, equally spaced in mel from 0 to 8 kHz, of warped frequencies [shape=(257, 26)]."""
-    bins = _mel(_warped(np.arange(FFT_SIZE // 2 + 1) * SPEECH_RATE_HZ / FFT_SIZE, warp))
-    edges = np.linspace(0, _mel(np.array(SPEECH_RATE_HZ / 2)), FILTERS + 2)
+    bins = mel(warped(np.arange(FFT_SIZE // 2 + 1) * SPEECH_RATE_HZ / FFT_SIZE, warp))
+    edges = np.linspace(0, mel(np.array(SPEECH_RATE_HZ / 2)), FILTERS + 2)
     return triangles(bins, edges).astype(np.float32)
 
 
@@ -205,13 +205,13 @@ def triangles(bins: NDArray[np.floating[Any]], edges: NDArray[np.floating[Any]])
     return np.maximum(0, np.minimum(rising, falling))
 
 
-def _warped(hertz: NDArray[np.float64], warp: float) -> NDArray[np.float64]:
+def warped(hertz: NDArray[np.float64], warp: float) -> NDArray[np.float64]:
     """Return stretched frequencies: by ``warp`` up to a knee, then a straight line to 8 kHz, which stays."""
     knee, top = KNEE_HZ * min(1.0, 1 / warp), SPEECH_RATE_HZ / 2
     return np.where(hertz <= knee, hertz * warp, warp * knee + (top - warp * knee) * (hertz - knee) / (top - knee))
 
 
-def _mel(hertz: NDArray[np.float64]) -> NDArray[np.float64]:
+def mel(hertz: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return frequencies in mel."""
     return 1127 * np.log1p(hertz / 700)
 

@@ -11,8 +11,17 @@ from lipmotion.types.explanation import (
     NamedProbability,
     RegressedMean,
 )
-from lipmotion.types.features import FRAME_RATE_HZ, Features, frame_of
-from lipmotion.types.generation import Constraints, Example, Generation, Pin, ReducedVariance, Speech, StateTrace
+from lipmotion.types.features import FRAME_RATE_HZ, SPECTRUM_BANDS, Features, frame_of
+from lipmotion.types.generation import (
+    Constraints,
+    Example,
+    Generation,
+    HeardSpectrum,
+    Pin,
+    ReducedVariance,
+    Speech,
+    StateTrace,
+)
 from lipmotion.types.motion import EYE_DISTANCE, GREY, WEIGHT, Channel, Motion, check_curves, check_magnitude
 from lipmotion.types.parallel_map import ParallelMap
 from lipmotion.types.progress import Item, Monitor, Progress, silent_monitor, sub_monitor, with_progress
@@ -23,6 +32,7 @@ __all__ = [
     "EYE_DISTANCE",
     "FRAME_RATE_HZ",
     "GREY",
+    "SPECTRUM_BANDS",
     "WEIGHT",
     "Audio",
     "ChainPosteriors",
@@ -36,6 +46,7 @@ __all__ = [
     "Explanation",
     "Features",
     "Generation",
+    "HeardSpectrum",
     "Item",
     "Monitor",
     "Motion",

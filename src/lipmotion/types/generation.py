@@ -23,12 +23,33 @@ class Speech:
     log_f0      : float32 array [shape=(T,)], natural logarithm of F0 in Hz, NaN in unvoiced frames (None: the engine
                   does not use F0)
     units_known : whether the units are given, labelled, or aligned to known words; False: they were recognised
+    spectrum    : float32 array [shape=(T, 40)], the normalised log mel spectrum (None: the engine does not use it)
+    confidence  : 0 to 1, how well recognised units are confirmed by words; 1 where the units are known
+    prior       : motion that another model generates from the same speech [T frames], on which this engine's model
+                  stands (None: it stands on none)
     """
 
     features: Features
     units: Timeline[Unit]
     log_f0: NDArray[np.float32] | None = None
     units_known: bool = True
+    spectrum: NDArray[np.float32] | None = None
+    confidence: float = 1.0
+    prior: Motion | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class HeardSpectrum:
+    """The spectrum of a recording as it would be heard in another acoustic condition, for training.
+
+    values   : float16 array [shape=(T', 40)], the normalised log mel spectrum
+    tempo    : frames of the recording in one of these frames: frame n is heard at frame ``tempo`` · n
+    distortion : 0 (as recorded) to 1: by how much noise and room cover the speech
+    """
+
+    values: NDArray[np.float16]
+    tempo: float
+    distortion: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,12 +59,14 @@ class Example:
     name   : of the utterance
     motion : at 100 Hz, on the frames of ``speech.features``
     valid  : bool array [shape=(T,)], False in frames whose motion was not measured
+    heard  : the recording as it was made, and as heard in other conditions; empty: the engine does not use it
     """
 
     name: str
     speech: Speech
     motion: Motion
     valid: NDArray[np.bool_]
+    heard: Sequence[HeardSpectrum] = ()
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,107 @@
+"""The convolutional network: gradients, reach, blocks, learning, determinism."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from lipmotion.stats import convolution
+from lipmotion.stats.convolution import (
+    TrainingPlan,
+    TrainingSequence,
+    fit_network,
+    initial_network,
+)
+
+
+def sequence(length: int = 40, seed: int = 0) -> TrainingSequence:
+    """A sequence whose targets are the inputs of the step before, times two."""
+    rng = np.random.default_rng(seed)
+    x = rng.standard_normal((length, 3)).astype(np.float32)
+    y = np.zeros((length, 2), np.float32)
+    y[1:] = 2 * x[:-1, :2]
+    return TrainingSequence(x, y, np.ones(length, bool))
+
+
+def test_gradients_are_those_of_differences() -> None:
+    network = initial_network(3, 5, 2, (1, 2), seed=1)
+    batch, weights = [sequence(9), sequence(6, 1)], np.array([0.3, 0.7], np.float32)
+    batch[0].valid[2] = False
+    _, gradients = convolution._gradients(network, batch, weights, 0.0, 0)
+    arrays = [array for layer in (*network.layers, network.output) for array in layer]
+    rng = np.random.default_rng(0)
+    differences, slopes = [], []
+    for array, gradient in zip(arrays, gradients, strict=True):
+        assert gradient.shape == array.shape
+        for index in [tuple(rng.integers(size) for size in array.shape) for _ in range(4)]:
+            step = 2e-3
+            before = array[index]
+            errors = []
+            for value in (before + step, before - step):
+                array[index] = value
+                errors.append(convolution._gradients(network, batch, weights, 0.0, 0)[0])
+            array[index] = before
+            differences.append((errors[0] - errors[1]) / (2 * step))
+            slopes.append(float(gradient[index]))
+    # a step may cross a corner of max(0, x), where the difference is between two slopes
+    assert np.median(np.abs(np.array(differences) - slopes)) < 1e-3
+    assert np.corrcoef(differences, slopes)[0, 1] > 0.995
+
+
+def test_steps_beyond_the_reach_change_nothing_and_those_within_do() -> None:
+    network = initial_network(3, 8, 2, (1, 2, 4), seed=0)
+    x = sequence(60).inputs.astype(np.float32)
+    changed = x.copy()
+    changed[30] += 1
+    moved = np.abs(network(changed) - network(x)).max(axis=1) > 0
+    assert network.reach == 7
+    assert not moved[: 30 - 7].any()
+    assert not moved[30 + 8 :].any()
+    assert moved[30]
+
+
+def test_long_sequences_are_computed_in_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
+    network = initial_network(3, 8, 2, (1, 2, 4), seed=0)
+    x = sequence(100).inputs.astype(np.float32)
+    whole = network(x)
+    monkeypatch.setattr(convolution, "BLOCK", 16)
+    np.testing.assert_allclose(network(x), whole, atol=1e-5)
+
+
+def train(seed: int = 0) -> tuple[list[float], convolution.ConvolutionalNetwork]:
+    errors: list[float] = []
+    sequences = [sequence(seed=number) for number in range(8)]
+    network = fit_network(
+        initial_network(3, 16, 2, (1, 1), seed),
+        lambda _, number: sequences[number],
+        len(sequences),
+        np.ones(2),
+        TrainingPlan(steps=150, batch_size=4, rate=1e-2, dropout=0.0, seed=seed),
+        lambda _, error: errors.append(error),
+    )
+    return errors, network
+
+
+def test_it_learns_what_depends_on_a_neighbour() -> None:
+    errors, network = train()
+    assert np.mean(errors[-10:]) < 0.05 * np.mean(errors[:5])
+    unseen = sequence(seed=99)
+    assert np.corrcoef(network(unseen.inputs.astype(np.float32))[:, 0], unseen.targets[:, 0])[0, 1] > 0.97
+
+
+def test_training_draws_the_same_numbers_every_time() -> None:
+    first, second = train()[1], train()[1]
+    np.testing.assert_allclose(first.output.weights, second.output.weights, rtol=1e-4, atol=1e-6)
+
+
+def test_steps_that_do_not_count_are_not_learned() -> None:
+    x, y, valid = sequence()
+    broken = y.copy()
+    broken[10:20] = 1e3
+    valid = valid.copy()
+    valid[10:20] = False
+    network = initial_network(3, 5, 2, (1,), seed=1)
+    weights = np.full(2, 0.5, np.float32)
+    good, _ = convolution._gradients(network, [TrainingSequence(x, y, valid)], weights, 0.0, 0)
+    bad, _ = convolution._gradients(network, [TrainingSequence(x, broken, valid)], weights, 0.0, 0)
+    assert bad == pytest.approx(good)
