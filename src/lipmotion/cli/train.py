@@ -3,16 +3,25 @@
 from __future__ import annotations
 
 import argparse
+from typing import TYPE_CHECKING, Any
 
 from lipmotion.cli.options import add_machine_readable, add_workers, list_or_all, worker_count
 from lipmotion.cli.paths import add_input, add_output
 from lipmotion.cli.speech import add_lexicon_argument
+
+if TYPE_CHECKING:
+    from lipmotion.engines import Engine
+    from lipmotion.pipeline.model import Model
 
 ENGINE = "trajectory (default), coupled (chains of states for speech and for lips) or joint (one model, five streams)"
 SYSTEM = "structure of the coupled engine: ph-HMM, ph-MSHMM, ph-FHMM, ph-vi-FHMM, ph-CHMM or ph-vi-CHMM (default)"
 UNITS = "modelled units: phone (default), eVis, sVis, pbVis, 2vis, or a table file (docs/unit-sets.md)"
 OTHERS = "also train on transcribed recordings without motion (coupled)"
 VISUAL = "modelled motion: geometry (tracked or given curves, default), eigenlips (mouth pictures) or both"
+
+
+FROM = "stand on this model (default: the one that ships), or 'none' (docs/own-model.md)"
+NONE = "none"
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -30,6 +39,9 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser.add_argument("--visual", default="geometry", metavar="KIND", help=VISUAL)
     parser.add_argument("--voices", action="store_true", help="also train on synthetic voices (coupled)")
     add_input(parser, "--recordings", what="folder of recordings", metavar="FOLDER", help=OTHERS)
+    add_input(
+        parser, "--from", what="model to start from", dest="start", default="", type=str, metavar="MODEL", help=FROM
+    )
     add_workers(parser)
     add_machine_readable(parser)
     parser.set_defaults(run=run)
@@ -60,6 +72,7 @@ def run(options: argparse.Namespace) -> None:
                 lexicon=lexicon,
                 visual=options.visual,
                 voices=voices,
+                prior=_prior(options, engine),
                 run=Run(report.receive, work, worker_count(options)),
             )
             save_model(model, options.output)
@@ -67,3 +80,18 @@ def run(options: argparse.Namespace) -> None:
         text = ", ".join(f"{value} {name}" for name, value in figures.items())
         use = f"use it: lipmotion animate SPEECH -o FILE --model {options.output}"
         report.finish(f"{options.output}: {text}; {use}", model=str(options.output), **figures)
+
+
+def _prior(options: argparse.Namespace, engine: Engine[Any]) -> Model | None:
+    """Return the model to start from. Raises InputError: the engine's models do not stand on others."""
+    from lipmotion.engines.base import StandsOnPrior
+    from lipmotion.errors import InputError
+    from lipmotion.pipeline.model import load_model
+
+    if options.start == NONE:
+        return None
+    if isinstance(engine, StandsOnPrior):
+        return load_model(options.start or None)
+    if options.start:
+        raise InputError(f"the engine {engine.name!r} does not start from another model; leave --from out")
+    return None

@@ -97,6 +97,36 @@ class WantsF0(Protocol):
 
 
 @runtime_checkable
+class HearsConditions(Protocol):
+    """An engine that can use spectra, and trains on recordings as heard in several acoustic conditions."""
+
+    def conditions(self, motion_s: float) -> int:
+        """Return in how many acoustic conditions training hears each example (``Example.heard``); 0: none are used.
+
+        motion_s : seconds of measured motion of all examples; infinite: whether any model uses spectra
+        """
+
+
+@runtime_checkable
+class HasAcousticNetwork(Protocol):
+    """An engine whose models may have an acoustic network, on which models of other people can stand."""
+
+    def hidden(self, model: Any, speech: Speech) -> tuple[NDArray[np.float32], NDArray[np.float64]] | None:
+        """Return the last hidden layer [shape=(T', H)] and the distortion of the sound [shape=(T',)], or None.
+
+        They have one row every 40 ms, T' = ceil(T / 4). None: the model has no network.
+        """
+
+
+@runtime_checkable
+class StandsOnPrior(Protocol):
+    """An engine whose models can stand on another model (``Speech.prior``)."""
+
+    def stands_on_prior(self, model: Any) -> bool:
+        """Return whether a model uses ``Speech.prior``."""
+
+
+@runtime_checkable
 class TrainsOnSpeechAlone(Protocol):
     """An engine that can also be trained on speech without motion: of other speakers, for instance."""
 

@@ -7,6 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.motion.articulation import (
+    ARTICULATION,
+    ArticulationPrior,
+    articulation_arrays,
+    articulation_from_arrays,
+)
 from lipmotion.motion.closure import OPENING, Closure
 from lipmotion.motion.generation import LearnedMotion
 from lipmotion.motion.limits import MotionLimits, check_poses
@@ -21,8 +27,10 @@ PHONE_SET = UNIT_SETS["phone"]
 """The unit set in which each phone is a unit of its own; models do not store it."""
 
 
-def motion_arrays(units: UnitSet, space: MotionSpace, closure: Closure | None) -> dict[str, NDArray[Any]]:
-    """Serialise the mapping of phones to units, the motion space and the closure."""
+def motion_arrays(
+    units: UnitSet, space: MotionSpace, closure: Closure | None, prior: ArticulationPrior | None = None
+) -> dict[str, NDArray[Any]]:
+    """Serialise the mapping of phones to units, the motion space, the closure and the prior."""
     arrays: dict[str, NDArray[Any]] = {
         "channels": np.array([(channel.name, channel.unit) for channel in space.channels]),
         "direct": space.direct,
@@ -33,7 +41,7 @@ def motion_arrays(units: UnitSet, space: MotionSpace, closure: Closure | None) -
         arrays |= {"points_mean": space.points.mean, "points_basis": space.points.basis.astype(np.float32)}
     if closure is not None:
         arrays |= {"closure": np.array([closure.column, closure.closed]), "closure_follow": closure.follow}
-    return arrays
+    return arrays | articulation_arrays(prior)
 
 
 def learned_motion_arrays(motion: LearnedMotion) -> dict[str, NDArray[Any]]:
@@ -41,7 +49,7 @@ def learned_motion_arrays(motion: LearnedMotion) -> dict[str, NDArray[Any]]:
 
     For engines that do not store limits and scaling in arrays of their own.
     """
-    arrays = motion_arrays(PHONE_SET, motion.space, motion.closure) | {"limits": np.stack(motion.limits)}
+    arrays = motion_arrays(PHONE_SET, motion.space, motion.closure, motion.prior) | {"limits": np.stack(motion.limits)}
     return arrays | ({"scaling": np.stack(motion.scaling)} if motion.scaling is not None else {})
 
 
@@ -51,17 +59,19 @@ def learned_motion_from_arrays(arrays: Arrays) -> LearnedMotion:
     Raises ModelFormatError: an array is missing, or has a wrong shape, type or range.
     """
     with format_errors("the learned motion"):
-        _, space, closure = motion_from_arrays(arrays, PHONE_SET.name)
+        _, space, closure, prior = motion_from_arrays(arrays, PHONE_SET.name)
         limits = MotionLimits(*checked_arrays(arrays, LIMITS, Q=space.dimensions)["limits"])
         check_poses(limits, space, closure)
         scaling = None
         if "scaling" in arrays:
             scaling = VarianceScaling(*checked_arrays(arrays, SCALING, Q=space.dimensions)["scaling"])
-        return LearnedMotion(space, closure, limits, scaling)
+        return LearnedMotion(space, closure, limits, scaling, prior)
 
 
-def motion_from_arrays(arrays: Arrays, units: str) -> tuple[UnitSet, MotionSpace, Closure | None]:
-    """Deserialise the mapping of phones to units, the motion space and the closure.
+def motion_from_arrays(
+    arrays: Arrays, units: str
+) -> tuple[UnitSet, MotionSpace, Closure | None, ArticulationPrior | None]:
+    """Deserialise the mapping of phones to units, the motion space, the closure and the prior.
 
     units : the name of the unit set; the set itself is in the arrays
     Raises KeyError, ValueError, IndexError, TypeError: an array is missing, or has a wrong shape, type or range.
@@ -79,7 +89,7 @@ def motion_from_arrays(arrays: Arrays, units: str) -> tuple[UnitSet, MotionSpace
     unit_set = PHONE_SET
     if units != PHONE_SET.name:
         unit_set = UnitSet(units, _unit_of_phone(checked_arrays(arrays, UNITS)["units"]))
-    return unit_set, space, closure
+    return unit_set, space, closure, articulation_from_arrays(arrays, space.dimensions)
 
 
 CHANNELS = {"channels": ArraySpec(np.str_, "P 2"), "direct": ArraySpec(np.intp, "d", 0, 1e6)}
@@ -91,9 +101,9 @@ CLOSURE = {"closure": ArraySpec(np.float64, "2"), "closure_follow": ArraySpec(np
 UNITS = {"units": ArraySpec(np.str_, "N 2")}
 LIMITS = {"limits": ArraySpec(np.float64, "2 Q")}
 SCALING = {"scaling": ArraySpec(np.float64, "2 Q")}
-MOTION_ARRAYS = (*CHANNELS, *POINTS, *CLOSURE, *UNITS)
+MOTION_ARRAYS = (*CHANNELS, *POINTS, *CLOSURE, *UNITS, *ARTICULATION)
 """Names of the arrays of ``motion_arrays``: P channels, of which R are reduced to K dimensions."""
-LEARNED_MOTION_ARRAYS = (*CHANNELS, *POINTS, *CLOSURE, *LIMITS, *SCALING)
+LEARNED_MOTION_ARRAYS = (*CHANNELS, *POINTS, *CLOSURE, *LIMITS, *SCALING, *ARTICULATION)
 """Names of the arrays of ``learned_motion_arrays``."""
 
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.motion.articulation import fit_articulation_prior
 from lipmotion.motion.closure import fit_closure
 from lipmotion.motion.generation import LearnedMotion
 from lipmotion.motion.limits import limits_of
@@ -24,4 +25,6 @@ def fit_motion(examples: Sequence[Example], components: int) -> tuple[LearnedMot
     space, values = fit_reduced_motion(examples, components)
     closure = fit_closure(space.direct_names, values, examples)
     valid = np.concatenate([x[example.valid] for x, example in zip(values, examples, strict=True)])
-    return LearnedMotion(space, closure, limits_of(valid)), values
+    return LearnedMotion(
+        space, closure, limits_of(valid), prior=fit_articulation_prior(space, values, examples)
+    ), values

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.kernels.banded import generate
+from lipmotion.motion.articulation import ArticulationPrior
 from lipmotion.motion.closure import OPENING, Closure, closable_ranges, frames_to_close
 from lipmotion.motion.limits import MotionLimits
 from lipmotion.motion.space import MotionSpace
@@ -47,12 +48,14 @@ class LearnedMotion:
     closure : of the lips in p, b and m (None: the motion has no channel ``opening``)
     limits  : of plausible motion in this space
     scaling : variance scaling about the rest pose (None: movements are not scaled)
+    prior   : the table of articulation, for contexts that training saw little of (None: the means are used as they are)
     """
 
     space: MotionSpace
     closure: Closure | None
     limits: MotionLimits
     scaling: VarianceScaling | None = None
+    prior: ArticulationPrior | None = None
 
     def generate(
         self,
@@ -63,22 +66,26 @@ class LearnedMotion:
         *,
         close: bool = True,
         closing_units: Container[str] = (),
+        reliability: NDArray[np.float64] | float = 1.0,
     ) -> tuple[Motion, NDArray[np.floating[Any]] | ReducedVariance]:
         """Return the motion of all channels at 100 Hz, and its variance [shape=(T, P)], by parameter generation.
 
-        The steps are variance scaling, parameter generation with pins, closures in p, b and m, the check of the
-        limits, and the restoration of all channels.
+        The steps are blending with the table of articulation, variance scaling, parameter generation with pins,
+        closures in p, b and m, the check of the limits, and the restoration of all channels.
         statistics    : returns the predicted means and precisions of a range of frames [each shape=(N, 3, Q)]
         frames        : length of the whole recording, T
         units         : phones in time
         constraints   : pins of channels that are modelled as they are
         close         : whether the lips are made to meet in every p, b and m
         closing_units : units that close the lips where no phone is known
+        reliability   : of the phones in time, 0 to 1 [shape=(T,)]
         Raises InputError: a pin names no channel, lies outside the recording or is not finite.
         Raises ModelFormatError: the motion leaves the limits, so that the model must be damaged.
         """
         pins = resolved_pins(constraints, self.space, frames)
         ranges = closable_ranges(units, frames, closing_units) if close else []
+        if self.prior is not None:
+            statistics = self.prior.blended(statistics, units, frames, reliability)
         values, variance = self._generated(statistics, frames, ranges, pins)
         return Motion(values, FRAME_RATE_HZ, self.space.channels), variance
 

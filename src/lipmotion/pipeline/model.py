@@ -36,6 +36,7 @@ class Model:
     about      : corpus, split, seed, versions, licence, attribution, by name: the information for users
     adaptation : adaptation of the phone models to a speaker (None: not adapted)
     eigenlips  : principal components of mouth pictures (None: the channels do not contain their coefficients)
+    prior      : the model on which this one stands: its motion is an input of this engine (None: it stands on none)
 
     >>> import lipmotion
     >>> model = lipmotion.load_model()
@@ -49,6 +50,7 @@ class Model:
     about: Mapping[str, Any]
     adaptation: Adaptation | None = None
     eigenlips: Eigenlips | None = None
+    prior: Model | None = None
 
     @property
     def visual(self) -> str:
@@ -77,12 +79,18 @@ def save_model(model: Model, path: str | Path) -> None:
     header = {
         "format": FORMAT,
         "version": VERSION,
-        "engine": model.engine.name,
-        "configuration": model.engine.config.as_mapping(),
+        **_engine_header(model),
         "recogniser": model.phones.config.as_mapping(),
-        **model.about,
     }
+    if model.prior is not None:
+        header["prior"] = _engine_header(model.prior)
+        arrays |= {f"prior/{key}": array for key, array in model.prior.engine.to_arrays(model.prior.learned).items()}
     write_archive(Path(path), header, arrays)
+
+
+def _engine_header(model: Model) -> dict[str, Any]:
+    """Return the part of a header that says which engine a model has, and the information for users."""
+    return {"engine": model.engine.name, "configuration": model.engine.config.as_mapping(), **model.about}
 
 
 def load_model(path: str | Path | None = None) -> Model:
@@ -149,7 +157,7 @@ def _read(path: Path) -> Model:
         for folder in _FOLDERS:
             arrays[folder] = arrays_under(stored, f"{folder}/")
         refuse_undeclared(stored, (f"{folder}/{key}" for folder, inner in arrays.items() for key in inner))
-        engine = engine_named(header["engine"], _options(header, "configuration"))
+        engine = _engine(header)
         config = HmmConfig.parsed(_options(header, "recogniser"))
         phones = hmm_from_arrays(arrays["phones"], config)
         if phones.mixtures.size[2] != FEATURES:
@@ -157,6 +165,7 @@ def _read(path: Path) -> Model:
         learned = engine.from_arrays(arrays["engine"])
         adaptation = adaptation_from_arrays(arrays["adaptation"]) if arrays["adaptation"] else None
         eigenlips = eigenlips_from_arrays(arrays["eigenlips"]) if arrays["eigenlips"] else None
+        prior = _prior(header, phones, arrays["prior"])
     except ModelFormatError as error:
         raise ModelFormatError(f"{path}: {error}") from error
     except UNREADABLE as error:
@@ -164,7 +173,26 @@ def _read(path: Path) -> Model:
     about = {key: value for key, value in header.items() if key not in _OWN_KEYS}
     if (about.get("visual", GEOMETRY) != GEOMETRY) != (eigenlips is not None):
         raise ModelFormatError(f"{path}: the model says visual {about.get('visual')!r}, which its eigenlips do not fit")
-    return Model(phones, engine, learned, about, adaptation, eigenlips)
+    return Model(phones, engine, learned, about, adaptation, eigenlips, prior)
+
+
+def _engine(header: Mapping[str, Any]) -> Engine[Any]:
+    """Return the engine that a header names. Raises KeyError, TypeError, InputError: it names none."""
+    return engine_named(header["engine"], _options(header, "configuration"))
+
+
+def _prior(header: Mapping[str, Any], phones: UnitHmm, arrays: Mapping[str, NDArray[Any]]) -> Model | None:
+    """Return the model on which a model stands, or None. Raises as ``_engine`` and the engine's ``from_arrays``."""
+    if "prior" not in header:
+        if arrays:
+            raise ValueError("arrays of another model, which the header does not name")
+        return None
+    inner = header["prior"]
+    if not isinstance(inner, dict):
+        raise TypeError(f"prior is {inner!r}, required a header")
+    engine = _engine(inner)
+    about = {key: value for key, value in inner.items() if key not in _OWN_KEYS}
+    return Model(phones, engine, engine.from_arrays(arrays), about)
 
 
 def _options(header: Mapping[str, Any], key: str) -> Mapping[str, Any]:
@@ -175,7 +203,7 @@ def _options(header: Mapping[str, Any], key: str) -> Mapping[str, Any]:
     return options
 
 
-_FOLDERS = ("phones", "engine", "adaptation", "eigenlips")
+_FOLDERS = ("phones", "engine", "adaptation", "eigenlips", "prior")
 """Prefixes of the names of all arrays."""
-_OWN_KEYS = ("format", "version", "engine", "configuration", "recogniser")
+_OWN_KEYS = ("format", "version", "engine", "configuration", "recogniser", "prior")
 """Keys of the header that are not part of ``Model.about``."""

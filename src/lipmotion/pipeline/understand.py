@@ -9,10 +9,13 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from lipmotion.engines import Animator
-from lipmotion.engines.base import RecognisesPhones, WantsF0
+from lipmotion.engines.base import HearsConditions, RecognisesPhones, WantsF0
 from lipmotion.errors import AlignmentError, InputError
 from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.prior import with_prior
 from lipmotion.pipeline.request import SpeechRequest
 from lipmotion.pipeline.transcribe import read_transcript, transcribe
 from lipmotion.speech.analysed_audio import analysed
@@ -28,11 +31,16 @@ LOG = logging.getLogger("lipmotion")
 
 
 def understand(model: Model, request: SpeechRequest) -> Speech:
-    """Return the speech of a request as input of a model's engine: features, phones in time, and F0 if it is needed.
+    """Return the speech of a request as input of a model's engine: features, phones in time, and what else it needs.
 
     Raises InputError: the recording, the transcript or the units are not usable, or there is no such recogniser.
     Raises AlignmentError: the transcript cannot be aligned with the recording.
     """
+    return with_prior(model.prior, _understood(model, request))
+
+
+def _understood(model: Model, request: SpeechRequest) -> Speech:
+    """Return the speech of a request, without what the model that this one stands on makes of it."""
     audio = analysed(audio_of(request))
     phones = cached_recogniser(model.phones, request.recogniser, model.adaptation)
     if request.units is not None:
@@ -53,8 +61,10 @@ def audio_of(request: SpeechRequest) -> Audio:
 
 
 def speech_of(engine: Animator[Any], audio: Audio, features: Features, units: Timeline[Unit]) -> Speech:
-    """Return speech of features and phones in time, with the F0 of the recording if the engine needs it."""
-    return Speech(features, units, log_f0(audio) if isinstance(engine, WantsF0) and engine.wants_f0 else None)
+    """Return speech of features and phones in time, with F0 and spectrum of the recording if the engine needs them."""
+    f0 = log_f0(audio) if isinstance(engine, WantsF0) and engine.wants_f0 else None
+    hears = isinstance(engine, HearsConditions) and engine.conditions(np.inf)
+    return Speech(features, units, f0, spectrum=analysed(audio).spectrum if hears else None)
 
 
 def recognised_speech(
@@ -78,11 +88,13 @@ def recognised_speech(
     if isinstance(engine, RecognisesPhones) and phones.kind != "general":
         recognised = engine.recognise(learned, speech)
     if recognised is None:
-        return replace(speech, units=recognise(), units_known=False)
+        return replace(speech, units=recognise(), units_known=False, confidence=0.0)
     try:
-        return replace(speech, units=phones.align_phones(audio, features, recognised), units_known=False)
+        return replace(
+            speech, units=phones.align_phones(audio, features, recognised), units_known=False, confidence=0.0
+        )
     except AlignmentError:
-        return replace(speech, units=recognise(), units_known=False)
+        return replace(speech, units=recognise(), units_known=False, confidence=0.0)
 
 
 def _words(transcript: str | Path | None, duration_s: float) -> tuple[str, ...] | None:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from lipmotion.speech.general.front_end import general_features
 from lipmotion.speech.mfcc import HOP, LOG_ENERGY, checked_samples, log_energy, mfcc_of_warps
+from lipmotion.speech.spectrum import spectrum
 from lipmotion.types import Audio, Features
 
 
@@ -48,6 +49,11 @@ class AnalysedAudio(Audio):
     def general_features(self) -> NDArray[np.float32]:
         """The features of the general models [shape=(T, 39)], as of ``speech.general.front_end``."""
         return general_features(self)
+
+    @cached_property
+    def spectrum(self) -> NDArray[np.float32]:
+        """The normalised log mel spectrum [shape=(T, 40)], as of ``speech.spectrum``."""
+        return spectrum(self)
 
     def loudest_stretch(self, frames: int) -> AnalysedAudio:
         """Return the stretch of so many frames with the most energy; the recording itself if it is no longer."""

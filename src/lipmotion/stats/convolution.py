@@ -231,15 +231,15 @@ def _gradients(
         inputs[number, :rows], targets[number, :rows] = sequence.inputs, sequence.targets
         counts[number, :rows, 0] = sequence.valid
     states, passes = _forward(network, inputs, (dropout, np.random.default_rng(seed)))
-    error = (states @ network.output.weights + network.output.biases - targets) * counts
-    slope = 2 * error * weights
+    error: Array = (states @ network.output.weights + network.output.biases - targets) * counts
+    slope: Array = 2 * error * weights
     flat = slope.reshape(-1, slope.shape[2])
     gradients = [flat.sum(axis=0), states.reshape(len(flat), -1).T @ flat]  # from the last to the first
-    back = slope @ network.output.weights.T
+    back: Array = slope @ network.output.weights.T
     for number in reversed(range(len(network.layers))):
-        inner = back * passes[number].slope
-        rows = inner.reshape(len(flat), -1)
-        gradients += [rows.sum(axis=0), passes[number].stacked.reshape(len(flat), -1).T @ rows]
+        inner: Array = back * passes[number].slope
+        spread: Array = inner.reshape(len(flat), -1)
+        gradients += [spread.sum(axis=0), passes[number].stacked.reshape(len(flat), -1).T @ spread]
         if number:
             back = back + _unstacked(inner @ network.layers[number].weights.T, network.dilations[number])
     return float((np.square(error) * weights).sum(dtype=float)), gradients[::-1]

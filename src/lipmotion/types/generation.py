@@ -15,6 +15,20 @@ from lipmotion.types.timeline import Timeline, Unit
 
 
 @dataclass(frozen=True, eq=False)
+class PriorOutput:
+    """What a model makes of speech, for a model that stands on it; one row every 40 ms, T' = ceil(T / 4).
+
+    articulators : opening, width, and what else of the articulators is known, of its motion [shape=(T', A)]
+    hidden       : float32 array [shape=(T', H)], the last hidden layer of its acoustic network; H may be 0
+    distortion   : 0 to 1, how much noise and room cover the speech [shape=(T',)]
+    """
+
+    articulators: NDArray[np.float64]
+    hidden: NDArray[np.float32]
+    distortion: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
 class Speech:
     """Speech of one recording: the input of an engine.
 
@@ -25,8 +39,7 @@ class Speech:
     units_known : whether the units are given, labelled, or aligned to known words; False: they were recognised
     spectrum    : float32 array [shape=(T, 40)], the normalised log mel spectrum (None: the engine does not use it)
     confidence  : 0 to 1, how well recognised units are confirmed by words; 1 where the units are known
-    prior       : motion that another model generates from the same speech [T frames], on which this engine's model
-                  stands (None: it stands on none)
+    prior       : what another model makes of the same speech, on which this engine's model stands (None: on none)
     """
 
     features: Features
@@ -35,7 +48,7 @@ class Speech:
     units_known: bool = True
     spectrum: NDArray[np.float32] | None = None
     confidence: float = 1.0
-    prior: Motion | None = None
+    prior: PriorOutput | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -43,7 +43,7 @@ def coupled_arrays(model: CoupledModel) -> dict[str, NDArray[Any]]:
     """Serialise a model: return its arrays by name. The configuration is not among them."""
     chains = model.chains
     product = chains.transitions.product
-    arrays = motion_arrays(PHONE_SET, model.space, model.closure) | {
+    arrays = motion_arrays(PHONE_SET, model.space, model.closure, model.prior) | {
         "gain": model.scaling,
         "rest": model.rest_pose,
         "streams": np.array(chains.streams),
@@ -101,7 +101,7 @@ def _regression_arrays(model: CoupledModel) -> dict[str, NDArray[Any]]:
 def coupled_from_arrays(arrays: Arrays, config: CoupledConfig) -> CoupledModel:
     """Deserialise a model. Raises ModelFormatError: an array is missing, not declared, misshapen or out of range."""
     try:
-        _, space, closure = motion_from_arrays(arrays, PHONE_SET.name)
+        _, space, closure, prior = motion_from_arrays(arrays, PHONE_SET.name)
         structure = _structure(arrays, config)
         poses = checked_arrays(arrays, POSES, Q=space.dimensions)
         streams = tuple(poses["streams"].tolist())
@@ -117,7 +117,7 @@ def coupled_from_arrays(arrays: Arrays, config: CoupledConfig) -> CoupledModel:
         )
         chains = Chains(streams, transitions, _groups(arrays, transitions.product.chain_states.shape[1], visual))
         regression = _regression(arrays, structure, visual) if config.dynamic and config.acoustic_regression else None
-        model = CoupledModel(chains, space, visual, regression, poses["gain"], poses["rest"], closure)
+        model = CoupledModel(chains, space, visual, regression, poses["gain"], poses["rest"], closure, prior)
         check_rest(model.rest_pose, model.pose_limits)
         check_poses(model.pose_limits, space, closure)
         return model

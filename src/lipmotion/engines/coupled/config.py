@@ -40,6 +40,7 @@ class CoupledConfig(Configuration):
     components : principal components that all point channels are reduced to
     variance_scaling : scale movements to the variance of the recorded ones
     closures   : make the lips meet in every p, b and m
+    articulation : lean on the table of English articulation in contexts that training saw little of
     """
 
     structure: str = option("coupled", Rule(choices=STRUCTURES))
@@ -63,6 +64,7 @@ class CoupledConfig(Configuration):
     components: int = option(16, COUNT)
     variance_scaling: bool = True
     closures: bool = True
+    articulation: bool = True
 
     presets: ClassVar[Mapping[str, Mapping[str, Any]]] = SYSTEMS
     former: ClassVar[Mapping[str, str]] = {

@@ -14,6 +14,7 @@ from lipmotion.engines.coupled.chains.model import Chains, Inference
 from lipmotion.engines.coupled.chains.visual_streams import VisualStream, speech_observations
 from lipmotion.engines.coupled.conversion.em import precision_statistics
 from lipmotion.engines.coupled.conversion.regression import RegressionInputs, VisualRegression
+from lipmotion.motion.articulation import ArticulationPrior
 from lipmotion.motion.closure import Closure
 from lipmotion.motion.generation import LearnedMotion
 from lipmotion.motion.limits import MotionLimits, limits_of
@@ -41,6 +42,7 @@ class CoupledModel:
     scaling    : factors of variance scaling, away from the rest pose [shape=(Q,)]
     rest_pose  : the pose in silence away from speech [shape=(Q,)]
     closure    : how the lips close; None: the motion has no opening
+    prior      : the table of articulation in the speaker's range (None: there is none)
     """
 
     chains: Chains
@@ -50,6 +52,7 @@ class CoupledModel:
     scaling: Array
     rest_pose: Array
     closure: Closure | None
+    prior: ArticulationPrior | None = None
 
     @cached_property
     def limits(self) -> MotionLimits:
@@ -63,7 +66,8 @@ class CoupledModel:
     @cached_property
     def motion(self) -> LearnedMotion:
         """What turns means and precisions into motion: space, closure, limits and variance scaling."""
-        return LearnedMotion(self.space, self.closure, self.limits, VarianceScaling(self.scaling, self.rest_pose))
+        scaling = VarianceScaling(self.scaling, self.rest_pose)
+        return LearnedMotion(self.space, self.closure, self.limits, scaling, self.prior)
 
     @property
     def pose_limits(self) -> MotionLimits:

@@ -22,6 +22,7 @@ from lipmotion.hmm.multistream.recognise import joint_recogniser
 from lipmotion.hmm.multistream.streams import MOTION, StreamObservations, StreamWeights, stream_observations
 from lipmotion.hmm.multistream.train import TrainingUtterance, train_joint
 from lipmotion.motion.arrays import MOTION_ARRAYS, motion_arrays, motion_from_arrays
+from lipmotion.motion.articulation import ArticulationPrior, fit_articulation_prior
 from lipmotion.motion.closure import Closure, fit_closure
 from lipmotion.motion.frame_labels import with_unit_names
 from lipmotion.motion.generation import LearnedMotion, Statistics
@@ -67,6 +68,7 @@ class JointEngineConfig(Configuration):
                  recognised; 1: the best sequence. More than 1 needs ``recognise_units``
     seed       : of the sampling
     closures   : make the lips meet in every p, b and m, and in every recognised unit that has no other phones
+    articulation : lean on the table of English articulation in contexts that training saw little of
     """
 
     units: str = "phone"
@@ -80,6 +82,7 @@ class JointEngineConfig(Configuration):
     paths: int = option(1, COUNT)
     seed: int = option(0, Rule(least=0))
     closures: bool = True
+    articulation: bool = True
 
     former: ClassVar[Mapping[str, str]] = {"sees": "motion_in_training", "recognises": "recognise_units"}
 
@@ -115,12 +118,14 @@ class JointModel:
     space   : the Q dimensions in which motion is modelled
     hmm     : the joint model
     closure : of the lips in p, b and m (None: the motion has no channel ``opening``)
+    prior   : the table of articulation in the speaker's range (None: there is none)
     """
 
     units: UnitSet
     space: MotionSpace
     hmm: JointHmm
     closure: Closure | None
+    prior: ArticulationPrior | None
 
     @cached_property
     def limits(self) -> MotionLimits:
@@ -130,7 +135,7 @@ class JointModel:
     @cached_property
     def motion(self) -> LearnedMotion:
         """Motion space, closure and limits, which turn predicted means into motion."""
-        return LearnedMotion(self.space, self.closure, self.limits)
+        return LearnedMotion(self.space, self.closure, self.limits, prior=self.prior)
 
     @property
     def poses(self) -> MotionLimits:
@@ -174,7 +179,8 @@ class JointEngine(Engine[JointModel]):
         closure = fit_closure(space.direct_names, values, examples)
         figures = {f"leaves_{name}": float(stream.forest.size) for name, stream in hmm.models.items()}
         frames = sum(int(example.valid.sum()) for example in examples)
-        return Fit(JointModel(units, space, hmm, closure), {"frames": frames, **figures})
+        prior = fit_articulation_prior(space, values, examples) if self.config.articulation else None
+        return Fit(JointModel(units, space, hmm, closure, prior), {"frames": frames, **figures})
 
     def without_closures(self) -> JointEngine:  # noqa: D102
         return replace(self, config=replace(self.config, closures=False))
@@ -211,18 +217,18 @@ class JointEngine(Engine[JointModel]):
 
     def to_arrays(self, model: JointModel) -> dict[str, NDArray[Any]]:  # noqa: D102
         joint = {f"{PREFIX}{name}": array for name, array in joint_arrays(model.hmm).items()}
-        return motion_arrays(model.units, model.space, model.closure) | joint
+        return motion_arrays(model.units, model.space, model.closure, model.prior) | joint
 
     def from_arrays(self, arrays: Arrays) -> JointModel:  # noqa: D102
         with format_errors("the joint model"):
             refuse_undeclared(arrays, MOTION_ARRAYS, (name for name in arrays if name.startswith(PREFIX)))
-            units, space, closure = motion_from_arrays(arrays, self.config.units)
+            units, space, closure, prior = motion_from_arrays(arrays, self.config.units)
             hmm = joint_from_arrays(arrays_under(arrays, PREFIX), self.config.hmm)
             if set(hmm.inventory.names) != set(units.units):
                 raise ValueError(f"the units {' '.join(hmm.inventory.names)}, required {' '.join(units.units)}")
             if MOTION not in hmm.models or len(hmm.models[MOTION].scale.mean) != 3 * space.dimensions:
                 raise ValueError(f"motion that is not of {space.dimensions} dimensions")
-            model = JointModel(units, space, hmm, closure)
+            model = JointModel(units, space, hmm, closure, prior)
             check_poses(model.poses, space, closure)
             return model
 

@@ -10,11 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.base import Arrays, Engine, Fit
+from lipmotion.engines.trajectory.experts import Experts
 from lipmotion.engines.trajectory.model import TrajectoryModel, model_arrays, model_from_arrays
-from lipmotion.engines.trajectory.train import fit_trajectory
+from lipmotion.engines.trajectory.train import LEAST_NETWORK_S, fit_trajectory
 from lipmotion.engines.trajectory.training_data import TrainingOptions
+from lipmotion.motion.acoustic_network import AcousticNetwork
 from lipmotion.motion.frame_labels import StateLayout, full_context_states, with_unit_names
-from lipmotion.motion.generation import Statistics
+from lipmotion.motion.prior_regression import PriorRegression
 from lipmotion.printable import printable
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import (
@@ -54,6 +56,10 @@ class TrajectoryConfig(Configuration):
     closures   : make the lips meet in every p, b and m, whatever their units are
     joint_recogniser : train the joint model as well, where there is enough speech: it recognises the phones of
                  speakers that it was trained on
+    conditions : acoustic conditions in which each recording is heard in the training of the acoustic network; 0: no
+                 network
+    epochs     : how often the training of the network uses each recording
+    articulation : lean on the table of English articulation in contexts that training saw little of
     units      : name of a unit set, or path of a table of units (docs/unit-sets.md), which training reads
     """
 
@@ -73,6 +79,9 @@ class TrajectoryConfig(Configuration):
     variance_scaling: bool = True
     closures: bool = True
     joint_recogniser: bool = True
+    conditions: int = option(15, Rule(least=0))
+    epochs: int = option(80, Rule(least=1))
+    articulation: bool = True
     units: str = "phone"
 
     former: ClassVar[Mapping[str, str]] = {
@@ -123,6 +132,19 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
         frames = sum(int(example.valid.sum()) for example in examples)
         return Fit(model, {"frames": frames, "leaves": len(model.emission.means)})
 
+    def conditions(self, motion_s: float) -> int:  # noqa: D102
+        return self.config.conditions if motion_s >= LEAST_NETWORK_S else 0
+
+    def hidden(  # noqa: D102
+        self, model: TrajectoryModel, speech: Speech
+    ) -> tuple[NDArray[np.float32], NDArray[np.float64]] | None:
+        if not isinstance(model.network, AcousticNetwork) or speech.spectrum is None:
+            return None
+        return model.network.hidden(speech.spectrum)
+
+    def stands_on_prior(self, model: TrajectoryModel) -> bool:  # noqa: D102
+        return isinstance(model.network, PriorRegression)
+
     def recognise(self, model: TrajectoryModel, speech: Speech) -> Timeline[Unit] | None:  # noqa: D102
         return model.phone_recogniser.phones(speech) if model.phone_recogniser is not None else None
 
@@ -130,19 +152,22 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
         return replace(self, config=replace(self.config, closures=False))
 
     def generate(self, model: TrajectoryModel, speech: Speech, constraints: Constraints | None = None) -> Generation:  # noqa: D102
-        features = np.asarray(speech.features.values)
+        frames = len(speech.features.values)
         layout = self.config.layout(model.units)
-        states = full_context_states(speech.units, len(features), layout)
+        states = full_context_states(speech.units, frames, layout)
         distinct = {state: number for number, state in enumerate(dict.fromkeys(states))}
         path = np.array([distinct[state] for state in states], np.intp)
         rows = np.array([model.emission.row(state, layout) for state in distinct], np.intp)
-
-        def statistics(frames: slice) -> Statistics:
-            return model.emission.statistics(rows[path[frames]], features, frames)
+        experts = Experts(model.emission, rows[path], speech, model.network, model.prior, model.network_share)
 
         learned = model.motion if self.config.variance_scaling else replace(model.motion, scaling=None)
         motion, variance = learned.generate(
-            statistics, len(features), speech.units, constraints, close=self.config.closures
+            experts.statistics,
+            frames,
+            speech.units,
+            constraints,
+            close=self.config.closures,
+            reliability=experts.reliability,
         )
         return Generation(
             motion,

@@ -17,11 +17,24 @@ from lipmotion.engines.trajectory.phone_recogniser import (
     recogniser_arrays,
     recogniser_from_arrays,
 )
+from lipmotion.motion.acoustic_network import (
+    NETWORK_ARRAYS,
+    AcousticNetwork,
+    acoustic_network_arrays,
+    acoustic_network_from_arrays,
+)
 from lipmotion.motion.arrays import MOTION_ARRAYS, motion_arrays, motion_from_arrays
+from lipmotion.motion.articulation import ArticulationPrior
 from lipmotion.motion.closure import Closure
 from lipmotion.motion.frame_labels import StateLayout
 from lipmotion.motion.generation import LearnedMotion
 from lipmotion.motion.limits import MotionLimits, check_poses, limits_of
+from lipmotion.motion.prior_regression import (
+    PRIOR_ARRAYS,
+    PriorRegression,
+    prior_regression_arrays,
+    prior_regression_from_arrays,
+)
 from lipmotion.motion.space import MotionSpace
 from lipmotion.motion.variance_scaling import VarianceScaling
 from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, checked_arrays, format_errors, refuse_undeclared
@@ -38,6 +51,10 @@ class TrajectoryModel:
     variance_factors : factors of variance scaling about the rest pose [shape=(Q,)]
     closure  : of the lips in p, b and m (None: the motion has no channel ``opening``)
     phone_recogniser : recognises the phones of speakers that it was trained on (None: there was too little speech)
+    network  : motion from the sound alone, or, where the model stands on another one, by regression on what that makes
+               of the speech (None: there was too little speech, and no other model)
+    network_share : weight of the network, 0 to 1, beside the states in contexts that training knows well
+    prior    : the table of articulation in the speaker's range (None: it is not used)
     """
 
     units: UnitSet
@@ -46,6 +63,9 @@ class TrajectoryModel:
     variance_factors: NDArray[np.float64]
     closure: Closure | None
     phone_recogniser: OwnPhoneRecogniser | None = None
+    network: AcousticNetwork | PriorRegression | None = None
+    prior: ArticulationPrior | None = None
+    network_share: float = 0.5
 
     @cached_property
     def limits(self) -> MotionLimits:
@@ -56,7 +76,10 @@ class TrajectoryModel:
     def motion(self) -> LearnedMotion:
         """Motion space, closure, limits and variance scaling, which turn predicted means into motion."""
         scaling = VarianceScaling(self.variance_factors, self.emission.means[-1, 0])
-        return LearnedMotion(self.space, self.closure, self.limits, scaling)
+        prior = (
+            None if isinstance(self.network, PriorRegression) else self.prior
+        )  # it has the table among its regressors
+        return LearnedMotion(self.space, self.closure, self.limits, scaling, prior)
 
     @property
     def poses(self) -> MotionLimits:
@@ -66,9 +89,16 @@ class TrajectoryModel:
 
 def model_arrays(model: TrajectoryModel) -> dict[str, NDArray[Any]]:
     """Serialise a model."""
-    arrays = motion_arrays(model.units, model.space, model.closure) | {"gain": model.variance_factors}
+    arrays = motion_arrays(model.units, model.space, model.closure, model.prior) | {"gain": model.variance_factors}
     recogniser = recogniser_arrays(model.phone_recogniser) if model.phone_recogniser is not None else {}
-    return arrays | emission_arrays(model.emission) | recogniser
+    network = {}
+    if isinstance(model.network, AcousticNetwork):
+        network = acoustic_network_arrays(model.network)
+    elif model.network is not None:
+        network = prior_regression_arrays(model.network)
+    if model.network is not None:
+        network |= {"network_share": np.array([model.network_share])}
+    return arrays | emission_arrays(model.emission) | network | recogniser
 
 
 def model_from_arrays(arrays: Arrays, layout: Callable[[UnitSet], StateLayout], units: str) -> TrajectoryModel:
@@ -80,13 +110,21 @@ def model_from_arrays(arrays: Arrays, layout: Callable[[UnitSet], StateLayout], 
     """
     with format_errors("the trajectory model"):
         joint = (name for name in arrays if name.startswith(JOINT_PREFIX))
-        refuse_undeclared(arrays, MOTION_ARRAYS, EMISSION, VARIANCE_FACTORS, joint)
-        unit_set, space, closure = motion_from_arrays(arrays, units)
+        refuse_undeclared(arrays, MOTION_ARRAYS, EMISSION, VARIANCE_FACTORS, NETWORK_ARRAYS, PRIOR_ARRAYS, SHARE, joint)
+        unit_set, space, closure, prior = motion_from_arrays(arrays, units)
         emission = emission_from_arrays(arrays, layout(unit_set), space.dimensions)
         factors = checked_arrays(arrays, VARIANCE_FACTORS, Q=space.dimensions)["gain"]
-        model = TrajectoryModel(unit_set, space, emission, factors, closure, recogniser_from_arrays(arrays))
+        recogniser, network = recogniser_from_arrays(arrays), acoustic_network_from_arrays(arrays, space.dimensions)
+        regression = prior_regression_from_arrays(arrays, space.dimensions)
+        (share,) = checked_arrays(arrays, SHARE)["network_share"].tolist() if "network_share" in arrays else (0.5,)
+        if network is not None and regression is not None:
+            raise ValueError("a network and a regression on another model, required one of them")
+        model = TrajectoryModel(
+            unit_set, space, emission, factors, closure, recogniser, network or regression, prior, share
+        )
         check_poses(model.poses, space, closure)
         return model
 
 
 VARIANCE_FACTORS = {"gain": ArraySpec(np.float64, "Q", POSITIVE, 10)}
+SHARE = {"network_share": ArraySpec(np.float64, "1", 0, 1)}

@@ -9,21 +9,31 @@ from numpy.typing import NDArray
 
 from lipmotion.engines.trajectory.acoustic_regression import fit_acoustic_regression
 from lipmotion.engines.trajectory.emission import Emission
+from lipmotion.engines.trajectory.experts import Experts
 from lipmotion.engines.trajectory.model import TrajectoryModel
 from lipmotion.engines.trajectory.phone_recogniser import fit_phone_recogniser
 from lipmotion.engines.trajectory.training_data import TrainingClip, TrainingOptions, density_rows
 from lipmotion.errors import CorpusError
 from lipmotion.kernels.banded import generate
+from lipmotion.motion.acoustic_network import AcousticNetwork, fit_acoustic_network
+from lipmotion.motion.articulation import ArticulationPrior, fit_articulation_prior
 from lipmotion.motion.closure import fit_closure
 from lipmotion.motion.frame_labels import FullContextState, StateLayout, full_context_states
+from lipmotion.motion.prior_regression import PriorRegression, fit_prior_regression, folds
 from lipmotion.motion.space import fit_reduced_motion
 from lipmotion.motion.variance_scaling import scaling_factors
 from lipmotion.stats.delta_windows import dynamics_known, with_dynamics
 from lipmotion.stats.trees import Question, Tree, gaussian_log_likelihood, grow_tree
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
-from lipmotion.types import Example, Monitor, Progress, sub_monitor
+from lipmotion.types import FRAME_RATE_HZ, Example, Monitor, Progress, sub_monitor
 
 Array = NDArray[np.float64]
+NETWORK_SHARE = 0.5
+"""Weight of the network beside the states, 0 to 1."""
+LEAST_NETWORK_S = 120.0
+"""The acoustic network is trained from this much measured motion on,"""
+LEAST_OWN_S = 480.0
+"""and from this much on where the model could stand on another one instead."""
 LEAST_VARIANCE_SHARE, LEAST_VARIANCE = 1e-3, 1e-12
 """Smallest variance: a share of the variance of all frames, and a constant for dimensions that never move."""
 
@@ -38,8 +48,8 @@ def fit_trajectory(
     space, values = fit_reduced_motion(examples, options.components)
     phone_recogniser = None
     if options.joint_recogniser:
-        phone_recogniser = fit_phone_recogniser(examples, values, sub_monitor(monitor, 0, 0.8), checkpoint)
-    monitor = sub_monitor(monitor, 0.8, 1)
+        phone_recogniser = fit_phone_recogniser(examples, values, sub_monitor(monitor, 0, 0.3), checkpoint)
+    monitor = sub_monitor(monitor, 0.3, 1)
     clips = [training_clip(example, x, options.layout) for example, x in zip(examples, values, strict=True)]
     layout = options.layout
     states = (state for clip in clips for state in clip.training_states)
@@ -53,25 +63,71 @@ def fit_trajectory(
     if options.acoustic_regression:
         monitor(Progress(_STAGE, 2, 3, 0.3))
         emission = fit_acoustic_regression(emission, clips, options)
-    factors = _scaling_factors(emission, clips, options)
-    monitor(Progress(_STAGE, 3, 3, 1.0))
+    monitor(Progress(_STAGE, 3, 3, 0.4))
+    prior = fit_articulation_prior(space, values, examples) if options.articulation else None
+    network: AcousticNetwork | PriorRegression | None = None
+    share = NETWORK_SHARE
+    motion_s = sum(int(example.valid.sum()) for example in examples) / FRAME_RATE_HZ
+    if motion_s < LEAST_OWN_S and all(example.speech.prior is not None for example in examples):
+        network, predictions = fit_prior_regression(examples, values, len(space.direct))
+        share = _share_of_regression(predictions, clips, options, len(space.direct))
+    elif all(example.heard for example in examples):
+        monitor = sub_monitor(monitor, 0.4, 1)
+        network = fit_acoustic_network(examples, values, len(space.direct), options.epochs, monitor, checkpoint)
+    factors = _scaling_factors(emission, network, prior, share, clips, options)
     closure = fit_closure(space.direct_names, values, examples)
-    return TrajectoryModel(options.layout.units, space, emission, factors, closure, phone_recogniser)
+    return TrajectoryModel(
+        options.layout.units, space, emission, factors, closure, phone_recogniser, network, prior, share
+    )
 
 
 _STAGE = "trees"
 """Name of this stage in reports of progress."""
 
 
-def _scaling_factors(emission: Emission, clips: Sequence[TrainingClip], options: TrainingOptions) -> Array:
+def _share_of_regression(
+    predictions: Sequence[Array], clips: Sequence[TrainingClip], options: TrainingOptions, direct: int
+) -> float:
+    """Return the weight of a regression on another model beside the states, by cross-validation: 0 to 1.
+
+    predictions : of each clip by regressions on other clips [each shape=(T, Q)]
+    direct      : number of channels that are modelled as they are; the weight is chosen for them
+    The states are trained on the same folds. With a single clip, the regression has all the weight.
+    """
+    if len(clips) < 2:
+        return 1.0
+    products = squares = 0.0
+    for inside, outside in folds(len(clips)):
+        emission = _fit_emission([clips[number] for number in inside], options)
+        if options.acoustic_regression:
+            emission = fit_acoustic_regression(emission, [clips[number] for number in inside], options)
+        for number in outside:
+            clip = clips[number]
+            rows = density_rows(emission, clip.states, options.layout)
+            states = generate(*emission.statistics(rows, clip.features, slice(None)))[0][clip.frames, :direct]
+            recorded, regressed = clip.rows[:, 0, :direct], predictions[number][clip.frames, :direct]
+            spread = np.maximum(recorded.std(axis=0), 1e-6)
+            change = (regressed - states) / spread
+            products += float((change * (recorded - states) / spread).sum())
+            squares += float(np.square(change).sum())
+    return float(np.clip(products / max(squares, 1e-12), 0, 1))
+
+
+def _scaling_factors(
+    emission: Emission,
+    network: AcousticNetwork | PriorRegression | None,
+    prior: ArticulationPrior | None,
+    share: float,
+    clips: Sequence[TrainingClip],
+    options: TrainingOptions,
+) -> Array:
     """Return the factors of variance scaling [shape=(Q,)]; 1 where no example has two valid frames."""
     recorded, generated = [], []
     for clip in clips:
         if len(clip.frames) < 2:
             continue
-        means, precisions = emission.statistics(
-            density_rows(emission, clip.states, options.layout), clip.features, slice(None)
-        )
+        rows = density_rows(emission, clip.states, options.layout)
+        means, precisions = Experts(emission, rows, clip.speech, network, prior, share).statistics(slice(None))
         recorded.append(clip.rows[:, 0].std(axis=0))
         generated.append(generate(means, precisions)[0][clip.frames].std(axis=0))
     return scaling_factors(recorded, generated) if recorded else np.ones(emission.means.shape[2])
@@ -84,9 +140,8 @@ def training_clip(example: Example, values: Array, layout: StateLayout) -> Train
     """
     frames = np.nonzero(dynamics_known(example.valid))[0]
     states = full_context_states(example.speech.units, len(values), layout)
-    features = np.asarray(example.speech.features.values)
     dynamics = with_dynamics(values)[frames].astype(np.float32)
-    return TrainingClip(features, states, frames, dynamics)
+    return TrainingClip(example.speech, states, frames, dynamics)
 
 
 def _fit_emission(clips: Sequence[TrainingClip], options: TrainingOptions) -> Emission:

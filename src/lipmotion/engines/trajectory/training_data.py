@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from lipmotion.engines.trajectory.emission import Emission
 from lipmotion.motion.frame_labels import FullContextState, StateLayout
+from lipmotion.types import Speech
 
 
 @dataclass(frozen=True)
@@ -27,6 +28,8 @@ class TrainingOptions:
                    all nodes share towards zero
     ridge_frames : smallest number of frames of a node with a regression of its own
     joint_recogniser : train the joint model as well
+    conditions, epochs : of the acoustic network
+    articulation : lean on the table of articulation
     """
 
     layout: StateLayout
@@ -41,22 +44,30 @@ class TrainingOptions:
     shared_ridge: float
     ridge_frames: float
     joint_recogniser: bool
+    conditions: int
+    epochs: int
+    articulation: bool
 
 
 @dataclass(frozen=True, eq=False)
 class TrainingClip:
     """One example, prepared for training.
 
-    features : acoustic features [shape=(T, D)]
+    speech   : of the example
     states   : full-context state of each frame [length T]
     frames   : int array [shape=(N,)], the frames that are valid and have valid neighbours
     rows     : float32 array [shape=(N, 3, Q)], static value, Δ and Δ² of the motion in these frames
     """
 
-    features: NDArray[np.float32]
+    speech: Speech
     states: list[FullContextState]
     frames: NDArray[np.intp]
     rows: NDArray[np.float32]
+
+    @property
+    def features(self) -> NDArray[np.float32]:
+        """Acoustic features [shape=(T, D)]."""
+        return np.asarray(self.speech.features.values)
 
     @property
     def training_states(self) -> list[FullContextState]:

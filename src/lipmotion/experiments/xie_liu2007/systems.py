@@ -138,7 +138,7 @@ def train_systems(
             model = engine.fit(examples, part).model
             trained[name] = TrainedSystem(engine, model, perf_counter() - start_s)
         else:
-            config = CoupledConfig(**system.options, states=states)
+            config = CoupledConfig(**system.options, states=states, articulation=False)
             selection = select_mixtures(examples, validation, config, mixtures, monitor=part)
             count, acc = selection.engine.config.mixtures, selection.validation_acc
             trained[name] = TrainedSystem(selection.engine, selection.model, selection.seconds, count, acc)

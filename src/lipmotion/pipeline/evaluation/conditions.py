@@ -15,6 +15,8 @@ from lipmotion.engines import Animator
 from lipmotion.errors import AlignmentError, CorpusError
 from lipmotion.measures import curves
 from lipmotion.measures.closures import closed_threshold
+from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.prior import with_prior
 from lipmotion.pipeline.training.channels import GEOMETRY, with_visual_channels
 from lipmotion.pipeline.training.train import phones_of
 from lipmotion.pipeline.transcribe import warn_of_guesses
@@ -54,6 +56,7 @@ class HeldOutRecordings:
     conditions   : phones in time that the engine is given, by condition: ``audio only``, ``with transcript``
     phones       : the recogniser of these phones
     eigenlips    : principal components of mouth pictures (None: their coefficients are not compared)
+    prior        : the model on which the evaluated one stands (None: it stands on none)
     """
 
     utterances: Sequence[Utterance]
@@ -64,6 +67,7 @@ class HeldOutRecordings:
     conditions: Mapping[str, Sequence[Timeline[Unit]]]
     phones: Recogniser
     eigenlips: Eigenlips | None = None
+    prior: Model | None = None
 
     @property
     def eigenlips_channels(self) -> tuple[str, ...]:
@@ -97,6 +101,7 @@ def held_out_recordings(
     monitor: Monitor = silent_monitor,
     visual: str = GEOMETRY,
     eigenlips: Eigenlips | None = None,
+    prior: Model | None = None,
 ) -> HeldOutRecordings:
     """Return held-out recordings with aligned and recognised phones. Raises as ``evaluate``.
 
@@ -104,6 +109,7 @@ def held_out_recordings(
     selection : the utterances; by default those of the list ``test``
     channels  : the channels to compare, whether they move or not; None: from ``compared_channels``
     visual, eigenlips : of the model: the kind of its channels, and its principal components of mouth pictures
+    prior     : the model on which the evaluated one stands, or None
     """
     lexicon = lexicon or Lexicon()
     utterances = [
@@ -120,7 +126,7 @@ def held_out_recordings(
     conditions = {AUDIO_ONLY: [phones.recognise(u.audio, u.features) for u in recognised]}
     if all(utterance.words or utterance.phones for utterance in utterances):
         conditions[WITH_TRANSCRIPT] = reference
-    return HeldOutRecordings(utterances, compared, still, threshold, reference, conditions, phones, eigenlips)
+    return HeldOutRecordings(utterances, compared, still, threshold, reference, conditions, phones, eigenlips, prior)
 
 
 def compared_channels(utterances: Sequence[Utterance]) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -217,8 +223,9 @@ def _speech(
 ) -> Speech:
     """Return the speech of an utterance as ``animate`` gives it to the engine."""
     if with_transcript:
-        return speech_of(engine, utterance.audio, utterance.features, units)
-    return recognised_speech(engine, learned, utterance.audio, utterance.features, recordings.phones, lambda: units)
+        return with_prior(recordings.prior, speech_of(engine, utterance.audio, utterance.features, units))
+    speech = recognised_speech(engine, learned, utterance.audio, utterance.features, recordings.phones, lambda: units)
+    return with_prior(recordings.prior, speech)
 
 
 def _clip(

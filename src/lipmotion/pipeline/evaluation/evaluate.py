@@ -75,6 +75,7 @@ def evaluate(
         monitor=monitor,
         visual=model.visual,
         eigenlips=model.eigenlips,
+        prior=model.prior,
     )
     figures = {
         "split": "given names" if selection.names is not None else selection.split or "all",

@@ -9,10 +9,13 @@ from collections.abc import Sequence
 from importlib import metadata
 from typing import Any
 
+import numpy as np
+
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import Engine
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.kernels.threads import blas_kernels
+from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.training.channels import GEOMETRY
 from lipmotion.storage.files import sha256_of
 from lipmotion.units import Lexicon
@@ -22,11 +25,18 @@ PICTURES = "crops.npy"
 
 
 def fingerprint(
-    corpus: Corpus, names: Sequence[str], engine: Engine[Any], recogniser: HmmConfig, lexicon: Lexicon, visual: str
+    corpus: Corpus,
+    names: Sequence[str],
+    engine: Engine[Any],
+    recogniser: HmmConfig,
+    lexicon: Lexicon,
+    visual: str,
+    prior: Model | None,
 ) -> str:
     """Return a digest of utterances, configurations, the user's lexicon, versions of software, and the processor.
 
     names  : of the utterances of the corpus
+    prior  : the model on which the new one stands, or None
     visual : kind of the channels; without eigenlips, mouth pictures are not part of the digest
     """
     digest = hashlib.sha256()
@@ -38,6 +48,10 @@ def fingerprint(
         "versions": {name: metadata.version(name) for name in ("lipmotion", "numpy", "scipy", "pocketsphinx")},
         "machine": [platform.machine(), blas_kernels()],
     }
+    if prior is not None:
+        for name, array in sorted(prior.engine.to_arrays(prior.learned).items()):
+            digest.update(f"{name} {array.dtype} {array.shape}\n".encode())
+            digest.update(np.ascontiguousarray(array).tobytes())
     digest.update(json.dumps(job, sort_keys=True).encode())
     for name in names:
         digest.update(f"\n{name}\n".encode())

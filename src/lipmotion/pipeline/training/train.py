@@ -15,13 +15,15 @@ import numpy as np
 
 from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines import Engine, engine_named
-from lipmotion.engines.base import TrainsOnSpeechAlone
+from lipmotion.engines.base import HearsConditions, StandsOnPrior, TrainsOnSpeechAlone
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.model import HmmConfig, UnitHmm
 from lipmotion.kernels.threads import one_thread
 from lipmotion.motion.resample import to_model_frames
 from lipmotion.pipeline.model import Model, load_model
+from lipmotion.pipeline.prior import with_prior
 from lipmotion.pipeline.training.channels import GEOMETRY, check_visual, train_eigenlips, with_visual_channels
+from lipmotion.pipeline.training.conditions import with_conditions
 from lipmotion.pipeline.training.fingerprint import fingerprint
 from lipmotion.pipeline.training.labels import label_utterances
 from lipmotion.pipeline.training.voices import VoiceExample
@@ -101,6 +103,7 @@ def train(
     lexicon: Lexicon | None = None,
     visual: str = GEOMETRY,
     voices: Iterable[VoiceExample] = (),
+    prior: Model | None = None,
     run: Run = DEFAULT_RUN,
 ) -> tuple[Model, TrainReport]:
     """Return a model that is trained on a corpus, and a report of the training.
@@ -116,6 +119,9 @@ def train(
                  (docs/eigenlips.md); ``both``
     voices     : speech of other speakers, without motion, for the second stage of training
                  (``pipeline.training.voices``); only for engines that ``TrainsOnSpeechAlone``
+    prior      : a model on which the new one stands, ``load_model()`` for instance: what it makes of the speech is an
+                 input of the engine, and part of the new model. None: the new model stands on none. It must not have
+                 been trained on recordings that the new model is judged on
     run        : monitor, checkpoints and processes; the model does not depend on them
     Labelled phones are used as they are. The phones of utterances without transcript are recognised, by the phone
     models of the other utterances or, if there are none, by those of the shipped model.
@@ -140,6 +146,7 @@ def train(
     check_visual(visual)
     if run.work is not None:
         check_apart((), [Source(corpus.path, "corpus")], folders=[run.work])
+    _check_prior(prior)
     lexicon = lexicon or Lexicon()
     engine = engine or engine_named("trajectory", {})
     chosen = corpus.selected(selection)
@@ -148,14 +155,18 @@ def train(
     utterances = [corpus.utterance(name) for name in chosen]
     eigenlips = train_eigenlips(utterances) if visual != GEOMETRY else None
     utterances = [with_visual_channels(utterance, visual, eigenlips) for utterance in utterances]
-    job = fingerprint(corpus, chosen, engine, recogniser, lexicon, visual) if run.work else ""
+    job = fingerprint(corpus, chosen, engine, recogniser, lexicon, visual, prior) if run.work else ""
     checkpoint = Checkpoint(run.work, job) if run.work else NO_CHECKPOINT
     with worker_pool(min(run.workers, len(chosen) // UTTERANCES_PER_WORKER)) as team:
-        monitor = sub_monitor(run.monitor, 0, 0.9)
+        monitor = sub_monitor(run.monitor, 0, 0.5)
         phones, examples, skipped = phones_and_examples(
             utterances, recogniser, lexicon, monitor, checkpoint, team.ordered_map
         )
-    fit = engine.fit([*examples, *speech_examples], sub_monitor(run.monitor, 0.9, 1, "learning motion: "), checkpoint)
+        examples = [replace(example, speech=with_prior(prior, example.speech)) for example in examples]
+        examples = _heard(engine, utterances, examples, sub_monitor(run.monitor, 0.5, 0.6), team.ordered_map)
+    fit = engine.fit([*examples, *speech_examples], sub_monitor(run.monitor, 0.6, 1, "learning motion: "), checkpoint)
+    if not (isinstance(engine, StandsOnPrior) and engine.stands_on_prior(fit.model)):
+        prior = None
     used = tuple(example.name for example in examples)
     about = _about(
         corpus, utterances, "given names" if selection.names is not None else selection.split or "all", len(used)
@@ -166,7 +177,9 @@ def train(
         about["voices"] = sorted({example.name for example in speech_examples})
     if eigenlips is not None:
         about |= {"visual": visual, "eigenlips": eigenlips.summary}
-    return Model(phones, engine, fit.model, about, eigenlips=eigenlips), TrainReport(used, skipped, fit.figures)
+    return Model(phones, engine, fit.model, about, eigenlips=eigenlips, prior=prior), TrainReport(
+        used, skipped, fit.figures
+    )
 
 
 def phones_and_examples(
@@ -222,6 +235,28 @@ def model_motion(track: Track, frames: int) -> tuple[Motion, Any]:
         np.asarray(motion.values, float), np.asarray(track.seen), motion.rate_hz, frames, FRAME_RATE_HZ
     )
     return replace(motion, values=values, rate_hz=FRAME_RATE_HZ), valid
+
+
+def _check_prior(prior: Model | None) -> None:
+    """Raise InputError if a model cannot be stood on."""
+    if prior is not None and prior.prior is not None:
+        raise InputError("the model to start from stands on another model itself; start from that one, or from none")
+
+
+def _heard(
+    engine: Engine[Any],
+    utterances: Sequence[Utterance],
+    examples: Sequence[Example],
+    monitor: Monitor,
+    each: ParallelMap,
+) -> list[Example]:
+    """Return the examples in all acoustic conditions that the engine's training uses."""
+    motion_s = sum(int(example.valid.sum()) for example in examples) / FRAME_RATE_HZ
+    count = engine.conditions(motion_s) if isinstance(engine, HearsConditions) else 0
+    if not count:
+        return list(examples)
+    audio = {utterance.name: utterance.audio for utterance in utterances}
+    return with_conditions(examples, [audio[example.name] for example in examples], count, monitor, each)
 
 
 def _train_phone_models(

@@ -40,6 +40,7 @@ from lipmotion.engines.coupled.training.speech_only import SpeechOnlySchedule, t
 from lipmotion.engines.coupled.training.train import MixtureSchedule, TrainingStep, growing_chains
 from lipmotion.errors import CorpusError
 from lipmotion.kernels.banded import generate
+from lipmotion.motion.articulation import fit_articulation_prior
 from lipmotion.motion.closure import fit_closure
 from lipmotion.motion.rest import away_from_speech, speech_intervals
 from lipmotion.motion.space import fit_reduced_motion
@@ -89,13 +90,14 @@ def growing_models(
         if not dynamics_known(example.valid).any()
     ]
     rest_pose, closure = _rest_pose(moving, values, valid), fit_closure(space.direct_names, values, moving)
+    prior = fit_articulation_prior(space, values, moving) if config.articulation else None
     first_share, second_share = (0.4, 0.7) if speech_only else (0.7, 0.7)
 
     def finished_model(chains: Chains) -> CoupledModel:
         if speech_only:
             second_monitor = sub_monitor(monitor, first_share, second_share)
             chains = _second_stage(chains, data, speech_only, config, second_monitor)
-        model = CoupledModel(chains, space, visual, None, np.ones(space.dimensions), rest_pose, closure)
+        model = CoupledModel(chains, space, visual, None, np.ones(space.dimensions), rest_pose, closure, prior)
         if config.dynamic and config.acoustic_regression:
             monitor(Progress("regression of visual means", 1, 1, 0.75))
             model = replace(model, regression=_fitted_regression(model, data))

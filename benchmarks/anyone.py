@@ -1,0 +1,204 @@
+"""Anyone's voice, any words, any room: accuracy of a model outside the training speaker's quiet studio.
+
+    python benchmarks/anyone.py [--model FILE] [--split val] [--open FOLDER] [--only rooms|strangers|phones|open]
+
+rooms     : clips of the corpus of ``--corpus`` in babble, white noise, a room, over a telephone; ACC of opening, pooled
+strangers : GRID clips of other speakers, audio only and with transcript; mean ACC per clip, best lag within 60 ms
+phones    : ``speech-open`` with transcripts: mean opening and width by phone, and their rank correlation with the table
+open      : recordings with a face of ``--open`` (docs/results/voices.md), in pieces of five seconds; mean ACC per clip,
+            best lag within 120 ms
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from robust import SPOKEN
+from scipy.signal import butter, fftconvolve, sosfilt
+from scipy.stats import spearmanr
+
+from lipmotion import Corpus, animate, load_model
+from lipmotion.corpora.grid import words_of_name
+from lipmotion.motion.articulation import articulation_table
+from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.request import SpeechRequest
+from lipmotion.speech.audio_files import read_audio
+from lipmotion.speech.noise import noisy_audio
+from lipmotion.types import Audio, Motion, Track
+from lipmotion.vision.track import track
+
+RATE_HZ = 16_000
+CHANNELS = ("opening", "width", "outer")
+BABBLE = ("61-70968-0000.flac", "acoustic_corpus.wav", "13697_11991_000000.opus", "arctic_a0009.wav",
+          "sense_and_sensibility_01_austen_64kb-0870.wav", "sense_and_sensibility_01_austen_64kb-0920.wav")  # fmt: skip
+PIECE_S = 5
+OPEN_VOWELS, NARROW = ("aa", "ae", "ay", "aw"), ("s", "t", "iy", "ih", "n", "d")
+ROUND, SPREAD = ("uw", "ow", "w", "ao"), ("iy", "ey")
+Curves = NDArray[np.float64]
+
+
+def main() -> None:
+    """Print one JSON object a figure."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--corpora", type=Path, default=Path("../shared/corpora"))
+    parser.add_argument("--corpus", type=Path, default=Path("build/grid-s1"), help="prepared, of the training speaker")
+    parser.add_argument("--split", default="val")
+    parser.add_argument("--open", type=Path, help="folder of videos of people who speak English")
+    parser.add_argument("--model", type=Path, help="default: the one that ships")
+    parser.add_argument("--recogniser", default="auto")
+    parser.add_argument("--only", action="append", choices=list(PARTS), help="repeatable; default: all")
+    options = parser.parse_args()
+    model = load_model(options.model)
+    for name in options.only or PARTS:
+        PARTS[name](options, model)
+
+
+def show(figure: str, **values: object) -> None:
+    """Print one figure."""
+    print(json.dumps({"figure": figure, **values}, ensure_ascii=False), flush=True)
+
+
+def conditions(corpora: Path) -> dict[str, Callable[[Audio, int], Audio]]:
+    """Return functions of a recording and a seed that put it into a condition."""
+    voices = [read_audio(corpora / "speech-open" / name) for name in BABBLE]
+
+    def in_room(audio: Audio, seed: int) -> Audio:
+        count = RATE_HZ // 2  # RT60 of 0.5 s, reverberation as strong as the direct sound
+        response = np.random.default_rng(seed).standard_normal(count) * 10 ** (-3 * np.arange(count) / count)
+        response[0] = np.sqrt(np.square(response[1:]).sum())
+        return Audio(fftconvolve(audio.samples, response)[: len(audio.samples)].astype(np.float32), RATE_HZ)
+
+    def over_telephone(audio: Audio, _: int) -> Audio:
+        band = butter(4, [300, 3400], "band", fs=RATE_HZ, output="sos")
+        return Audio(sosfilt(band, audio.samples).astype(np.float32), RATE_HZ)
+
+    return {
+        "quiet": lambda audio, _: audio,
+        "babble 20 dB": lambda audio, seed: noisy_audio(audio, "babble", 20, voices, seed),
+        "babble 10 dB": lambda audio, seed: noisy_audio(audio, "babble", 10, voices, seed),
+        "white 20 dB": lambda audio, seed: noisy_audio(audio, "white", 20, seed=seed),
+        "white 10 dB": lambda audio, seed: noisy_audio(audio, "white", 10, seed=seed),
+        "room": in_room,
+        "telephone": over_telephone,
+    }
+
+
+def rooms(options: argparse.Namespace, model: Model) -> None:
+    """Print the pooled correlations of the training speaker in each condition."""
+    corpus = Corpus.open(options.corpus)
+    utterances = [corpus.utterance(name) for name in corpus.names(options.split)]
+    for name, condition in conditions(options.corpora).items():
+        pairs = []
+        for seed, utterance in enumerate(utterances):
+            request = SpeechRequest(condition(utterance.audio, seed), recogniser=options.recogniser)
+            pairs.append(compared(animate(request, model=model).motion, utterance.track))
+        generated, tracked = (np.concatenate(each) for each in zip(*pairs, strict=True))
+        show(f"{options.split}, {name}", clips=len(pairs), **correlations(generated, tracked))
+
+
+def strangers(options: argparse.Namespace, model: Model) -> None:
+    """Print the correlations of other GRID speakers."""
+    clips = sorted((options.corpora / "grid-others").glob("*.mpg"))
+    tracks = {clip: track(clip, crops=False) for clip in clips}
+    for condition in ("audio only", "transcript"):
+        each = {}
+        for clip in clips:
+            words = " ".join(words_of_name(clip.stem) or ()) if condition == "transcript" else None
+            request = SpeechRequest(clip, transcript=words, recogniser=options.recogniser)
+            each[clip.stem] = best_lag(animate(request, model=model).motion, tracks[clip], 0.06)
+        show_means(f"grid-others, {condition}", each)
+
+
+def phones(options: argparse.Namespace, model: Model) -> None:
+    """Print how far and how wide the mouth opens in each phone, against the table of articulation."""
+    values: dict[str, list[Curves]] = {}
+    for name in SPOKEN:
+        path = options.corpora / "speech-open" / name
+        text = path.with_suffix(".txt")
+        request = SpeechRequest(path, transcript=(text if text.exists() else path.with_suffix(".lab")).read_text())
+        result = animate(request, model=model)
+        for span in result.units:
+            middle = int((span.start_s + span.end_s) / 2 * result.motion.rate_hz)
+            frame = [result.motion[channel][min(middle, len(result.motion.values) - 1)] for channel in CHANNELS]
+            values.setdefault(span.label.phone, []).append(np.array(frame))
+    means = {phone: np.mean(rows, axis=0) for phone, rows in values.items()}
+    counts = {phone: len(rows) for phone, rows in values.items()}
+
+    def mean_of(chosen: tuple[str, ...], channel: int) -> float:
+        return float(np.mean(np.concatenate([[row[channel] for row in values[phone]] for phone in chosen])))
+
+    table = articulation_table()
+    common = [phone for phone in table if counts.get(phone, 0) >= 3 and phone not in ("sil", "sp")]
+    ranks = {
+        channel: round(float(spearmanr([table[p][1, n] for p in common], [means[p][n] for p in common])[0]), 3)
+        for n, channel in enumerate(CHANNELS)
+    }
+    show(
+        "speech-open with transcripts, by phone",
+        opening_ratio=round(mean_of(OPEN_VOWELS, 0) / mean_of(NARROW, 0), 3),
+        width_ratio=round(mean_of(ROUND, 1) / mean_of(SPREAD, 1), 3),
+        rank_correlation=ranks,
+        phones=len(common),
+    )
+
+
+def open_english(options: argparse.Namespace, model: Model) -> None:
+    """Print the correlations of recordings in the open folder."""
+    if options.open is None:
+        return
+    each = {}
+    for path in sorted(options.open.rglob("*.mp4")):
+        if "french" in path.stem:
+            continue
+        for name, audio, piece in pieces(path):
+            request = SpeechRequest(audio, recogniser=options.recogniser)
+            each[name] = best_lag(animate(request, model=model).motion, piece, 0.12)
+    show_means("open English, audio only", each)
+
+
+def pieces(path: Path) -> Iterator[tuple[str, Audio, Track]]:
+    """Yield pieces of five seconds of a video: name, sound, track."""
+    audio, tracked = read_audio(path), track(path, crops=False)
+    whole, rate = tracked.motion, tracked.motion.rate_hz
+    for number in range(max(int(audio.duration_s / PIECE_S), 1)):
+        end = len(whole.values) if audio.duration_s < 2 * PIECE_S else int((number + 1) * PIECE_S * rate)
+        start = int(number * PIECE_S * rate)
+        samples = audio.samples[int(start / rate * RATE_HZ) : int(end / rate * RATE_HZ)]
+        motion = Motion(whole.values[start:end], rate, whole.channels)
+        yield f"{path.stem} {number}", Audio(samples, RATE_HZ), Track(motion, tracked.seen[start:end])
+
+
+def compared(motion: Motion, tracked: Track, lag_s: float = 0.0) -> tuple[Curves, Curves]:
+    """Return generated and tracked channels in the frames with a face [each shape=(N, 3)]."""
+    time_s = tracked.motion.time_s + lag_s
+    generated = np.stack([np.interp(time_s, motion.time_s, motion[name]) for name in CHANNELS], axis=1)
+    recorded = np.stack([tracked.motion[name] for name in CHANNELS], axis=1)
+    return generated[tracked.seen], recorded[tracked.seen]
+
+
+def correlations(generated: Curves, tracked: Curves) -> dict[str, float]:
+    """Return the correlation of each channel."""
+    return {name: round(float(np.corrcoef(generated[:, n], tracked[:, n])[0, 1]), 3) for n, name in enumerate(CHANNELS)}
+
+
+def best_lag(motion: Motion, tracked: Track, limit_s: float) -> dict[str, float]:
+    """Return the correlations at the lag within a limit that is best for the opening."""
+    lags = np.arange(-limit_s, limit_s + 1e-9, 0.01)
+    return max((correlations(*compared(motion, tracked, lag)) for lag in lags), key=lambda each: each["opening"])
+
+
+def show_means(figure: str, each: dict[str, dict[str, float]]) -> None:
+    """Print the mean over clips of each channel, and the opening of every clip."""
+    means = {name: round(float(np.mean([clip[name] for clip in each.values()])), 3) for name in CHANNELS}
+    show(figure, clips=len(each), **means, each={name: clip["opening"] for name, clip in each.items()})
+
+
+PARTS = {"rooms": rooms, "strangers": strangers, "phones": phones, "open": open_english}
+
+if __name__ == "__main__":
+    main()

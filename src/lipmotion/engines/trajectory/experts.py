@@ -1,0 +1,85 @@
+"""Two experts that predict each frame together: the states, and the acoustic network."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.engines.trajectory.emission import Emission
+from lipmotion.motion.acoustic_network import AcousticNetwork
+from lipmotion.motion.articulation import ArticulationPrior, dynamics_of
+from lipmotion.motion.generation import Statistics
+from lipmotion.motion.prior_regression import PriorRegression
+from lipmotion.types import FRAME_RATE_HZ, Speech
+
+Array = NDArray[np.float64]
+LARGEST_DISTORTION = 0.3
+"""Recognised phones are not relied on from this distortion of the sound on: noise 21 dB under the speech."""
+DISTORTION_S = 1.0
+"""Seconds before and after a frame over which the distortion is averaged."""
+
+
+@dataclass(frozen=True, eq=False)
+class Experts:
+    """The states and the network on one recording.
+
+    emission, rows : densities, and the one of each frame [shape=(T,)]; the last density is that of the rest pose
+    network        : motion from the sound alone (None: there was too little speech to train it)
+    network_share  : weight of the network, 0 to 1, in contexts that training knows well
+    prior          : says how well training knows a phone in its context (None: taken as well known)
+    """
+
+    emission: Emission
+    rows: NDArray[np.intp]
+    speech: Speech
+    network: AcousticNetwork | PriorRegression | None
+    prior: ArticulationPrior | None
+    network_share: float = 0.5
+
+    def statistics(self, frames: slice) -> Statistics:
+        """Return means and precisions of a range of N frames [each shape=(N, 3, Q)]: weighted means of both."""
+        means, precisions = self.emission.statistics(self.rows[frames], np.asarray(self.speech.features.values), frames)
+        if self.network is None or self._heard is None:
+            return means, precisions
+        share = self._share[frames, None, None]
+        means += share * (dynamics_of(self._heard[0], frames) - means)
+        precisions += share * (1 / self.network.variances - precisions)
+        return means, precisions
+
+    @cached_property
+    def reliability(self) -> Array:
+        """How far the phones in time can be relied on, 0 to 1 [shape=(T,)]: fully, where they are known."""
+        if self.speech.units_known or self._heard is None:
+            return np.ones(len(self.rows))
+        reach = int(DISTORTION_S * FRAME_RATE_HZ)
+        total, numbers = np.concatenate([[0.0], np.cumsum(self._heard[1])]), np.arange(len(self.rows))
+        first, stop = np.maximum(numbers - reach, 0), np.minimum(numbers + reach + 1, len(self.rows))
+        mean = (total[stop] - total[first]) / (stop - first)
+        return np.maximum(np.clip(1 - mean / LARGEST_DISTORTION, 0, 1), self.speech.confidence)
+
+    @cached_property
+    def _heard(self) -> tuple[Array, Array] | None:
+        """Motion [shape=(T, Q)] and distortion [shape=(T,)] by the network."""
+        if isinstance(self.network, PriorRegression):
+            return self.network.predict(self.speech)
+        if self.network is None or self.speech.spectrum is None:
+            return None
+        return self.network.predict(self.speech.spectrum)
+
+    @cached_property
+    def _share(self) -> Array:
+        """The share of the network in every frame, 0 to 1 [shape=(T,)].
+
+        It is ``network_share`` where training knows the phone in its context, and all where not; in the rest pose the
+        states alone count. Phones that cannot be relied on leave all to the network.
+        """
+        familiarity = np.ones(len(self.rows))
+        if self.prior is not None:
+            familiarity = self.prior.familiarity(self.speech.units, len(self.rows))
+        resting = self.rows == len(self.emission.means) - 1
+        states = (1 - self.network_share) * self.reliability * familiarity
+        network = self.network_share * np.where(resting, 1 - self.reliability, 1.0)
+        return network / np.maximum(states + network, 1e-12)

@@ -1,0 +1,229 @@
+"""Acoustic networks: the motion, and the distortion of the sound, predicted from the spectrum around each frame."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.stats.convolution import (
+    TAPS,
+    ConvolutionalNetwork,
+    Layer,
+    TrainingPlan,
+    TrainingSequence,
+    fit_network,
+    initial_network,
+)
+from lipmotion.stats.delta_windows import dynamics_known, with_dynamics
+from lipmotion.storage.checkpoint import Checkpoint
+from lipmotion.storage.schema import POSITIVE, STANDARD, Arrays, ArraySpec, checked_arrays
+from lipmotion.types import SPECTRUM_BANDS, Example, HeardSpectrum, Monitor, Progress
+
+Array = NDArray[np.float64]
+STEP = 4
+"""Frames of a time step of the network, 40 ms: about a picture of a video."""
+HIDDEN, DILATIONS = 192, (1, 2, 4, 8, 1, 2, 4, 8)
+"""Units of a hidden layer, and time steps between its taps: it hears 1.2 s before and after a frame."""
+BATCH_SIZE, LEARNING_RATE, DROPOUT, SEED = 16, 2e-3, 0.3, 0
+LEAST_STEPS = 600
+"""Least number of optimiser steps: with few recordings, each is used more often."""
+DIRECT_WEIGHT = 4.0
+"""Weight of the error of a channel that is modelled as it is; that of a principal component is 1."""
+LEAST_DEVIATION = 1e-6
+LONGEST_STEPS = 250
+"""Longer recordings are cut into pieces of so many time steps, 10 s, for training."""
+CHECKPOINT = "network"
+
+
+@dataclass(frozen=True, eq=False)
+class AcousticNetwork:
+    """A network from spectra to motion.
+
+    network   : its outputs are Q standardised dimensions of motion, and the distortion of the sound
+    mean, scale : mean and standard deviation of the motion in training [each shape=(Q,)]
+    variances : of the error of static value, Δ and Δ² in training [shape=(3, Q)]
+    """
+
+    network: ConvolutionalNetwork
+    mean: Array
+    scale: Array
+    variances: Array
+
+    def predict(self, spectrum: NDArray[np.floating]) -> tuple[Array, Array]:
+        """Return motion in the motion space [shape=(T, Q)] and the distortion, 0 to 1 [shape=(T,)].
+
+        spectrum : normalised log mel spectrum [shape=(T, 40)]
+        """
+        steps = self.network(_steps(spectrum)).astype(float)
+        outputs = between_steps(steps, len(spectrum))
+        return outputs[:, :-1] * self.scale + self.mean, np.clip(outputs[:, -1], 0, 1)
+
+    def hidden(self, spectrum: NDArray[np.floating]) -> tuple[NDArray[np.float32], Array]:
+        """Return the last hidden layer [shape=(ceil(T / 4), H)] and the distortion [shape=(ceil(T / 4),)] in each step.
+
+        spectrum : normalised log mel spectrum [shape=(T, 40)]
+        """
+        hidden = self.network.hidden(_steps(spectrum))
+        output = self.network.output
+        return hidden, np.clip(hidden @ output.weights[:, -1].astype(float) + output.biases[-1], 0, 1)
+
+
+def fit_acoustic_network(
+    examples: Sequence[Example],
+    values: Sequence[Array],
+    direct: int,
+    epochs: int,
+    monitor: Monitor,
+    checkpoint: Checkpoint,
+) -> AcousticNetwork:
+    """Return a network that is trained on all conditions in which each example is heard.
+
+    values : motion of each example in the motion space [each shape=(T, Q)]
+    direct : number of channels that are modelled as they are; they are the first dimensions
+    epochs : how often each example is used, in one of its conditions drawn at random
+    """
+    poses = np.concatenate([x[example.valid] for x, example in zip(values, examples, strict=True)])
+    mean, scale = poses.mean(axis=0), np.maximum(poses.std(axis=0), LEAST_DEVIATION)
+    pieces = [
+        [_sequence(version, (x - mean) / scale, example.valid) for version in example.heard]
+        for example, x in zip(examples, values, strict=True)
+    ]
+    stored = checkpoint.load(CHECKPOINT)
+    if stored is not None:
+        network = _network_from_arrays(stored, len(mean))
+    else:
+        steps = max(epochs * -(-len(pieces) // BATCH_SIZE), LEAST_STEPS)
+        weights = np.ones(len(mean) + 1)
+        weights[:direct] = DIRECT_WEIGHT
+
+        def draw(rng: np.random.Generator, number: int) -> TrainingSequence:
+            versions = pieces[number]
+            return _piece(versions[int(rng.integers(len(versions)))], rng)
+
+        def report(step: int, error: float) -> None:
+            if step % 50 == 0 or step == steps:
+                monitor(Progress("training the network", step, steps, error))
+
+        network = fit_network(
+            initial_network(STEP * SPECTRUM_BANDS, HIDDEN, len(mean) + 1, DILATIONS, SEED),
+            draw,
+            len(pieces),
+            weights,
+            TrainingPlan(steps, BATCH_SIZE, LEARNING_RATE, DROPOUT, SEED),
+            report,
+        )
+        checkpoint.save(CHECKPOINT, _network_arrays(network))
+    trained = AcousticNetwork(network, mean, scale, np.ones((3, len(mean))))
+    return AcousticNetwork(network, mean, scale, _error_variances(trained, examples, values))
+
+
+def between_steps(steps: Array, frames: int) -> Array:
+    """Return values at time steps of 40 ms [shape=(N, C)] interpolated to frames of 10 ms [shape=(frames, C)].
+
+    Source: Catmull & Rom 1974; the curve has no corners, and passes through the values.
+    """
+    padded = np.concatenate([steps[:1], steps, steps[-1:], steps[-1:]])
+    position, u = np.divmod(np.arange(frames), STEP)
+    u = (u / STEP)[:, None]
+    before, here, after, last = (padded[np.minimum(position + k, len(padded) - 1)] for k in range(4))
+    result: Array = here + u / 2 * (
+        after - before + u * (2 * before - 5 * here + 4 * after - last + u * (3 * (here - after) + last - before))
+    )
+    return result
+
+
+def acoustic_network_arrays(acoustic: AcousticNetwork) -> dict[str, NDArray[Any]]:
+    """Serialise a network, at half precision."""
+    arrays = {name: array.astype(np.float16) for name, array in _network_arrays(acoustic.network).items()}
+    return arrays | {
+        "network_targets": np.stack([acoustic.mean, acoustic.scale]),
+        "network_variances": acoustic.variances,
+    }
+
+
+def acoustic_network_from_arrays(arrays: Arrays, dimensions: int) -> AcousticNetwork | None:
+    """Deserialise a network; None where there is none, as in models of earlier versions.
+
+    dimensions : of the motion space, Q
+    Raises KeyError, ValueError: an array is missing, or has a wrong shape, type or range.
+    """
+    if arrays.keys().isdisjoint(NETWORK_ARRAYS):
+        return None
+    stored = checked_arrays(arrays, TARGETS, Q=dimensions)
+    mean, scale = stored["network_targets"]
+    if not (scale > 0).all():
+        raise ValueError("network_targets with a scale that is not more than 0")
+    return AcousticNetwork(_network_from_arrays(arrays, dimensions), mean, scale, stored["network_variances"])
+
+
+WEIGHTS = {
+    "network_first": ArraySpec(np.float32, f"{TAPS * STEP * SPECTRUM_BANDS} {HIDDEN}", -STANDARD, STANDARD),
+    "network_layers": ArraySpec(np.float32, f"{len(DILATIONS) - 1} {TAPS * HIDDEN} {HIDDEN}", -STANDARD, STANDARD),
+    "network_biases": ArraySpec(np.float32, f"{len(DILATIONS)} {HIDDEN}", -STANDARD, STANDARD),
+    "network_output": ArraySpec(np.float32, f"{HIDDEN + 1} O", -STANDARD, STANDARD),
+}
+TARGETS = {
+    "network_targets": ArraySpec(np.float64, "2 Q", -1e6, 1e6),
+    "network_variances": ArraySpec(np.float64, "3 Q", POSITIVE),
+}
+NETWORK_ARRAYS = (*WEIGHTS, *TARGETS)
+"""Names of the arrays of ``acoustic_network_arrays``."""
+
+
+def _network_arrays(network: ConvolutionalNetwork) -> dict[str, NDArray[Any]]:
+    return {
+        "network_first": network.layers[0].weights,
+        "network_layers": np.stack([layer.weights for layer in network.layers[1:]]),
+        "network_biases": np.stack([layer.biases for layer in network.layers]),
+        "network_output": np.concatenate([network.output.weights, network.output.biases[None]]),
+    }
+
+
+def _network_from_arrays(arrays: Arrays, dimensions: int) -> ConvolutionalNetwork:
+    stored = checked_arrays(arrays, WEIGHTS, O=dimensions + 1)
+    weights = [stored["network_first"], *stored["network_layers"]]
+    layers = tuple(Layer(each, biases) for each, biases in zip(weights, stored["network_biases"], strict=True))
+    output = stored["network_output"]
+    return ConvolutionalNetwork(layers, DILATIONS, Layer(output[:-1], output[-1]))
+
+
+def _steps(spectrum: NDArray[np.floating]) -> NDArray[np.float32]:
+    """Return the frames around every time step, concatenated [shape=(ceil(T / 4), 160)]."""
+    centres = np.arange(0, len(spectrum), STEP)
+    frames = np.clip(centres[:, None] + np.arange(STEP) - STEP // 2, 0, len(spectrum) - 1)
+    return spectrum[frames].reshape(len(centres), -1).astype(np.float32)
+
+
+def _sequence(heard: HeardSpectrum, targets: Array, valid: NDArray[np.bool_]) -> TrainingSequence:
+    """Return inputs and targets of a whole recording in time steps; inputs at half precision."""
+    inputs = _steps(heard.values).astype(np.float16)
+    frames = np.minimum(np.round(np.arange(len(inputs)) * STEP * heard.tempo).astype(int), len(targets) - 1)
+    distortion = np.full((len(inputs), 1), heard.distortion)
+    outputs = np.concatenate([targets[frames], distortion], axis=1).astype(np.float32)
+    return TrainingSequence(inputs, outputs, valid[frames])
+
+
+def _piece(sequence: TrainingSequence, rng: np.random.Generator) -> TrainingSequence:
+    """Return a sequence, or a piece of it from a random place where it is long."""
+    excess = len(sequence.inputs) - LONGEST_STEPS
+    if excess <= 0:
+        return sequence
+    start = int(rng.integers(excess + 1))
+    kept = slice(start, start + LONGEST_STEPS)
+    return TrainingSequence(sequence.inputs[kept], sequence.targets[kept], sequence.valid[kept])
+
+
+def _error_variances(acoustic: AcousticNetwork, examples: Sequence[Example], values: Sequence[Array]) -> Array:
+    """Return the variances of the error of static value, Δ and Δ² in the examples as recorded [shape=(3, Q)]."""
+    squares, count = np.zeros((3, len(acoustic.mean))), 0
+    for example, x in zip(examples, values, strict=True):
+        frames = dynamics_known(example.valid)
+        predicted, _ = acoustic.predict(example.heard[0].values)
+        squares += np.square(with_dynamics(x - predicted)[frames]).sum(axis=0)
+        count += int(frames.sum())
+    floor = 1e-4 * np.square(acoustic.scale) + 1e-12
+    return np.maximum(squares / max(count, 1), floor)

@@ -1,0 +1,276 @@
+"""How English mouths move: a table of mean articulations by phone, as a prior for units that training saw little of."""
+
+from __future__ import annotations
+
+import csv
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.motion.closure import OPENING
+from lipmotion.motion.frame_labels import with_neighbours
+from lipmotion.motion.rest import away_from_speech, speech_intervals
+from lipmotion.motion.space import MotionSpace
+from lipmotion.stats.delta_windows import with_dynamics
+from lipmotion.storage.schema import Arrays, ArraySpec, checked_arrays
+from lipmotion.types import FRAME_RATE_HZ, Example, Span, Timeline, Unit
+from lipmotion.units import SILENCE, is_silent, most_similar_phone
+
+Array = NDArray[np.float64]
+Context = tuple[str, str, str]
+"""The phone before, the phone, and the phone after."""
+Statistics = tuple[Array, Array]
+ARTICULATORS = ("opening", "width", "outer", "jaw", "upper_lip", "lower_lip", "protrusion", "inner_width")
+"""The columns of the table (docs/articulation.md)."""
+THIRDS = ("begin", "middle", "end")
+SMOOTHING_S = 0.048
+"""Standard deviation of the Gaussian that joins the thirds of successive phones: 1.2 pictures at 25 Hz."""
+REST_S = 1.0
+"""Silence further than this from speech is not in the table: the mouth rests."""
+GAIN = 2.0
+"""The means of the table are made so much larger. They were measured on recognised words, of which a fifth to a third
+are wrong, so that all are drawn towards 0; of 1.3, 1.8 and 2.2, the largest was best for strangers."""
+RIDGE = 1e-2
+"""Ridge parameter of the map from articulators to the motion space, as a share of the number of frames."""
+LEAST_DEVIATION = 1e-6
+TABLE_WEIGHT = 4.0
+"""Weight of the table beside a model's own means, in a context that training never saw."""
+HALF_FAMILIAR = 1.0
+"""Occurrences in training after which a context counts as half familiar."""
+
+
+@dataclass(frozen=True, eq=False)
+class ArticulationPrior:
+    """The table of articulations in the range of one speaker, for phones in contexts that training saw little of.
+
+    centre   : the pose of which the table gives deviations: the median in speech [shape=(Q,)]
+    matrix   : change of the motion space with each articulator, per standard deviation of the speaker [shape=(8, Q)]
+    contexts : occurrences in training of each phone between its neighbours; pauses count as silence
+    """
+
+    centre: Array
+    matrix: Array
+    contexts: Mapping[Context, int]
+
+    def trajectory(self, units: Timeline[Unit], frames: int) -> Array:
+        """Return the motion of phones in time, in the motion space [shape=(frames, Q)].
+
+        Raises InputError: an unknown phone.
+        """
+        return self.centre + GAIN * articulators(units, frames) @ self.matrix
+
+    def familiarity(self, units: Timeline[Unit], frames: int) -> Array:
+        """Return how well training knows each phone between its neighbours, 0 to 1 [shape=(frames,)].
+
+        Silence away from speech, in which the mouth rests, is always well known.
+        """
+        steps = np.ones((frames, 1))
+        for left, span, right in with_neighbours(units):
+            if span.label.phone:
+                count = self.contexts.get((_merged(left), _merged(span.label.phone), _merged(right)), 0)
+                first, stop = _frames_of(span, frames)
+                steps[first:stop] = count / (count + HALF_FAMILIAR)
+        steps[away_from_speech(np.arange(frames) / FRAME_RATE_HZ, speech_intervals(units), REST_S)] = 1
+        return smoothed(steps)[:, 0]
+
+    def blended(
+        self, statistics: Callable[[slice], Statistics], units: Timeline[Unit], frames: int, reliability: Array | float
+    ) -> Callable[[slice], Statistics]:
+        """Return means and precisions of ranges of frames, drawn towards the table where training saw little.
+
+        statistics  : returns those of a model
+        reliability : of the phones in time, 0 to 1 [shape=(frames,)]
+        Precisions stay those of the model.
+        """
+        values = self.trajectory(units, frames)
+        weight = TABLE_WEIGHT * reliability * (1 - self.familiarity(units, frames))
+        share = (weight / (1 + weight))[:, None, None]
+
+        def drawn(chosen: slice) -> Statistics:
+            means, precisions = statistics(chosen)
+            return means + share[chosen] * (dynamics_of(values, chosen) - means), precisions
+
+        return drawn
+
+
+def dynamics_of(values: Array, frames: slice) -> Array:
+    """Return static value, Δ and Δ² of a range of N frames [shape=(N, 3, Q)].
+
+    values : of the whole recording [shape=(T, Q)]
+    """
+    start, stop, _ = frames.indices(len(values))
+    first = max(start - 1, 0)
+    return with_dynamics(values[first : stop + 1])[start - first :][: stop - start]
+
+
+def articulators(units: Timeline[Unit], frames: int) -> Array:
+    """Return the articulators of phones in time, in standard deviations of a speaker [shape=(frames, 8)].
+
+    Every third of a phone has the means of the table; a Gaussian joins them. A phone without a row of its own has that
+    of the most similar phone with one.
+    """
+    table, steps = articulation_table(), np.zeros((frames, len(ARTICULATORS)))
+    for span in units:
+        phone, (first, stop) = span.label.phone, _frames_of(span, frames)
+        if first < stop and phone:
+            row = table[phone if phone in table else most_similar_phone(phone, list(table))]
+            time_s = np.arange(first, stop) / FRAME_RATE_HZ
+            third = (time_s - span.start_s) / max(span.duration_s, 1e-9) * len(THIRDS)
+            steps[first:stop] = row[np.clip(third.astype(int), 0, len(THIRDS) - 1)]
+    return smoothed(steps)
+
+
+def smoothed(steps: Array) -> Array:
+    """Return values in frames [shape=(T, C)] smoothed by a Gaussian of ``SMOOTHING_S``; the ends are repeated."""
+    deviation = SMOOTHING_S * FRAME_RATE_HZ
+    reach = int(np.ceil(4 * deviation))
+    weights = np.exp(-np.square(np.arange(-reach, reach + 1) / deviation) / 2)
+    padded = np.pad(steps, ((reach, reach), (0, 0)), mode="edge")
+    columns = [np.convolve(column, weights / weights.sum(), mode="valid") for column in padded.T]
+    return np.stack(columns, axis=1)
+
+
+@cache
+def articulation_table() -> dict[str, Array]:
+    """Return the mean of every articulator in each third of every phone [each shape=(3, 8)]."""
+    text = resources.files("lipmotion.motion").joinpath("articulation.csv").read_text(encoding="ascii")
+    return {
+        row["phone"]: np.array([[float(row[f"{name}_{third}"]) for name in ARTICULATORS] for third in THIRDS])
+        for row in csv.DictReader(text.splitlines())
+    }
+
+
+def fit_articulation_prior(
+    space: MotionSpace, values: Sequence[Array], examples: Sequence[Example]
+) -> ArticulationPrior | None:
+    """Return the table in the range of the speaker of some examples; None where no channel is called ``opening``.
+
+    values : motion of each example in the motion space [each shape=(T, Q)]
+    Channels that the table has are taken from it. The other dimensions follow by a regression on the articulators that
+    can be measured on the examples.
+    """
+    if OPENING not in space.direct_names:
+        return None
+    poses = np.concatenate([x[_spoken(example)] for x, example in zip(values, examples, strict=True)])
+    if not len(poses):
+        return None
+    channels, _ = space.restore(poses, np.zeros_like(poses))
+    measured = measured_articulators(channels, [channel.name for channel in space.channels])
+    known = [number for number, name in enumerate(ARTICULATORS) if name in measured]
+    columns = np.stack([measured[ARTICULATORS[number]] for number in known], axis=1)
+    centred = columns - columns.mean(axis=0)
+    deviations = np.maximum(columns.std(axis=0), LEAST_DEVIATION)
+    standard = centred / deviations
+    products = standard.T @ standard + RIDGE * len(poses) * np.eye(len(known))
+    matrix = np.zeros((len(ARTICULATORS), poses.shape[1]))
+    matrix[known] = np.linalg.solve(products, standard.T @ (poses - poses.mean(axis=0)))
+    for column, name in enumerate(space.direct_names):
+        if name in ARTICULATORS:
+            matrix[:, column] = 0
+            row = ARTICULATORS.index(name)
+            matrix[row, column] = deviations[known.index(row)]
+    contexts = count_contexts(example.speech.units for example in examples)
+    return ArticulationPrior(np.median(poses, axis=0), matrix, contexts)
+
+
+def count_contexts(timelines: Iterable[Timeline[Unit]]) -> dict[Context, int]:
+    """Return how often each phone occurs between its neighbours; pauses count as silence."""
+    counts: Counter[Context] = Counter()
+    for units in timelines:
+        counts.update(
+            (_merged(left), _merged(span.label.phone), _merged(right))
+            for left, span, right in with_neighbours(units)
+            if span.label.phone
+        )
+    return dict(sorted(counts.items()))
+
+
+def articulation_arrays(prior: ArticulationPrior | None) -> dict[str, NDArray[Any]]:
+    """Serialise a prior."""
+    if prior is None:
+        return {}
+    return {
+        "articulation_centre": prior.centre,
+        "articulation_matrix": prior.matrix,
+        "contexts": np.array(list(prior.contexts)),
+        "context_counts": np.array(list(prior.contexts.values()), np.int32),
+    }
+
+
+def articulation_from_arrays(arrays: Arrays, dimensions: int) -> ArticulationPrior | None:
+    """Deserialise a prior; None where there is none, as in models of earlier versions.
+
+    dimensions : of the motion space, Q
+    Raises KeyError, ValueError: an array is missing, or has a wrong shape, type or range.
+    """
+    if arrays.keys().isdisjoint(ARTICULATION):
+        return None
+    stored = checked_arrays(arrays, ARTICULATION, Q=dimensions)
+    pairs = zip(stored["contexts"].tolist(), stored["context_counts"].tolist(), strict=True)
+    contexts = {(left, phone, right): count for (left, phone, right), count in pairs}
+    return ArticulationPrior(stored["articulation_centre"], stored["articulation_matrix"], contexts)
+
+
+ARTICULATION = {
+    "articulation_centre": ArraySpec(np.float64, "Q", -1e6, 1e6),
+    "articulation_matrix": ArraySpec(np.float64, f"{len(ARTICULATORS)} Q", -1e6, 1e6),
+    "contexts": ArraySpec(np.str_, "N 3"),
+    "context_counts": ArraySpec(np.int32, "N", 1, 1e9),
+}
+
+
+def _merged(phone: str) -> str:
+    return SILENCE if is_silent(phone) else phone
+
+
+def _frames_of(span: Span[Unit], frames: int) -> tuple[int, int]:
+    """Return the first frame of a span, and the one after its last."""
+    edges = np.ceil(np.array([span.start_s, span.end_s]) * FRAME_RATE_HZ - 1e-6)
+    first, stop = np.clip(edges, 0, frames).astype(int).tolist()
+    return first, stop
+
+
+def _spoken(example: Example) -> NDArray[np.bool_]:
+    """Return the valid frames within speech [shape=(T,)]."""
+    spoken = np.zeros(len(example.valid), bool)
+    for start_s, end_s in speech_intervals(example.speech.units):
+        spoken[int(np.ceil(start_s * FRAME_RATE_HZ)) : int(np.ceil(end_s * FRAME_RATE_HZ))] = True
+    return spoken & example.valid
+
+
+def measured_articulators(motion: NDArray[np.floating[Any]], names: Sequence[str]) -> dict[str, Array]:
+    """Return the articulators that can be measured on motion, by name [each shape=(N,)].
+
+    motion : values of all channels [shape=(N, P)]
+    names  : of the channels
+    """
+    column = {name: number for number, name in enumerate(names)}
+
+    def channel(name: str) -> Array:
+        return np.asarray(motion[:, column[name]], float)
+
+    found = {name: channel(name) for name in ARTICULATORS[:3] if name in column}
+    for name, (points, measure) in _MEASURES.items():
+        if all(point in column for point in points):
+            found[name] = measure(channel)
+    return found
+
+
+_Channel = Callable[[str], Array]
+_MEASURES: dict[str, tuple[tuple[str, ...], Callable[[_Channel], Array]]] = {
+    "jaw": (("y_152",), lambda of: -of("y_152")),
+    "upper_lip": (("y_13",), lambda of: -of("y_13")),
+    "lower_lip": (("y_14", "y_152"), lambda of: of("y_14") - of("y_152")),
+    "protrusion": (
+        ("z_13", "z_14", "z_61", "z_291"),
+        lambda of: (of("z_13") + of("z_14") - of("z_61") - of("z_291")) / 2,
+    ),
+    "inner_width": (("x_78", "x_308"), lambda of: np.abs(of("x_78") - of("x_308"))),
+}
+"""Points that an articulator is measured on, and how: y is up, z out of the face, the nose does not move."""

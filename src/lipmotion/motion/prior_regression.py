@@ -1,0 +1,223 @@
+"""Motion of a person with few recordings, by regression on what another model makes of the same speech."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.motion.acoustic_network import STEP, between_steps
+from lipmotion.motion.articulation import ARTICULATORS, articulators
+from lipmotion.stats.delta_windows import dynamics_known, with_dynamics
+from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, checked_arrays
+from lipmotion.types import SPECTRUM_BANDS, Example, Speech
+
+Array = NDArray[np.float64]
+WINDOW = 4
+"""Time steps of 40 ms before and after a frame whose spectrum is used: 160 ms."""
+FOLDS = 4
+RIDGES = tuple(10.0**power for power in range(0, 6))
+"""Ridge parameters that cross-validation chooses from, one for each kind of regressors."""
+START = 1000.0
+"""Ridge parameter of all kinds before the choice."""
+ROUNDS = 2
+LEAST_DEVIATION = 1e-3
+KINDS = ("prior", "hidden", "articulation", "spectrum")
+"""Kinds of regressors: the articulators of the other model's motion, the last hidden layer of its network, the table of
+articulation for the phones in time, the spectrum around the frame."""
+
+
+@dataclass(frozen=True, eq=False)
+class PriorRegression:
+    """Ridge regression of motion on the output of another model (``Speech.prior``), the phones, and the spectrum.
+
+    sizes        : number of regressors of each of ``KINDS``
+    mean, scale  : of the regressors [each shape=(R,)]
+    coefficients : float32 array [shape=(R, Q)]
+    centre       : mean of the motion [shape=(Q,)]
+    variances    : of the error of static value, Δ and Δ², in cross-validation [shape=(3, Q)]
+    """
+
+    sizes: tuple[int, ...]
+    mean: NDArray[np.float32]
+    scale: NDArray[np.float32]
+    coefficients: NDArray[np.float32]
+    centre: Array
+    variances: Array
+
+    def predict(self, speech: Speech) -> tuple[Array, Array]:
+        """Return motion in the motion space [shape=(T, Q)] and the distortion of the sound, 0 to 1 [shape=(T,)].
+
+        Raises InputError: an unknown phone.
+        """
+        regressors = (np.concatenate(_regressors(speech), axis=1) - self.mean) / self.scale
+        steps = (regressors @ self.coefficients).astype(float) + self.centre
+        frames = len(speech.features.values)
+        distortion = speech.prior.distortion if speech.prior is not None else np.zeros(len(steps))
+        outputs = between_steps(np.concatenate([steps, distortion[:, None]], axis=1), frames)
+        return outputs[:, :-1], np.clip(outputs[:, -1], 0, 1)
+
+
+class _Fold(NamedTuple):
+    """Regressors and motion, in time steps, of some examples."""
+
+    regressors: Array
+    motion: Array
+
+
+def fit_prior_regression(
+    examples: Sequence[Example], values: Sequence[Array], direct: int
+) -> tuple[PriorRegression, list[Array]]:
+    """Return the regression, and its predictions for each example by regressions on the other folds.
+
+    values : motion of each example in the motion space [each shape=(T, Q)]
+    direct : number of channels that are modelled as they are; the ridge parameters are chosen for them
+    Ridge parameters are chosen by cross-validation over examples, one kind of regressors after the other. The
+    predictions are in frames [each shape=(T, Q)]; with a single example, they are those of the regression itself.
+    """
+    kinds = [_regressors(example.speech) for example in examples]
+    sizes = tuple(kind.shape[1] for kind in kinds[0])
+    everything = [np.concatenate(kind, axis=1) for kind in kinds]
+    known = [example.valid[::STEP] for example in examples]
+    rows = np.concatenate([x[mask] for x, mask in zip(everything, known, strict=True)])
+    mean, scale = rows.mean(axis=0), rows.std(axis=0) + LEAST_DEVIATION
+    data = [
+        _Fold((x[mask] - mean) / scale, motion[::STEP][mask])
+        for x, motion, mask in zip(everything, values, known, strict=True)
+    ]
+    spread = np.maximum(np.concatenate([each.motion for each in data]).std(axis=0), 1e-6)
+    ridges = _chosen_ridges(data, sizes, (1 / spread**2)[:direct])
+    penalty = np.repeat(ridges, sizes)
+    predictions: list[Array] = [np.zeros(0)] * len(data)
+    for inside, outside in folds(len(data)):
+        coefficients, centre = _solved([data[n] for n in inside], penalty)
+        for number in outside:
+            steps = (everything[number] - mean) / scale @ coefficients + centre
+            predictions[number] = between_steps(steps, len(values[number]))
+    coefficients, centre = _solved(data, penalty)
+    regression = PriorRegression(
+        sizes,
+        mean.astype(np.float32),
+        scale.astype(np.float32),
+        coefficients.astype(np.float32),
+        centre,
+        _variances(predictions, values, examples),
+    )
+    return regression, predictions
+
+
+def folds(count: int) -> Iterator[tuple[list[int], list[int]]]:
+    """Yield the numbers of the examples inside and outside of each fold; a single example is both."""
+    if count == 1:
+        yield [0], [0]
+        return
+    for fold in range(min(FOLDS, count)):
+        outside = list(range(fold, count, FOLDS))
+        yield [number for number in range(count) if number not in outside], outside
+
+
+def prior_regression_arrays(regression: PriorRegression) -> dict[str, NDArray[Any]]:
+    """Serialise a regression; the coefficients at half precision."""
+    return {
+        "prior_sizes": np.array(regression.sizes, np.int32),
+        "prior_inputs": np.stack([regression.mean, regression.scale]),
+        "prior_coefficients": regression.coefficients.astype(np.float16),
+        "prior_centre": regression.centre,
+        "prior_variances": regression.variances,
+    }
+
+
+def prior_regression_from_arrays(arrays: Arrays, dimensions: int) -> PriorRegression | None:
+    """Deserialise a regression; None where there is none.
+
+    dimensions : of the motion space, Q
+    Raises KeyError, ValueError: an array is missing, or has a wrong shape, type or range.
+    """
+    if arrays.keys().isdisjoint(PRIOR_ARRAYS):
+        return None
+    stored = checked_arrays(arrays, PRIOR_ARRAYS, Q=dimensions)
+    sizes = tuple(stored["prior_sizes"].tolist())
+    if sum(sizes) != stored.sizes["R"] or sizes[2:] != (len(ARTICULATORS), (2 * WINDOW + 1) * SPECTRUM_BANDS):
+        raise ValueError(f"prior_sizes {sizes}, whose sum is not {stored.sizes['R']}, or of another version")
+    mean, scale = stored["prior_inputs"]
+    if not (scale > 0).all():
+        raise ValueError("prior_inputs with a scale that is not more than 0")
+    return PriorRegression(
+        sizes, mean, scale, stored["prior_coefficients"], stored["prior_centre"], stored["prior_variances"]
+    )
+
+
+PRIOR_ARRAYS = {
+    "prior_sizes": ArraySpec(np.int32, str(len(KINDS)), 0, 1e5),
+    "prior_inputs": ArraySpec(np.float32, "2 R", -1e6, 1e6),
+    "prior_coefficients": ArraySpec(np.float32, "R Q", -1e4, 1e4),
+    "prior_centre": ArraySpec(np.float64, "Q", -1e6, 1e6),
+    "prior_variances": ArraySpec(np.float64, "3 Q", POSITIVE),
+}
+
+
+def _regressors(speech: Speech) -> list[Array]:
+    """Return the regressors of each of ``KINDS`` in every time step of 40 ms [each shape=(ceil(T / 4), ...)]."""
+    frames = len(speech.features.values)
+    count = -(-frames // STEP)
+    spectrum = speech.spectrum if speech.spectrum is not None else np.zeros((frames, SPECTRUM_BANDS))
+    padded = np.concatenate([spectrum, np.repeat(spectrum[-1:], count * STEP - frames, axis=0)])
+    bands = padded.reshape(count, STEP, SPECTRUM_BANDS).mean(axis=1)
+    around = np.clip(np.arange(count)[:, None] + np.arange(-WINDOW, WINDOW + 1), 0, count - 1)
+    table = articulators(speech.units, frames)[::STEP]
+    prior = speech.prior
+    motion, hidden = (prior.articulators, prior.hidden) if prior is not None else (np.zeros((count, 0)),) * 2
+    return [np.asarray(x, float) for x in (motion, hidden, table, bands[around].reshape(count, -1))]
+
+
+def _solved(data: Sequence[_Fold], penalty: Array) -> tuple[Array, Array]:
+    """Return coefficients [shape=(R, Q)] and centre [shape=(Q,)] of a ridge regression with a penalty a regressor."""
+    x = np.concatenate([each.regressors for each in data])
+    y = np.concatenate([each.motion for each in data])
+    centre, shift = y.mean(axis=0), x.mean(axis=0)
+    scaled = (x - shift) / np.sqrt(penalty)
+    if len(x) < x.shape[1]:  # the dual form has fewer equations
+        dual = np.linalg.solve(scaled @ scaled.T + np.eye(len(x)), y - centre)
+        coefficients = scaled.T @ dual
+    else:
+        coefficients = np.linalg.solve(scaled.T @ scaled + np.eye(x.shape[1]), scaled.T @ (y - centre))
+    coefficients = coefficients / np.sqrt(penalty)[:, None]
+    return coefficients, centre - shift @ coefficients
+
+
+def _chosen_ridges(data: Sequence[_Fold], sizes: Sequence[int], weights: Array) -> Array:
+    """Return the ridge parameter of each kind of regressors with the least error of the first dimensions.
+
+    weights : of the squared errors of these dimensions [shape=(D,)]
+    """
+    data = [_Fold(each.regressors, each.motion[:, : len(weights)]) for each in data]
+    ridges = np.full(len(sizes), START)
+
+    def error(candidate: Array) -> float:
+        total = 0.0
+        for inside, outside in folds(len(data)):
+            coefficients, centre = _solved([data[n] for n in inside], np.repeat(candidate, sizes))
+            for number in outside:
+                missed = data[number].regressors @ coefficients + centre - data[number].motion
+                total += float((np.square(missed) * weights).sum())
+        return total
+
+    for _ in range(ROUNDS):
+        for kind, size in enumerate(sizes):
+            if not size:
+                continue
+            candidates = [np.where(np.arange(len(sizes)) == kind, ridge, ridges) for ridge in RIDGES]
+            ridges = min(candidates, key=error)
+    return ridges
+
+
+def _variances(predictions: Sequence[Array], values: Sequence[Array], examples: Sequence[Example]) -> Array:
+    """Return the variances of the error of static value, Δ and Δ² [shape=(3, Q)]."""
+    errors = [
+        with_dynamics(x - predicted)[dynamics_known(example.valid)]
+        for predicted, x, example in zip(predictions, values, examples, strict=True)
+    ]
+    return np.square(np.concatenate(errors)).mean(axis=0) + 1e-12
