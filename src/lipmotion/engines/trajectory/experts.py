@@ -74,10 +74,11 @@ class Experts:
         """The share of the network in every frame, 0 to 1 [shape=(T,)].
 
         It is ``network_share`` where training knows the phone in its context, and all where not; in the rest pose the
-        states alone count. Phones that cannot be relied on leave all to the network.
+        states alone count. Beside a regression on another model, contexts are not asked for: its share was chosen with
+        those that training does not know. Phones that cannot be relied on leave all to the network.
         """
         familiarity = np.ones(len(self.rows))
-        if self.prior is not None:
+        if self.prior is not None and not isinstance(self.network, PriorRegression):
             familiarity = self.prior.familiarity(self.speech.units, len(self.rows))
         resting = self.rows == len(self.emission.means) - 1
         states = (1 - self.network_share) * self.reliability * familiarity

@@ -34,14 +34,7 @@ def with_conditions(
     for block in each(partial(_block, voices=voices, count=count), blocks):
         heard += block
         monitor(Progress("acoustic conditions", len(heard), len(recordings), len(heard) / len(recordings)))
-    return [
-        replace(
-            example,
-            heard=tuple(spectra),
-            speech=replace(example.speech, spectrum=spectra[0].values.astype(np.float32)),
-        )
-        for example, spectra in zip(examples, heard, strict=True)
-    ]
+    return [replace(example, heard=tuple(spectra)) for example, spectra in zip(examples, heard, strict=True)]
 
 
 def _block(recordings: Sequence[tuple[int, Audio]], voices: Sequence[Audio], count: int) -> list[list[HeardSpectrum]]:

@@ -32,6 +32,7 @@ from lipmotion.pipeline.workers import worker_pool
 from lipmotion.speech.f0 import log_f0
 from lipmotion.speech.phone_models import train_phone_models
 from lipmotion.speech.recogniser import Recogniser
+from lipmotion.speech.spectrum import spectrum
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
 from lipmotion.storage.sources import Source, check_apart
 from lipmotion.types import (
@@ -318,7 +319,7 @@ def _examples(
             skipped[utterance.name] = units
             continue
         motion, valid = model_motion(utterance.track, len(utterance.features.values))
-        speech = Speech(utterance.features, units, log_f0(utterance.audio))
+        speech = Speech(utterance.features, units, log_f0(utterance.audio), spectrum=spectrum(utterance.audio))
         examples.append(Example(utterance.name, speech, motion, valid))
     if not examples:
         name, reason = next(iter(skipped.items()))
