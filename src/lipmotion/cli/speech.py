@@ -50,9 +50,9 @@ def _shipped() -> Path:
 
 
 def add_recogniser_argument(parser: argparse.ArgumentParser) -> None:
-    """Add ``--recogniser``: the choice of phone models."""
-    models = "phone models: auto, own (those of the model) or general (those of many voices) (default: auto)"
-    parser.add_argument("--recogniser", default="auto", metavar="KIND", help=models)
+    """Add ``--recogniser``: how speech without a transcript is recognised."""
+    kinds = "auto, words (English), fast (phones alone), own (phone models of the model) or general (of many voices)"
+    parser.add_argument("--recogniser", default="auto", metavar="KIND", help=f"{kinds}; default: auto")
 
 
 def request_and_model(options: argparse.Namespace) -> tuple[SpeechRequest, Model]:

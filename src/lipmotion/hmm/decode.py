@@ -59,7 +59,11 @@ def decode_units(
     beam : as in ``Network.best_path``; None: exact
     Viterbi over context-dependent states with the bigram (Hofer 2008, Eq. 5).
     """
-    path = loop.network.best_path(log_likelihoods, beam=beam)
+    return units_of_path(loop, loop.network.best_path(log_likelihoods, beam=beam))
+
+
+def units_of_path(loop: UnitLoop, path: NDArray[np.intp]) -> tuple[tuple[str, ...], NDArray[np.intp]]:
+    """Return the units of a path through the loop [shape=(T,)], and their frames as ``decode_units`` does."""
     starts = [t for t in range(len(path)) if t == 0 or (path[t] != path[t - 1] and path[t] in loop.entries)]
     return tuple(loop.owners[path[t]] for t in starts), np.array([*starts, len(path)], np.intp)
 

@@ -30,6 +30,19 @@ class LogLikelihoods:
     frames: int
     log_density: Callable[[int, int, DensitySelection], NDArray[np.float32]]
 
+    def stretch(self, first: int, end: int) -> NDArray[np.float32]:
+        """Return the log densities of some frames under all densities [shape=(end - first, G)]."""
+        return self.log_density(first, end, None)
+
+
+def log_likelihoods_from(values: NDArray[np.float32]) -> LogLikelihoods:
+    """Return the log likelihoods of a recording, or a stretch of one, that were computed [shape=(T, G)]."""
+
+    def log_density(first: int, end: int, chosen: DensitySelection) -> NDArray[np.float32]:
+        return values[first:end].copy() if chosen is None else values[first:end][:, chosen]
+
+    return LogLikelihoods(len(values), log_density)
+
 
 def log_likelihoods_of(hmm: UnitHmm, features: NDArray[np.float32]) -> LogLikelihoods:
     """Return the log likelihoods of features [shape=(T, D)] under models of the same features."""

@@ -13,17 +13,18 @@ LEAST_RISE = 1e-3
 """Energy with less between these percentiles, as natural logarithm or standardised, is constant but for rounding."""
 
 
-def loud_frames(log_energy: NDArray[np.float32], smoothing: int) -> NDArray[np.bool_]:
+def loud_frames(log_energy: NDArray[np.float32], smoothing: int, share: float = LOUD_SHARE) -> NDArray[np.bool_]:
     """Return which frames are loud [shape=(T,)]; none where the energy is constant but for rounding.
 
     log_energy : [shape=(T,)], of any scale
     smoothing  : frames averaged over, an odd number
+    share      : how far above the quiet frames, of the way to the loud ones
     """
     padded = np.pad(log_energy, smoothing // 2, "edge")
     smooth = np.convolve(padded, np.full(smoothing, 1 / smoothing), "valid")
     quiet, loud = np.quantile(smooth, [0.1, 0.95])
     rise = loud - quiet
-    return (rise > LEAST_RISE) & (smooth > quiet + LOUD_SHARE * rise)
+    return (rise > LEAST_RISE) & (smooth > quiet + share * rise)
 
 
 QUIET = 35 * np.log(10) / 10

@@ -19,8 +19,9 @@ class SpeechRequest:
     units      : phones in time, for instance those of an earlier generation, edited; with units, phones are neither
                  recognised nor aligned
     lexicon    : pronunciations of words, ahead of those of the dictionary
-    recogniser : ``own``: the phone models of the model; ``general``: those of many voices; ``auto``: both, weighted by
-                 the speaker similarity score
+    recogniser : how speech without a transcript is recognised. ``auto``: English words where they fit the sound, phones
+                 elsewhere; ``words``: words alone; ``fast``: phones alone, by the phone models of the model and those
+                 of many voices, weighted by the speaker similarity score; ``own``, ``general``: by one of these alone
 
     >>> import lipmotion
     >>> request = lipmotion.SpeechRequest("examples/welcome.flac", recogniser="general")

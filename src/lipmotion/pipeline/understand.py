@@ -85,7 +85,7 @@ def recognised_speech(
     """
     speech = speech_of(engine, audio, features, Timeline(()))
     recognised = None
-    if isinstance(engine, RecognisesPhones) and phones.kind != "general":
+    if isinstance(engine, RecognisesPhones) and phones.kind not in ("general", "words"):
         recognised = engine.recognise(learned, speech)
     if recognised is None:
         return replace(speech, units=recognise(), units_known=False, confidence=0.0)

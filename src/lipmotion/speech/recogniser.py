@@ -12,21 +12,50 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError, InputError
 from lipmotion.hmm.align import align_units, choose_pronunciations
-from lipmotion.hmm.decode import UnitLoop, decode_units, unit_loop
-from lipmotion.hmm.log_likelihoods import LogLikelihoods, log_likelihoods_of, penalise_silence, penalise_speech
+from lipmotion.hmm.decode import UnitLoop, unit_loop, units_of_path
+from lipmotion.hmm.log_likelihoods import (
+    LogLikelihoods,
+    log_likelihoods_from,
+    log_likelihoods_of,
+    penalise_silence,
+    penalise_speech,
+)
 from lipmotion.hmm.loudness import loud_frames, quiet_frames
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.speech.adaptation import Adaptation
 from lipmotion.speech.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.combined_phones import NOISES, CombinedPhones, combine_phones, combined_log_likelihoods
+from lipmotion.speech.heard_words import align_heard_words, phone_bonus
 from lipmotion.speech.mfcc import LOG_ENERGY
-from lipmotion.speech.speaker_similarity import speaker_similarity
-from lipmotion.types import FRAME_RATE_HZ, Audio, Features, Span, Timeline, Unit
+from lipmotion.speech.recognition import (
+    HeardWord,
+    LabelledFrames,
+    LabelledStretch,
+    Recognition,
+    confidence_of,
+    labels_of_words,
+    recognition_of,
+    spliced,
+)
+from lipmotion.speech.speaker_similarity import SpeakerSimilarity, speaker_similarity
+from lipmotion.speech.voice_activity import stretches_of_sound
+from lipmotion.speech.word_decoder import stretch_samples, words_in
+from lipmotion.types import FRAME_RATE_HZ, Audio, Features, ParallelMap, Span, Timeline, Unit
 from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent, most_similar_phone
 
-RECOGNISER_KINDS = ("auto", "own", "general")
-"""``own``: the model's own phone models alone; ``general``: those of many voices alone; ``auto``: both, the own ones
-weighted by how similar the speaker is to those of their training data."""
+RECOGNISER_KINDS = ("auto", "words", "fast", "own", "general")
+"""Phones are recognised by: ``own``: the model's own phone models alone; ``general``: those of many voices alone;
+``fast``: both, the own ones weighted by how similar the speaker is to those of their training data. ``words``: English
+words are recognised and aligned. ``auto``: as ``fast``, and words where they fit."""
+USING_WORDS, WEIGHTED = ("auto", "words"), ("auto", "words", "fast")
+WORD_FIT, STRETCH_FIT = -2.0, -1.5
+"""Words are believed from the first fit on, all words of a stretch from the second one on (``AlignedWords.fits``)."""
+WORD_BONUS = 2.0
+"""Where words are not believed, their phones are still more probable than others, by so many nats a frame."""
+OWN_VOICE_SCORE, SMALL_PERPLEXITY = -3.0, 9.0
+"""A voice with the first speaker similarity score or more is that of the own models; if the perplexity of their bigram
+is less than the second one, their corpus has few words, which no language model of English expects. Then the phones
+alone decide. The perplexity is 5.3 for GRID's 51 words, 18.6 for English."""
 NO_WEIGHT_SCORE, FULL_WEIGHT_SCORE = -9.0, -5.0
 """Own models have no weight for recordings with the first speaker similarity score or less, and the weight of the
 general models from the second one on. The score of another speaker in the same studio is -4 to -6 for GRID's models, of
@@ -35,6 +64,8 @@ FEW_GAUSSIANS = 2
 """Own models of so few Gaussians a state were trained on less than two minutes: forced alignment uses the general ones
 alone then. With 20 clips of GRID that raises ACC of opening on the validation list from 0.767 to 0.786 (audio only),
 from 0.806 to 0.841 (transcripts)."""
+DICTIONARY = Lexicon()
+"""Words that were recognised are in the dictionary."""
 ENERGY_SMOOTHING_FRAMES = 11
 """The energy is averaged over so many frames before it rules silence out."""
 SHORT_PAUSE_S = 0.2
@@ -63,22 +94,101 @@ class Recogniser:
         audio    : an ``AnalysedAudio`` shares its features with what else is computed of it
         features : of the audio, as ``mfcc`` returns them
         Digital silence, of which all normalised features are 0, is recognised as silence.
-        Raises MissingDependencyError: general models are wanted and pocketsphinx is not installed.
+        With words, see ``recognition``.
+        Raises MissingDependencyError: general models or words are wanted and pocketsphinx is not installed.
         Source: Hofer 2008, Eq. 5.
         """
+        return self.recognition(audio, features).units
+
+    def recognition(self, audio: Audio, features: Features, each: ParallelMap = map) -> Recognition:
+        """Return the recognised phones of a recording in time, with the words that decided them.
+
+        audio, features : as of ``recognise``
+        each            : applies a function to many items, perhaps in several processes
+        Words are recognised in every stretch of sound and aligned by our models. ``auto`` compares their likelihood
+        with that of the best path of phones without words: words that fit decide their phones; of the other words, the
+        phones only become more probable (``WORD_BONUS``).
+        Raises MissingDependencyError: as ``recognise``.
+        """
         if not features.values.any():
-            return _timeline([(SILENCE, "")], np.array([0, len(features.values)]), features.duration_s)
+            silence = _timeline([(SILENCE, "")], np.array([0, len(features.values)]), features.duration_s)
+            return recognition_of(silence, [LabelledFrames(0, SILENCE)], (), None)
         audio = analysed(audio, features)
-        _, log_likelihoods = self._log_likelihoods(audio)
-        phones, bounds = decode_units(self._loop, log_likelihoods)
-        labels = [(SILENCE if phone in NOISES else phone, "") for phone in phones]
-        recognised = _timeline(labels, bounds, features.duration_s)
-        if self.kind != "auto" or not self._has_few_gaussians:
-            return recognised
+        similarity = self._similarity(audio)
+        hmm, log_likelihoods = self._log_likelihoods(audio, similarity)
+        path = self._loop.network.best_path(log_likelihoods)
+        labels, heard = self._free_labels(audio, features, path), list[HeardWord]()
+        if self.kind in USING_WORDS and not self._knows_voice_and_words(similarity):
+            parts, heard = self._word_parts(audio, hmm, log_likelihoods, path, each)
+            labels = spliced(labels if self.kind == "auto" else [LabelledFrames(0, SILENCE)], parts, len(path))
+        units = _timeline(
+            [(label.phone, heard[label.word].text if label.word >= 0 else "") for label in labels],
+            np.array([*(label.first for label in labels), len(path)]),
+            features.duration_s,
+        )
+        return recognition_of(units, labels, heard, similarity.score if similarity is not None else None)
+
+    def _free_labels(self, audio: AnalysedAudio, features: Features, path: NDArray[np.intp]) -> list[LabelledFrames]:
+        """Return the phones of a recording as they are recognised without words, of their best path."""
+        labels = free_labels(self._loop, path)
+        if self.kind not in WEIGHTED or not self._has_few_gaussians:
+            return labels
+        named, bounds = [(label.phone, "") for label in labels], [label.first for label in labels]
+        phones = _timeline(named, np.array([*bounds, len(path)]), features.duration_s)
         try:
-            return self.align_phones(audio, features, recognised)
+            aligned = self.align_phones(audio, features, phones)
         except AlignmentError:
-            return recognised
+            return labels
+        return [LabelledFrames(_first_frame(span.start_s), span.label.phone) for span in aligned]
+
+    def _word_parts(
+        self,
+        audio: AnalysedAudio,
+        hmm: UnitHmm,
+        log_likelihoods: LogLikelihoods,
+        path: NDArray[np.intp],
+        each: ParallelMap,
+    ) -> tuple[list[LabelledStretch], list[HeardWord]]:
+        """Return the stretches in which words were recognised, with their labels, and these words.
+
+        path : of the phones without words, through ``_loop`` [shape=(T,)]
+        """
+        free = self._loop.network.emission[path]
+        of_words = self._log_likelihoods(audio, aligning=True)[1] if self._has_few_gaussians else log_likelihoods
+        loud = loud_frames(audio.mfcc().values[:, LOG_ENERGY], ENERGY_SMOOTHING_FRAMES)
+        stretches = stretches_of_sound(audio.log_energy)
+        parts, heard = list[LabelledStretch](), list[HeardWord]()
+        found = each(words_in, (stretch_samples(audio, stretch) for stretch in stretches))
+        for stretch, words in zip(stretches, found, strict=True):
+            if not words:
+                continue
+            frames, values = slice(*stretch), of_words.stretch(*stretch)
+            try:
+                here = penalise_silence(hmm, log_likelihoods_from(values), loud[frames])
+                aligned = align_heard_words(hmm, here, words, DICTIONARY)
+            except AlignmentError:  # more words than there is room for
+                continue
+            fits, fit = aligned.fits(values, free[frames])
+            believed = np.full(len(words), self.kind == "words" or fit > STRETCH_FIT) | (fits > WORD_FIT)
+            here_parts = list(labels_of_words(aligned, stretch, believed, len(heard)))
+            if not believed.all():
+                favoured = log_likelihoods.stretch(*stretch) + phone_bonus(hmm, aligned, WORD_BONUS)
+                others = self._loop.network.best_path(log_likelihoods_from(favoured))
+                here_parts = [
+                    (stretch, spliced(free_labels(self._loop, others, stretch.first), here_parts, stretch.end))
+                ]
+            parts += here_parts
+            heard += [HeardWord(word, confidence_of(fit)) for word, fit in zip(words, fits.tolist(), strict=True)]
+        return parts, heard
+
+    def _knows_voice_and_words(self, similarity: SpeakerSimilarity | None) -> bool:
+        """Return whether a voice is that of the own models, and their corpus one of few words."""
+        return (
+            self.kind == "auto"
+            and similarity is not None
+            and similarity.score > OWN_VOICE_SCORE
+            and self.own.bigram.perplexity < SMALL_PERPLEXITY
+        )
 
     def align(self, audio: Audio, features: Features, words: Sequence[str], lexicon: Lexicon) -> Timeline[Unit]:
         """Return the phones of a known transcript in time: forced alignment.
@@ -149,26 +259,40 @@ class Recogniser:
     def _has_few_gaussians(self) -> bool:
         return self.own.mixtures.size[1] <= FEW_GAUSSIANS
 
-    def _log_likelihoods(self, audio: AnalysedAudio, aligning: bool = False) -> tuple[UnitHmm, LogLikelihoods]:
-        """Return the models that are used, and the log likelihoods of a recording under them."""
-        hmm, log_likelihoods = self._unpenalised(audio, aligning)
+    def _log_likelihoods(
+        self, audio: AnalysedAudio, similarity: SpeakerSimilarity | None = None, aligning: bool = False
+    ) -> tuple[UnitHmm, LogLikelihoods]:
+        """Return the models that are used, and the log likelihoods of a recording under them.
+
+        similarity : of the recording, if it is known
+        """
+        hmm, log_likelihoods = self._unpenalised(audio, similarity, aligning)
         return hmm, penalise_speech(hmm, log_likelihoods, quiet_frames(audio.log_energy))
 
-    def _unpenalised(self, audio: AnalysedAudio, aligning: bool) -> tuple[UnitHmm, LogLikelihoods]:
+    def _unpenalised(
+        self, audio: AnalysedAudio, similarity: SpeakerSimilarity | None, aligning: bool
+    ) -> tuple[UnitHmm, LogLikelihoods]:
         if self.kind == "own":
-            return self.own, log_likelihoods_of(self.own, self._own_features(audio, self._own_transform(audio)[0]))
+            warp, _ = self._own_transform(audio, similarity)
+            return self.own, log_likelihoods_of(self.own, self._own_features(audio, warp))
         general_alone = self.kind == "general" or (aligning and self._has_few_gaussians)
-        warp, weight = (1.0, 0.0) if general_alone else self._own_transform(audio)
+        warp, weight = (1.0, 0.0) if general_alone else self._own_transform(audio, similarity)
         # own models without weight are not evaluated: any features will do, and those of a long recording are large
         own = self._own_features(audio, warp) if weight > 0 else audio.mfcc().values
         general = audio.general_features if self.adaptation is None else self.adaptation.general_features(audio)
         return self.combined.hmm, combined_log_likelihoods(self.combined, own, weight, general)
 
-    def _own_transform(self, audio: AnalysedAudio) -> tuple[float, float]:
+    def _similarity(self, audio: AnalysedAudio) -> SpeakerSimilarity | None:
+        """Return the speaker similarity of a recording; None where nothing depends on it."""
+        if self.adaptation is not None or self.kind == "general":
+            return None
+        return speaker_similarity(self.own, audio)
+
+    def _own_transform(self, audio: AnalysedAudio, similarity: SpeakerSimilarity | None) -> tuple[float, float]:
         """Return the warp of the frequencies for the own models, and the weight of these models, 0 to 1."""
         if self.adaptation is not None:
             return self.adaptation.warp, self.adaptation.own_weight
-        similarity = speaker_similarity(self.own, audio)
+        similarity = similarity or speaker_similarity(self.own, audio)
         return similarity.warp, own_model_weight(similarity.score)
 
     def _own_features(self, audio: AnalysedAudio, warp: float) -> NDArray[np.float32]:
@@ -185,6 +309,20 @@ def cached_recogniser(own: UnitHmm, kind: str = "auto", adaptation: Adaptation |
 def own_model_weight(score: float) -> float:
     """Return the weight of own models beside the general ones, 0 to 1, at a speaker similarity score."""
     return min(max((score - NO_WEIGHT_SCORE) / (FULL_WEIGHT_SCORE - NO_WEIGHT_SCORE), 0.0), 1.0)
+
+
+def free_labels(loop: UnitLoop, path: NDArray[np.intp], first: int = 0) -> list[LabelledFrames]:
+    """Return the phones of a path through a loop [shape=(T,)] whose first frame is ``first``; noises are silence."""
+    phones, starts = units_of_path(loop, path)
+    return [
+        LabelledFrames(first + int(start), SILENCE if phone in NOISES else phone)
+        for phone, start in zip(phones, starts[:-1], strict=True)
+    ]
+
+
+def _first_frame(start_s: float) -> int:
+    """Return the first frame of a phone that ``_timeline`` made."""
+    return round(start_s * FRAME_RATE_HZ + 0.5) if start_s > 0 else 0
 
 
 def _timeline(labels: list[tuple[str, str]], bounds: NDArray[np.intp], duration_s: float) -> Timeline[Unit]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -16,6 +17,8 @@ DISCOUNT = 0.5
 """Subtracted from the count of every pair of units that occurred."""
 BIGRAM = {"bigram": ArraySpec(np.float32, "U U", -1e4, 0.1)}
 """How log probabilities are stored."""
+PERPLEXITY_STEPS = 200
+"""After so many steps the shares of the units hardly change."""
 ROW_TOLERANCE = 0.01
 """Largest error of a sum of stored probabilities."""
 
@@ -30,6 +33,16 @@ class Bigram:
     def __call__(self, unit: str, following: str) -> float:
         """Return log P(following | unit)."""
         return float(self.log_probability[self.units.index(unit), self.units.index(following)])
+
+    @cached_property
+    def perplexity(self) -> float:
+        """The number of next units among which an equally uncertain choice would be: exp(entropy rate)."""
+        move = np.exp(self.log_probability.astype(float))
+        move /= move.sum(axis=1, keepdims=True)
+        share = np.full(len(move), 1 / len(move))
+        for _ in range(PERPLEXITY_STEPS):
+            share = (share + share @ move) / 2  # the mean of two steps settles where single ones would alternate
+        return float(np.exp(-(share[:, None] * move * np.log(np.maximum(move, np.finfo(float).tiny))).sum()))
 
 
 def estimate_bigram(units: Sequence[str], sentences: Iterable[Sequence[str]]) -> Bigram:
