@@ -39,6 +39,23 @@ class TimedTranscript:
         """The words of all lines."""
         return tuple(word.word for line in self.lines for word in line.words)
 
+    def shifted(self, offset_s: float) -> TimedTranscript:
+        """Return the transcript with ``offset_s`` seconds added to all times."""
+
+        def moved(time_s: float | None) -> float | None:
+            return None if time_s is None else time_s + offset_s
+
+        return TimedTranscript(
+            tuple(
+                TranscriptLine(
+                    tuple(TimedWord(word.word, moved(word.start_s), moved(word.end_s)) for word in line.words),
+                    moved(line.start_s),
+                    moved(line.end_s),
+                )
+                for line in self.lines
+            )
+        )
+
     @property
     def has_times(self) -> bool:
         """Whether any line or word has a time."""
