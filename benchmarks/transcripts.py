@@ -5,8 +5,8 @@
 Sentences in the voices of flite, whose words' times are known, follow one another with pauses of up to three seconds,
 in noise 30 dB under the speech. The transcript is written as a file and read as a user's is; its times differ as the
 case says. One JSON object per case, each in a process of its own: ``median_ms``, ``p90_ms``: distance of the start of a
-word from the true one; ``lost``: share of the words that are more than half a second away; ``wall_s``: of reading the
-transcript and aligning it, features included; ``peak_mb``: of the process, the sound included.
+word from the true one; ``lost``: share of the words that are more than half a second away; ``wall_s``,
+``cpu_s``: of reading the transcript and aligning it, features included; ``peak_mb``: of the process, with the sound.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ import lipmotion
 from lipmotion.pipeline.corpus.prompts import prompts
 from lipmotion.pipeline.transcribe import read_transcript, transcribe
 from lipmotion.speech.analysed_audio import analysed
+from lipmotion.speech.audio_files import read_audio
 from lipmotion.speech.recogniser import Recogniser
 from lipmotion.speech.voices.installed import installed_voices, speak_sentences
 from lipmotion.types import Audio, TimedTranscript, Timeline, Unit
@@ -77,66 +78,96 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--minutes", type=float, default=60)
     parser.add_argument("--cases", default=",".join(CASES))
-    parser.add_argument("--one", nargs=2, metavar=("FOLDER", "CASE"), help=argparse.SUPPRESS)
+    parser.add_argument("--grid", type=Path, metavar="FOLDER", help="GRID speaker s1 in place of flite's voices")
+    parser.add_argument("--one", nargs=3, metavar=("FOLDER", "CASE", "RECOGNISER"), help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.one:
-        folder, case = options.one
-        print(json.dumps(_measured(Path(folder), CASES[case], case)), flush=True)
+        folder, case, recogniser = options.one
+        print(json.dumps(_measured(Path(folder), case, recogniser)), flush=True)
         return
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        samples, sentences = _speech(60 * options.minutes)
+        spoken = _grid_sentences(options.grid) if options.grid else _synthetic_sentences()
+        samples, sentences = _speech(spoken, 60 * options.minutes, shuffled=options.grid is None)
         np.save(folder / "speech.npy", samples)
         (folder / "said.json").write_text(json.dumps(sentences), encoding="utf-8")
+        recogniser = "general" if options.grid else "auto"  # the shipped model was trained on s1
         for case in options.cases.split(","):
-            subprocess.run([sys.executable, __file__, "--one", name, case.strip()], check=True)
+            subprocess.run([sys.executable, __file__, "--one", name, case.strip(), recogniser], check=True)
 
 
-def _speech(duration_s: float) -> tuple[NDArray[np.float32], list[list[Row]]]:
-    """Return speech, and its sentences as words in time."""
-    draw = np.random.default_rng(0)
+def _synthetic_sentences() -> list[tuple[NDArray[np.float32], list[Row]]]:
+    """Return sentences in the voices of flite: samples, and words in time."""
     texts = [prompt.text for prompt in prompts(count=400).chosen]
     texts = [text for text in texts if len(words_of(text)) > 2]
     voices = [voice for voice in installed_voices() if voice.synthesiser == "flite"]
     spoken = [item for voice in voices for item in zip(texts, speak_sentences(texts, voice), strict=True)]
+    timed = [(text, audio.samples, _word_times(units)) for text, (audio, units) in spoken]
+    return [
+        (samples, rows)
+        for text, samples, rows in timed
+        if tuple(word for word, *_ in rows) == words_of(text)  # else one is read otherwise
+    ]
+
+
+def _grid_sentences(folder: Path) -> list[tuple[NDArray[np.float32], list[Row]]]:
+    """Return the sentences of a GRID speaker's training list: samples, and words in time (unit 1/25000 s)."""
+    sentences = []
+    for name in (folder / "train.txt").read_text("utf-8").split():
+        rows = [row.split() for row in (folder / "align" / f"{name}.align").read_text("utf-8").splitlines()]
+        words = [
+            (word, int(start) / 25_000, int(end) / 25_000) for start, end, word in rows if word not in ("sil", "sp")
+        ]
+        sentences.append((read_audio(folder / "clips" / f"{name}.mkv").samples, words))
+    return sentences
+
+
+def _speech(
+    spoken: list[tuple[NDArray[np.float32], list[Row]]], duration_s: float, shuffled: bool
+) -> tuple[NDArray[np.float32], list[list[Row]]]:
+    """Return speech with pauses in noise, and its sentences; those of a shuffled list may come several times."""
+    draw = np.random.default_rng(0)
+    order = draw.integers(len(spoken), size=100_000) if shuffled else np.arange(len(spoken))
     pieces, sentences, at_s = [], [], 0.0
-    while at_s < duration_s:
-        text, (audio, units) = spoken[draw.integers(len(spoken))]
+    for number in order:
+        if at_s >= duration_s:
+            break
+        sound, rows = spoken[number]
         pause_s = float(draw.uniform(0.1, LONGEST_PAUSE_S))
         pause = np.zeros(int(pause_s * RATE_HZ), np.float32)
-        words = _word_times(units, at_s + len(pause) / RATE_HZ)
-        if tuple(word for word, *_ in words) == words_of(text):  # else one is read otherwise
-            sentences.append(words)
-            pieces += [pause, audio.samples]
-            at_s += (len(pause) + len(audio.samples)) / RATE_HZ
+        at_s += len(pause) / RATE_HZ
+        sentences.append([(word, start_s + at_s, end_s + at_s) for word, start_s, end_s in rows])
+        pieces += [pause, sound]
+        at_s += len(sound) / RATE_HZ
     samples = np.concatenate(pieces)
     level = 10 ** (NOISE_DB / 20) * float(np.sqrt(np.mean(samples**2)))
     return samples + draw.normal(0, level, len(samples)).astype(np.float32), sentences
 
 
-def _word_times(units: Timeline[Unit], offset_s: float = 0.0) -> list[Row]:
+def _word_times(units: Timeline[Unit]) -> list[Row]:
     """Return the words of a timeline with their times."""
     rows = []
     for word, spans in groupby(units, key=lambda span: span.label.word):
         inside = list(spans)
         if word:
-            rows.append((word, inside[0].start_s + offset_s, inside[-1].end_s + offset_s))
+            rows.append((word, inside[0].start_s, inside[-1].end_s))
     return rows
 
 
-def _measured(folder: Path, change: Change, name: str) -> dict[str, object]:
+def _measured(folder: Path, name: str, recogniser: str) -> dict[str, object]:
     """Return the figures of one case."""
     logging.basicConfig(format="%(message)s")
     sentences = [[tuple(row) for row in rows] for rows in json.loads((folder / "said.json").read_text("utf-8"))]
-    path = _written(folder, sentences, change)
+    path = _written(folder, sentences, CASES[name])
     audio = Audio(np.load(folder / "speech.npy"), RATE_HZ)
-    phones = Recogniser(lipmotion.load_model().phones, "auto")
-    start = time.perf_counter()
+    phones = Recogniser(lipmotion.load_model().phones, recogniser)
+    start, start_cpu = time.perf_counter(), time.process_time()
     transcript = read_transcript(path)
     words = transcript if isinstance(transcript, TimedTranscript) else words_of(transcript)
     analysed_audio = analysed(audio)
     units = transcribe(phones, analysed_audio, analysed_audio.mfcc(), words, Lexicon())
-    wall_s = time.perf_counter() - start
+    wall_s, cpu_s = time.perf_counter() - start, time.process_time() - start_cpu
+    peak_mb = round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
     errors_s = _errors(_word_times(units), [row for rows in sentences for row in rows])
     return {
         "case": name,
@@ -146,7 +177,8 @@ def _measured(folder: Path, change: Change, name: str) -> dict[str, object]:
         "p90_ms": round(1000 * float(np.quantile(errors_s, 0.9)), 1),
         "lost": round(float(np.mean(errors_s > LOST_S)), 4),
         "wall_s": round(wall_s, 1),
-        "peak_mb": round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024),
+        "cpu_s": round(cpu_s, 1),
+        "peak_mb": peak_mb,
     }
 
 

@@ -63,7 +63,7 @@ def anchors_of(transcript: TimedTranscript) -> Anchors:
             rows.append((_number(start_s), _number(end_s), tolerance_s))
     table = np.array(rows, float).reshape(-1, 3)
     differs = ~np.isclose(table[1:, :2], table[:-1, :2], equal_nan=True).all(axis=1)
-    return Anchors(*table.T, groups=np.append(0, np.cumsum(differs)))
+    return Anchors(table[:, 0], table[:, 1], table[:, 2], np.append(0, np.cumsum(differs)))
 
 
 def _number(time_s: float | None) -> float:

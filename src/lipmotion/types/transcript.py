@@ -59,9 +59,8 @@ class TimedTranscript:
     @property
     def has_times(self) -> bool:
         """Whether any line or word has a time."""
-        return any(
-            item.start_s is not None or item.end_s is not None for line in self.lines for item in (line, *line.words)
-        )
+        spans: list[TranscriptLine | TimedWord] = [*self.lines, *(word for line in self.lines for word in line.words)]
+        return any(span.start_s is not None or span.end_s is not None for span in spans)
 
 
 def in_order(lines: list[TranscriptLine]) -> TimedTranscript:
@@ -71,8 +70,8 @@ def in_order(lines: list[TranscriptLine]) -> TimedTranscript:
     """
     latest_s, keys = float("-inf"), []
     for line in lines:
-        starts_s = [item.start_s for item in (line, *line.words[:1]) if item.start_s is not None]
-        latest_s = starts_s[0] if starts_s else latest_s
+        start_s = line.words[0].start_s if line.start_s is None and line.words else line.start_s
+        latest_s = latest_s if start_s is None else start_s
         keys.append(latest_s)
     order = sorted(range(len(lines)), key=keys.__getitem__)
     return TimedTranscript(tuple(lines[i] for i in order if lines[i].words))

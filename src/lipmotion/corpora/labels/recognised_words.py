@@ -8,10 +8,10 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
-from lipmotion.corpora.labels.spoken_text import check_word_count, lines_by_pauses, spoken_text, timed_words
 from lipmotion.corpora.labels.tier import check_count
 from lipmotion.errors import InputError, shortened
 from lipmotion.types import TimedTranscript, TimedWord, TranscriptLine, in_order
+from lipmotion.units.spoken_text import check_word_count, lines_by_pauses, spoken_text, timed_words
 
 BLANK = re.compile(r"\s*")
 DECODER = json.JSONDecoder()

@@ -7,11 +7,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from io import StringIO
 
-from lipmotion.corpora.labels.spoken_text import check_word_count, speaker_names, spoken_text, timed_words
 from lipmotion.corpora.labels.tier import check_count
 from lipmotion.errors import InputError, shortened
 from lipmotion.types import TimedTranscript, TimedWord, TranscriptLine, in_order
 from lipmotion.units import words_in
+from lipmotion.units.spoken_text import check_word_count, speaker_names, spoken_text, timed_words
 
 CUE = re.compile(r"^.{0,40}\d\s*-->\s*\d", re.MULTILINE)
 """The times of a subtitle."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 from io import StringIO
 
-from lipmotion.corpora.labels.spoken_text import check_word_count, lines_by_pauses, spoken_text, timed_words
 from lipmotion.corpora.labels.tier import SILENCES, check_count, required_time
 from lipmotion.errors import InputError, shortened
 from lipmotion.types import TimedTranscript, TimedWord, in_order
+from lipmotion.units.spoken_text import check_word_count, lines_by_pauses, spoken_text, timed_words
 
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,3})?|nan|inf"
 LINE = re.compile(rf"(\S+)\s+(\S+)\s+({NUMBER})\s+({NUMBER})\s+(\S+)(?:\s+(?:{NUMBER}|NA))?(?:\s.*)?")

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 
 from lipmotion.errors import InputError
 from lipmotion.types import TimedWord, TranscriptLine
-from lipmotion.units import words_in
+from lipmotion.units.transcript import words_in
 
 TAG = re.compile(r"</?[a-zA-Z!][^<>]{0,200}>|<[\d:.]{1,20}>|\{[^{}]{0,200}\}")
 """Tags of SubRip and WebVTT (``<i>``, ``<v Anna>``, ``<00:01.500>``), of SubStation (``{\\an8}``), and ``<unk>``."""
