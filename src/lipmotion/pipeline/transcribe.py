@@ -41,7 +41,8 @@ def transcribe(
     Raises AlignmentError: the words cannot be aligned with the recording.
     """
     if isinstance(words, TimedTranscript):
-        words = fitted(words, loud_frames(features.values[:, LOG_ENERGY], ENERGY_SMOOTHING_FRAMES))
+        loud = loud_frames(features.values[:, LOG_ENERGY], ENERGY_SMOOTHING_FRAMES)
+        words = fitted(words, loud, audio.duration_s)
     warn_of_guesses(words.words if isinstance(words, TimedTranscript) else words or (), lexicon)
     units = phones_in_time(phones, audio, features, words, lexicon)
     if words is not None and phones.kind != "own":

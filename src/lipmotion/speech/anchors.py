@@ -70,12 +70,13 @@ def _number(time_s: float | None) -> float:
     return np.nan if time_s is None else time_s
 
 
-def fitted(transcript: TimedTranscript, loud: NDArray[np.bool_]) -> TimedTranscript:
+def fitted(transcript: TimedTranscript, loud: NDArray[np.bool_], duration_s: float) -> TimedTranscript:
     """Return a transcript whose times fit a recording as a whole.
 
     If all are late or early they are corrected; lines that begin after the end of the recording are left out. Both are
     logged as warnings.
-    loud : which frames are loud [shape=(T,)]
+    loud       : which frames are loud [shape=(T,)]
+    duration_s : of the recording
     Raises InputError: all lines begin after the end.
     """
     late_s = lateness_s(transcript, loud)
@@ -83,7 +84,7 @@ def fitted(transcript: TimedTranscript, loud: NDArray[np.bool_]) -> TimedTranscr
         which = "late" if late_s > 0 else "early"
         LOG.warning("the times of the transcript are %.1f s %s; corrected", abs(late_s), which)
         transcript = transcript.shifted(-late_s)
-    return _within(transcript, len(loud) / FRAME_RATE_HZ)
+    return _within(transcript, duration_s)
 
 
 def _within(transcript: TimedTranscript, duration_s: float) -> TimedTranscript:
