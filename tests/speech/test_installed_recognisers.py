@@ -15,7 +15,7 @@ import pytest
 from lipmotion.errors import InputError, MissingDependencyError
 from lipmotion.speech import installed_recognisers
 from lipmotion.speech.installed_recognisers import recognise_words
-from lipmotion.types import Audio
+from lipmotion.types import Audio, TimedTranscript
 
 WORDS = [(" See", 0.1, 0.5), (" five,", 0.6, 1.0), (" 20-foot", 1.0, 1.6)]
 AUDIO = Audio(np.linspace(-1, 1, 20_000, dtype=np.float32), 16_000)
@@ -104,7 +104,7 @@ def vosk(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[bytes]:
     return heard
 
 
-def check_words(transcript: object) -> None:
+def check_words(transcript: TimedTranscript | None) -> None:
     assert transcript is not None
     assert transcript.words == ("see", "five", "twenty", "foot")
     times = [time for word in transcript.lines[0].words for time in (word.start_s, word.end_s)]

@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -117,12 +118,12 @@ def test_lines_in_time(read: Read, kind: str) -> None:
     assert [time for line in found for time in line[:2]] == pytest.approx([time for line in HELLO for time in line[:2]])
 
 
-def segment(first: int, end: int, name: str = "word", space: str = " ") -> dict[str, object]:
+def segment(first: int, end: int, name: str = "word", space: str = " ") -> dict[str, Any]:
     items = [{name: space + word, "start": start_s, "end": end_s} for word, start_s, end_s in HELLO_WORDS[first:end]]
     return {"start": items[0]["start"], "end": items[-1]["end"], "text": "ignored", "words": items}
 
 
-VOSK = [{"result": segment(0, 2, space="")["words"], "text": "hello there"}, {"text": ""}]
+VOSK: list[dict[str, Any]] = [{"result": segment(0, 2, space="")["words"], "text": "hello there"}, {"text": ""}]
 VOSK += [{"result": segment(2, 5, space="")["words"], "text": "how are you"}]
 OF_WORDS = {
     "Whisper": json.dumps({"text": "", "segments": [segment(0, 2), segment(2, 5)]}),
