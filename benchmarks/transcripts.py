@@ -157,7 +157,7 @@ def _measured(folder: Path, name: str, recogniser: str) -> dict[str, object]:
     """Return the figures of one case."""
     logging.basicConfig(format="%(message)s")
     sentences = [[tuple(row) for row in rows] for rows in json.loads((folder / "said.json").read_text("utf-8"))]
-    path = _written(folder, sentences, CASES[name])
+    path, kept = _written(folder, sentences, CASES[name])
     audio = Audio(np.load(folder / "speech.npy"), RATE_HZ)
     phones = Recogniser(lipmotion.load_model().phones, recogniser)
     start, start_cpu = time.perf_counter(), time.process_time()
@@ -167,7 +167,7 @@ def _measured(folder: Path, name: str, recogniser: str) -> dict[str, object]:
     units = transcribe(phones, analysed_audio, analysed_audio.mfcc(), words, Lexicon())
     wall_s, cpu_s = time.perf_counter() - start, time.process_time() - start_cpu
     peak_mb = _peak_mb()
-    errors_s = _errors(_word_times(units), [row for rows in sentences for row in rows])
+    errors_s = _errors(_word_times(units), [row for rows in kept for row in rows])
     return {
         "case": name,
         "minutes": round(audio.duration_s / 60, 1),
@@ -188,7 +188,7 @@ def _peak_mb() -> int:
 
 
 def _errors(found: list[Row], true: list[Row]) -> NDArray[np.float64]:
-    """Return how far the starts of words are from the true ones, of those that both have."""
+    """Return how far the starts of words are from the true ones; equal words that meet may be one of either."""
     pairs = SequenceMatcher(None, [row[0] for row in found], [row[0] for row in true], autojunk=False)
     return np.array(
         [
@@ -199,8 +199,8 @@ def _errors(found: list[Row], true: list[Row]) -> NDArray[np.float64]:
     )
 
 
-def _written(folder: Path, sentences: list[list[Row]], change: Change) -> Path:
-    """Write the transcript of a case; return its file."""
+def _written(folder: Path, sentences: list[list[Row]], change: Change) -> tuple[Path, list[list[Row]]]:
+    """Write the transcript of a case; return its file, and the true times of the sentences that it has."""
     draw = np.random.default_rng(1)
     kept = [rows for rows in sentences if draw.random() >= change.missing]
     path = folder / f"transcript.{change.form}"
@@ -224,7 +224,7 @@ def _written(folder: Path, sentences: list[list[Row]], change: Change) -> Path:
             segments.append({"start": words[0]["start"], "end": words[-1]["end"], "text": "", "words": words})
         text = json.dumps({"text": "", "segments": segments})
     path.write_text(text, encoding="utf-8")
-    return path
+    return path, kept
 
 
 def _clock(time_s: float) -> str:

@@ -1,29 +1,30 @@
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lipmotion.errors import InputError
-from lipmotion.hmm.align import SpokenWord
+from lipmotion.hmm.align import PlacedWord, SpokenWord
 from lipmotion.kernels.windowed_viterbi import Windows
 from lipmotion.speech import anchors as module
 from lipmotion.speech.anchors import (
+    FREE_FRAMES,
     LINE_TOLERANCE_S,
-    WIDEST_S,
     WORD_TOLERANCE_S,
     align_within,
     anchors_of,
     feasible_windows,
     fitted,
+    group_fits,
     lateness_s,
     pressed_words,
     windows_of,
 )
 from lipmotion.types import TimedTranscript, TimedWord, TranscriptLine
-
-NOISE = SpokenWord(-1, 0, ("sil",))
 
 
 def line(text: str, start_s: float | None = None, end_s: float | None = None) -> TranscriptLine:
@@ -47,15 +48,15 @@ def test_words_have_the_times_of_their_line_or_their_own():
 def test_windows_are_the_times_and_the_tolerance():
     found = anchors_of(transcript(line("a b", 2.0, 3.0), line("c", 5.0, 6.0)))
     windows = windows_of(found, found.tolerance_s, 1000)
-    assert windows.first.tolist() == [100, 100, 400]
-    assert windows.end.tolist() == [401, 401, 701]
+    assert windows.first.tolist() == [150, 150, 450]
+    assert windows.end.tolist() == [351, 351, 651]
 
 
 def test_words_without_times_lie_between_those_that_have_some():
     found = anchors_of(transcript(line("a"), line("b", 2.0, 3.0), line("c d"), line("e", 8.0, 9.0), line("f")))
     windows = windows_of(found, found.tolerance_s, 1200)
-    assert windows.first.tolist() == [0, 100, 100, 100, 700, 700]
-    assert windows.end.tolist() == [401, 401, 1001, 1001, 1001, 1200]
+    assert windows.first.tolist() == [0, 150, 150, 150, 750, 750]
+    assert windows.end.tolist() == [351, 351, 951, 951, 951, 1200]
 
 
 times = st.one_of(st.none(), st.floats(-5, 40))
@@ -79,6 +80,13 @@ def test_windows_of_any_times_are_in_order_and_hold_what_is_known(spans, frames)
             assert at <= min(end, frames - 3)
 
 
+def test_no_word_may_begin_before_those_ahead_of_it():
+    found = anchors_of(transcript(line("a", 5.0, 9.0), line("b", 6.0, 7.0), line("c", 5.5, 20.0)))
+    windows = windows_of(found, found.tolerance_s, 3000)
+    assert windows.first.tolist() == [450, 550, 550]
+    assert windows.end.tolist() == [751, 751, 2051]
+
+
 def test_windows_without_room_are_widened_where_it_lacks():
     crowded = [line("a", 1.0, 2.0), line(" ".join("b" * 100), 20.0, 20.5), line("c", 60.0, 61.0)]
     found = anchors_of(transcript(*crowded))
@@ -89,8 +97,13 @@ def test_windows_without_room_are_widened_where_it_lacks():
     assert windows.end[100] - windows.first[1] >= 900
 
 
-def found_words(*starts: int) -> list[tuple[SpokenWord, int]]:
-    return [(NOISE, 0), *((SpokenWord(word, 0, ("a",)), start) for word, start in enumerate(starts))]
+def found_words(*starts: int, fits: Sequence[float] | None = None) -> list[PlacedWord]:
+    silence = PlacedWord(SpokenWord(-1, 0, ("sil",)), 0, -1.0)
+    words = [
+        PlacedWord(SpokenWord(word, 0, ("a",)), start, fit)
+        for word, (start, fit) in enumerate(zip(starts, fits or [-1.0] * len(starts), strict=True))
+    ]
+    return [silence, *words]
 
 
 def test_words_that_begin_or_end_with_their_window_are_pressed():
@@ -100,58 +113,81 @@ def test_words_that_begin_or_end_with_their_window_are_pressed():
     assert pressed_words(found_words(20, 150, 300), windows, 500).tolist() == [True, True, False]
 
 
+def test_the_fit_of_a_time_is_that_of_its_frames():
+    placed = found_words(10, 20, 50, fits=[-1.0, -4.0, -2.0])
+    assert group_fits(placed, np.array([0, 0, 1]), 60).tolist() == pytest.approx([-3.25, -2.0])
+
+
 class Search:
-    """A search that finds the words at true places, as far as their windows allow."""
+    """A search that finds the words at true places, as far as their windows allow; elsewhere they fit badly."""
 
-    def __init__(self, starts: list[int]):
+    def __init__(self, starts: list[int], elsewhere: float = -8.0):
         self.starts = np.array(starts)
-        self.asked: list[Windows | None] = []
+        self.elsewhere = elsewhere
+        self.asked: list[Windows] = []
 
-    def __call__(self, windows: Windows | None) -> list[tuple[SpokenWord, int]]:
+    def __call__(self, windows: Windows) -> list[PlacedWord]:
         self.asked.append(windows)
-        return found_words(*(self.starts if windows is None else np.maximum(self.starts, windows.first)))
+        starts = np.clip(self.starts, windows.first, windows.end - 1)
+        return found_words(*starts, fits=np.where(starts == self.starts, -1.0, self.elsewhere).tolist())
 
 
-def many_lines(count: int, late_s: float = 0.0) -> TimedTranscript:
-    return transcript(*(line("a", 10.0 * n + late_s, 10.0 * n + 1 + late_s) for n in range(1, count + 1)))
+def many_lines(count: int) -> TimedTranscript:
+    return transcript(*(line("a", 10.0 * n, 10.0 * n + 1) for n in range(1, count + 1)))
+
+
+def aligned(search: Search, frames: int = 12_000) -> list[int]:
+    count = len(search.starts)
+    placed, _ = align_within(anchors_of(many_lines(count)), np.full(count, 3, np.intp), 3, frames, search)
+    return [item.start for item in placed[1:]]
 
 
 def test_times_that_fit_are_used_at_once(caplog):
     search = Search([1000 * n for n in range(1, 11)])
-    found, windows = align_within(anchors_of(many_lines(10)), np.full(10, 3, np.intp), 3, 12_000, search)
-    assert [start for _, start in found] == [0, *search.starts]
-    assert windows is not None
+    assert aligned(search) == search.starts.tolist()
     assert len(search.asked) == 1
     assert not caplog.records
 
 
-def test_a_time_that_is_late_is_widened_until_the_word_fits(caplog):
+@pytest.mark.parametrize("late", [-350, 450])
+def test_a_time_that_is_wrong_is_widened_until_the_word_fits(late, caplog):
     starts = [1000 * n for n in range(1, 11)]
-    starts[4] -= 350
-    found, _ = align_within(anchors_of(many_lines(10)), np.full(10, 3, np.intp), 3, 12_000, search := Search(starts))
-    assert [start for _, start in found] == [0, *starts]
-    assert len(search.asked) == 3
+    starts[4] += late
+    search = Search(starts)
+    assert aligned(search) == starts
+    assert 2 < len(search.asked) < 9
+    first = np.array([windows.first for windows in search.asked])
+    assert (first[-1] != first[0]).tolist() == [n == 4 for n in range(10)]
     assert not caplog.records
+
+
+def test_a_word_that_presses_stays_where_it_does_not_fit_better_elsewhere():
+    """As beside speech that is not in the transcript."""
+    starts = [1000 * n for n in range(1, 11)]
+    starts[4] += 350
+    found = aligned(search := Search(starts, elsewhere=-0.9))
+    assert found[:4] + found[5:] == starts[:4] + starts[5:]
+    assert found[4] == search.asked[0].end[4] - 1
 
 
 def test_a_time_far_off_is_reported(caplog):
     starts = [1000 * n for n in range(1, 11)]
-    starts[4] -= 950
-    found, windows = align_within(anchors_of(many_lines(10)), np.full(10, 3, np.intp), 3, 12_000, Search(starts))
-    assert windows is not None
-    assert found[5][1] == pytest.approx(5000 - 100 * WIDEST_S)
+    starts[4:7] = [start - 950 for start in starts[4:7]]
+    found = aligned(Search(starts, elsewhere=-9.0), frames=FREE_FRAMES + 1)
+    assert found[:4] == starts[:4]
     (record,) = caplog.records
-    message = "1 of the 10 times of the transcript do not fit the sound within 8 s, the first at 50.00 s"
+    message = "at 3 of the 10 times of the transcript the words do not fit the sound, first at 50.00 s; check them"
     assert record.getMessage() == message
 
 
 def test_times_of_something_else_are_not_used(caplog):
     starts = [1000 * n - 950 for n in range(1, 11)]
-    found, windows = align_within(anchors_of(many_lines(10)), np.full(10, 3, np.intp), 3, 12_000, Search(starts))
-    assert windows is None
-    assert [start for _, start in found] == [0, *starts]
+    assert aligned(Search(starts)) == starts
     (record,) = caplog.records
-    assert record.getMessage().endswith("do not fit the sound within 8 s; no time is used")
+    assert record.getMessage() == "the times of the transcript do not fit the sound; they are not used"
+    caplog.clear()
+    assert aligned(Search(starts), frames=FREE_FRAMES + 1) != starts  # too long for that
+    assert "at 10 of the 10 times" in caplog.text
 
 
 def loud_at(spans: list[tuple[float, float]], duration_s: float) -> np.ndarray:

@@ -15,6 +15,8 @@ from lipmotion.hmm.model import UnitHmm
 from lipmotion.hmm.network import Network, NetworkBuilder
 from lipmotion.kernels.windowed_viterbi import Windows
 
+FIT_BLOCK = 2048
+"""Frames whose log densities are in memory at a time."""
 FEW_ARCS, ARCS_A_FRAME = 1_000_000, 10
 """The largest number of arcs of a network, and how many more for each frame; sentences need about one a frame."""
 
@@ -105,6 +107,20 @@ class SpokenWord(NamedTuple):
     units: tuple[str, ...]
 
 
+class PlacedWord(NamedTuple):
+    """A word or a silence as it was pronounced, and where.
+
+    spoken : the pronunciation
+    start  : its first frame
+    fit    : by how much its states are less probable than the best of all states, the mean of its frames in nats, 0 or
+             less; NaN where it was not asked for
+    """
+
+    spoken: SpokenWord
+    start: int
+    fit: float
+
+
 def choose_pronunciations(
     hmm: UnitHmm, log_likelihoods: LogLikelihoods, words: Sequence[Sequence[Sequence[str]]], pause: str
 ) -> list[SpokenWord]:
@@ -115,19 +131,20 @@ def choose_pronunciations(
     Only states without context are used: then the states of a pronunciation do not depend on the words beside it.
     Raises AlignmentError: the words do not fit into the frames.
     """
-    return [item for item, _ in pronunciations_in_time(hmm, log_likelihoods, words, pause)]
+    return [item.spoken for item in place_words(hmm, log_likelihoods, words, pause)]
 
 
-def pronunciations_in_time(
+def place_words(
     hmm: UnitHmm,
     log_likelihoods: LogLikelihoods,
     words: Sequence[Sequence[Sequence[str]]],
     pause: str,
     windows: Windows | None = None,
-) -> list[tuple[SpokenWord, int]]:
-    """Return what ``choose_pronunciations`` does, each with its first frame.
+) -> list[PlacedWord]:
+    """Return what ``choose_pronunciations`` does, each with its place.
 
-    windows : of the words: the frames that each may have; a pause may have those of both words beside it
+    windows : of the words: the frames that each may have; a pause may have those of both words beside it; with windows
+              the fit is computed
     Raises AlignmentError: the words do not fit into the frames, or into their windows.
     """
     _check_room(hmm, log_likelihoods, words)
@@ -160,9 +177,26 @@ def pronunciations_in_time(
     if windows is not None:
         of_slots = _slot_windows(windows, log_likelihoods.frames)
         of_states = Windows(of_slots.first[slot_of], of_slots.end[slot_of])
-    path = builder.build().best_path(log_likelihoods, plain, windows=of_states)
-    starts = np.flatnonzero(np.diff(np.array(slot_of)[path], prepend=-1)).tolist()
-    return [(owners[path[start]], start) for start in starts]
+    network = builder.build()
+    path = network.best_path(log_likelihoods, plain, windows=of_states)
+    starts = np.flatnonzero(np.diff(np.array(slot_of)[path], prepend=-1))
+    fits = np.full(len(starts), np.nan)
+    if windows is not None:
+        fits = _fits(log_likelihoods, plain, network.emission[path], starts)
+    placed = zip(path[starts].tolist(), starts.tolist(), fits.tolist(), strict=True)
+    return [PlacedWord(owners[state], start, fit) for state, start, fit in placed]
+
+
+def _fits(
+    log_likelihoods: LogLikelihoods, chosen: NDArray[np.intp], densities: NDArray[np.intp], starts: NDArray[np.intp]
+) -> NDArray[np.float64]:
+    """Return the fit of stretches of a path, given the density of each frame, and the first frame of each stretch."""
+    fit = np.empty(len(densities))
+    for first in range(0, len(densities), FIT_BLOCK):
+        end = min(first + FIT_BLOCK, len(densities))
+        values = log_likelihoods.log_density(first, end, chosen)
+        fit[first:end] = values[np.arange(end - first), densities[first:end]] - values.max(axis=1)
+    return np.add.reduceat(fit, starts) / np.diff(starts, append=len(densities))
 
 
 def _slot_windows(windows: Windows, frames: int) -> Windows:

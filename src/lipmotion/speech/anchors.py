@@ -10,25 +10,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.hmm.align import SpokenWord
+from lipmotion.hmm.align import PlacedWord
 from lipmotion.kernels.windowed_viterbi import Windows
 from lipmotion.types import FRAME_RATE_HZ, TimedTranscript
 
 LOG = logging.getLogger("lipmotion")
-LINE_TOLERANCE_S, WORD_TOLERANCE_S = 1.0, 0.5
+LINE_TOLERANCE_S, WORD_TOLERANCE_S = 0.5, 0.25
 """By how much lines and words may be earlier or later than their times say, at first."""
-WIDEST_S = 8.0
-"""A tolerance that is widened as long as words press against it goes up to this."""
+WIDER, LEAST_IMPROVEMENT = (2, 4, 8, 16), 0.2
+"""Where words press against their windows or fit badly, the tolerance becomes so many times as wide, step by step, and
+stays so if the words then fit better, in nats a frame."""
+BAD_FIT, WORST_FIT = -3.5, -6.0
+"""Words that fit worse than the first, in nats a frame, may be elsewhere; worse than the second, they are not there."""
+FREE_FRAMES = 60_000
+"""A recording of up to so many frames, ten minutes, is aligned without times where these are of something else."""
 NEIGHBOURS = 3
-"""So many words on each side of one that presses against its window, and all that share its time, are widened, too."""
-DOUBTED_SHARE = 0.3
-"""If so large a share of the times does not fit within ``WIDEST_S``, they are those of something else."""
+"""So many words on each side of one without room, and all that share its time, get a wider window, too."""
 MOST_SHIFT_S, LEAST_CORRELATION, LEAST_GAIN, FEWEST_TIMES = 120.0, 0.3, 0.15, 20
 """A shift of all times, of so many or more, is searched up to the first, and corrected from these correlations on."""
 MOST_WIDENINGS = 40
 """Windows without room are doubled so many times; then they are opened altogether."""
-Spoken = list[tuple[SpokenWord, int]]
-"""Words, pauses and silences, each with its first frame, as ``hmm.align.pronunciations_in_time`` returns them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,13 +148,13 @@ def _correlations(heard: NDArray[np.float64], spoken: NDArray[np.float64]) -> ND
 def windows_of(anchors: Anchors, tolerance_s: NDArray[np.float64], frames: int) -> Windows:
     """Return the frames that each word may have.
 
-    A word without a time has those between the words with times around it. Where times are out of order the windows
-    are widened until they are in order.
+    A word without a time has those between the words with times around it. No word may begin before those ahead of it
+    may, nor end after those behind it may; where times are out of order that leaves no room (``feasible_windows``).
     """
     first = np.floor((anchors.start_s - tolerance_s) * FRAME_RATE_HZ)
     end = np.ceil((anchors.end_s + tolerance_s) * FRAME_RATE_HZ) + 1
     first, end = _filled(first, 0.0), _filled(end[::-1], float(frames))[::-1]
-    first, end = np.minimum.accumulate(first[::-1])[::-1], np.maximum.accumulate(end)
+    first, end = np.maximum.accumulate(first), np.minimum.accumulate(end[::-1])[::-1]
     return Windows(np.clip(first, 0, frames).astype(np.intp), np.clip(end, 0, frames).astype(np.intp))
 
 
@@ -202,51 +203,114 @@ def _widened(anchors: Anchors, tolerance_s: NDArray[np.float64], chosen: NDArray
     return np.where(near, 2 * tolerance_s, tolerance_s)
 
 
-def pressed_words(spoken: Spoken, windows: Windows, frames: int) -> NDArray[np.bool_]:
+def pressed_words(placed: Sequence[PlacedWord], windows: Windows, frames: int) -> NDArray[np.bool_]:
     """Return which words begin with their window, or end with it: they might belong outside [shape=(W,)]."""
     pressed = np.zeros(len(windows.first), bool)
-    starts = [start for _, start in spoken] + [frames]
-    for (item, start), stop in zip(spoken, starts[1:], strict=True):
-        if item.word >= 0:
-            first, end = windows.first[item.word], windows.end[item.word]
-            pressed[item.word] = (0 < first == start) or (frames > end == stop)
+    ends = [item.start for item in placed[1:]] + [frames]
+    for item, stop in zip(placed, ends, strict=True):
+        word = item.spoken.word
+        if word >= 0:
+            first, end = windows.first[word], windows.end[word]
+            pressed[word] = (0 < first == item.start) or (frames > end == stop)
     return pressed
 
 
+def group_fits(placed: Sequence[PlacedWord], groups: NDArray[np.intp], frames: int) -> NDArray[np.float64]:
+    """Return the fit of the words of each time, the mean over their frames [shape=(groups,)]."""
+    total, count = np.zeros(int(groups[-1]) + 1), np.zeros(int(groups[-1]) + 1)
+    ends = [item.start for item in placed[1:]] + [frames]
+    for item, stop in zip(placed, ends, strict=True):
+        if item.spoken.word >= 0:
+            group = groups[item.spoken.word]
+            total[group] += item.fit * (stop - item.start)
+            count[group] += stop - item.start
+    return total / np.maximum(count, 1)
+
+
 def align_within(
-    anchors: Anchors, least: NDArray[np.intp], edge: int, frames: int, search: Callable[[Windows | None], Spoken]
-) -> tuple[Spoken, Windows | None]:
-    """Return words aligned within their windows, and these; None: the times are not used.
+    anchors: Anchors,
+    least: NDArray[np.intp],
+    edge: int,
+    frames: int,
+    search: Callable[[Windows], list[PlacedWord]],
+) -> tuple[list[PlacedWord], Windows]:
+    """Return words aligned within their windows, and these.
 
     least, edge : as of ``feasible_windows``
-    search      : aligns within windows, or without
-    Where words press against their windows, these are doubled, up to ``WIDEST_S``; what still does not fit is logged as
-    a warning. If that is true of ``DOUBTED_SHARE`` of the times, none is used.
+    search      : aligns within windows, with the fit of each word
+    Where words press against their windows, or fit badly, these are widened step by step, and stay so if the words then
+    fit better by ``LEAST_IMPROVEMENT``: words also press where speech beside them is not in the transcript. If all fit
+    badly even so, the words of a recording of up to ``FREE_FRAMES`` are aligned without times; if they fit better then,
+    the times are not used. What fits badly in the end is logged as a warning.
     """
-    tolerance_s = anchors.tolerance_s
-    while True:
-        windows, tolerance_s = feasible_windows(anchors, tolerance_s, least, edge, frames)
-        spoken = search(windows)
-        pressed = pressed_words(spoken, windows, frames)
-        again = pressed & (tolerance_s < WIDEST_S)
-        if not again.any():
+    placed, windows, tolerance_s = _placed(anchors, anchors.tolerance_s, least, edge, frames, search)
+    for factor in WIDER:
+        fits = group_fits(placed, anchors.groups, frames)
+        wider_s = np.maximum(factor * anchors.tolerance_s, tolerance_s)
+        doubted = fits < BAD_FIT
+        doubted[anchors.groups[pressed_words(placed, windows, frames)]] = True
+        doubted &= np.isin(np.arange(len(fits)), anchors.groups[tolerance_s < wider_s])
+        if not doubted.any():
             break
-        tolerance_s = _widened(anchors, tolerance_s, again)
-    doubted = np.unique(anchors.groups[pressed])
-    if not len(doubted):
-        return spoken, windows
-    total = int(anchors.groups[-1]) + 1
-    if len(doubted) >= DOUBTED_SHARE * total:
+        wide_s = np.where(doubted[anchors.groups], wider_s, tolerance_s)
+        wide = _placed(anchors, wide_s, least, edge, frames, search)
+        gain = group_fits(wide[0], anchors.groups, frames) - fits
+        better = doubted & (np.maximum(gain, _beside(gain)) >= LEAST_IMPROVEMENT)
+        if (better == doubted).all():
+            placed, windows, tolerance_s = wide
+        elif better.any():
+            kept_s = np.where(better[anchors.groups], wider_s, tolerance_s)
+            placed, windows, tolerance_s = _placed(anchors, kept_s, least, edge, frames, search)
+    free = _free(placed, anchors, frames, search)
+    if free is not None:
+        return free
+    _warn_of_misfits(group_fits(placed, anchors.groups, frames), anchors)
+    return placed, windows
+
+
+def _placed(
+    anchors: Anchors,
+    tolerance_s: NDArray[np.float64],
+    least: NDArray[np.intp],
+    edge: int,
+    frames: int,
+    search: Callable[[Windows], list[PlacedWord]],
+) -> tuple[list[PlacedWord], Windows, NDArray[np.float64]]:
+    """Return words aligned within windows that have room, these windows, and their tolerances."""
+    windows, tolerance_s = feasible_windows(anchors, tolerance_s, least, edge, frames)
+    return search(windows), windows, tolerance_s
+
+
+def _free(
+    placed: list[PlacedWord], anchors: Anchors, frames: int, search: Callable[[Windows], list[PlacedWord]]
+) -> tuple[list[PlacedWord], Windows] | None:
+    """Return words aligned without times, if those that are aligned within them fit badly, and fit better so."""
+    everywhere = np.zeros(len(anchors.groups), np.intp)
+    fit = float(group_fits(placed, everywhere, frames)[0])
+    if fit >= BAD_FIT or frames > FREE_FRAMES:
+        return None
+    windows = Windows(everywhere, np.full(len(everywhere), frames, np.intp))
+    free = search(windows)
+    if float(group_fits(free, everywhere, frames)[0]) < fit + LEAST_IMPROVEMENT:
+        return None
+    LOG.warning("the times of the transcript do not fit the sound; they are not used")
+    return free, windows
+
+
+def _warn_of_misfits(fits: NDArray[np.float64], anchors: Anchors) -> None:
+    """Log a warning of the times whose words, and those beside them, fit the sound very badly."""
+    wrong = np.flatnonzero(_beside(fits) < WORST_FIT)
+    if len(wrong):
         LOG.warning(
-            "%d of the %d times of the transcript do not fit the sound within %g s; no time is used",
-            *(len(doubted), total, WIDEST_S),
+            "at %d of the %d times of the transcript the words do not fit the sound, first at %.2f s; check them",
+            *(len(wrong), len(fits), _first_time(anchors, int(wrong[0]))),
         )
-        return search(None), None
-    LOG.warning(
-        "%d of the %d times of the transcript do not fit the sound within %g s, the first at %.2f s",
-        *(len(doubted), total, WIDEST_S, _first_time(anchors, int(doubted[0]))),
-    )
-    return spoken, windows
+
+
+def _beside(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the mean of each value and those beside it."""
+    count = np.convolve(np.ones(len(values)), np.ones(3))[1:-1]
+    return np.convolve(values, np.ones(3))[1:-1] / count
 
 
 def _first_time(anchors: Anchors, group: int) -> float:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError, InputError
-from lipmotion.hmm.align import SpokenWord, align_units, pronunciations_in_time, unit_windows
+from lipmotion.hmm.align import PlacedWord, SpokenWord, align_units, place_words, unit_windows
 from lipmotion.hmm.decode import UnitLoop, decode_units, unit_loop
 from lipmotion.hmm.log_likelihoods import LogLikelihoods, log_likelihoods_of, penalise_silence, penalise_speech
 from lipmotion.hmm.loudness import loud_frames, quiet_frames
@@ -190,17 +190,18 @@ def _aligned(
 ) -> tuple[list[SpokenWord], NDArray[np.intp]]:
     """Return words as they were pronounced, with silences and pauses, and the bounds of their units in frames."""
 
-    def search(windows: Windows | None) -> list[tuple[SpokenWord, int]]:
-        return pronunciations_in_time(hmm, log_likelihoods, words, PAUSE, windows)
+    def search(windows: Windows | None) -> list[PlacedWord]:
+        return place_words(hmm, log_likelihoods, words, PAUSE, windows)
 
-    frames, counts = log_likelihoods.frames, dict(zip(hmm.table.units, hmm.table.counts, strict=True))
+    of_units = None
     if anchors is None:
-        in_time, windows = search(None), None
+        spoken = [item.spoken for item in search(None)]
     else:
-        edge = counts[hmm.table.free[0]]
-        in_time, windows = align_within(anchors, least_frames(words, counts), edge, frames, search)
-    spoken = [item for item, _ in in_time]
-    of_units = unit_windows(spoken, windows, frames) if windows is not None else None
+        counts = dict(zip(hmm.table.units, hmm.table.counts, strict=True))
+        edge, frames = counts[hmm.table.free[0]], log_likelihoods.frames
+        placed, windows = align_within(anchors, least_frames(words, counts), edge, frames, search)
+        spoken = [item.spoken for item in placed]
+        of_units = unit_windows(spoken, windows, frames)
     return spoken, align_units(hmm, log_likelihoods, [unit for item in spoken for unit in item.units], of_units)
 
 
