@@ -122,12 +122,12 @@ def test_outputs_are_checked_before_work_begins(run: RunCommand, options: list[s
 def test_files_that_are_not_what_they_should_be(
     run: RunCommand, basics: tuple[object, ...], here: Path, toy_speech: Path, newer_model: Path
 ) -> None:
-    (here / "latin.txt").write_bytes("näh".encode("latin-1"))
+    (here / "control.txt").write_bytes(b"\xe4\x81")
     (here / "empty.txt").touch()
     (here / "lexicon.txt").write_text("bin B IH N\nbam B Q\n")
     before = sorted(here.iterdir())
     wrong: list[tuple[list[object], int, str]] = [
-        (["--transcript", "latin.txt"], 3, "latin.txt: not a readable UTF-8 transcript"),
+        (["--transcript", "control.txt"], 3, "control.txt: is not UTF-8 text; save it as UTF-8"),
         (["--transcript", "empty.txt"], 3, "holds no word"),
         (["--lexicon", "lexicon.txt"], 3, "lexicon.txt, line 2: unknown phone 'Q'"),
         (

@@ -6,6 +6,7 @@ import pytest
 
 from lipmotion.cli.texts import text_or_file_content
 from lipmotion.errors import InputError
+from lipmotion.types import TimedTranscript
 
 
 @pytest.mark.usefixtures("here")
@@ -26,6 +27,14 @@ def test_a_file_deep_in_folders(here: Path) -> None:
     assert text_or_file_content(str(deep / "words.txt")) == "hello"
 
 
+def test_subtitles_keep_their_times(here: Path) -> None:
+    (here / "words.srt").write_text("1\n00:00:01,000 --> 00:00:02,500\n<i>Hello</i> there\n")
+    transcript = text_or_file_content("words.srt")
+    assert isinstance(transcript, TimedTranscript)
+    assert transcript.words == ("hello", "there")
+    assert (transcript.lines[0].start_s, transcript.lines[0].end_s) == pytest.approx((1.0, 2.5))
+
+
 @pytest.mark.usefixtures("here")
 def test_a_file_that_is_not_there() -> None:
     with pytest.raises(InputError, match=r"words.txt: no such transcript file"):
@@ -33,6 +42,6 @@ def test_a_file_that_is_not_there() -> None:
 
 
 def test_a_file_that_is_not_text(here: Path) -> None:
-    (here / "words.txt").write_bytes(b"\xff\xfe")
-    with pytest.raises(InputError, match=r"words.txt: not a readable UTF-8 transcript"):
+    (here / "words.txt").write_bytes(b"\x81\xfe")
+    with pytest.raises(InputError, match=r"words.txt: is not UTF-8 text; save it as UTF-8"):
         text_or_file_content("words.txt")

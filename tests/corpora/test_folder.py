@@ -42,9 +42,10 @@ def test_a_transcript_without_words_is_reported(tmp_path):
 
 def test_a_transcript_in_another_encoding_is_reported(tmp_path):
     touch(tmp_path, "a.mp4", "b.mp4")
-    (tmp_path / "a.txt").write_bytes("naïve".encode("latin-1"))
+    (tmp_path / "a.txt").write_bytes(b"na\x81ve")
+    (tmp_path / "b.txt").write_bytes("naïve".encode("cp1252"))
     found = discover(tmp_path)
-    assert [item.name for item in found.recordings] == ["b"]
+    assert [item.words for item in found.recordings] == [("naïve",)]
     assert "is not UTF-8 text" in found.problems["a"]
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import groupby
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -11,6 +12,7 @@ import pytest
 
 from lipmotion.engines import Engine
 from lipmotion.errors import InputError
+from lipmotion.pipeline import understand as pipeline_understand
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import SpeechRequest, request_of
 from lipmotion.pipeline.understand import recognised_speech, speech_of, understand
@@ -18,7 +20,7 @@ from lipmotion.speech.f0 import log_f0
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.recogniser import Recogniser
 from lipmotion.testing.toy import ToySentence
-from lipmotion.types import Speech, Timeline, Unit
+from lipmotion.types import Audio, Speech, TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit
 
 
 @dataclass(frozen=True)
@@ -96,6 +98,56 @@ def test_the_name_of_a_file_is_no_transcript(toy_model: Model, toy_sentence: Toy
     request = SpeechRequest(toy_sentence.audio, transcript=str(tmp_path / "words.txt"))
     with pytest.raises(InputError, match="is the name of a file; give Path"):
         understand(toy_model, request)
+
+
+def words_in_time(sentence: ToySentence, late_s: float = 0.0) -> TimedTranscript:
+    """Return each word of a sentence as a line in time."""
+    lines = []
+    for word, spans in groupby(sentence.units, key=lambda span: span.label.word):
+        inside = list(spans)
+        if word:
+            start_s, end_s = inside[0].start_s + late_s, inside[-1].end_s + late_s
+            lines.append(TranscriptLine((TimedWord(word),), start_s, end_s))
+    return TimedTranscript(tuple(lines))
+
+
+def test_subtitles_are_aligned_within_their_times(toy_model: Model, toy_sentence: ToySentence, tmp_path: Path) -> None:
+    (tmp_path / "said.srt").write_text(
+        f"00:00:00,300 --> 00:00:02,600\n<i>{' '.join(toy_sentence.words)}</i>\n", encoding="utf-8"
+    )
+    plain = SpeechRequest(toy_sentence.audio, transcript=" ".join(toy_sentence.words), recogniser="own")
+    wanted = understand(toy_model, plain)
+    for transcript in (tmp_path / "said.srt", words_in_time(toy_sentence), words_in_time(toy_sentence, 0.4)):
+        found = understand(toy_model, replace(plain, transcript=transcript))
+        assert found.units == wanted.units
+        assert found.units_known
+
+
+def test_times_decide_where_words_alone_do_not(toy_model: Model, toy_sentence: ToySentence) -> None:
+    """The sentence twice, and a transcript of the second time alone."""
+    twice = Audio(np.tile(toy_sentence.audio.samples, 2), 16_000)
+    second = words_in_time(toy_sentence, toy_sentence.audio.duration_s)
+    found = understand(toy_model, SpeechRequest(twice, transcript=second, recogniser="own")).units
+    starts_s = [span.start_s for span in found if span.label.word]
+    true_s = [span.start_s + toy_sentence.audio.duration_s for span in toy_sentence.units if span.label.word]
+    assert starts_s == pytest.approx(true_s, abs=0.06)
+
+
+def test_words_of_an_installed_recogniser_are_aligned(
+    toy_model: Model, toy_sentence: ToySentence, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said = [words_in_time(toy_sentence), None]
+    monkeypatch.setattr(pipeline_understand, "recognise_words", lambda _, kind: said.pop(0) if kind == "vosk" else None)
+    request = SpeechRequest(toy_sentence.audio, recogniser="vosk")
+    found = understand(toy_model, request)
+    words = tuple(span.label.word for span in found.units if span.label.word)
+    assert tuple(word for word, _ in groupby(words)) == toy_sentence.words
+    assert found.units_known
+    nothing = understand(toy_model, request)  # nothing heard: phones are recognised
+    assert not nothing.units_known
+    known = understand(toy_model, replace(request, transcript=" ".join(toy_sentence.words)))
+    assert known.units == found.units
+    assert not said
 
 
 def test_a_transcript_beside_a_request_is_taken_if_there_is_no_other() -> None:

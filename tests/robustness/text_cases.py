@@ -41,7 +41,7 @@ _transcript("a device", "/dev/zero", 3, "is a pipe or a device, required a file"
 _transcript("more than fits in a name", "papa mama " * 40 + "/", 5, *TOO_MUCH)
 
 
-def _transcript_file(name: str, content: bytes, code: int, *messages: str) -> None:
+def _transcript_file(name: str, content: bytes | str, code: int, *messages: str) -> None:
     @case(GROUP, name, code, *messages)
     def _(bench: Bench) -> list[object]:
         return bench.animate(None, "--transcript", bench.file("words.txt", content))
@@ -49,27 +49,83 @@ def _transcript_file(name: str, content: bytes, code: int, *messages: str) -> No
 
 _transcript_file("an empty file", b"", 3, *NO_WORD)
 _transcript_file(
-    "a file in Latin-1", "Bübchen".encode("latin-1"), 3, "not a readable UTF-8 transcript", "save it as UTF-8"
+    "a file in Latin-1", "papa, “mama”".encode("cp1252"), 0, "not UTF-8; read as Windows-1252 (western Europe); save it"
 )
-_transcript_file("a file in UTF-16", "papa".encode("utf-16"), 3, "not a readable UTF-8 transcript", "save it as UTF-8")
+_transcript_file("a file in UTF-16", "papa mama".encode("utf-16"), 0)
 _transcript_file("a file with a byte order mark", b"\xef\xbb\xbfpapa mama", 0)
 _transcript_file(
-    "30 million bytes of words", b"a " * 15_000_000, 3, "30000000 bytes, required at most 4194304: is it a"
+    "30 million bytes of words", b"a " * 15_000_000, 3, "30000000 bytes, required at most 16777216: is it a"
+)
+_transcript_file(
+    "10 million bytes of words", b"a " * 5_000_000, 3, "10000000 characters, required at most 4194304: is it"
 )
 _transcript_file("a million accents on one letter", b"b" + "\u0316\u0301".encode() * 500_000, 5, *TOO_LONG)
 _transcript_file(
-    "a TextGrid", b'"ooTextFile"\n"TextGrid"\n0 1 <exists> 0\n', 3, "holds labels in time, required the words alone"
+    "a TextGrid without a tier", b'"ooTextFile"\n"TextGrid"\n0 1 <exists> 0\n', 3, "the transcript holds no word"
 )
 _transcript_file(
-    "HTK's labels", b"0 1000000 p\n1000000 2000000 aa\n", 3, "holds labels in time, required the words alone"
+    "HTK's labels of phones", b"0 1000000 p\n1000000 2000000 aa\n", 3, "phones in time, but no words; give"
+)
+_transcript_file("HTK's labels of words", b"0 10000000 papa\n10000000 20000000 mama\n", 0)
+_transcript_file("subtitles", b"1\n00:00:00,500 --> 00:00:02,000\npapa mama\n", 0)
+_transcript_file(
+    "subtitles without words", b"1\n00:00:01,000 --> 00:00:02,000\n[music]\n", 3, "the transcript holds no word"
 )
 _transcript_file(
-    "subtitles", b"1\n00:00:01,000 --> 00:00:02,000\npapa\n", 3, "is a file of subtitles, required the words"
+    "subtitles with damaged times", b"1\n00:00:01,000 --> 7\npapa\n", 3, "line 2 is '00:00:01,000 --> 7'; required"
+)
+_transcript_file(
+    "subtitles that end before they start", b"00:03,0 --> 00:02,0\npapa\n", 3, "line 1 ends at 2 s, before its start"
+)
+_transcript_file(
+    "subtitles of another recording",
+    b"10:03,0 --> 10:05,0\npapa\n",
+    3,
+    "begins at 603.00 s, the recording ends at 2.76 s",
+)
+_transcript_file(
+    "subtitles that go on",
+    b"00:00,5 --> 00:02,0\npapa\n\n00:30,0 --> 00:31,0\nmama\n",
+    0,
+    "goes on after the recording ends at 2.76 s; its last 1 lines are left out",
+)
+_transcript_file("subtitles out of order, one over another", b"0:1 --> 0:2\nmama\n\n0:0.5 --> 0:2\npapa\n", 0)
+_transcript_file("200 words in a subtitle of a moment", b"0:1 --> 0:1.1\n" + b"papa " * 200, 5, *TOO_MUCH)
+_transcript_file("14 words in a subtitle of a moment", b"0:1 --> 0:1.1\n" + b"papa " * 7 + b"mama " * 7, 0)
+_transcript_file(
+    "a subtitle of a million words", b"0:1 --> 0:2\n" + b"a " * 1_000_000, 3, "more than 500000 words; give those"
+)
+_transcript_file(
+    "half a million subtitles", b"0:1 --> 0:2\n" * 500_000, 3, "more than 250000 labels; give those of one"
+)
+_transcript_file("recognised words", b'{"result": [{"word": "papa", "start": 0.5, "end": 1.2}], "text": "papa"}', 0)
+_transcript_file(
+    "recognised words, cut off", b'{"segments": [\n{"start": 0.5,', 3, "line 2: damaged JSON (", "write it again"
+)
+_transcript_file("100,000 brackets", b'{"segments": ' + b"[" * 100_000, 3, "damaged JSON: nested too deeply")
+_transcript_file(
+    "a time that is NaN", b'{"words": [{"word": "papa", "start": NaN}]}', 3, "word 1: a time is nan, required a number"
+)
+_transcript_file(
+    "a time that is a text",
+    b'{"words": [{"word": "papa", "start": "x"}]}',
+    3,
+    "word 1: a time is 'x', required a number",
+)
+_transcript_file(
+    "a time of centuries",
+    b'{"words": [{"word": "papa", "end": 1e99}]}',
+    3,
+    "word 1: a time is 1e+99, required a number",
+)
+_transcript_file("JSON of another kind", b'{"name": "papa"}', 3, "required the words alone; save it as text")
+_transcript_file(
+    "a CTM of two recordings", b"a 1 0.0 0.5 papa\nb 1 0.5 0.5 mama\n", 3, "line 2: words of two recordings"
 )
 _transcript_file(
     "UTF-16 without its mark", "papa".encode("utf-16-le"), 3, "holds NUL characters: is it UTF-16 without its mark?"
 )
-_transcript_file("a sound as a transcript", b"RIFF\x80\x81\x82", 3, "not a readable UTF-8 transcript")
+_transcript_file("a sound as a transcript", b"RIFF\x80\x81\x82", 3, "is not UTF-8 text; save it as UTF-8")
 
 
 @case(GROUP, "a pipe as a transcript", 3, "is a pipe or a device, required a file")
@@ -78,7 +134,7 @@ def _(bench: Bench) -> list[object]:
     return bench.animate(None, "--transcript", bench.folder / "words.txt")
 
 
-@case(GROUP, "a file of terabytes", 3, "1099511627776 bytes, required at most 4194304")
+@case(GROUP, "a file of terabytes", 3, "1099511627776 bytes, required at most 16777216")
 def _(bench: Bench) -> list[object]:
     path = bench.file("words.txt", b"")
     os.truncate(path, 2**40)

@@ -25,7 +25,11 @@ def add_speech_arguments(parser: argparse.ArgumentParser) -> None:
 def add_recording_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the recording, its transcript, lexicon, units and recogniser."""
     add_input(parser, "speech", what="recording", help="audio or video file")
-    transcript: dict[str, Any] = {"type": str, "metavar": "TEXT|FILE", "help": "the words that are spoken, if known"}
+    transcript: dict[str, Any] = {
+        "type": str,
+        "metavar": "TEXT|FILE",
+        "help": "the words that are spoken, if known: also subtitles, and what recognisers write",
+    }
     add_input(parser, "--transcript", what="transcript", replaceable=True, **transcript)
     add_lexicon_argument(parser)
     edited = "phones in time from an earlier .json or .npz, edited or not"
@@ -51,8 +55,11 @@ def _shipped() -> Path:
 
 def add_recogniser_argument(parser: argparse.ArgumentParser) -> None:
     """Add ``--recogniser``: how speech without a transcript is recognised."""
-    kinds = "auto, words (English), fast (phones alone), own (phone models of the model) or general (of many voices)"
-    parser.add_argument("--recogniser", default="auto", metavar="KIND", help=f"{kinds}; default: auto")
+    kinds = (
+        "auto, words (English), fast (phones alone), own (phone models of the model), general (of many voices), or "
+        "words by an installed recogniser: whisper, vosk (default: auto)"
+    )
+    parser.add_argument("--recogniser", default="auto", metavar="KIND", help=kinds)
 
 
 def request_and_model(options: argparse.Namespace) -> tuple[SpeechRequest, Model]:

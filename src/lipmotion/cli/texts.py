@@ -5,12 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 from lipmotion.pipeline.transcribe import read_transcript
+from lipmotion.types import TimedTranscript
 
 
-def text_or_file_content(argument: str) -> str:
+def text_or_file_content(argument: str) -> str | TimedTranscript:
     """Return the content of the file that the argument names, else the argument itself.
 
-    Raises InputError: the argument looks like a file name but no such file exists, or the file is not UTF-8 text.
+    Raises InputError: the argument looks like a file name but no such file exists, or the file cannot be read.
     """
     path = Path(argument)
     looks_like_path = " " not in argument and path.suffix[1:].isalpha()

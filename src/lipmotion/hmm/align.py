@@ -13,7 +13,10 @@ from lipmotion.errors import AlignmentError
 from lipmotion.hmm.log_likelihoods import LogLikelihoods
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.hmm.network import Network, NetworkBuilder
+from lipmotion.kernels.windowed_viterbi import Windows
 
+FIT_BLOCK = 2048
+"""Frames whose log densities are in memory at a time."""
 FEW_ARCS, ARCS_A_FRAME = 1_000_000, 10
 """The largest number of arcs of a network, and how many more for each frame; sentences need about one a frame."""
 
@@ -50,24 +53,29 @@ def state_sequence(hmm: UnitHmm, units: Sequence[str]) -> StateSequence:
 
 
 def state_path(
-    hmm: UnitHmm, log_likelihoods: LogLikelihoods, units: Sequence[str]
+    hmm: UnitHmm, log_likelihoods: LogLikelihoods, units: Sequence[str], windows: Windows | None = None
 ) -> tuple[tuple[tuple[str, int], ...], NDArray[np.intp]]:
     """Return the states of a unit sequence (``StateSequence.names``), and the state of every frame [shape=(T,)].
 
+    windows : of the units
     Raises AlignmentError: fewer frames than states.
     """
     chain = state_sequence(hmm, units)
     used, local = np.unique(chain.densities, return_inverse=True)
-    path = _chain_network(hmm, chain, local).best_path(log_likelihoods, used)
+    of_states = None if windows is None else Windows(windows.first[chain.positions], windows.end[chain.positions])
+    path = _chain_network(hmm, chain, local).best_path(log_likelihoods, used, windows=of_states)
     return chain.names, path
 
 
-def align_units(hmm: UnitHmm, log_likelihoods: LogLikelihoods, units: Sequence[str]) -> NDArray[np.intp]:
+def align_units(
+    hmm: UnitHmm, log_likelihoods: LogLikelihoods, units: Sequence[str], windows: Windows | None = None
+) -> NDArray[np.intp]:
     """Return the first frame of each unit, and the frame count at the end [shape=(len(units) + 1,)].
 
-    Raises AlignmentError: fewer frames than states.
+    windows : of the units: the frames that each may have
+    Raises AlignmentError: fewer frames than states, or none within the windows.
     """
-    _, path = state_path(hmm, log_likelihoods, units)
+    _, path = state_path(hmm, log_likelihoods, units, windows)
     positions = state_sequence(hmm, units).positions[path]
     return np.append(np.searchsorted(positions, np.arange(len(units))), log_likelihoods.frames)
 
@@ -99,6 +107,20 @@ class SpokenWord(NamedTuple):
     units: tuple[str, ...]
 
 
+class PlacedWord(NamedTuple):
+    """A word or a silence as it was pronounced, and where.
+
+    spoken : the pronunciation
+    start  : its first frame
+    fit    : by how much its states are less probable than the best of all states, the mean of its frames in nats, 0 or
+             less; NaN where it was not asked for
+    """
+
+    spoken: SpokenWord
+    start: int
+    fit: float
+
+
 def choose_pronunciations(
     hmm: UnitHmm, log_likelihoods: LogLikelihoods, words: Sequence[Sequence[Sequence[str]]], pause: str
 ) -> list[SpokenWord]:
@@ -109,6 +131,22 @@ def choose_pronunciations(
     Only states without context are used: then the states of a pronunciation do not depend on the words beside it.
     Raises AlignmentError: the words do not fit into the frames.
     """
+    return [item.spoken for item in place_words(hmm, log_likelihoods, words, pause)]
+
+
+def place_words(
+    hmm: UnitHmm,
+    log_likelihoods: LogLikelihoods,
+    words: Sequence[Sequence[Sequence[str]]],
+    pause: str,
+    windows: Windows | None = None,
+) -> list[PlacedWord]:
+    """Return what ``choose_pronunciations`` does, each with its place.
+
+    windows : of the words: the frames that each may have; a pause may have those of both words beside it; with windows
+              the fit is computed
+    Raises AlignmentError: the words do not fit into the frames, or into their windows.
+    """
     _check_room(hmm, log_likelihoods, words)
     silence = SpokenWord(-1, 0, (hmm.table.free[0],))
     slots: list[list[SpokenWord]] = [[silence]]
@@ -118,22 +156,65 @@ def choose_pronunciations(
         slots.append([SpokenWord(word, number, tuple(variant)) for number, variant in enumerate(variants)])
     slots.append([silence])
     builder = NetworkBuilder()
-    owners: list[tuple[int, SpokenWord]] = []
+    owners: list[SpokenWord] = []
+    slot_of: list[int] = []
     open_ends: list[tuple[int, float]] = []
     for slot, choices in enumerate(slots):
         ends: list[tuple[int, float]] = []
         for choice in choices:
             begin = len(owners)
             ends += _append(builder, hmm, choice.units, open_ends)
-            owners += [(slot, choice)] * sum(hmm.table.count(unit) for unit in choice.units)
+            count = sum(hmm.table.count(unit) for unit in choice.units)
+            owners += [choice] * count
+            slot_of += [slot] * count
             if slot == 0:
                 builder.initial(begin)
         open_ends = ends
     for state, move in open_ends:
         builder.final(state, move)
     plain = np.arange(len(hmm.log_stay), dtype=np.intp)
-    path = builder.build().best_path(log_likelihoods, plain)
-    return [choice for _, choice in sorted({owners[state] for state in path})]
+    of_states = None
+    if windows is not None:
+        of_slots = _slot_windows(windows, log_likelihoods.frames)
+        of_states = Windows(of_slots.first[slot_of], of_slots.end[slot_of])
+    network = builder.build()
+    path = network.best_path(log_likelihoods, plain, windows=of_states)
+    starts = np.flatnonzero(np.diff(np.array(slot_of)[path], prepend=-1))
+    fits = np.full(len(starts), np.nan)
+    if windows is not None:
+        fits = _fits(log_likelihoods, plain, network.emission[path], starts)
+    placed = zip(path[starts].tolist(), starts.tolist(), fits.tolist(), strict=True)
+    return [PlacedWord(owners[state], start, fit) for state, start, fit in placed]
+
+
+def _fits(
+    log_likelihoods: LogLikelihoods, chosen: NDArray[np.intp], densities: NDArray[np.intp], starts: NDArray[np.intp]
+) -> NDArray[np.float64]:
+    """Return the fit of stretches of a path, given the density of each frame, and the first frame of each stretch."""
+    fit = np.empty(len(densities))
+    for first in range(0, len(densities), FIT_BLOCK):
+        end = min(first + FIT_BLOCK, len(densities))
+        values = log_likelihoods.log_density(first, end, chosen)
+        fit[first:end] = values[np.arange(end - first), densities[first:end]] - values.max(axis=1)
+    return np.add.reduceat(fit, starts) / np.diff(starts, append=len(densities))
+
+
+def _slot_windows(windows: Windows, frames: int) -> Windows:
+    """Return the windows of words with the silences and pauses before, between and after them [shape=(2 W + 1,)]."""
+    first, end = np.zeros(2 * len(windows.first) + 1, np.intp), np.full(2 * len(windows.end) + 1, frames, np.intp)
+    first[1::2], end[1::2] = windows
+    first[2::2], end[:-1:2] = windows
+    return Windows(first, end)
+
+
+def unit_windows(spoken: Sequence[SpokenWord], windows: Windows, frames: int) -> Windows:
+    """Return the windows of all units of words with silences and pauses, from those of the words."""
+    of_slots = _slot_windows(windows, frames)
+    slots, word = [], -1
+    for item in spoken:
+        word = max(word, item.word)
+        slots += [2 * word + (1 if item.word >= 0 else 2)] * len(item.units)
+    return Windows(of_slots.first[slots], of_slots.end[slots])
 
 
 def _check_room(hmm: UnitHmm, log_likelihoods: LogLikelihoods, words: Sequence[Sequence[Sequence[str]]]) -> None:

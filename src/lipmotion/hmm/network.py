@@ -12,6 +12,7 @@ from lipmotion.errors import AlignmentError
 from lipmotion.hmm.log_likelihoods import LogLikelihoods
 from lipmotion.kernels.arcs import ArcLayout, NetworkArrays, arc_layout
 from lipmotion.kernels.viterbi import best_path
+from lipmotion.kernels.windowed_viterbi import Windows, best_path_within
 
 KEPT_FRAMES = 12_000
 """Up to so many frames (two minutes), log densities are computed once and kept; those of longer recordings twice."""
@@ -41,12 +42,17 @@ class Network:
         return arc_layout(self.arc_from, self.arc_start)
 
     def best_path(
-        self, log_likelihoods: LogLikelihoods, chosen: NDArray[np.intp] | None = None, beam: float | None = None
+        self,
+        log_likelihoods: LogLikelihoods,
+        chosen: NDArray[np.intp] | None = None,
+        beam: float | None = None,
+        windows: Windows | None = None,
     ) -> NDArray[np.intp]:
         """Return the states of the best path [shape=(T,)].
 
-        chosen : the densities that ``emission`` numbers; None: all
-        beam   : states with a score lower than the best of the frame by more than this are dropped; None: exact
+        chosen  : the densities that ``emission`` numbers; None: all
+        beam    : states with a score lower than the best of the frame by more than this are dropped; None: exact
+        windows : the frames that each state may have; the search is exact within them, without a beam; None: any
         Raises AlignmentError: no path reaches the end.
         """
         cached = (
@@ -58,13 +64,11 @@ class Network:
         def log_emission(first: int, end: int) -> NDArray[np.float32]:
             return log_likelihoods.log_density(first, end, chosen) if cached is None else cached[first:end]
 
-        path, score = best_path(
-            log_emission,
-            log_likelihoods.frames,
-            self.arrays,
-            beam,
-            lambda: self.layout,
-        )
+        frames = log_likelihoods.frames
+        if windows is None:
+            path, score = best_path(log_emission, frames, self.arrays, beam, lambda: self.layout)
+        else:
+            path, score = best_path_within(log_emission, frames, self.arrays, windows)
         if not np.isfinite(score):
             raise AlignmentError(
                 f"no path through {len(self.emission)} states in {log_likelihoods.frames} frames of 10 ms: "

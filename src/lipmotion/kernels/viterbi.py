@@ -46,7 +46,7 @@ def best_path(
             network, widest, layout() if layout else arc_layout(network.arc_from, network.arc_start)
         )
     else:
-        search = _Search(network, widest, order=np.arange(len(emission)), place=np.arange(len(emission)))
+        search = _plain_search(network, widest)
     starts = range(0, count, BLOCK)
     first = (network.log_initial + log_emission(0, 1)[0, emission])[None]
     checkpoints, score = [first[0, search.order]], 0.0
@@ -70,7 +70,7 @@ def best_path(
 
 
 @dataclass(frozen=True, eq=False)
-class _Search:
+class PathSearch:
     """The search for the best path through a network. Rows of scores are by place.
 
     order, place    : of the layout, or without one those of the states' own order
@@ -135,5 +135,17 @@ class _Search:
             path[frame] = state
 
 
-def _compiled_search(network: NetworkArrays, beam: float, layout: ArcLayout) -> _Search:
-    return _Search(network, beam, layout.order, layout.place, layout, arc_weights(layout, network.arc_log, -np.inf))
+def path_search(network: NetworkArrays, compiled: bool) -> PathSearch:
+    """Return the exact search through a network, in its compiled form or in that of NumPy."""
+    if not compiled:
+        return _plain_search(network, np.inf)
+    return _compiled_search(network, np.inf, arc_layout(network.arc_from, network.arc_start))
+
+
+def _plain_search(network: NetworkArrays, beam: float) -> PathSearch:
+    states = np.arange(len(network.emission))
+    return PathSearch(network, beam, order=states, place=states)
+
+
+def _compiled_search(network: NetworkArrays, beam: float, layout: ArcLayout) -> PathSearch:
+    return PathSearch(network, beam, layout.order, layout.place, layout, arc_weights(layout, network.arc_log, -np.inf))

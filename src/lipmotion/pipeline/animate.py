@@ -15,7 +15,7 @@ from lipmotion.pipeline.request import SpeechInput, request_of
 from lipmotion.pipeline.understand import understand
 from lipmotion.speech.audio_files import read_audio
 from lipmotion.storage.files import as_text, check_distinct, check_target
-from lipmotion.types import Constraints, Generation
+from lipmotion.types import Constraints, Generation, TimedTranscript
 
 VIDEO_SUFFIX = ".mp4"
 SOUND_RATE_HZ = 48_000
@@ -29,14 +29,14 @@ def animate(
     speech: SpeechInput,
     *,
     model: Model | str | Path | None = None,
-    transcript: str | Path | None = None,
+    transcript: str | Path | TimedTranscript | None = None,
     constraints: Constraints | None = None,
 ) -> Generation:
     """Return lip motion for speech: values of all channels at 100 Hz, variances, phones in time, and states.
 
     speech      : an audio or video file, samples at 16 kHz, or a ``SpeechRequest`` with all that is known of it
     model       : from ``load_model``, or the path of a model file; None: the shipped model
-    transcript  : the spoken words, or a Path of a text file; the same as a ``SpeechRequest`` with this transcript
+    transcript  : the spoken words, or a Path of a file with them; the same as a ``SpeechRequest`` with this transcript
     constraints : values that the motion must take exactly
     Raises InputError: the recording, the transcript or a constraint is not usable.
     Raises AlignmentError: the transcript cannot be aligned with the recording.

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from lipmotion.errors import InputError
-from lipmotion.types import Audio, Timeline, Unit
+from lipmotion.types import Audio, TimedTranscript, Timeline, Unit
 from lipmotion.units import Lexicon
 
 
@@ -15,13 +15,17 @@ class SpeechRequest:
     """A recording, with all that its user knows of it: the input of ``animate`` and ``explain``.
 
     recording  : an audio or video file, or samples at 16 kHz
-    transcript : the spoken words, or a Path of a text file; with a transcript, phones are aligned instead of recognised
+    transcript : the spoken words, a Path of a file with them (plain text, subtitles, what recognisers write, labels),
+                 or a ``TimedTranscript``; with a transcript, phones are aligned instead of recognised, and within the
+                 times that it gives
     units      : phones in time, for instance those of an earlier generation, edited; with units, phones are neither
                  recognised nor aligned
     lexicon    : pronunciations of words, ahead of those of the dictionary
     recogniser : how speech without a transcript is recognised. ``auto``: English words where they fit the sound, phones
                  elsewhere; ``words``: words alone; ``fast``: phones alone, by the phone models of the model and those
-                 of many voices, weighted by the speaker similarity score; ``own``, ``general``: by one of these alone
+                 of many voices, weighted by the speaker similarity score; ``own``, ``general``: by one of these alone;
+                 ``whisper``, ``vosk``: words, by what is installed (``speech.installed_recognisers``), aligned as a
+                 transcript is
 
     >>> import lipmotion
     >>> request = lipmotion.SpeechRequest("examples/welcome.flac", recogniser="general")
@@ -30,7 +34,7 @@ class SpeechRequest:
     """
 
     recording: str | Path | Audio
-    transcript: str | Path | None = None
+    transcript: str | Path | TimedTranscript | None = None
     units: Timeline[Unit] | None = None
     lexicon: Lexicon | None = None
     recogniser: str = "auto"
@@ -40,7 +44,7 @@ SpeechInput = str | Path | Audio | SpeechRequest
 """A recording alone, or a request."""
 
 
-def request_of(speech: SpeechInput, transcript: str | Path | None = None) -> SpeechRequest:
+def request_of(speech: SpeechInput, transcript: str | Path | TimedTranscript | None = None) -> SpeechRequest:
     """Return a request for a recording, or the given request; with the transcript, if one is given.
 
     Raises InputError: a transcript is given, and the request has one already.

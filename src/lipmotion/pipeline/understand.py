@@ -21,8 +21,9 @@ from lipmotion.pipeline.transcribe import read_transcript, transcribe
 from lipmotion.speech.analysed_audio import analysed
 from lipmotion.speech.audio_files import read_audio
 from lipmotion.speech.f0 import log_f0
+from lipmotion.speech.installed_recognisers import INSTALLED_RECOGNISERS, recognise_words
 from lipmotion.speech.recogniser import Recogniser, cached_recogniser
-from lipmotion.types import Audio, Features, Speech, Timeline, Unit
+from lipmotion.types import Audio, Features, Speech, TimedTranscript, Timeline, Unit
 from lipmotion.units import Lexicon, check_phones, check_text, words_of
 
 LATE_S = 0.1
@@ -42,11 +43,14 @@ def understand(model: Model, request: SpeechRequest) -> Speech:
 def _understood(model: Model, request: SpeechRequest) -> Speech:
     """Return the speech of a request, without what the model that this one stands on makes of it."""
     audio = analysed(audio_of(request))
-    phones = cached_recogniser(model.phones, request.recogniser, model.adaptation)
+    installed = request.recogniser in INSTALLED_RECOGNISERS
+    phones = cached_recogniser(model.phones, "auto" if installed else request.recogniser, model.adaptation)
     if request.units is not None:
         _check_units(request.units, audio.duration_s)
         return speech_of(model.engine, audio, audio.mfcc(), request.units)
     words = _words(request.transcript, audio.duration_s)
+    if installed and words is None:
+        words = recognise_words(audio, request.recogniser)
     features = audio.mfcc()
     transcribed = partial(transcribe, phones, audio, features, words, request.lexicon or Lexicon())
     if words is not None:
@@ -97,11 +101,13 @@ def recognised_speech(
         return replace(speech, units=recognise(), units_known=False, confidence=0.0)
 
 
-def _words(transcript: str | Path | None, duration_s: float) -> tuple[str, ...] | None:
+def _words(
+    transcript: str | Path | TimedTranscript | None, duration_s: float
+) -> tuple[str, ...] | TimedTranscript | None:
     """Return the words of a transcript. Raises AlignmentError: a text that is too long for the recording."""
     text = read_transcript(transcript) if isinstance(transcript, Path) else transcript
-    if text is None:
-        return None
+    if text is None or isinstance(text, TimedTranscript):
+        return text
     if text is transcript and "." in text and not any(map(str.isspace, text)) and Path(text).is_file():
         raise InputError(f"the transcript {text!r} is the name of a file; give Path({text!r}), or the words themselves")
     check_text(text, duration_s)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError, InputError
-from lipmotion.hmm.align import align_units, choose_pronunciations
+from lipmotion.hmm.align import PlacedWord, SpokenWord, align_units, place_words, unit_windows
 from lipmotion.hmm.decode import UnitLoop, unit_loop, units_of_path
 from lipmotion.hmm.log_likelihoods import (
     LogLikelihoods,
@@ -22,8 +22,10 @@ from lipmotion.hmm.log_likelihoods import (
 )
 from lipmotion.hmm.loudness import loud_frames, quiet_frames
 from lipmotion.hmm.model import UnitHmm
+from lipmotion.kernels.windowed_viterbi import Windows
 from lipmotion.speech.adaptation import Adaptation
 from lipmotion.speech.analysed_audio import AnalysedAudio, analysed
+from lipmotion.speech.anchors import Anchors, align_within, least_frames
 from lipmotion.speech.combined_phones import NOISES, CombinedPhones, combine_phones, combined_log_likelihoods
 from lipmotion.speech.heard_words import align_heard_words, phone_bonus
 from lipmotion.speech.mfcc import LOG_ENERGY
@@ -190,11 +192,19 @@ class Recogniser:
             and self.own.bigram.perplexity < SMALL_PERPLEXITY
         )
 
-    def align(self, audio: Audio, features: Features, words: Sequence[str], lexicon: Lexicon) -> Timeline[Unit]:
+    def align(
+        self,
+        audio: Audio,
+        features: Features,
+        words: Sequence[str],
+        lexicon: Lexicon,
+        anchors: Anchors | None = None,
+    ) -> Timeline[Unit]:
         """Return the phones of a known transcript in time: forced alignment.
 
         audio, features : as of ``recognise``
         words           : of the transcript, lower case
+        anchors         : times of the words, within which they are aligned (``speech.anchors``); None: anywhere
         The pronunciation of each word, and the pauses between words, are those with the most probable path. A phone
         without a model borrows that of the most similar phone with one (``units.SIMILAR_PHONES``).
         Raises AlignmentError: the transcript does not fit into the recording.
@@ -209,8 +219,7 @@ class Recogniser:
             word: [tuple(most_similar_phone(phone, modelled) for phone in variant) for variant in variants]
             for word, variants in variants_of.items()
         }
-        spoken = choose_pronunciations(hmm, log_likelihoods, [units_of[word] for word in words], PAUSE)
-        bounds = align_units(hmm, log_likelihoods, [unit for item in spoken for unit in item.units])
+        spoken, bounds = _aligned(hmm, log_likelihoods, [units_of[word] for word in words], anchors)
         labels = [
             (phone, words[item.word] if item.word >= 0 else "")
             for item in spoken
@@ -298,6 +307,26 @@ class Recogniser:
     def _own_features(self, audio: AnalysedAudio, warp: float) -> NDArray[np.float32]:
         """Return the features for the own models, warped and, where there is an adaptation, transformed."""
         return audio.mfcc(warp).values if self.adaptation is None else self.adaptation.own_features(audio)
+
+
+def _aligned(
+    hmm: UnitHmm, log_likelihoods: LogLikelihoods, words: list[list[tuple[str, ...]]], anchors: Anchors | None
+) -> tuple[list[SpokenWord], NDArray[np.intp]]:
+    """Return words as they were pronounced, with silences and pauses, and the bounds of their units in frames."""
+
+    def search(windows: Windows | None) -> list[PlacedWord]:
+        return place_words(hmm, log_likelihoods, words, PAUSE, windows)
+
+    of_units = None
+    if anchors is None:
+        spoken = [item.spoken for item in search(None)]
+    else:
+        counts = dict(zip(hmm.table.units, hmm.table.counts, strict=True))
+        edge, frames = counts[hmm.table.free[0]], log_likelihoods.frames
+        placed, windows = align_within(anchors, least_frames(words, counts), edge, frames, search)
+        spoken = [item.spoken for item in placed]
+        of_units = unit_windows(spoken, windows, frames)
+    return spoken, align_units(hmm, log_likelihoods, [unit for item in spoken for unit in item.units], of_units)
 
 
 @lru_cache(maxsize=4)

@@ -27,6 +27,7 @@ from lipmotion.types.motion import EYE_DISTANCE, GREY, WEIGHT, Channel, Motion, 
 from lipmotion.types.parallel_map import ParallelMap
 from lipmotion.types.progress import Item, Monitor, Progress, silent_monitor, sub_monitor, with_progress
 from lipmotion.types.timeline import Span, Timeline, Unit
+from lipmotion.types.transcript import TimedTranscript, TimedWord, TranscriptLine, in_order
 from lipmotion.types.utterance import Track, Utterance
 
 __all__ = [
@@ -62,13 +63,17 @@ __all__ = [
     "Span",
     "Speech",
     "StateTrace",
+    "TimedTranscript",
+    "TimedWord",
     "Timeline",
     "Track",
+    "TranscriptLine",
     "Unit",
     "Utterance",
     "check_curves",
     "check_magnitude",
     "frame_of",
+    "in_order",
     "option",
     "silent_monitor",
     "sub_monitor",

@@ -13,7 +13,7 @@ from lipmotion.units.phones import (
     most_similar_phone,
     unknown_phone_message,
 )
-from lipmotion.units.transcript import words_of
+from lipmotion.units.transcript import words_in, words_of
 from lipmotion.units.unit_set import UnitSet
 from lipmotion.units.unit_sets import UNIT_SETS, unit_set
 from lipmotion.units.visemes import VISEME_OF, VISEMES
@@ -40,5 +40,6 @@ __all__ = [
     "unit_set",
     "unknown_phone_message",
     "with_reduced_vowels",
+    "words_in",
     "words_of",
 ]

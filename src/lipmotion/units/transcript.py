@@ -22,11 +22,17 @@ def words_of(text: str) -> tuple[str, ...]:
 
     Raises InputError: there is no word in it.
     """
+    words = words_in(text)
+    if not words:
+        raise InputError(f"the transcript {text[:40]!r} holds no word; give the words that are spoken")
+    return words
+
+
+def words_in(text: str) -> tuple[str, ...]:
+    """Return the words of a text as ``words_of`` does; none where there is none."""
     words: list[str] = []
     for token in re.findall(r"[^\W\d_]+(?:'[^\W\d_]+)*|\d+", re.sub(r"(?<=\d),(?=\d{3})", "", normalised_text(text))):
         words += number_words(token) if token.isdecimal() else [token]
-    if not words:
-        raise InputError(f"the transcript {text[:40]!r} holds no word; give the words that are spoken")
     return tuple(words)
 
 

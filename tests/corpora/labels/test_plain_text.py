@@ -9,20 +9,24 @@ from lipmotion.errors import InputError
 
 OTHER = {
     "master labels": ('#!MLF!#\n"*/a.lab"\n0 1000000 sil\n.\n', "is a master label file"),
-    "SubRip": ("1\n00:00:01,000 --> 00:00:02,000\nhello\n", "is a file of subtitles"),
-    "WebVTT": ("WEBVTT\n\n00:01.000 --> 00:02.000\nhello\n", "is a file of subtitles"),
     "RTF": ("{\\rtf1\\ansi hello}", "begins with '{"),
     "HTML": ("\n<html><body>hello</body></html>", "begins with '<html>"),
-    "JSON": ('{"words": [{"start": 0.0, "word": "hello"}]}', "begins with '{"),
+    "JSON of another kind": ('{"name": "hello", "size": 3}', "begins with '{"),
     "NUL": ("h\0e\0l\0l\0o\0", "holds NUL characters: is it UTF-16 without its mark"),
     "ESPS": ("signal a\nnfields 1\n#\n 0.0500 26 sil\n 0.1 26 p\n 0.2 26 aa\n", "its lines hold times"),
-    "CTM": ("a 1 0.00 0.5 hello\na 1 0.5 0.5 you\n", "its lines hold times"),
     "mixed seconds": ("0 0.5 p\n0.5 1 aa\n", "its lines hold times"),
     "a table": ("start,end,label\n0.0,0.5,p\n0.5,0.75,aa\n", "its lines hold times"),
     "a start of NaN": ("nan 1000000 sil\n1000000 2000000 p\n2000000 3500000 aa\n", "its lines hold times"),
     "an end of 0": ("0 0 sil\n1000000 2000000 p\n2000000 3500000 aa\n", "its lines hold times"),
     "a last start of 0": ("0 sil\n1000000 p\n0 aa\n", "its lines hold times"),
 }
+TIMED = {
+    "SubRip": ("1\n00:00:01,000 --> 00:00:02,000\nhello\n", "is a file of subtitles"),
+    "WebVTT": ("WEBVTT\n\n00:01.000 --> 00:02.000\nhello\n", "is a file of subtitles"),
+    "JSON": ('{"words": [{"start": 0.0, "word": "hello"}]}', "begins with '{"),
+    "CTM": ("a 1 0.00 0.5 hello\na 1 0.5 0.5 you\n", "its lines hold times"),
+}
+"""What is read as a transcript, but is no plain text."""
 WORDS = [
     "hello you",
     "3 5 7\n1 2 9\n",
@@ -46,6 +50,15 @@ def test_what_would_be_read_as_words_is_refused(tmp_path: Path, kind: str, suffi
         read_labels(path)
     with pytest.raises(InputError, match=message):
         check_plain_text(text, "a.txt")
+
+
+@pytest.mark.parametrize("kind", TIMED)
+def test_words_in_time_are_no_plain_text(tmp_path: Path, kind: str) -> None:
+    text, message = TIMED[kind]
+    with pytest.raises(InputError, match=message):
+        check_plain_text(text, "a.txt")
+    (tmp_path / "a.txt").write_text(text, encoding="utf-8")
+    assert "hello" in (read_labels(tmp_path / "a.txt").words or ())
 
 
 @pytest.mark.parametrize("text", WORDS)

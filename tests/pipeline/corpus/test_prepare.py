@@ -147,7 +147,7 @@ def test_bad_recordings_are_listed_and_the_rest_is_prepared(studio, tmp_path):
     speak(studio / "strange.mp4", 6)
     (studio / "empty.mp4").touch()
     (studio / "words.mp4").write_text("not a video")
-    (studio / "c.txt").write_bytes(b"\xff")
+    (studio / "c.txt").write_bytes(b"\x81")
     report = prepare(studio, tmp_path / "corpus", workers=1)
     assert report.prepared == ("a", "b")
     assert list(report.failed) == ["broken", "c", "empty", "strange", "words"]

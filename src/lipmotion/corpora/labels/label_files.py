@@ -3,22 +3,34 @@
 from __future__ import annotations
 
 import codecs
+import logging
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
 from lipmotion.corpora.labels.plain_text import check_no_labels
+from lipmotion.corpora.labels.recognised_words import is_json, parse_recognised
+from lipmotion.corpora.labels.subtitles import is_subtitles, parse_subtitles
 from lipmotion.corpora.labels.textgrid import MARK, is_textgrid, parse_interval_tiers
-from lipmotion.corpora.labels.tier import LabelTier, holds_phones, is_named_as_words, phone_timeline, tier_words
+from lipmotion.corpora.labels.tier import LabelTier, holds_phones, is_named_as_words, phone_timeline, tier_transcript
 from lipmotion.corpora.labels.timed_lines import parse_timed_lines
+from lipmotion.corpora.labels.word_lists import is_ctm, parse_ctm
 from lipmotion.errors import InputError
-from lipmotion.types import Timeline, Unit
+from lipmotion.storage.files import check_regular
+from lipmotion.types import TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit
 from lipmotion.units import phone_named, words_of
 from lipmotion.units.length_limits import LARGEST_TRANSCRIPT
 
-FOR_WORDS = (".txt", ".TextGrid", ".textgrid", ".lab")
-"""Suffixes in whose files words are searched, in order: plain text first, as labels in time may not be words."""
+LOG = logging.getLogger("lipmotion")
+RECOGNISED = (".srt", ".vtt", ".json", ".ctm", ".tsv")
+"""Suffixes of subtitles and of what recognisers write."""
+FOR_WORDS = (".txt", ".TextGrid", ".textgrid", ".lab", *RECOGNISED)
+"""Suffixes in whose files words are searched, in order: plain text first, as labels in time may not be words, and what
+may be recognised last."""
 FOR_PHONES = (".TextGrid", ".textgrid", ".lab", ".txt")
 """Suffixes in whose files phones are searched, in order."""
+CONTROL = re.compile(r"[\x00-\x08\x0e-\x1a\x1c-\x1f]")
+"""Characters that no text has."""
 LARGEST_LABELS = 1 << 24
 """Most bytes of a label file: labels of a day."""
 
@@ -27,49 +39,124 @@ LARGEST_LABELS = 1 << 24
 class RecordingLabels:
     """The transcript and the phones of a recording, from its label files.
 
-    words  : the transcript, lower case, or None
-    phones : phones in time without gaps, or None; the end of the last may be infinite
+    transcript : what is said, with the times that the file gives, or None
+    phones     : phones in time without gaps, or None; the end of the last may be infinite
     """
 
-    words: tuple[str, ...] | None = None
+    transcript: TimedTranscript | None = None
     phones: Timeline[Unit] | None = None
+
+    @property
+    def words(self) -> tuple[str, ...] | None:
+        """The words of the transcript, lower case, or None."""
+        return self.transcript.words if self.transcript else None
 
 
 def labels_beside(recording: Path, *, ignored: frozenset[Path] = frozenset()) -> RecordingLabels:
-    """Return the labels from the files beside a recording that have its name: ``.txt``, ``.TextGrid``, ``.lab``.
+    """Return the labels from the files beside a recording that have its name, with a suffix of ``FOR_WORDS``.
 
+    Those of ``RECOGNISED`` may have a language as well (``take.en.vtt``), or the whole name (``take.mp4.srt``); JSON
+    that is no transcript, as motion, is passed over.
     ignored : files that are no labels (the lists of the splits)
     Raises InputError: one of them cannot be read.
     """
     found: dict[str, tuple[Path, RecordingLabels]] = {}
     for suffix in FOR_WORDS:
-        path = recording.with_suffix(suffix)
-        if path not in ignored and path.is_file() and not any(path.samefile(other) for other, _ in found.values()):
-            found[suffix] = path, read_labels(path)
-    words = [found[suffix][1].words for suffix in FOR_WORDS if suffix in found]
+        for path in _named(recording, suffix):
+            if path in ignored or any(path.samefile(other) for other, _ in found.values()):
+                continue
+            labels = _read(path, unknown_json=suffix == ".json")
+            if labels is not None:
+                found.setdefault(suffix, (path, labels))
+    transcripts = [found[suffix][1].transcript for suffix in FOR_WORDS if suffix in found]
     phones = [found[suffix][1].phones for suffix in FOR_PHONES if suffix in found]
-    return RecordingLabels(next(filter(None, words), None), next(filter(None, phones), None))
+    return RecordingLabels(next(filter(None, transcripts), None), next(filter(None, phones), None))
+
+
+def _named(recording: Path, suffix: str) -> list[Path]:
+    """Return the files that have a recording's name and a suffix."""
+    names = [recording.with_suffix(suffix)]
+    if suffix in RECOGNISED:
+        names += [recording.with_suffix(f".en{suffix}"), recording.with_name(recording.name + suffix)]
+    return [path for path in names if path.is_file()]
 
 
 def read_labels(path: Path) -> RecordingLabels:
-    """Return the words and phones of one file: a TextGrid, labels with times, or plain text.
+    """Return the words and phones of one file.
 
+    Read are TextGrids, labels with times (HTK, Audacity), subtitles (SubRip, WebVTT), the JSON and tables of
+    recognisers (Whisper, Vosk), NIST's CTM, and plain text; the content decides, not the name.
     Raises InputError: not text, damaged, overlapping labels, or labels among phones that are no phones.
     """
+    return _read(path, unknown_json=False) or RecordingLabels()
+
+
+def read_transcript(path: Path) -> str | TimedTranscript:
+    """Return the text of a file of plain text, or the words in time of one of another kind that ``read_labels`` reads.
+
+    Raises InputError: as ``read_labels``, no such file, or phones without words.
+    """
+    check_regular(path, "transcript file")
+    if not path.exists():
+        raise InputError(f"{path}: no such transcript file")
     text = _text(path)
-    if is_textgrid(text):
-        return _chosen(parse_interval_tiers(text, str(path)), str(path))
-    lines = parse_timed_lines(text, str(path))
-    if lines is not None:
-        return _chosen([lines], str(path))
-    if len(text) > LARGEST_TRANSCRIPT:
-        raise InputError(f"{path}: {len(text)} characters, required at most {LARGEST_TRANSCRIPT}: is it a transcript?")
+    labels = _timed(text, path)
+    if labels is None:
+        check_size(path, text)
+        check_no_labels(text, str(path))
+        return text
+    if labels.transcript is None:
+        what = "phones in time, but no words; give them as units" if labels.phones else "no word"
+        raise InputError(f"{path}: the transcript holds {what}")
+    return labels.transcript
+
+
+def _read(path: Path, *, unknown_json: bool) -> RecordingLabels | None:
+    """Return the labels of a file; None for JSON of another kind, if that is expected, else an error."""
+    if unknown_json and path.stat().st_size > LARGEST_LABELS:
+        return None
+    text = _text(path)
+    if unknown_json and (not is_json(text) or parse_recognised(text, str(path)) is None):
+        return None
+    labels = _timed(text, path)
+    if labels is not None:
+        return labels
+    check_size(path, text)
     check_no_labels(text, str(path))
     tokens = text.split()
     one_a_line = len(tokens) == sum(bool(line.strip()) for line in text.splitlines())
     if len(tokens) > 1 and one_a_line and all(map(phone_named, tokens)):
         raise InputError(f"{path}: a list of phones without times; add their times, or give the words instead")
-    return RecordingLabels(words_of(text) if tokens else None)
+    if not tokens:
+        return RecordingLabels()
+    return RecordingLabels(TimedTranscript((TranscriptLine(tuple(map(TimedWord, words_of(text)))),)))
+
+
+def _timed(text: str, path: Path) -> RecordingLabels | None:
+    """Return the labels of a text whose form has times; None of any other text."""
+    where = str(path)
+    if is_textgrid(text):
+        return _chosen(parse_interval_tiers(text, where), where)
+    if is_subtitles(text):
+        return _spoken(parse_subtitles(text, where))
+    transcript = parse_recognised(text, where) if is_json(text) else None
+    if transcript is not None:
+        return _spoken(transcript)
+    lines = parse_timed_lines(text, where)
+    if lines is not None:
+        return _chosen([lines], where)
+    return _spoken(parse_ctm(text, where)) if is_ctm(text) else None
+
+
+def _spoken(transcript: TimedTranscript) -> RecordingLabels:
+    """Return the labels of a transcript, without it if it has no word."""
+    return RecordingLabels(transcript if transcript.lines else None)
+
+
+def check_size(path: Path, text: str) -> None:
+    """Raise InputError for more plain text than a transcript has."""
+    if len(text) > LARGEST_TRANSCRIPT:
+        raise InputError(f"{path}: {len(text)} characters, required at most {LARGEST_TRANSCRIPT}: is it a transcript?")
 
 
 def _chosen(tiers: list[LabelTier], where: str) -> RecordingLabels:
@@ -83,7 +170,7 @@ def _chosen(tiers: list[LabelTier], where: str) -> RecordingLabels:
         return RecordingLabels()
     timed = words if words is not None and all(len(label.text.split()) < 2 for label in words.labels) else None
     return RecordingLabels(
-        tier_words(words, where) if words else None,
+        tier_transcript(words, where) if words else None,
         phone_timeline(phones[0], timed, where) if phones else None,
     )
 
@@ -101,9 +188,24 @@ def _text(path: Path) -> str:
     try:
         text = content.decode("utf-16" if wide else "utf-8-sig")
     except UnicodeDecodeError as error:
-        binary = MARK.match(content[:40].decode("latin-1"))
-        kind = "a binary TextGrid; save it as a text file" if binary else "not UTF-8 text; save it as UTF-8"
-        raise InputError(f"{path}: is {kind}") from error
+        text = _western(path, content, error)
     if text.startswith("ooBinaryFile"):
         raise InputError(f"{path}: is a binary TextGrid; save it as a text file")
+    return text
+
+
+def _western(path: Path, content: bytes, error: UnicodeDecodeError) -> str:
+    """Return the text of a file that is not UTF-8, in the code page of Windows in western Europe and America.
+
+    Logs a warning. Raises InputError: it has bytes that stand for no character there, or control characters.
+    """
+    if MARK.match(content[:40].decode("latin-1")):
+        raise InputError(f"{path}: is a binary TextGrid; save it as a text file") from error
+    try:
+        text = content.decode("cp1252")
+    except UnicodeDecodeError:
+        text = "\0"
+    if CONTROL.search(text):
+        raise InputError(f"{path}: is not UTF-8 text; save it as UTF-8") from error
+    LOG.warning("%s: not UTF-8; read as Windows-1252 (western Europe); save it as UTF-8 if letters are wrong", path)
     return text

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from io import StringIO
 from itertools import islice
 
+from lipmotion.corpora.labels.subtitles import CUE
 from lipmotion.corpora.labels.textgrid import is_textgrid
 from lipmotion.corpora.labels.timed_lines import parse_timed_lines
 from lipmotion.errors import InputError, shortened
@@ -15,8 +16,6 @@ MASTER = "#!MLF!#"
 """The start of HTK's master label files, which hold the labels of many recordings."""
 MARKUP = re.compile(r'\{\\rtf|<[!?a-zA-Z]|\{\s*"|\[\s*[\[{]')
 """The start of RTF, HTML, XML and JSON."""
-CUE = re.compile(r"^.{0,40}\d\s*-->\s*\d", re.MULTILINE)
-"""The times of a subtitle."""
 LINES_JUDGED = 1000
 """Lines of a text that are judged for whether they hold times."""
 NUMBERED = re.compile(r"[-+.]?\d|nan\b|[-+]?inf\b")

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from lipmotion.errors import InputError, shortened
-from lipmotion.types import Span, Timeline, Unit
-from lipmotion.units import PHONES, SILENCE, is_silent, phone_named, with_reduced_vowels, words_of
+from lipmotion.types import Span, TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit
+from lipmotion.units import PHONES, SILENCE, is_silent, phone_named, with_reduced_vowels, words_in
 
 SILENCES = frozenset(["", *"sil sp spn pau ssil nsn h# #h # _ - silence <sil> <p:> {sil} [sil] <eps>".split()])
 """Labels of other tools for silence, pauses and noise that is not speech."""
@@ -73,14 +73,22 @@ def is_named_as_words(tier: LabelTier) -> bool:
     return re.search(r"\bwords?\b|transcript|\bort", tier.name.lower()) is not None
 
 
-def tier_words(tier: LabelTier, where: str) -> tuple[str, ...]:
-    """Return the words of a tier, silence left out. Raises InputError: labels overlap, or there is no word."""
+def tier_transcript(tier: LabelTier, where: str) -> TimedTranscript:
+    """Return the words of a tier with their times, silence left out; each label is a line.
+
+    Raises InputError: labels overlap, or there is no word.
+    """
     _check_order(tier, where)
-    text = " ".join(label.text for label in tier.labels if not _is_silence(label.text))
-    try:
-        return words_of(text)
-    except InputError as error:
-        raise InputError(f"{where}: {tier.name} holds no word; remove the file if the words are not known") from error
+    lines = []
+    for label in tier.labels:
+        words = () if _is_silence(label.text) else words_in(label.text)
+        end_s = label.end_s if math.isfinite(label.end_s) else None
+        times_s = (label.start_s, end_s) if len(words) == 1 else (None, None)
+        if words:
+            lines.append(TranscriptLine(tuple(TimedWord(word, *times_s) for word in words), label.start_s, end_s))
+    if not lines:
+        raise InputError(f"{where}: {tier.name} holds no word; remove the file if the words are not known")
+    return TimedTranscript(tuple(lines))
 
 
 def phone_timeline(tier: LabelTier, words: LabelTier | None, where: str) -> Timeline[Unit]:

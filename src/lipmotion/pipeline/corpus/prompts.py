@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from lipmotion.corpora.entry import read_entry
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import InputError
-from lipmotion.pipeline.transcribe import read_transcript
+from lipmotion.pipeline.transcribe import read_plain_text
 from lipmotion.units import SILENCE, VISEME_OF, Lexicon, is_silent, words_of
 
 SHIPPED = "english.txt"
@@ -131,7 +131,7 @@ def greedy_cover(
 
 
 def _lines(path: Path) -> list[str]:
-    lines = (" ".join(line.split()) for line in read_transcript(path).splitlines())
+    lines = (" ".join(line.split()) for line in read_plain_text(path).splitlines())
     return list(dict.fromkeys(line for line in lines if line))
 
 

@@ -1,0 +1,236 @@
+"""Alignment of long recordings with transcripts in time: error of the words, time and memory, with and without times.
+
+    python benchmarks/transcripts.py [--minutes 60] [--cases lines,none] [--grid FOLDER]
+
+Sentences in the voices of flite, whose words' times are known, follow one another with pauses of up to three seconds,
+in noise 30 dB under the speech. The transcript is written as a file and read as a user's is; its times differ as the
+case says. One JSON object per case, each in a process of its own: ``median_ms``, ``p90_ms``: distance of the start of a
+word from the true one; ``lost``: share of the words that are more than half a second away; ``wall_s``,
+``cpu_s``: of reading the transcript and aligning it, features included; ``peak_mb``: of the process, with the sound.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import logging
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from difflib import SequenceMatcher
+from itertools import groupby
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+import lipmotion
+from lipmotion.pipeline.corpus.prompts import prompts
+from lipmotion.pipeline.transcribe import read_transcript, transcribe
+from lipmotion.speech.analysed_audio import analysed
+from lipmotion.speech.audio_files import read_audio
+from lipmotion.speech.recogniser import Recogniser
+from lipmotion.speech.voices.installed import installed_voices, speak_sentences
+from lipmotion.types import Audio, TimedTranscript, Timeline, Unit
+from lipmotion.units import Lexicon, words_of
+
+RATE_HZ, NOISE_DB, LONGEST_PAUSE_S, LOST_S = 16_000, -30, 3.0, 0.5
+Row = tuple[str, float, float]
+"""A word, its start and its end in seconds."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """How the times of a transcript differ from the true ones, and its words from those that are said.
+
+    form     : ``srt`` (a line a sentence), ``json`` (words in time) or ``txt``
+    jitter_s : standard deviation of the error of every time
+    late_s   : added to all times
+    missing  : share of the lines that are left out
+    longer_s : by how much lines stay longer than they are said
+    """
+
+    form: str
+    jitter_s: float = 0.0
+    late_s: float = 0.0
+    missing: float = 0.0
+    longer_s: float = 0.0
+
+
+CASES = {
+    "none": Change("txt"),
+    "lines": Change("srt"),
+    "lines 0.3 s": Change("srt", 0.3, longer_s=0.7),
+    "lines 0.6 s": Change("srt", 0.6, longer_s=0.7),
+    "lines 2 s late": Change("srt", 0.3, late_s=2.0),
+    "lines 30 s late": Change("srt", 0.3, late_s=30.0),
+    "lines lacking": Change("srt", 0.3, missing=0.1),
+    "none lacking": Change("txt", missing=0.1),
+    "words 0.2 s": Change("json", 0.2),
+}
+
+
+def main() -> None:
+    """Print one JSON object per case."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--minutes", type=float, default=60)
+    parser.add_argument("--cases", default=",".join(CASES))
+    parser.add_argument("--grid", type=Path, metavar="FOLDER", help="GRID speaker s1 in place of flite's voices")
+    parser.add_argument("--one", nargs=3, metavar=("FOLDER", "CASE", "RECOGNISER"), help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.one:
+        folder, case, recogniser = options.one
+        print(json.dumps(_measured(Path(folder), case, recogniser)), flush=True)
+        return
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        spoken = _grid_sentences(options.grid) if options.grid else _synthetic_sentences()
+        samples, sentences = _speech(spoken, 60 * options.minutes, shuffled=options.grid is None)
+        np.save(folder / "speech.npy", samples)
+        (folder / "said.json").write_text(json.dumps(sentences), encoding="utf-8")
+        recogniser = "general" if options.grid else "auto"  # the shipped model was trained on s1
+        for case in options.cases.split(","):
+            subprocess.run([sys.executable, __file__, "--one", name, case.strip(), recogniser], check=True)
+
+
+def _synthetic_sentences() -> list[tuple[NDArray[np.float32], list[Row]]]:
+    """Return sentences in the voices of flite: samples, and words in time."""
+    texts = [prompt.text for prompt in prompts(count=400).chosen]
+    texts = [text for text in texts if len(words_of(text)) > 2]
+    voices = [voice for voice in installed_voices() if voice.synthesiser == "flite"]
+    spoken = [item for voice in voices for item in zip(texts, speak_sentences(texts, voice), strict=True)]
+    timed = [(text, audio.samples, _word_times(units)) for text, (audio, units) in spoken]
+    return [
+        (samples, rows)
+        for text, samples, rows in timed
+        if tuple(word for word, *_ in rows) == words_of(text)  # else one is read otherwise
+    ]
+
+
+def _grid_sentences(folder: Path) -> list[tuple[NDArray[np.float32], list[Row]]]:
+    """Return the sentences of a GRID speaker's training list: samples, and words in time (unit 1/25000 s)."""
+    sentences = []
+    for name in (folder / "train.txt").read_text("utf-8").split():
+        rows = [row.split() for row in (folder / "align" / f"{name}.align").read_text("utf-8").splitlines()]
+        words = [
+            (word, int(start) / 25_000, int(end) / 25_000) for start, end, word in rows if word not in ("sil", "sp")
+        ]
+        sentences.append((read_audio(folder / "clips" / f"{name}.mkv").samples, words))
+    return sentences
+
+
+def _speech(
+    spoken: list[tuple[NDArray[np.float32], list[Row]]], duration_s: float, shuffled: bool
+) -> tuple[NDArray[np.float32], list[list[Row]]]:
+    """Return speech with pauses in noise, and its sentences; those of a shuffled list may come several times."""
+    draw = np.random.default_rng(0)
+    order = draw.integers(len(spoken), size=100_000) if shuffled else np.arange(len(spoken))
+    pieces, sentences, at_s = [], [], 0.0
+    for number in order:
+        if at_s >= duration_s:
+            break
+        sound, rows = spoken[number]
+        pause_s = float(draw.uniform(0.1, LONGEST_PAUSE_S))
+        pause = np.zeros(int(pause_s * RATE_HZ), np.float32)
+        at_s += len(pause) / RATE_HZ
+        sentences.append([(word, start_s + at_s, end_s + at_s) for word, start_s, end_s in rows])
+        pieces += [pause, sound]
+        at_s += len(sound) / RATE_HZ
+    samples = np.concatenate(pieces)
+    level = 10 ** (NOISE_DB / 20) * float(np.sqrt(np.mean(samples**2)))
+    return samples + draw.normal(0, level, len(samples)).astype(np.float32), sentences
+
+
+def _word_times(units: Timeline[Unit]) -> list[Row]:
+    """Return the words of a timeline with their times."""
+    rows = []
+    for word, spans in groupby(units, key=lambda span: span.label.word):
+        inside = list(spans)
+        if word:
+            rows.append((word, inside[0].start_s, inside[-1].end_s))
+    return rows
+
+
+def _measured(folder: Path, name: str, recogniser: str) -> dict[str, object]:
+    """Return the figures of one case."""
+    logging.basicConfig(format="%(message)s")
+    sentences = [[tuple(row) for row in rows] for rows in json.loads((folder / "said.json").read_text("utf-8"))]
+    path, kept = _written(folder, sentences, CASES[name])
+    audio = Audio(np.load(folder / "speech.npy"), RATE_HZ)
+    phones = Recogniser(lipmotion.load_model().phones, recogniser)
+    start, start_cpu = time.perf_counter(), time.process_time()
+    transcript = read_transcript(path)
+    words = transcript if isinstance(transcript, TimedTranscript) else words_of(transcript)
+    analysed_audio = analysed(audio)
+    units = transcribe(phones, analysed_audio, analysed_audio.mfcc(), words, Lexicon())
+    wall_s, cpu_s = time.perf_counter() - start, time.process_time() - start_cpu
+    peak_mb = _peak_mb()
+    errors_s = _errors(_word_times(units), [row for rows in kept for row in rows])
+    return {
+        "case": name,
+        "minutes": round(audio.duration_s / 60, 1),
+        "words": sum(map(len, sentences)),
+        "median_ms": round(1000 * float(np.median(errors_s)), 1),
+        "p90_ms": round(1000 * float(np.quantile(errors_s, 0.9)), 1),
+        "lost": round(float(np.mean(errors_s > LOST_S)), 4),
+        "wall_s": round(wall_s, 1),
+        "cpu_s": round(cpu_s, 1),
+        "peak_mb": peak_mb,
+    }
+
+
+def _peak_mb() -> int:
+    """Return the most memory that this process had (Linux); ``ru_maxrss`` may be that of the parent."""
+    status = Path("/proc/self/status").read_text("utf-8")
+    return round(int(status.partition("VmHWM:")[2].split()[0]) / 1024)
+
+
+def _errors(found: list[Row], true: list[Row]) -> NDArray[np.float64]:
+    """Return how far the starts of words are from the true ones; equal words that meet may be one of either."""
+    pairs = SequenceMatcher(None, [row[0] for row in found], [row[0] for row in true], autojunk=False)
+    return np.array(
+        [
+            abs(found[block.a + i][1] - true[block.b + i][1])
+            for block in pairs.get_matching_blocks()
+            for i in range(block.size)
+        ]
+    )
+
+
+def _written(folder: Path, sentences: list[list[Row]], change: Change) -> tuple[Path, list[list[Row]]]:
+    """Write the transcript of a case; return its file, and the true times of the sentences that it has."""
+    draw = np.random.default_rng(1)
+    kept = [rows for rows in sentences if draw.random() >= change.missing]
+    path = folder / f"transcript.{change.form}"
+    off = lambda: float(draw.normal(0, change.jitter_s)) + change.late_s  # noqa: E731
+    if change.form == "txt":
+        text = "\n".join(" ".join(word for word, *_ in rows) for rows in kept)
+    elif change.form == "srt":
+        cues = []
+        for number, rows in enumerate(kept, 1):
+            start_s = max(rows[0][1] + off(), 0)
+            end_s = max(rows[-1][2] + off() + change.longer_s, start_s + 0.5)
+            cues.append(f"{number}\n{_clock(start_s)} --> {_clock(end_s)}\n{' '.join(word for word, *_ in rows)}\n")
+        text = "\n".join(cues)
+    else:
+        segments = []
+        for rows in kept:
+            words = []
+            for word, true_start_s, true_end_s in rows:
+                start_s = max(true_start_s + off(), 0)
+                words.append({"word": f" {word}", "start": start_s, "end": max(true_end_s + off(), start_s)})
+            segments.append({"start": words[0]["start"], "end": words[-1]["end"], "text": "", "words": words})
+        text = json.dumps({"text": "", "segments": segments})
+    path.write_text(text, encoding="utf-8")
+    return path, kept
+
+
+def _clock(time_s: float) -> str:
+    ms = round(1000 * time_s)
+    return f"{ms // 3_600_000:02}:{ms // 60_000 % 60:02}:{ms // 1000 % 60:02},{ms % 1000:03}"
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,154 @@
+"""Recognisers of words that users install themselves: Whisper (faster-whisper) and Vosk, with a model on the disk."""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+from collections.abc import Callable, Iterator
+from functools import lru_cache
+from importlib import import_module
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from lipmotion.errors import InputError, MissingDependencyError, shortened
+from lipmotion.types import Audio, TimedTranscript, TimedWord, TranscriptLine, in_order
+from lipmotion.units.spoken_text import spoken_text, timed_words
+
+LOG = logging.getLogger("lipmotion")
+ENGLISH = "en"
+STEP = 8000
+"""Samples that Vosk is given at a time."""
+
+
+class InstalledRecogniser(NamedTuple):
+    """A recogniser that users install themselves.
+
+    package  : the module to import
+    extra    : of this package, that installs it
+    variable : the environment variable that names the folder of its model
+    parts    : files or folders of a model, one of each group
+    words    : returns the lines of a recording, given the module and the folder; None: the language is not English
+    """
+
+    package: str
+    extra: str
+    variable: str
+    parts: tuple[tuple[str, ...], ...]
+    words: Callable[[Any, Path, Audio], list[TranscriptLine] | None]
+
+
+def recognise_words(audio: Audio, kind: str) -> TimedTranscript | None:
+    """Return the words of a recording in time, or None where nothing is said in English.
+
+    audio : at 16 kHz
+    kind  : ``whisper`` or ``vosk``, of ``INSTALLED_RECOGNISERS``
+    The model is the folder that the environment variable ``LIPMOTION_WHISPER_MODEL`` or ``LIPMOTION_VOSK_MODEL``
+    names. Nothing is ever downloaded.
+    Raises MissingDependencyError: the package is not installed. Raises InputError: no model, or one it cannot read.
+    """
+    recogniser = INSTALLED_RECOGNISERS[kind]
+    folder = _folder(recogniser, kind)
+    os.environ.setdefault("HF_HUB_OFFLINE", "1")  # faster-whisper reads it when it is imported
+    try:
+        module = import_module(recogniser.package)
+    except ImportError as error:
+        raise MissingDependencyError(
+            f"the recogniser {kind!r} needs {recogniser.package}: pip install 'lipmotion[{recogniser.extra}]'"
+        ) from error
+    lines = recogniser.words(module, folder, audio)
+    if lines is None:
+        return None
+    transcript = in_order(lines)
+    return transcript if transcript.lines else None
+
+
+def _folder(recogniser: InstalledRecogniser, kind: str) -> Path:
+    """Return the folder of the model. Raises InputError: none is named, or it holds no model."""
+    named = os.environ.get(recogniser.variable, "")
+    if not named:
+        raise InputError(
+            f"the recogniser {kind!r} needs a model: set {recogniser.variable} to its folder (docs/transcripts.md)"
+        )
+    folder = Path(named)
+    missing = [group for group in recogniser.parts if not any((folder / name).exists() for name in group)]
+    if missing:
+        raise InputError(
+            f"{shortened(named)} ({recogniser.variable}): is no model of {kind}, required a folder with "
+            f"{' or '.join(missing[0])}; see docs/transcripts.md"
+        )
+    return folder
+
+
+def _whisper_lines(module: Any, folder: Path, audio: Audio) -> list[TranscriptLine] | None:
+    segments, about = _whisper_model(module, str(folder)).transcribe(
+        audio.samples, word_timestamps=True, vad_filter=True, condition_on_previous_text=False
+    )
+    if about.language != ENGLISH:
+        LOG.warning("whisper hears the language %r; phones are recognised instead of words", about.language)
+        return None
+    return [_whisper_line(segment) for segment in segments]
+
+
+def _whisper_line(segment: Any) -> TranscriptLine:
+    """Return a segment: from its words in time, or where there are none from its text."""
+    words: list[TimedWord] = []
+    for word in segment.words or ():
+        words += timed_words(spoken_text(word.word), float(word.start), float(word.end))
+    if not words:
+        words = [TimedWord(word.word) for word in timed_words(spoken_text(segment.text))]
+    return TranscriptLine(tuple(words), float(segment.start), float(segment.end))
+
+
+@lru_cache(maxsize=1)
+def _whisper_model(module: Any, folder: str) -> Any:
+    try:
+        return module.WhisperModel(folder, device="cpu", compute_type="int8", local_files_only=True)
+    except (RuntimeError, ValueError, OSError) as error:
+        raise InputError(f"{folder}: faster-whisper cannot read this model: {shortened(str(error))}") from error
+
+
+def _vosk_lines(module: Any, folder: Path, audio: Audio) -> list[TranscriptLine]:
+    recogniser = module.KaldiRecognizer(_vosk_model(module, str(folder)), audio.rate_hz)
+    recogniser.SetWords(True)
+    lines = []
+    for result in _vosk_results(recogniser, audio):
+        words: list[TimedWord] = []
+        for item in json.loads(result).get("result", ()):
+            words += timed_words(spoken_text(item["word"]), float(item["start"]), float(item["end"]))
+        if words:
+            lines.append(TranscriptLine(tuple(words), words[0].start_s, words[-1].end_s))
+    return lines
+
+
+def _vosk_results(recogniser: Any, audio: Audio) -> Iterator[str]:
+    """Yield the JSON of every stretch of speech."""
+    for start in range(0, len(audio.samples), STEP):
+        samples = np.clip(audio.samples[start : start + STEP] * 32_768, -32_768, 32_767).astype("<i2")
+        if recogniser.AcceptWaveform(samples.tobytes()):
+            yield recogniser.Result()
+    yield recogniser.FinalResult()
+
+
+@lru_cache(maxsize=1)
+def _vosk_model(module: Any, folder: str) -> Any:
+    module.SetLogLevel(-1)
+    try:
+        return module.Model(folder)
+    except Exception as error:  # vosk raises nothing more special
+        raise InputError(f"{folder}: vosk cannot read this model: {shortened(str(error))}") from error
+
+
+INSTALLED_RECOGNISERS = {
+    "whisper": InstalledRecogniser(
+        "faster_whisper",
+        "whisper",
+        "LIPMOTION_WHISPER_MODEL",
+        (("model.bin",), ("tokenizer.json",)),  # without a tokenizer in the folder it would be fetched
+        _whisper_lines,
+    ),
+    "vosk": InstalledRecogniser("vosk", "vosk", "LIPMOTION_VOSK_MODEL", (("am", "final.mdl"),), _vosk_lines),
+}
+"""By the name that ``--recogniser`` has for each."""

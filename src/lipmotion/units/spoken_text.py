@@ -1,0 +1,74 @@
+"""What is spoken of a subtitle or of recognised text: without tags, descriptions of sounds, and names of speakers."""
+
+from __future__ import annotations
+
+import html
+import re
+from collections import Counter
+from collections.abc import Iterable
+
+from lipmotion.errors import InputError
+from lipmotion.types import TimedWord, TranscriptLine
+from lipmotion.units.transcript import words_in
+
+TAG = re.compile(r"</?[a-zA-Z!][^<>]{0,200}>|<[\d:.]{1,20}>|\{[^{}]{0,200}\}")
+"""Tags of SubRip and WebVTT (``<i>``, ``<v Anna>``, ``<00:01.500>``), of SubStation (``{\\an8}``), and ``<unk>``."""
+SOUND = re.compile(r"\[[^\[\]]{0,200}\]|\([^()]{0,200}\)|（[^（）]{0,200}）")
+"""Descriptions of what is heard, as subtitles for the deaf and recognisers write them: ``[music]``, ``(laughs)``."""
+SPEAKER = re.compile(
+    r"^[ \t>\-–—]{0,8}(?:[A-Z][A-Z0-9.'_#& -]{0,30}|[Ss]peaker[ _]?\w{1,3})[ \t]*:(?=\s|$)", re.MULTILINE
+)
+"""A name in capitals, or ``Speaker 1``, before a colon at the start of a line."""
+NAME = re.compile(r"^[ \t>\-–—]{0,8}([A-Z][\w.'-]{0,30}(?: [A-Z][\w.'-]{0,30}){0,3})[ \t]*:(?=\s)", re.MULTILINE)
+"""What may be the name of a speaker, as programs for meetings write it."""
+REPEATED = 3
+"""A name that begins so many lines is that of a speaker."""
+LONGEST_PAUSE_S = 0.5
+"""Words in time that are further apart are not of one line."""
+MOST_WORDS = 500_000
+"""Most words of a transcript: twelve hours of the fastest speech on record."""
+
+
+def spoken_text(text: str, names: frozenset[str] = frozenset()) -> str:
+    """Return what is spoken of a text; ``names``: of speakers, as ``speaker_names`` returns them."""
+    text = SOUND.sub(" ", TAG.sub("", html.unescape(TAG.sub("", text))))
+    text = SPEAKER.sub("", text)
+    return NAME.sub(lambda found: "" if found[1] in names else found[0], text) if names else text
+
+
+def speaker_names(texts: Iterable[str]) -> frozenset[str]:
+    """Return the names that stand before a colon at the start of several lines."""
+    counts = Counter(found[1] for text in texts for found in NAME.finditer(text))
+    return frozenset(name for name, count in counts.items() if count >= REPEATED)
+
+
+def timed_words(text: str, start_s: float | None = None, end_s: float | None = None) -> list[TimedWord]:
+    """Return the words of a text with the times of the whole: several words share them by their letters."""
+    words = words_in(text)
+    if len(words) < 2 or start_s is None or end_s is None:
+        return [TimedWord(word, start_s, end_s) for word in words]
+    letters, done = sum(map(len, words)), 0
+    timed = []
+    for word in words:
+        first, done = done, done + len(word)
+        timed.append(TimedWord(word, *(start_s + (end_s - start_s) * share / letters for share in (first, done))))
+    return timed
+
+
+def lines_by_pauses(words: list[TimedWord]) -> list[TranscriptLine]:
+    """Return words in time as lines, each up to a pause."""
+    lines: list[list[TimedWord]] = []
+    for word in words:
+        last_s = lines[-1][-1].end_s if lines else None
+        joined = last_s is not None and word.start_s is not None and word.start_s - last_s <= LONGEST_PAUSE_S
+        if joined:
+            lines[-1].append(word)
+        else:
+            lines.append([word])
+    return [TranscriptLine(tuple(line), line[0].start_s, line[-1].end_s) for line in lines]
+
+
+def check_word_count(count: int, where: str) -> None:
+    """Raise InputError for more words than a recording has."""
+    if count > MOST_WORDS:
+        raise InputError(f"{where}: more than {MOST_WORDS} words; give those of one recording")

@@ -1,0 +1,249 @@
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lipmotion.errors import InputError
+from lipmotion.hmm.align import PlacedWord, SpokenWord
+from lipmotion.kernels.windowed_viterbi import Windows
+from lipmotion.speech import anchors as module
+from lipmotion.speech.anchors import (
+    FREE_FRAMES,
+    LINE_TOLERANCE_S,
+    WORD_TOLERANCE_S,
+    align_within,
+    anchors_of,
+    feasible_windows,
+    fitted,
+    group_fits,
+    lateness_s,
+    pressed_words,
+    windows_of,
+)
+from lipmotion.types import TimedTranscript, TimedWord, TranscriptLine
+
+
+def line(text: str, start_s: float | None = None, end_s: float | None = None) -> TranscriptLine:
+    return TranscriptLine(tuple(TimedWord(word) for word in text.split()), start_s, end_s)
+
+
+def transcript(*lines: TranscriptLine) -> TimedTranscript:
+    return TimedTranscript(lines)
+
+
+def test_words_have_the_times_of_their_line_or_their_own():
+    timed = TranscriptLine((TimedWord("c"), TimedWord("d", 4.5, 4.75), TimedWord("e")), 4.0, 5.0)
+    found = anchors_of(transcript(line("a b", 1.0, 2.0), timed, line("f")))
+    nan = np.nan
+    np.testing.assert_allclose(found.start_s, [1.0, 1.0, 4.0, 4.5, nan, nan])
+    np.testing.assert_allclose(found.end_s, [2.0, 2.0, nan, 4.75, 5.0, nan])
+    assert found.tolerance_s.tolist() == [LINE_TOLERANCE_S] * 3 + [WORD_TOLERANCE_S] + [LINE_TOLERANCE_S] * 2
+    assert found.groups.tolist() == [0, 0, 1, 2, 3, 4]
+
+
+def test_windows_are_the_times_and_the_tolerance():
+    found = anchors_of(transcript(line("a b", 2.0, 3.0), line("c", 5.0, 6.0)))
+    windows = windows_of(found, found.tolerance_s, 1000)
+    assert windows.first.tolist() == [150, 150, 450]
+    assert windows.end.tolist() == [351, 351, 651]
+
+
+def test_words_without_times_lie_between_those_that_have_some():
+    found = anchors_of(transcript(line("a"), line("b", 2.0, 3.0), line("c d"), line("e", 8.0, 9.0), line("f")))
+    windows = windows_of(found, found.tolerance_s, 1200)
+    assert windows.first.tolist() == [0, 150, 150, 150, 750, 750]
+    assert windows.end.tolist() == [351, 351, 951, 951, 951, 1200]
+
+
+times = st.one_of(st.none(), st.floats(-5, 40))
+
+
+@given(spans=st.lists(st.tuples(times, times), min_size=1, max_size=12), frames=st.integers(10, 3000))
+@settings(deadline=None, max_examples=150)
+def test_windows_of_any_times_are_in_order_and_hold_what_is_known(spans, frames):
+    found = anchors_of(transcript(*(line("a b", start_s, end_s) for start_s, end_s in spans)))
+    least = np.full(len(found.start_s), 3, np.intp)
+    windows, tolerance_s = feasible_windows(found, found.tolerance_s, least, 3, frames)
+    assert np.all(np.diff(windows.first) >= 0)
+    assert np.all(np.diff(windows.end) >= 0)
+    assert np.all(tolerance_s >= found.tolerance_s)
+    assert windows.first.min() >= 0
+    assert windows.end.max() <= frames
+    if np.all(tolerance_s < np.inf):  # one word after another fits
+        at = 3
+        for first, end in zip(windows.first, windows.end, strict=True):
+            at = max(at, first) + 3
+            assert at <= min(end, frames - 3)
+
+
+def test_no_word_may_begin_before_those_ahead_of_it():
+    found = anchors_of(transcript(line("a", 5.0, 9.0), line("b", 6.0, 7.0), line("c", 5.5, 20.0)))
+    windows = windows_of(found, found.tolerance_s, 3000)
+    assert windows.first.tolist() == [450, 550, 550]
+    assert windows.end.tolist() == [751, 751, 2051]
+
+
+def test_windows_without_room_are_widened_where_it_lacks():
+    crowded = [line("a", 1.0, 2.0), line(" ".join("b" * 100), 20.0, 20.5), line("c", 60.0, 61.0)]
+    found = anchors_of(transcript(*crowded))
+    least = np.full(102, 9, np.intp)
+    windows, tolerance_s = feasible_windows(found, found.tolerance_s, least, 3, 10_000)
+    assert tolerance_s[50] > 4
+    assert tolerance_s[0] <= tolerance_s[50]
+    assert windows.end[100] - windows.first[1] >= 900
+
+
+def found_words(*starts: int, fits: Sequence[float] | None = None) -> list[PlacedWord]:
+    silence = PlacedWord(SpokenWord(-1, 0, ("sil",)), 0, -1.0)
+    words = [
+        PlacedWord(SpokenWord(word, 0, ("a",)), start, fit)
+        for word, (start, fit) in enumerate(zip(starts, fits or [-1.0] * len(starts), strict=True))
+    ]
+    return [silence, *words]
+
+
+def test_words_that_begin_or_end_with_their_window_are_pressed():
+    windows = Windows(np.array([0, 100, 200]), np.array([150, 300, 500]))
+    assert pressed_words(found_words(20, 120, 250), windows, 500).tolist() == [False, False, False]
+    assert pressed_words(found_words(20, 100, 250), windows, 500).tolist() == [False, True, False]
+    assert pressed_words(found_words(20, 150, 300), windows, 500).tolist() == [True, True, False]
+
+
+def test_the_fit_of_a_time_is_that_of_its_frames():
+    placed = found_words(10, 20, 50, fits=[-1.0, -4.0, -2.0])
+    assert group_fits(placed, np.array([0, 0, 1]), 60).tolist() == pytest.approx([-3.25, -2.0])
+
+
+class Search:
+    """A search that finds the words at true places, as far as their windows allow; elsewhere they fit badly."""
+
+    def __init__(self, starts: list[int], elsewhere: float = -8.0):
+        self.starts = np.array(starts)
+        self.elsewhere = elsewhere
+        self.asked: list[Windows] = []
+
+    def __call__(self, windows: Windows) -> list[PlacedWord]:
+        self.asked.append(windows)
+        starts = np.clip(self.starts, windows.first, windows.end - 1)
+        return found_words(*starts, fits=np.where(starts == self.starts, -1.0, self.elsewhere).tolist())
+
+
+def many_lines(count: int) -> TimedTranscript:
+    return transcript(*(line("a", 10.0 * n, 10.0 * n + 1) for n in range(1, count + 1)))
+
+
+def aligned(search: Search, frames: int = 12_000) -> list[int]:
+    count = len(search.starts)
+    placed, _ = align_within(anchors_of(many_lines(count)), np.full(count, 3, np.intp), 3, frames, search)
+    return [item.start for item in placed[1:]]
+
+
+def test_times_that_fit_are_used_at_once(caplog):
+    search = Search([1000 * n for n in range(1, 11)])
+    assert aligned(search) == search.starts.tolist()
+    assert len(search.asked) == 1
+    assert not caplog.records
+
+
+@pytest.mark.parametrize("late", [-350, 450])
+def test_a_time_that_is_wrong_is_widened_until_the_word_fits(late, caplog):
+    starts = [1000 * n for n in range(1, 11)]
+    starts[4] += late
+    search = Search(starts)
+    assert aligned(search) == starts
+    assert 2 < len(search.asked) < 9
+    first = np.array([windows.first for windows in search.asked])
+    assert (first[-1] != first[0]).tolist() == [n == 4 for n in range(10)]
+    assert not caplog.records
+
+
+def test_a_word_that_presses_stays_where_it_does_not_fit_better_elsewhere():
+    """As beside speech that is not in the transcript."""
+    starts = [1000 * n for n in range(1, 11)]
+    starts[4] += 350
+    found = aligned(search := Search(starts, elsewhere=-0.9))
+    assert found[:4] + found[5:] == starts[:4] + starts[5:]
+    assert found[4] == search.asked[0].end[4] - 1
+
+
+def test_a_time_far_off_is_reported(caplog):
+    starts = [1000 * n for n in range(1, 11)]
+    starts[4:7] = [start - 950 for start in starts[4:7]]
+    found = aligned(Search(starts, elsewhere=-9.0), frames=FREE_FRAMES + 1)
+    assert found[:4] == starts[:4]
+    (record,) = caplog.records
+    message = "at 3 of the 10 times of the transcript the words do not fit the sound, first at 50.00 s; check them"
+    assert record.getMessage() == message
+
+
+def test_times_of_something_else_are_not_used(caplog):
+    starts = [1000 * n - 950 for n in range(1, 11)]
+    assert aligned(Search(starts)) == starts
+    (record,) = caplog.records
+    assert record.getMessage() == "the times of the transcript do not fit the sound; they are not used"
+    caplog.clear()
+    assert aligned(Search(starts), frames=FREE_FRAMES + 1) != starts  # too long for that
+    assert "at 10 of the 10 times" in caplog.text
+
+
+def loud_at(spans: list[tuple[float, float]], duration_s: float) -> np.ndarray:
+    loud = np.zeros(round(100 * duration_s), bool)
+    for start_s, end_s in spans:
+        loud[round(100 * start_s) : round(100 * end_s)] = True
+    return loud
+
+
+def spoken_spans(seed: int, count: int) -> list[tuple[float, float]]:
+    draw = np.random.default_rng(seed)
+    edges = np.cumsum(draw.uniform(0.5, 3.0, 2 * count))
+    return [(float(start_s), float(end_s)) for start_s, end_s in edges.reshape(-1, 2)]
+
+
+@pytest.mark.parametrize("late_s", [-20.0, -3.0, 2.5, 40.0])
+def test_a_shift_of_all_times_is_found(late_s, caplog):
+    spans = spoken_spans(0, 80)
+    duration_s = spans[-1][1] + 1
+    loud = loud_at(spans, duration_s)
+    shifted = transcript(*(line("a", start_s + late_s, end_s + late_s) for start_s, end_s in spans))
+    assert lateness_s(shifted, loud) == pytest.approx(late_s, abs=0.05)
+    corrected = fitted(shifted, loud, duration_s)
+    assert [each.start_s for each in corrected.lines] == pytest.approx([start_s for start_s, _ in spans], abs=0.05)
+    (record,) = caplog.records
+    which = "late" if late_s > 0 else "early"
+    assert record.getMessage() == f"the times of the transcript are {abs(late_s):.1f} s {which}; corrected"
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_no_shift_is_found_where_there_is_none(seed):
+    draw = np.random.default_rng(seed)
+    spans = spoken_spans(seed, 60)
+    loud = loud_at(spans, spans[-1][1] + 1)
+    inexact = [(start_s + draw.normal(0, 0.6), end_s + draw.normal(0.5, 0.6)) for start_s, end_s in spans]
+    lines = [line("a", start_s, max(start_s, end_s)) for start_s, end_s in inexact]
+    assert lateness_s(transcript(*lines), loud) == 0
+    others = spoken_spans(seed + 100, 60)  # times of something else
+    assert lateness_s(transcript(*(line("a", *span) for span in others)), loud) == 0
+    assert lateness_s(transcript(line("a"), line("b")), loud) == 0
+    assert lateness_s(transcript(line("a", 1.0, 2.0)), np.zeros(0, bool)) == 0
+
+
+def test_lines_after_the_end_are_left_out(caplog):
+    loud = np.ones(1000, bool)
+    kept = fitted(transcript(line("a", 1.0, 2.0), line("b"), line("c", 10.5, 12.0), line("d", 11.5, 12.0)), loud, 10.0)
+    assert kept.words == ("a", "b", "c")
+    (record,) = caplog.records
+    assert "goes on after the recording ends at 10.00 s; its last 1 lines are left out" in record.getMessage()
+    with pytest.raises(InputError, match=r"begins at 20\.00 s, the recording ends at 10\.00 s; give the transcript"):
+        fitted(transcript(line("a", 20.0, 22.0)), loud, 10.0)
+
+
+def test_widening_ends(monkeypatch):
+    monkeypatch.setattr(module, "MOST_WIDENINGS", 3)
+    found = anchors_of(transcript(line(" ".join("a" * 50), 1.0, 1.1)))
+    windows, tolerance_s = feasible_windows(found, found.tolerance_s, np.full(50, 90, np.intp), 3, 3000)
+    assert np.all(np.isinf(tolerance_s))
+    assert (windows.first.max(), windows.end.min()) == (0, 3000)

@@ -1,0 +1,186 @@
+"""Recognisers that users install, with stand-ins that have their interfaces (faster-whisper 1.2, vosk 0.3.45)."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+
+from lipmotion.errors import InputError, MissingDependencyError
+from lipmotion.speech import installed_recognisers
+from lipmotion.speech.installed_recognisers import recognise_words
+from lipmotion.types import Audio, TimedTranscript
+
+WORDS = [(" See", 0.1, 0.5), (" five,", 0.6, 1.0), (" 20-foot", 1.0, 1.6)]
+AUDIO = Audio(np.linspace(-1, 1, 20_000, dtype=np.float32), 16_000)
+
+
+@pytest.fixture(autouse=True)
+def no_cache() -> Iterator[None]:
+    yield
+    installed_recognisers._whisper_model.cache_clear()
+    installed_recognisers._vosk_model.cache_clear()
+
+
+class WhisperModel:
+    """faster-whisper's, as far as it is used."""
+
+    loaded: ClassVar[list[tuple[str, dict[str, object]]]] = []
+    language = "en"
+    segments: ClassVar[list[SimpleNamespace]] = [
+        SimpleNamespace(
+            start=0.1, end=1.6, text="-", words=[SimpleNamespace(word=w, start=a, end=b) for w, a, b in WORDS]
+        )
+    ]
+
+    def __init__(self, model_size_or_path: str, **options: object):
+        self.loaded.append((model_size_or_path, options))
+        if (Path(model_size_or_path) / "model.bin").read_bytes() != b"good":
+            raise RuntimeError("Unsupported model binary version")
+
+    def transcribe(self, audio: np.ndarray, **options: object) -> tuple[Iterator[Any], Any]:
+        assert audio.dtype == np.float32
+        assert options["word_timestamps"] is True
+        return iter(self.segments), SimpleNamespace(language=self.language)
+
+
+@pytest.fixture
+def whisper(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> type[WhisperModel]:
+    """Return a stand-in for the class of models; its model is in ``tmp_path``."""
+    model = type("WhisperModel", (WhisperModel,), {"loaded": []})
+    module = ModuleType("faster_whisper")
+    module.WhisperModel = model  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "faster_whisper", module)
+    monkeypatch.setenv("LIPMOTION_WHISPER_MODEL", str(tmp_path))
+    monkeypatch.delenv("HF_HUB_OFFLINE", raising=False)
+    (tmp_path / "model.bin").write_bytes(b"good")
+    (tmp_path / "tokenizer.json").write_text("{}")
+    return model
+
+
+@pytest.fixture
+def vosk(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[bytes]:
+    """Install a stand-in for vosk, whose model is in ``tmp_path``; return the sound that it is given."""
+    heard: list[bytes] = []
+    results = [
+        {"text": ""},
+        {"result": [{"conf": 1, "word": w.strip(" ,"), "start": a, "end": b} for w, a, b in WORDS], "text": ""},
+    ]
+
+    class Recogniser:
+        def __init__(self, model: object, rate_hz: float):
+            assert (model, rate_hz) == (str(tmp_path), 16_000)
+
+        def SetWords(self, wanted: bool) -> None:  # noqa: N802
+            assert wanted
+
+        def AcceptWaveform(self, sound: bytes) -> bool:  # noqa: N802
+            heard.append(sound)
+            return len(heard) == 2
+
+        def Result(self) -> str:  # noqa: N802
+            return json.dumps(results[0])
+
+        def FinalResult(self) -> str:  # noqa: N802
+            return json.dumps(results[1])
+
+    def load(folder: str) -> str:
+        if not (Path(folder) / "am" / "final.mdl").exists():
+            raise Exception("Failed to create a model")
+        return folder
+
+    module = ModuleType("vosk")
+    vars(module).update(Model=load, KaldiRecognizer=Recogniser, SetLogLevel=lambda level: None)  # noqa: ARG005
+    monkeypatch.setitem(sys.modules, "vosk", module)
+    monkeypatch.setenv("LIPMOTION_VOSK_MODEL", str(tmp_path))
+    (tmp_path / "am").mkdir()
+    (tmp_path / "am" / "final.mdl").touch()
+    return heard
+
+
+def check_words(transcript: TimedTranscript | None) -> None:
+    assert transcript is not None
+    assert transcript.words == ("see", "five", "twenty", "foot")
+    times = [time for word in transcript.lines[0].words for time in (word.start_s, word.end_s)]
+    assert times == pytest.approx([0.1, 0.5, 0.6, 1.0, 1.0, 1.36, 1.36, 1.6])
+    assert (transcript.lines[0].start_s, transcript.lines[0].end_s) == pytest.approx((0.1, 1.6))
+
+
+def test_whisper(whisper: type[WhisperModel], tmp_path: Path) -> None:
+    for _ in range(2):
+        check_words(recognise_words(AUDIO, "whisper"))
+    options = {"device": "cpu", "compute_type": "int8", "local_files_only": True}
+    assert whisper.loaded == [(str(tmp_path), options)]
+
+
+def test_whisper_without_times_of_words(whisper: type[WhisperModel], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(whisper, "segments", [SimpleNamespace(start=0.5, end=2.0, text=" [Music] Hi!", words=None)])
+    found = recognise_words(AUDIO, "whisper")
+    assert found is not None
+    assert found.words == ("hi",)
+    assert (found.lines[0].words[0].start_s, found.lines[0].end_s) == (None, 2.0)
+
+
+def test_whisper_says_that_it_is_offline(whisper: type[WhisperModel]) -> None:
+    import os
+
+    recognise_words(AUDIO, "whisper")
+    assert whisper.loaded
+    assert os.environ.pop("HF_HUB_OFFLINE") == "1"
+
+
+def test_another_language_is_not_taken_for_words(
+    whisper: type[WhisperModel], monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(whisper, "language", "fr")
+    assert recognise_words(AUDIO, "whisper") is None
+    assert "hears the language 'fr'; phones are recognised" in caplog.text
+
+
+def test_nothing_said(whisper: type[WhisperModel], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(whisper, "segments", [])
+    assert recognise_words(AUDIO, "whisper") is None
+
+
+def test_vosk(vosk: list[bytes]) -> None:
+    check_words(recognise_words(AUDIO, "vosk"))
+    sound = np.frombuffer(b"".join(vosk), "<i2")
+    assert len(sound) == 20_000
+    assert (sound[0], sound[-1]) == (-32_768, 32_767)
+
+
+@pytest.mark.usefixtures("whisper")
+def test_models_that_are_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "model.bin").write_bytes(b"bad")
+    with pytest.raises(InputError, match="faster-whisper cannot read this model: Unsupported model binary"):
+        recognise_words(AUDIO, "whisper")
+    (tmp_path / "tokenizer.json").unlink()  # it would be fetched
+    with pytest.raises(InputError, match=r"LIPMOTION_WHISPER_MODEL\): is no model of whisper, .* with tokenizer\.json"):
+        recognise_words(AUDIO, "whisper")
+    monkeypatch.delenv("LIPMOTION_WHISPER_MODEL")
+    with pytest.raises(InputError, match="'whisper' needs a model: set LIPMOTION_WHISPER_MODEL to its folder"):
+        recognise_words(AUDIO, "whisper")
+
+
+@pytest.mark.usefixtures("vosk")
+def test_models_of_vosk_that_are_none(tmp_path: Path) -> None:
+    (tmp_path / "am" / "final.mdl").unlink()
+    with pytest.raises(InputError, match="vosk cannot read this model: Failed to create a model"):
+        recognise_words(AUDIO, "vosk")
+    (tmp_path / "am").rmdir()
+    with pytest.raises(InputError, match=r"is no model of vosk, required a folder with am or final\.mdl"):
+        recognise_words(AUDIO, "vosk")
+
+
+@pytest.mark.usefixtures("whisper", "vosk")
+@pytest.mark.parametrize(("kind", "package"), [("whisper", "faster_whisper"), ("vosk", "vosk")])
+def test_packages_that_are_not_installed(kind: str, package: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, package, None)
+    with pytest.raises(MissingDependencyError, match=rf"needs {package}: pip install 'lipmotion\[{kind}\]'"):
+        recognise_words(AUDIO, kind)
