@@ -8,6 +8,8 @@ from contextlib import ExitStack
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.vision.face_finder import FaceFinder
+from lipmotion.vision.face_window import WindowedMesh
 from lipmotion.vision.image_similarity import face_thumbnail, image_correlation, scene_thumbnail
 from lipmotion.vision.landmarks import EYE_CORNERS, TRACKED_POINTS
 from lipmotion.vision.mesh import FaceMesh
@@ -26,6 +28,11 @@ LOST_FRAMES = 10
 SAME_PERSON = 0.9
 """Correlation of the upper faces above which two faces are one person's. GRID: 0.90 to 1 within a clip; two people, 0.2
 to 0.87 in 14 pairs of 15, and 0.94 in one."""
+LARGE_PX = 1280
+"""In a picture with a longer side than this, faces are first searched with the full-range detector, as they are likely
+to be small in it, and followed in a window, which takes less time than the mesh of the whole picture."""
+THOROUGH_STEP = 5
+"""Where no face is found, the parts of every such frame are searched too, not only the whole picture."""
 THUMBNAIL_STEP, MOST_THUMBNAILS = 5, 20
 """Every how many frames of a scene a thumbnail of the face is kept for comparison, and how many at most."""
 
@@ -35,11 +42,14 @@ _EYES = [TRACKED_POINTS.index(index) for index in EYE_CORNERS]
 class FaceFollower:
     """Finds one face in every scene of a clip, frame by frame, and then selects the scenes of one person.
 
+    The mesh finds a face that takes a fifth of the picture or more; smaller ones are found by the full-range detector
+    and followed in a window.
     Use it as a context manager.
     """
 
     def __init__(self) -> None:
-        self._scenes = [_Scene(())]
+        self._finder = FaceFinder()
+        self._scenes = [_Scene((), self._finder)]
         self._picture: Array | None = None
         self._scene_of_frame: list[int | None] = []  # None: no face was found
 
@@ -48,6 +58,7 @@ class FaceFollower:
 
     def __exit__(self, *_: object) -> None:
         self._scenes[-1].close()
+        self._finder.__exit__()
 
     def points(self, image: Image) -> Array | None:
         """Return the points of a face in the next frame, as of ``FaceMesh.faces``; None if there is none.
@@ -83,7 +94,8 @@ class FaceFollower:
 
     def _begin_scene(self) -> None:
         self._scenes[-1].close()
-        self._scenes.append(_Scene([thumbnail for scene in self._scenes for thumbnail in scene.thumbnails]))
+        known = [thumbnail for scene in self._scenes for thumbnail in scene.thumbnails]
+        self._scenes.append(_Scene(known, self._finder))
 
     def _scenes_of_person(self) -> set[int]:
         """Return the scene with the most frames, and all whose face resembles one of a scene returned."""
@@ -109,16 +121,18 @@ class _Scene:
     is_lost        : whether the mesh, which follows one face, has changed to another one
     """
 
-    def __init__(self, known: Sequence[Array]) -> None:
+    def __init__(self, known: Sequence[Array], finder: FaceFinder) -> None:
         self.thumbnails: list[Array] = []
         self.missing_frames = 0
         self.is_lost = False
         self._known = known
+        self._finder = finder
+        self._searches = 0
         self._first: Array | None = None
         self._last: Array | None = None
         self._frames = 0
         self._open = ExitStack()
-        self._mesh: FaceMesh | None = None
+        self._mesh: FaceMesh | WindowedMesh | None = None
         self._is_crowd = False
 
     def close(self) -> None:
@@ -141,17 +155,43 @@ class _Scene:
         return self._first is not None and before._last is not None and before._could_be(self._first, before._last)
 
     def _first_face(self, image: Image) -> Array | None:
-        faces = self._faces(image)
-        if faces:
-            faces = self._several(image) or faces
-            self._first = max(faces, key=lambda face: self._priority(image, face))
+        if max(image.shape[:2]) > LARGE_PX:
+            self._first = self._searched(image)
+        if self._first is None:
+            faces = self._faces(image)
+            if faces:
+                faces = self._several(image) or faces
+                self._first = max(faces, key=lambda face: self._priority(image, face))
+            elif max(image.shape[:2]) <= LARGE_PX:
+                self._first = self._searched(image)
         return self._first
 
     def _same_face(self, image: Image, last: Array) -> Array | None:
         faces = self._faces(image)
+        if not faces:
+            return self._searched(image, last)
         near = [face for face in faces if self._could_be(face, last)]
-        self.is_lost = bool(faces) and not near and not self._is_crowd
+        self.is_lost = not near and not self._is_crowd
         return min(near, key=lambda face: _distance(face, last), default=None)
+
+    def _searched(self, image: Image, last: Array | None = None) -> Array | None:
+        """Return the face that the detector finds, and follow it in a window from now on; None if there is none.
+
+        last : the face followed so far, which it must be; None: the one of the highest priority is taken
+        """
+        boxes = self._finder.boxes(image, thorough=self._searches % THOROUGH_STEP == 0)
+        self._searches += 1
+        found: list[tuple[Array, WindowedMesh]] = []
+        with ExitStack() as tried:
+            for box in boxes[:MOST_FACES]:
+                mesh = tried.enter_context(WindowedMesh(box))
+                found += [(face, mesh) for face in mesh.faces(image) if last is None or self._could_be(face, last)]
+            if not found:
+                return None
+            face, self._mesh = max(found, key=lambda pair: self._priority(image, pair[0]))
+            self._open.push(tried.pop_all())
+        self._is_crowd = False
+        return face
 
     def _could_be(self, face: Array, last: Array) -> bool:
         growth = _size(face) / _size(last)

@@ -11,6 +11,8 @@ Image = NDArray[np.uint8]
 Array = NDArray[np.float64]
 
 SCENE_SIZE = (32, 24)
+SCENE_SAMPLES = 640
+"""Every so many columns and rows of a picture are looked at that about this number is left of the more numerous."""
 FACE_SIZE = (36, 24)
 FACE_WIDTH, FACE_TOP, FACE_BOTTOM = 0.75, 0.5, 0.5
 """The region of the upper face, which speech does not change: from the point between the eyes to either side, up and
@@ -26,8 +28,10 @@ FLAT_LEVELS = 1.0
 
 
 def scene_thumbnail(image: Image) -> Array:
-    """Return a thumbnail of the whole picture, less its mean [shape=(24, 32, 3)]."""
-    small: Array = import_opencv().resize(image, SCENE_SIZE, interpolation=import_opencv().INTER_AREA).astype(float)
+    """Return a thumbnail of the whole picture, less its mean [shape=(24, 32, 3)]; of a large one, from some pixels."""
+    cv2 = import_opencv()
+    step = max(1, max(image.shape[:2]) // SCENE_SAMPLES)
+    small: Array = cv2.resize(image[::step, ::step], SCENE_SIZE, interpolation=cv2.INTER_AREA).astype(float)
     return small - small.mean()
 
 
