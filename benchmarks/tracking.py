@@ -53,9 +53,10 @@ class Clip:
 
 @dataclass(frozen=True)
 class Case:
-    """Pictures made of a clip, which of them show the face, and the rotation that the container states."""
+    """Pictures made of a clip, which of its frames each shows, whether the face is in it, and the stated rotation."""
 
     frames: list[Image]
+    order: list[int]
     shown: NDArray[np.bool_]
     rotation: int = 0
 
@@ -102,10 +103,10 @@ def figures(clip: Clip, case: Case) -> dict[str, float]:
         found, speed = tracked(write(Path(folder) / "case.mp4", case))
     if found is None:
         return {"refused": 1.0, "seen": 0.0}
-    count = min(len(found.seen), len(case.shown), len(clip.usual.seen))
-    both = found.seen[:count] & clip.usual.seen[:count]
+    order = case.order[: len(found.seen)]
+    both = found.seen[: len(order)] & clip.usual.seen[order]
     alike = {
-        name: float(np.corrcoef(found.motion[name][:count][both], clip.usual.motion[name][:count][both])[0, 1])
+        name: float(np.corrcoef(found.motion[name][: len(order)][both], clip.usual.motion[name][order][both])[0, 1])
         for name in ("opening", "width")
     }
     return {
@@ -201,7 +202,7 @@ def swaying(x: float, y: float) -> Callable[[int], tuple[float, float]]:
 
 def whole(frames: list[Image], rotation: int = 0) -> Case:
     """Return the case of pictures that all show the face."""
-    return Case(frames, np.ones(len(frames), bool), rotation)
+    return Case(frames, list(range(len(frames))), np.ones(len(frames), bool), rotation)
 
 
 def waist(clip: Clip, eyes: float = 65.0) -> Case:
@@ -210,7 +211,7 @@ def waist(clip: Clip, eyes: float = 65.0) -> Case:
 
 
 def four_k(clip: Clip) -> Case:
-    """Return somebody filmed to the waist at 3840 × 2160 (every third frame, as encoding takes long)."""
+    """Return somebody filmed to the waist at 3840 × 2160 (the first 40 frames, as encoding takes long)."""
     part = Clip(clip.name, clip.frames[:40], clip.points[:40], clip.usual)
     return whole(placed(part, (3840, 2160), 195.0, at=swaying(0.45, 0.3)))
 
@@ -222,18 +223,22 @@ def phone(clip: Clip) -> Case:
 
 
 def away(clip: Clip) -> Case:
-    """Return somebody who walks out of a picture of 1280 × 720 and comes back from the other side."""
-    out, back, count = 30, 45, len(clip.frames)
+    """Return somebody who walks out of a picture of 1280 × 720 and comes back from the other side.
+
+    The clip is shown to its end, backwards and to its end again; the person is away around the turn to backwards.
+    """
+    count = len(clip.frames)
+    order = [*range(count), *reversed(range(count)), *range(count)]
+    out, back = count - 20, count + 30
 
     def at(n: int) -> tuple[float, float]:
-        if n < out:
-            return 0.5 + 0.65 * max(0.0, (n - 20) / 10), 0.3
         if n < back:
-            return -0.5, 0.3
-        return min(0.5, -0.15 + 0.65 * (n - back) / 10), 0.3
+            return 0.5 + 0.025 * max(0, n - out), 0.3
+        return min(0.5, -0.15 + 0.025 * (n - back)), 0.3
 
-    shown = np.array([0.08 < at(n)[0] < 0.92 for n in range(count)])
-    return Case(placed(clip, (1280, 720), 65.0, at=at), shown)
+    longer = Clip(clip.name, [clip.frames[n] for n in order], clip.points, clip.usual)
+    shown = np.array([0.08 < at(n)[0] < 0.92 for n in range(len(order))])
+    return Case(placed(longer, (1280, 720), 65.0, at=at), order, shown)
 
 
 def rolled(clip: Clip) -> Case:

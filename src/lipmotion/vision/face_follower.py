@@ -34,7 +34,9 @@ to be small in it, and followed in a window, which takes less time than the mesh
 THOROUGH_STEP = 5
 """Where no face is found, the parts of every such frame are searched too, not only the whole picture."""
 THUMBNAIL_STEP, MOST_THUMBNAILS = 5, 20
-"""Every how many frames of a scene a thumbnail of the face is kept for comparison, and how many at most."""
+"""Every how many frames of a scene a thumbnail of the face is kept for comparison, and how many at first."""
+NEW_LOOK, MOST_LOOKS = 0.95, 60
+"""Later thumbnails are kept when they correlate less than this with all that are kept, and how many at most in all."""
 
 _EYES = [TRACKED_POINTS.index(index) for index in EYE_CORNERS]
 
@@ -116,7 +118,7 @@ class FaceFollower:
 class _Scene:
     """The frames between two cuts, and the face followed through them.
 
-    thumbnails     : of the face, every ``THUMBNAIL_STEP`` frames
+    thumbnails     : of the face, every ``THUMBNAIL_STEP`` frames, later only where it looks different
     missing_frames : frames since the face was last found, 0 before it was found
     is_lost        : whether the mesh, which follows one face, has changed to another one
     """
@@ -144,11 +146,16 @@ class _Scene:
         if face is None:
             self.missing_frames += self._last is not None
             return None
-        if self._frames % THUMBNAIL_STEP == 0 and len(self.thumbnails) < MOST_THUMBNAILS:
-            self.thumbnails.append(face_thumbnail(image, face[_EYES, :2]))
+        if self._frames % THUMBNAIL_STEP == 0 and len(self.thumbnails) < MOST_LOOKS:
+            self._keep_thumbnail(face_thumbnail(image, face[_EYES, :2]))
         self._frames += 1
         self._last, self.missing_frames = face, 0
         return face
+
+    def _keep_thumbnail(self, thumbnail: Array) -> None:
+        is_early = len(self.thumbnails) < MOST_THUMBNAILS
+        if is_early or _best_correlation([thumbnail], self.thumbnails) < NEW_LOOK:
+            self.thumbnails.append(thumbnail)
 
     def is_near(self, before: _Scene) -> bool:
         """Return whether this scene's face begins where the one before ended."""

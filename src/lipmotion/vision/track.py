@@ -31,6 +31,9 @@ UNSEEN_LIMIT = 0.2
 """A clip is refused when more than this share of its frames shows no face."""
 USABLE = 0.5
 """A clip is refused when its pictures cover less than this share of the duration that it states."""
+SMALL_EYES_PX = 35.0
+"""A smaller median distance between the eyes is reported. GRID clips made small and tracked have a correlation of the
+opening with the clip as it was of 0.99 at 65 px, 0.98 at 40, 0.90 at 25."""
 SHORT_S = 0.5
 """Pictures that end more than this before the stated duration are reported."""
 STRETCH_LIMIT = 2.0
@@ -79,7 +82,7 @@ def track(path: Path, *, crops: bool = True) -> Track:
     Returns a Track at the video's nominal frame rate, frame n at n / rate seconds after the container's start, not
     smoothed. Frames that were dropped or damaged, show no face or another one, or in which the mouth is occluded, are
     interpolated, False in ``seen``, and have the mouth picture of the nearest frame that is seen. Of several people the
-    largest and most central is followed. ``notes`` reports damage, cuts and other faces.
+    largest and most central is followed. ``notes`` reports damage, cuts, other faces, and a face that is very small.
     Raises InputError: not a video, damaged or cut short before half of it, or the face in too few of the frames.
     Raises MissingDependencyError: MediaPipe or OpenCV is not installed.
     """
@@ -96,6 +99,7 @@ def track(path: Path, *, crops: bool = True) -> Track:
         *(f"cut at {times_s[index]:.2f} s" for index in follower.cuts()),
         *([f"another face, or one that is not recognised, in {others} frames"] if others else []),
         *([f"the mouth is covered, or the picture damaged, in {covered} frames"] if covered else []),
+        *_smallness(tracked),
     )
     _check(path, tracked, video, rate_hz, notes)
     mouths = _mouths(path, tracked) if crops else None
@@ -123,6 +127,16 @@ def _damage(video: OpenVideo, times_s: Array, rate_hz: float) -> list[str]:
     if end_s < video.stated_s - SHORT_S:
         notes.append(f"cut short: pictures up to {end_s:.2f} s of {video.stated_s:.2f} s")
     return notes
+
+
+def _smallness(tracked: _TrackedFrames) -> list[str]:
+    """Return a note on a face that is too small to be measured well."""
+    if not tracked.points:
+        return []
+    unit_px = float(np.median(_distance(np.stack(tracked.points)[:, :, :2], EYE_CORNERS)))
+    if unit_px >= SMALL_EYES_PX:
+        return []
+    return [f"the face is small: {unit_px:.0f} px between the eyes, {SMALL_EYES_PX:.0f} give a good track; film closer"]
 
 
 def motion_values(points: Array) -> Array:
