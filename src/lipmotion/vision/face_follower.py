@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lipmotion.vision.face_finder import FaceFinder
 from lipmotion.vision.face_window import WindowedMesh
-from lipmotion.vision.image_similarity import face_thumbnail, image_correlation, scene_thumbnail
+from lipmotion.vision.image_similarity import face_thumbnail, image_correlation, is_cut, scene_thumbnail
 from lipmotion.vision.landmarks import EYE_CORNERS, TRACKED_POINTS
 from lipmotion.vision.mesh import FaceMesh
 
@@ -19,8 +19,6 @@ Array = NDArray[np.float64]
 
 MOST_FACES = 4
 """The most faces that are searched for where a scene begins."""
-CUT_LEVELS = 6.0
-"""Mean change of the thumbnail between two frames, in grey levels, that begins a new scene (GRID: up to 1.3)."""
 JUMP, GROWTH = 0.6, 1.25
 """Most eye distances that a face moves in a frame (GRID: up to 0.03), and the largest ratio of its sizes (1.06)."""
 LOST_FRAMES = 10
@@ -69,8 +67,7 @@ class FaceFollower:
         largest and most central.
         """
         before, self._picture = self._picture, scene_thumbnail(image)
-        is_cut = before is not None and np.abs(self._picture - before).mean() > CUT_LEVELS
-        if is_cut or self._scenes[-1].missing_frames > LOST_FRAMES:
+        if is_cut(before, self._picture) or self._scenes[-1].missing_frames > LOST_FRAMES:
             self._begin_scene()
         face = self._scenes[-1].next_face(image)
         if face is None and self._scenes[-1].is_lost:

@@ -10,6 +10,8 @@ from lipmotion.vision.packages import import_opencv
 Image = NDArray[np.uint8]
 Array = NDArray[np.float64]
 
+CUT_LEVELS = 6.0
+"""Mean change of the thumbnail between two frames, in grey levels, that begins a new scene (GRID: up to 1.3)."""
 SCENE_SIZE = (32, 24)
 SCENE_SAMPLES = 640
 """Every so many columns and rows of a picture are looked at that about this number is left of the more numerous."""
@@ -33,6 +35,11 @@ def scene_thumbnail(image: Image) -> Array:
     step = max(1, max(image.shape[:2]) // SCENE_SAMPLES)
     small: Array = cv2.resize(image[::step, ::step], SCENE_SIZE, interpolation=cv2.INTER_AREA).astype(float)
     return small - small.mean()
+
+
+def is_cut(before: Array | None, after: Array) -> bool:
+    """Return whether a new scene begins between two frames, from their thumbnails; False if there is none before."""
+    return before is not None and bool(np.abs(after - before).mean() > CUT_LEVELS)
 
 
 def face_thumbnail(image: Image, eyes: Array) -> Array:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError
 from lipmotion.types import Channel, Motion, Track
 from lipmotion.vision.face_follower import FaceFollower
-from lipmotion.vision.frames import OpenVideo, open_video
+from lipmotion.vision.frames import WHOLE, OpenVideo, VideoSpan, open_video
 from lipmotion.vision.image_similarity import mouth_thumbnail, occluded_mouths
 from lipmotion.vision.landmarks import DISTANCES, EYE_CORNERS, JAW_POINTS, LIP_POINTS, TRACKED_POINTS
 from lipmotion.vision.mouth import eyes_to_image, face_to_image, mouth_crop
@@ -74,24 +74,27 @@ class _TrackedFrames:
         return int(wrong.sum())
 
 
-def track(path: Path, *, crops: bool = True) -> Track:
+def track(path: Path, *, crops: bool = True, span: VideoSpan = WHOLE) -> Track:
     """Return the motion of lips and jaw in a video, without head motion, and the mouth pictures.
 
     path  : a video that shows one face, more or less from the front
     crops : whether mouth pictures are wanted
-    Returns a Track at the video's nominal frame rate, frame n at n / rate seconds after the container's start, not
-    smoothed. Frames that were dropped or damaged, show no face or another one, or in which the mouth is occluded, are
+    span  : the part of the video that is tracked
+    Returns a Track at the video's nominal frame rate, frame n at n / rate seconds after the start of the container, or
+    of the span, not smoothed. Frames that were dropped or damaged, show no face or another one, or in which the mouth is occluded, are
     interpolated, False in ``seen``, and have the mouth picture of the nearest frame that is seen. Of several people the
     largest and most central is followed. ``notes`` reports damage, cuts, other faces, and a face that is very small.
     Raises InputError: not a video, damaged or cut short before half of it, or the face in too few of the frames.
     Raises MissingDependencyError: MediaPipe or OpenCV is not installed.
     """
     tracked = _TrackedFrames()
-    with open_video(path) as video, FaceFollower() as follower:
+    with open_video(path, span) as video, FaceFollower() as follower:
         for frame in video.frames:
             tracked.add(frame.time_s, frame.image, follower.points(frame.image))
     others = tracked.mark_unseen(~follower.person()[tracked.seen])
     covered = tracked.mark_unseen(occluded_mouths(np.stack(tracked.mouths))) if tracked.mouths else 0
+    if not tracked.times_s:
+        raise InputError(f"{path}: no picture from {span.start_s:.2f} to {span.end_s:.2f} s; give a whole video")
     times_s = np.array(tracked.times_s)
     rate_hz = nominal_rate_hz(times_s, video.stated_rates_hz)
     notes = (
@@ -102,17 +105,17 @@ def track(path: Path, *, crops: bool = True) -> Track:
         *_smallness(tracked),
     )
     _check(path, tracked, video, rate_hz, notes)
-    mouths = _mouths(path, tracked) if crops else None
+    mouths = _mouths(path, span, tracked) if crops else None
     return replace(_resampled(tracked, mouths, rate_hz, frame_count(times_s, rate_hz)), notes=notes)
 
 
-def _mouths(path: Path, tracked: _TrackedFrames) -> NDArray[np.uint8]:
+def _mouths(path: Path, span: VideoSpan, tracked: _TrackedFrames) -> NDArray[np.uint8]:
     """Return the mouth picture of every frame that shows the face [shape=(n, 56, 72, 3)].
 
     The video is decoded once more: the head pose depends on all frames, and the frames do not fit into memory.
     """
     maps = iter(face_to_image(np.stack(tracked.points)))
-    with open_video(path) as video:
+    with open_video(path, span) as video:
         shown = zip(tracked.seen, video.frames, strict=False)
         return np.stack([mouth_crop(frame.image, next(maps)) for seen, frame in shown if seen])
 
