@@ -86,4 +86,5 @@ class WindowedMesh:
         low, high = face[:, :2].min(axis=0), face[:, :2].max(axis=0)
         side = REACH * float((high - low).max())
         is_steady = 1 / STEADY < side / self._window.side < STEADY
-        return Window.around(*(low + high) / 2, self._window.side if is_steady else side)
+        x, y = (low + high) / 2
+        return Window.around(float(x), float(y), self._window.side if is_steady else side)

@@ -81,9 +81,10 @@ def track(path: Path, *, crops: bool = True, span: VideoSpan = WHOLE) -> Track:
     crops : whether mouth pictures are wanted
     span  : the part of the video that is tracked
     Returns a Track at the video's nominal frame rate, frame n at n / rate seconds after the start of the container, or
-    of the span, not smoothed. Frames that were dropped or damaged, show no face or another one, or in which the mouth is occluded, are
-    interpolated, False in ``seen``, and have the mouth picture of the nearest frame that is seen. Of several people the
-    largest and most central is followed. ``notes`` reports damage, cuts, other faces, and a face that is very small.
+    of the span, not smoothed. Frames that were dropped or damaged, show no face or another one, or in which the mouth
+    is occluded, are interpolated, False in ``seen``, and have the mouth picture of the nearest frame that is seen. Of
+    several people the largest and most central is followed. ``notes`` reports damage, cuts, other faces, and a face
+    that is very small.
     Raises InputError: not a video, damaged or cut short before half of it, or the face in too few of the frames.
     Raises MissingDependencyError: MediaPipe or OpenCV is not installed.
     """

@@ -5,6 +5,7 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 SHORTEST_S, LONGEST_S = 3.0, 12.0
 """Wanted length of an utterance. Longer ones are divided at their longest pause, shorter ones joined where they can."""
@@ -80,7 +81,7 @@ def _divided_at_cuts(stretch: Stretch, cuts_s: Sequence[float]) -> list[Stretch]
         return [stretch]
     inside = [t for t in cuts_s if stretch.start_s + ROUNDING_S < t < stretch.end_s - ROUNDING_S]
     edges = [stretch.start_s, *inside, stretch.end_s]
-    return [Stretch(*pair) for pair in zip(edges, edges[1:], strict=False)]
+    return [Stretch(*pair) for pair in pairwise(edges)]
 
 
 def _divided_in_speech(stretch: Stretch, quietest: Quietest) -> list[Stretch]:
