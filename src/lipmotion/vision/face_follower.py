@@ -44,12 +44,14 @@ class FaceFollower:
 
     The mesh finds a face that takes a fifth of the picture or more; smaller ones are found by the full-range detector
     and followed in a window.
+    person : thumbnails of the person who is to be followed; without any, it is the one with the most frames
     Use it as a context manager.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, person: Sequence[Array] = ()) -> None:
+        self._wanted = list(person)
         self._finder = FaceFinder()
-        self._scenes = [_Scene((), self._finder)]
+        self._scenes = [_Scene(self._wanted, self._finder)]
         self._picture: Array | None = None
         self._scene_of_frame: list[int | None] = []  # None: no face was found
 
@@ -77,9 +79,20 @@ class FaceFollower:
         return face
 
     def person(self) -> NDArray[np.bool_]:
-        """Return in which frames the face found is that of the person with the most frames [shape=(T,)]."""
+        """Return in which frames the face found is that of the person [shape=(T,)]."""
         kept = self._scenes_of_person()
         return np.array([scene in kept for scene in self._scene_of_frame])
+
+    def share_of_person(self) -> float:
+        """Return in which share of the frames with a face it is that of the person; 1 if there is no face."""
+        found = sum(scene is not None for scene in self._scene_of_frame)
+        return float(self.person().sum()) / found if found else 1.0
+
+    def thumbnails(self) -> list[Array]:
+        """Return thumbnails of the person's face, at most ``MOST_LOOKS`` from all scenes."""
+        kept = [self._scenes[index].thumbnails for index in sorted(self._scenes_of_person())]
+        found = [thumbnail for scene in kept for thumbnail in scene]
+        return found[:: -(-len(found) // MOST_LOOKS)] if found else []
 
     def cuts(self) -> list[int]:
         """Return the frames at which the camera changes, or the picture changes to or from somebody else."""
@@ -93,15 +106,18 @@ class FaceFollower:
 
     def _begin_scene(self) -> None:
         self._scenes[-1].close()
-        known = [thumbnail for scene in self._scenes for thumbnail in scene.thumbnails]
+        known = self._wanted or [thumbnail for scene in self._scenes for thumbnail in scene.thumbnails]
         self._scenes.append(_Scene(known, self._finder))
 
     def _scenes_of_person(self) -> set[int]:
-        """Return the scene with the most frames, and all whose face resembles one of a scene returned."""
-        counts = [self._scene_of_frame.count(index) for index in range(len(self._scenes))]
-        kept = {int(np.argmax(counts))}
+        """Return the scene with the most frames, and all whose face resembles one of a scene returned.
+
+        If a person is wanted, these are the scenes whose face resembles hers, and all whose face resembles one of them.
+        """
+        counts = np.bincount([n for n in self._scene_of_frame if n is not None], minlength=len(self._scenes))
+        kept = set() if self._wanted else {int(np.argmax(counts))}
         while True:
-            known = [thumbnail for index in kept for thumbnail in self._scenes[index].thumbnails]
+            known = self._wanted + [thumbnail for index in kept for thumbnail in self._scenes[index].thumbnails]
             more = {
                 index
                 for index, scene in enumerate(self._scenes)

@@ -23,7 +23,7 @@ STEADY = 1.25
 
 
 @dataclass(frozen=True)
-class Window:
+class FaceWindow:
     """A square part of a picture, possibly beyond its edges: upper left corner and side, px."""
 
     left: int
@@ -31,10 +31,10 @@ class Window:
     side: int
 
     @staticmethod
-    def around(x: float, y: float, side: float) -> Window:
+    def around(x: float, y: float, side: float) -> FaceWindow:
         """Return the window whose middle is nearest to a point; of a side given, px."""
         whole = max(1, round(side))
-        return Window(round(x - whole / 2), round(y - whole / 2), whole)
+        return FaceWindow(round(x - whole / 2), round(y - whole / 2), whole)
 
     def shown(self, image: Image) -> Image:
         """Return this part of a picture, scaled to ``SIZE_PX``; beyond the picture it is black."""
@@ -66,7 +66,7 @@ class WindowedMesh:
     """
 
     def __init__(self, box: FaceBox) -> None:
-        self._window = Window.around(box.x, box.y, REACH * box.side)
+        self._window = FaceWindow.around(box.x, box.y, REACH * box.side)
         self._mesh = FaceMesh()
 
     def __enter__(self) -> WindowedMesh:
@@ -82,9 +82,9 @@ class WindowedMesh:
             self._window = self._following(found[0])
         return found
 
-    def _following(self, face: Array) -> Window:
+    def _following(self, face: Array) -> FaceWindow:
         low, high = face[:, :2].min(axis=0), face[:, :2].max(axis=0)
         side = REACH * float((high - low).max())
         is_steady = 1 / STEADY < side / self._window.side < STEADY
         x, y = (low + high) / 2
-        return Window.around(float(x), float(y), self._window.side if is_steady else side)
+        return FaceWindow.around(float(x), float(y), self._window.side if is_steady else side)

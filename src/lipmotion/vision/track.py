@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -17,8 +18,7 @@ from lipmotion.vision.landmarks import DISTANCES, EYE_CORNERS, JAW_POINTS, LIP_P
 from lipmotion.vision.mouth import eyes_to_image, face_to_image, mouth_crop
 from lipmotion.vision.pose import without_head_motion
 from lipmotion.vision.timing import (
-    HIGHEST_HZ,
-    LOWEST_HZ,
+    check_rate,
     frame_count,
     nearest_indices,
     nominal_rate_hz,
@@ -74,12 +74,15 @@ class _TrackedFrames:
         return int(wrong.sum())
 
 
-def track(path: Path, *, crops: bool = True, span: VideoSpan = WHOLE) -> Track:
+def track(
+    path: Path, *, crops: bool = True, span: VideoSpan = WHOLE, person: Sequence[NDArray[np.float64]] = ()
+) -> Track:
     """Return the motion of lips and jaw in a video, without head motion, and the mouth pictures.
 
-    path  : a video that shows one face, more or less from the front
-    crops : whether mouth pictures are wanted
-    span  : the part of the video that is tracked
+    path   : a video that shows one face, more or less from the front
+    crops  : whether mouth pictures are wanted
+    span   : the part of the video that is tracked
+    person : thumbnails of the face that is wanted, of ``VideoScan``; without any, the one with the most frames
     Returns a Track at the video's nominal frame rate, frame n at n / rate seconds after the start of the container, or
     of the span, not smoothed. Frames that were dropped or damaged, show no face or another one, or in which the mouth
     is occluded, are interpolated, False in ``seen``, and have the mouth picture of the nearest frame that is seen. Of
@@ -89,7 +92,7 @@ def track(path: Path, *, crops: bool = True, span: VideoSpan = WHOLE) -> Track:
     Raises MissingDependencyError: MediaPipe or OpenCV is not installed.
     """
     tracked = _TrackedFrames()
-    with open_video(path, span) as video, FaceFollower() as follower:
+    with open_video(path, span) as video, FaceFollower(person) as follower:
         for frame in video.frames:
             tracked.add(frame.time_s, frame.image, follower.points(frame.image))
     others = tracked.mark_unseen(~follower.person()[tracked.seen])
@@ -164,10 +167,7 @@ def _distance(flat: Array, pair: tuple[int, int]) -> Array:
 
 def _check(path: Path, tracked: _TrackedFrames, video: OpenVideo, rate_hz: float, notes: tuple[str, ...]) -> None:
     times_s, seen = np.array(tracked.times_s), np.array(tracked.seen)
-    if not LOWEST_HZ <= rate_hz <= HIGHEST_HZ:
-        raise InputError(
-            f"{path}: {rate_hz:g} pictures a second, required {LOWEST_HZ:g} to {HIGHEST_HZ:g}; export the video again"
-        )
+    check_rate(rate_hz, path)
     count = frame_count(times_s, rate_hz)
     noted = f" ({'; '.join(notes)})" if notes else ""
     if count < USABLE * video.stated_s * rate_hz:

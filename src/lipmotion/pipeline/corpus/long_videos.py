@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lipmotion.corpora.folder import VIDEO_KINDS
 from lipmotion.corpora.labels import labels_beside
@@ -39,11 +40,16 @@ HELD_OUT = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class DividedVideo:
-    """A long video, the recordings that its parts become, and the sound of each."""
+class VideoPart:
+    """One utterance of a long video.
 
-    recordings: tuple[SourceRecording, ...]
-    sounds: tuple[Audio, ...]
+    sound  : its sound
+    person : thumbnails of the face that is to be followed; none where nobody else is in the video
+    """
+
+    recording: SourceRecording
+    sound: Audio
+    person: tuple[NDArray[np.float64], ...]
 
 
 def single_video(path: Path) -> RecordingFolder:
@@ -53,8 +59,8 @@ def single_video(path: Path) -> RecordingFolder:
 
 def with_long_videos_divided(
     folder: RecordingFolder, place: Path, monitor: Monitor
-) -> tuple[RecordingFolder, dict[str, Audio]]:
-    """Return the folder with the parts of long videos in their place, and the sound of each part, by name.
+) -> tuple[RecordingFolder, dict[str, VideoPart]]:
+    """Return the folder with the parts of long videos in their place, and those parts by name.
 
     place : the folder itself, where lists of splits may lie
     Of a single video, without lists, the last parts become ``val`` and ``test``; others have the split of the whole.
@@ -64,21 +70,21 @@ def with_long_videos_divided(
         return folder, {}
     is_only_one = len(folder.recordings) == 1 and not any((place / name).is_file() for name in LISTS)
     recordings = [item for item in folder.recordings if item not in videos]
-    problems, sounds = dict(folder.problems), dict[str, Audio]()
+    problems, parts = dict(folder.problems), dict[str, VideoPart]()
     for n, item in enumerate(videos):
         reached = partial(_report_share, monitor, n, len(videos))
         reached(0.0)
         try:
-            parts = divided(item, reached, splits_by_time=is_only_one)
+            found = divided(item, reached, splits_by_time=is_only_one)
         except InputError as error:
             problems[item.name] = str(error)
             continue
-        recordings += parts.recordings
-        sounds |= {part.name: sound for part, sound in zip(parts.recordings, parts.sounds, strict=True)}
-        if not parts.recordings:
+        if not found:
             problems[item.name] = f"{item.file}: no speech in it; give a video in which somebody talks"
+        parts |= {part.recording.name: part for part in found}
+    recordings += [part.recording for part in parts.values()]
     recordings.sort(key=lambda recording: recording.name)
-    return RecordingFolder(f"{folder.kind}, divided into utterances", tuple(recordings), problems), sounds
+    return RecordingFolder(f"{folder.kind}, divided into utterances", tuple(recordings), problems), parts
 
 
 def _report_share(monitor: Monitor, before: int, count: int, share: float) -> None:
@@ -99,7 +105,7 @@ def _is_long_video(recording: SourceRecording) -> bool:
         return False
 
 
-def divided(recording: SourceRecording, reached: Callable[[float], None], *, splits_by_time: bool) -> DividedVideo:
+def divided(recording: SourceRecording, reached: Callable[[float], None], *, splits_by_time: bool) -> list[VideoPart]:
     """Return the utterances of a long video; each is named after its start (``talk-00h01m12.48s``).
 
     reached        : called now and then with the share of the video that was looked at
@@ -107,19 +113,21 @@ def divided(recording: SourceRecording, reached: Callable[[float], None], *, spl
     Words are those of the lines in time beside the video; without such lines, the utterances have none.
     Memory: the whole sound (230 MB for an hour), but not the pictures. Raises InputError: it cannot be read.
     """
-    audio = read_audio(recording.file)
     scan = scan_video(recording.file, reached)
+    audio = read_audio(recording.file)
     levels = levels_db(audio)
     lines = _lines(recording)
     stretches = [Stretch(line.start_s, line.end_s, line.label) for line in lines]
     if not lines:
         stretches = [Stretch(*span) for span in spoken_spans(levels)]
-    end_s = min(audio.duration_s, _end_s(scan))
+    end_s = min(audio.duration_s, scan.end_s)
     spans = utterance_spans(_within(stretches, end_s), scan.cuts_s.tolist(), end_s, partial(quietest_s, levels))
-    parts = [part for span in spans if (part := _on_pictures(span, scan, end_s)).duration_s > 0]
-    splits = _splits(len(parts), recording.split) if splits_by_time else [recording.split] * len(parts)
-    pieces = tuple(_piece(recording, *pair) for pair in zip(parts, splits, strict=True))
-    return DividedVideo(pieces, tuple(_sound(audio, part) for part in parts))
+    spans = [span for longer in spans if (span := _on_pictures(longer, scan, end_s)).duration_s > 0]
+    splits = _splits(len(spans), recording.split) if splits_by_time else [recording.split] * len(spans)
+    return [
+        VideoPart(_recording_of(span, recording, split), _sound(audio, span), scan.person)
+        for span, split in zip(spans, splits, strict=True)
+    ]
 
 
 def _lines(recording: SourceRecording) -> list[Line]:
@@ -136,12 +144,6 @@ def _lines(recording: SourceRecording) -> list[Line]:
 
 def _within(stretches: Sequence[Stretch], end_s: float) -> list[Stretch]:
     return [replace(part, end_s=min(part.end_s, end_s)) for part in stretches if part.start_s < end_s]
-
-
-def _end_s(scan: VideoScan) -> float:
-    """Return the end of the last picture."""
-    step_s = float(np.median(np.diff(scan.times_s))) if len(scan.times_s) > 1 else 0.0
-    return float(scan.times_s[-1]) + step_s
 
 
 def _on_pictures(span: Stretch, scan: VideoScan, end_s: float) -> Stretch:
@@ -161,7 +163,7 @@ def _splits(count: int, split: str) -> list[str]:
     return [split] * (count - 2 * held_out) + ["val"] * held_out + ["test"] * held_out
 
 
-def _piece(recording: SourceRecording, part: Stretch, split: str) -> SourceRecording:
+def _recording_of(part: Stretch, recording: SourceRecording, split: str) -> SourceRecording:
     minutes, seconds = divmod(round(part.start_s, 2), 60)
     name = f"{recording.name}-{int(minutes) // 60:02}h{int(minutes) % 60:02}m{seconds:05.2f}s"
     return replace(

@@ -18,14 +18,14 @@ from lipmotion.corpora.entry import quantise, read_entry, write_utterance
 from lipmotion.corpora.source_recordings import VIDEO_SUFFIXES, RecordingFolder, SourceRecording
 from lipmotion.corpora.store import UTTERANCES, Corpus
 from lipmotion.errors import AlignmentError, CorpusError, ExportError, InputError, MissingDependencyError
-from lipmotion.pipeline.corpus.long_videos import single_video, with_long_videos_divided
+from lipmotion.pipeline.corpus.long_videos import VideoPart, single_video, with_long_videos_divided
 from lipmotion.pipeline.corpus.supplied_motion import DIGESTS, source_digests, supplied_phones, supplied_track
 from lipmotion.pipeline.workers import worker_pool
 from lipmotion.speech.audio_files import read_audio
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.storage.files import locked, remove_unfinished, sha256_of
 from lipmotion.storage.sources import Source, check_apart, is_folder
-from lipmotion.types import Audio, Item, Monitor, Progress, Track, Utterance, silent_monitor
+from lipmotion.types import Item, Monitor, Progress, Track, Utterance, silent_monitor
 from lipmotion.units import check_words
 from lipmotion.vision.frames import VideoSpan
 from lipmotion.vision.packages import package_versions
@@ -74,14 +74,14 @@ class PrepareReport:
 class _Job:
     """One recording, the folder of its utterance, its source and the settings of the preparation.
 
-    sound : of a part of a long recording; None: it is read from the file
+    part : the part of a long video that it is; None: it is a whole file
     """
 
     recording: SourceRecording
     folder: Path
     source: dict[str, str]
     settings: dict[str, str]
-    sound: Audio | None = None
+    part: VideoPart | None = None
 
 
 @dataclass(frozen=True)
@@ -132,9 +132,9 @@ def prepare(
     is_new = not is_folder(output)
     with locked(output):
         corpus = Corpus.create(output)
-        folder, sounds = with_long_videos_divided(folder, place, monitor)
+        folder, parts = with_long_videos_divided(folder, place, monitor)
         jobs = [
-            _job(item, place.resolve(), corpus, packages, crops, sounds.get(item.name)) for item in folder.recordings
+            _job(item, place.resolve(), corpus, packages, crops, parts.get(item.name)) for item in folder.recordings
         ]
         with _refreshed(corpus), worker_pool(min(workers or os.cpu_count() or 1, len(jobs))) as team:
             outcomes = _collected(folder, team.unordered_map(_process, jobs), len(jobs), monitor)
@@ -178,7 +178,7 @@ def _job(
     corpus: Corpus,
     packages: dict[str, str],
     crops: bool,
-    sound: Audio | None,
+    part: VideoPart | None,
 ) -> _Job:
     collection = "/".join(directory.parts[-2:]).strip("/")
     name = recording.name
@@ -199,7 +199,7 @@ def _job(
     if recording.end_s is not None:
         source |= {"start_s": f"{recording.start_s:.3f}", "end_s": f"{recording.end_s:.3f}"}
         settings["part"] = f"{recording.start_s:.3f} to {recording.end_s:.3f} s"
-    return _Job(replace(recording, name=name), corpus.folder(name), source, settings, sound)
+    return _Job(replace(recording, name=name), corpus.folder(name), source, settings, part)
 
 
 def _is_taken(folder: Path, video: Path, collection: str) -> bool:
@@ -259,7 +259,7 @@ def _up_to_date(job: _Job, source: dict[str, str]) -> dict[str, Any] | None:
 
 
 def _utterance(job: _Job, source: dict[str, str]) -> Utterance:
-    audio = quantise(read_audio(job.recording.file) if job.sound is None else job.sound)
+    audio = quantise(job.part.sound if job.part else read_audio(job.recording.file))
     check_words(job.recording.words or (), audio.duration_s)
     return Utterance(
         name=job.recording.name,
@@ -278,9 +278,10 @@ def _track(job: _Job, duration_s: float) -> Track:
     if job.recording.motion_file is not None:
         return supplied_track(job.recording.motion_file, duration_s)
     recording, crops = job.recording, job.settings["crops"] == "yes"
-    if recording.end_s is None:
+    if job.part is None or recording.end_s is None:
         return track(recording.file, crops=crops)
-    return track(recording.file, crops=crops, span=VideoSpan(recording.start_s, recording.end_s))
+    span = VideoSpan(recording.start_s, recording.end_s)
+    return track(recording.file, crops=crops, span=span, person=job.part.person)
 
 
 def _collected(folder: RecordingFolder, outcomes: Iterator[_Outcome], count: int, monitor: Monitor) -> list[_Outcome]:
