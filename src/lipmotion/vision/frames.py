@@ -70,7 +70,8 @@ def open_video(path: Path, span: VideoSpan = WHOLE, *, longest_px: int | None = 
     span       : the part that is wanted, which the times and the duration then refer to; it is sought in the file
     longest_px : reduce larger pictures to this while they are converted, for a quick look; decode in several threads
     Time 0 is the container's start, as in ``speech.audio_files``, so sound and picture agree.
-    Raises InputError: no such file, empty, not a video, no video stream, or no picture that can be decoded.
+    Raises InputError: no such file, empty, not a video, no video stream, or no picture that can be decoded (in a span
+    there may be none).
     Packets and pictures that are damaged later are left out, and listed in ``OpenVideo.damage``.
     """
     import av
@@ -116,7 +117,7 @@ def _frames(
             break
         _check_size(path, picture.width, picture.height, pixel_shape)
         yield VideoFrame(max(last_s - span.start_s, 0.0), _upright(picture, pixel_shape, longest_px))
-    if last_s == float("-inf"):
+    if last_s == float("-inf") and span == WHOLE:
         raise InputError(f"{path}: holds no picture that can be decoded; export the video again")
 
 

@@ -95,10 +95,10 @@ def track(
     with open_video(path, span) as video, FaceFollower(person) as follower:
         for frame in video.frames:
             tracked.add(frame.time_s, frame.image, follower.points(frame.image))
-    others = tracked.mark_unseen(~follower.person()[tracked.seen])
-    covered = tracked.mark_unseen(occluded_mouths(np.stack(tracked.mouths))) if tracked.mouths else 0
     if not tracked.times_s:
         raise InputError(f"{path}: no picture from {span.start_s:.2f} to {span.end_s:.2f} s; give a whole video")
+    others = tracked.mark_unseen(~follower.person()[tracked.seen])
+    covered = tracked.mark_unseen(occluded_mouths(np.stack(tracked.mouths))) if tracked.mouths else 0
     times_s = np.array(tracked.times_s)
     rate_hz = nominal_rate_hz(times_s, video.stated_rates_hz)
     notes = (
