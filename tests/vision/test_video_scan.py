@@ -15,6 +15,7 @@ class Follower:
     """Stands for the follower of faces: counts what it is shown."""
 
     share = 1.0
+    last: Follower
 
     def __init__(self) -> None:
         self.shown: list[int] = []

@@ -28,6 +28,8 @@ LOG = logging.getLogger("lipmotion")
 
 _STAGE = "dividing long videos"
 """Name of the stage in reports of progress."""
+DIVIDING_SHARE = 0.2
+"""Share of the whole preparation that this takes, for reports of progress."""
 VIDEO = "one video"
 DIVIDED_KINDS = (*VIDEO_KINDS, VIDEO)
 """Kinds of recordings of which the long ones are divided; GRID's and others hold a sentence each."""
@@ -88,7 +90,7 @@ def with_long_videos_divided(
 
 
 def _report_share(monitor: Monitor, before: int, count: int, share: float) -> None:
-    monitor(Progress(_STAGE, before, count, (before + share) / count))
+    monitor(Progress(_STAGE, before, count, DIVIDING_SHARE * (before + share) / count))
 
 
 def _is_long_video(recording: SourceRecording) -> bool:

@@ -18,7 +18,7 @@ from lipmotion.corpora.entry import quantise, read_entry, write_utterance
 from lipmotion.corpora.source_recordings import VIDEO_SUFFIXES, RecordingFolder, SourceRecording
 from lipmotion.corpora.store import UTTERANCES, Corpus
 from lipmotion.errors import AlignmentError, CorpusError, ExportError, InputError, MissingDependencyError
-from lipmotion.pipeline.corpus.long_videos import VideoPart, single_video, with_long_videos_divided
+from lipmotion.pipeline.corpus.long_videos import DIVIDING_SHARE, VideoPart, single_video, with_long_videos_divided
 from lipmotion.pipeline.corpus.supplied_motion import DIGESTS, source_digests, supplied_phones, supplied_track
 from lipmotion.pipeline.workers import worker_pool
 from lipmotion.speech.audio_files import read_audio
@@ -137,7 +137,9 @@ def prepare(
             _job(item, place.resolve(), corpus, packages, crops, parts.get(item.name)) for item in folder.recordings
         ]
         with _refreshed(corpus), worker_pool(min(workers or os.cpu_count() or 1, len(jobs))) as team:
-            outcomes = _collected(folder, team.unordered_map(_process, jobs), len(jobs), monitor)
+            outcomes = _collected(
+                folder, team.unordered_map(_process, jobs), len(jobs), monitor, DIVIDING_SHARE if parts else 0.0
+            )
     report = _report(corpus, folder, outcomes, time.monotonic() - start_s)
     if not report.prepared and not report.kept:
         if is_new:
@@ -284,18 +286,23 @@ def _track(job: _Job, duration_s: float) -> Track:
     return track(recording.file, crops=crops, span=span, person=job.part.person)
 
 
-def _collected(folder: RecordingFolder, outcomes: Iterator[_Outcome], count: int, monitor: Monitor) -> list[_Outcome]:
-    """Return all outcomes; each is reported to the monitor as soon as it is known."""
+def _collected(
+    folder: RecordingFolder, outcomes: Iterator[_Outcome], count: int, monitor: Monitor, done: float
+) -> list[_Outcome]:
+    """Return all outcomes; each is reported to the monitor as soon as it is known.
+
+    done : the share of the whole work that was done before
+    """
     for name, problem in folder.problems.items():
         monitor(Item(name, "skipped", problem))
     collected: list[_Outcome] = []
-    monitor(Progress(_STAGE, 0, count, 0.0))
+    monitor(Progress(_STAGE, 0, count, done))
     for outcome in outcomes:
         collected.append(outcome)
         kind = "skipped" if outcome.problem else "kept" if outcome.kept else "prepared"
         unseen = (f"no face in {outcome.unseen} frames, interpolated",) if outcome.unseen else ()
         monitor(Item(outcome.name, kind, outcome.problem or "; ".join((*outcome.notes, *unseen))))
-        monitor(Progress(_STAGE, len(collected), count, len(collected) / count))
+        monitor(Progress(_STAGE, len(collected), count, done + (1 - done) * len(collected) / count))
     return collected
 
 
