@@ -25,6 +25,10 @@ OCCLUDED_CORRELATION = 0.2
 did)..."""
 OCCLUDED_DIFFERENCE = 20.0
 """... and differs from it by more grey levels on average (GRID: up to 17 in open mouths)."""
+NOD_ROWS = 4
+"""... and correlates less at every shift by up to so many of its 14 rows than..."""
+SHIFTED_CORRELATION = 0.5
+"""... this: a nod moves the mouth in its region, which is placed by the eyes."""
 FLAT_LEVELS = 1.0
 """A region with a smaller standard deviation, in grey levels, has no texture to compare."""
 
@@ -88,6 +92,18 @@ def occluded_mouths(mouths: NDArray[np.uint8]) -> NDArray[np.bool_]:
     if np.square(median - median.mean(axis=(0, 1))).mean() < FLAT_LEVELS**2:
         return np.zeros(len(mouths), bool)
     values = mouths.astype(float)
-    return (image_correlation(values, median) < OCCLUDED_CORRELATION) & (
+    unlike = (image_correlation(values, median) < OCCLUDED_CORRELATION) & (
         np.abs(values - median).mean(axis=(1, 2, 3)) > OCCLUDED_DIFFERENCE
     )
+    unlike[unlike] = _shifted_correlation(values[unlike], median) < SHIFTED_CORRELATION
+    return unlike
+
+
+def _shifted_correlation(mouths: Array, median: Array) -> Array:
+    """Return the highest correlation of each mouth region with the median one, at any shift up or down."""
+    best = np.full(len(mouths), -1.0)
+    for shift in range(1, NOD_ROWS + 1):
+        up = image_correlation(mouths[:, :-shift], median[shift:])
+        down = image_correlation(mouths[:, shift:], median[:-shift])
+        best = np.maximum(best, np.maximum(up, down))
+    return best
