@@ -9,7 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 from lipmotion.vision import face_follower as follow
-from lipmotion.vision.face_follower import JUMP, LOST_FRAMES, FaceFollower
+from lipmotion.vision.face_finder import FaceBox
+from lipmotion.vision.face_follower import JUMP, LOST_FRAMES, MOST_THUMBNAILS, FaceFollower
 from lipmotion.vision.landmarks import EYE_CORNERS, TRACKED_POINTS
 
 pytestmark = pytest.mark.video
@@ -39,6 +40,10 @@ def points(face: Face) -> NDArray[np.float64]:
     return found
 
 
+SMALL = 40
+"""A face with a smaller distance between the eyes is found by the detector alone."""
+
+
 class Mesh:
     """Finds the faces of the frame that is being shown, at most so many, in their order; not those in capitals."""
 
@@ -54,10 +59,43 @@ class Mesh:
         pass
 
     def faces(self, _image: NDArray[np.uint8]) -> list[NDArray[np.float64]]:
-        return [points(face) for face in Mesh.shown if face[0].islower()][: self.most]
+        return [points(face) for face in Mesh.shown if face[0].islower() and face[3] >= SMALL][: self.most]
 
 
-Show = Callable[[Sequence[tuple[Sequence[Face], int]]], tuple[FaceFollower, list[float | None]]]
+class Finder:
+    """Stands for the detector: finds all faces of the frame that is being shown, those in capitals too."""
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def boxes(self, _image: NDArray[np.uint8], *, thorough: bool) -> list[FaceBox]:
+        del thorough
+        return [FaceBox(x, y, 2 * unit, 0.9) for _, x, y, unit in Mesh.shown]
+
+
+class SmallMesh:
+    """Stands for the mesh in a window: finds the face that is nearest to the last one; not those in capitals."""
+
+    open = 0
+
+    def __init__(self, box: FaceBox) -> None:
+        self.x = box.x
+
+    def __enter__(self) -> SmallMesh:
+        SmallMesh.open += 1
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        SmallMesh.open -= 1
+
+    def faces(self, _image: NDArray[np.uint8]) -> list[NDArray[np.float64]]:
+        near = [face for face in Mesh.shown if face[0].islower() and abs(face[1] - self.x) < 2 * face[3]]
+        if near:
+            self.x = near[0][1]
+        return [points(face) for face in near[:1]]
+
+
+Show = Callable[..., tuple[FaceFollower, list[float | None]]]
 
 
 @pytest.fixture
@@ -65,10 +103,14 @@ def show(monkeypatch: pytest.MonkeyPatch) -> Show:
     """Shows frames (faces, place); returns the follower, and where the face was followed to."""
     pytest.importorskip("cv2")
     monkeypatch.setattr(follow, "FaceMesh", Mesh)
+    monkeypatch.setattr(follow, "FaceFinder", Finder)
+    monkeypatch.setattr(follow, "WindowedMesh", SmallMesh)
 
-    def run(frames: Sequence[tuple[Sequence[Face], int]]) -> tuple[FaceFollower, list[float | None]]:
+    def run(
+        frames: Sequence[tuple[Sequence[Face], int]], person: Sequence[NDArray[np.float64]] = ()
+    ) -> tuple[FaceFollower, list[float | None]]:
         followed: list[float | None] = []
-        with FaceFollower() as follower:
+        with FaceFollower(person) as follower:
             for faces, place in frames:
                 Mesh.shown = faces
                 found = follower.points(picture(faces, place))
@@ -125,6 +167,60 @@ def test_away_for_long_is_compared_again(show: Show) -> None:
     assert follower.person().tolist() == [True] * 12 + [False] * (len(gone) + 6)
     follower, _ = show([([ANNA], 0)] * 12 + gone + [([moved(ANNA, 15)], 0)] * 6)
     assert follower.person().tolist() == [True] * 12 + [False] * len(gone) + [True] * 6
+
+
+SMALL_ANNA, SMALL_BELLA = ("a", 220.0, 60.0, 32.0), ("b", 80.0, 60.0, 32.0)
+
+
+def test_a_small_face_is_found_from_the_first_frame_and_followed(show: Show) -> None:
+    follower, followed = show([([moved(SMALL_ANNA, n)], 0) for n in range(20)])
+    assert followed == [220.0 + n for n in range(20)]
+    assert follower.person().all()
+    assert follower.cuts() == []
+    assert SmallMesh.open == 0
+
+
+def test_a_small_face_that_is_lost_is_searched_where_it_was(show: Show) -> None:
+    hidden = ("A", *SMALL_ANNA[1:])
+    frames = [([SMALL_ANNA], 0)] * 8 + [([hidden], 0)] * 3 + [([SMALL_BELLA, moved(SMALL_ANNA, 10)], 0)] * 8
+    follower, followed = show(frames)
+    assert followed == [220.0] * 8 + [None] * 3 + [230.0] * 8
+    assert np.flatnonzero(~follower.person()).tolist() == [8, 9, 10]
+    assert SmallMesh.open == 0
+
+
+def test_who_leaves_and_returns_elsewhere_is_known_again(show: Show) -> None:
+    gone = [([], 0)] * (LOST_FRAMES + 5)
+    follower, followed = show([([SMALL_ANNA], 0)] * 12 + gone + [([moved(SMALL_ANNA, -120)], 0)] * 6)
+    assert followed == [220.0] * 12 + [None] * len(gone) + [100.0] * 6
+    assert np.flatnonzero(follower.person()).tolist() == [*range(12), *range(len(followed) - 6, len(followed))]
+
+
+def test_a_face_of_which_the_mesh_is_unsure_is_nobodys(show: Show) -> None:
+    _, followed = show([([("A", *SMALL_ANNA[1:])], 0)] * 6)
+    assert followed == [None] * 6
+    assert SmallMesh.open == 0
+
+
+def test_of_several_small_ones_the_largest_then_the_known_one(show: Show) -> None:
+    larger = ("b", 110.0, 60.0, 36.0)
+    assert set(show([([SMALL_ANNA, larger], 0)] * 4)[1]) == {110.0}
+    known, _ = show([([SMALL_ANNA], 0)] * 8)
+    assert set(show([([SMALL_ANNA, larger], 0)] * 4, known.thumbnails())[1]) == {220.0}
+
+
+def test_only_the_person_who_is_wanted_counts(show: Show) -> None:
+    wanted = show([([ANNA], 0)] * 8)[0].thumbnails()
+    follower, _ = show([([BELLA], 1)] * 20 + [([ANNA], 0)] * 5, wanted)
+    assert follower.person().tolist() == [False] * 20 + [True] * 5
+    assert follower.share_of_person() == pytest.approx(0.2)
+    assert not show([([BELLA], 1)] * 20, wanted)[0].person().any()
+
+
+def test_later_looks_are_kept_when_they_are_new(show: Show) -> None:
+    """Frames 0 to 95 give the first twenty thumbnails; nothing changes until somebody else's look comes slowly."""
+    same, _ = show([([ANNA], 0)] * 160)
+    assert len(same.thumbnails()) == MOST_THUMBNAILS
 
 
 def test_of_several_the_largest_then_the_middle_one(show: Show) -> None:

@@ -1,16 +1,20 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 
 import av
 import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.vision.frames import VideoFrame, open_video
+from lipmotion.vision import frames
+from lipmotion.vision.frames import VideoFrame, VideoSpan, open_video
+from vision.variants import write_frames
 
 
 def all_frames(path: Path) -> list[VideoFrame]:
@@ -42,7 +46,77 @@ def test_states_the_nominal_rate(write_video):
         assert video.stated_rates_hz[0] == 30
 
 
+@pytest.mark.parametrize("name", ["clip.mp4", "clip.mkv", "clip.ts", "clip.avi", "clip.mpg"])
+@pytest.mark.parametrize("span", [VideoSpan(0.4, 0.8), VideoSpan(7.0, 8.0), VideoSpan(9.48), VideoSpan(0.0, 0.2)])
+def test_a_span_holds_the_frames_of_its_time(tmp_path, name, span):
+    """With B-frames, and key frames twelve frames apart, wherever seeking ends."""
+    pictures = [np.full((48, 64, 3), 30 + n % 200, np.uint8) for n in range(250)]
+    other = {"clip.avi": "mpeg4", "clip.mpg": "mpeg2video"}.get(name)
+    codec, options = (other, {"g": "12"}) if other else ("libx264", {"bf": "3", "g": "12", "crf": "1"})
+    path = write_frames(tmp_path / name, pictures, codec=codec, options=options)
+    with open_video(path) as video:
+        whole = [(frame.time_s, frame.image.mean()) for frame in video.frames]
+        rest_s = video.stated_s - span.start_s
+    expected = [(t, value) for t, value in whole if span.start_s - 1e-4 <= t < span.end_s - 1e-4]
+    assert len(expected) >= round((min(span.end_s, 10.0) - span.start_s) * 25) - 1  # MPEG-2's encoder leaves one out
+    with open_video(path, span) as video:
+        found = [(frame.time_s + span.start_s, frame.image.mean()) for frame in video.frames]
+        assert video.stated_s == pytest.approx(min(span.end_s - span.start_s, rest_s))
+        assert video.damage == []
+    np.testing.assert_allclose(found, expected, atol=1e-4)
+
+
+class LateContainer:
+    """A container of ten pictures, one a second, in which seeking ends three pictures too late, unless at the start."""
+
+    start_time = 0
+
+    def __init__(self) -> None:
+        self.at = 0
+
+    def seek(self, ticks: int, *, stream: object) -> None:
+        del stream
+        self.at = 0 if ticks <= 0 else ticks + 3
+
+    def demux(self, _stream: object) -> Iterator[SimpleNamespace]:
+        for n in range(self.at, 10):
+            picture = SimpleNamespace(time=float(n), is_corrupt=n == 1)
+            yield SimpleNamespace(decode=lambda shown=picture: [shown])
+
+
+def test_where_seeking_ends_too_late_all_is_decoded():
+    damage: list[str] = []
+    found = frames._pictures_from(LateContainer(), SimpleNamespace(time_base=Fraction(1)), 5.0, damage)
+    assert [picture.time for picture in found] == [5, 6, 7, 8, 9]
+    assert damage == []  # what is damaged before the span is none of its business
+
+
+def test_a_span_behind_the_end_is_empty(write_video):
+    with open_video(write_video(), VideoSpan(5.0, 6.0)) as video:
+        assert list(video.frames) == []
+        assert video.stated_s == 0
+
+
+def test_a_quick_look_is_small(write_video):
+    with open_video(write_video(size=(64, 48)), longest_px=32) as video:
+        frames = list(video.frames)
+    assert {frame.image.shape for frame in frames} == {(24, 32, 3)}
+    np.testing.assert_allclose([frame.image.mean() for frame in frames], 10 * np.arange(10), atol=3)
+
+
+@pytest.mark.parametrize("rotation", [90, 180, -90])
+def test_rotations_turn_the_corner(write_video, rotation):
+    pytest.importorskip("cv2")
+    picture = np.zeros((48, 64, 3), np.uint8)
+    picture[:16, :16] = 255
+    image = all_frames(write_video(picture=picture, rotation=rotation))[0].image
+    turned = np.rot90(picture, rotation // 90)
+    assert image.shape == turned.shape
+    np.testing.assert_allclose(image, turned, atol=60)
+
+
 def test_a_rotated_video_comes_upright(write_video):
+    pytest.importorskip("cv2")
     picture = np.zeros((48, 64, 3), np.uint8)
     picture[:16, :16] = 255
     image = all_frames(write_video(picture=picture, rotation=90))[0].image

@@ -78,6 +78,19 @@ def test_other_light_is_not_strange():
     assert not occluded_mouths(frames).any()
 
 
+@pytest.mark.parametrize("rows", [-4, -2, 3])
+def test_a_nod_is_not_strange(rows):
+    frames = mouths()
+    frames[10:18] = np.roll(frames[10:18], rows, axis=1)
+    assert not occluded_mouths(frames).any()
+
+
+def test_what_has_another_texture_is_strange_at_any_shift():
+    frames = mouths()
+    frames[10:18] = DRAW.integers(0, 255, frames[10:18].shape)
+    assert np.flatnonzero(occluded_mouths(frames)).tolist() == list(range(10, 18))
+
+
 def test_where_the_usual_look_is_flat_nothing_is_strange():
     frames = np.full((20, 14, 18, 3), 100, np.uint8)
     frames[3] = 250

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.vision import face_follower as follow
+from lipmotion.vision.face_finder import FaceBox
+from lipmotion.vision.frames import VideoSpan
 from lipmotion.vision.landmarks import JAW_POINTS, LIP_POINTS, TRACKED_POINTS
 from lipmotion.vision.track import CHANNELS, motion_values, track
 
@@ -45,12 +47,24 @@ class ScriptedMesh:
         return [] if self.last is None else [self.last]
 
 
+class NoFinder:
+    """Stands for the detector, which finds no more than the mesh."""
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def boxes(self, _image: NDArray[np.uint8], *, thorough: bool) -> list[FaceBox]:
+        del thorough
+        return []
+
+
 @pytest.fixture
 def scripted(monkeypatch):
     pytest.importorskip("cv2")
 
     def script(answers: Sequence[NDArray[np.float64] | None]) -> None:
         answered = iter(answers)
+        monkeypatch.setattr(follow, "FaceFinder", NoFinder)
         monkeypatch.setattr(follow, "FaceMesh", lambda most=1: ScriptedMesh(answered, most))
 
     return script
@@ -94,6 +108,27 @@ def test_frames_without_a_face_are_marked_and_interpolated(write_video, scripted
     np.testing.assert_allclose(opening[[0, 1, 19]], OPENINGS[[2, 2, 18]], atol=1e-9)
     assert opening[9] == pytest.approx(OPENINGS[9], abs=2e-3)
     assert np.isfinite(result.motion.values).all()
+
+
+def test_a_part_of_a_video_begins_at_zero(write_video, scripted):
+    scripted([face(OPENINGS[n]) for n in range(5, 15)])
+    result = track(write_video(ticks=range(20)), crops=False, span=VideoSpan(0.2, 0.6))
+    np.testing.assert_allclose(result.motion["opening"], OPENINGS[5:15], atol=1e-9)
+    assert result.seen.all()
+
+
+def test_a_part_without_pictures_is_refused(write_video, scripted):
+    scripted([])
+    with pytest.raises(InputError, match=r"no picture from 5\.00 to 6\.00 s"):
+        track(write_video(ticks=range(20)), span=VideoSpan(5.0, 6.0))
+
+
+def test_a_small_face_is_noted(write_video, scripted):
+    small = [0.4 * face(opening) for opening in OPENINGS]
+    scripted(small)
+    assert track(write_video(ticks=range(20)), crops=False).notes == (
+        "the face is small: 24 px between the eyes, 35 give a good track; film closer",
+    )
 
 
 def test_dropped_frames_are_put_in_their_place(write_video, scripted):

@@ -13,7 +13,7 @@ from lipmotion.types import Track
 from lipmotion.vision.landmarks import EYE_CORNERS, TRACKED_POINTS
 from lipmotion.vision.mesh import FaceMesh
 from lipmotion.vision.track import track
-from vision.variants import Image, covered, frames_of, half_size, side_by_side, write_frames, zoomed
+from vision.variants import Image, covered, frames_of, half_size, in_a_room, side_by_side, write_frames, zoomed
 
 pytestmark = [pytest.mark.video, pytest.mark.recordings]
 
@@ -131,6 +131,46 @@ def test_odd_and_portrait_sizes(tmp_path: Path, frames: list[Image], usual: Trac
         found = track(path, crops=False)
         assert unseen(found) == []
         assert alike(found, usual) > 0.99
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("size", "scale", "least"),
+    [
+        ((1280, 720), 1.0, 0.97),  # eyes 66 px apart: somebody filmed to the waist
+        ((1280, 720), 0.6, 0.95),  # 40 px
+        ((720, 1280), 1.0, 0.97),
+        ((2560, 1440), 2.0, 0.97),
+    ],
+)
+def test_a_face_that_is_small_in_the_picture(
+    tmp_path: Path, frames: list[Image], usual: Track, size: tuple[int, int], scale: float, least: float
+) -> None:
+    width, height = size
+    shown = in_a_room(
+        frames, size, scale, lambda n: (0.6 * width + 15 * scale * np.sin(n / 9), 0.35 * height + 8 * np.sin(n / 7))
+    )
+    found = track(write_frames(tmp_path / "a.mp4", shown, options={"crf": "15", "preset": "veryfast"}))
+    assert unseen(found) == []
+    assert alike(found, usual) > least
+    assert found.crops is not None
+    assert found.crops[40].std() > 10
+
+
+@pytest.mark.long
+def test_a_face_that_leaves_and_returns(tmp_path: Path, frames: list[Image], usual: Track) -> None:
+    """Away for twenty frames, then on the other side of the picture."""
+    away = range(COUNT, COUNT + 20)
+    order = [*range(COUNT), *reversed(range(COUNT)), *range(COUNT)]
+
+    def at(n: int) -> tuple[float, float]:
+        return (300.0 if n < away[0] else 900.0, -1000.0 if n in away else 250.0)
+
+    shown = in_a_room([frames[n] for n in order], (1280, 720), 1.0, at)
+    found = track(write_frames(tmp_path / "a.mp4", shown, options={"crf": "15", "preset": "veryfast"}), crops=False)
+    assert unseen(found) == list(away)
+    seen = np.flatnonzero(found.seen)
+    assert np.corrcoef(found.motion["opening"][seen], usual.motion["opening"][order][seen])[0, 1] > 0.97
 
 
 def test_first_packet_later_than_zero(tmp_path: Path, frames: list[Image], usual: Track) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from pathlib import Path
 
@@ -57,6 +57,26 @@ def half_size(frames: Sequence[Image]) -> list[Image]:
     """Return the pictures at half their size, on black."""
     height, width = frames[0].shape[0] // 4, frames[0].shape[1] // 4
     return [np.pad(frame[::2, ::2], ((height, height), (width, width), (0, 0))) for frame in frames]
+
+
+def in_a_room(
+    frames: Sequence[Image], size: tuple[int, int], scale: float, at: Callable[[int], tuple[float, float]]
+) -> list[Image]:
+    """Return the pictures, scaled, in larger ones of a width and height; in frame n their middle is ``at(n)``, px."""
+    import cv2
+
+    patches = np.random.default_rng(0).integers(60, 180, (6, 9, 3)).astype(np.uint8)
+    room = cv2.GaussianBlur(cv2.resize(patches, size, interpolation=cv2.INTER_NEAREST), (0, 0), 8)
+    shown = []
+    for n, frame in enumerate(frames):
+        x, y = at(n)
+        place = np.array(
+            [[scale, 0, x - scale * frame.shape[1] / 2], [0, scale, y - scale * frame.shape[0] / 2]], np.float64
+        )
+        mask = cv2.warpAffine(np.ones(frame.shape[:2], np.uint8), place, size)[..., None]
+        body = cv2.warpAffine(frame, place, size, flags=cv2.INTER_AREA if scale < 1 else cv2.INTER_CUBIC)
+        shown.append(np.where(mask > 0, body, room))
+    return shown
 
 
 def zoomed(frames: Sequence[Image]) -> list[Image]:

@@ -13,8 +13,8 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb and its actions to the parser of the command line."""
     parser = verbs.add_parser("corpus", help="prepare recordings for training")
     actions = parser.add_subparsers(title="actions", required=True, metavar="ACTION")
-    prepare = actions.add_parser("prepare", help="make a corpus from a folder of recordings")
-    layouts = "folder of videos, or of sounds with motion (docs/corpora.md)"
+    prepare = actions.add_parser("prepare", help="make a corpus of recordings")
+    layouts = "folder of videos, or of sounds with motion; or one video (docs/corpora.md)"
     add_input(prepare, "recordings", what="folder of recordings", help=layouts)
     add_output(prepare, "-o", "--output", is_folder=True, required=True, metavar="CORPUS")
     add_workers(prepare)

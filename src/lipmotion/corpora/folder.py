@@ -16,6 +16,8 @@ from lipmotion.corpora.splits import LISTS, assign_splits
 from lipmotion.errors import InputError
 
 VIDEOS, SOUNDS, BOTH = "folder of videos", "folder of sounds with motion", "folder of videos, and of sounds with motion"
+VIDEO_KINDS = (VIDEOS, BOTH)
+"""Kinds of folders whose videos may be longer than a sentence."""
 MOTION_SUFFIXES = (".csv", ".json", ".npz")
 """Motion files that ``animate`` writes and ``read_motion`` reads."""
 

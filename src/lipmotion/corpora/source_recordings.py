@@ -42,6 +42,8 @@ class SourceRecording:
     speaker     : name of the speaker, empty where it is not known
     phones      : labelled phones in time, or None
     motion_file : the motion; None: the face in ``file`` is to be tracked
+    start_s     : where in the file the sentence begins, s
+    end_s       : where it ends; None: the file is this one sentence
     """
 
     name: str
@@ -52,6 +54,8 @@ class SourceRecording:
     speaker: str = ""
     phones: Timeline[Unit] | None = None
     motion_file: MotionFile | None = None
+    start_s: float = 0.0
+    end_s: float | None = None
 
 
 @dataclass(frozen=True)

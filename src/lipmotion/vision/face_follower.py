@@ -8,7 +8,9 @@ from contextlib import ExitStack
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.vision.image_similarity import face_thumbnail, image_correlation, scene_thumbnail
+from lipmotion.vision.face_finder import FaceFinder
+from lipmotion.vision.face_window import WindowedMesh
+from lipmotion.vision.image_similarity import face_thumbnail, image_correlation, is_cut, scene_thumbnail
 from lipmotion.vision.landmarks import EYE_CORNERS, TRACKED_POINTS
 from lipmotion.vision.mesh import FaceMesh
 
@@ -17,8 +19,6 @@ Array = NDArray[np.float64]
 
 MOST_FACES = 4
 """The most faces that are searched for where a scene begins."""
-CUT_LEVELS = 6.0
-"""Mean change of the thumbnail between two frames, in grey levels, that begins a new scene (GRID: up to 1.3)."""
 JUMP, GROWTH = 0.6, 1.25
 """Most eye distances that a face moves in a frame (GRID: up to 0.03), and the largest ratio of its sizes (1.06)."""
 LOST_FRAMES = 10
@@ -26,8 +26,15 @@ LOST_FRAMES = 10
 SAME_PERSON = 0.9
 """Correlation of the upper faces above which two faces are one person's. GRID: 0.90 to 1 within a clip; two people, 0.2
 to 0.87 in 14 pairs of 15, and 0.94 in one."""
+LARGE_PX = 1280
+"""In a picture with a longer side than this, faces are first searched with the full-range detector, as they are likely
+to be small in it, and followed in a window, which takes less time than the mesh of the whole picture."""
+THOROUGH_STEP = 5
+"""Where no face is found, the parts of every such frame are searched too, not only the whole picture."""
 THUMBNAIL_STEP, MOST_THUMBNAILS = 5, 20
-"""Every how many frames of a scene a thumbnail of the face is kept for comparison, and how many at most."""
+"""Every how many frames of a scene a thumbnail of the face is kept for comparison, and how many at first."""
+NEW_LOOK, MOST_LOOKS = 0.95, 60
+"""Later thumbnails are kept when they correlate less than this with all that are kept, and how many at most in all."""
 
 _EYES = [TRACKED_POINTS.index(index) for index in EYE_CORNERS]
 
@@ -35,11 +42,16 @@ _EYES = [TRACKED_POINTS.index(index) for index in EYE_CORNERS]
 class FaceFollower:
     """Finds one face in every scene of a clip, frame by frame, and then selects the scenes of one person.
 
+    The mesh finds a face that takes a fifth of the picture or more; smaller ones are found by the full-range detector
+    and followed in a window.
+    person : thumbnails of the person who is to be followed; without any, it is the one with the most frames
     Use it as a context manager.
     """
 
-    def __init__(self) -> None:
-        self._scenes = [_Scene(())]
+    def __init__(self, person: Sequence[Array] = ()) -> None:
+        self._wanted = list(person)
+        self._finder = FaceFinder()
+        self._scenes = [_Scene(self._wanted, self._finder)]
         self._picture: Array | None = None
         self._scene_of_frame: list[int | None] = []  # None: no face was found
 
@@ -48,6 +60,7 @@ class FaceFollower:
 
     def __exit__(self, *_: object) -> None:
         self._scenes[-1].close()
+        self._finder.__exit__()
 
     def points(self, image: Image) -> Array | None:
         """Return the points of a face in the next frame, as of ``FaceMesh.faces``; None if there is none.
@@ -56,8 +69,7 @@ class FaceFollower:
         largest and most central.
         """
         before, self._picture = self._picture, scene_thumbnail(image)
-        is_cut = before is not None and np.abs(self._picture - before).mean() > CUT_LEVELS
-        if is_cut or self._scenes[-1].missing_frames > LOST_FRAMES:
+        if is_cut(before, self._picture) or self._scenes[-1].missing_frames > LOST_FRAMES:
             self._begin_scene()
         face = self._scenes[-1].next_face(image)
         if face is None and self._scenes[-1].is_lost:
@@ -67,9 +79,20 @@ class FaceFollower:
         return face
 
     def person(self) -> NDArray[np.bool_]:
-        """Return in which frames the face found is that of the person with the most frames [shape=(T,)]."""
+        """Return in which frames the face found is that of the person [shape=(T,)]."""
         kept = self._scenes_of_person()
         return np.array([scene in kept for scene in self._scene_of_frame])
+
+    def share_of_person(self) -> float:
+        """Return in which share of the frames with a face it is that of the person; 1 if there is no face."""
+        found = sum(scene is not None for scene in self._scene_of_frame)
+        return float(self.person().sum()) / found if found else 1.0
+
+    def thumbnails(self) -> list[Array]:
+        """Return thumbnails of the person's face, at most ``MOST_LOOKS`` from all scenes."""
+        kept = [self._scenes[index].thumbnails for index in sorted(self._scenes_of_person())]
+        found = [thumbnail for scene in kept for thumbnail in scene]
+        return found[:: -(-len(found) // MOST_LOOKS)] if found else []
 
     def cuts(self) -> list[int]:
         """Return the frames at which the camera changes, or the picture changes to or from somebody else."""
@@ -83,14 +106,18 @@ class FaceFollower:
 
     def _begin_scene(self) -> None:
         self._scenes[-1].close()
-        self._scenes.append(_Scene([thumbnail for scene in self._scenes for thumbnail in scene.thumbnails]))
+        known = self._wanted or [thumbnail for scene in self._scenes for thumbnail in scene.thumbnails]
+        self._scenes.append(_Scene(known, self._finder))
 
     def _scenes_of_person(self) -> set[int]:
-        """Return the scene with the most frames, and all whose face resembles one of a scene returned."""
-        counts = [self._scene_of_frame.count(index) for index in range(len(self._scenes))]
-        kept = {int(np.argmax(counts))}
+        """Return the scene with the most frames, and all whose face resembles one of a scene returned.
+
+        If a person is wanted, these are the scenes whose face resembles hers, and all whose face resembles one of them.
+        """
+        counts = np.bincount([n for n in self._scene_of_frame if n is not None], minlength=len(self._scenes))
+        kept = set() if self._wanted else {int(np.argmax(counts))}
         while True:
-            known = [thumbnail for index in kept for thumbnail in self._scenes[index].thumbnails]
+            known = self._wanted + [thumbnail for index in kept for thumbnail in self._scenes[index].thumbnails]
             more = {
                 index
                 for index, scene in enumerate(self._scenes)
@@ -104,21 +131,23 @@ class FaceFollower:
 class _Scene:
     """The frames between two cuts, and the face followed through them.
 
-    thumbnails     : of the face, every ``THUMBNAIL_STEP`` frames
+    thumbnails     : of the face, every ``THUMBNAIL_STEP`` frames, later only where it looks different
     missing_frames : frames since the face was last found, 0 before it was found
     is_lost        : whether the mesh, which follows one face, has changed to another one
     """
 
-    def __init__(self, known: Sequence[Array]) -> None:
+    def __init__(self, known: Sequence[Array], finder: FaceFinder) -> None:
         self.thumbnails: list[Array] = []
         self.missing_frames = 0
         self.is_lost = False
         self._known = known
+        self._finder = finder
+        self._searches = 0
         self._first: Array | None = None
         self._last: Array | None = None
         self._frames = 0
         self._open = ExitStack()
-        self._mesh: FaceMesh | None = None
+        self._mesh: FaceMesh | WindowedMesh | None = None
         self._is_crowd = False
 
     def close(self) -> None:
@@ -130,28 +159,59 @@ class _Scene:
         if face is None:
             self.missing_frames += self._last is not None
             return None
-        if self._frames % THUMBNAIL_STEP == 0 and len(self.thumbnails) < MOST_THUMBNAILS:
-            self.thumbnails.append(face_thumbnail(image, face[_EYES, :2]))
+        if self._frames % THUMBNAIL_STEP == 0 and len(self.thumbnails) < MOST_LOOKS:
+            self._keep_thumbnail(face_thumbnail(image, face[_EYES, :2]))
         self._frames += 1
         self._last, self.missing_frames = face, 0
         return face
+
+    def _keep_thumbnail(self, thumbnail: Array) -> None:
+        is_early = len(self.thumbnails) < MOST_THUMBNAILS
+        if is_early or _best_correlation([thumbnail], self.thumbnails) < NEW_LOOK:
+            self.thumbnails.append(thumbnail)
 
     def is_near(self, before: _Scene) -> bool:
         """Return whether this scene's face begins where the one before ended."""
         return self._first is not None and before._last is not None and before._could_be(self._first, before._last)
 
     def _first_face(self, image: Image) -> Array | None:
-        faces = self._faces(image)
-        if faces:
-            faces = self._several(image) or faces
-            self._first = max(faces, key=lambda face: self._priority(image, face))
+        if max(image.shape[:2]) > LARGE_PX:
+            self._first = self._searched(image)
+        if self._first is None:
+            faces = self._faces(image)
+            if faces:
+                faces = self._several(image) or faces
+                self._first = max(faces, key=lambda face: self._priority(image, face))
+            elif max(image.shape[:2]) <= LARGE_PX:
+                self._first = self._searched(image)
         return self._first
 
     def _same_face(self, image: Image, last: Array) -> Array | None:
         faces = self._faces(image)
+        if not faces:
+            return self._searched(image, last)
         near = [face for face in faces if self._could_be(face, last)]
-        self.is_lost = bool(faces) and not near and not self._is_crowd
+        self.is_lost = not near and not self._is_crowd
         return min(near, key=lambda face: _distance(face, last), default=None)
+
+    def _searched(self, image: Image, last: Array | None = None) -> Array | None:
+        """Return the face that the detector finds, and follow it in a window from now on; None if there is none.
+
+        last : the face followed so far, which it must be; None: the one of the highest priority is taken
+        """
+        boxes = self._finder.boxes(image, thorough=self._searches % THOROUGH_STEP == 0)
+        self._searches += 1
+        found: list[tuple[Array, WindowedMesh]] = []
+        with ExitStack() as tried:
+            for box in boxes[:MOST_FACES]:
+                mesh = tried.enter_context(WindowedMesh(box))
+                found += [(face, mesh) for face in mesh.faces(image) if last is None or self._could_be(face, last)]
+            if not found:
+                return None
+            face, self._mesh = max(found, key=lambda pair: self._priority(image, pair[0]))
+            self._open.push(tried.pop_all())
+        self._is_crowd = False
+        return face
 
     def _could_be(self, face: Array, last: Array) -> bool:
         growth = _size(face) / _size(last)

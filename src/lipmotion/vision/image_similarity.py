@@ -10,7 +10,11 @@ from lipmotion.vision.packages import import_opencv
 Image = NDArray[np.uint8]
 Array = NDArray[np.float64]
 
+CUT_LEVELS = 6.0
+"""Mean change of the thumbnail between two frames, in grey levels, that begins a new scene (GRID: up to 1.3)."""
 SCENE_SIZE = (32, 24)
+SCENE_SAMPLES = 640
+"""Every so many columns and rows of a picture are looked at that about this number is left of the more numerous."""
 FACE_SIZE = (36, 24)
 FACE_WIDTH, FACE_TOP, FACE_BOTTOM = 0.75, 0.5, 0.5
 """The region of the upper face, which speech does not change: from the point between the eyes to either side, up and
@@ -21,14 +25,25 @@ OCCLUDED_CORRELATION = 0.2
 did)..."""
 OCCLUDED_DIFFERENCE = 20.0
 """... and differs from it by more grey levels on average (GRID: up to 17 in open mouths)."""
+NOD_ROWS = 4
+"""... and correlates less at every shift by up to so many of its 14 rows than..."""
+SHIFTED_CORRELATION = 0.5
+"""... this: a nod moves the mouth in its region, which is placed by the eyes."""
 FLAT_LEVELS = 1.0
 """A region with a smaller standard deviation, in grey levels, has no texture to compare."""
 
 
 def scene_thumbnail(image: Image) -> Array:
-    """Return a thumbnail of the whole picture, less its mean [shape=(24, 32, 3)]."""
-    small: Array = import_opencv().resize(image, SCENE_SIZE, interpolation=import_opencv().INTER_AREA).astype(float)
+    """Return a thumbnail of the whole picture, less its mean [shape=(24, 32, 3)]; of a large one, from some pixels."""
+    cv2 = import_opencv()
+    step = max(1, max(image.shape[:2]) // SCENE_SAMPLES)
+    small: Array = cv2.resize(image[::step, ::step], SCENE_SIZE, interpolation=cv2.INTER_AREA).astype(float)
     return small - small.mean()
+
+
+def is_cut(before: Array | None, after: Array) -> bool:
+    """Return whether a new scene begins between two frames, from their thumbnails; False if there is none before."""
+    return before is not None and bool(np.abs(after - before).mean() > CUT_LEVELS)
 
 
 def face_thumbnail(image: Image, eyes: Array) -> Array:
@@ -77,6 +92,18 @@ def occluded_mouths(mouths: NDArray[np.uint8]) -> NDArray[np.bool_]:
     if np.square(median - median.mean(axis=(0, 1))).mean() < FLAT_LEVELS**2:
         return np.zeros(len(mouths), bool)
     values = mouths.astype(float)
-    return (image_correlation(values, median) < OCCLUDED_CORRELATION) & (
+    unlike = (image_correlation(values, median) < OCCLUDED_CORRELATION) & (
         np.abs(values - median).mean(axis=(1, 2, 3)) > OCCLUDED_DIFFERENCE
     )
+    unlike[unlike] = _shifted_correlation(values[unlike], median) < SHIFTED_CORRELATION
+    return unlike
+
+
+def _shifted_correlation(mouths: Array, median: Array) -> Array:
+    """Return the highest correlation of each mouth region with the median one, at any shift up or down."""
+    best = np.full(len(mouths), -1.0)
+    for shift in range(1, NOD_ROWS + 1):
+        up = image_correlation(mouths[:, :-shift], median[shift:])
+        down = image_correlation(mouths[:, shift:], median[:-shift])
+        best = np.maximum(best, np.maximum(up, down))
+    return best

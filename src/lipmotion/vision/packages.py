@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from importlib import metadata
+from importlib import import_module, metadata
 from typing import Any
 
 from lipmotion.errors import MissingDependencyError
@@ -20,13 +20,22 @@ def import_opencv() -> Any:
 
 def import_face_mesh() -> Any:
     """Return MediaPipe's module ``face_mesh``, with less logging. Raises MissingDependencyError: no import."""
+    return _import_solution("face_mesh")
+
+
+def import_face_detection() -> Any:
+    """Return MediaPipe's module ``face_detection``, with less logging. Raises MissingDependencyError: no import."""
+    return _import_solution("face_detection")
+
+
+def _import_solution(name: str) -> Any:
     os.environ.setdefault("GLOG_minloglevel", "2")
     os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")
     try:
-        from mediapipe.python.solutions import face_mesh
+        solutions = import_module("mediapipe.python.solutions")  # all of them
     except ImportError as error:
         raise _missing("MediaPipe", error) from error
-    return face_mesh
+    return getattr(solutions, name)
 
 
 def package_versions() -> dict[str, str]:

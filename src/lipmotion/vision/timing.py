@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+
+from lipmotion.errors import InputError
 
 Array = NDArray[np.float64]
 
@@ -31,6 +34,14 @@ def nominal_rate_hz(times_s: Array, stated_rates_hz: Sequence[float]) -> float:
     measured = 1.0 / float(np.median(np.diff(times_s)))
     fitting = [rate for rate in stated_rates_hz if abs(rate / measured - 1) <= RATE_TOLERANCE]
     return fitting[0] if fitting else measured
+
+
+def check_rate(rate_hz: float, path: Path) -> None:
+    """Raise InputError for a frame rate that no video of a face has: its time stamps are wrong."""
+    if not LOWEST_HZ <= rate_hz <= HIGHEST_HZ:
+        raise InputError(
+            f"{path}: {rate_hz:g} pictures a second, required {LOWEST_HZ:g} to {HIGHEST_HZ:g}; export the video again"
+        )
 
 
 def frame_count(times_s: Array, rate_hz: float) -> int:

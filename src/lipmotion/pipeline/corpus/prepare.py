@@ -8,15 +8,17 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 from lipmotion.corpora.discover import discover
 from lipmotion.corpora.entry import quantise, read_entry, write_utterance
-from lipmotion.corpora.source_recordings import RecordingFolder, SourceRecording
+from lipmotion.corpora.source_recordings import VIDEO_SUFFIXES, RecordingFolder, SourceRecording
 from lipmotion.corpora.store import UTTERANCES, Corpus
 from lipmotion.errors import AlignmentError, CorpusError, ExportError, InputError, MissingDependencyError
+from lipmotion.pipeline.corpus.long_videos import DIVIDING_SHARE, VideoPart, single_video, with_long_videos_divided
 from lipmotion.pipeline.corpus.supplied_motion import DIGESTS, source_digests, supplied_phones, supplied_track
 from lipmotion.pipeline.workers import worker_pool
 from lipmotion.speech.audio_files import read_audio
@@ -25,10 +27,11 @@ from lipmotion.storage.files import locked, remove_unfinished, sha256_of
 from lipmotion.storage.sources import Source, check_apart, is_folder
 from lipmotion.types import Item, Monitor, Progress, Track, Utterance, silent_monitor
 from lipmotion.units import check_words
+from lipmotion.vision.frames import VideoSpan
 from lipmotion.vision.packages import package_versions
 from lipmotion.vision.track import track
 
-RECIPE = "4"
+RECIPE = "5"
 """Version of the preparation, increased when the same video gives other values; older utterances are then replaced."""
 _STAGE = "preparing recordings"
 """Name of the stage in reports of progress."""
@@ -69,12 +72,16 @@ class PrepareReport:
 
 @dataclass(frozen=True)
 class _Job:
-    """One recording, the folder of its utterance, its source and the settings of the preparation."""
+    """One recording, the folder of its utterance, its source and the settings of the preparation.
+
+    part : the part of a long video that it is; None: it is a whole file
+    """
 
     recording: SourceRecording
     folder: Path
     source: dict[str, str]
     settings: dict[str, str]
+    part: VideoPart | None = None
 
 
 @dataclass(frozen=True)
@@ -96,10 +103,10 @@ def prepare(
     crops: bool = True,
     monitor: Monitor = silent_monitor,
 ) -> PrepareReport:
-    """Create a corpus from a folder of recordings, or add the recordings to a corpus; return a report.
+    """Create a corpus from recordings, or add the recordings to a corpus; return a report.
 
     directory : folder in the layout of GRID or FACEGOOD, or any folder of videos, or of sounds with motion
-                (docs/corpora.md)
+                (docs/corpora.md); or one video. Videos of more than half a minute are divided into utterances
     output    : folder of the corpus; utterances that are up to date are kept, so that a stopped preparation continues
     workers   : number of processes; None: one for each core. With more than one, a script must be guarded by
                 ``if __name__ == "__main__":``
@@ -120,14 +127,19 @@ def prepare(
     if workers is not None and workers < 1:
         raise InputError(f"{workers} processes, required at least 1; leave it out for one a core")
     check_apart((), [Source(directory, "folder of recordings")], folders=[output])
-    folder = discover(directory)
+    folder, place = _found(directory)
     packages = package_versions() if any(item.motion_file is None for item in folder.recordings) else {}
     is_new = not is_folder(output)
     with locked(output):
         corpus = Corpus.create(output)
-        jobs = [_job(item, directory.resolve(), corpus, packages, crops) for item in folder.recordings]
+        folder, parts = with_long_videos_divided(folder, place, monitor)
+        jobs = [
+            _job(item, place.resolve(), corpus, packages, crops, parts.get(item.name)) for item in folder.recordings
+        ]
         with _refreshed(corpus), worker_pool(min(workers or os.cpu_count() or 1, len(jobs))) as team:
-            outcomes = _collected(folder, team.unordered_map(_process, jobs), len(jobs), monitor)
+            outcomes = _collected(
+                folder, team.unordered_map(_process, jobs), len(jobs), monitor, DIVIDING_SHARE if parts else 0.0
+            )
     report = _report(corpus, folder, outcomes, time.monotonic() - start_s)
     if not report.prepared and not report.kept:
         if is_new:
@@ -137,6 +149,13 @@ def prepare(
             f"{directory}: none of {len(report.failed)} recordings is usable; the first, {name}: {reason}"
         )
     return report
+
+
+def _found(path: Path) -> tuple[RecordingFolder, Path]:
+    """Return the recordings in a folder, or the one video that is given; and the folder that they are in."""
+    if path.is_file() and path.suffix.lower() in VIDEO_SUFFIXES:
+        return single_video(path), path.parent
+    return discover(path), path
 
 
 def _report(corpus: Corpus, folder: RecordingFolder, outcomes: list[_Outcome], seconds: float) -> PrepareReport:
@@ -155,7 +174,14 @@ def _report(corpus: Corpus, folder: RecordingFolder, outcomes: list[_Outcome], s
     )
 
 
-def _job(recording: SourceRecording, directory: Path, corpus: Corpus, packages: dict[str, str], crops: bool) -> _Job:
+def _job(
+    recording: SourceRecording,
+    directory: Path,
+    corpus: Corpus,
+    packages: dict[str, str],
+    crops: bool,
+    part: VideoPart | None,
+) -> _Job:
     collection = "/".join(directory.parts[-2:]).strip("/")
     name = recording.name
     if _is_taken(corpus.folder(name), recording.file, collection):
@@ -172,7 +198,10 @@ def _job(recording: SourceRecording, directory: Path, corpus: Corpus, packages: 
         **packages,
         **recording.rights,
     }
-    return _Job(replace(recording, name=name), corpus.folder(name), source, settings)
+    if recording.end_s is not None:
+        source |= {"start_s": f"{recording.start_s:.3f}", "end_s": f"{recording.end_s:.3f}"}
+        settings["part"] = f"{recording.start_s:.3f} to {recording.end_s:.3f} s"
+    return _Job(replace(recording, name=name), corpus.folder(name), source, settings, part)
 
 
 def _is_taken(folder: Path, video: Path, collection: str) -> bool:
@@ -181,7 +210,7 @@ def _is_taken(folder: Path, video: Path, collection: str) -> bool:
         source = read_entry(folder).get("source", {})
     except CorpusError:
         return False
-    return source.get("collection") != collection and source.get("sha256") != sha256_of(video)
+    return source.get("collection") != collection and source.get("sha256") != _digest(video)
 
 
 def _process(job: _Job) -> _Outcome:
@@ -190,9 +219,7 @@ def _process(job: _Job) -> _Outcome:
     try:
         sound = job.recording.file
         source = (
-            job.source
-            | {"sha256": sha256_of(sound), "bytes": str(sound.stat().st_size)}
-            | source_digests(job.recording)
+            job.source | {"sha256": _digest(sound), "bytes": str(sound.stat().st_size)} | source_digests(job.recording)
         )
         entry = _up_to_date(job, source)
         if entry is not None:
@@ -206,6 +233,17 @@ def _process(job: _Job) -> _Outcome:
     except Exception as error:  # one damaged file must not stop the others
         return _Outcome(name, problem=f"{job.recording.file}: {type(error).__name__}: {error}")
     return _Outcome(name, unseen=int((~utterance.track.seen).sum()), notes=utterance.track.notes)
+
+
+def _digest(path: Path) -> str:
+    """Return the SHA-256 digest of a file; the parts of a long video share one, which is computed once a process."""
+    status = path.stat()
+    return _digest_of_content(path, status.st_size, status.st_mtime_ns)
+
+
+@lru_cache(maxsize=16)
+def _digest_of_content(path: Path, _size: int, _changed_ns: int) -> str:
+    return sha256_of(path)
 
 
 def _up_to_date(job: _Job, source: dict[str, str]) -> dict[str, Any] | None:
@@ -223,7 +261,7 @@ def _up_to_date(job: _Job, source: dict[str, str]) -> dict[str, Any] | None:
 
 
 def _utterance(job: _Job, source: dict[str, str]) -> Utterance:
-    audio = quantise(read_audio(job.recording.file))
+    audio = quantise(job.part.sound if job.part else read_audio(job.recording.file))
     check_words(job.recording.words or (), audio.duration_s)
     return Utterance(
         name=job.recording.name,
@@ -241,21 +279,30 @@ def _utterance(job: _Job, source: dict[str, str]) -> Utterance:
 def _track(job: _Job, duration_s: float) -> Track:
     if job.recording.motion_file is not None:
         return supplied_track(job.recording.motion_file, duration_s)
-    return track(job.recording.file, crops=job.settings["crops"] == "yes")
+    recording, crops = job.recording, job.settings["crops"] == "yes"
+    if job.part is None or recording.end_s is None:
+        return track(recording.file, crops=crops)
+    span = VideoSpan(recording.start_s, recording.end_s)
+    return track(recording.file, crops=crops, span=span, person=job.part.person)
 
 
-def _collected(folder: RecordingFolder, outcomes: Iterator[_Outcome], count: int, monitor: Monitor) -> list[_Outcome]:
-    """Return all outcomes; each is reported to the monitor as soon as it is known."""
+def _collected(
+    folder: RecordingFolder, outcomes: Iterator[_Outcome], count: int, monitor: Monitor, done: float
+) -> list[_Outcome]:
+    """Return all outcomes; each is reported to the monitor as soon as it is known.
+
+    done : the share of the whole work that was done before
+    """
     for name, problem in folder.problems.items():
         monitor(Item(name, "skipped", problem))
     collected: list[_Outcome] = []
-    monitor(Progress(_STAGE, 0, count, 0.0))
+    monitor(Progress(_STAGE, 0, count, done))
     for outcome in outcomes:
         collected.append(outcome)
         kind = "skipped" if outcome.problem else "kept" if outcome.kept else "prepared"
         unseen = (f"no face in {outcome.unseen} frames, interpolated",) if outcome.unseen else ()
         monitor(Item(outcome.name, kind, outcome.problem or "; ".join((*outcome.notes, *unseen))))
-        monitor(Progress(_STAGE, len(collected), count, len(collected) / count))
+        monitor(Progress(_STAGE, len(collected), count, done + (1 - done) * len(collected) / count))
     return collected
 
 

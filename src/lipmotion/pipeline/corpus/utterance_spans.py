@@ -1,0 +1,166 @@
+"""Dividing a long recording into utterances of a few seconds: at pauses, at cuts, between lines of a transcript."""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+SHORTEST_S, LONGEST_S = 3.0, 12.0
+"""Wanted length of an utterance. Longer ones are divided at their longest pause, shorter ones joined where they can."""
+LEAST_S = 0.8
+"""Shorter pieces are left out."""
+LONGEST_PAUSE_S = 1.0
+"""A longer pause always divides, and is left out except for its edges."""
+MARGIN_S = 0.3
+"""Silence kept before and after an utterance, at most half of the pause: lips begin before the sound."""
+ROUNDING_S = 0.05
+"""A cut that is this close to the end of a stretch does not divide it."""
+
+Quietest = Callable[[float, float], float]
+"""Returns the time of the lowest level between two times."""
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A part of a recording that is not divided by a pause: between two silences, or a line of a transcript.
+
+    start_s, end_s : seconds
+    words          : what is said in it, or None where it is not known
+    """
+
+    start_s: float
+    end_s: float
+    words: tuple[str, ...] | None = None
+
+    @property
+    def duration_s(self) -> float:
+        """Duration in seconds."""
+        return self.end_s - self.start_s
+
+
+def utterance_spans(
+    stretches: Sequence[Stretch], cuts_s: Sequence[float], duration_s: float, quietest: Quietest
+) -> list[Stretch]:
+    """Return the utterances of a recording, in order, without overlap.
+
+    stretches  : parts with speech, in order; those with words are never divided
+    cuts_s     : times at which the camera changes, rising; utterances without words are divided there
+    duration_s : of the recording
+    quietest   : finds the best place to divide where there is no pause
+    Between neighbours, the pause is shared; of one longer than twice ``MARGIN_S``, the middle belongs to nobody.
+    """
+    parts = [part for stretch in _in_order(stretches) for part in _divided_at_cuts(stretch, cuts_s)]
+    parts = [piece for part in parts for piece in _divided_in_speech(part, quietest)]
+    groups: list[list[Stretch]] = []
+    for part in parts:
+        if groups and not _is_border(groups[-1][-1], part, cuts_s):
+            groups[-1].append(part)
+        else:
+            groups.append([part])
+    pieces = [_joined(piece) for group in groups for piece in _divided(group)]
+    wanted = [piece for piece in _without_short_ones(pieces, cuts_s) if piece.duration_s >= LEAST_S]
+    return _with_margins(wanted, cuts_s, duration_s, quietest)
+
+
+def _in_order(stretches: Sequence[Stretch]) -> list[Stretch]:
+    """Return stretches without overlap: lines of a transcript may be shown together, or a little too long."""
+    ordered: list[Stretch] = []
+    for stretch in sorted(stretches, key=lambda stretch: stretch.start_s):
+        if ordered and stretch.start_s < ordered[-1].end_s:
+            border_s = max(ordered[-1].start_s, stretch.start_s)
+            ordered[-1] = replace(ordered[-1], end_s=border_s)
+        ordered.append(stretch)
+    return ordered
+
+
+def _divided_at_cuts(stretch: Stretch, cuts_s: Sequence[float]) -> list[Stretch]:
+    """Return the parts of a stretch between cuts; all of it if it has words."""
+    if stretch.words is not None:
+        return [stretch]
+    inside = [t for t in cuts_s if stretch.start_s + ROUNDING_S < t < stretch.end_s - ROUNDING_S]
+    edges = [stretch.start_s, *inside, stretch.end_s]
+    return [Stretch(*pair) for pair in pairwise(edges)]
+
+
+def _divided_in_speech(stretch: Stretch, quietest: Quietest) -> list[Stretch]:
+    """Return the parts of a stretch that is too long, divided where it is quietest in its middle third."""
+    if stretch.words is not None or stretch.duration_s <= LONGEST_S:
+        return [stretch]
+    third = stretch.duration_s / 3
+    border_s = quietest(stretch.start_s + third, stretch.end_s - third)
+    halves = replace(stretch, end_s=border_s), replace(stretch, start_s=border_s)
+    return [part for half in halves for part in _divided_in_speech(half, quietest)]
+
+
+def _is_border(before: Stretch, after: Stretch, cuts_s: Sequence[float]) -> bool:
+    return after.start_s - before.end_s > LONGEST_PAUSE_S or _is_cut_between(before, after, cuts_s)
+
+
+def _is_cut_between(before: Stretch, after: Stretch, cuts_s: Sequence[float]) -> bool:
+    following = bisect_left(cuts_s, before.end_s - ROUNDING_S)
+    return following < len(cuts_s) and cuts_s[following] <= after.start_s + ROUNDING_S
+
+
+def _joined(parts: Sequence[Stretch]) -> Stretch:
+    words = [word for part in parts for word in part.words or ()]
+    return Stretch(parts[0].start_s, parts[-1].end_s, tuple(words) if parts[0].words is not None else None)
+
+
+def _divided(group: list[Stretch]) -> list[list[Stretch]]:
+    """Return the parts of a group, none longer than ``LONGEST_S`` unless it is one stretch."""
+    if len(group) < 2 or group[-1].end_s - group[0].start_s <= LONGEST_S:
+        return [group]
+    middle_s = (group[0].start_s + group[-1].end_s) / 2
+
+    def worth(n: int) -> tuple[bool, float]:
+        is_long = min(group[n - 1].end_s - group[0].start_s, group[-1].end_s - group[n].start_s) >= SHORTEST_S
+        pause_s = group[n].start_s - group[n - 1].end_s
+        return is_long, pause_s if is_long else -abs(group[n].start_s - middle_s)
+
+    at = max(range(1, len(group)), key=worth)
+    return _divided(group[:at]) + _divided(group[at:])
+
+
+def _without_short_ones(pieces: list[Stretch], cuts_s: Sequence[float]) -> list[Stretch]:
+    """Return the pieces, with those that are too short joined to a neighbour where a short pause is between."""
+    joined: list[Stretch] = []
+    for piece in pieces:
+        before = joined[-1] if joined else None
+        if (
+            before is not None
+            and min(before.duration_s, piece.duration_s) < SHORTEST_S
+            and piece.end_s - before.start_s <= LONGEST_S
+            and piece.start_s - before.end_s <= LONGEST_PAUSE_S
+            and not _is_cut_between(before, piece, cuts_s)
+        ):
+            joined[-1] = _joined([before, piece])
+        else:
+            joined.append(piece)
+    return joined
+
+
+def _with_margins(
+    pieces: list[Stretch], cuts_s: Sequence[float], duration_s: float, quietest: Quietest
+) -> list[Stretch]:
+    """Return the pieces with silence at both ends, not beyond a neighbour, a cut or the recording."""
+    result: list[Stretch] = []
+    for n, piece in enumerate(pieces):
+        border_s = result[-1].end_s if result else 0.0
+        end_s = min(piece.end_s + MARGIN_S, duration_s)
+        if n + 1 < len(pieces) and pieces[n + 1].start_s - piece.end_s < 2 * MARGIN_S:
+            low_s, high_s = piece.end_s, pieces[n + 1].start_s
+            if piece.words is not None:  # lines begin and end late or early
+                low_s, high_s = low_s - MARGIN_S / 2, high_s + MARGIN_S / 2
+            end_s = quietest(low_s, high_s) if high_s > low_s else low_s
+        start_s = max(piece.start_s - MARGIN_S, border_s)
+        if result and piece.start_s - pieces[n - 1].end_s < 2 * MARGIN_S:
+            start_s = border_s
+        middle_s = (piece.start_s + piece.end_s) / 2
+        near = [t for t in cuts_s if start_s <= t <= end_s]
+        if piece.words is None:
+            start_s = max([start_s, *(t for t in near if t <= middle_s)])
+            end_s = min([end_s, *(t for t in near if t > middle_s)])
+        result.append(replace(piece, start_s=start_s, end_s=end_s))
+    return result

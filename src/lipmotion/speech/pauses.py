@@ -1,0 +1,79 @@
+"""Pauses of a long recording: where its sound is quiet enough for long enough to divide it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.types import Audio
+
+Array = NDArray[np.float64]
+
+STEP_S = 0.01
+SMOOTHING_FRAMES = 5
+"""Levels are means of this many frames: shorter dips, as in plosives, are none."""
+BLOCK_S = 30.0
+"""The quiet and the loud level are measured around every such block, as rooms and voices change in an hour."""
+QUIET_PERCENTILE, LOUD_PERCENTILE = 10, 95
+SPEECH_SHARE = 0.35
+"""Speech is louder than the quiet level by this share of the distance between the quiet and the loud one, in dB."""
+LEAST_RANGE_DB = 10.0
+"""Where loud and quiet differ by less (music, noise), there are no pauses: all of it counts as speech."""
+LEAST_PAUSE_S = 0.2
+"""A shorter silence is part of a word, or of no use to divide at."""
+LEAST_SPEECH_S = 0.1
+"""Shorter sounds are clicks."""
+QUIETEST_DB = -100.0
+
+
+def levels_db(audio: Audio) -> Array:
+    """Return the smoothed level of every 10 ms [shape=(floor(duration / 0.01),)], dB of full scale."""
+    from scipy.ndimage import uniform_filter1d
+
+    size = round(STEP_S * audio.rate_hz)
+    frames = audio.samples[: len(audio.samples) // size * size].reshape(-1, size)
+    power = np.einsum("ts,ts->t", frames, frames, dtype=np.float64) / size
+    levels: Array = 10 * np.log10(np.maximum(power, 10 ** (QUIETEST_DB / 10)))
+    return uniform_filter1d(levels, SMOOTHING_FRAMES, mode="nearest") if len(levels) else levels
+
+
+def spoken_spans(levels: Array) -> list[tuple[float, float]]:
+    """Return start and end of every stretch between two pauses, s.
+
+    levels : of ``levels_db``
+    Other sounds that are as loud as speech count as speech.
+    """
+    loud = levels > _thresholds_db(levels)
+    edges = np.flatnonzero(np.diff(np.r_[False, loud, False]))
+    starts_s, ends_s = edges[::2] * STEP_S, edges[1::2] * STEP_S
+    joined: list[tuple[float, float]] = []
+    for start_s, end_s in zip(starts_s.tolist(), ends_s.tolist(), strict=True):
+        if joined and start_s - joined[-1][1] < LEAST_PAUSE_S:
+            joined[-1] = (joined[-1][0], end_s)
+        else:
+            joined.append((start_s, end_s))
+    return [(start_s, end_s) for start_s, end_s in joined if end_s - start_s >= LEAST_SPEECH_S]
+
+
+def quietest_s(levels: Array, start_s: float, end_s: float) -> float:
+    """Return the time of the lowest level from ``start_s`` to ``end_s``; their middle if no frame lies between."""
+    first, last = round(start_s / STEP_S), round(end_s / STEP_S)
+    part = levels[max(first, 0) : max(last, 0)]
+    if not part.size:
+        return (start_s + end_s) / 2
+    return (max(first, 0) + int(np.argmin(part)) + 0.5) * STEP_S
+
+
+def _thresholds_db(levels: Array) -> Array:
+    """Return the level above which each frame is speech [shape=(T,)]."""
+    size = round(BLOCK_S / STEP_S)
+    count = max(1, round(len(levels) / size))
+    values = []
+    for block in range(count):  # each with half a block on both sides
+        middle = (block + 0.5) * len(levels) / count
+        part = levels[max(0, round(middle - size)) : round(middle + size)]
+        quiet, loud = np.percentile(part, [QUIET_PERCENTILE, LOUD_PERCENTILE]) if part.size else (0.0, 0.0)
+        flat = loud - quiet < LEAST_RANGE_DB
+        values.append(QUIETEST_DB - 1 if flat else quiet + SPEECH_SHARE * (loud - quiet))
+    middles = (np.arange(count) + 0.5) * len(levels) / count
+    return np.interp(np.arange(len(levels)), middles, values)

@@ -1,0 +1,103 @@
+"""Dividing long recordings: every stretch comes once, no word is cut, nothing crosses a cut."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from lipmotion.pipeline.corpus.utterance_spans import (
+    LEAST_S,
+    LONGEST_S,
+    MARGIN_S,
+    SHORTEST_S,
+    Stretch,
+    utterance_spans,
+)
+
+
+def middle(low_s: float, high_s: float) -> float:
+    return (low_s + high_s) / 2
+
+
+def spans(stretches: list[Stretch], cuts_s: list[float] | None = None, duration_s: float = 100.0) -> list[Stretch]:
+    return utterance_spans(stretches, cuts_s or [], duration_s, middle)
+
+
+def edges(found: list[Stretch]) -> list[tuple[float, float]]:
+    return [(round(part.start_s, 6), round(part.end_s, 6)) for part in found]
+
+
+def test_a_long_pause_divides_and_is_left_out():
+    assert edges(spans([Stretch(1, 5), Stretch(8, 12)])) == [(0.7, 5.3), (7.7, 12.3)]
+
+
+def test_short_pauses_do_not_divide():
+    assert edges(spans([Stretch(1, 3), Stretch(3.4, 6), Stretch(6.5, 9)])) == [(0.7, 9.3)]
+
+
+def test_too_long_ones_are_divided_at_the_longest_pause():
+    parts = [Stretch(1, 5), Stretch(5.3, 9), Stretch(9.8, 13), Stretch(13.3, 16)]
+    assert edges(spans(parts)) == [(0.7, 9.3), (9.5, 16.3)]
+
+
+def test_without_any_pause_it_is_divided_where_it_is_quietest():
+    assert edges(spans([Stretch(0, 30)], duration_s=30.0)) == [(0, 7.5), (7.5, 15), (15, 22.5), (22.5, 30)]
+
+
+def test_a_cut_divides_even_in_speech():
+    assert edges(spans([Stretch(1, 9)], [4.0])) == [(0.7, 4.0), (4.0, 9.3)]
+
+
+def test_a_cut_in_a_pause_bounds_both_sides():
+    assert edges(spans([Stretch(1, 4), Stretch(4.4, 8)], [4.1])) == [(0.7, 4.1), (4.1, 8.3)]
+
+
+def test_what_is_left_between_two_cuts_may_be_too_short():
+    assert edges(spans([Stretch(1, 9)], [4.0, 4.0 + LEAST_S / 2])) == [(0.7, 4.0), (4.4, 9.3)]
+
+
+def test_short_ones_join_a_neighbour_within_a_second():
+    assert edges(spans([Stretch(1, 2), Stretch(2.9, 6)])) == [(0.7, 6.3)]
+    assert edges(spans([Stretch(1, 2), Stretch(3.5, 6.5)])) == [(0.7, 2.3), (3.2, 6.8)]
+
+
+def test_lines_keep_their_words_and_are_never_divided():
+    lines = [Stretch(1, 7, ("one", "two")), Stretch(7, 15, ("three",)), Stretch(15.2, 17, ("four",))]
+    found = spans(lines, [4.0, 10.0])
+    assert [part.words for part in found] == [("one", "two"), ("three", "four")]
+    assert edges(found) == [(0.7, 7.0), (7.0, 17.3)]
+
+
+def test_lines_that_overlap_end_where_the_next_begins():
+    found = spans([Stretch(1, 8, ("a",)), Stretch(6, 16, ("b",))])
+    assert [part.words for part in found] == [("a",), ("b",)]
+    assert edges(found) == [(0.7, 6.0), (6.0, 16.3)]
+
+
+def test_nothing_said_is_nothing():
+    assert spans([]) == []
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_any_recording(seed: int):
+    draw = np.random.default_rng(seed)
+    times_s = np.cumsum(draw.choice([0.25, 0.6, 1.5, 4.0, 9.0], size=60))
+    stretches = [Stretch(*pair) for pair in zip(times_s[::2].tolist(), times_s[1::2].tolist(), strict=True)]
+    duration_s = float(times_s[-1]) + draw.uniform(0, 1)
+    cuts_s = sorted(draw.uniform(0, duration_s, 8).tolist())
+    found = spans(stretches, cuts_s, duration_s)
+    assert all(0 <= part.start_s < part.end_s <= duration_s for part in found)
+    assert all(before.end_s <= after.start_s + 1e-9 for before, after in pairwise(found))
+    assert all(part.duration_s <= LONGEST_S + 2 * MARGIN_S for part in found)
+    for part in found:
+        assert not [t for t in cuts_s if part.start_s + 0.06 < t < part.end_s - 0.06]
+    said_s = sum(part.duration_s for part in stretches)
+    kept_s = sum(
+        max(0.0, min(part.end_s, stretch.end_s) - max(part.start_s, stretch.start_s))
+        for part in found
+        for stretch in stretches
+    )
+    assert kept_s > said_s - LEAST_S * (len(stretches) + len(cuts_s))
+    assert min(SHORTEST_S, said_s) <= max(part.duration_s for part in found)
