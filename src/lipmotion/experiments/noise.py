@@ -31,12 +31,13 @@ def recordings_in_noise(
     kind, snr_db, talkers, seed : as in ``speech.noise.noisy_audio``
     Raises InputError: as ``speech.noise.noisy_audio``.
     """
-    utterances, phones = [], []
+    utterances, recognitions = [], []
     for number, utterance in enumerate(with_progress(recordings.utterances, "adding noise", monitor)):
         audio = noisy_audio(utterance.audio, kind, snr_db, talkers, seed + number)
         utterances.append(replace(utterance, audio=audio, features=mfcc(audio)))
-        phones.append(recordings.phones.recognise(audio, utterances[-1].features))
-    return replace(recordings, utterances=utterances, conditions={AUDIO_ONLY: phones})
+        recognitions.append(recordings.phones.recognition(audio, utterances[-1].features))
+    phones = [found.units for found in recognitions]
+    return replace(recordings, utterances=utterances, conditions={AUDIO_ONLY: phones}, recognitions=recognitions)
 
 
 def read_talkers(folder: Path) -> list[Audio]:

@@ -23,6 +23,7 @@ from lipmotion.speech.audio_files import read_audio
 from lipmotion.speech.f0 import log_f0
 from lipmotion.speech.installed_recognisers import INSTALLED_RECOGNISERS, recognise_words
 from lipmotion.speech.recogniser import Recogniser, cached_recogniser
+from lipmotion.speech.recognition import Recognition
 from lipmotion.types import Audio, Features, Speech, TimedTranscript, Timeline, Unit
 from lipmotion.units import Lexicon, check_phones, check_text, words_of
 
@@ -52,10 +53,11 @@ def _understood(model: Model, request: SpeechRequest) -> Speech:
     if installed and words is None:
         words = recognise_words(audio, request.recogniser)
     features = audio.mfcc()
-    transcribed = partial(transcribe, phones, audio, features, words, request.lexicon or Lexicon())
     if words is not None:
-        return speech_of(model.engine, audio, features, transcribed())
-    return recognised_speech(model.engine, model.learned, audio, features, phones, transcribed)
+        units = transcribe(phones, audio, features, words, request.lexicon or Lexicon())
+        return speech_of(model.engine, audio, features, units)
+    recognise = partial(phones.recognition, audio, features)
+    return recognised_speech(model.engine, model.learned, audio, features, phones, recognise)
 
 
 def audio_of(request: SpeechRequest) -> Audio:
@@ -77,13 +79,13 @@ def recognised_speech(
     audio: Audio,
     features: Features,
     phones: Recogniser,
-    recognise: Callable[[], Timeline[Unit]],
+    recognise: Callable[[], Recognition],
 ) -> Speech:
     """Return the speech of a recording whose words are not known, with recognised phones in time.
 
     learned   : the engine's model of motion
     phones    : the recogniser
-    recognise : returns phones in time, for speakers that the engine does not recognise itself
+    recognise : recognises phones in time, for speakers that the engine does not recognise itself
     If the engine's own model recognises phones of this speaker, these are aligned by ``phones``, as the phones of the
     training were; else the result of ``recognise`` is used.
     """
@@ -91,14 +93,14 @@ def recognised_speech(
     recognised = None
     if isinstance(engine, RecognisesPhones) and phones.kind not in ("general", "words"):
         recognised = engine.recognise(learned, speech)
-    if recognised is None:
-        return replace(speech, units=recognise(), units_known=False, confidence=0.0)
-    try:
-        return replace(
-            speech, units=phones.align_phones(audio, features, recognised), units_known=False, confidence=0.0
-        )
-    except AlignmentError:
-        return replace(speech, units=recognise(), units_known=False, confidence=0.0)
+    if recognised is not None:
+        try:
+            units = phones.align_phones(audio, features, recognised)
+            return replace(speech, units=units, units_known=False, confidence=0.0)
+        except AlignmentError:
+            pass
+    found = recognise()
+    return replace(speech, units=found.units, units_known=False, confidence=found.reliability)
 
 
 def _words(

@@ -69,6 +69,11 @@ class Recognition:
             return None
         return sum(span.duration_s * span.label.confidence for span in self.words) / seconds
 
+    @property
+    def reliability(self) -> float:
+        """How far words confirm the phones, 0 to 1: the confidence, by the share of speech that words decided."""
+        return (self.confidence or 0.0) * self.word_s / max(self.word_s + self.phone_s, 1e-9)
+
 
 def recognition_of(
     units: Timeline[Unit], labels: Sequence[LabelledFrames], heard: Sequence[HeardWord], similarity: float | None

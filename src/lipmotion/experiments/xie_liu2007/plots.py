@@ -58,6 +58,7 @@ def draw_plots(chains: TrainedSystem, recordings: HeldOutRecordings, folder: Pat
         utterances=recordings.utterances[:CONVERGENCE_RECORDINGS],
         reference=recordings.reference[:CONVERGENCE_RECORDINGS],
         conditions={AUDIO_ONLY: recordings.conditions[AUDIO_ONLY][:CONVERGENCE_RECORDINGS]},
+        recognitions=recordings.recognitions[:CONVERGENCE_RECORDINGS],
     )
     by_em = compared_clips(some, AUDIO_ONLY, chains.engine, chains.model)
     path_engine = CoupledEngine(replace(chains.engine.config, conversion="viterbi"))

@@ -55,6 +55,7 @@ class HeldOutRecordings:
     reference    : phones in time of every utterance: labelled, or aligned, or recognised
     conditions   : phones in time that the engine is given, by condition: ``audio only``, ``with transcript``
     phones       : the recogniser of these phones
+    recognitions : what it recognised in every utterance
     eigenlips    : principal components of mouth pictures (None: their coefficients are not compared)
     prior        : the model on which the evaluated one stands (None: it stands on none)
     """
@@ -66,6 +67,7 @@ class HeldOutRecordings:
     reference: Sequence[Timeline[Unit]]
     conditions: Mapping[str, Sequence[Timeline[Unit]]]
     phones: Recogniser
+    recognitions: Sequence[Recognition]
     eigenlips: Eigenlips | None = None
     prior: Model | None = None
 
@@ -123,10 +125,13 @@ def held_out_recordings(
     if OPENING in compared:
         threshold = closed_threshold([_openings(u) for u in _training_list(corpus, selection.speakers) or utterances])
     recognised = with_progress(utterances, "phones: recognition", sub_monitor(monitor, 0.4, 0.9))
-    conditions = {AUDIO_ONLY: [phones.recognise(u.audio, u.features) for u in recognised]}
+    found = [phones.recognition(utterance.audio, utterance.features) for utterance in recognised]
+    conditions = {AUDIO_ONLY: [each.units for each in found]}
     if all(utterance.words or utterance.phones for utterance in utterances):
         conditions[WITH_TRANSCRIPT] = reference
-    return HeldOutRecordings(utterances, compared, still, threshold, reference, conditions, phones, eigenlips, prior)
+    return HeldOutRecordings(
+        utterances, compared, still, threshold, reference, conditions, phones, found, eigenlips, prior
+    )
 
 
 def compared_channels(utterances: Sequence[Utterance]) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -192,10 +197,18 @@ def speech_of_condition(
     recordings: HeldOutRecordings, condition: str, engine: Animator[ModelT], learned: ModelT
 ) -> list[Speech]:
     """Return the speech of all utterances under a condition, as ``animate`` gives it to the engine."""
-    return [
-        _speech(engine, learned, recordings, utterance, units, condition == WITH_TRANSCRIPT)
-        for utterance, units in zip(recordings.utterances, recordings.conditions[condition], strict=True)
-    ]
+    phones, prior = recordings.phones, recordings.prior
+    if condition == AUDIO_ONLY:
+        heard = [
+            recognised_speech(engine, learned, u.audio, u.features, phones, lambda found=found: found)  # type: ignore[misc]
+            for u, found in zip(recordings.utterances, recordings.recognitions, strict=True)
+        ]
+    else:
+        heard = [
+            speech_of(engine, u.audio, u.features, units)
+            for u, units in zip(recordings.utterances, recordings.conditions[condition], strict=True)
+        ]
+    return [with_prior(prior, speech) for speech in heard]
 
 
 def compare_with_recorded(
@@ -211,21 +224,6 @@ def compare_with_recorded(
         _clip(engine, learned, recordings.channels, utterance, spoken, reference)
         for utterance, spoken, reference in zip(recordings.utterances, speech, recordings.reference, strict=True)
     ]
-
-
-def _speech(
-    engine: Animator[ModelT],
-    learned: ModelT,
-    recordings: HeldOutRecordings,
-    utterance: Utterance,
-    units: Timeline[Unit],
-    with_transcript: bool,
-) -> Speech:
-    """Return the speech of an utterance as ``animate`` gives it to the engine."""
-    if with_transcript:
-        return with_prior(recordings.prior, speech_of(engine, utterance.audio, utterance.features, units))
-    speech = recognised_speech(engine, learned, utterance.audio, utterance.features, recordings.phones, lambda: units)
-    return with_prior(recordings.prior, speech)
 
 
 def _clip(
