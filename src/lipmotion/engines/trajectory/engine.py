@@ -80,7 +80,7 @@ class TrajectoryConfig(Configuration):
     closures: bool = True
     joint_recogniser: bool = True
     conditions: int = option(15, Rule(least=0))
-    epochs: int = option(80, Rule(least=1))
+    epochs: int = option(100, Rule(least=1))
     articulation: bool = True
     units: str = "phone"
 

@@ -22,6 +22,7 @@ from lipmotion.pipeline.training.train import phones_of
 from lipmotion.pipeline.transcribe import warn_of_guesses
 from lipmotion.pipeline.understand import recognised_speech, speech_of
 from lipmotion.speech.recogniser import Recogniser
+from lipmotion.speech.recognition import Recognition
 from lipmotion.types import (
     GREY,
     Monitor,
