@@ -31,7 +31,7 @@ ARTICULATORS = ("opening", "width", "outer", "jaw", "upper_lip", "lower_lip", "p
 THIRDS = ("begin", "middle", "end")
 SMOOTHING_S = 0.048
 """Standard deviation of the Gaussian that joins the thirds of successive phones: 1.2 pictures at 25 Hz."""
-REST_S = 1.0
+REST_S = 0.5
 """Silence further than this from speech is not in the table: the mouth rests."""
 GAIN = 2.0
 """The means of the table are made so much larger. They were measured on recognised words, of which a fifth to a third

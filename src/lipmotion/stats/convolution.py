@@ -10,6 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.kernels.threads import one_thread
+
 Array = NDArray[np.float32]
 TAPS = 3
 """Time steps that each unit sees of the layer below: one before, the same, one after; ``dilation`` steps apart."""
@@ -107,6 +109,7 @@ def initial_network(
     return ConvolutionalNetwork((first, *others), tuple(dilations), layer(hidden, outputs, 0.1))
 
 
+@one_thread()
 def fit_network(
     network: ConvolutionalNetwork,
     draw: Callable[[np.random.Generator, int], TrainingSequence],

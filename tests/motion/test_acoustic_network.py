@@ -1,0 +1,108 @@
+"""Acoustic networks: interpolation, training on heard conditions, serialisation."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from lipmotion.motion import acoustic_network
+from lipmotion.motion.acoustic_network import (
+    STEP,
+    AcousticNetwork,
+    acoustic_network_arrays,
+    acoustic_network_from_arrays,
+    between_steps,
+    fit_acoustic_network,
+)
+from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
+from lipmotion.testing.examples import example
+from lipmotion.types import SPECTRUM_BANDS, Example, HeardSpectrum, silent_monitor
+
+
+def heard_example(seed: int, tempos: tuple[float, ...] = (1.0,)) -> tuple[Example, np.ndarray]:
+    """An example whose motion is a smooth function of two bands; its other versions are as much distorted as fast."""
+    one = example(("aa", "t", "iy", "s"), seed)
+    frames = len(one.valid)
+    rng = np.random.default_rng(seed)
+    slow = np.cumsum(rng.standard_normal((frames, 2)), axis=0)
+    slow = (slow - slow.mean(axis=0)) / slow.std(axis=0)
+    spectrum = rng.normal(0, 0.1, (frames, SPECTRUM_BANDS))
+    spectrum[:, 3], spectrum[:, 8] = slow[:, 0], slow[:, 1]
+    versions = []
+    for tempo in tempos:
+        positions = np.minimum(np.round(np.arange(int(frames / tempo)) * tempo).astype(int), frames - 1)
+        versions.append(HeardSpectrum(spectrum[positions].astype(np.float16), tempo, float(tempo != 1)))
+    return replace(one, heard=tuple(versions)), slow * [0.1, 0.02] + [0.3, 0.6]
+
+
+@pytest.fixture(scope="module")
+def trained() -> AcousticNetwork:
+    """A small network."""
+    patch = pytest.MonkeyPatch()
+    patch.setattr(acoustic_network, "LEAST_STEPS", 60)
+    patch.setattr(acoustic_network, "BATCH_SIZE", 4)
+    examples, values = zip(*(heard_example(seed, (1.0, 0.8, 1.25)) for seed in range(6)), strict=True)
+    result = fit_acoustic_network(examples, values, 2, 1, silent_monitor, NO_CHECKPOINT)
+    patch.undo()
+    return result
+
+
+def test_it_predicts_motion_of_speech_that_it_did_not_hear(trained: AcousticNetwork) -> None:
+    one, values = heard_example(99)
+    motion, distortion = trained.predict(one.heard[0].values)
+    assert motion.shape == values.shape
+    assert distortion.shape == (len(values),)
+    for column in range(2):
+        assert np.corrcoef(motion[:, column], values[:, column])[0, 1] > 0.7
+    assert abs(motion[:, 0].mean() - 0.3) < 0.06
+
+
+def test_frames_at_the_steps_have_the_values_of_the_steps() -> None:
+    steps = np.random.default_rng(0).standard_normal((6, 2))
+    curve = between_steps(steps, 23)
+    np.testing.assert_allclose(curve[::STEP], steps, atol=1e-12)
+
+
+def test_a_straight_line_stays_straight_inside() -> None:
+    curve = between_steps(np.arange(8.0)[:, None], 29)
+    np.testing.assert_allclose(curve[STEP : -2 * STEP, 0], np.arange(29)[STEP : -2 * STEP] / STEP, atol=1e-12)
+
+
+def test_it_is_the_same_after_serialisation_but_for_half_precision(trained: AcousticNetwork) -> None:
+    again = acoustic_network_from_arrays(acoustic_network_arrays(trained), 2)
+    assert again is not None
+    spectrum = heard_example(5)[0].heard[0].values
+    np.testing.assert_allclose(again.predict(spectrum)[0], trained.predict(spectrum)[0], atol=3e-3)
+
+
+@pytest.mark.parametrize("name", ["network_first", "network_layers", "network_biases", "network_output"])
+def test_a_network_without_a_part_is_refused(trained: AcousticNetwork, name: str) -> None:
+    arrays = acoustic_network_arrays(trained)
+    del arrays[name]
+    with pytest.raises(KeyError, match=name):
+        acoustic_network_from_arrays(arrays, 2)
+
+
+def test_a_scale_of_nothing_is_refused(trained: AcousticNetwork) -> None:
+    arrays = acoustic_network_arrays(trained)
+    arrays["network_targets"][1, 0] = 0
+    with pytest.raises(ValueError, match="scale"):
+        acoustic_network_from_arrays(arrays, 2)
+
+
+def test_a_stopped_training_goes_on_from_its_checkpoint(
+    tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    checkpoint = Checkpoint(tmp_path_factory.mktemp("work"), "job")
+    monkeypatch.setattr(acoustic_network, "LEAST_STEPS", 2)
+    examples, values = zip(*(heard_example(seed) for seed in range(2)), strict=True)
+    first = fit_acoustic_network(examples, values, 2, 1, silent_monitor, checkpoint)
+
+    def never(*_: object) -> None:
+        raise AssertionError("trained again")
+
+    monkeypatch.setattr(acoustic_network, "fit_network", never)
+    again = fit_acoustic_network(examples, values, 2, 1, silent_monitor, checkpoint)
+    np.testing.assert_allclose(again.network.output.weights, first.network.output.weights)

@@ -1,0 +1,128 @@
+"""The table of articulation: its curves, its place in a speaker's range, and how far contexts are known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from lipmotion.motion.articulation import (
+    ARTICULATORS,
+    ArticulationPrior,
+    articulation_arrays,
+    articulation_from_arrays,
+    articulation_table,
+    articulators,
+    count_contexts,
+    dynamics_of,
+    fit_articulation_prior,
+)
+from lipmotion.motion.space import fit_reduced_motion
+from lipmotion.stats.delta_windows import with_dynamics
+from lipmotion.testing.examples import examples, timeline
+from lipmotion.units import PHONES
+
+OPENING, WIDTH = ARTICULATORS.index("opening"), ARTICULATORS.index("width")
+
+
+def middle(phone: str, articulator: int) -> float:
+    """The articulator in the middle of a long phone between others."""
+    units = timeline(("t", phone, "t"), 0.3)
+    curve = articulators(units, 230)
+    span = units[2]
+    return float(curve[int((span.start_s + span.end_s) * 50), articulator])
+
+
+def test_every_phone_of_the_inventory_has_a_curve() -> None:
+    units = timeline(PHONES, 0.1)
+    assert np.isfinite(articulators(units, 700)).all()
+
+
+def test_open_vowels_are_open_and_closures_closed() -> None:
+    assert min(middle(phone, OPENING) for phone in ("aa", "ae", "ay")) > 0.5
+    assert max(middle(phone, OPENING) for phone in ("p", "b", "m", "f", "v")) < -0.4
+
+
+def test_rounded_sounds_are_narrow() -> None:
+    assert max(middle(phone, WIDTH) for phone in ("uw", "ow", "w", "ao")) < -0.5 < middle("iy", WIDTH)
+
+
+def test_a_phone_without_a_row_borrows_that_of_the_most_similar_one() -> None:
+    assert "oy" not in articulation_table()
+    assert middle("oy", OPENING) == pytest.approx(middle("ao", OPENING))
+
+
+@pytest.fixture(scope="module")
+def prior() -> ArticulationPrior:
+    """The table in the range of the synthetic speaker."""
+    some = examples()
+    space, values = fit_reduced_motion(some, 3)
+    found = fit_articulation_prior(space, values, some)
+    assert found is not None
+    return found
+
+
+def test_the_table_is_in_the_speakers_own_range(prior: ArticulationPrior) -> None:
+    spoken = np.concatenate([one.motion.values[60:-60, :2] for one in examples()])
+    assert prior.matrix[OPENING, 0] == pytest.approx(spoken[:, 0].std(), rel=0.1)
+    assert prior.centre[0] == pytest.approx(np.median(spoken[:, 0]), rel=0.1)
+    assert prior.matrix[WIDTH, 0] == 0
+
+
+def test_contexts_of_the_training_are_known_and_others_are_not(prior: ArticulationPrior) -> None:
+    seen = examples()[0].speech.units
+    frames = len(examples()[0].valid)
+    unseen = timeline(("hh", "oy", "zh", "ng", "uh"), 0.2)
+    assert prior.familiarity(seen, frames)[60:-60].min() > 0.45
+    assert prior.familiarity(unseen, 220)[70:-70].max() < 0.1
+    assert prior.familiarity(timeline((), 0.2), 400)[150:250].min() > 0.99  # rest is always known
+
+
+def test_unknown_contexts_follow_the_table_and_unreliable_phones_do_not(prior: ArticulationPrior) -> None:
+    units, frames = timeline(("hh", "ao", "zh", "ng", "uh"), 0.2), 220
+    own = np.ones((frames, 3, len(prior.centre)))
+
+    def statistics(chosen: slice) -> tuple[np.ndarray, np.ndarray]:
+        return own[chosen].copy(), own[chosen].copy()
+
+    followed, precisions = prior.blended(statistics, units, frames, 1.0)(slice(0, frames))
+    table = with_dynamics(prior.trajectory(units, frames))
+    share = (followed - own)[100, 0] / (table - own)[100, 0]
+    np.testing.assert_allclose(share, share[0])
+    assert 0.7 < share[0] < 0.9
+    np.testing.assert_allclose(precisions, own)
+    ignored, _ = prior.blended(statistics, units, frames, 0.0)(slice(0, frames))
+    np.testing.assert_allclose(ignored, own)
+
+
+def test_ranges_of_frames_have_the_dynamics_of_the_whole() -> None:
+    values = np.random.default_rng(0).standard_normal((30, 2))
+    whole = with_dynamics(values)
+    for frames in (slice(0, 30), slice(0, 7), slice(7, 20), slice(20, 30), slice(None)):
+        np.testing.assert_allclose(dynamics_of(values, frames), whole[frames])
+
+
+def test_contexts_are_counted_with_pauses_as_silence() -> None:
+    units = timeline(("t", "aa"))
+    paused = replace(units, spans=tuple(
+        replace(span, label=replace(span.label, phone="sp")) if span.label.phone == "sil" else span for span in units
+    ))  # fmt: skip
+    assert count_contexts([units, paused])["sil", "t", "aa"] == 2
+
+
+def test_it_is_the_same_after_serialisation(prior: ArticulationPrior) -> None:
+    again = articulation_from_arrays(articulation_arrays(prior), len(prior.centre))
+    assert again is not None
+    assert again.contexts == prior.contexts
+    np.testing.assert_allclose(again.matrix, prior.matrix)
+    assert articulation_from_arrays({}, 5) is None
+
+
+def test_motion_without_an_opening_has_no_table() -> None:
+    some = [
+        replace(one, motion=replace(one.motion, values=one.motion.values[:, 1:], channels=one.motion.channels[1:]))
+        for one in examples(3)
+    ]
+    space, values = fit_reduced_motion(some, 3)
+    assert fit_articulation_prior(space, values, some) is None
