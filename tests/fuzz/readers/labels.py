@@ -12,6 +12,7 @@ from lipmotion.corpora.labels import read_labels
 from lipmotion.corpora.source_recordings import RecordingFolder, SourceRecording
 from lipmotion.corpora.splits import LISTS, assign_splits
 from lipmotion.pipeline.corpus.supplied_motion import supplied_phones
+from lipmotion.types import TimedWord, TranscriptLine
 
 LONG = """File type = "ooTextFile"
 Object class = "TextGrid"
@@ -90,7 +91,8 @@ def _read_labels(path: Path) -> None:
     labels = read_labels(path)
     for line in labels.transcript.lines if labels.transcript else ():
         require(bool(line.words), "a line without a word")
-        for part in (line, *line.words):
+        parts: list[TranscriptLine | TimedWord] = [line, *line.words]
+        for part in parts:
             times_s = [time for time in (part.start_s, part.end_s) if time is not None]
             require(all(map(math.isfinite, times_s)) and times_s == sorted(times_s), "times that are none")
     phones = supplied_phones(SourceRecording("a", path, labels.words, phones=labels.phones), LENGTH_S)
