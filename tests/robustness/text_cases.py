@@ -107,7 +107,7 @@ _transcript_file(
     "14 words in a subtitle of a moment",
     b"0:1 --> 0:1.1\n" + b"papa " * 7 + b"mama " * 7,
     0,
-    "the words do not fit the sound, first at",
+    "the times of the transcript do not fit the sound; they are not used",
 )
 _transcript_file(
     "a subtitle of a million words",

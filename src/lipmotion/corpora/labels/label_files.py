@@ -188,6 +188,8 @@ def _text(path: Path) -> str:
     try:
         text = content.decode("utf-16" if wide else "utf-8-sig")
     except UnicodeDecodeError as error:
+        if wide:
+            raise InputError(f"{path}: is not UTF-16 text, as its first bytes say; save it as UTF-8") from error
         text = _western(path, content, error)
     if text.startswith("ooBinaryFile"):
         raise InputError(f"{path}: is a binary TextGrid; save it as a text file")
