@@ -49,6 +49,16 @@ def test_a_transcript_in_another_encoding_is_reported(tmp_path):
     assert "is not UTF-8 text" in found.problems["a"]
 
 
+def test_subtitles_and_recognised_words_are_transcripts(tmp_path):
+    touch(tmp_path, "a.mp4", "b.mp4", "c.mp4")
+    (tmp_path / "a.srt").write_text("1\n00:00:00,500 --> 00:00:02,000\n<i>Hello</i> there\n")
+    (tmp_path / "b.json").write_text('{"segments": [{"start": 0.5, "end": 2.0, "text": " Hello you."}]}')
+    (tmp_path / "c.srt").write_text("1\n00:00:00,500 --> 2\nHello\n")
+    found = discover(tmp_path)
+    assert [item.words for item in found.recordings] == [("hello", "there"), ("hello", "you")]
+    assert "c.srt: line 2 is '00:00:00,500 --> 2'" in found.problems["c"]
+
+
 def test_videos_of_the_same_name_are_reported(tmp_path):
     touch(tmp_path, "a.mp4", "a.mkv", "b.mp4")
     found = discover(tmp_path)

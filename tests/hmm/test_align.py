@@ -3,8 +3,16 @@ import pytest
 
 from hmm.synthetic import PAUSE, SILENCE, known_hmm, random_hmm, recordings, speaker
 from lipmotion.errors import AlignmentError
-from lipmotion.hmm.align import align_units, choose_pronunciations, state_path, state_sequence
+from lipmotion.hmm.align import (
+    align_units,
+    choose_pronunciations,
+    place_words,
+    state_path,
+    state_sequence,
+    unit_windows,
+)
 from lipmotion.hmm.log_likelihoods import log_likelihoods_of
+from lipmotion.kernels.windowed_viterbi import Windows
 from oracles import sequences
 
 
@@ -114,3 +122,29 @@ def test_pronunciations_without_number_are_refused_before_a_network_is_built():
         AlignmentError, match=r"4 words in all their pronunciations make \d+ arcs, required at most 1000600"
     ):
         choose_pronunciations(hmm, log_likelihoods_of(hmm, features), [[("a",)] * 800] * 4, PAUSE)
+
+
+def test_words_are_placed_within_their_windows():
+    """The same word twice in the sound, and once in the transcript: the window says which."""
+    who = speaker()
+    hmm = known_hmm(who)
+    features, edges = who.say(np.random.default_rng(7), (SILENCE, "b", "c", SILENCE, "b", "c", SILENCE))
+    log_likelihoods, words = log_likelihoods_of(hmm, features), [[("b", "c")]]
+    for first in (1, 4):
+        begin, end = edges[first], edges[first + 2]
+        windows = Windows(np.array([begin - 2]), np.array([end + 2]))
+        placed = place_words(hmm, log_likelihoods, words, PAUSE, windows)
+        assert [item.spoken.units for item in placed] == [(SILENCE,), ("b", "c"), (SILENCE,)]
+        assert placed[1].start == pytest.approx(begin, abs=1)
+        assert -0.5 < placed[1].fit <= 0
+        spoken = [item.spoken for item in placed]
+        of_units = unit_windows(spoken, windows, len(features))
+        assert of_units.first.tolist() == [0, begin - 2, begin - 2, begin - 2]
+        assert of_units.end.tolist() == [end + 2, end + 2, end + 2, len(features)]
+        bounds = align_units(hmm, log_likelihoods, [unit for item in spoken for unit in item.units], of_units)
+        assert bounds.tolist() == pytest.approx([0, *edges[first : first + 3], len(features)], abs=1)
+    between = Windows(np.array([edges[3] - 3]), np.array([edges[4] + 3]))
+    assert place_words(hmm, log_likelihoods, words, PAUSE, between)[1].fit < -2
+    nowhere = Windows(np.array([edges[3]]), np.array([edges[3] + 3]))
+    with pytest.raises(AlignmentError, match="no path"):
+        place_words(hmm, log_likelihoods, words, PAUSE, nowhere)

@@ -287,7 +287,11 @@ _label_file(
     "labels in seconds without decimals in the first line", ".txt", "0 0.5 p\n0.5 1.5 aa\n", "its lines hold times"
 )
 _label_file("many recordings in one", ".lab", '#!MLF!#\n"*/a.lab"\n0 1000000 p\n', "is a master label file")
-_label_file("subtitles", ".txt", "1\n00:00:01,000 --> 00:00:02,000\nhello\n", "is a file of subtitles")
+_label_file(
+    "damaged times", ".srt", "1\n00:00:01,000 --> 7\nhello\n", "a.srt: line 2 is '00:00:01,000 --> 7'; required times"
+)
+_label_file("damaged JSON", ".json", '{"segments": [\n', "a.json: line 2: damaged JSON")
+_label_file("two recordings", ".ctm", "a 1 0.0 0.5 hi\nb 1 0.5 0.5 you\n", "a.ctm: line 2: words of two recordings")
 _label_file("a word processor's file", ".txt", "{\\rtf1\\ansi hello}", "required the words alone; save it as text")
 _label_file("UTF-16 without its mark", ".txt", "hello".encode("utf-16-le"), "holds NUL characters: is it UTF-16")
 _label_file(

@@ -66,8 +66,15 @@ _transcript_file(
 _transcript_file(
     "HTK's labels of phones", b"0 1000000 p\n1000000 2000000 aa\n", 3, "phones in time, but no words; give"
 )
-_transcript_file("HTK's labels of words", b"0 10000000 papa\n10000000 20000000 mama\n", 0)
-_transcript_file("subtitles", b"1\n00:00:00,500 --> 00:00:02,000\npapa mama\n", 0)
+_transcript_file(
+    "HTK's labels of words",
+    b"0 10000000 papa\n10000000 20000000 mama\n",
+    0,
+    "the words do not fit the sound, first at 0.00 s",
+)
+_transcript_file(
+    "subtitles", b"1\n00:00:00,500 --> 00:00:02,000\npapa mama\n", 0, "the words do not fit the sound, first at 0.50 s"
+)
 _transcript_file(
     "subtitles without words", b"1\n00:00:01,000 --> 00:00:02,000\n[music]\n", 3, "the transcript holds no word"
 )
@@ -89,16 +96,34 @@ _transcript_file(
     0,
     "goes on after the recording ends at 2.76 s; its last 1 lines are left out",
 )
-_transcript_file("subtitles out of order, one over another", b"0:1 --> 0:2\nmama\n\n0:0.5 --> 0:2\npapa\n", 0)
-_transcript_file("200 words in a subtitle of a moment", b"0:1 --> 0:1.1\n" + b"papa " * 200, 5, *TOO_MUCH)
-_transcript_file("14 words in a subtitle of a moment", b"0:1 --> 0:1.1\n" + b"papa " * 7 + b"mama " * 7, 0)
 _transcript_file(
-    "a subtitle of a million words", b"0:1 --> 0:2\n" + b"a " * 1_000_000, 3, "more than 500000 words; give those"
+    "subtitles out of order, one over another",
+    b"0:1 --> 0:2\nmama\n\n0:0.5 --> 0:2\npapa\n",
+    0,
+    "the words do not fit the sound, first at",
+)
+_transcript_file("200 words in a subtitle of a moment", b"0:1 --> 0:1.1\n" + b"papa " * 200, 5, *TOO_MUCH)
+_transcript_file(
+    "14 words in a subtitle of a moment",
+    b"0:1 --> 0:1.1\n" + b"papa " * 7 + b"mama " * 7,
+    0,
+    "the times of the transcript do not fit the sound; they are not used",
+)
+_transcript_file(
+    "a subtitle of a million words",
+    b"0:1 --> 0:2\n" + b"a " * 1_000_000,
+    3,
+    "line 1: a line of 2000000 characters, required at most 262144",
 )
 _transcript_file(
     "half a million subtitles", b"0:1 --> 0:2\n" * 500_000, 3, "more than 250000 labels; give those of one"
 )
-_transcript_file("recognised words", b'{"result": [{"word": "papa", "start": 0.5, "end": 1.2}], "text": "papa"}', 0)
+_transcript_file(
+    "recognised words",
+    b'{"result": [{"word": "papa", "start": 0.5, "end": 1.2}], "text": "papa"}',
+    0,
+    "the words do not fit the sound, first at 0.50 s",
+)
 _transcript_file(
     "recognised words, cut off", b'{"segments": [\n{"start": 0.5,', 3, "line 2: damaged JSON (", "write it again"
 )

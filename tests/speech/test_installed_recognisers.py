@@ -140,7 +140,7 @@ def test_another_language_is_not_taken_for_words(
 ) -> None:
     monkeypatch.setattr(whisper, "language", "fr")
     assert recognise_words(AUDIO, "whisper") is None
-    assert "hears the language 'fr'; phones are recognised" in caplog.text
+    assert "hears the language 'fr', not English; its words are not used" in caplog.text
 
 
 def test_nothing_said(whisper: type[WhisperModel], monkeypatch: pytest.MonkeyPatch) -> None:

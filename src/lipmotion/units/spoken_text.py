@@ -25,6 +25,8 @@ REPEATED = 3
 """A name that begins so many lines is that of a speaker."""
 LONGEST_PAUSE_S = 0.5
 """Words in time that are further apart are not of one line."""
+LONGEST_LINE = 1 << 18
+"""Most characters of a line: a label may hold four hours of speech."""
 MOST_WORDS = 500_000
 """Most words of a transcript: twelve hours of the fastest speech on record."""
 
@@ -42,9 +44,21 @@ def speaker_names(texts: Iterable[str]) -> frozenset[str]:
     return frozenset(name for name, count in counts.items() if count >= REPEATED)
 
 
-def timed_words(text: str, start_s: float | None = None, end_s: float | None = None) -> list[TimedWord]:
-    """Return the words of a text with the times of the whole: several words share them by their letters."""
-    words = words_in(text)
+def line_words(text: str, where: str) -> tuple[str, ...]:
+    """Return the words of one line; ``where``: its place, for messages. Raises InputError: it is too long."""
+    if len(text) > LONGEST_LINE:
+        raise InputError(f"{where}: a line of {len(text)} characters, required at most {LONGEST_LINE}")
+    return words_in(text)
+
+
+def timed_words(
+    text: str, start_s: float | None = None, end_s: float | None = None, where: str = "the transcript"
+) -> list[TimedWord]:
+    """Return the words of a line with the times of the whole: several words share them by their letters.
+
+    Raises InputError: as ``line_words``.
+    """
+    words = line_words(text, where)
     if len(words) < 2 or start_s is None or end_s is None:
         return [TimedWord(word, start_s, end_s) for word in words]
     letters, done = sum(map(len, words)), 0

@@ -284,7 +284,7 @@ HOSTILE = {
     "30 million bytes": (b"00:01 --> 00:02\nhi\n" * 1_700_000, "bytes, required at most 16777216"),
     "a million cues": (b"0:1-->0:2\n" * 1_000_000, "more than 250000 labels"),
     "a million segments": (b"[" + b'{"start":0,"text":"a"},' * 700_000 + b"{}]", "more than 250000 labels"),
-    "a number of 15 million digits": (b"0:1-->0:2\n" + b"7" * 15_000_000, "more than 500000 words"),
+    "a number of 15 million digits": (b"0:1-->0:2\n" + b"7" * 15_000_000, "line 1: a line of 15000000 characters"),
     "a million words in time": (
         b'{"words":[' + b'{"word":"a"},' * 1_000_000 + b'{"word":"a"}]}',
         "more than 500000 words",

@@ -1,7 +1,8 @@
-"""Files beside recordings: TextGrids, labels of HTK and Audacity, word times, and the lists of the splits."""
+"""Files beside recordings: labels, subtitles, what recognisers write, word times, and the lists of the splits."""
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 from fuzz.inputs import Files, Good
@@ -11,6 +12,7 @@ from lipmotion.corpora.labels import read_labels
 from lipmotion.corpora.source_recordings import RecordingFolder, SourceRecording
 from lipmotion.corpora.splits import LISTS, assign_splits
 from lipmotion.pipeline.corpus.supplied_motion import supplied_phones
+from lipmotion.types import TimedWord, TranscriptLine
 
 LONG = """File type = "ooTextFile"
 Object class = "TextGrid"
@@ -52,6 +54,15 @@ TEXTS = {
     "starts.lab": "0 sil\n1000000 p\n2000000 aa\n",
     "audacity.txt": "0.0\t0.5\tp\n0.5\t1.25\taa\n\\\t100\t200\n",
     "words.txt": "Hello, you 42 people.\n",
+    "said.srt": "1\n00:00:00,500 --> 00:00:01,500\n<i>Hi</i> (laughs)\n\n2\n00:00:02,000 --> 00:00:03,000\nANNA: you\n",
+    "said.vtt": "WEBVTT\n\nNOTE a\n\n00:00.500 --> 00:01.500 line:0\nHi<00:01.000><c> you</c>\n\n"
+    "00:01.500 --> 00:01.510\nHi you\n",
+    "whisper.json": '{"text": "Hi", "segments": [{"start": 0.5, "end": 1.5, "text": " Hi 2 you", "words": '
+    '[{"word": " Hi", "start": 0.5, "end": 0.75}, {"word": "2"}, {"word": " you", "start": 1, "end": 1.5}]}]}',
+    "cpp.json": '{"transcription": [{"offsets": {"from": 500, "to": 1500}, "text": " Hi"}]}',
+    "vosk.json": '{"result": [{"conf": 1.0, "end": 1.5, "start": 0.5, "word": "hi"}], "text": "hi"}\n{"text": ""}\n',
+    "words.ctm": ";; a\na 1 0.50 0.25 hi 0.9\na 1 0.75 0.5 <eps>\na 1 1.25 0.5 you\n",
+    "table.tsv": "start\tend\ttext\n500\t1500\tHi you\n",
     "grid.align": "0 23750 sil\n23750 29500 bin\n29500 34000 blue\n",
 }
 SPLITS = {"train.txt": b"a\nb\n", "val.txt": b"c\n", "test.txt": b"d\n"}
@@ -78,6 +89,12 @@ def read(folder: Path, _: Good) -> None:
 
 def _read_labels(path: Path) -> None:
     labels = read_labels(path)
+    for line in labels.transcript.lines if labels.transcript else ():
+        require(bool(line.words), "a line without a word")
+        parts: list[TranscriptLine | TimedWord] = [line, *line.words]
+        for part in parts:
+            times_s = [time for time in (part.start_s, part.end_s) if time is not None]
+            require(all(map(math.isfinite, times_s)) and times_s == sorted(times_s), "times that are none")
     phones = supplied_phones(SourceRecording("a", path, labels.words, phones=labels.phones), LENGTH_S)
     for span in phones or ():
         require(0 <= span.start_s <= span.end_s <= LENGTH_S, "a phone outside of the sound")

@@ -17,8 +17,10 @@ TEXTS = (
     "Hello, you 42 people.\n",
     "baby's mother-in-law has 1,234,567 cats; 3 o'clock! (See two maps.)\nNow £5, 007, ½, twenty-three.\n",
     "naïve qwrx zzyx",
+    "1\n00:00:00,100 --> 00:00:00,600\n<i>Baby</i>\n",
+    '{"result": [{"word": "baby", "start": 0.1, "end": 0.5}], "text": "baby"}',
 )
-"""The last ones are too long for the sound, or have words without a pronunciation."""
+"""Some are too long for the sound, or have words without a pronunciation; the last ones have times."""
 
 
 def seeds(_: Good) -> list[Files]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import codecs
 import logging
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -60,17 +61,29 @@ def labels_beside(recording: Path, *, ignored: frozenset[Path] = frozenset()) ->
     ignored : files that are no labels (the lists of the splits)
     Raises InputError: one of them cannot be read.
     """
-    found: dict[str, tuple[Path, RecordingLabels]] = {}
+    found = list(each_labels_beside(recording, ignored=ignored))
+    transcripts = [labels.transcript for _, labels in found if labels.transcript]
+    in_order = sorted(found, key=lambda item: FOR_PHONES.index(item[0]) if item[0] in FOR_PHONES else len(FOR_PHONES))
+    phones = [labels.phones for _, labels in in_order if labels.phones]
+    return RecordingLabels(next(iter(transcripts), None), next(iter(phones), None))
+
+
+def each_labels_beside(
+    recording: Path, *, ignored: frozenset[Path] = frozenset()
+) -> Iterator[tuple[str, RecordingLabels]]:
+    """Yield the suffix and the labels of each file that ``labels_beside`` reads, in the order of ``FOR_WORDS``.
+
+    Raises InputError: one of them cannot be read.
+    """
+    seen: list[Path] = []
     for suffix in FOR_WORDS:
         for path in _named(recording, suffix):
-            if path in ignored or any(path.samefile(other) for other, _ in found.values()):
+            if path in ignored or any(path.samefile(other) for other in seen):
                 continue
+            seen.append(path)
             labels = _read(path, unknown_json=suffix == ".json")
             if labels is not None:
-                found.setdefault(suffix, (path, labels))
-    transcripts = [found[suffix][1].transcript for suffix in FOR_WORDS if suffix in found]
-    phones = [found[suffix][1].phones for suffix in FOR_PHONES if suffix in found]
-    return RecordingLabels(next(filter(None, transcripts), None), next(filter(None, phones), None))
+                yield suffix, labels
 
 
 def _named(recording: Path, suffix: str) -> list[Path]:
@@ -188,6 +201,8 @@ def _text(path: Path) -> str:
     try:
         text = content.decode("utf-16" if wide else "utf-8-sig")
     except UnicodeDecodeError as error:
+        if wide:
+            raise InputError(f"{path}: is not UTF-16 text, as its first bytes say; save it as UTF-8") from error
         text = _western(path, content, error)
     if text.startswith("ooBinaryFile"):
         raise InputError(f"{path}: is a binary TextGrid; save it as a text file")

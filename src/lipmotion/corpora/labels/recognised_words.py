@@ -43,11 +43,12 @@ def parse_recognised(text: str, where: str) -> TimedTranscript | None:
         documents = documents[0]
     if not all(isinstance(document, dict) and _is_recognised(document) for document in documents):
         return None
+    segments = [segment for document in documents for segment in _segments(document, where)]
+    check_count(len(segments), where)
     lines: list[TranscriptLine] = []
     count = 0
-    for number, segment in enumerate(part for document in documents for part in _segments(document, where)):
-        check_count(number, where)
-        line = _lines(segment, f"{where}: segment {number + 1}")
+    for number, segment in enumerate(segments, 1):
+        line = _lines(segment, f"{where}: segment {number}")
         count += sum(len(part.words) for part in line)
         check_word_count(count, where)
         lines += line
@@ -99,6 +100,7 @@ def _segments(document: dict[str, Any], where: str) -> list[dict[str, Any]]:
 
 
 def _required_objects(items: list[Any], name: str, where: str) -> list[dict[str, Any]]:
+    """Return the items of a list. Raises InputError: one is no object."""
     wrong = next((number for number, item in enumerate(items, 1) if not isinstance(item, dict)), None)
     if wrong is not None:
         found = shortened(repr(items[wrong - 1])[:200])
@@ -118,16 +120,17 @@ def _lines(segment: dict[str, Any], where: str) -> list[TranscriptLine]:
     text = segment.get("text", "")
     if not isinstance(text, str):
         raise InputError(f"{where}: its text is {shortened(repr(text)[:200])}, required a text")
-    return [TranscriptLine(tuple(timed_words(spoken_text(text))), start_s, end_s)]
+    return [TranscriptLine(tuple(timed_words(spoken_text(text), where=where)), start_s, end_s)]
 
 
 def _words(items: list[dict[str, Any]], where: str) -> list[TimedWord]:
+    check_word_count(len(items), where)
     words: list[TimedWord] = []
     for number, item in enumerate(items, 1):
-        text = item.get("word", item.get("text"))
+        text, place = item.get("word", item.get("text")), f"{where}, word {number}"
         if not isinstance(text, str):
-            raise InputError(f"{where}, word {number}: no text; required a member 'word'")
-        words += timed_words(spoken_text(text), *_times(item, f"{where}, word {number}"))
+            raise InputError(f"{place}: no text; required a member 'word'")
+        words += timed_words(spoken_text(text), *_times(item, place), where=place)
     return words
 
 

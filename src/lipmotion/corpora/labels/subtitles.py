@@ -10,8 +10,7 @@ from io import StringIO
 from lipmotion.corpora.labels.tier import check_count
 from lipmotion.errors import InputError, shortened
 from lipmotion.types import TimedTranscript, TimedWord, TranscriptLine, in_order
-from lipmotion.units import words_in
-from lipmotion.units.spoken_text import check_word_count, speaker_names, spoken_text, timed_words
+from lipmotion.units.spoken_text import check_word_count, line_words, speaker_names, spoken_text, timed_words
 
 CUE = re.compile(r"^.{0,40}\d\s*-->\s*\d", re.MULTILINE)
 """The times of a subtitle."""
@@ -59,7 +58,7 @@ def parse_subtitles(text: str, where: str) -> TimedTranscript:
     names = speaker_names("\n".join(cue.lines) for cue in cues)
     lines, count = [], 0
     for cue in _without_repetitions(cues):
-        words = _words(cue, names)
+        words = _words(cue, names, f"{where}: line {cue.number}")
         count += len(words)
         check_word_count(count, where)
         lines.append(TranscriptLine(tuple(words), cue.start_s, cue.end_s))
@@ -149,11 +148,11 @@ def _repeated(shown: tuple[str, ...], lines: tuple[str, ...]) -> int:
     return next((n for n in range(min(len(lines), len(shown)), 0, -1) if shown[-n:] == lines[:n]), 0)
 
 
-def _words(cue: SubtitleCue, names: frozenset[str]) -> list[TimedWord]:
+def _words(cue: SubtitleCue, names: frozenset[str], where: str) -> list[TimedWord]:
     """Return the words of a cue, with times where these stand between them."""
     text = "\n".join(cue.lines)
     if WORD_TIME.search(text) is None:
-        return [TimedWord(word) for word in words_in(spoken_text(text, names))]
+        return [TimedWord(word) for word in line_words(spoken_text(text, names), where)]
     marks = list(WORD_TIME.finditer(text))
     edges = [0, *(mark.end() for mark in marks)]
     ends = [*(mark.start() for mark in marks), len(text)]
@@ -161,5 +160,5 @@ def _words(cue: SubtitleCue, names: frozenset[str]) -> list[TimedWord]:
     return [
         word
         for first, end, start_s, end_s in zip(edges, ends, times_s, times_s[1:], strict=False)
-        for word in timed_words(spoken_text(text[first:end], names), start_s, max(start_s, end_s))
+        for word in timed_words(spoken_text(text[first:end], names), start_s, max(start_s, end_s), where)
     ]

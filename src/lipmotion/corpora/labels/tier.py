@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 from lipmotion.errors import InputError, shortened
 from lipmotion.types import Span, TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit
-from lipmotion.units import PHONES, SILENCE, is_silent, phone_named, with_reduced_vowels, words_in
+from lipmotion.units import PHONES, SILENCE, is_silent, phone_named, with_reduced_vowels
+from lipmotion.units.spoken_text import line_words
 
 SILENCES = frozenset(["", *"sil sp spn pau ssil nsn h# #h # _ - silence <sil> <p:> {sil} [sil] <eps>".split()])
 """Labels of other tools for silence, pauses and noise that is not speech."""
@@ -81,7 +82,7 @@ def tier_transcript(tier: LabelTier, where: str) -> TimedTranscript:
     _check_order(tier, where)
     lines = []
     for label in tier.labels:
-        words = () if _is_silence(label.text) else words_in(label.text)
+        words = () if _is_silence(label.text) else line_words(label.text, f"{where}: {label.position}")
         end_s = label.end_s if math.isfinite(label.end_s) else None
         times_s = (label.start_s, end_s) if len(words) == 1 else (None, None)
         if words:

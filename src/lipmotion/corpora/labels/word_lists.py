@@ -48,7 +48,7 @@ def parse_ctm(text: str, where: str) -> TimedTranscript:
         if duration_s < 0:
             raise InputError(f"{where}: line {number}: a duration of {duration_s:g} s, required 0 or more")
         if found[5].lower() not in SILENCES:
-            words.append((start_s, timed_words(spoken_text(found[5]), start_s, start_s + duration_s)))
+            words.append((start_s, timed_words(spoken_text(found[5]), start_s, start_s + duration_s, where)))
             count += len(words[-1][1])
             check_word_count(count, where)
     words.sort(key=lambda item: item[0])

@@ -138,7 +138,7 @@ def _lines(recording: SourceRecording) -> list[Line]:
     if recording.words and not lines:
         LOG.warning(
             "%s: its transcript has no times, so it is not known what is said in which part; the parts have no "
-            "transcript. Give labels with times",
+            "transcript. Give subtitles, or labels with times",
             recording.file,
         )
     return lines
