@@ -116,6 +116,8 @@ def divided(recording: SourceRecording, reached: Callable[[float], None], *, spl
     Memory: the whole sound (230 MB for an hour), but not the pictures. Raises InputError: it cannot be read.
     """
     scan = scan_video(recording.file, reached)
+    for note in scan.damage:
+        LOG.warning("%s: %s", recording.file, note)
     audio = read_audio(recording.file)
     levels = levels_db(audio)
     lines = _lines(recording)
