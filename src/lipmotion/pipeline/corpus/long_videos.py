@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from lipmotion.corpora.folder import VIDEO_KINDS
 from lipmotion.corpora.labels import labels_beside
-from lipmotion.corpora.labels.lines_in_time import Line, lines_in_time
 from lipmotion.corpora.source_recordings import RecordingFolder, SourceRecording
 from lipmotion.corpora.splits import LISTS
 from lipmotion.errors import InputError
+from lipmotion.pipeline.corpus.spoken_lines import spoken_lines, transcript_beside
 from lipmotion.pipeline.corpus.utterance_spans import SpokenPart, utterance_spans
 from lipmotion.speech.audio_files import read_audio
 from lipmotion.speech.pauses import levels_db, quietest_s, spoken_spans
@@ -120,12 +120,9 @@ def divided(recording: SourceRecording, reached: Callable[[float], None], *, spl
         LOG.warning("%s: %s", recording.file, note)
     audio = read_audio(recording.file)
     levels = levels_db(audio)
-    lines = _lines(recording)
-    stretches = [SpokenPart(line.start_s, line.end_s, line.label) for line in lines]
-    if not lines:
-        stretches = [SpokenPart(*span) for span in spoken_spans(levels)]
+    parts = _lines(recording) or [SpokenPart(*span) for span in spoken_spans(levels)]
     end_s = min(audio.duration_s, scan.end_s)
-    spans = utterance_spans(_within(stretches, end_s), scan.cuts_s.tolist(), end_s, partial(quietest_s, levels))
+    spans = utterance_spans(_within(parts, end_s), scan.cuts_s.tolist(), end_s, partial(quietest_s, levels))
     spans = [span for longer in spans if (span := _on_pictures(longer, scan, end_s)).duration_s > 0]
     splits = _splits(len(spans), recording.split) if splits_by_time else [recording.split] * len(spans)
     return [
@@ -134,13 +131,14 @@ def divided(recording: SourceRecording, reached: Callable[[float], None], *, spl
     ]
 
 
-def _lines(recording: SourceRecording) -> list[Line]:
+def _lines(recording: SourceRecording) -> list[SpokenPart]:
     """Return the lines in time beside a video, with a warning where there are words without times."""
-    lines = lines_in_time(recording.file)
-    if recording.words and not lines:
+    transcript = transcript_beside(recording.file)
+    lines = [] if transcript is None else spoken_lines(transcript)
+    if transcript is not None and not lines:
         LOG.warning(
             "%s: its transcript has no times, so it is not known what is said in which part; the parts have no "
-            "transcript. Give labels with times",
+            "transcript. Give one with times: subtitles, labels, or what a recogniser writes",
             recording.file,
         )
     return lines
