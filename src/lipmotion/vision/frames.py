@@ -59,6 +59,8 @@ SEEK_MARGIN_S = 1.0
 by the pictures that wait for others."""
 ROUNDING_S = 1e-4
 """A picture belongs to a span that begins this much later: times of the container are whole ticks."""
+SHORT_S = 0.5
+"""Pictures that end more than this before the stated duration are reported."""
 LEAST_SIDE, LONGEST_SIDE = 16, 8192
 """Bounds of a picture's width and height, px: a smaller one shows no face, a larger one fills the memory."""
 
@@ -101,6 +103,22 @@ def open_video(path: Path, span: VideoSpan = WHOLE, *, longest_px: int | None = 
             _frames(container, stream, path, span, longest_px, damage)
         ) as frames:  # decoding from a closed container would crash
             yield OpenVideo(frames, tuple(rates), stated_s, damage)
+
+
+def damage_notes(video: OpenVideo, times_s: NDArray[np.float64], rate_hz: float) -> list[str]:
+    """Return notes on pictures that cannot be decoded or are missing at the end; ``video`` was read to its end.
+
+    times_s : times of the pictures that were decoded
+    rate_hz : nominal frame rate
+    """
+    notes = []
+    end_s = float(times_s[-1]) + 1 / rate_hz
+    if video.damage:
+        expected = round(max(video.stated_s, end_s) * rate_hz)
+        notes.append(f"damaged: {len(times_s)} of about {expected} frames can be decoded")
+    if end_s < video.stated_s - SHORT_S:
+        notes.append(f"cut short: pictures up to {end_s:.2f} s of {video.stated_s:.2f} s")
+    return notes
 
 
 def _frames(

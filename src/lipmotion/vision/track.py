@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError
 from lipmotion.types import Channel, Motion, Track
 from lipmotion.vision.face_follower import FaceFollower
-from lipmotion.vision.frames import WHOLE, OpenVideo, VideoSpan, open_video
+from lipmotion.vision.frames import WHOLE, OpenVideo, VideoSpan, damage_notes, open_video
 from lipmotion.vision.image_similarity import mouth_thumbnail, occluded_mouths
 from lipmotion.vision.landmarks import DISTANCES, EYE_CORNERS, JAW_POINTS, LIP_POINTS, TRACKED_POINTS
 from lipmotion.vision.mouth import eyes_to_image, face_to_image, mouth_crop
@@ -34,8 +34,6 @@ USABLE = 0.5
 SMALL_EYES_PX = 35.0
 """A smaller median distance between the eyes is reported. GRID clips made small and tracked have a correlation of the
 opening with the clip as it was of 0.99 at 65 px, 0.98 at 40, 0.90 at 25."""
-SHORT_S = 0.5
-"""Pictures that end more than this before the stated duration are reported."""
 STRETCH_LIMIT = 2.0
 """A clip is refused when its time stamps span more than this many times the frames that it holds."""
 
@@ -102,7 +100,7 @@ def track(
     times_s = np.array(tracked.times_s)
     rate_hz = nominal_rate_hz(times_s, video.stated_rates_hz)
     notes = (
-        *_damage(video, times_s, rate_hz),
+        *damage_notes(video, times_s, rate_hz),
         *(f"cut at {times_s[index]:.2f} s" for index in follower.cuts()),
         *([f"another face, or one that is not recognised, in {others} frames"] if others else []),
         *([f"the mouth is covered, or the picture damaged, in {covered} frames"] if covered else []),
@@ -122,18 +120,6 @@ def _mouths(path: Path, span: VideoSpan, tracked: _TrackedFrames) -> NDArray[np.
     with open_video(path, span) as video:
         shown = zip(tracked.seen, video.frames, strict=False)
         return np.stack([mouth_crop(frame.image, next(maps)) for seen, frame in shown if seen])
-
-
-def _damage(video: OpenVideo, times_s: Array, rate_hz: float) -> list[str]:
-    """Return notes on pictures that cannot be decoded or are missing at the end."""
-    notes = []
-    end_s = float(times_s[-1]) + 1 / rate_hz
-    if video.damage:
-        expected = round(max(video.stated_s, end_s) * rate_hz)
-        notes.append(f"damaged: {len(times_s)} of about {expected} frames can be decoded")
-    if end_s < video.stated_s - SHORT_S:
-        notes.append(f"cut short: pictures up to {end_s:.2f} s of {video.stated_s:.2f} s")
-    return notes
 
 
 def _smallness(tracked: _TrackedFrames) -> list[str]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.vision.face_follower import FaceFollower
-from lipmotion.vision.frames import open_video
+from lipmotion.vision.frames import damage_notes, open_video
 from lipmotion.vision.image_similarity import is_cut, scene_thumbnail
 from lipmotion.vision.timing import check_rate, nominal_rate_hz
 
@@ -31,12 +31,14 @@ class VideoScan:
     cuts_s  : the times of those before which the camera changes, s
     rate_hz : nominal frame rate
     person  : thumbnails of the face that is seen most, where other people are seen too; else none
+    damage  : remarks on pictures that cannot be decoded, or are missing at the end
     """
 
     times_s: NDArray[np.float64]
     cuts_s: NDArray[np.float64]
     rate_hz: float
     person: tuple[NDArray[np.float64], ...] = ()
+    damage: tuple[str, ...] = ()
 
     @property
     def end_s(self) -> float:
@@ -66,8 +68,9 @@ def scan_video(path: Path, reached: Callable[[float], None] = lambda _: None) ->
             if len(times_s) % REPORT_STEP == 0 and video.stated_s:
                 reached(min(frame.time_s / video.stated_s, 1.0))
         rate_hz = nominal_rate_hz(np.array(times_s), video.stated_rates_hz)
+        damage = tuple(damage_notes(video, np.array(times_s), rate_hz))
     check_rate(rate_hz, path)
-    return VideoScan(np.array(times_s), np.array(cuts_s), rate_hz, tuple(_person(follower)))
+    return VideoScan(np.array(times_s), np.array(cuts_s), rate_hz, tuple(_person(follower)), damage)
 
 
 def _person(follower: FaceFollower) -> list[NDArray[np.float64]]:

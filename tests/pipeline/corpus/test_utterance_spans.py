@@ -12,7 +12,7 @@ from lipmotion.pipeline.corpus.utterance_spans import (
     LONGEST_S,
     MARGIN_S,
     SHORTEST_S,
-    Stretch,
+    SpokenPart,
     utterance_spans,
 )
 
@@ -21,57 +21,59 @@ def middle(low_s: float, high_s: float) -> float:
     return (low_s + high_s) / 2
 
 
-def spans(stretches: list[Stretch], cuts_s: list[float] | None = None, duration_s: float = 100.0) -> list[Stretch]:
+def spans(
+    stretches: list[SpokenPart], cuts_s: list[float] | None = None, duration_s: float = 100.0
+) -> list[SpokenPart]:
     return utterance_spans(stretches, cuts_s or [], duration_s, middle)
 
 
-def edges(found: list[Stretch]) -> list[tuple[float, float]]:
+def edges(found: list[SpokenPart]) -> list[tuple[float, float]]:
     return [(round(part.start_s, 6), round(part.end_s, 6)) for part in found]
 
 
 def test_a_long_pause_divides_and_is_left_out():
-    assert edges(spans([Stretch(1, 5), Stretch(8, 12)])) == [(0.7, 5.3), (7.7, 12.3)]
+    assert edges(spans([SpokenPart(1, 5), SpokenPart(8, 12)])) == [(0.7, 5.3), (7.7, 12.3)]
 
 
 def test_short_pauses_do_not_divide():
-    assert edges(spans([Stretch(1, 3), Stretch(3.4, 6), Stretch(6.5, 9)])) == [(0.7, 9.3)]
+    assert edges(spans([SpokenPart(1, 3), SpokenPart(3.4, 6), SpokenPart(6.5, 9)])) == [(0.7, 9.3)]
 
 
 def test_too_long_ones_are_divided_at_the_longest_pause():
-    parts = [Stretch(1, 5), Stretch(5.3, 9), Stretch(9.8, 13), Stretch(13.3, 16)]
+    parts = [SpokenPart(1, 5), SpokenPart(5.3, 9), SpokenPart(9.8, 13), SpokenPart(13.3, 16)]
     assert edges(spans(parts)) == [(0.7, 9.3), (9.5, 16.3)]
 
 
 def test_without_any_pause_it_is_divided_where_it_is_quietest():
-    assert edges(spans([Stretch(0, 30)], duration_s=30.0)) == [(0, 7.5), (7.5, 15), (15, 22.5), (22.5, 30)]
+    assert edges(spans([SpokenPart(0, 30)], duration_s=30.0)) == [(0, 7.5), (7.5, 15), (15, 22.5), (22.5, 30)]
 
 
 def test_a_cut_divides_even_in_speech():
-    assert edges(spans([Stretch(1, 9)], [4.0])) == [(0.7, 4.0), (4.0, 9.3)]
+    assert edges(spans([SpokenPart(1, 9)], [4.0])) == [(0.7, 4.0), (4.0, 9.3)]
 
 
 def test_a_cut_in_a_pause_bounds_both_sides():
-    assert edges(spans([Stretch(1, 4), Stretch(4.4, 8)], [4.1])) == [(0.7, 4.1), (4.1, 8.3)]
+    assert edges(spans([SpokenPart(1, 4), SpokenPart(4.4, 8)], [4.1])) == [(0.7, 4.1), (4.1, 8.3)]
 
 
 def test_what_is_left_between_two_cuts_may_be_too_short():
-    assert edges(spans([Stretch(1, 9)], [4.0, 4.0 + LEAST_S / 2])) == [(0.7, 4.0), (4.4, 9.3)]
+    assert edges(spans([SpokenPart(1, 9)], [4.0, 4.0 + LEAST_S / 2])) == [(0.7, 4.0), (4.4, 9.3)]
 
 
 def test_short_ones_join_a_neighbour_within_a_second():
-    assert edges(spans([Stretch(1, 2), Stretch(2.9, 6)])) == [(0.7, 6.3)]
-    assert edges(spans([Stretch(1, 2), Stretch(3.5, 6.5)])) == [(0.7, 2.3), (3.2, 6.8)]
+    assert edges(spans([SpokenPart(1, 2), SpokenPart(2.9, 6)])) == [(0.7, 6.3)]
+    assert edges(spans([SpokenPart(1, 2), SpokenPart(3.5, 6.5)])) == [(0.7, 2.3), (3.2, 6.8)]
 
 
 def test_lines_keep_their_words_and_are_never_divided():
-    lines = [Stretch(1, 7, ("one", "two")), Stretch(7, 15, ("three",)), Stretch(15.2, 17, ("four",))]
+    lines = [SpokenPart(1, 7, ("one", "two")), SpokenPart(7, 15, ("three",)), SpokenPart(15.2, 17, ("four",))]
     found = spans(lines, [4.0, 10.0])
     assert [part.words for part in found] == [("one", "two"), ("three", "four")]
     assert edges(found) == [(0.7, 7.0), (7.0, 17.3)]
 
 
 def test_lines_that_overlap_end_where_the_next_begins():
-    found = spans([Stretch(1, 8, ("a",)), Stretch(6, 16, ("b",))])
+    found = spans([SpokenPart(1, 8, ("a",)), SpokenPart(6, 16, ("b",))])
     assert [part.words for part in found] == [("a",), ("b",)]
     assert edges(found) == [(0.7, 6.0), (6.0, 16.3)]
 
@@ -84,7 +86,7 @@ def test_nothing_said_is_nothing():
 def test_any_recording(seed: int):
     draw = np.random.default_rng(seed)
     times_s = np.cumsum(draw.choice([0.25, 0.6, 1.5, 4.0, 9.0], size=60))
-    stretches = [Stretch(*pair) for pair in zip(times_s[::2].tolist(), times_s[1::2].tolist(), strict=True)]
+    stretches = [SpokenPart(*pair) for pair in zip(times_s[::2].tolist(), times_s[1::2].tolist(), strict=True)]
     duration_s = float(times_s[-1]) + draw.uniform(0, 1)
     cuts_s = sorted(draw.uniform(0, duration_s, 8).tolist())
     found = spans(stretches, cuts_s, duration_s)

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from lipmotion.corpora.folder import VIDEO_KINDS
 from lipmotion.corpora.labels import labels_beside
-from lipmotion.corpora.labels.lines_in_time import Line, lines_in_time
 from lipmotion.corpora.source_recordings import RecordingFolder, SourceRecording
 from lipmotion.corpora.splits import LISTS
 from lipmotion.errors import InputError
-from lipmotion.pipeline.corpus.utterance_spans import Stretch, utterance_spans
+from lipmotion.pipeline.corpus.spoken_lines import spoken_lines, transcript_beside
+from lipmotion.pipeline.corpus.utterance_spans import SpokenPart, utterance_spans
 from lipmotion.speech.audio_files import read_audio
 from lipmotion.speech.pauses import levels_db, quietest_s, spoken_spans
 from lipmotion.storage.media import open_media, stated_duration_s, video_streams
@@ -116,14 +116,13 @@ def divided(recording: SourceRecording, reached: Callable[[float], None], *, spl
     Memory: the whole sound (230 MB for an hour), but not the pictures. Raises InputError: it cannot be read.
     """
     scan = scan_video(recording.file, reached)
+    for note in scan.damage:
+        LOG.warning("%s: %s", recording.file, note)
     audio = read_audio(recording.file)
     levels = levels_db(audio)
-    lines = _lines(recording)
-    stretches = [Stretch(line.start_s, line.end_s, line.label) for line in lines]
-    if not lines:
-        stretches = [Stretch(*span) for span in spoken_spans(levels)]
+    parts = _lines(recording) or [SpokenPart(*span) for span in spoken_spans(levels)]
     end_s = min(audio.duration_s, scan.end_s)
-    spans = utterance_spans(_within(stretches, end_s), scan.cuts_s.tolist(), end_s, partial(quietest_s, levels))
+    spans = utterance_spans(_within(parts, end_s), scan.cuts_s.tolist(), end_s, partial(quietest_s, levels))
     spans = [span for longer in spans if (span := _on_pictures(longer, scan, end_s)).duration_s > 0]
     splits = _splits(len(spans), recording.split) if splits_by_time else [recording.split] * len(spans)
     return [
@@ -132,23 +131,24 @@ def divided(recording: SourceRecording, reached: Callable[[float], None], *, spl
     ]
 
 
-def _lines(recording: SourceRecording) -> list[Line]:
+def _lines(recording: SourceRecording) -> list[SpokenPart]:
     """Return the lines in time beside a video, with a warning where there are words without times."""
-    lines = lines_in_time(recording.file)
-    if recording.words and not lines:
+    transcript = transcript_beside(recording.file)
+    lines = [] if transcript is None else spoken_lines(transcript)
+    if transcript is not None and not lines:
         LOG.warning(
             "%s: its transcript has no times, so it is not known what is said in which part; the parts have no "
-            "transcript. Give subtitles, or labels with times",
+            "transcript. Give one with times: subtitles, labels, or what a recogniser writes",
             recording.file,
         )
     return lines
 
 
-def _within(stretches: Sequence[Stretch], end_s: float) -> list[Stretch]:
+def _within(stretches: Sequence[SpokenPart], end_s: float) -> list[SpokenPart]:
     return [replace(part, end_s=min(part.end_s, end_s)) for part in stretches if part.start_s < end_s]
 
 
-def _on_pictures(span: Stretch, scan: VideoScan, end_s: float) -> Stretch:
+def _on_pictures(span: SpokenPart, scan: VideoScan, end_s: float) -> SpokenPart:
     """Return a span that begins and ends at the times of pictures, none later than before; the last at the very end."""
     first, last = np.searchsorted(scan.times_s, [span.start_s + 1e-6, span.end_s + 1e-6], side="right") - 1
     is_last = span.end_s >= end_s - 1e-6
@@ -165,7 +165,7 @@ def _splits(count: int, split: str) -> list[str]:
     return [split] * (count - 2 * held_out) + ["val"] * held_out + ["test"] * held_out
 
 
-def _recording_of(part: Stretch, recording: SourceRecording, split: str) -> SourceRecording:
+def _recording_of(part: SpokenPart, recording: SourceRecording, split: str) -> SourceRecording:
     minutes, seconds = divmod(round(part.start_s, 2), 60)
     name = f"{recording.name}-{int(minutes) // 60:02}h{int(minutes) % 60:02}m{seconds:05.2f}s"
     return replace(
@@ -173,6 +173,6 @@ def _recording_of(part: Stretch, recording: SourceRecording, split: str) -> Sour
     )
 
 
-def _sound(audio: Audio, part: Stretch) -> Audio:
+def _sound(audio: Audio, part: SpokenPart) -> Audio:
     first, last = (round(time_s * audio.rate_hz) for time_s in (part.start_s, part.end_s))
     return Audio(audio.samples[first:last], audio.rate_hz)

@@ -23,7 +23,7 @@ Quietest = Callable[[float, float], float]
 
 
 @dataclass(frozen=True)
-class Stretch:
+class SpokenPart:
     """A part of a recording that is not divided by a pause: between two silences, or a line of a transcript.
 
     start_s, end_s : seconds
@@ -41,8 +41,8 @@ class Stretch:
 
 
 def utterance_spans(
-    stretches: Sequence[Stretch], cuts_s: Sequence[float], duration_s: float, quietest: Quietest
-) -> list[Stretch]:
+    stretches: Sequence[SpokenPart], cuts_s: Sequence[float], duration_s: float, quietest: Quietest
+) -> list[SpokenPart]:
     """Return the utterances of a recording, in order, without overlap.
 
     stretches  : parts with speech, in order; those with words are never divided
@@ -53,7 +53,7 @@ def utterance_spans(
     """
     parts = [part for stretch in _in_order(stretches) for part in _divided_at_cuts(stretch, cuts_s)]
     parts = [piece for part in parts for piece in _divided_in_speech(part, quietest)]
-    groups: list[list[Stretch]] = []
+    groups: list[list[SpokenPart]] = []
     for part in parts:
         if groups and not _is_border(groups[-1][-1], part, cuts_s):
             groups[-1].append(part)
@@ -64,9 +64,9 @@ def utterance_spans(
     return _with_margins(wanted, cuts_s, duration_s, quietest)
 
 
-def _in_order(stretches: Sequence[Stretch]) -> list[Stretch]:
+def _in_order(stretches: Sequence[SpokenPart]) -> list[SpokenPart]:
     """Return stretches without overlap: lines of a transcript may be shown together, or a little too long."""
-    ordered: list[Stretch] = []
+    ordered: list[SpokenPart] = []
     for stretch in sorted(stretches, key=lambda stretch: stretch.start_s):
         if ordered and stretch.start_s < ordered[-1].end_s:
             border_s = max(ordered[-1].start_s, stretch.start_s)
@@ -75,16 +75,16 @@ def _in_order(stretches: Sequence[Stretch]) -> list[Stretch]:
     return ordered
 
 
-def _divided_at_cuts(stretch: Stretch, cuts_s: Sequence[float]) -> list[Stretch]:
+def _divided_at_cuts(stretch: SpokenPart, cuts_s: Sequence[float]) -> list[SpokenPart]:
     """Return the parts of a stretch between cuts; all of it if it has words."""
     if stretch.words is not None:
         return [stretch]
     inside = [t for t in cuts_s if stretch.start_s + ROUNDING_S < t < stretch.end_s - ROUNDING_S]
     edges = [stretch.start_s, *inside, stretch.end_s]
-    return [Stretch(*pair) for pair in pairwise(edges)]
+    return [SpokenPart(*pair) for pair in pairwise(edges)]
 
 
-def _divided_in_speech(stretch: Stretch, quietest: Quietest) -> list[Stretch]:
+def _divided_in_speech(stretch: SpokenPart, quietest: Quietest) -> list[SpokenPart]:
     """Return the parts of a stretch that is too long, divided where it is quietest in its middle third."""
     if stretch.words is not None or stretch.duration_s <= LONGEST_S:
         return [stretch]
@@ -94,21 +94,21 @@ def _divided_in_speech(stretch: Stretch, quietest: Quietest) -> list[Stretch]:
     return [part for half in halves for part in _divided_in_speech(half, quietest)]
 
 
-def _is_border(before: Stretch, after: Stretch, cuts_s: Sequence[float]) -> bool:
+def _is_border(before: SpokenPart, after: SpokenPart, cuts_s: Sequence[float]) -> bool:
     return after.start_s - before.end_s > LONGEST_PAUSE_S or _is_cut_between(before, after, cuts_s)
 
 
-def _is_cut_between(before: Stretch, after: Stretch, cuts_s: Sequence[float]) -> bool:
+def _is_cut_between(before: SpokenPart, after: SpokenPart, cuts_s: Sequence[float]) -> bool:
     following = bisect_left(cuts_s, before.end_s - ROUNDING_S)
     return following < len(cuts_s) and cuts_s[following] <= after.start_s + ROUNDING_S
 
 
-def _joined(parts: Sequence[Stretch]) -> Stretch:
+def _joined(parts: Sequence[SpokenPart]) -> SpokenPart:
     words = [word for part in parts for word in part.words or ()]
-    return Stretch(parts[0].start_s, parts[-1].end_s, tuple(words) if parts[0].words is not None else None)
+    return SpokenPart(parts[0].start_s, parts[-1].end_s, tuple(words) if parts[0].words is not None else None)
 
 
-def _divided(group: list[Stretch]) -> list[list[Stretch]]:
+def _divided(group: list[SpokenPart]) -> list[list[SpokenPart]]:
     """Return the parts of a group, none longer than ``LONGEST_S`` unless it is one stretch."""
     if len(group) < 2 or group[-1].end_s - group[0].start_s <= LONGEST_S:
         return [group]
@@ -123,9 +123,9 @@ def _divided(group: list[Stretch]) -> list[list[Stretch]]:
     return _divided(group[:at]) + _divided(group[at:])
 
 
-def _without_short_ones(pieces: list[Stretch], cuts_s: Sequence[float]) -> list[Stretch]:
+def _without_short_ones(pieces: list[SpokenPart], cuts_s: Sequence[float]) -> list[SpokenPart]:
     """Return the pieces, with those that are too short joined to a neighbour where a short pause is between."""
-    joined: list[Stretch] = []
+    joined: list[SpokenPart] = []
     for piece in pieces:
         before = joined[-1] if joined else None
         if (
@@ -142,10 +142,10 @@ def _without_short_ones(pieces: list[Stretch], cuts_s: Sequence[float]) -> list[
 
 
 def _with_margins(
-    pieces: list[Stretch], cuts_s: Sequence[float], duration_s: float, quietest: Quietest
-) -> list[Stretch]:
+    pieces: list[SpokenPart], cuts_s: Sequence[float], duration_s: float, quietest: Quietest
+) -> list[SpokenPart]:
     """Return the pieces with silence at both ends, not beyond a neighbour, a cut or the recording."""
-    result: list[Stretch] = []
+    result: list[SpokenPart] = []
     for n, piece in enumerate(pieces):
         border_s = result[-1].end_s if result else 0.0
         end_s = min(piece.end_s + MARGIN_S, duration_s)
