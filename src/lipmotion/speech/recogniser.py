@@ -25,7 +25,7 @@ from lipmotion.kernels.windowed_viterbi import Windows
 from lipmotion.speech.adaptation import Adaptation
 from lipmotion.speech.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.anchors import Anchors, align_within, least_frames
-from lipmotion.speech.combined_phones import NOISES, CombinedPhones, combine_phones, combined_log_likelihoods
+from lipmotion.speech.combined_phones import CombinedPhones, combine_phones, combined_log_likelihoods
 from lipmotion.speech.mfcc import LOG_ENERGY
 from lipmotion.speech.recognition import HeardWord, LabelledFrames, Recognition, recognition_of, spliced
 from lipmotion.speech.speaker_similarity import SpeakerSimilarity, speaker_similarity
