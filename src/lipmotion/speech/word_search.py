@@ -27,6 +27,8 @@ WORD_BONUS = 2.0
 """Where words are not believed, their phones are still more probable than others, by so many nats a frame."""
 HALF_FIT, FIT_SCALE = -0.9, 0.6
 """At the first fit every other word is right; the odds grow by a factor of e for every further so many nats."""
+SHORT_FRAMES = 3000
+"""The words of so little sound are recognised in this process: to start another one would take as long."""
 DICTIONARY = Lexicon()
 """Words that were recognised are in the dictionary."""
 
@@ -59,6 +61,7 @@ class WordSearch:
         Raises MissingDependencyError: as ``words_in``.
         """
         stretches = stretches_of_sound(audio.log_energy)
+        each = each if sum(stretch.end - stretch.first for stretch in stretches) > SHORT_FRAMES else map
         found = each(words_in, (stretch_samples(audio, stretch) for stretch in stretches))
         parts, heard = list[LabelledStretch](), list[HeardWord]()
         for stretch, words in zip(stretches, found, strict=True):
