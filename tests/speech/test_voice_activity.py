@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -29,7 +31,7 @@ def test_sound_has_its_stretch_with_a_margin() -> None:
 
 
 def test_a_margin_ends_with_the_recording() -> None:
-    (found,) = stretches_of_sound(energy(400, (10, 390)))
+    (found,) = stretches_of_sound(energy(400, (10, 200), (230, 390)))
     assert found == Stretch(0, 400)
 
 
@@ -48,10 +50,10 @@ def test_constant_energy_holds_no_stretch(level: float) -> None:
 
 
 def test_a_long_stretch_is_cut_where_it_is_quietest() -> None:
-    values = energy(5000, (100, 4900))
-    values[1500:1530] = -1.0
+    values = energy(5000, (400, 4600))
+    values[1900:1930] = -1.0
     first, second, *_ = stretches_of_sound(values)
-    assert 1500 <= first.end <= 1530
+    assert 1900 <= first.end <= 1930
     assert second.first == first.end
 
 
@@ -65,7 +67,7 @@ def test_stretches_are_in_order_bounded_and_hold_all_sound(seed: int) -> None:
     found = stretches_of_sound(values)
     assert all(0 <= stretch.first < stretch.end <= frames for stretch in found)
     assert all(stretch.end - stretch.first <= LONGEST_FRAMES for stretch in found)
-    assert all(before.end <= after.first for before, after in zip(found, found[1:], strict=False))
+    assert all(before.end <= after.first for before, after in pairwise(found))
     inside = np.zeros(frames, bool)
     for stretch in found:
         inside[slice(*stretch)] = True
