@@ -34,9 +34,9 @@ def main() -> None:
     for name in corpus.names(options.split):
         utterance = corpus.utterance(name)
         features = type(utterance.features)(np.asarray(utterance.features.values), utterance.features.duration_s)
-        units = phones.recognise(utterance.audio, features)
+        found = phones.recognition(utterance.audio, features)
         given = model.engine, model.learned, utterance.audio, features, phones
-        recordings.append(recognised_speech(*given, lambda units=units: units))
+        recordings.append(recognised_speech(*given, lambda found=found: found))
     seconds = sum(speech.features.duration_s for speech in recordings)
     times_s = []
     for _ in range(options.rounds + 1):

@@ -12,6 +12,7 @@ from lipmotion.errors import AlignmentError, InputError
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.speech import recogniser as module
+from lipmotion.speech import word_search
 from lipmotion.speech.audio_files import read_audio
 from lipmotion.speech.combined_phones import combined_log_likelihoods
 from lipmotion.speech.formant_synthesiser import synthesise
@@ -80,7 +81,7 @@ def test_frame_n_reaches_from_half_a_frame_before_to_half_a_frame_after(
     hmm: UnitHmm, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     bounds = np.array([0, 10, 12, 40, 60, 101])
-    monkeypatch.setattr(module, "decode_units", lambda *_: (("sil", "p", "sil", "aa", "sil"), bounds))
+    monkeypatch.setattr(word_search, "units_of_path", lambda *_: (("sil", "p", "sil", "aa", "sil"), bounds))
     found = recognise(hmm, Audio(np.sin(np.arange(16_100)).astype(np.float32), 16_000))
     assert [span.start_s for span in found] == pytest.approx([0, 0.095, 0.115, 0.395, 0.595])
     assert covers(found, 16_100 / 16_000)
@@ -188,7 +189,7 @@ def test_every_kind_gives_phones_from_start_to_end(hmm: UnitHmm, sentences: list
 
 
 def test_an_unknown_kind() -> None:
-    with pytest.raises(InputError, match="unknown recogniser 'best'; required one of: auto, own, general"):
+    with pytest.raises(InputError, match="unknown recogniser 'best'; required one of: auto, words, fast, own, general"):
         Recogniser(load_model().phones, "best")
 
 
@@ -234,7 +235,7 @@ def test_own_models_that_learned_enough_align_too(
 def test_noises_are_silence_and_silences_are_one(hmm: UnitHmm, monkeypatch: pytest.MonkeyPatch) -> None:
     bounds = np.array([0, 10, 30, 40, 60, 80, 101])
     labels = ("+spn+", "sil", "aa", "+nsn+", "sil", "+spn+")
-    monkeypatch.setattr(module, "decode_units", lambda *_: (labels, bounds))
+    monkeypatch.setattr(word_search, "units_of_path", lambda *_: (labels, bounds))
     found = recognise(hmm, Audio(np.sin(np.arange(16_100)).astype(np.float32), 16_000), "general")
     assert phones(found) == ["sil", "aa", "sil"]
     assert [span.start_s for span in found] == pytest.approx([0, 0.295, 0.395])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
+from lipmotion.cli.options import add_workers, worker_count
 from lipmotion.cli.output import print_line
 from lipmotion.cli.paths import add_output
 from lipmotion.cli.speech import add_speech_arguments, request_and_model
@@ -22,6 +23,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     posteriors = "draw the posterior probabilities of the chains' units over time (coupled models)"
     add_output(parser, "--posteriors", metavar="FILE.png", help=posteriors)
     parser.add_argument("--face", default="portrait", metavar="NAME", help="face that videos show (default: portrait)")
+    add_workers(parser)
     parser.set_defaults(run=run)
 
 
@@ -39,7 +41,7 @@ def run(options: argparse.Namespace) -> None:
         result, posteriors = animate_with_posteriors(request, model=model)
         write_posteriors(options.posteriors, result, posteriors)
     else:
-        result = animate(request, model=model)
+        result = animate(request, model=model, workers=worker_count(options))
     write(
         result,
         options.output,

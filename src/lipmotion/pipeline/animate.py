@@ -13,6 +13,7 @@ from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.request import SpeechInput, request_of
 from lipmotion.pipeline.understand import understand
+from lipmotion.pipeline.workers import map_in_processes
 from lipmotion.speech.audio_files import read_audio
 from lipmotion.storage.files import as_text, check_distinct, check_target
 from lipmotion.types import Constraints, Generation, TimedTranscript
@@ -31,6 +32,7 @@ def animate(
     model: Model | str | Path | None = None,
     transcript: str | Path | TimedTranscript | None = None,
     constraints: Constraints | None = None,
+    workers: int = 1,
 ) -> Generation:
     """Return lip motion for speech: values of all channels at 100 Hz, variances, phones in time, and states.
 
@@ -38,6 +40,8 @@ def animate(
     model       : from ``load_model``, or the path of a model file; None: the shipped model
     transcript  : the spoken words, or a Path of a file with them; the same as a ``SpeechRequest`` with this transcript
     constraints : values that the motion must take exactly
+    workers     : number of processes that recognise the words of a long recording. With more than one, a script must be
+                  guarded by ``if __name__ == "__main__":``
     Raises InputError: the recording, the transcript or a constraint is not usable.
     Raises AlignmentError: the transcript cannot be aligned with the recording.
     Source: Hofer, Yamagishi & Shimodaira 2008 (``engines.trajectory``, the engine of the shipped model).
@@ -51,7 +55,8 @@ def animate(
     'please'
     """
     chosen = model if isinstance(model, Model) else load_model(model)
-    return chosen.engine.generate(chosen.learned, understand(chosen, request_of(speech, transcript)), constraints)
+    understood = understand(chosen, request_of(speech, transcript), map_in_processes(workers))
+    return chosen.engine.generate(chosen.learned, understood, constraints)
 
 
 def write(

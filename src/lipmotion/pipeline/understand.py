@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
-from dataclasses import replace
-from functools import partial
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +23,7 @@ from lipmotion.speech.f0 import log_f0
 from lipmotion.speech.installed_recognisers import INSTALLED_RECOGNISERS, recognise_words
 from lipmotion.speech.recogniser import Recogniser, cached_recogniser
 from lipmotion.speech.recognition import Recognition
-from lipmotion.types import Audio, Features, Speech, TimedTranscript, Timeline, Unit
+from lipmotion.types import Audio, Features, ParallelMap, Speech, TimedTranscript, Timeline, Unit
 from lipmotion.units import Lexicon, check_phones, check_text, words_of
 
 LATE_S = 0.1
@@ -32,17 +31,39 @@ LATE_S = 0.1
 LOG = logging.getLogger("lipmotion")
 
 
-def understand(model: Model, request: SpeechRequest) -> Speech:
+@dataclass(frozen=True, eq=False)
+class UnderstoodSpeech:
+    """The speech of a recording as input of an engine, and what was recognised in it.
+
+    recognition : None where words or phones were given, or the engine's own model recognised the speaker
+    """
+
+    speech: Speech
+    recognition: Recognition | None
+
+
+def understand(model: Model, request: SpeechRequest, each: ParallelMap = map) -> Speech:
     """Return the speech of a request as input of a model's engine: features, phones in time, and what else it needs.
 
+    each : applies a function to many items, perhaps in several processes
     Raises InputError: the recording, the transcript or the units are not usable, or there is no such recogniser.
     Raises AlignmentError: the transcript cannot be aligned with the recording.
     """
-    return with_prior(model.prior, _understood(model, request))
+    return understood_speech(model, request, each).speech
 
 
-def _understood(model: Model, request: SpeechRequest) -> Speech:
-    """Return the speech of a request, without what the model that this one stands on makes of it."""
+def understood_speech(model: Model, request: SpeechRequest, each: ParallelMap = map) -> UnderstoodSpeech:
+    """Return the speech of a request as ``understand`` does, with what was recognised."""
+    found: list[Recognition] = []
+    speech = _understood(model, request, each, found)
+    return UnderstoodSpeech(with_prior(model.prior, speech), found[0] if found else None)
+
+
+def _understood(model: Model, request: SpeechRequest, each: ParallelMap, found: list[Recognition]) -> Speech:
+    """Return the speech of a request, without what the model that this one stands on makes of it.
+
+    found : what is recognised is added
+    """
     audio = analysed(audio_of(request))
     installed = request.recogniser in INSTALLED_RECOGNISERS
     phones = cached_recogniser(model.phones, "auto" if installed else request.recogniser, model.adaptation)
@@ -56,7 +77,11 @@ def _understood(model: Model, request: SpeechRequest) -> Speech:
     if words is not None:
         units = transcribe(phones, audio, features, words, request.lexicon or Lexicon())
         return speech_of(model.engine, audio, features, units)
-    recognise = partial(phones.recognition, audio, features)
+
+    def recognise() -> Recognition:
+        found.append(phones.recognition(audio, features, each))
+        return found[-1]
+
     return recognised_speech(model.engine, model.learned, audio, features, phones, recognise)
 
 

@@ -13,13 +13,14 @@ import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from itertools import islice
+from itertools import chain, islice
 from multiprocessing import connection as pipes
 from multiprocessing.process import BaseProcess
 from typing import Any, TypeVar
 
 from lipmotion.errors import CorpusError
 from lipmotion.kernels.threads import one_thread
+from lipmotion.types import ParallelMap
 
 ItemT = TypeVar("ItemT")
 ResultT = TypeVar("ResultT")
@@ -83,6 +84,18 @@ def worker_pool(count: int) -> Iterator[Workers]:
             yield Workers(())
             return
         yield Workers([stack.enter_context(_worker()) for _ in range(count)])
+
+
+def map_in_processes(count: int) -> ParallelMap:
+    """Return a map whose calls start up to ``count`` processes, and end them; of one item or none, no process."""
+
+    def each(function: Callable[[ItemT], ResultT], items: Iterable[ItemT], /) -> Iterator[ResultT]:
+        waiting = iter(items)
+        first = list(islice(waiting, count))
+        with worker_pool(len(first)) as team:
+            yield from team.ordered_map(function, chain(first, waiting))
+
+    return each
 
 
 @contextmanager

@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError, InputError
 from lipmotion.hmm.align import PlacedWord, SpokenWord, align_units, place_words, unit_windows
-from lipmotion.hmm.decode import UnitLoop, unit_loop, units_of_path
+from lipmotion.hmm.decode import UnitLoop, unit_loop
 from lipmotion.hmm.log_likelihoods import (
     LogLikelihoods,
-    log_likelihoods_from,
     log_likelihoods_of,
     penalise_silence,
     penalise_speech,
@@ -26,22 +25,11 @@ from lipmotion.kernels.windowed_viterbi import Windows
 from lipmotion.speech.adaptation import Adaptation
 from lipmotion.speech.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.anchors import Anchors, align_within, least_frames
-from lipmotion.speech.combined_phones import NOISES, CombinedPhones, combine_phones, combined_log_likelihoods
-from lipmotion.speech.heard_words import align_heard_words, phone_bonus
+from lipmotion.speech.combined_phones import CombinedPhones, combine_phones, combined_log_likelihoods
 from lipmotion.speech.mfcc import LOG_ENERGY
-from lipmotion.speech.recognition import (
-    HeardWord,
-    LabelledFrames,
-    LabelledStretch,
-    Recognition,
-    confidence_of,
-    labels_of_words,
-    recognition_of,
-    spliced,
-)
+from lipmotion.speech.recognition import HeardWord, LabelledFrames, Recognition, recognition_of, spliced
 from lipmotion.speech.speaker_similarity import SpeakerSimilarity, speaker_similarity
-from lipmotion.speech.voice_activity import stretches_of_sound
-from lipmotion.speech.word_decoder import stretch_samples, words_in
+from lipmotion.speech.word_search import WordSearch, free_labels
 from lipmotion.types import FRAME_RATE_HZ, Audio, Features, ParallelMap, Span, Timeline, Unit
 from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent, most_similar_phone
 
@@ -50,10 +38,6 @@ RECOGNISER_KINDS = ("auto", "words", "fast", "own", "general")
 ``fast``: both, the own ones weighted by how similar the speaker is to those of their training data. ``words``: English
 words are recognised and aligned. ``auto``: as ``fast``, and words where they fit."""
 USING_WORDS, WEIGHTED = ("auto", "words"), ("auto", "words", "fast")
-WORD_FIT, STRETCH_FIT = -2.0, -1.5
-"""Words are believed from the first fit on, all words of a stretch from the second one on (``AlignedWords.fits``)."""
-WORD_BONUS = 2.0
-"""Where words are not believed, their phones are still more probable than others, by so many nats a frame."""
 OWN_VOICE_SCORE, SMALL_PERPLEXITY = -3.0, 9.0
 """A voice with the first speaker similarity score or more is that of the own models; if the perplexity of their bigram
 is less than the second one, their corpus has few words, which no language model of English expects. Then the phones
@@ -66,8 +50,6 @@ FEW_GAUSSIANS = 2
 """Own models of so few Gaussians a state were trained on less than two minutes: forced alignment uses the general ones
 alone then. With 20 clips of GRID that raises ACC of opening on the validation list from 0.767 to 0.786 (audio only),
 from 0.806 to 0.841 (transcripts)."""
-DICTIONARY = Lexicon()
-"""Words that were recognised are in the dictionary."""
 ENERGY_SMOOTHING_FRAMES = 11
 """The energy is averaged over so many frames before it rules silence out."""
 SHORT_PAUSE_S = 0.2
@@ -109,7 +91,7 @@ class Recogniser:
         each            : applies a function to many items, perhaps in several processes
         Words are recognised in every stretch of sound and aligned by our models. ``auto`` compares their likelihood
         with that of the best path of phones without words: words that fit decide their phones; of the other words, the
-        phones only become more probable (``WORD_BONUS``).
+        phones only become more probable (``speech.word_search``).
         Raises MissingDependencyError: as ``recognise``.
         """
         if not features.values.any():
@@ -121,7 +103,7 @@ class Recogniser:
         path = self._loop.network.best_path(log_likelihoods)
         labels, heard = self._free_labels(audio, features, path), list[HeardWord]()
         if self.kind in USING_WORDS and not self._knows_voice_and_words(similarity):
-            parts, heard = self._word_parts(audio, hmm, log_likelihoods, path, each)
+            parts, heard = self._word_search(audio, hmm, log_likelihoods, path).words_of(audio, each)
             labels = spliced(labels if self.kind == "auto" else [LabelledFrames(0, SILENCE)], parts, len(path))
         units = _timeline(
             [(label.phone, heard[label.word].text if label.word >= 0 else "") for label in labels],
@@ -143,45 +125,14 @@ class Recogniser:
             return labels
         return [LabelledFrames(_first_frame(span.start_s), span.label.phone) for span in aligned]
 
-    def _word_parts(
-        self,
-        audio: AnalysedAudio,
-        hmm: UnitHmm,
-        log_likelihoods: LogLikelihoods,
-        path: NDArray[np.intp],
-        each: ParallelMap,
-    ) -> tuple[list[LabelledStretch], list[HeardWord]]:
-        """Return the stretches in which words were recognised, with their labels, and these words.
-
-        path : of the phones without words, through ``_loop`` [shape=(T,)]
-        """
-        free = self._loop.network.emission[path]
-        of_words = self._log_likelihoods(audio, aligning=True)[1] if self._has_few_gaussians else log_likelihoods
+    def _word_search(
+        self, audio: AnalysedAudio, hmm: UnitHmm, log_likelihoods: LogLikelihoods, path: NDArray[np.intp]
+    ) -> WordSearch:
+        """Return the search for words in a recording whose phones without words have a path through ``_loop``."""
+        aligning = self._log_likelihoods(audio, aligning=True)[1] if self._has_few_gaussians else log_likelihoods
         loud = loud_frames(audio.mfcc().values[:, LOG_ENERGY], ENERGY_SMOOTHING_FRAMES)
-        stretches = stretches_of_sound(audio.log_energy)
-        parts, heard = list[LabelledStretch](), list[HeardWord]()
-        found = each(words_in, (stretch_samples(audio, stretch) for stretch in stretches))
-        for stretch, words in zip(stretches, found, strict=True):
-            if not words:
-                continue
-            frames, values = slice(*stretch), of_words.stretch(*stretch)
-            try:
-                here = penalise_silence(hmm, log_likelihoods_from(values), loud[frames])
-                aligned = align_heard_words(hmm, here, words, DICTIONARY)
-            except AlignmentError:  # more words than there is room for
-                continue
-            fits, fit = aligned.fits(values, free[frames])
-            believed = np.full(len(words), self.kind == "words" or fit > STRETCH_FIT) | (fits > WORD_FIT)
-            here_parts = list(labels_of_words(aligned, stretch, believed, len(heard)))
-            if not believed.all():
-                favoured = log_likelihoods.stretch(*stretch) + phone_bonus(hmm, aligned, WORD_BONUS)
-                others = self._loop.network.best_path(log_likelihoods_from(favoured))
-                here_parts = [
-                    (stretch, spliced(free_labels(self._loop, others, stretch.first), here_parts, stretch.end))
-                ]
-            parts += here_parts
-            heard += [HeardWord(word, confidence_of(fit)) for word, fit in zip(words, fits.tolist(), strict=True)]
-        return parts, heard
+        free = self._loop.network.emission[path]
+        return WordSearch(hmm, self._loop, log_likelihoods, aligning, free, loud, believing=self.kind == "words")
 
     def _knows_voice_and_words(self, similarity: SpeakerSimilarity | None) -> bool:
         """Return whether a voice is that of the own models, and their corpus one of few words."""
@@ -338,15 +289,6 @@ def cached_recogniser(own: UnitHmm, kind: str = "auto", adaptation: Adaptation |
 def own_model_weight(score: float) -> float:
     """Return the weight of own models beside the general ones, 0 to 1, at a speaker similarity score."""
     return min(max((score - NO_WEIGHT_SCORE) / (FULL_WEIGHT_SCORE - NO_WEIGHT_SCORE), 0.0), 1.0)
-
-
-def free_labels(loop: UnitLoop, path: NDArray[np.intp], first: int = 0) -> list[LabelledFrames]:
-    """Return the phones of a path through a loop [shape=(T,)] whose first frame is ``first``; noises are silence."""
-    phones, starts = units_of_path(loop, path)
-    return [
-        LabelledFrames(first + int(start), SILENCE if phone in NOISES else phone)
-        for phone, start in zip(phones, starts[:-1], strict=True)
-    ]
 
 
 def _first_frame(start_s: float) -> int:

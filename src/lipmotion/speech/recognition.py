@@ -15,8 +15,6 @@ from lipmotion.speech.voice_activity import Stretch
 from lipmotion.types import FRAME_RATE_HZ, Span, Timeline, Unit
 from lipmotion.units import is_silent
 
-HALF_FIT, FIT_SCALE = -0.9, 0.6
-"""At the first fit every other word is right; the odds grow by a factor of e for every further so many nats."""
 SLIVER_FRAMES = 3
 """Phones without words of which fewer frames are left beside a word are not made: no phone model is shorter."""
 
@@ -94,11 +92,6 @@ def recognition_of(
     word_s = sum(span.duration_s for span in spoken if span.label.word)
     phone_s = sum(span.duration_s for span in spoken) - word_s
     return Recognition(units, Timeline(tuple(words)), word_s, phone_s, similarity)
-
-
-def confidence_of(fit: float) -> float:
-    """Return the probability that a word with a fit (``AlignedWords.fits``) is right."""
-    return float(1 / (1 + np.exp(-(fit - HALF_FIT) / FIT_SCALE)))
 
 
 def labels_of_words(

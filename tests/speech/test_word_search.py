@@ -1,0 +1,137 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lipmotion.pipeline.model import load_model
+from lipmotion.speech import word_search
+from lipmotion.speech.audio_files import read_audio
+from lipmotion.speech.mfcc import mfcc
+from lipmotion.speech.recogniser import Recogniser
+from lipmotion.speech.recognition import Recognition
+from lipmotion.speech.word_search import confidences_of
+from lipmotion.types import Audio
+from lipmotion.units import Lexicon, is_silent
+
+WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"
+SAID = "please speak and my lips will move five big blue boats float by".split()
+
+
+@pytest.fixture(scope="module")
+def welcome() -> Audio:
+    return read_audio(WELCOME)
+
+
+def recognition(audio: Audio, kind: str = "auto") -> Recognition:
+    return Recogniser(load_model().phones, kind).recognition(audio, mfcc(audio))
+
+
+def texts(found: Recognition) -> list[str]:
+    return [span.label.text for span in found.words]
+
+
+@pytest.mark.parametrize("kind", ["auto", "words"])
+def test_words_decide_the_phones_of_english(welcome: Audio, kind: str) -> None:
+    found = recognition(welcome, kind)
+    assert texts(found) == SAID
+    assert found.word_s > 9 * found.phone_s
+    aligned = Recogniser(load_model().phones).align(welcome, mfcc(welcome), SAID, Lexicon())
+    spoken, wanted = (
+        [span.label for span in units if not is_silent(span.label.phone)] for units in (found.units, aligned)
+    )
+    assert [(label.phone, label.word) for label in spoken] == [(label.phone, label.word) for label in wanted]
+
+
+@pytest.mark.parametrize("kind", ["fast", "general", "own"])
+def test_other_kinds_do_not_search_for_words(welcome: Audio, kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delattr(word_search, "words_in")
+    found = recognition(welcome, kind)
+    assert texts(found) == []
+    assert found.word_s == found.reliability == 0
+    assert found.phone_s > 3
+
+
+def test_confidences_grow_with_the_fit() -> None:
+    confidences = confidences_of(np.linspace(-40, 5, 100))
+    assert (np.diff(confidences) >= 0).all()
+    assert 0 <= confidences.min() < 0.1
+    assert 0.5 < confidences.max() <= 1
+
+
+def heard(monkeypatch: pytest.MonkeyPatch, *words: str) -> None:
+    monkeypatch.setattr(word_search, "words_in", lambda _: words)
+
+
+def test_words_that_do_not_fit_are_not_believed(welcome: Audio, monkeypatch: pytest.MonkeyPatch) -> None:
+    heard(monkeypatch, *("thick", "zoo", "choosy", "oath", "judges", "azure", "shush"))
+    found = recognition(welcome)
+    assert found.word_s < found.phone_s
+    assert texts(recognition(welcome, "words")) == ["thick", "zoo", "choosy", "oath", "judges", "azure", "shush"]
+
+
+def test_the_words_that_fit_are_believed_among_others(welcome: Audio, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(word_search, "STRETCH_FIT", 0.0)
+    heard(monkeypatch, *SAID[:9], "oxygen", *SAID[10:])
+    found = recognition(welcome)
+    assert "oxygen" not in texts(found)
+    assert {"lips", "float", "by"} <= set(texts(found))
+
+
+def test_too_many_words_are_not_believed(welcome: Audio, monkeypatch: pytest.MonkeyPatch) -> None:
+    heard(monkeypatch, *["constitutional"] * 100)
+    assert texts(recognition(welcome)) == []
+    assert recognition(welcome).units == recognition(welcome, "fast").units
+
+
+def test_no_words_leave_the_phones_as_they_are(welcome: Audio, monkeypatch: pytest.MonkeyPatch) -> None:
+    heard(monkeypatch)
+    assert recognition(welcome).units == recognition(welcome, "fast").units
+    assert {span.label.phone for span in recognition(welcome, "words").units} == {"sil"}
+
+
+def test_words_that_are_doubted_still_favour_their_phones(welcome: Audio, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(word_search, "STRETCH_FIT", 99.0)
+    monkeypatch.setattr(word_search, "WORD_FIT", 99.0)
+    wanted = [span.label.phone for span in recognition(welcome, "words").units]
+
+    def agreement(found: Recognition) -> float:
+        instants = np.arange(0.5, 5, 0.01)
+        return float(np.mean([_phone_at(found, time_s) == _phone_at(true, time_s) for time_s in instants]))
+
+    true = recognition(welcome, "words")
+    assert wanted
+    assert agreement(recognition(welcome)) > agreement(recognition(welcome, "fast")) + 0.05
+
+
+def _phone_at(found: Recognition, time_s: float) -> str:
+    return next(span.label.phone for span in found.units if time_s < span.end_s)
+
+
+def test_noise_has_no_words() -> None:
+    noise = np.random.default_rng(0).normal(0, 0.1, 48_000).astype(np.float32)
+    found = recognition(Audio(noise, 16_000))
+    assert found.word_s < 0.3
+
+
+def test_silence_has_no_words() -> None:
+    found = recognition(Audio(np.zeros(16_000, np.float32), 16_000))
+    assert [span.label.phone for span in found.units] == ["sil"]
+    assert texts(found) == []
+
+
+@pytest.mark.recordings
+def test_a_voice_and_words_that_the_model_knows_are_left_to_its_phones(recordings: Path) -> None:
+    """The speaker and the words of the training: no language model of English expects "bin blue at f two now"."""
+    grid = recordings / "grid-s1"
+    for name in (grid / "val.txt").read_text().split()[:3]:
+        audio = read_audio(grid / "clips" / f"{name}.mkv")
+        assert recognition(audio).units == recognition(audio, "fast").units
+
+
+@pytest.mark.recordings
+def test_strangers_are_understood_better_with_words(recordings: Path) -> None:
+    audio = read_audio(recordings / "speech-open" / "61-70968-0000.flac")
+    said = (recordings / "speech-open" / "61-70968-0000.lab").read_text().lower().split()
+    assert len(set(texts(recognition(audio))) & set(said)) > 0.7 * len(set(said))
