@@ -3,15 +3,10 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING, Any
 
 from lipmotion.cli.options import add_machine_readable, add_workers, list_or_all, worker_count
 from lipmotion.cli.paths import add_input, add_output
 from lipmotion.cli.speech import add_lexicon_argument
-
-if TYPE_CHECKING:
-    from lipmotion.engines import Engine
-    from lipmotion.pipeline.model import Model
 
 ENGINE = "trajectory (default), coupled (chains of states for speech and for lips) or joint (one model, five streams)"
 SYSTEM = "structure of the coupled engine: ph-HMM, ph-MSHMM, ph-FHMM, ph-vi-FHMM, ph-CHMM or ph-vi-CHMM (default)"
@@ -21,7 +16,6 @@ VISUAL = "modelled motion: geometry (tracked or given curves, default), eigenlip
 
 
 FROM = "stand on this model (default: the one that ships), or 'none' (docs/own-model.md)"
-NONE = "none"
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -50,6 +44,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 def run(options: argparse.Namespace) -> None:
     """Call ``lipmotion.train`` and ``lipmotion.save_model``; report what was used."""
     from lipmotion.cli.progress import reporting
+    from lipmotion.cli.starting_model import model_to_start_from
     from lipmotion.corpora.store import Corpus, Selection
     from lipmotion.engines import engine_from_settings
     from lipmotion.pipeline.model import save_model
@@ -72,7 +67,7 @@ def run(options: argparse.Namespace) -> None:
                 lexicon=lexicon,
                 visual=options.visual,
                 voices=voices,
-                prior=_prior(options, engine),
+                prior=model_to_start_from(options.start, engine),
                 run=Run(report.receive, work, worker_count(options)),
             )
             save_model(model, options.output)
@@ -80,18 +75,3 @@ def run(options: argparse.Namespace) -> None:
         text = ", ".join(f"{value} {name}" for name, value in figures.items())
         use = f"use it: lipmotion animate SPEECH -o FILE --model {options.output}"
         report.finish(f"{options.output}: {text}; {use}", model=str(options.output), **figures)
-
-
-def _prior(options: argparse.Namespace, engine: Engine[Any]) -> Model | None:
-    """Return the model to start from. Raises InputError: the engine's models do not stand on others."""
-    from lipmotion.engines.base import StandsOnPrior
-    from lipmotion.errors import InputError
-    from lipmotion.pipeline.model import load_model
-
-    if options.start == NONE:
-        return None
-    if isinstance(engine, StandsOnPrior):
-        return load_model(options.start or None)
-    if options.start:
-        raise InputError(f"the engine {engine.name!r} does not start from another model; leave --from out")
-    return None

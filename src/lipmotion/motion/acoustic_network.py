@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from lipmotion.stats.convolution import (
     TAPS,
     ConvolutionalNetwork,
-    Layer,
+    LinearMap,
     TrainingPlan,
     TrainingSequence,
     fit_network,
@@ -186,9 +186,9 @@ def _network_arrays(network: ConvolutionalNetwork) -> dict[str, NDArray[Any]]:
 def _network_from_arrays(arrays: Arrays, dimensions: int) -> ConvolutionalNetwork:
     stored = checked_arrays(arrays, WEIGHTS, O=dimensions + 1)
     weights = [stored["network_first"], *stored["network_layers"]]
-    layers = tuple(Layer(each, biases) for each, biases in zip(weights, stored["network_biases"], strict=True))
+    layers = tuple(LinearMap(each, biases) for each, biases in zip(weights, stored["network_biases"], strict=True))
     output = stored["network_output"]
-    return ConvolutionalNetwork(layers, DILATIONS, Layer(output[:-1], output[-1]))
+    return ConvolutionalNetwork(layers, DILATIONS, LinearMap(output[:-1], output[-1]))
 
 
 def _steps(spectrum: NDArray[np.floating]) -> NDArray[np.float32]:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.errors import InputError
 from lipmotion.motion.closure import OPENING
 from lipmotion.motion.frame_labels import with_neighbours
 from lipmotion.motion.rest import away_from_speech, speech_intervals
@@ -20,7 +21,7 @@ from lipmotion.motion.space import MotionSpace
 from lipmotion.stats.delta_windows import with_dynamics
 from lipmotion.storage.schema import Arrays, ArraySpec, checked_arrays
 from lipmotion.types import FRAME_RATE_HZ, Example, Span, Timeline, Unit
-from lipmotion.units import SILENCE, is_silent, most_similar_phone
+from lipmotion.units import PHONES, SILENCE, is_silent, most_similar_phone, unknown_phone_message
 
 Array = NDArray[np.float64]
 Context = tuple[str, str, str]
@@ -68,11 +69,12 @@ class ArticulationPrior:
     def familiarity(self, units: Timeline[Unit], frames: int) -> Array:
         """Return how well training knows each phone between its neighbours, 0 to 1 [shape=(frames,)].
 
-        Silence away from speech, in which the mouth rests, is always well known.
+        Silence at both ends and away from speech, in which the mouth rests, is always well known.
         """
         steps = np.ones((frames, 1))
         for left, span, right in with_neighbours(units):
-            if span.label.phone:
+            at_end = is_silent(span.label.phone) and span in (units[0], units[-1])
+            if span.label.phone and not at_end:
                 count = self.contexts.get((_merged(left), _merged(span.label.phone), _merged(right)), 0)
                 first, stop = _frames_of(span, frames)
                 steps[first:stop] = count / (count + HALF_FAMILIAR)
@@ -114,10 +116,13 @@ def articulators(units: Timeline[Unit], frames: int) -> Array:
 
     Every third of a phone has the means of the table; a Gaussian joins them. A phone without a row of its own has that
     of the most similar phone with one.
+    Raises InputError: an unknown phone.
     """
     table, steps = articulation_table(), np.zeros((frames, len(ARTICULATORS)))
     for span in units:
         phone, (first, stop) = span.label.phone, _frames_of(span, frames)
+        if phone and phone not in PHONES:
+            raise InputError(unknown_phone_message(phone, f" at {span.start_s} s"))
         if first < stop and phone:
             row = table[phone if phone in table else most_similar_phone(phone, list(table))]
             time_s = np.arange(first, stop) / FRAME_RATE_HZ

@@ -125,7 +125,9 @@ def recognised_speech(
         except AlignmentError:
             pass
     found = recognise()
-    return replace(speech, units=found.units, units_known=False, confidence=found.reliability)
+    return replace(
+        speech, units=found.units, units_known=False, confidence=found.reliability(analysed(audio).log_energy)
+    )
 
 
 def _words(

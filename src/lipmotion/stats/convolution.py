@@ -26,7 +26,7 @@ SHARDS = 2
 """Parts of a batch, computed in one thread each. Their number is fixed: the sum does not depend on the processors."""
 
 
-class Layer(NamedTuple):
+class LinearMap(NamedTuple):
     """Weights [shape=(inputs, outputs)] and biases [shape=(outputs,)] of one layer."""
 
     weights: Array
@@ -44,9 +44,9 @@ class ConvolutionalNetwork:
     Source: Bai, Kolter & Koltun 2018, without causality and without normalisation.
     """
 
-    layers: tuple[Layer, ...]
+    layers: tuple[LinearMap, ...]
     dilations: tuple[int, ...]
-    output: Layer
+    output: LinearMap
 
     def __call__(self, inputs: Array) -> Array:
         """Return the outputs of one sequence [shape=(T, O)]; inputs [shape=(T, I)]."""
@@ -100,9 +100,9 @@ def initial_network(
     """Return an untrained network with random weights (He et al. 2015); those of residual layers are halved."""
     rng = np.random.default_rng(seed)
 
-    def layer(size: int, width: int, factor: float) -> Layer:
+    def layer(size: int, width: int, factor: float) -> LinearMap:
         weights = rng.standard_normal((size, width)) * np.sqrt(2 / size) * factor
-        return Layer(weights.astype(np.float32), np.zeros(width, np.float32))
+        return LinearMap(weights.astype(np.float32), np.zeros(width, np.float32))
 
     first = layer(TAPS * inputs, hidden, 1.0)
     others = [layer(TAPS * hidden, hidden, 0.5) for _ in dilations[1:]]
@@ -155,7 +155,7 @@ def fit_network(
 
 
 def _rebuilt(network: ConvolutionalNetwork, parameters: Sequence[Array]) -> ConvolutionalNetwork:
-    pairs = [Layer(*parameters[i : i + 2]) for i in range(0, len(parameters), 2)]
+    pairs = [LinearMap(*parameters[i : i + 2]) for i in range(0, len(parameters), 2)]
     return ConvolutionalNetwork(tuple(pairs[:-1]), network.dilations, pairs[-1])
 
 

@@ -63,7 +63,6 @@ def fit_trajectory(
     if options.acoustic_regression:
         monitor(Progress(_STAGE, 2, 3, 0.3))
         emission = fit_acoustic_regression(emission, clips, options)
-    monitor(Progress(_STAGE, 3, 3, 0.4))
     prior = fit_articulation_prior(space, values, examples) if options.articulation else None
     network: AcousticNetwork | PriorRegression | None = None
     share = NETWORK_SHARE
@@ -72,9 +71,10 @@ def fit_trajectory(
         network, predictions = fit_prior_regression(examples, values, len(space.direct))
         share = _share_of_regression(predictions, clips, options, len(space.direct))
     elif all(example.heard for example in examples):
-        monitor = sub_monitor(monitor, 0.4, 1)
-        network = fit_acoustic_network(examples, values, len(space.direct), options.epochs, monitor, checkpoint)
+        network_monitor = sub_monitor(monitor, 0.4, 0.99)
+        network = fit_acoustic_network(examples, values, len(space.direct), options.epochs, network_monitor, checkpoint)
     factors = _scaling_factors(emission, network, prior, share, clips, options)
+    monitor(Progress(_STAGE, 3, 3, 1.0))
     closure = fit_closure(space.direct_names, values, examples)
     return TrajectoryModel(
         options.layout.units, space, emission, factors, closure, phone_recogniser, network, prior, share
