@@ -42,6 +42,8 @@ RIDGE = 1e-2
 LEAST_DEVIATION = 1e-6
 TABLE_WEIGHT = 4.0
 """Weight of the table beside a model's own means, in a context that training never saw."""
+RELIABILITY_POWER = 3
+"""The weight of the table grows with this power of the reliability: phones that are wrong make contexts unknown."""
 HALF_FAMILIAR = 1.0
 """Occurrences in training after which a context counts as half familiar."""
 
@@ -91,7 +93,7 @@ class ArticulationPrior:
         Precisions stay those of the model.
         """
         values = self.trajectory(units, frames)
-        weight = TABLE_WEIGHT * reliability * (1 - self.familiarity(units, frames))
+        weight = TABLE_WEIGHT * np.asarray(reliability) ** RELIABILITY_POWER * (1 - self.familiarity(units, frames))
         share = (weight / (1 + weight))[:, None, None]
 
         def drawn(chosen: slice) -> Statistics:

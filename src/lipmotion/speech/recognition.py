@@ -16,11 +16,11 @@ from lipmotion.types import FRAME_RATE_HZ, Span, Timeline, Unit
 from lipmotion.units import is_silent
 
 CONFIDENCES = (0.45, 0.65)
-"""Words confirm nothing at the first confidence, all at the second one. Five-second pieces of fluent strangers had 0.58 to
-0.78; GRID's sentences, which no language model expects, in babble at 20 dB 0.30 to 0.51, at 10 dB 0.27 to 0.65."""
+"""Words confirm nothing at the first confidence, all at the second one. Five-second pieces of fluent strangers had 0.58
+to 0.78; GRID's sentences, which no language model expects, in babble at 20 dB 0.30 to 0.51, at 10 dB 0.27 to 0.65."""
 RANGE_PERCENTILES = (5, 95)
 RANGES_DB = (20.0, 28.0)
-"""Likewise for the range of levels: 25 to 34 dB for these pieces, 23 to 26 and 16 to 19 dB in babble at 20 and 10 dB."""
+"""Likewise for the range of levels: 25 to 34 dB in these pieces, 23 to 26 and 16 to 19 dB in babble of 20 and 10 dB."""
 SLIVER_FRAMES = 3
 """Phones without words of which fewer frames are left beside a word are not made: no phone model is shorter."""
 

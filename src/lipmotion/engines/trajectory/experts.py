@@ -16,10 +16,10 @@ from lipmotion.motion.prior_regression import PriorRegression
 from lipmotion.types import FRAME_RATE_HZ, Speech
 
 Array = NDArray[np.float64]
-DISTORTIONS = (0.25, 0.45)
+DISTORTIONS = (0.2, 0.35)
 """Recognised phones are relied on up to the first distortion of the sound, and from the second one on not at all. The
-network finds 0.17 to 0.27 in quiet recordings of its speaker, 0.40 to 0.50 in white noise at 20 dB, 0.45 to 0.63 in babble
-at 20 dB."""
+network finds 0.17 to 0.27 in quiet recordings of its speaker, 0.40 to 0.50 in white noise at 20 dB, 0.45 to 0.63 in
+babble at 20 dB."""
 DISTORTION_S = 1.0
 """Seconds before and after a frame over which the distortion is averaged."""
 
