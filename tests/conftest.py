@@ -42,8 +42,9 @@ def toy_sentence() -> ToySentence:
 
 @pytest.fixture(scope="session")
 def toy_model(toy_corpus: Corpus) -> Model:
-    """Trained in a second on the toy corpus."""
-    return train(toy_corpus, recogniser=HmmConfig(mixtures=1, iterations=2))[0]
+    """Trained in a second on the toy corpus, whose mouth does not move as English ones do."""
+    engine = engine_named("trajectory", {"articulation": False})
+    return train(toy_corpus, recogniser=HmmConfig(mixtures=1, iterations=2), engine=engine)[0]
 
 
 @pytest.fixture(scope="session")
@@ -57,7 +58,7 @@ def toy_model_file(toy_model: Model, tmp_path_factory: pytest.TempPathFactory) -
 @pytest.fixture(scope="session")
 def coupled_model(toy_corpus: Corpus) -> Model:
     """A small coupled model of the toy corpus."""
-    engine = engine_named("coupled", {"chains": "sVis 2vis", "mixtures": 2})
+    engine = engine_named("coupled", {"chains": "sVis 2vis", "mixtures": 2, "articulation": False})
     return train(toy_corpus, recogniser=HmmConfig(mixtures=1, iterations=2), engine=engine)[0]
 
 

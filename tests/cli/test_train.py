@@ -24,7 +24,7 @@ def test_a_model_and_what_it_was_made_of(run: RunCommand, toy_corpus: Corpus, he
     use = "use it: lipmotion animate SPEECH -o FILE --model mine.lipmotion"
     assert done == (0, [f"mine.lipmotion: 8 used, 0.3 minutes, 0 skipped; {use}"], [])
     assert [path.name for path in here.iterdir()] == ["mine.lipmotion"]
-    save_model(train(toy_corpus)[0], here / "function.lipmotion")
+    save_model(train(toy_corpus, prior=load_model())[0], here / "function.lipmotion")
     assert (here / "mine.lipmotion").read_bytes() == (here / "function.lipmotion").read_bytes()
 
 

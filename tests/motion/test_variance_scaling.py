@@ -10,7 +10,7 @@ from lipmotion.testing.examples import examples, speech, timeline
 from lipmotion.types import Constraints, Pin
 from lipmotion.types.progress import silent_monitor
 
-OPTIONS = {"states": 3, "silent_states": 7, "components": 2, "acoustic_components": 20}
+OPTIONS = {"articulation": False, "states": 3, "silent_states": 7, "components": 2, "acoustic_components": 20}
 
 
 def test_the_trajectory_grows_about_rest_and_its_variance_with_it():

@@ -19,6 +19,7 @@ from lipmotion.pipeline.understand import recognised_speech, speech_of, understa
 from lipmotion.speech.f0 import log_f0
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.recogniser import Recogniser
+from lipmotion.speech.recognition import Recognition
 from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Audio, Speech, TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit
 
@@ -43,11 +44,12 @@ class RecognisingEngine(Engine[Any]):
 
 
 RECOGNISED: Timeline[Unit] = Timeline(())
+RECOGNITION = Recognition(RECOGNISED, Timeline(()), 0.0, 0.0, None)
 
 
 def recognised(engine: Engine[Any], model: Model, sentence: ToySentence, kind: str = "own") -> Speech:
     phones, features = Recogniser(model.phones, kind), mfcc(sentence.audio)
-    return recognised_speech(engine, None, sentence.audio, features, phones, lambda: RECOGNISED)
+    return recognised_speech(engine, None, sentence.audio, features, phones, lambda: RECOGNITION)
 
 
 def test_phones_that_the_engine_recognises_are_aligned_as_in_training(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from lipmotion.errors import ExportError, InputError
@@ -11,8 +12,9 @@ from lipmotion.faces.base import Face
 from lipmotion.faces.registry import face_named
 from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.model import Model, load_model
+from lipmotion.pipeline.outlook import outlook_of
 from lipmotion.pipeline.request import SpeechInput, request_of
-from lipmotion.pipeline.understand import understand
+from lipmotion.pipeline.understand import understood_speech
 from lipmotion.pipeline.workers import map_in_processes
 from lipmotion.speech.audio_files import read_audio
 from lipmotion.storage.files import as_text, check_distinct, check_target
@@ -55,8 +57,10 @@ def animate(
     'please'
     """
     chosen = model if isinstance(model, Model) else load_model(model)
-    understood = understand(chosen, request_of(speech, transcript), map_in_processes(workers))
-    return chosen.engine.generate(chosen.learned, understood, constraints)
+    request = request_of(speech, transcript)
+    understood = understood_speech(chosen, request, map_in_processes(workers))
+    generation = chosen.engine.generate(chosen.learned, understood.speech, constraints)
+    return replace(generation, outlook=outlook_of(request, understood))
 
 
 def write(

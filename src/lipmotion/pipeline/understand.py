@@ -17,12 +17,12 @@ from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.prior import with_prior
 from lipmotion.pipeline.request import SpeechRequest
 from lipmotion.pipeline.transcribe import read_transcript, transcribe
-from lipmotion.speech.analysed_audio import analysed
+from lipmotion.speech.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.audio_files import read_audio
 from lipmotion.speech.f0 import log_f0
 from lipmotion.speech.installed_recognisers import INSTALLED_RECOGNISERS, recognise_words
 from lipmotion.speech.recogniser import Recogniser, cached_recogniser
-from lipmotion.speech.recognition import Recognition
+from lipmotion.speech.recognition import Recognition, level_range_db
 from lipmotion.types import Audio, Features, ParallelMap, Speech, TimedTranscript, Timeline, Unit
 from lipmotion.units import Lexicon, check_phones, check_text, words_of
 
@@ -35,11 +35,13 @@ LOG = logging.getLogger("lipmotion")
 class UnderstoodSpeech:
     """The speech of a recording as input of an engine, and what was recognised in it.
 
+    range_db    : decibels between the loud and the quiet moments of the recording
     recognition : None where words or phones were given, or the engine's own model recognised the speaker
     """
 
     speech: Speech
     recognition: Recognition | None
+    range_db: float
 
 
 def understand(model: Model, request: SpeechRequest, each: ParallelMap = map) -> Speech:
@@ -55,16 +57,20 @@ def understand(model: Model, request: SpeechRequest, each: ParallelMap = map) ->
 def understood_speech(model: Model, request: SpeechRequest, each: ParallelMap = map) -> UnderstoodSpeech:
     """Return the speech of a request as ``understand`` does, with what was recognised."""
     found: list[Recognition] = []
-    speech = _understood(model, request, each, found)
-    return UnderstoodSpeech(with_prior(model.prior, speech), found[0] if found else None)
+    audio = analysed(audio_of(request))
+    speech = _understood(model, request, audio, each, found)
+    return UnderstoodSpeech(
+        with_prior(model.prior, speech), found[0] if found else None, level_range_db(audio.log_energy)
+    )
 
 
-def _understood(model: Model, request: SpeechRequest, each: ParallelMap, found: list[Recognition]) -> Speech:
+def _understood(
+    model: Model, request: SpeechRequest, audio: AnalysedAudio, each: ParallelMap, found: list[Recognition]
+) -> Speech:
     """Return the speech of a request, without what the model that this one stands on makes of it.
 
     found : what is recognised is added
     """
-    audio = analysed(audio_of(request))
     installed = request.recogniser in INSTALLED_RECOGNISERS
     phones = cached_recogniser(model.phones, "auto" if installed else request.recogniser, model.adaptation)
     if request.units is not None:

@@ -81,8 +81,15 @@ class Recognition:
         and in the babble of others, words are found that nobody said, with some confidence.
         """
         share = self.word_s / max(self.word_s + self.phone_s, 1e-9)
-        range_db = float(np.ptp(np.percentile(log_energy, RANGE_PERCENTILES))) * 10 / np.log(10)
-        return _risen((self.confidence or 0.0) * share, *CONFIDENCES) * _risen(range_db, *RANGES_DB)
+        return _risen((self.confidence or 0.0) * share, *CONFIDENCES) * _risen(level_range_db(log_energy), *RANGES_DB)
+
+
+def level_range_db(log_energy: NDArray[np.floating[Any]]) -> float:
+    """Return the decibels between the loud and the quiet moments of a recording (``RANGE_PERCENTILES``).
+
+    log_energy : natural logarithm of the energy of every frame [shape=(T,)]
+    """
+    return float(np.ptp(np.percentile(log_energy, RANGE_PERCENTILES)) * 10 / np.log(10))
 
 
 def _risen(value: float, low: float, high: float) -> float:

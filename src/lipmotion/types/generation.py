@@ -137,6 +137,40 @@ class ReducedVariance:
     mixing: NDArray[np.floating[Any]]
 
 
+@dataclass(frozen=True)
+class Outlook:
+    """What to expect of generated motion: how well the model knew the words and the voice.
+
+    words      : where the phones come from: ``transcript``, ``given units``, ``own model`` (the engine's own
+                 recognition of a speaker that it was trained on), ``words`` or ``phones`` (recognised, most of the speech)
+    confidence : 0 to 1, of recognised words, by their share of the speech; 1 where words or units were given
+    voice      : 0 (unknown) to 1 (as in the training); None where it was not needed
+    range_db   : decibels between loud and quiet moments; under 20 the recording is noisy
+    advice     : what would help, the most helpful first
+
+    >>> Outlook("words", 0.66, 0.0, 31.2, ("the words that are spoken",)).text
+    'words recognised, confidence 0.66; voice 0.00; levels 31 dB apart; would help most: the words that are spoken'
+    """
+
+    words: str
+    confidence: float
+    voice: float | None
+    range_db: float
+    advice: tuple[str, ...]
+
+    @property
+    def text(self) -> str:
+        """The outlook in one line."""
+        recognised = self.words in ("words", "phones")
+        parts = [f"{self.words} recognised, confidence {self.confidence:.2f}" if recognised else f"words: {self.words}"]
+        if self.voice is not None:
+            parts.append(f"voice {self.voice:.2f}")
+        parts.append(f"levels {self.range_db:.0f} dB apart")
+        if self.advice:
+            parts.append(f"would help most: {self.advice[0]}")
+        return "; ".join(parts)
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Generation:
     """Generated motion, with its variance, its phones in time and its states; returned by ``animate``.
@@ -146,6 +180,7 @@ class Generation:
              ``ReducedVariance``; ``variance`` returns an array for both
     units  : the phones in time from which the motion was generated; edit them and generate again
     trace  : the state of the model in every frame
+    outlook : how well the model knew words and voice (None: not from ``animate``)
 
     >>> import lipmotion
     >>> result = lipmotion.animate("examples/welcome.flac")
@@ -159,6 +194,7 @@ class Generation:
     spread: NDArray[np.floating[Any]] | ReducedVariance
     units: Timeline[Unit]
     trace: StateTrace
+    outlook: Outlook | None = None
 
     def __repr__(self) -> str:
         frames, channels = self.motion.values.shape

@@ -10,7 +10,7 @@ from lipmotion.testing.examples import CHANNELS, OPENINGS, examples, speech, tim
 from lipmotion.types import WEIGHT, Channel, Constraints, Pin
 from lipmotion.types.progress import silent_monitor
 
-ENGINE = engine_named("trajectory", {"silent_states": 7})  # at rest from 0.24 s on
+ENGINE = engine_named("trajectory", {"silent_states": 7, "articulation": False})  # at rest from 0.24 s on
 MODEL = ENGINE.fit(examples(), silent_monitor).model
 
 
@@ -49,7 +49,7 @@ def test_any_odd_number_of_states_works(states):
 
 
 def test_configuration_and_model_are_different_things():
-    assert ENGINE.config == TrajectoryConfig(silent_states=7)
+    assert ENGINE.config == TrajectoryConfig(silent_states=7, articulation=False)
     fit = ENGINE.fit(examples(3), silent_monitor)
     assert fit.figures["frames"] == sum(int(e.valid.sum()) for e in examples(3))
     assert fit.figures["leaves"] == len(fit.model.emission.means)

@@ -15,7 +15,7 @@ from lipmotion.types import Generation
 from lipmotion.types.progress import silent_monitor
 from lipmotion.units import LIP_CLOSING, PHONES, UNIT_SETS, unit_set
 
-PLAIN = {"acoustic_regression": False, "silent_states": 7}
+PLAIN = {"articulation": False, "acoustic_regression": False, "silent_states": 7}
 SPOKEN = speech(timeline(("t", "aa", "p", "iy", "zh", "m", "uw", "sp", "s", "aa")))
 named = pytest.mark.parametrize("name", UNIT_SETS)
 

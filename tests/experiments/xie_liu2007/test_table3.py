@@ -96,6 +96,7 @@ def test_the_conversion_is_all_that_differs(figures: dict[str, Any], toy_corpus:
         "mixtures": 1,
         "variance_scaling": False,
         "closures": False,
+        "articulation": False,
         "start": "viterbi",
         "steps": 10,
     }

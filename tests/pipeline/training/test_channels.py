@@ -27,6 +27,7 @@ from lipmotion.testing.toy import toy_utterances
 from lipmotion.types import Utterance
 
 SMALL = HmmConfig(mixtures=1, iterations=2)
+ENGINE = engine_named("trajectory", {"articulation": False})
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +45,7 @@ def models(toy_corpus: Corpus, tmp_path_factory: pytest.TempPathFactory) -> dict
     """A model of the pictures, and one of pictures and points, as they are saved."""
     folder = tmp_path_factory.mktemp("visual")
     for visual in (EIGENLIPS, BOTH):
-        save_model(train(toy_corpus, recogniser=SMALL, visual=visual)[0], folder / visual)
+        save_model(train(toy_corpus, recogniser=SMALL, engine=ENGINE, visual=visual)[0], folder / visual)
     return {visual: folder / visual for visual in (EIGENLIPS, BOTH)}
 
 
@@ -195,7 +196,9 @@ def test_the_joint_engine_learns_pictures_too(toy_corpus: Corpus) -> None:
 def test_it_is_the_same_file_again(models: dict[str, Path], toy_corpus: Corpus, tmp_path: Path) -> None:
     save_model(load_model(models[BOTH]), tmp_path / "again")
     assert (tmp_path / "again").read_bytes() == models[BOTH].read_bytes()
-    save_model(train(toy_corpus, recogniser=SMALL, visual=BOTH, run=Run(work=tmp_path))[0], tmp_path / "anew")
+    save_model(
+        train(toy_corpus, recogniser=SMALL, engine=ENGINE, visual=BOTH, run=Run(work=tmp_path))[0], tmp_path / "anew"
+    )
     assert (tmp_path / "anew").read_bytes() == models[BOTH].read_bytes()
 
 
@@ -203,7 +206,7 @@ def test_what_was_kept_for_other_channels_is_not_used(
     toy_corpus: Corpus, models: dict[str, Path], tmp_path: Path
 ) -> None:
     for visual in (GEOMETRY, BOTH):
-        model, _ = train(toy_corpus, recogniser=SMALL, visual=visual, run=Run(work=tmp_path))
+        model, _ = train(toy_corpus, recogniser=SMALL, engine=ENGINE, visual=visual, run=Run(work=tmp_path))
     save_model(model, tmp_path / "both")
     assert (tmp_path / "both").read_bytes() == models[BOTH].read_bytes()
 

@@ -103,7 +103,7 @@ def test_what_is_done_is_not_done_again(corpus: Corpus, work: Path) -> None:
     assert not [event for event in events_of(corpus, work) if isinstance(event, Progress) and event.share > 1]
     again = [event for event in events_of(corpus, work) if isinstance(event, Progress)]
     assert [event.share for event in again] == sorted(event.share for event in again)
-    assert again[0].share >= 0.8
+    assert again[0].share >= 0.5  # of phones; motion is learned again
 
 
 def test_unused_utterances_are_reported_again(corpus: Corpus, work: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -27,12 +28,13 @@ def header(generation: Generation) -> dict[str, Any]:
 
 
 def units_and_origin(generation: Generation, source: Mapping[str, str], model: Mapping[str, str]) -> dict[str, Any]:
-    """Return the members ``units``, ``source`` and ``model``."""
+    """Return the members ``units``, ``outlook`` (if it is known), ``source`` and ``model``."""
     units = [
         {"start_s": span.start_s, "end_s": span.end_s, "phone": span.label.phone, "unit": span.label.unit}
         for span in generation.units
     ]
-    return {"units": units, "source": dict(source), "model": dict(model)}
+    outlook = {} if generation.outlook is None else {"outlook": asdict(generation.outlook)}
+    return {"units": units, **outlook, "source": dict(source), "model": dict(model)}
 
 
 def parse(document: Any, values: Any) -> tuple[Motion, Timeline[Unit]]:

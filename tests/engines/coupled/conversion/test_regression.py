@@ -96,7 +96,7 @@ def test_every_viseme_has_a_regression_for_each_position_of_a_state():
 
 @pytest.mark.parametrize("regression", [True, False])
 def test_the_regression_brings_motion_closer(regression):
-    config = CoupledConfig(acoustic_regression=regression, mixtures=1, closures=False)
+    config = CoupledConfig(acoustic_regression=regression, mixtures=1, closures=False, articulation=False)
     model = fit_coupled(examples(), config, silent_monitor)
     assert (model.regression is not None) is regression
     held_out = example(("t", "aa", "p", "iy", "m", "uw", "s", "aa"), seed=77)

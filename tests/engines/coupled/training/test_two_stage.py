@@ -24,7 +24,7 @@ from lipmotion.types import Example, Motion, Span, Timeline, Unit, silent_monito
 from oracles.joint import mixture
 from oracles.networks import posteriors
 
-SMALL = {"states": 1, "asynchrony": 0, "mixtures": 1, "speech_only_mixtures": 2, "components": 1}
+SMALL = {"articulation": False, "states": 1, "asynchrony": 0, "mixtures": 1, "speech_only_mixtures": 2, "components": 1}
 PLAIN = {"acoustic_regression": False, "variance_scaling": False}
 STRUCTURES = {
     "hmm": "phone",

@@ -1,0 +1,42 @@
+"""What to expect of generated motion: how well a model knows a voice and its words, and what would help most."""
+
+from __future__ import annotations
+
+from lipmotion.pipeline.request import SpeechRequest
+from lipmotion.pipeline.understand import UnderstoodSpeech
+from lipmotion.speech.recogniser import FULL_WEIGHT_SCORE, NO_WEIGHT_SCORE
+from lipmotion.speech.recognition import CONFIDENCES, RANGES_DB
+from lipmotion.types import Outlook
+
+TRANSCRIPT = "the words that are spoken (--transcript)"
+OWN_MODEL = "recordings of this person (lipmotion adapt for the sound alone, lipmotion train with video)"
+LESS_NOISE = "a recording with less noise"
+
+
+def outlook_of(request: SpeechRequest, understood: UnderstoodSpeech) -> Outlook:
+    """Return what to expect of the motion of some speech."""
+    found, speech = understood.recognition, understood.speech
+    if found is None:
+        words = "given units" if request.units is not None else "transcript" if speech.units_known else "own model"
+        return Outlook(words, 1.0, 1.0 if words == "own model" else None, understood.range_db, _advice(understood))
+    words = "words" if found.word_s > found.phone_s else "phones"
+    voice = None
+    if found.similarity is not None:
+        share = (found.similarity - NO_WEIGHT_SCORE) / (FULL_WEIGHT_SCORE - NO_WEIGHT_SCORE)
+        voice = min(max(share, 0.0), 1.0)
+    confidence = (found.confidence or 0.0) * found.word_s / max(found.word_s + found.phone_s, 1e-9)
+    return Outlook(words, confidence, voice, understood.range_db, _advice(understood))
+
+
+def _advice(understood: UnderstoodSpeech) -> tuple[str, ...]:
+    """Return what would help, the most helpful first."""
+    found, advice = understood.recognition, []
+    if found is not None:
+        if understood.speech.confidence < 1:
+            advice.append(TRANSCRIPT)
+        if found.similarity is None or found.similarity < FULL_WEIGHT_SCORE:
+            advice.append(OWN_MODEL)
+    if understood.range_db < RANGES_DB[0]:
+        unsure = found is None or (found.confidence or 0.0) < CONFIDENCES[0]
+        advice.insert(0 if unsure else len(advice), LESS_NOISE)
+    return tuple(advice)
