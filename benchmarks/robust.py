@@ -1,11 +1,14 @@
 """Speakers, words and lengths outside the training data of the shipped model: accuracy, speed, memory.
 
-    python benchmarks/robust.py [--corpora FOLDER] [--model FILE] [--only others|phones|noise|hour|calls]
+    python benchmarks/robust.py [--corpora FOLDER] [--model FILE] [--only others|phones|noise|foreign|whole|hour|calls]
 
 others : GRID clips of other speakers, correlation of opening per clip, audio only and with the words of the file's name
 phones : recordings with transcripts of ``speech-open``, phone accuracy against their forced alignment by the general
-         models, and real-time factors (recognition in one process, warm, median of five)
+         models, real-time factors (recognition in one process, warm, median of five), and the share of the speech of
+         which words decided
 noise  : sounds that are not speech: share of the time that is recognised as speech, and mean opening of the mouth
+foreign: speech that is not English: share of the speech of which words decided, and their confidence
+whole  : time of ``lipmotion animate`` on a minute of speech, whole processes, the second of two
 hour   : peak memory and time of ``lipmotion animate`` on an hour of speech, a process of its own
 calls  : memory of one process over a thousand ``animate`` calls
 """
@@ -93,9 +96,10 @@ def phones(corpora: Path, model: Model, _: Path | None) -> None:
         recordings.append((audio, spoken(span.label.phone for span in aligned)))
     for kind in RECOGNISER_KINDS:
         phone_recogniser = cached_recogniser(model.phones, kind)
+        found = [phone_recogniser.recognition(audio, mfcc(audio)) for audio, _ in recordings]
         errors = [
-            edits(wanted, spoken(s.label.phone for s in phone_recogniser.recognise(a, mfcc(a))))
-            for a, wanted in recordings
+            edits(wanted, spoken(s.label.phone for s in each.units))
+            for each, (_, wanted) in zip(found, recordings, strict=True)
         ]
         count = sum(len(wanted) for _, wanted in recordings)
         total_s = sum(audio.duration_s for audio, _ in recordings)
@@ -106,6 +110,7 @@ def phones(corpora: Path, model: Model, _: Path | None) -> None:
             phones=count,
             recordings=len(recordings),
             real_time_factor=round(statistics.median(times) / total_s, 4),
+            by_words=round(sum(each.word_s for each in found) / sum(each.word_s + each.phone_s for each in found), 2),
         )
 
 
@@ -169,17 +174,51 @@ def not_speech() -> dict[str, np.ndarray]:
     }
 
 
+def foreign(corpora: Path, model: Model, _: Path | None) -> None:
+    """Print how far words decide of speech that is not English."""
+    recogniser = cached_recogniser(model.phones, "auto")
+    for name in (
+        "speech-open/common_voice_ja_24511055.mp3",
+        "speech-open/13697_11991_000000.opus",
+        "facegood/1114_2_01.wav",
+    ):
+        audio = read_audio(corpora / name)
+        audio = Audio(audio.samples[: 40 * RATE_HZ], RATE_HZ)
+        found = recogniser.recognition(audio, mfcc(audio))
+        share = found.word_s / max(found.word_s + found.phone_s, 1e-9)
+        show(f"foreign: {name}", by_words=round(share, 2), confidence=round(found.confidence or 0.0, 2))
+
+
+def whole(corpora: Path, _: Model, model_file: Path | None) -> None:
+    """Print the time of whole processes for a minute of speech."""
+    samples = read_audio(corpora / "speech-open" / "threelittlekittens_01_rountreesmith.ogg").samples[: 60 * RATE_HZ]
+    chosen = ["--model", str(model_file)] if model_file else []
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "minute.wav"
+        write_wave(path, samples)
+        line = [sys.executable, "-m", "lipmotion.cli.main", "animate", str(path), "-o", f"{path}.csv", *chosen]
+        for kind in ("auto", "fast"):
+            command = [*line, "--recogniser", kind]
+            times = [seconds(lambda: subprocess.run(command, check=True, stdout=subprocess.DEVNULL)) for _ in range(2)]  # noqa: B023
+            show(f"a minute to .csv, {kind}", seconds=round(times[1], 2))
+
+
+def write_wave(path: Path, samples: np.ndarray) -> None:
+    """Write samples as a sound file of 16 bits."""
+    with wave.open(str(path), "wb") as file:
+        file.setnchannels(1)
+        file.setsampwidth(2)
+        file.setframerate(RATE_HZ)
+        file.writeframes((np.clip(samples, -1, 1) * 32767).astype("<i2").tobytes())
+
+
 def hour(corpora: Path, _: Model, model_file: Path | None) -> None:
     """Print peak memory and time for an hour: a repeated reading."""
     reading = read_audio(corpora / "speech-open" / "threelittlekittens_01_rountreesmith.ogg").samples
     samples = np.tile(reading, 1 + 3600 * RATE_HZ // len(reading))[: 3600 * RATE_HZ]
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "hour.wav"
-        with wave.open(str(path), "wb") as file:
-            file.setnchannels(1)
-            file.setsampwidth(2)
-            file.setframerate(RATE_HZ)
-            file.writeframes((np.clip(samples, -1, 1) * 32767).astype("<i2").tobytes())
+        write_wave(path, samples)
         del samples, reading
         chosen = ["--model", str(model_file)] if model_file else []
         for suffix in (".npz", ".json"):
@@ -215,7 +254,15 @@ def resident_megabytes() -> float:
     return pages * resource.getpagesize() / 1e6
 
 
-PARTS = {"others": others, "phones": phones, "noise": noise, "hour": hour, "calls": calls}
+PARTS = {
+    "others": others,
+    "phones": phones,
+    "noise": noise,
+    "foreign": foreign,
+    "whole": whole,
+    "hour": hour,
+    "calls": calls,
+}
 
 if __name__ == "__main__":
     main()

@@ -18,7 +18,10 @@ WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"
 
 def test_words_of_a_sentence() -> None:
     audio = read_audio(WELCOME)
-    found = words_in(stretch_samples(audio, Stretch(0, len(audio.samples) // 160)))
+    words = words_in(stretch_samples(audio, Stretch(0, len(audio.samples) // 160)))
+    found = [word.text for word in words]
+    assert all(0 <= word.posterior <= 1 for word in words)
+    assert sum(word.posterior for word in words) > len(words) / 2
     assert {"please", "speak", "lips", "five", "big", "blue", "boats"} <= set(found)
     assert all(Lexicon().known(word) for word in found)
     assert not any(is_filler(word) or "(" in word for word in found)

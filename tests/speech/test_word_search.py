@@ -11,7 +11,8 @@ from lipmotion.speech.audio_files import read_audio
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.recogniser import Recogniser
 from lipmotion.speech.recognition import Recognition
-from lipmotion.speech.word_search import confidences_of
+from lipmotion.speech.word_decoder import FoundWord
+from lipmotion.speech.word_search import confidence_of
 from lipmotion.types import Audio
 from lipmotion.units import Lexicon, is_silent
 
@@ -53,15 +54,23 @@ def test_other_kinds_do_not_search_for_words(welcome: Audio, kind: str, monkeypa
     assert found.phone_s > 3
 
 
-def test_confidences_grow_with_the_fit() -> None:
-    confidences = confidences_of(np.linspace(-40, 5, 100))
-    assert (np.diff(confidences) >= 0).all()
-    assert 0 <= confidences.min() < 0.1
-    assert 0.5 < confidences.max() <= 1
+def test_confidences_grow_with_fit_and_posterior() -> None:
+    by_fit = [confidence_of(fit, 0.5) for fit in np.linspace(-40, 5, 100)]
+    by_posterior = [confidence_of(-0.5, share) for share in np.linspace(0, 1, 100)]
+    assert by_fit == sorted(by_fit)
+    assert by_posterior == sorted(by_posterior)
+    assert 0 <= confidence_of(-99, 0) < 0.1
+    assert 0.7 < confidence_of(0, 1) <= 1
+
+
+def test_what_is_said_clearly_is_confident(welcome: Audio) -> None:
+    confidence = recognition(welcome).confidence
+    assert confidence is not None
+    assert confidence > 0.5
 
 
 def heard(monkeypatch: pytest.MonkeyPatch, *words: str) -> None:
-    monkeypatch.setattr(word_search, "words_in", lambda _: words)
+    monkeypatch.setattr(word_search, "words_in", lambda _: tuple(FoundWord(word, 0.5) for word in words))
 
 
 def test_words_that_do_not_fit_are_not_believed(welcome: Audio, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -135,3 +144,12 @@ def test_strangers_are_understood_better_with_words(recordings: Path) -> None:
     audio = read_audio(recordings / "speech-open" / "61-70968-0000.flac")
     said = (recordings / "speech-open" / "61-70968-0000.lab").read_text().lower().split()
     assert len(set(texts(recognition(audio))) & set(said)) > 0.7 * len(set(said))
+
+
+@pytest.mark.recordings
+def test_other_languages_have_no_confident_words(recordings: Path) -> None:
+    confidence = recognition(
+        read_audio(recordings / "speech-open" / "common_voice_ja_24511055.mp3"), "words"
+    ).confidence
+    assert confidence is not None
+    assert confidence < 0.35

@@ -53,13 +53,13 @@ def _shipped() -> Path:
     return shipped_path()
 
 
-def add_recogniser_argument(parser: argparse.ArgumentParser, default: str = "auto") -> None:
+def add_recogniser_argument(parser: argparse.ArgumentParser) -> None:
     """Add ``--recogniser``: how speech without a transcript is recognised."""
     kinds = (
         "auto, words (English), fast (phones alone), own (phone models of the model), general (of many voices), or "
-        f"words by an installed recogniser: whisper, vosk (default: {default})"
+        "words by an installed recogniser: whisper, vosk (default: auto)"
     )
-    parser.add_argument("--recogniser", default=default, metavar="KIND", help=kinds)
+    parser.add_argument("--recogniser", default="auto", metavar="KIND", help=kinds)
 
 
 def request_and_model(options: argparse.Namespace) -> tuple[SpeechRequest, Model]:

@@ -13,8 +13,6 @@ SYSTEM = "structure of the coupled engine: ph-HMM, ph-MSHMM, ph-FHMM, ph-vi-FHMM
 UNITS = "modelled units: phone (default), eVis, sVis, pbVis, 2vis, or a table file (docs/unit-sets.md)"
 OTHERS = "also train on transcribed recordings without motion (coupled)"
 VISUAL = "modelled motion: geometry (tracked or given curves, default), eigenlips (mouth pictures) or both"
-
-
 FROM = "stand on this model (default: the one that ships), or 'none' (docs/own-model.md)"
 
 
@@ -33,9 +31,8 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser.add_argument("--visual", default="geometry", metavar="KIND", help=VISUAL)
     parser.add_argument("--voices", action="store_true", help="also train on synthetic voices (coupled)")
     add_input(parser, "--recordings", what="folder of recordings", metavar="FOLDER", help=OTHERS)
-    add_input(
-        parser, "--from", what="model to start from", dest="start", default="", type=str, metavar="MODEL", help=FROM
-    )
+    start = {"what": "model to start from", "dest": "start", "type": str, "default": ""}
+    add_input(parser, "--from", metavar="MODEL", help=FROM, **start)
     add_workers(parser)
     add_machine_readable(parser)
     parser.set_defaults(run=run)

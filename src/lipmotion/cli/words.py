@@ -7,7 +7,7 @@ from typing import Any
 
 from lipmotion.cli.options import add_machine_readable, add_workers, worker_count
 from lipmotion.cli.paths import add_input, add_output
-from lipmotion.cli.speech import add_model_argument, add_recogniser_argument
+from lipmotion.cli.speech import add_model_argument
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -17,7 +17,8 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     outputs: dict[str, Any] = {"type": str, "nargs": "+", "action": "extend", "default": []}
     written = "FILE.txt, or FILE.json with times and confidences (default: text on standard output)"
     add_output(parser, "-o", "--output", force=True, help=written, **outputs)
-    add_recogniser_argument(parser, "words")
+    kinds = "words: all; auto: those that fit the sound (default: words)"
+    parser.add_argument("--recogniser", default="words", metavar="KIND", help=kinds)
     add_model_argument(parser)
     add_workers(parser)
     add_machine_readable(parser)

@@ -25,8 +25,9 @@ WORD_FIT, STRETCH_FIT = -2.0, -1.5
 """Words are believed from the first fit on, all words of a stretch from the second one on (``AlignedWords.fits``)."""
 WORD_BONUS = 2.0
 """Where words are not believed, their phones are still more probable than others, by so many nats a frame."""
-HALF_FIT, FIT_SCALE = -0.9, 0.6
-"""At the first fit every other word is right; the odds grow by a factor of e for every further so many nats."""
+FIT_WEIGHT, POSTERIOR_WEIGHT, CONSTANT = 0.62, 3.4, -1.9
+LEAST_FIT, MOST_FIT = -4.0, 1.0
+"""Coefficients of the confidence; fits count within these limits."""
 SHORT_FRAMES = 3000
 """The words of so little sound are recognised in this process: to start another one would take as long."""
 DICTIONARY = Lexicon()
@@ -65,15 +66,17 @@ class WordSearch:
         found = each(words_in, (stretch_samples(audio, stretch) for stretch in stretches))
         parts, heard = list[LabelledStretch](), list[HeardWord]()
         for stretch, words in zip(stretches, found, strict=True):
-            here, confidences = self._part(stretch, words, len(heard))
+            here, fits = self._part(stretch, [word.text for word in words], len(heard))
             parts += here
-            heard += [HeardWord(word, confidence) for word, confidence in zip(words, confidences, strict=True)]
+            heard += [
+                HeardWord(word.text, confidence_of(fit, word.posterior)) for word, fit in zip(words, fits, strict=True)
+            ]
         return parts, heard
 
     def _part(
         self, stretch: Stretch, words: Sequence[str], first_word: int
     ) -> tuple[list[LabelledStretch], list[float]]:
-        """Return the frames of a stretch that its words decide, with their phones, and the confidence of each word."""
+        """Return the frames of a stretch that its words decide, with their phones, and the fit of each word."""
         if not words:
             return [], []
         values = self.aligning.stretch(*stretch)
@@ -81,13 +84,13 @@ class WordSearch:
         try:
             aligned = align_heard_words(self.hmm, likelihoods, words, DICTIONARY)
         except AlignmentError:  # there is not room for them all
-            return [], [0.0] * len(words)
+            return [], [LEAST_FIT] * len(words)
         fits, fit = aligned.fits(values, self.path[slice(*stretch)])
         believed = np.full(len(words), self.believing or fit > STRETCH_FIT) | (fits > WORD_FIT)
         decided = list(labels_of_words(aligned, stretch, believed, first_word))
         if not believed.all():
             decided = [(stretch, spliced(self._favouring(stretch, aligned), decided, stretch.end))]
-        return decided, confidences_of(fits).tolist()
+        return decided, fits.tolist()
 
     def _favouring(self, stretch: Stretch, aligned: AlignedWords) -> list[LabelledFrames]:
         """Return the phones of a stretch that are recognised if those of words in it are more probable than others."""
@@ -95,10 +98,14 @@ class WordSearch:
         return free_labels(self.loop, self.loop.network.best_path(log_likelihoods_from(values)), stretch.first)
 
 
-def confidences_of(fits: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the probability that words with these fits (``AlignedWords.fits``) are right [same shape]."""
-    confidence: NDArray[np.float64] = 1 / (1 + np.exp(-(fits - HALF_FIT) / FIT_SCALE))
-    return confidence
+def confidence_of(fit: float, posterior: float) -> float:
+    """Return the probability that a word is right, 0 to 1: a logistic regression on some hundred words (decision 13).
+
+    fit       : of the word (``AlignedWords.fits``), in nats
+    posterior : among the words of the search
+    """
+    score = FIT_WEIGHT * min(max(fit, LEAST_FIT), MOST_FIT) + POSTERIOR_WEIGHT * posterior + CONSTANT
+    return float(1 / (1 + np.exp(-score)))
 
 
 def free_labels(loop: UnitLoop, path: NDArray[np.intp], first: int = 0) -> list[LabelledFrames]:

@@ -29,11 +29,8 @@ def header(generation: Generation) -> dict[str, Any]:
 
 def units_and_origin(generation: Generation, source: Mapping[str, str], model: Mapping[str, str]) -> dict[str, Any]:
     """Return the members ``units``, ``outlook`` (if it is known), ``source`` and ``model``."""
-    units = [
-        {"start_s": span.start_s, "end_s": span.end_s, "phone": span.label.phone, "unit": span.label.unit}
-        for span in generation.units
-    ]
     outlook = {} if generation.outlook is None else {"outlook": asdict(generation.outlook)}
+    units = [_row(span) for span in generation.units]
     return {"units": units, **outlook, "source": dict(source), "model": dict(model)}
 
 
@@ -74,8 +71,15 @@ def _array(values: Any, channels: int) -> NDArray[np.float64]:
     return array.reshape(0, channels) if array.size == 0 else array
 
 
+def _row(span: Span[Unit]) -> dict[str, Any]:
+    """Return the member of ``units`` for a phone, with its word if that is known."""
+    row = {"start_s": span.start_s, "end_s": span.end_s, "phone": span.label.phone, "unit": span.label.unit}
+    return row | {"word": span.label.word} if span.label.word else row
+
+
 def _span(row: Any) -> Span[Unit]:
-    span = Span(float(row["start_s"]), float(row["end_s"]), Unit(str(row["phone"]), str(row["unit"])))
+    label = Unit(str(row["phone"]), str(row["unit"]), str(row.get("word", "")))
+    span = Span(float(row["start_s"]), float(row["end_s"]), label)
     if not span.start_s >= 0 or span.end_s == float("inf"):
         raise InputError(
             f"the unit {span.label.phone!r} lasts from {span.start_s} to {span.end_s} s, required: finite times from 0"

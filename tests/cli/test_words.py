@@ -1,0 +1,53 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from cli.conftest import RunCommand, is_one_error
+
+pytestmark = pytest.mark.usefixtures("here")
+WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"
+SAID = "please speak and my lips will move five big blue boats float by"
+
+
+def test_words_are_printed(run: RunCommand) -> None:
+    assert run("words", WELCOME) == (0, [SAID], [])
+
+
+def test_words_are_written_and_given_back(run: RunCommand, here: Path) -> None:
+    assert run("words", WELCOME, "-o", "said.txt", "said.json") == (0, ["said.txt", "said.json"], [])
+    assert (here / "said.txt").read_text() == SAID + "\n"
+    for transcript in ("said.txt", "said.json"):
+        assert run("animate", WELCOME, "--transcript", transcript, "-o", "motion.json") == (0, ["motion.json"], [])
+        units = json.loads((here / "motion.json").read_text())["units"]
+        assert list(dict.fromkeys(unit["word"] for unit in units if unit.get("word"))) == SAID.split()
+
+
+def test_for_programs(run: RunCommand) -> None:
+    done = run("words", WELCOME, "--machine-readable")
+    start, success = map(json.loads, done.out)
+    assert (start["type"], success["type"]) == ("start", "success")
+    assert " ".join(word["word"] for word in success["words"]) == SAID
+    assert success["word_s"] > success["phone_s"]
+    assert 0 < success["confidence"] < 1
+
+
+def test_without_words_there_is_nothing(run: RunCommand) -> None:
+    done = run("words", WELCOME, "--recogniser", "fast", "--machine-readable")
+    assert json.loads(done.out[-1])["words"] == []
+
+
+@pytest.mark.parametrize(
+    ("line", "code", "said"),
+    [
+        (["words", "missing.wav"], 3, "no such file"),
+        (["words", WELCOME, "-o", "words.csv"], 7, "unknown format '.csv'; required one of: .txt .json"),
+        (["words", WELCOME, "--recogniser", "best"], 3, "unknown recogniser 'best'"),
+    ],
+)
+def test_errors(run: RunCommand, line: list[object], code: int, said: str) -> None:
+    done = run(*line)
+    assert is_one_error(done, code)
+    assert said in done.err[0]

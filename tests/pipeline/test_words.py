@@ -1,0 +1,91 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from lipmotion.errors import ExportError
+from lipmotion.pipeline.animate import animate
+from lipmotion.pipeline.model import load_model
+from lipmotion.pipeline.request import SpeechRequest
+from lipmotion.pipeline.understand import understand, understood_speech
+from lipmotion.pipeline.words import recognise_words, words_as_text, write_words
+from lipmotion.speech.recognition import HeardWord, Recognition
+from lipmotion.types import Span, Timeline, Unit
+
+WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"
+
+
+def words(*timed: tuple[float, float, str]) -> Timeline[HeardWord]:
+    return Timeline(tuple(Span(start_s, end_s, HeardWord(text, 0.5)) for start_s, end_s, text in timed))
+
+
+def labels(units: Timeline[Unit]) -> list[tuple[str, str]]:
+    return [(span.label.phone, span.label.word) for span in units]
+
+
+@pytest.fixture(scope="module")
+def found() -> Recognition:
+    return recognise_words(WELCOME)
+
+
+def test_long_pauses_end_a_line() -> None:
+    assert words_as_text(words((0.0, 0.3, "oh"), (0.4, 0.6, "no"), (1.2, 1.5, "yes"))) == "oh no\nyes\n"
+    assert words_as_text(words()) == ""
+
+
+@pytest.mark.parametrize("suffix", [".txt", ".json", ".JSON"])
+def test_files_of_words_are_transcripts(found: Recognition, tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"words{suffix}"
+    write_words(found.words, [path], WELCOME)
+    aligned = animate(WELCOME, transcript=path).units
+    assert labels(aligned) == labels(found.units)
+    starts = [(a.start_s, b.start_s) for a, b in zip(aligned, found.units, strict=True)]
+    assert all(abs(a - b) < 0.05 for a, b in starts)
+
+
+def test_json_has_times_and_confidences(found: Recognition, tmp_path: Path) -> None:
+    write_words(found.words, [tmp_path / "words.json"])
+    document = json.loads((tmp_path / "words.json").read_text())
+    assert document["text"].startswith("please speak")
+    first = document["result"][0]
+    assert set(first) == {"word", "start", "end", "conf"}
+    assert 0.4 < first["start"] < first["end"] < 1.0
+    assert all(0 <= word["conf"] <= 1 for word in document["result"])
+
+
+def test_edited_words_win(found: Recognition, tmp_path: Path) -> None:
+    path = tmp_path / "words.txt"
+    write_words(found.words, [path])
+    path.write_text(path.read_text().replace("boats", "goats"))
+    assert "goats" in {span.label.word for span in animate(WELCOME, transcript=path).units}
+
+
+@pytest.mark.parametrize("name", ["words.srt", "words", "nowhere/words.txt"])
+def test_files_that_cannot_be_written(found: Recognition, tmp_path: Path, name: str) -> None:
+    with pytest.raises(ExportError):
+        write_words(found.words, [tmp_path / "first.txt", tmp_path / name])
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_words_are_those_of_the_motion(found: Recognition) -> None:
+    assert labels(animate(WELCOME).units) == labels(found.units)
+
+
+def test_speech_is_as_reliable_as_its_words(found: Recognition) -> None:
+    request, model = SpeechRequest(WELCOME), load_model()
+    understood = understood_speech(model, request)
+    assert understood.recognition is not None
+    assert understood.recognition.units == found.units
+    assert understood.speech.confidence == pytest.approx(found.reliability)
+    assert understood.speech.units == understand(model, request).units
+    given = understood_speech(model, SpeechRequest(WELCOME, transcript="please speak"))
+    assert given.recognition is None
+    assert understand(model, SpeechRequest(WELCOME, recogniser="fast")).confidence == pytest.approx(0)
+
+
+@pytest.mark.long
+def test_words_do_not_depend_on_the_processes(monkeypatch: pytest.MonkeyPatch, found: Recognition) -> None:
+    monkeypatch.setattr("lipmotion.speech.word_search.SHORT_FRAMES", 0)
+    assert recognise_words(WELCOME, workers=2).words == found.words
