@@ -15,12 +15,12 @@ from lipmotion.speech.voice_activity import Stretch
 from lipmotion.types import FRAME_RATE_HZ, Span, Timeline, Unit
 from lipmotion.units import is_silent
 
-CONFIDENCES = (0.45, 0.65)
-"""Words confirm nothing at the first confidence, all at the second one. Five-second pieces of fluent strangers had 0.58
-to 0.78; GRID's sentences, which no language model expects, in babble at 20 dB 0.30 to 0.51, at 10 dB 0.27 to 0.65."""
+CONFIDENCES = (0.25, 0.4)
+"""Words confirm nothing at the first confidence, all at the second one. Five-second pieces of a fluent stranger had 0.40
+to 0.67; sentences in babble and white noise at 10 and 20 dB, in which words are found that nobody said, 0.00 to 0.28."""
 RANGE_PERCENTILES = (5, 95)
-RANGES_DB = (20.0, 28.0)
-"""Likewise for the range of levels: 25 to 34 dB in these pieces, 23 to 26 and 16 to 19 dB in babble of 20 and 10 dB."""
+NOISY_DB = 20.0
+"""A recording with a smaller range of levels is noisy: 25 to 34 dB in these pieces, 16 to 19 dB in babble of 10 dB."""
 SLIVER_FRAMES = 3
 """Phones without words of which fewer frames are left beside a word are not made: no phone model is shorter."""
 
@@ -73,15 +73,11 @@ class Recognition:
             return None
         return sum(span.duration_s * span.label.confidence for span in self.words) / seconds
 
-    def reliability(self, log_energy: NDArray[np.floating[Any]]) -> float:
-        """Return how far words confirm the phones, 0 to 1.
-
-        log_energy : of every frame of the recording [shape=(T,)], as of ``speech.mfcc.log_energy``
-        It rises with the confidence, by the share of speech that words decided, and with the range of levels: in noise,
-        and in the babble of others, words are found that nobody said, with some confidence.
-        """
-        share = self.word_s / max(self.word_s + self.phone_s, 1e-9)
-        return _risen((self.confidence or 0.0) * share, *CONFIDENCES) * _risen(level_range_db(log_energy), *RANGES_DB)
+    @property
+    def reliability(self) -> float:
+        """How far words confirm the phones, 0 to 1: by their confidence, and the share of speech that they decided."""
+        confirmed = (self.confidence or 0.0) * self.word_s / max(self.word_s + self.phone_s, 1e-9)
+        return float(np.clip((confirmed - CONFIDENCES[0]) / (CONFIDENCES[1] - CONFIDENCES[0]), 0, 1))
 
 
 def level_range_db(log_energy: NDArray[np.floating[Any]]) -> float:
@@ -90,11 +86,6 @@ def level_range_db(log_energy: NDArray[np.floating[Any]]) -> float:
     log_energy : natural logarithm of the energy of every frame [shape=(T,)]
     """
     return float(np.ptp(np.percentile(log_energy, RANGE_PERCENTILES)) * 10 / np.log(10))
-
-
-def _risen(value: float, low: float, high: float) -> float:
-    """Return 0 up to ``low``, 1 from ``high`` on, and a straight line between."""
-    return float(np.clip((value - low) / (high - low), 0, 1))
 
 
 def recognition_of(
