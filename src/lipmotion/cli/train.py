@@ -7,13 +7,13 @@ import argparse
 from lipmotion.cli.options import add_machine_readable, add_workers, list_or_all, worker_count
 from lipmotion.cli.paths import add_input, add_output
 from lipmotion.cli.speech import add_lexicon_argument
+from lipmotion.cli.starting_model import add_start_argument, model_to_start_from
 
 ENGINE = "trajectory (default), coupled (chains of states for speech and for lips) or joint (one model, five streams)"
 SYSTEM = "structure of the coupled engine: ph-HMM, ph-MSHMM, ph-FHMM, ph-vi-FHMM, ph-CHMM or ph-vi-CHMM (default)"
 UNITS = "modelled units: phone (default), eVis, sVis, pbVis, 2vis, or a table file (docs/unit-sets.md)"
 OTHERS = "also train on transcribed recordings without motion (coupled)"
 VISUAL = "modelled motion: geometry (tracked or given curves, default), eigenlips (mouth pictures) or both"
-FROM = "stand on this model (default: the one that ships), or 'none' (docs/own-model.md)"
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -31,8 +31,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser.add_argument("--visual", default="geometry", metavar="KIND", help=VISUAL)
     parser.add_argument("--voices", action="store_true", help="also train on synthetic voices (coupled)")
     add_input(parser, "--recordings", what="folder of recordings", metavar="FOLDER", help=OTHERS)
-    start = {"what": "model to start from", "dest": "start", "type": str, "default": ""}
-    add_input(parser, "--from", metavar="MODEL", help=FROM, **start)
+    add_start_argument(parser)
     add_workers(parser)
     add_machine_readable(parser)
     parser.set_defaults(run=run)
@@ -41,7 +40,6 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 def run(options: argparse.Namespace) -> None:
     """Call ``lipmotion.train`` and ``lipmotion.save_model``; report what was used."""
     from lipmotion.cli.progress import reporting
-    from lipmotion.cli.starting_model import model_to_start_from
     from lipmotion.corpora.store import Corpus, Selection
     from lipmotion.engines import engine_from_settings
     from lipmotion.pipeline.model import save_model

@@ -5,7 +5,7 @@ from __future__ import annotations
 from lipmotion.pipeline.request import SpeechRequest
 from lipmotion.pipeline.understand import UnderstoodSpeech
 from lipmotion.speech.recogniser import FULL_WEIGHT_SCORE, NO_WEIGHT_SCORE
-from lipmotion.speech.recognition import CONFIDENCES, RANGES_DB
+from lipmotion.speech.recognition import CONFIDENCES, NOISY_DB
 from lipmotion.types import Outlook
 
 TRANSCRIPT = "the words that are spoken (--transcript)"
@@ -36,7 +36,7 @@ def _advice(understood: UnderstoodSpeech) -> tuple[str, ...]:
             advice.append(TRANSCRIPT)
         if found.similarity is None or found.similarity < FULL_WEIGHT_SCORE:
             advice.append(OWN_MODEL)
-    if understood.range_db < RANGES_DB[0]:
+    if understood.range_db < NOISY_DB:
         unsure = found is None or (found.confidence or 0.0) < CONFIDENCES[0]
         advice.insert(0 if unsure else len(advice), LESS_NOISE)
     return tuple(advice)

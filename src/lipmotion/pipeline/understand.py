@@ -131,9 +131,7 @@ def recognised_speech(
         except AlignmentError:
             pass
     found = recognise()
-    return replace(
-        speech, units=found.units, units_known=False, confidence=found.reliability(analysed(audio).log_energy)
-    )
+    return replace(speech, units=found.units, units_known=False, confidence=found.reliability)
 
 
 def _words(

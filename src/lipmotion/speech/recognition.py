@@ -16,8 +16,8 @@ from lipmotion.types import FRAME_RATE_HZ, Span, Timeline, Unit
 from lipmotion.units import is_silent
 
 CONFIDENCES = (0.25, 0.4)
-"""Words confirm nothing at the first confidence, all at the second one. Five-second pieces of a fluent stranger had 0.40
-to 0.67; sentences in babble and white noise at 10 and 20 dB, in which words are found that nobody said, 0.00 to 0.28."""
+"""Words confirm nothing at the first confidence, all at the second one. Five-second pieces of a fluent stranger had
+0.40 to 0.67; sentences in noise of 10 and 20 dB, in which words are found that nobody said, 0.00 to 0.28."""
 RANGE_PERCENTILES = (5, 95)
 NOISY_DB = 20.0
 """A recording with a smaller range of levels is noisy: 25 to 34 dB in these pieces, 16 to 19 dB in babble of 10 dB."""

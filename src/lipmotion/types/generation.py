@@ -142,7 +142,8 @@ class Outlook:
     """What to expect of generated motion: how well the model knew the words and the voice.
 
     words      : where the phones come from: ``transcript``, ``given units``, ``own model`` (the engine's own
-                 recognition of a speaker that it was trained on), ``words`` or ``phones`` (recognised, most of the speech)
+                 recognition of a speaker that it was trained on), ``words`` or ``phones`` (recognised, for the most
+                 part)
     confidence : 0 to 1, of recognised words, by their share of the speech; 1 where words or units were given
     voice      : 0 (unknown) to 1 (as in the training); None where it was not needed
     range_db   : decibels between loud and quiet moments; under 20 the recording is noisy
