@@ -78,8 +78,8 @@ def _row(span: Span[Unit]) -> dict[str, Any]:
 
 
 def _span(row: Any) -> Span[Unit]:
-    label = Unit(str(row["phone"]), str(row["unit"]), str(row.get("word", "")))
-    span = Span(float(row["start_s"]), float(row["end_s"]), label)
+    start_s, end_s = float(row["start_s"]), float(row["end_s"])
+    span = Span(start_s, end_s, Unit(str(row["phone"]), str(row["unit"]), str(row.get("word", ""))))
     if not span.start_s >= 0 or span.end_s == float("inf"):
         raise InputError(
             f"the unit {span.label.phone!r} lasts from {span.start_s} to {span.end_s} s, required: finite times from 0"
