@@ -144,3 +144,15 @@ def test_no_frames_no_rate_and_no_size_are_refused():
         mouth_poses(motion(opening=[0.0], width=[0.0]), NOTHING_SAID, 25)
     with pytest.raises(InputError, match="thickness of the lips"):
         mouth_poses(motion(opening=[0.2], outer=[0.2]), NOTHING_SAID, 25)
+
+
+def test_teeth_are_hidden_in_pauses_and_seen_in_speech() -> None:
+    units = Timeline((Span(0.0, 0.5, Unit("aa")), Span(0.5, 1.0, Unit("sp")), Span(1.0, 1.5, Unit("aa"))))
+    motion = Motion(np.full((151, 1), 0.1), 100.0, (Channel("opening"),))
+    poses = mouth_poses(motion, units, 25)
+    assert poses[6].teeth == pytest.approx(1)
+    assert poses[6].gap == pytest.approx(0.1)
+    assert poses[19].teeth == pytest.approx(0)
+    assert poses[19].gap < 0.04
+    short = Timeline((Span(0.0, 0.7, Unit("aa")), Span(0.7, 0.8, Unit("sp")), Span(0.8, 1.5, Unit("aa"))))
+    assert min(pose.teeth for pose in mouth_poses(motion, short, 25)) == pytest.approx(1)

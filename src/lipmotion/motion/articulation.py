@@ -20,7 +20,7 @@ from lipmotion.motion.rest import away_from_speech, speech_intervals
 from lipmotion.motion.space import MotionSpace
 from lipmotion.stats.delta_windows import with_dynamics
 from lipmotion.storage.schema import Arrays, ArraySpec, checked_arrays
-from lipmotion.types import FRAME_RATE_HZ, Example, Span, Timeline, Unit
+from lipmotion.types import EYE_DISTANCE, FRAME_RATE_HZ, Example, Span, Timeline, Unit
 from lipmotion.units import PHONES, SILENCE, is_silent, most_similar_phone, unknown_phone_message
 
 Array = NDArray[np.float64]
@@ -29,6 +29,9 @@ Context = tuple[str, str, str]
 Statistics = tuple[Array, Array]
 ARTICULATORS = ("opening", "width", "outer", "jaw", "upper_lip", "lower_lip", "protrusion", "inner_width")
 """The columns of the table (docs/articulation.md)."""
+TYPICAL_DEVIATIONS = (0.054, 0.051, 0.055, 0.047, 0.023, 0.032, 0.009, 0.041)
+"""Standard deviations of talkers in fluent speech, eye distances. The range of a speaker is taken to be the geometric
+mean of these and of his own: few words, as GRID's, do not show how far a mouth can go."""
 THIRDS = ("begin", "middle", "end")
 SMOOTHING_S = 0.048
 """Standard deviation of the Gaussian that joins the thirds of successive phones: 1.2 pictures at 25 Hz."""
@@ -172,11 +175,15 @@ def fit_articulation_prior(
     known = [number for number, name in enumerate(ARTICULATORS) if name in measured]
     columns = np.stack([measured[ARTICULATORS[number]] for number in known], axis=1)
     centred = columns - columns.mean(axis=0)
-    deviations = np.maximum(columns.std(axis=0), LEAST_DEVIATION)
-    standard = centred / deviations
+    own = np.maximum(columns.std(axis=0), LEAST_DEVIATION)
+    standard = centred / own
+    deviations = own
+    if space.channels[space.direct[space.direct_names.index(OPENING)]].unit == EYE_DISTANCE:
+        deviations = np.sqrt(own * [TYPICAL_DEVIATIONS[number] for number in known])
     products = standard.T @ standard + RIDGE * len(poses) * np.eye(len(known))
     matrix = np.zeros((len(ARTICULATORS), poses.shape[1]))
-    matrix[known] = np.linalg.solve(products, standard.T @ (poses - poses.mean(axis=0)))
+    slopes = np.linalg.solve(products, standard.T @ (poses - poses.mean(axis=0)))
+    matrix[known] = slopes * (deviations / own)[:, None]
     for column, name in enumerate(space.direct_names):
         if name in ARTICULATORS:
             matrix[:, column] = 0

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.base import Arrays, Engine, Fit
-from lipmotion.engines.trajectory.experts import Experts
+from lipmotion.engines.trajectory.experts import Experts, unheard_frames
 from lipmotion.engines.trajectory.model import TrajectoryModel, model_arrays, model_from_arrays
 from lipmotion.engines.trajectory.train import LEAST_NETWORK_S, fit_trajectory
 from lipmotion.engines.trajectory.training_data import TrainingOptions
@@ -158,7 +158,10 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
         distinct = {state: number for number, state in enumerate(dict.fromkeys(states))}
         path = np.array([distinct[state] for state in states], np.intp)
         rows = np.array([model.emission.row(state, layout) for state in distinct], np.intp)
-        experts = Experts(model.emission, rows[path], speech, model.network, model.prior, model.network_share)
+        densities = rows[path]
+        if speech.spectrum is not None:
+            densities[unheard_frames(speech.spectrum, speech.units)] = len(model.emission.means) - 1
+        experts = Experts(model.emission, densities, speech, model.network, model.prior, model.network_share)
 
         learned = model.motion if self.config.variance_scaling else replace(model.motion, scaling=None)
         motion, variance = learned.generate(

@@ -55,11 +55,11 @@ def _teeth_and_tongue(face: Bands, shape: LipOutlines, within: MouthInterior, po
     top, bottom = shape.upper_inner, shape.lower_inner
     hole = face.between(float(top.min()), float(bottom.max()))
     hole.fill(top, bottom, palette.CAVITY)
-    arch = np.exp(-((hole.x / 0.19) ** 4)) * (1 - 0.4 * roundness(pose))
+    arch = np.exp(-((hole.x / 0.19) ** 4)) * (1 - 0.4 * roundness(pose)) * pose.teeth
     hole.fill(within.teeth_lower, bottom, palette.LOWER_TOOTH, 0.95 * arch)
-    hole.fill(within.teeth_lower, bottom, palette.MOUTH_SHADOW, 0.32 * _lines(hole, LOWER_TOOTH_GAPS))
+    hole.fill(within.teeth_lower, bottom, palette.MOUTH_SHADOW, 0.32 * pose.teeth * _lines(hole, LOWER_TOOTH_GAPS))
     hole.fill(top, within.teeth_upper, palette.TOOTH, arch)
-    hole.fill(top, within.teeth_upper, palette.MOUTH_SHADOW, 0.32 * _lines(hole, UPPER_TOOTH_GAPS))
+    hole.fill(top, within.teeth_upper, palette.MOUTH_SHADOW, 0.32 * pose.teeth * _lines(hole, UPPER_TOOTH_GAPS))
     lit = np.exp(-((hole.x / 0.16) ** 2)) * (0.75 + 0.25 * pose.tip)
     hole.fill(within.tongue_top, within.tongue_bottom, palette.TONGUE, lit)
     groove = 0.2 * np.exp(-((hole.x / 0.018) ** 2))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.faces.portrait.articulation import CLOSURES, TIP_RAISES, TUCKS, gesture_weight
+from lipmotion.faces.portrait.articulation import CLOSURES, TIP_RAISES, TUCKS, gesture_weight, pause_weight
 from lipmotion.types import Motion, Timeline, Unit
 from lipmotion.units import is_silent
 
@@ -24,6 +24,8 @@ WIDTH_GAIN, WIDTH_REACH = 1.5, 0.3
 """Changes of width are exaggerated: small ones by the factor, none beyond the reach."""
 TUCKED_GAP = (0.03, 0.055)
 """Range of the gap while the lower lip is on the teeth: enough to show them."""
+PAUSED_GAP = 0.035
+"""Largest gap in pauses, in which people breathe with lips that hardly part."""
 DRAWN = ("opening", "width", "outer", "y_152")
 """The channels that are drawn."""
 
@@ -37,6 +39,7 @@ class MouthPose(NamedTuple):
     jaw      : drop of the chin, in eye distances
     tuck     : 0..1, how far the lower lip is against the upper teeth (f v)
     tip      : 0..1, how far the tip of the tongue is raised to the upper teeth (th dh l; less for t d n)
+    teeth    : 0..1, how far teeth can be seen: in pauses the lips hide them
     """
 
     gap: float
@@ -45,6 +48,7 @@ class MouthPose(NamedTuple):
     jaw: float
     tuck: float
     tip: float
+    teeth: float = 1.0
 
 
 def mouth_poses(motion: Motion, units: Timeline[Unit], fps: float) -> list[MouthPose]:
@@ -59,6 +63,8 @@ def mouth_poses(motion: Motion, units: Timeline[Unit], fps: float) -> list[Mouth
     tuck = np.maximum(gesture_weight(units, TUCKS, time_s) - gesture_weight(units, CLOSURES, time_s), 0)
     gap = _gap(motion, time_s, fps)
     gap += tuck * (np.clip(gap, *TUCKED_GAP) - gap)
+    pause = pause_weight(units, time_s)
+    gap += pause * (np.minimum(gap, PAUSED_GAP) - gap)
     curves = (
         gap,
         _at(motion, _width(motion, rest), time_s),
@@ -66,6 +72,7 @@ def mouth_poses(motion: Motion, units: Timeline[Unit], fps: float) -> list[Mouth
         _jaw(motion, rest, gap, time_s),
         tuck,
         gesture_weight(units, TIP_RAISES, time_s),
+        1 - pause,
     )
     return [MouthPose(*row) for row in np.stack(curves, axis=1).tolist()]
 
