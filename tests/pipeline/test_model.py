@@ -204,7 +204,7 @@ def test_a_package_without_a_model_says_so(monkeypatch: pytest.MonkeyPatch, tmp_
 def test_a_model_with_the_former_names_of_options_is_read(toy_model_file: Path, tmp_path: Path) -> None:
     former = {
         "parts": 5, "silent_parts": 13, "listens": True, "axes": 150, "full_range": True, "joint": True,
-        "trajectory_steps": 0,
+        "trajectory_steps": 0, "articulation": False,
     }  # fmt: skip
     model = load_model(with_header(toy_model_file, tmp_path / "m.lipmotion", configuration=former))
     assert model.engine == load_model(toy_model_file).engine

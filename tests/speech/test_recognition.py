@@ -111,9 +111,9 @@ def test_what_was_recognised() -> None:
     ]
     assert (found.word_s, found.phone_s) == pytest.approx((0.3, 0.1))
     assert found.confidence == pytest.approx(0.8)
-    energy = np.tile(np.float32([-12.0, 3.0]), 25)
-    assert 0 <= found.reliability(energy) <= 1
-    assert found.reliability(np.zeros(50, np.float32)) == pytest.approx(0)
+    assert found.reliability == pytest.approx(1)
+    doubtful = recognition_of(units, labels, [HeardWord("bee", 0.3)], -7.0)
+    assert doubtful.reliability == pytest.approx(0)
 
 
 def test_the_same_word_twice_is_two_words() -> None:

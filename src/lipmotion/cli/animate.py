@@ -6,7 +6,7 @@ import argparse
 from typing import Any
 
 from lipmotion.cli.options import add_workers, worker_count
-from lipmotion.cli.output import print_error, print_line
+from lipmotion.cli.output import print_line, print_note
 from lipmotion.cli.paths import add_output
 from lipmotion.cli.speech import add_speech_arguments, request_and_model
 
@@ -55,4 +55,4 @@ def run(options: argparse.Namespace) -> None:
     for path in [*options.output, *filter(None, [options.posteriors])]:
         print_line(path)
     if result.outlook is not None:
-        print_error(result.outlook.text)
+        print_note(result.outlook.text)

@@ -35,6 +35,12 @@ def print_error(text: object) -> None:
             print(f"{LINE_START if sys.stderr.isatty() else ''}{with_program_name(text)}", file=sys.stderr)
 
 
+def print_note(text: object) -> None:
+    """Print one line for people on standard error, if it is a terminal: programs find the same in files."""
+    if sys.stderr is not None and sys.stderr.isatty():
+        print_error(text)
+
+
 def with_program_name(text: object) -> str:
     """Return a text as one printable line that begins with the program's name."""
     return f"lipmotion: {printable(text)}"

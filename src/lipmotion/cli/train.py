@@ -68,5 +68,5 @@ def run(options: argparse.Namespace) -> None:
             save_model(model, options.output)
         figures = {"used": len(result.used), "minutes": model.about["minutes"], "skipped": len(result.skipped)}
         text = ", ".join(f"{value} {name}" for name, value in figures.items())
-        use = f"use it: lipmotion animate SPEECH -o FILE --model {options.output}"
-        report.finish(f"{options.output}: {text}; {use}", model=str(options.output), **figures)
+        text += f"; use it: lipmotion animate SPEECH -o FILE --model {options.output}"
+        report.finish(f"{options.output}: {text}", model=str(options.output), **figures)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from lipmotion.engines import ENGINES
@@ -9,8 +10,9 @@ from lipmotion.engines.base import HasPosteriors
 from lipmotion.errors import ExportError, InputError
 from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.outlook import outlook_of
 from lipmotion.pipeline.request import SpeechInput, request_of
-from lipmotion.pipeline.understand import understand
+from lipmotion.pipeline.understand import understood_speech
 from lipmotion.storage.files import check_target, whole_file
 from lipmotion.types import ChainPosteriors, Generation
 
@@ -30,8 +32,11 @@ def animate_with_posteriors(speech: SpeechInput, *, model: Model) -> tuple[Gener
             f"the engine {engine.name!r} has no chains of states whose posteriors could be shown; give a model that "
             f"was trained with --engine {' or '.join(having)}"
         )
-    understood = understand(model, request_of(speech))
-    return engine.generate(learned, understood), engine.posteriors(learned, understood)
+    request = request_of(speech)
+    understood = understood_speech(model, request)
+    generation = engine.generate(learned, understood.speech)
+    outlook = outlook_of(request, understood)
+    return replace(generation, outlook=outlook), engine.posteriors(learned, understood.speech)
 
 
 def check_picture(path: Path, speech: Path | None = None) -> None:
