@@ -10,6 +10,7 @@ from lipmotion.errors import ExportError, InputError
 from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import SpeechInput, request_of
+from lipmotion.pipeline.speakers import generate_for, speaker_map
 from lipmotion.pipeline.understand import understand
 from lipmotion.storage.files import check_target, whole_file
 from lipmotion.types import ChainPosteriors, Generation
@@ -30,8 +31,10 @@ def animate_with_posteriors(speech: SpeechInput, *, model: Model) -> tuple[Gener
             f"the engine {engine.name!r} has no chains of states whose posteriors could be shown; give a model that "
             f"was trained with --engine {' or '.join(having)}"
         )
-    understood = understand(model, request_of(speech))
-    return engine.generate(learned, understood), engine.posteriors(learned, understood)
+    request = request_of(speech)
+    person = speaker_map(model.speakers, request.speaker)
+    understood = understand(model, request)
+    return generate_for(person, engine, learned, understood), engine.posteriors(learned, understood)
 
 
 def check_picture(path: Path, speech: Path | None = None) -> None:
