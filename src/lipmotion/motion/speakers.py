@@ -210,7 +210,7 @@ def _measured(examples: Sequence[Example], column: int | None) -> _Person:
         speech_s = speech_intervals(example.speech.units)
         silent.append(values[valid & away_from_speech(time_s, speech_s, FAR_FROM_SPEECH_S)])
         silence.append(values[valid & away_from_speech(time_s, speech_s, NEAR_SPEECH_S)])
-        spoken.append(values[valid & ~away_from_speech(time_s, speech_s, 0.0)])
+        spoken.append(values[valid & np.logical_not(away_from_speech(time_s, speech_s, 0.0))])
         if column is not None:
             ranges = closable_ranges(example.speech.units, len(values))
             smallest += [values[frames, column][valid[frames]].min() for frames in ranges if valid[frames].any()]
