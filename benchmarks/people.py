@@ -4,19 +4,24 @@
 
 Trains on 100 utterances of s1 and one clip of each of four other GRID speakers, and judges the clip of the fifth; five
 times. ``alone``: s1 without the others; ``pooled``: all as one person; ``maps``: each person's motion mapped to that of
-the mean person. ACC of opening, width and outer: of the fifth person the mean over clips, at the best lag within 60 ms
-(as ``anyone.py``), of s1 the figures of ``evaluate`` on ``val``. Corpus: docs/results/voices-people.md.
+the mean person; ``nearest``: the same models, with the motion of the person whose voice is most like the fifth's.
+ACC of opening, width and outer: of the fifth person the mean over clips, at the best lag within 60 ms (as
+``anyone.py``), of s1 the figures of ``evaluate`` on ``val``. Distance: mean absolute difference of the three channels
+without a lag, their sum. Corpus: docs/results/voices-people.md.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from anyone import CHANNELS, best_lag
+from anyone import CHANNELS, best_lag, compared
+from numpy.typing import NDArray
 
 from lipmotion import Corpus, animate, load_model, save_model
 from lipmotion.corpora.store import Selection
@@ -27,6 +32,7 @@ from lipmotion.pipeline.request import SpeechRequest
 from lipmotion.pipeline.training.train import train
 
 MAIN = "s1"
+KINDS = ["alone", "pooled", "maps", "nearest"]
 
 
 def main() -> None:
@@ -39,26 +45,32 @@ def main() -> None:
     parser.add_argument("--clips", type=int, default=100, help="of s1 (default: 100)")
     parser.add_argument("--engine", default="trajectory")
     parser.add_argument("--set", action="append", default=[])
-    parser.add_argument("--only", action="append", choices=["alone", "pooled", "maps"])
+    parser.add_argument("--only", action="append", choices=KINDS)
     options = parser.parse_args()
     options.output.mkdir(parents=True, exist_ok=True)
     corpus = Corpus.open(options.corpus)
     others = [name for name in corpus.speakers if name and name != MAIN]
-    for kind in options.only or ["alone", "pooled", "maps"]:
+    for kind in options.only or KINDS:
         each, own = {}, []
         for person in others:
             model = trained(options, corpus, kind, [name for name in others if name != person])
-            each[person] = of_person(corpus, model, person)
-            if kind != "alone" or not own:
+            whose = nearest(corpus, model, person) if kind == "nearest" else ""
+            each[person] = of_person(corpus, model, person, whose) | ({"whose": whose} if whose else {})
+            if kind in ("pooled", "maps") or not own:
                 own.append(of_main(corpus, model))
-        means = {name: round(float(np.mean([clip[name] for clip in each.values()])), 3) for name in CHANNELS}
-        print(json.dumps({"judged": "the fifth person", "trained": kind, **means, "each": each}), flush=True)
-        means = {name: round(float(np.mean([row[name] for row in own])), 4) for name in CHANNELS}
-        print(json.dumps({"judged": MAIN, "trained": kind, **means}), flush=True)
+        show("the fifth person", kind, [*CHANNELS, "distance"], list(each.values()), each=each)
+        show(MAIN, kind, CHANNELS, own)
+
+
+def show(judged: str, kind: str, figures: Sequence[str], rows: Sequence[Mapping[str, Any]], **more: object) -> None:
+    """Print the mean of each figure over rows."""
+    means = {name: round(float(np.mean([row[name] for row in rows])), 4) for name in figures}
+    print(json.dumps({"judged": judged, "trained": kind, **means, **more}), flush=True)
 
 
 def trained(options: argparse.Namespace, corpus: Corpus, kind: str, others: list[str]) -> Model:
     """Return a model of s1, and of some others unless it is to be alone."""
+    kind = "maps" if kind == "nearest" else kind
     path = options.output / ("alone.lipmotion" if kind == "alone" else f"{kind}-{'-'.join(others)}.lipmotion")
     if path.exists():
         return load_model(path)
@@ -80,10 +92,27 @@ def unnamed(corpus: Corpus, names: list[str], folder: Path) -> Corpus:
     return copy
 
 
-def of_person(corpus: Corpus, model: Model, person: str) -> dict[str, float]:
-    """Return the correlations of a person's first clip, from audio only."""
+def nearest(corpus: Corpus, model: Model, person: str) -> str:
+    """Return the speaker of a model whose mean spectrum in the louder half of the frames is most like a person's."""
+    assert model.speakers is not None
+    return min(
+        model.speakers.names, key=lambda other: float(np.linalg.norm(voice(corpus, other) - voice(corpus, person)))
+    )
+
+
+def voice(corpus: Corpus, speaker: str) -> NDArray[np.float64]:
+    """Return a speaker's mean cepstrum in the louder half of the frames of at most 20 clips [shape=(12,)]."""
+    frames = [np.asarray(corpus.utterance(name).features.values)[:, :13] for name in corpus.names(None, [speaker])[:20]]
+    return np.concatenate([rows[rows[:, 0] > np.median(rows[:, 0]), 1:] for rows in frames]).mean(axis=0)
+
+
+def of_person(corpus: Corpus, model: Model, person: str, whose: str) -> dict[str, Any]:
+    """Return the figures of a person's first clip, from audio only, in the motion of another person of the model."""
     utterance = corpus.utterance(corpus.names(None, [person])[0])
-    return best_lag(animate(SpeechRequest(utterance.audio), model=model).motion, utterance.track, 0.06)
+    motion = animate(SpeechRequest(utterance.audio, speaker=whose), model=model).motion
+    generated, recorded = compared(motion, utterance.track)
+    distance = float(np.abs(generated - recorded).mean(axis=0).sum())
+    return {**best_lag(motion, utterance.track, 0.06), "distance": round(distance, 4)}
 
 
 def of_main(corpus: Corpus, model: Model) -> dict[str, float]:

@@ -130,7 +130,7 @@ def test_a_pin_that_nobody_can_take_is_refused_as_it_was_given(model: Model, toy
 def test_unknown_speakers_are_refused(model: Model, toy_model: Model, toy_sentence: ToySentence) -> None:
     with pytest.raises(InputError, match="no speaker 'cleo', only: anna, ben"):
         opening(model, toy_sentence, "cleo")
-    with pytest.raises(InputError, match="tells no speakers apart.*'cleo'"):
+    with pytest.raises(InputError, match=r"tells no speakers apart.*'cleo'"):
         opening(toy_model, toy_sentence, "cleo")
     assert toy_model.speakers is None
 
