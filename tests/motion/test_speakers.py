@@ -28,7 +28,7 @@ POINTS = tuple(Channel(f"{axis}_{number}") for number in (13, 14) for axis in "x
 
 def spoken(units: Timeline[Unit], motion: Motion, frames: int | None = None) -> Example:
     count = len(motion.values) if frames is None else frames
-    speech = Speech(Features(np.zeros((count, 39)), count / 100), units)
+    speech = Speech(Features(np.zeros((count, 39), np.float32), count / 100), units)
     return Example("one", speech, replace(motion, values=motion.values[:count]), np.ones(count, bool))
 
 

@@ -241,7 +241,7 @@ def _rest_poses(people: Sequence[_Person]) -> Array:
     Whoever is never silent rests as far from their median pose in speech as the others do.
     """
     rests, spoken = np.stack([person.rest for person in people]), np.stack([person.spoken for person in people])
-    known = np.isfinite(rests).all(axis=1)
+    known: NDArray[np.bool_] = np.asarray(np.isfinite(rests).all(axis=1))
     usual = (rests - spoken)[known].mean(axis=0) if known.any() else np.zeros(rests.shape[1])
     return np.where(known[:, None], rests, spoken + usual)
 
