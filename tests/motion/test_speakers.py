@@ -12,11 +12,14 @@ from lipmotion.motion.rest import away_from_speech, speech_intervals
 from lipmotion.motion.speakers import (
     FAR_FROM_SPEECH_S,
     NEAR_SPEECH_S,
+    VISEME_NAMES,
     SpeakerMaps,
     mean_person_examples,
     restfulness,
     speaker_arrays,
     speakers_from_arrays,
+    viseme_weights,
+    with_habits,
 )
 from lipmotion.testing.toy import toy_motion, toy_sentences
 from lipmotion.types import Channel, Example, Features, Motion, Span, Speech, Timeline, Unit
@@ -219,6 +222,42 @@ def test_channels_in_another_order() -> None:
         person.ordered((Channel("jaw"),))
 
 
+def test_habits_are_what_is_left_in_each_viseme() -> None:
+    examples, names = [*anna(), *ben()], ["anna"] * 6 + ["ben"] * 6
+    mapped, maps = mean_person_examples(examples, names)
+    planted = np.zeros((len(VISEME_NAMES), 3))
+    planted[VISEME_NAMES.index("lr1"), 1], planted[VISEME_NAMES.index("al"), 2] = 0.1, -0.2
+    generated = [
+        each.motion.values
+        - (viseme_weights(each.speech.units, len(each.motion.values)) @ planted if name == "ben" else 0.0)
+        for each, name in zip(mapped, names, strict=True)
+    ]
+    found = with_habits(maps, mapped, names, generated)
+    np.testing.assert_allclose(found.of("anna").habits, 0, atol=1e-12)
+    habits = found.of("ben").habits
+    assert 0.05 < habits[VISEME_NAMES.index("lr1"), 1] < 0.1
+    assert -0.2 < habits[VISEME_NAMES.index("al"), 2] < -0.05
+    assert np.abs(habits[:, 0]).max() < 1e-12
+    one = mapped[-1]
+    visemes = viseme_weights(one.speech.units, len(one.motion.values))
+    shift = found.of("ben").shift(one.motion.values, visemes)
+    assert np.abs(shift).max() > 0.03
+    restful = restfulness(one.speech.units, len(shift)) >= 1
+    assert np.abs(shift[restful]).max() < 1e-12
+    closed_lips = one.motion.values[:, 0] <= found.lips[0]
+    assert closed_lips.any()
+    assert np.abs(shift[closed_lips]).max() < 1e-12
+
+
+def test_weights_of_visemes_fade() -> None:
+    units = toy_sentences(3)[0].units
+    weights = viseme_weights(units, 250)
+    assert np.abs(weights.sum(axis=1) + restfulness(units, 250) - 1).max() < 1e-9
+    assert 0 < np.abs(np.diff(weights, axis=0)).max() < 0.3
+    unknown = Timeline((Span(0.0, 1.0, Unit("", "a group")),))
+    assert np.abs(viseme_weights(unknown, 100)).max() < 1e-12
+
+
 def test_maps_are_stored() -> None:
     _, maps = both(anna(), ben())
     again = speakers_from_arrays(speaker_arrays(maps))
@@ -235,6 +274,8 @@ def test_maps_are_stored() -> None:
         ("gain", np.ones((3, 3))),
         ("offset", np.ones((2, 2))),
         ("rest", np.full((2, 3), np.inf)),
+        ("habits", np.ones((2, 12, 3))),
+        ("lips", np.array([-0.1, 0.2])),
         ("names", np.array(["anna", "anna"])),
         ("names", np.array(["anna", ""])),
         ("names", np.array([1, 2])),
@@ -248,7 +289,7 @@ def test_damaged_maps_are_refused(name: str, value: np.ndarray) -> None:
         speakers_from_arrays(arrays | {name: value})
 
 
-@pytest.mark.parametrize("name", ["channels", "names", "gain", "offset", "rest"])
+@pytest.mark.parametrize("name", ["channels", "names", "gain", "offset", "rest", "habits", "lips"])
 def test_missing_arrays_are_refused(name: str) -> None:
     arrays = speaker_arrays(both(anna(), ben())[1])
     del arrays[name]

@@ -5,18 +5,20 @@ Engines learn and generate the motion of the mean person; the maps are outside o
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import convolve1d
 
 from lipmotion.errors import InputError
 from lipmotion.motion.closure import OPENING, closable_ranges
 from lipmotion.motion.rest import away_from_speech, speech_intervals
 from lipmotion.storage.schema import Arrays, ArraySpec, checked_arrays, format_errors, refuse_undeclared
 from lipmotion.types import FRAME_RATE_HZ, Channel, Example, Timeline, Unit
+from lipmotion.units import VISEME_OF, VISEMES
 
 NEAR_SPEECH_S, FAR_FROM_SPEECH_S = 0.1, 0.48
 """Within the first distance of speech the map is that of speech, beyond the second the rest pose is exactly the
@@ -31,6 +33,13 @@ LEAST_FRAMES = 10
 """Fewest frames of silence from which a rest pose is taken."""
 LEAST_RANGE = 0.05
 """A channel that somebody moves by less than this share of the widest range has a gain of 1 for everyone."""
+VISEME_NAMES = tuple(VISEMES)
+"""The order of the visemes in stored habits."""
+FADE_FRAMES = 11
+HABIT_PRIOR_FRAMES = 50.0
+"""Frames of a viseme that count as much as the assumption that a person has no habit in it."""
+WHOLLY = 0.25
+"""Share of the mean range by which lips must be open for habits to show wholly."""
 Array = NDArray[np.float64]
 
 
@@ -42,12 +51,30 @@ class SpeakerMap:
     gain     : the person's range as a multiple of the mean person's [shape=(P,)]
     offset   : in the units of the channels [shape=(P,)]
     rest     : what is added in silence away from speech, so that rest pose maps onto rest pose [shape=(P,)]
+    habits   : how the mean person's poses in each of the V visemes are changed before they are mapped [shape=(V, P)]
+    lips     : openings of the mean person's lips up to which habits do not show, and from which on they do wholly
     """
 
     channels: tuple[Channel, ...]
     gain: Array
     offset: Array
     rest: Array
+    habits: Array
+    lips: tuple[float, float]
+
+    def shift(self, values: NDArray[np.floating[Any]], visemes: Array) -> Array:
+        """Return by how much the mean person's poses are changed by this person's habits [shape=(T, P)].
+
+        values  : all channels of the mean person [shape=(T, P)]
+        visemes : from ``viseme_weights`` [shape=(T, V)]
+        Lips that are closed stay closed.
+        """
+        moved: Array = visemes @ self.habits
+        column = next((n for n, channel in enumerate(self.channels) if channel.name == OPENING), None)
+        if column is not None:
+            closed, opened = self.lips
+            moved *= np.clip((values[:, column : column + 1] - closed) / max(opened - closed, 1e-6), 0, 1)
+        return moved
 
     def to_person(self, values: NDArray[np.floating[Any]], restful: Array) -> Array:
         """Return the motion of this person, of the mean person's.
@@ -69,7 +96,8 @@ class SpeakerMap:
         if missing:
             raise InputError(f"no map of speakers for the channel {missing[0]!r}; train the model again")
         columns = [self.channels.index(channel) for channel in channels]
-        return SpeakerMap(tuple(channels), self.gain[columns], self.offset[columns], self.rest[columns])
+        parts = (self.gain[columns], self.offset[columns], self.rest[columns], self.habits[:, columns])
+        return SpeakerMap(tuple(channels), *parts, self.lips)
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +107,8 @@ class SpeakerMaps:
     channels : the P channels
     names    : of the S people
     gain, offset, rest : as in ``SpeakerMap``, of each [each shape=(S, P)]
+    habits   : as in ``SpeakerMap``, of each, in the order of ``VISEME_NAMES`` [shape=(S, V, P)]
+    lips     : as in ``SpeakerMap``, the same for all
     """
 
     channels: tuple[Channel, ...]
@@ -86,6 +116,8 @@ class SpeakerMaps:
     gain: Array
     offset: Array
     rest: Array
+    habits: Array
+    lips: tuple[float, float]
 
     def of(self, name: str) -> SpeakerMap:
         """Return the map of one person. Raises InputError: a person of another name."""
@@ -95,12 +127,14 @@ class SpeakerMaps:
                 "the mean person"
             )
         number = self.names.index(name)
-        return SpeakerMap(self.channels, self.gain[number], self.offset[number], self.rest[number])
+        parts = (self.gain[number], self.offset[number], self.rest[number], self.habits[number])
+        return SpeakerMap(self.channels, *parts, self.lips)
 
     def selected(self, names: Sequence[str]) -> SpeakerMaps:
         """Return the maps of some people."""
         rows = [self.names.index(name) for name in names]
-        return SpeakerMaps(self.channels, tuple(names), self.gain[rows], self.offset[rows], self.rest[rows])
+        parts = (self.gain[rows], self.offset[rows], self.rest[rows], self.habits[rows])
+        return SpeakerMaps(self.channels, tuple(names), *parts, self.lips)
 
 
 def restfulness(units: Timeline[Unit], frames: int) -> Array:
@@ -113,6 +147,45 @@ def restfulness(units: Timeline[Unit], frames: int) -> Array:
     share = np.clip((distance_s - NEAR_SPEECH_S) / (FAR_FROM_SPEECH_S - NEAR_SPEECH_S), 0, 1)
     smooth: Array = share * share * (3 - 2 * share)
     return smooth
+
+
+def viseme_weights(units: Timeline[Unit], frames: int) -> Array:
+    """Return how much of each viseme is in each frame at 100 Hz [shape=(frames, V)].
+
+    Visemes fade into each other over ``FADE_FRAMES``; in silence away from speech, and where no phone is known, all
+    weights are 0.
+    """
+    weights = np.zeros((frames, len(VISEME_NAMES)))
+    for span in units:
+        if span.label.phone in VISEME_OF:
+            first, stop = (round(time_s * FRAME_RATE_HZ) for time_s in (span.start_s, span.end_s))
+            weights[max(first, 0) : max(stop, 0), VISEME_NAMES.index(VISEME_OF[span.label.phone])] = 1
+    if frames:
+        window = np.hanning(FADE_FRAMES + 2)[1:-1]
+        weights = convolve1d(weights, window / window.sum(), axis=0, mode="nearest")
+    faded: Array = weights * (1 - restfulness(units, frames))[:, None]
+    return faded
+
+
+def with_habits(
+    maps: SpeakerMaps, examples: Sequence[Example], speakers: Sequence[str], generated: Iterable[NDArray[Any]]
+) -> SpeakerMaps:
+    """Return maps with the habits of each person: what is left of their motion in each viseme, on average.
+
+    examples  : from ``mean_person_examples``
+    speakers  : the name of each example's speaker
+    generated : the mean person's motion of each, as the engine generates it [each shape=(T, P)]
+    Averages are drawn towards 0 with the weight of ``HABIT_PRIOR_FRAMES``.
+    """
+    sums = np.zeros(maps.habits.shape)
+    counts = np.full(maps.habits.shape[:2], HABIT_PRIOR_FRAMES)
+    for example, speaker, values in zip(examples, speakers, generated, strict=True):
+        if speaker in maps.names:
+            weights = viseme_weights(example.speech.units, len(values)) * example.valid[:, None]
+            number = maps.names.index(speaker)
+            sums[number] += weights.T @ np.where(example.valid[:, None], example.motion.values - values, 0)
+            counts[number] += weights.sum(axis=0)
+    return replace(maps, habits=sums / counts[:, :, None])
 
 
 def mean_person_examples(examples: Sequence[Example], speakers: Sequence[str]) -> tuple[list[Example], SpeakerMaps]:
@@ -142,6 +215,8 @@ def speaker_arrays(maps: SpeakerMaps) -> dict[str, NDArray[Any]]:
         "gain": maps.gain,
         "offset": maps.offset,
         "rest": maps.rest,
+        "habits": maps.habits,
+        "lips": np.array(maps.lips),
     }
 
 
@@ -149,7 +224,7 @@ def speakers_from_arrays(arrays: Arrays) -> SpeakerMaps:
     """Deserialise maps. Raises ModelFormatError: an array is missing, unknown, or has a wrong shape, type or range."""
     with format_errors("the table of speakers"):
         refuse_undeclared(arrays, SPEAKERS)
-        stored = checked_arrays(arrays, SPEAKERS)
+        stored = checked_arrays(arrays, SPEAKERS, V=len(VISEME_NAMES))
         channels = tuple(Channel(name, unit) for name, unit in stored["channels"].tolist())
         names = tuple(stored["names"].tolist())
         if (
@@ -158,7 +233,9 @@ def speakers_from_arrays(arrays: Arrays) -> SpeakerMaps:
             or not all(names)
         ):
             raise ValueError("names of speakers or channels that are empty or repeat")
-        return SpeakerMaps(channels, names, stored["gain"], stored["offset"], stored["rest"])
+        closed, opened = stored["lips"].tolist()
+        parts = (stored["gain"], stored["offset"], stored["rest"], stored["habits"])
+        return SpeakerMaps(channels, names, *parts, (closed, opened))
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,7 +272,10 @@ def _fit_maps(examples: Sequence[Example], speakers: Sequence[str]) -> SpeakerMa
     gain = _gains(people, channels)
     offset = anchors - gain * anchors.mean(axis=0)
     rest = rests - offset - gain * rests.mean(axis=0)
-    return SpeakerMaps(channels, names, gain, offset, rest)
+    shut = float(closed.mean())
+    wide = float(np.mean([person.range[column] for person in people])) if column is not None else 0.0
+    habits = np.zeros((len(names), len(VISEME_NAMES), len(channels)))
+    return SpeakerMaps(channels, names, gain, offset, rest, habits, (shut, shut + WHOLLY * wide))
 
 
 def _measured(examples: Sequence[Example], column: int | None) -> _Person:
@@ -272,5 +352,7 @@ SPEAKERS = {
     "gain": ArraySpec(np.float64, "S P", LEAST_GAIN, MOST_GAIN),
     "offset": ArraySpec(np.float64, "S P", -1e6, 1e6),
     "rest": ArraySpec(np.float64, "S P", -1e6, 1e6),
+    "habits": ArraySpec(np.float64, "S V P", -1e6, 1e6),
+    "lips": ArraySpec(np.float64, "2", 0, 1e6),
 }
-"""Arrays of the maps of S speakers and P channels."""
+"""Arrays of the maps of S speakers, P channels and V visemes."""

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from lipmotion.engines import Animator
 from lipmotion.errors import InputError
 from lipmotion.motion.closure import OPENING
-from lipmotion.motion.speakers import SpeakerMap, SpeakerMaps, restfulness
+from lipmotion.motion.generation import BLOCK_FRAMES
+from lipmotion.motion.speakers import SpeakerMap, SpeakerMaps, restfulness, viseme_weights
 from lipmotion.types import (
     FRAME_RATE_HZ,
     WEIGHT,
@@ -70,7 +71,12 @@ def generate_for(
     pins = constraints.pins if constraints is not None else ()
     mean = engine.generate(learned, speech, Constraints(tuple(_mean_pin(person, restful, pin) for pin in pins)))
     fitted = person.ordered(mean.motion.channels)
-    values = fitted.to_person(mean.motion.values, restful).astype(mean.motion.values.dtype)
+    visemes = viseme_weights(speech.units, len(restful))
+    values = np.empty_like(mean.motion.values)
+    for start in range(0, len(values), BLOCK_FRAMES):
+        block = slice(start, start + BLOCK_FRAMES)
+        poses = mean.motion.values[block]
+        values[block] = fitted.to_person(poses + fitted.shift(poses, visemes[block]), restful[block])
     motion = replace(mean.motion, values=values)
     _hold_pins(motion, pins)
     bounded = [_is_never_negative(channel) for channel in motion.channels]
@@ -85,11 +91,16 @@ def explanation_for(person: SpeakerMap | None, explanation: Explanation, speech:
     """
     if person is None:
         return explanation
-    rest = person.rest * restfulness(speech.units, len(speech.features.values))[explanation.frame]
-    numbers = {channel.name: number for number, channel in enumerate(person.channels)}
+    frames, frame = len(speech.features.values), slice(explanation.frame, explanation.frame + 1)
+    channels = tuple(channel for channel in person.channels if channel.name in explanation.motion)
+    fitted = person.ordered(channels)
+    poses = np.array([[explanation.motion[channel.name].value for channel in channels]])
+    shift = fitted.shift(poses, viseme_weights(speech.units, frames)[frame])
+    added = fitted.to_person(shift, restfulness(speech.units, frames)[frame])[0]
+    numbers = {channel.name: number for number, channel in enumerate(channels)}
 
-    def mapped(channels: Mapping[str, ChannelValue]) -> dict[str, ChannelValue]:
-        return {name: _value(person, rest, numbers[name], value) for name, value in channels.items()}
+    def mapped(values: Mapping[str, ChannelValue]) -> dict[str, ChannelValue]:
+        return {name: _value(fitted, added, numbers[name], value) for name, value in values.items()}
 
     return replace(
         explanation,
@@ -99,10 +110,9 @@ def explanation_for(person: SpeakerMap | None, explanation: Explanation, speech:
     )
 
 
-def _value(person: SpeakerMap, rest: NDArray[np.float64], number: int, mean: ChannelValue) -> ChannelValue:
+def _value(person: SpeakerMap, added: NDArray[np.float64], number: int, mean: ChannelValue) -> ChannelValue:
     gain = float(person.gain[number])
-    value = float(person.offset[number] + rest[number]) + gain * mean.value
-    return ChannelValue(value, gain * mean.deviation)
+    return ChannelValue(float(added[number]) + gain * mean.value, gain * mean.deviation)
 
 
 def _mean_pin(person: SpeakerMap, restful: NDArray[np.float64], pin: Pin) -> Pin:

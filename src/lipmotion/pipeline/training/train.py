@@ -20,7 +20,7 @@ from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.model import HmmConfig, UnitHmm
 from lipmotion.kernels.threads import one_thread
 from lipmotion.motion.resample import to_model_frames
-from lipmotion.motion.speakers import SpeakerMaps, mean_person_examples
+from lipmotion.motion.speakers import SpeakerMaps, mean_person_examples, with_habits
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.prior import with_prior
 from lipmotion.pipeline.training.channels import (
@@ -171,7 +171,8 @@ def train(
         phones, examples, skipped = phones_and_examples(
             utterances, recogniser, lexicon, monitor, checkpoint, team.ordered_map
         )
-        examples, speakers = _of_the_mean_person(examples, {each.name: each.speaker for each in utterances})
+        speaker_of = {utterance.name: utterance.speaker for utterance in utterances}
+        examples, speakers = _of_the_mean_person(examples, speaker_of)
         examples = [replace(example, speech=with_prior(prior, example.speech)) for example in examples]
         examples = _heard(engine, utterances, examples, sub_monitor(run.monitor, 0.5, 0.6), team.ordered_map)
     fit = engine.fit([*examples, *speech_examples], sub_monitor(run.monitor, 0.6, 1, "learning motion: "), checkpoint)
@@ -188,6 +189,8 @@ def train(
     if eigenlips is not None:
         about |= {"visual": visual, "eigenlips": eigenlips.summary}
     if speakers is not None:
+        generated = (engine.generate(fit.model, example.speech).motion.values for example in examples)
+        speakers = with_habits(speakers, examples, [speaker_of[name] for name in used], generated)
         about["speakers"] = list(speakers.names)
     return Model(phones, engine, fit.model, about, eigenlips=eigenlips, prior=prior, speakers=speakers), TrainReport(
         used, skipped, fit.figures
