@@ -56,10 +56,11 @@ def main() -> None:
             model = trained(options, corpus, kind, [name for name in others if name != person])
             whose = nearest(corpus, model, person) if kind == "nearest" else ""
             each[person] = of_person(corpus, model, person, whose) | ({"whose": whose} if whose else {})
-            if kind in ("pooled", "maps") or not own:
+            if kind in ("pooled", "maps") or (kind == "alone" and not own):
                 own.append(of_main(corpus, model))
         show("the fifth person", kind, [*CHANNELS, "distance"], list(each.values()), each=each)
-        show(MAIN, kind, CHANNELS, own)
+        if own:
+            show(MAIN, kind, CHANNELS, own)
 
 
 def show(judged: str, kind: str, figures: Sequence[str], rows: Sequence[Mapping[str, Any]], **more: object) -> None:
