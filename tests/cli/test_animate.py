@@ -1,15 +1,18 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from PIL import Image
 
 from cli.conftest import RunCommand, is_one_error
+from lipmotion.corpora.store import Corpus
 from lipmotion.export.base import read_motion
 from lipmotion.pipeline.animate import animate, write
 from lipmotion.pipeline.model import VERSION, load_model
+from lipmotion.pipeline.request import SpeechRequest
 
 
 @pytest.fixture
@@ -204,3 +207,22 @@ def test_posteriors_that_cannot_be_drawn(
     assert is_one_error(done, code)
     assert words in done.err[0]
     assert list(here.iterdir()) == []
+
+
+@pytest.mark.long
+def test_one_of_several_people(
+    run: RunCommand, here: Path, toy_speech: Path, toy_corpus: Corpus, tmp_path: Path
+) -> None:
+    people = Corpus.create(tmp_path / "people")
+    for number, name in enumerate(toy_corpus.names("train")):
+        people.add(replace(toy_corpus.utterance(name), speaker=("anna", "ben")[number % 2]))
+    assert run("train", people.path, "-o", "m", "--from", "none").code == 0
+    assert any("anna; ben" in line for line in run("info", "m").out)
+    done = run("animate", toy_speech, "--model", "m", "--recogniser", "own", "--speaker", "ben", "-o", "ben.json")
+    assert (done.code, done.out) == (0, ["ben.json"])
+    request = SpeechRequest(toy_speech, recogniser="own", speaker="ben")
+    written, expected = read_motion(here / "ben.json")[0], animate(request, model="m").motion
+    assert written["opening"].tolist() == pytest.approx(expected["opening"].tolist(), abs=1e-5)
+    done = run("animate", toy_speech, "--model", "m", "--speaker", "cleo", "-o", "cleo.json")
+    assert is_one_error(done, 3)
+    assert "no speaker 'cleo', only: anna, ben" in done.err[0]

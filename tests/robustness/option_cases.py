@@ -23,6 +23,7 @@ for _value in ("0", "-1", "nan", "inf", "1e9"):
 _option("--channels of an unknown name", 3, ("no motion channel 'smile' among",), "--channels", "opening,smile")
 _option("--channels of an empty text", 3, ("no motion channel ''",), "--channels", "")
 _option("--channels of one name twice", 3, ("channel names repeat",), "--channels", "opening,opening")
+_option("an unknown --speaker", 3, ("the model tells no speakers apart", "no 'nobody'"), "--speaker", "nobody")
 _option("an unknown --recogniser", 3, ("unknown recogniser 'best'; required one of: auto",), "--recogniser", "best")
 
 

@@ -16,6 +16,12 @@ def add_workers(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--workers", type=int, help="number of processes (default: one per core)")
 
 
+def add_execution(parser: argparse.ArgumentParser) -> None:
+    """Add ``--workers`` and ``--machine-readable``."""
+    add_workers(parser)
+    add_machine_readable(parser)
+
+
 def worker_count(options: argparse.Namespace) -> int:
     """Return the number of processes of ``--workers``; by default, that of the processor's cores."""
     return options.workers or os.cpu_count() or 1

@@ -17,13 +17,13 @@ MODEL = "trained model (default: the one that ships with the package)"
 
 
 def add_speech_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the recording, its transcript, lexicon, units and recogniser, and the model."""
+    """Add the recording, its transcript, lexicon, units, recogniser and speaker, and the model."""
     add_recording_arguments(parser)
     add_model_argument(parser)
 
 
 def add_recording_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the recording, its transcript, lexicon, units and recogniser."""
+    """Add the recording, its transcript, lexicon, units, recogniser and speaker."""
     add_input(parser, "speech", what="recording", help="audio or video file")
     transcript: dict[str, Any] = {
         "type": str,
@@ -35,6 +35,8 @@ def add_recording_arguments(parser: argparse.ArgumentParser) -> None:
     edited = "phones in time from an earlier .json or .npz, edited or not"
     add_input(parser, "--units", what="units file", replaceable=True, metavar="FILE", help=edited)
     add_recogniser_argument(parser)
+    whose = "whose motion, of the people that the model was trained on (default: the mean person; see lipmotion info)"
+    parser.add_argument("--speaker", default="", metavar="NAME", help=whose)
 
 
 def add_lexicon_argument(parser: argparse.ArgumentParser) -> None:
@@ -76,5 +78,6 @@ def request_and_model(options: argparse.Namespace) -> tuple[SpeechRequest, Model
         units=read_motion(options.units)[1] if options.units else None,
         lexicon=Lexicon.from_file(options.lexicon) if options.lexicon else None,
         recogniser=options.recogniser,
+        speaker=options.speaker,
     )
     return request, load_model(options.model)

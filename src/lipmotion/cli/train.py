@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from lipmotion.cli.options import add_machine_readable, add_workers, list_or_all, worker_count
+from lipmotion.cli.options import add_execution, list_or_all, worker_count
 from lipmotion.cli.paths import add_input, add_output
 from lipmotion.cli.speech import add_lexicon_argument
 from lipmotion.cli.starting_model import add_start_argument, model_to_start_from
@@ -13,7 +13,6 @@ ENGINE = "trajectory (default), coupled (chains of states for speech and for lip
 SYSTEM = "structure of the coupled engine: ph-HMM, ph-MSHMM, ph-FHMM, ph-vi-FHMM, ph-CHMM or ph-vi-CHMM (default)"
 UNITS = "modelled units: phone (default), eVis, sVis, pbVis, 2vis, or a table file (docs/unit-sets.md)"
 OTHERS = "also train on transcribed recordings without motion (coupled)"
-VISUAL = "modelled motion: geometry (tracked or given curves, default), eigenlips (mouth pictures) or both"
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -28,12 +27,13 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser.add_argument("--system", metavar="NAME", help=SYSTEM)
     add_input(parser, "--units", what="table of units", replaceable=True, type=str, metavar="SET", help=UNITS)
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="engine option (repeatable)")
-    parser.add_argument("--visual", default="geometry", metavar="KIND", help=VISUAL)
+    parser.add_argument(
+        "--visual", default="geometry", metavar="KIND", help="geometry, eigenlips (mouth pictures) or both"
+    )
     parser.add_argument("--voices", action="store_true", help="also train on synthetic voices (coupled)")
     add_input(parser, "--recordings", what="folder of recordings", metavar="FOLDER", help=OTHERS)
     add_start_argument(parser)
-    add_workers(parser)
-    add_machine_readable(parser)
+    add_execution(parser)
     parser.set_defaults(run=run)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from lipmotion.cli.options import add_machine_readable, add_workers, worker_count
+from lipmotion.cli.options import add_execution, worker_count
 from lipmotion.cli.paths import add_input, add_output
 from lipmotion.cli.speech import add_model_argument
 
@@ -20,8 +20,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     kinds = "words: all; auto: those that fit the sound (default: words)"
     parser.add_argument("--recogniser", default="words", metavar="KIND", help=kinds)
     add_model_argument(parser)
-    add_workers(parser)
-    add_machine_readable(parser)
+    add_execution(parser)
     parser.set_defaults(run=run)
 
 

@@ -19,6 +19,8 @@ def figures_table(figures: Mapping[str, Any]) -> str:
     lines = [f"split {figures['split']}: {figures['clips']} clips"]
     lines[0] += f"; closed under {closed:.4f}" if closed is not None else ""
     lines += [f"left out, for they do not move: {', '.join(still)}"] if still else []
+    strangers = [name or "speakers without a name" for name in figures.get("strangers", ())]
+    lines += [f"unknown to the model, compared with the mean person: {', '.join(strangers)}"] if strangers else []
     lines += [PINNED] if any("unpinned" in condition for condition in figures["conditions"].values()) else []
     for name, condition in figures["conditions"].items():
         rows = condition["channels"] | _eigenlips_row(condition)

@@ -14,6 +14,7 @@ from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.outlook import outlook_of
 from lipmotion.pipeline.request import SpeechInput, request_of
+from lipmotion.pipeline.speakers import generate_for, speaker_map
 from lipmotion.pipeline.understand import understood_speech
 from lipmotion.pipeline.workers import map_in_processes
 from lipmotion.speech.audio_files import read_audio
@@ -41,10 +42,10 @@ def animate(
     speech      : an audio or video file, samples at 16 kHz, or a ``SpeechRequest`` with all that is known of it
     model       : from ``load_model``, or the path of a model file; None: the shipped model
     transcript  : the spoken words, or a Path of a file with them; the same as a ``SpeechRequest`` with this transcript
-    constraints : values that the motion must take exactly
+    constraints : values that the motion must take exactly, in the units of the request's speaker
     workers     : number of processes that recognise the words of a long recording. With more than one, a script must be
                   guarded by ``if __name__ == "__main__":``
-    Raises InputError: the recording, the transcript or a constraint is not usable.
+    Raises InputError: the recording, the transcript or a constraint is not usable, or the model knows no such speaker.
     Raises AlignmentError: the transcript cannot be aligned with the recording.
     Source: Hofer, Yamagishi & Shimodaira 2008 (``engines.trajectory``, the engine of the shipped model).
 
@@ -58,8 +59,9 @@ def animate(
     """
     chosen = model if isinstance(model, Model) else load_model(model)
     request = request_of(speech, transcript)
+    person = speaker_map(chosen.speakers, request.speaker)
     understood = understood_speech(chosen, request, map_in_processes(workers))
-    generation = chosen.engine.generate(chosen.learned, understood.speech, constraints)
+    generation = generate_for(person, chosen.engine, chosen.learned, understood.speech, constraints)
     return replace(generation, outlook=outlook_of(request, understood))
 
 

@@ -13,6 +13,7 @@ from lipmotion.errors import InputError
 from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.request import SpeechInput, request_of
+from lipmotion.pipeline.speakers import explanation_for, generate_for, speaker_map
 from lipmotion.pipeline.understand import audio_of, understand
 from lipmotion.printable import printable
 from lipmotion.speech.mfcc import frame_count
@@ -60,10 +61,12 @@ def explain(
     times = [at] if isinstance(at, int | float) else at
     count = frame_count(audio.samples)
     frames = [_frame(time_s, count) for time_s in times]
+    person = speaker_map(chosen.speakers, request.speaker)
     understood = understand(chosen, replace(request, recording=audio))
     if isinstance(chosen.engine, Explains):
-        return chosen.engine.explain(chosen.learned, understood, frames)
-    generation = chosen.engine.generate(chosen.learned, understood)
+        explained = chosen.engine.explain(chosen.learned, understood, frames)
+        return tuple(explanation_for(person, explanation, understood) for explanation in explained)
+    generation = generate_for(person, chosen.engine, chosen.learned, understood)
     return tuple(explain_by_trace(generation, frame) for frame in frames)
 
 

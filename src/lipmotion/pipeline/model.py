@@ -15,6 +15,7 @@ from lipmotion.appearance.eigenlips import Eigenlips, eigenlips_arrays, eigenlip
 from lipmotion.engines import ENGINES, Engine, engine_named
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.hmm.model import HmmConfig, UnitHmm, hmm_arrays, hmm_from_arrays
+from lipmotion.motion.speakers import SpeakerMaps, speaker_arrays, speakers_from_arrays
 from lipmotion.pipeline.training.channels import EIGENLIPS, GEOMETRY
 from lipmotion.speech.adaptation import Adaptation, adaptation_arrays, adaptation_from_arrays
 from lipmotion.speech.mfcc import FEATURES
@@ -37,6 +38,8 @@ class Model:
     adaptation : adaptation of the phone models to a speaker (None: not adapted)
     eigenlips  : principal components of mouth pictures (None: the channels do not contain their coefficients)
     prior      : the model on which this one stands: its motion is an input of this engine (None: it stands on none)
+    speakers   : maps from the motion of the mean person, which the engine generates, to that of each person it was
+                 trained on (None: it tells no people apart)
 
     >>> import lipmotion
     >>> model = lipmotion.load_model()
@@ -51,6 +54,7 @@ class Model:
     adaptation: Adaptation | None = None
     eigenlips: Eigenlips | None = None
     prior: Model | None = None
+    speakers: SpeakerMaps | None = None
 
     @property
     def visual(self) -> str:
@@ -76,6 +80,8 @@ def save_model(model: Model, path: str | Path) -> None:
         arrays |= {f"adaptation/{key}": array for key, array in adaptation_arrays(model.adaptation).items()}
     if model.eigenlips is not None:
         arrays |= {f"eigenlips/{key}": array for key, array in eigenlips_arrays(model.eigenlips).items()}
+    if model.speakers is not None:
+        arrays |= {f"speakers/{key}": array for key, array in speaker_arrays(model.speakers).items()}
     header = {
         "format": FORMAT,
         "version": VERSION,
@@ -166,6 +172,7 @@ def _read(path: Path) -> Model:
         adaptation = adaptation_from_arrays(arrays["adaptation"]) if arrays["adaptation"] else None
         eigenlips = eigenlips_from_arrays(arrays["eigenlips"]) if arrays["eigenlips"] else None
         prior = _prior(header, phones, arrays["prior"])
+        speakers = speakers_from_arrays(arrays["speakers"]) if arrays["speakers"] else None
     except ModelFormatError as error:
         raise ModelFormatError(f"{path}: {error}") from error
     except UNREADABLE as error:
@@ -173,7 +180,7 @@ def _read(path: Path) -> Model:
     about = {key: value for key, value in header.items() if key not in _OWN_KEYS}
     if (about.get("visual", GEOMETRY) != GEOMETRY) != (eigenlips is not None):
         raise ModelFormatError(f"{path}: the model says visual {about.get('visual')!r}, which its eigenlips do not fit")
-    return Model(phones, engine, learned, about, adaptation, eigenlips, prior)
+    return Model(phones, engine, learned, about, adaptation, eigenlips, prior, speakers)
 
 
 def _engine(header: Mapping[str, Any]) -> Engine[Any]:
@@ -203,7 +210,7 @@ def _options(header: Mapping[str, Any], key: str) -> Mapping[str, Any]:
     return options
 
 
-_FOLDERS = ("phones", "engine", "adaptation", "eigenlips", "prior")
+_FOLDERS = ("phones", "engine", "adaptation", "eigenlips", "prior", "speakers")
 """Prefixes of the names of all arrays."""
 _OWN_KEYS = ("format", "version", "engine", "configuration", "recogniser", "prior")
 """Keys of the header that are not part of ``Model.about``."""

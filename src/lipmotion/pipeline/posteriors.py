@@ -12,6 +12,7 @@ from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outlook import outlook_of
 from lipmotion.pipeline.request import SpeechInput, request_of
+from lipmotion.pipeline.speakers import generate_for, speaker_map
 from lipmotion.pipeline.understand import understood_speech
 from lipmotion.storage.files import check_target, whole_file
 from lipmotion.types import ChainPosteriors, Generation
@@ -33,8 +34,9 @@ def animate_with_posteriors(speech: SpeechInput, *, model: Model) -> tuple[Gener
             f"was trained with --engine {' or '.join(having)}"
         )
     request = request_of(speech)
+    person = speaker_map(model.speakers, request.speaker)
     understood = understood_speech(model, request)
-    generation = engine.generate(learned, understood.speech)
+    generation = generate_for(person, engine, learned, understood.speech)
     outlook = outlook_of(request, understood)
     return replace(generation, outlook=outlook), engine.posteriors(learned, understood.speech)
 

@@ -26,6 +26,8 @@ class SpeechRequest:
                  of many voices, weighted by the speaker similarity score; ``own``, ``general``: by one of these alone;
                  ``whisper``, ``vosk``: words, by what is installed (``speech.installed_recognisers``), aligned as a
                  transcript is
+    speaker    : whose motion is generated, of the people whom the model was trained on; empty: the mean person, or the
+                 only one
 
     >>> import lipmotion
     >>> request = lipmotion.SpeechRequest("examples/welcome.flac", recogniser="general")
@@ -38,6 +40,7 @@ class SpeechRequest:
     units: Timeline[Unit] | None = None
     lexicon: Lexicon | None = None
     recogniser: str = "auto"
+    speaker: str = ""
 
 
 SpeechInput = str | Path | Audio | SpeechRequest

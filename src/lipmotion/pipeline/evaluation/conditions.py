@@ -15,8 +15,10 @@ from lipmotion.engines import Animator
 from lipmotion.errors import AlignmentError, CorpusError
 from lipmotion.measures import curves
 from lipmotion.measures.closures import closed_threshold
+from lipmotion.motion.speakers import SpeakerMap, SpeakerMaps
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.prior import with_prior
+from lipmotion.pipeline.speakers import generate_for
 from lipmotion.pipeline.training.channels import GEOMETRY, with_visual_channels
 from lipmotion.pipeline.training.train import phones_of
 from lipmotion.pipeline.transcribe import warn_of_guesses
@@ -59,6 +61,7 @@ class HeldOutRecordings:
     recognitions : what it recognised in every utterance
     eigenlips    : principal components of mouth pictures (None: their coefficients are not compared)
     prior        : the model on which the evaluated one stands (None: it stands on none)
+    speakers     : maps of the people whom the evaluated model knows (None: it tells no people apart)
     """
 
     utterances: Sequence[Utterance]
@@ -71,6 +74,19 @@ class HeldOutRecordings:
     recognitions: Sequence[Recognition]
     eigenlips: Eigenlips | None = None
     prior: Model | None = None
+    speakers: SpeakerMaps | None = None
+
+    @property
+    def strangers(self) -> tuple[str, ...]:
+        """Names of the speakers whom the model does not know: they are compared with the mean person."""
+        known = self.speakers.names if self.speakers is not None else ()
+        return tuple(sorted({utterance.speaker for utterance in self.utterances} - set(known)))
+
+    def person(self, utterance: Utterance) -> SpeakerMap | None:
+        """Return the map to the motion of an utterance's speaker; None for a stranger."""
+        if self.speakers is None or utterance.speaker not in self.speakers.names:
+            return None
+        return self.speakers.of(utterance.speaker)
 
     @property
     def eigenlips_channels(self) -> tuple[str, ...]:
@@ -105,6 +121,7 @@ def held_out_recordings(
     visual: str = GEOMETRY,
     eigenlips: Eigenlips | None = None,
     prior: Model | None = None,
+    speakers: SpeakerMaps | None = None,
 ) -> HeldOutRecordings:
     """Return held-out recordings with aligned and recognised phones. Raises as ``evaluate``.
 
@@ -113,6 +130,7 @@ def held_out_recordings(
     channels  : the channels to compare, whether they move or not; None: from ``compared_channels``
     visual, eigenlips : of the model: the kind of its channels, and its principal components of mouth pictures
     prior     : the model on which the evaluated one stands, or None
+    speakers  : maps of the people whom the evaluated model knows, or None
     """
     lexicon = lexicon or Lexicon()
     utterances = [
@@ -131,7 +149,7 @@ def held_out_recordings(
     if all(utterance.words or utterance.phones for utterance in utterances):
         conditions[WITH_TRANSCRIPT] = reference
     return HeldOutRecordings(
-        utterances, compared, still, threshold, reference, conditions, phones, found, eigenlips, prior
+        utterances, compared, still, threshold, reference, conditions, phones, found, eigenlips, prior, speakers
     )
 
 
@@ -222,24 +240,20 @@ def compare_with_recorded(
     Raises CorpusError: the model has other channels.
     """
     return [
-        _clip(engine, learned, recordings.channels, utterance, spoken, reference)
+        _clip(
+            recordings, generate_for(recordings.person(utterance), engine, learned, spoken).motion, utterance, reference
+        )
         for utterance, spoken, reference in zip(recordings.utterances, speech, recordings.reference, strict=True)
     ]
 
 
 def _clip(
-    engine: Animator[ModelT],
-    learned: ModelT,
-    channels: Sequence[str],
-    utterance: Utterance,
-    speech: Speech,
-    reference: Timeline[Unit],
+    recordings: HeldOutRecordings, generated: Motion, utterance: Utterance, reference: Timeline[Unit]
 ) -> ComparedClip:
     """Return recorded and generated motion of one utterance."""
-    motion = utterance.track.motion
+    motion, channels = utterance.track.motion, recordings.channels
     seen = np.asarray(utterance.track.seen)
     time_s = (np.arange(len(motion.values)) / motion.rate_hz)[seen]
-    generated = engine.generate(learned, speech).motion
     _check_channels(generated, channels)
     spoken = tuple((s.start_s, s.end_s, s.label.phone) for s in reference if not is_silent(s.label.phone))
     return ComparedClip(

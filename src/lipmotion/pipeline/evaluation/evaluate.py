@@ -46,7 +46,8 @@ def evaluate(
 
     Compared are the lip distances or, in a corpus without them, every channel that moves in the recordings; in addition
     or instead, the eigenlips of the model. Figures of closures and of silence need the channel ``opening``. Figures
-    that cannot be computed are None.
+    that cannot be computed are None. A model of several people generates the motion of each utterance's speaker; of
+    speakers whom it does not know, named under ``strangers``, that of the mean person.
     If the engine makes the lips meet in p, b and m, ``unpinned`` holds the figures of its motion without that.
     The reference for speech and for p, b and m are the labelled phones, or the forced alignment, or the recognised
     phones of utterances without transcript. The threshold of a closed mouth is computed from the corpus's training
@@ -76,6 +77,7 @@ def evaluate(
         visual=model.visual,
         eigenlips=model.eigenlips,
         prior=model.prior,
+        speakers=model.speakers,
     )
     figures = {
         "split": "given names" if selection.names is not None else selection.split or "all",
@@ -87,6 +89,8 @@ def evaluate(
             for name in recordings.conditions
         },
     }
+    if model.speakers is not None:
+        figures["strangers"] = list(recordings.strangers)
     plain: dict[str, Any] = nan_as_null(figures)
     return plain
 

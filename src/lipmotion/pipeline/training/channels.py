@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -9,10 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.appearance.eigenlips import COMPONENTS, Eigenlips, fit_eigenlips
-from lipmotion.errors import CorpusError, InputError
+from lipmotion.errors import CorpusError, InputError, shortened
+from lipmotion.printable import printable
 from lipmotion.stats.pca import evenly_spaced
-from lipmotion.types import Motion, Track, Utterance
+from lipmotion.types import Channel, Motion, Track, Utterance
 
+LOG = logging.getLogger("lipmotion")
 GEOMETRY, EIGENLIPS, BOTH = "geometry", "eigenlips", "both"
 VISUALS = (GEOMETRY, EIGENLIPS, BOTH)
 """Tracked or supplied channels; coefficients of mouth pictures (eigenlips); the former followed by the latter."""
@@ -66,6 +69,43 @@ def with_visual_channels(utterance: Utterance, visual: str, eigenlips: Eigenlips
     return replace(
         utterance, track=_with_eigenlips(utterance.track, eigenlips.project(_crops(utterance)), visual, eigenlips)
     )
+
+
+def with_common_channels(utterances: Sequence[Utterance]) -> list[Utterance]:
+    """Return utterances with the channels, by name and unit, that all of them have, in the order of the first.
+
+    Utterances that have the same channels are returned as they are; else a warning says which are left out.
+    Raises CorpusError: they have no channel in common.
+    """
+    kinds = list(dict.fromkeys(utterance.track.motion.channels for utterance in utterances))
+    if len(kinds) < 2:
+        return list(utterances)
+    common = tuple(channel for channel in kinds[0] if all(channel in kind for kind in kinds))
+    if not common:
+        raise CorpusError(
+            f"{len(kinds)} kinds of motion without a common channel: {'; '.join(map(_some, kinds))}; train on one kind "
+            "at a time (--speaker), or give their channels the same names and units"
+        )
+    left_out = sorted({channel.name for kind in kinds for channel in kind if channel not in common})
+    LOG.warning(
+        "%d kinds of motion: training on the %d channels that all have (%s); left out: %s",
+        *(len(kinds), len(common), _some(common), printable(shortened(", ".join(left_out)))),
+    )
+    return [_with_channels(utterance, common) for utterance in utterances]
+
+
+def _some(channels: Sequence[Channel]) -> str:
+    """Return the names of some channels, for a message."""
+    return printable(shortened(", ".join(channel.name for channel in channels)))
+
+
+def _with_channels(utterance: Utterance, channels: tuple[Channel, ...]) -> Utterance:
+    motion = utterance.track.motion
+    if motion.channels == channels:
+        return utterance
+    columns = [motion.channels.index(channel) for channel in channels]
+    chosen = Motion(np.asarray(motion.values)[:, columns], motion.rate_hz, channels)
+    return replace(utterance, track=replace(utterance.track, motion=chosen))
 
 
 def _with_eigenlips(track: Track, coefficients: NDArray[np.float32], visual: str, eigenlips: Eigenlips) -> Track:

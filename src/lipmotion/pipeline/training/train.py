@@ -20,9 +20,16 @@ from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.model import HmmConfig, UnitHmm
 from lipmotion.kernels.threads import one_thread
 from lipmotion.motion.resample import to_model_frames
+from lipmotion.motion.speakers import SpeakerMaps, mean_person_examples, with_habits
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.prior import with_prior
-from lipmotion.pipeline.training.channels import GEOMETRY, check_visual, train_eigenlips, with_visual_channels
+from lipmotion.pipeline.training.channels import (
+    GEOMETRY,
+    check_visual,
+    train_eigenlips,
+    with_common_channels,
+    with_visual_channels,
+)
 from lipmotion.pipeline.training.conditions import with_conditions
 from lipmotion.pipeline.training.fingerprint import fingerprint
 from lipmotion.pipeline.training.labels import label_utterances
@@ -110,7 +117,8 @@ def train(
     """Return a model that is trained on a corpus, and a report of the training.
 
     Phone models are trained on all transcribed or labelled utterances, then the engine is trained on the motion of all
-    utterances.
+    utterances. Of several people by name, it learns the motion of the mean person, and the model has a map to each
+    (``Model.speakers``). Of motion with different channels, it learns the channels that all have.
     corpus     : from ``prepare``
     selection  : the utterances; by default those of the list ``train``
     engine     : the engine, with its configuration; None: the trajectory engine
@@ -127,7 +135,7 @@ def train(
     Labelled phones are used as they are. The phones of utterances without transcript are recognised, by the phone
     models of the other utterances or, if there are none, by those of the shipped model.
     Training draws no random numbers: the same corpus gives the same model.
-    Raises CorpusError: no such utterances, or none that can be used.
+    Raises CorpusError: no such utterances, none that can be used, or motion without a common channel.
     Raises InputError: no such ``visual``, or ``voices`` for an engine that is not trained on speech alone.
     Source: of the engines; of the two stages of training, Xie & Liu 2007, §3.4.
 
@@ -155,7 +163,7 @@ def train(
     speech_examples = list(examples_without_motion(engine, voices, run.monitor))
     utterances = [corpus.utterance(name) for name in chosen]
     eigenlips = train_eigenlips(utterances) if visual != GEOMETRY else None
-    utterances = [with_visual_channels(utterance, visual, eigenlips) for utterance in utterances]
+    utterances = with_common_channels([with_visual_channels(each, visual, eigenlips) for each in utterances])
     job = fingerprint(corpus, chosen, engine, recogniser, lexicon, visual, prior) if run.work else ""
     checkpoint = Checkpoint(run.work, job) if run.work else NO_CHECKPOINT
     with worker_pool(min(run.workers, len(chosen) // UTTERANCES_PER_WORKER)) as team:
@@ -163,6 +171,8 @@ def train(
         phones, examples, skipped = phones_and_examples(
             utterances, recogniser, lexicon, monitor, checkpoint, team.ordered_map
         )
+        speaker_of = {utterance.name: utterance.speaker for utterance in utterances}
+        examples, speakers = _of_the_mean_person(examples, speaker_of)
         examples = [replace(example, speech=with_prior(prior, example.speech)) for example in examples]
         examples = _heard(engine, utterances, examples, sub_monitor(run.monitor, 0.5, 0.6), team.ordered_map)
     fit = engine.fit([*examples, *speech_examples], sub_monitor(run.monitor, 0.6, 1, "learning motion: "), checkpoint)
@@ -178,7 +188,11 @@ def train(
         about["voices"] = sorted({example.name for example in speech_examples})
     if eigenlips is not None:
         about |= {"visual": visual, "eigenlips": eigenlips.summary}
-    return Model(phones, engine, fit.model, about, eigenlips=eigenlips, prior=prior), TrainReport(
+    if speakers is not None:
+        generated = (engine.generate(fit.model, example.speech).motion.values for example in examples)
+        speakers = with_habits(speakers, examples, [speaker_of[name] for name in used], generated)
+        about["speakers"] = list(speakers.names)
+    return Model(phones, engine, fit.model, about, eigenlips=eigenlips, prior=prior, speakers=speakers), TrainReport(
         used, skipped, fit.figures
     )
 
@@ -242,6 +256,19 @@ def _check_prior(prior: Model | None) -> None:
     """Raise InputError if a model cannot be stood on."""
     if prior is not None and prior.prior is not None:
         raise InputError("the model to start from stands on another model itself; start from that one, or from none")
+
+
+def _of_the_mean_person(
+    examples: list[Example], speakers: Mapping[str, str]
+) -> tuple[list[Example], SpeakerMaps | None]:
+    """Return examples in the motion of the mean person, and the maps of all people; as they are, of one person.
+
+    speakers : of each example, by its name
+    """
+    names = [speakers[example.name] for example in examples]
+    if len(set(filter(None, names))) < 2:
+        return examples, None
+    return mean_person_examples(examples, names)
 
 
 def _heard(

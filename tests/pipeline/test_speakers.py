@@ -1,0 +1,255 @@
+"""Several people in one model, from the corpus to the motion of one of them."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lipmotion.corpora.store import Corpus, Selection
+from lipmotion.engines import engine_named
+from lipmotion.errors import CorpusError, InputError, ModelFormatError
+from lipmotion.hmm.model import HmmConfig
+from lipmotion.motion.closure import closable_ranges
+from lipmotion.motion.speakers import speaker_arrays
+from lipmotion.pipeline.animate import animate
+from lipmotion.pipeline.evaluation.evaluate import evaluate
+from lipmotion.pipeline.explain import explain
+from lipmotion.pipeline.model import Model, load_model, save_model
+from lipmotion.pipeline.posteriors import animate_with_posteriors
+from lipmotion.pipeline.request import SpeechRequest
+from lipmotion.pipeline.training.train import train
+from lipmotion.testing.toy import ToySentence, toy_utterances
+from lipmotion.types import Channel, Constraints, Motion, Pin, ReducedVariance, Track, Utterance
+
+SMALL = HmmConfig(mixtures=1, iterations=2)
+GAIN, OFFSET = np.array([0.5, 1.2, 0.6]), np.array([0.04, -0.05, 0.1])
+"""How ben's opening, width and outer differ from anna's."""
+
+
+def with_motion(utterance: Utterance, values: np.ndarray, channels: tuple[Channel, ...] | None = None) -> Utterance:
+    motion = utterance.track.motion
+    track = replace(utterance.track, motion=Motion(values, motion.rate_hz, channels or motion.channels))
+    return replace(utterance, track=track)
+
+
+def two_people(count: int = 12) -> Iterator[Utterance]:
+    """Every other sentence is ben's, who has a narrower mouth that never closes wholly."""
+    for number, utterance in enumerate(toy_utterances(count)):
+        if number % 2:
+            values = OFFSET + GAIN * utterance.track.motion.values
+            yield replace(with_motion(utterance, values), speaker="ben")
+        else:
+            yield replace(utterance, speaker="anna")
+
+
+def corpus_of(folder: Path, utterances: list[Utterance]) -> Corpus:
+    corpus = Corpus.create(folder)
+    for utterance in utterances:
+        corpus.add(utterance)
+    return corpus
+
+
+@pytest.fixture(scope="module")
+def people(tmp_path_factory: pytest.TempPathFactory) -> Corpus:
+    return corpus_of(tmp_path_factory.mktemp("people") / "corpus", list(two_people()))
+
+
+@pytest.fixture(scope="module")
+def model(people: Corpus) -> Model:
+    return train(people, recogniser=SMALL)[0]
+
+
+def request(sentence: ToySentence, speaker: str = "") -> SpeechRequest:
+    return SpeechRequest(sentence.audio, units=sentence.units, speaker=speaker)
+
+
+def opening(model: Model, sentence: ToySentence, speaker: str = "") -> np.ndarray:
+    return animate(request(sentence, speaker), model=model).motion["opening"]
+
+
+def test_each_person_moves_as_far_as_they_do(model: Model, toy_sentence: ToySentence) -> None:
+    assert model.speakers is not None
+    assert model.speakers.names == ("anna", "ben")
+    assert model.about["speakers"] == ["anna", "ben"]
+    anna, ben, mean = (opening(model, toy_sentence, name) for name in ("anna", "ben", ""))
+    assert anna.max() > mean.max() > ben.max()
+    assert np.ptp(ben) / np.ptp(anna) == pytest.approx(GAIN[0], abs=0.15)
+    assert np.corrcoef(anna, ben)[0, 1] > 0.97
+
+
+def test_lips_close_in_p_b_m_as_far_as_each_person_closes_them(model: Model, toy_sentence: ToySentence) -> None:
+    ranges = closable_ranges(toy_sentence.units, len(opening(model, toy_sentence)))
+    assert ranges
+    for name, closed in (("anna", 0.0), ("ben", OFFSET[0])):
+        curve = opening(model, toy_sentence, name)
+        for frames in ranges:
+            assert curve[frames].min() < closed + 0.012
+
+
+def test_variances_are_in_the_units_of_the_person(model: Model, toy_sentence: ToySentence) -> None:
+    assert model.speakers is not None
+    mean, ben = (animate(request(toy_sentence, name), model=model) for name in ("", "ben"))
+    np.testing.assert_allclose(ben.variance, mean.variance * np.square(model.speakers.of("ben").gain))
+
+
+def test_variances_of_long_recordings(model: Model, toy_sentence: ToySentence, monkeypatch: pytest.MonkeyPatch) -> None:
+    exact = animate(request(toy_sentence, "ben"), model=model)
+    monkeypatch.setattr("lipmotion.motion.generation.DOUBLE_FRAMES", 10)
+    single = animate(request(toy_sentence, "ben"), model=model)
+    assert isinstance(single.spread, ReducedVariance)
+    assert single.motion.values.dtype == np.float32
+    np.testing.assert_allclose(single.variance, exact.variance, rtol=1e-4)
+    np.testing.assert_allclose(single.motion.values, exact.motion.values, atol=1e-5)
+
+
+@pytest.mark.parametrize("speaker", ["anna", "ben"])
+def test_pins_hold_in_the_units_of_the_person(model: Model, toy_sentence: ToySentence, speaker: str) -> None:
+    pins = (Pin(0.1, "opening", 0.0), Pin(0.9, "opening", 0.17), Pin(0.93, "opening", 0.0), Pin(1.2, "width", 0.5))
+    motion = animate(request(toy_sentence, speaker), model=model, constraints=Constraints(pins)).motion
+    for pin in pins:
+        assert motion[pin.channel][round(pin.time_s * 100)] == pytest.approx(pin.value, abs=1e-9)
+    assert motion["opening"].min() >= 0
+
+
+def test_a_pin_that_nobody_can_take_is_refused_as_it_was_given(model: Model, toy_sentence: ToySentence) -> None:
+    for pin, message in (
+        (Pin(0.5, "opening", -0.01), r"-0\.01, required at least 0"),
+        (Pin(50.0, "opening", 0.1), "outside the recording"),
+        (Pin(0.5, "jaw", 0.1), "cannot pin 'jaw'"),
+        (Pin(0.5, "opening", float("nan")), "nan, required a finite number"),
+    ):
+        with pytest.raises(InputError, match=message):
+            animate(request(toy_sentence, "ben"), model=model, constraints=Constraints((pin,)))
+
+
+def test_unknown_speakers_are_refused(model: Model, toy_model: Model, toy_sentence: ToySentence) -> None:
+    with pytest.raises(InputError, match="no speaker 'cleo', only: anna, ben"):
+        opening(model, toy_sentence, "cleo")
+    with pytest.raises(InputError, match=r"tells no speakers apart.*'cleo'"):
+        opening(toy_model, toy_sentence, "cleo")
+    assert toy_model.speakers is None
+
+
+def test_maps_are_in_the_model_file(model: Model, toy_sentence: ToySentence, tmp_path: Path) -> None:
+    save_model(model, tmp_path / "people.lipmotion")
+    again = load_model(tmp_path / "people.lipmotion")
+    for name in ("anna", "ben"):
+        np.testing.assert_allclose(opening(again, toy_sentence, name), opening(model, toy_sentence, name), atol=1e-4)
+
+
+def test_a_file_with_half_the_maps_is_refused(model: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def without_gain(maps: object) -> dict[str, np.ndarray]:
+        arrays = speaker_arrays(maps)
+        del arrays["gain"]
+        return arrays
+
+    monkeypatch.setattr("lipmotion.pipeline.model.speaker_arrays", without_gain)
+    save_model(model, tmp_path / "half.lipmotion")
+    with pytest.raises(ModelFormatError, match="gain is missing"):
+        load_model(tmp_path / "half.lipmotion")
+
+
+def test_maps_of_other_channels_are_refused(
+    model: Model, toy_sentence: ToySentence, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def of_jaw(maps: object) -> dict[str, np.ndarray]:
+        arrays = speaker_arrays(maps)
+        arrays["channels"] = np.array([("opening", "eye_distance"), ("width", "eye_distance"), ("jaw", "weight")])
+        return arrays
+
+    monkeypatch.setattr("lipmotion.pipeline.model.speaker_arrays", of_jaw)
+    save_model(model, tmp_path / "jaw.lipmotion")
+    again = load_model(tmp_path / "jaw.lipmotion")
+    with pytest.raises(InputError, match="'outer'"):
+        opening(again, toy_sentence, "ben")
+
+
+def test_evaluation_compares_each_with_their_own_motion(people: Corpus, model: Model) -> None:
+    own = evaluate(model, people, selection=Selection(None))
+    mean = evaluate(replace(model, speakers=None), people, selection=Selection(None))
+    condition = "with transcript"
+    assert own["conditions"][condition]["amse"] < 0.8 * mean["conditions"][condition]["amse"]
+    assert own["strangers"] == []
+    assert "strangers" not in mean
+
+
+def test_strangers_are_named_and_get_the_mean_person(people: Corpus, model: Model, tmp_path: Path) -> None:
+    cleo = replace(people.utterance(people.names("test")[0]), speaker="cleo")
+    corpus = corpus_of(tmp_path / "cleo", [cleo])
+    figures = evaluate(model, corpus, selection=Selection(None))
+    assert figures["strangers"] == ["cleo"]
+    mean = evaluate(replace(model, speakers=None), corpus, selection=Selection(None))
+    assert figures["conditions"] == mean["conditions"]
+
+
+def test_an_explanation_is_in_the_units_of_the_person(model: Model, toy_sentence: ToySentence) -> None:
+    motion = animate(request(toy_sentence, "ben"), model=model).motion
+    for explanation in explain(request(toy_sentence, "ben"), at=[0.0, 0.9], model=model):
+        for name, value in explanation.motion.items():
+            assert value.value == pytest.approx(motion[name][explanation.frame], abs=1e-9)
+
+
+def test_one_person_is_not_mapped(people: Corpus) -> None:
+    model, _ = train(people, selection=Selection("train", ("anna",)), recogniser=SMALL)
+    assert model.speakers is None
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("engine", ["joint", "coupled"])
+def test_other_engines(people: Corpus, toy_sentence: ToySentence, engine: str) -> None:
+    settings = {"chains": "sVis 2vis", "mixtures": 2} if engine == "coupled" else {}
+    model, _ = train(people, recogniser=SMALL, engine=engine_named(engine, settings))
+    anna, ben = (opening(model, toy_sentence, name) for name in ("anna", "ben"))
+    assert np.ptp(ben) / np.ptp(anna) == pytest.approx(GAIN[0], abs=0.15)
+    pins = Constraints((Pin(0.9, "opening", 0.01),))
+    pinned = animate(request(toy_sentence, "ben"), model=model, constraints=pins).motion
+    assert pinned["opening"][90] == pytest.approx(0.01, abs=1e-9)
+    (explanation,) = explain(request(toy_sentence, "ben"), at=0.9, model=model)
+    assert explanation.motion["opening"].value == pytest.approx(ben[90], abs=1e-9)
+    if engine == "coupled":
+        generation, _ = animate_with_posteriors(request(toy_sentence, "ben"), model=model)
+        np.testing.assert_allclose(generation.motion["opening"], ben, atol=1e-12)
+
+
+def captured(utterance: Utterance, channels: tuple[Channel, ...]) -> Utterance:
+    values = utterance.track.motion.values[:, : len(channels)]
+    return replace(with_motion(utterance, values, channels), speaker="captured")
+
+
+def test_channels_that_all_have_are_trained_on(
+    people: Corpus, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    footage = [people.utterance(name) for name in people.names("train")[:6]]
+    jaw = (Channel("jaw", "weight"), Channel("width"), Channel("opening"))
+    capture = [captured(utterance, jaw) for utterance in toy_utterances(6, seed=1)[:3]]
+    capture = [replace(utterance, name=f"capture-{utterance.name}") for utterance in capture]
+    corpus = corpus_of(tmp_path / "mixed", [*footage, *capture])
+    with caplog.at_level(logging.WARNING):
+        model, report = train(corpus, recogniser=SMALL)
+    assert "training on the 2 channels that all have (width, opening); left out: jaw, outer" in caplog.text
+    assert len(report.used) == 9
+    assert model.speakers is not None
+    assert model.speakers.names == ("anna", "ben", "captured")
+    generated = animate(SpeechRequest(toy_utterances(3)[0].audio, speaker="captured", recogniser="own"), model=model)
+    assert generated.motion.names == ("width", "opening")
+
+
+def test_no_common_channel_is_an_error(people: Corpus, tmp_path: Path) -> None:
+    weights = tuple(Channel(name, "weight") for name in ("opening", "jaw"))
+    strange = [captured(utterance, weights) for utterance in toy_utterances(3)[:1]]
+    corpus = corpus_of(tmp_path / "apart", [people.utterance(people.names("train")[1]), *strange])
+    with pytest.raises(CorpusError, match=r"2 kinds of motion without a common channel: .*opening, jaw.*--speaker"):
+        train(corpus, recogniser=SMALL)
+
+
+def test_one_track_of_each_kind_stays_as_it_is(people: Corpus) -> None:
+    from lipmotion.pipeline.training.channels import with_common_channels
+
+    utterances = [people.utterance(name) for name in people.names("train")[:3]]
+    assert all(a is b for a, b in zip(with_common_channels(utterances), utterances, strict=True))
+    assert isinstance(utterances[0].track, Track)
