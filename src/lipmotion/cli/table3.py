@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 from lipmotion.cli.experiment_options import add_experiment_arguments, run_experiment
 from lipmotion.cli.options import list_or_all, numbers
 from lipmotion.cli.paths import add_input, add_output
-from lipmotion.cli.train import VISUAL
 
 if TYPE_CHECKING:
     from lipmotion.corpora.store import Corpus
@@ -29,7 +28,7 @@ def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser.add_argument("--states", type=int, default=5, help="states per unit, in the paper's systems (default: 5)")
     gaussians = "Gaussians per state, in the paper's systems, selected on the list val (default: 1,2,4,8)"
     parser.add_argument("--mixtures", type=numbers, default=[1, 2, 4, 8], metavar="K,K,...", help=gaussians)
-    parser.add_argument("--visual", default="geometry", metavar="KIND", help=VISUAL)
+    parser.add_argument("--visual", default="geometry", metavar="KIND", help="geometry, eigenlips or both")
     parser.add_argument("--transcripts", action="store_true", help="compare also with known transcripts")
     parser.add_argument("--noise", default="", metavar="KIND,KIND", help="compare also in noise: white, babble")
     parser.add_argument(

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.speech.audio_files import SPEECH_RATE_HZ
-from lipmotion.types import FRAME_RATE_HZ, Audio, Features
+from lipmotion.types import ENERGY_FEATURE, FRAME_RATE_HZ, Audio, Features
 
 WINDOW = 400  # 25 ms
 HOP = 160  # 10 ms
@@ -21,7 +21,7 @@ FILTERS = 26
 CEPSTRA = 12
 FEATURES = 39
 """12 cepstra and the log energy, their Δ and ΔΔ."""
-LOG_ENERGY = 12
+LOG_ENERGY = ENERGY_FEATURE
 """The column of the features that holds the log energy."""
 LIFTER = 22
 PRE_EMPHASIS = 0.97

@@ -11,7 +11,7 @@ from lipmotion.types.explanation import (
     NamedProbability,
     RegressedMean,
 )
-from lipmotion.types.features import FRAME_RATE_HZ, SPECTRUM_BANDS, Features, frame_of
+from lipmotion.types.features import ENERGY_FEATURE, FRAME_RATE_HZ, SPECTRUM_BANDS, Features, frame_of
 from lipmotion.types.generation import (
     Constraints,
     Example,
@@ -32,6 +32,7 @@ from lipmotion.types.transcript import TimedTranscript, TimedWord, TranscriptLin
 from lipmotion.types.utterance import Track, Utterance
 
 __all__ = [
+    "ENERGY_FEATURE",
     "EYE_DISTANCE",
     "FRAME_RATE_HZ",
     "GREY",

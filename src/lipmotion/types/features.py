@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 FRAME_RATE_HZ = 100.0
 """Frames per second of all models; frame n is centred at n / FRAME_RATE_HZ seconds."""
+ENERGY_FEATURE = 12
+"""The acoustic feature that is the log energy."""
 SPECTRUM_BANDS = 40
 """Mel bands of a spectrum, the input of acoustic networks."""
 

@@ -159,8 +159,7 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
         path = np.array([distinct[state] for state in states], np.intp)
         rows = np.array([model.emission.row(state, layout) for state in distinct], np.intp)
         densities = rows[path]
-        if speech.spectrum is not None:
-            densities[unheard_frames(speech.spectrum, speech.units)] = len(model.emission.means) - 1
+        densities[unheard_frames(np.asarray(speech.features.values), speech.units)] = len(model.emission.means) - 1
         experts = Experts(model.emission, densities, speech, model.network, model.prior, model.network_share)
 
         learned = model.motion if self.config.variance_scaling else replace(model.motion, scaling=None)

@@ -14,16 +14,16 @@ from lipmotion.motion.articulation import ArticulationPrior, dynamics_of
 from lipmotion.motion.generation import Statistics
 from lipmotion.motion.prior_regression import PriorRegression
 from lipmotion.motion.rest import away_from_speech, speech_intervals
-from lipmotion.types import FRAME_RATE_HZ, Speech, Timeline, Unit
+from lipmotion.types import ENERGY_FEATURE, FRAME_RATE_HZ, Speech, Timeline, Unit
 
 Array = NDArray[np.float64]
 DISTORTIONS = (0.2, 0.35)
 """Recognised phones are relied on up to the first distortion of the sound, and from the second one on not at all. The
 network finds 0.17 to 0.27 in quiet recordings of its speaker, 0.40 to 0.50 in white noise at 20 dB, 0.45 to 0.63 in
 babble at 20 dB."""
-BEFORE_SPEECH_S = 0.1
+BEFORE_SPEECH_S = 0.05
 """Mouths open or close for the first phone this long before it."""
-FLOOR_MARGIN = 1e-3
+LEAST_SILENCE_S, FLOOR_MARGIN = 0.05, 1e-4
 DISTORTION_S = 1.0
 """Seconds before and after a frame over which the distortion is averaged."""
 
@@ -94,13 +94,17 @@ class Experts:
         return network / np.maximum(states + network, 1e-12)
 
 
-def unheard_frames(spectrum: NDArray[np.floating], units: Timeline[Unit]) -> NDArray[np.bool_]:
-    """Return the frames in which the mouth rests because nothing is heard at all, not even a breath [shape=(T,)].
+def unheard_frames(features: NDArray[np.floating], units: Timeline[Unit]) -> NDArray[np.bool_]:
+    """Return the frames of digital silence, in which the mouth rests: not even a breath is heard [shape=(T,)].
 
-    spectrum : normalised log mel spectrum [shape=(T, 40)]
-    Every band is at its floor, 60 dB under the loudest sound, and speech is further away than ``BEFORE_SPEECH_S``.
+    features : acoustic features [shape=(T, D)]
+    The log energy stays at its floor for ``LEAST_SILENCE_S``, and speech is further away than ``BEFORE_SPEECH_S``.
     """
-    floor = spectrum.min(axis=0)
-    unheard = (spectrum <= floor + FLOOR_MARGIN).all(axis=1)
-    time_s = np.arange(len(spectrum)) / FRAME_RATE_HZ
-    return unheard & away_from_speech(time_s, speech_intervals(units), BEFORE_SPEECH_S)
+    energy = features[:, ENERGY_FEATURE]
+    at_floor = energy <= energy.min() + FLOOR_MARGIN
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], at_floor, [False]])))
+    silent = np.zeros(len(energy), bool)
+    for first, stop in edges.reshape(-1, 2):
+        silent[first:stop] = stop - first >= LEAST_SILENCE_S * FRAME_RATE_HZ
+    time_s = np.arange(len(energy)) / FRAME_RATE_HZ
+    return silent & away_from_speech(time_s, speech_intervals(units), BEFORE_SPEECH_S)
