@@ -60,10 +60,10 @@ bench: $(VENV)/dev
 model: $(VENV)/dev
 	mkdir -p $(BUILD)
 	$(BIN)/lipmotion corpus prepare $(GRID) -o $(BUILD)/grid-s1
-	$(BIN)/lipmotion train $(BUILD)/grid-s1 -o $(BUILD)/grid-s1-train.lipmotion
+	$(BIN)/lipmotion train $(BUILD)/grid-s1 --from none -o $(BUILD)/grid-s1-train.lipmotion
 	for split in val test; do \
 	  $(BIN)/lipmotion evaluate $(BUILD)/grid-s1-train.lipmotion $(BUILD)/grid-s1 --split $$split -o docs/results/grid-s1-$$split.json; done
-	$(BIN)/lipmotion train $(BUILD)/grid-s1 --split all -o src/lipmotion/models/grid-s1.lipmotion
+	$(BIN)/lipmotion train $(BUILD)/grid-s1 --from none --split all -o src/lipmotion/models/grid-s1.lipmotion
 
 requirements:
 	for list in core dev; do uv pip compile --universal --python-version 3.10 --generate-hashes --no-emit-index-url \

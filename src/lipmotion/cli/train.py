@@ -27,9 +27,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser.add_argument("--system", metavar="NAME", help=SYSTEM)
     add_input(parser, "--units", what="table of units", replaceable=True, type=str, metavar="SET", help=UNITS)
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="engine option (repeatable)")
-    parser.add_argument(
-        "--visual", default="geometry", metavar="KIND", help="geometry, eigenlips (mouth pictures) or both"
-    )
+    parser.add_argument("--visual", default="geometry", metavar="KIND", help="geometry (default), eigenlips or both")
     parser.add_argument("--voices", action="store_true", help="also train on synthetic voices (coupled)")
     add_input(parser, "--recordings", what="folder of recordings", metavar="FOLDER", help=OTHERS)
     add_start_argument(parser)

@@ -57,8 +57,11 @@ class Experts:
 
     @cached_property
     def reliability(self) -> Array:
-        """How far the phones in time can be relied on, 0 to 1 [shape=(T,)]: fully, where they are known."""
-        if self.speech.units_known or self._heard is None:
+        """How far the phones in time can be relied on, 0 to 1 [shape=(T,)].
+
+        Fully, where they are known; also where there are none: noise alone moves no mouth.
+        """
+        if self.speech.units_known or self._heard is None or not speech_intervals(self.speech.units):
             return np.ones(len(self.rows))
         reach = int(DISTORTION_S * FRAME_RATE_HZ)
         total, numbers = np.concatenate([[0.0], np.cumsum(self._heard[1])]), np.arange(len(self.rows))
