@@ -45,8 +45,10 @@ RIDGE = 1e-2
 LEAST_DEVIATION = 1e-6
 TABLE_WEIGHT = 4.0
 """Weight of the table beside a model's own means, in a context that training never saw."""
-RELIABILITY_POWER = 3
-"""The weight of the table grows with this power of the reliability: phones that are wrong make contexts unknown."""
+POWER = 3
+"""The weight of the table grows with this power of the reliability, for phones that are wrong make contexts unknown,
+and of how unknown a context is: the table has a third of the weight where training saw the context once, an eighth
+where twice."""
 HALF_FAMILIAR = 1.0
 """Occurrences in training after which a context counts as half familiar."""
 
@@ -96,7 +98,8 @@ class ArticulationPrior:
         Precisions stay those of the model.
         """
         values = self.trajectory(units, frames)
-        weight = TABLE_WEIGHT * np.asarray(reliability) ** RELIABILITY_POWER * (1 - self.familiarity(units, frames))
+        unknown = 1 - self.familiarity(units, frames)
+        weight = TABLE_WEIGHT * (np.asarray(reliability) * unknown) ** POWER
         share = (weight / (1 + weight))[:, None, None]
 
         def drawn(chosen: slice) -> Statistics:
