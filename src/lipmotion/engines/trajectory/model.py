@@ -76,9 +76,8 @@ class TrajectoryModel:
     def motion(self) -> LearnedMotion:
         """Motion space, closure, limits and variance scaling, which turn predicted means into motion."""
         scaling = VarianceScaling(self.variance_factors, self.emission.means[-1, 0])
-        prior = (
-            None if isinstance(self.network, PriorRegression) else self.prior
-        )  # it has the table among its regressors
+        has_table = isinstance(self.network, PriorRegression)  # among its regressors
+        prior = None if has_table else self.prior
         return LearnedMotion(self.space, self.closure, self.limits, scaling, prior)
 
     @property

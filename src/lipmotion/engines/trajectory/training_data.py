@@ -28,7 +28,7 @@ class TrainingOptions:
                    all nodes share towards zero
     ridge_frames : smallest number of frames of a node with a regression of its own
     joint_recogniser : train the joint model as well
-    conditions, epochs : of the acoustic network
+    epochs : how often the training of the acoustic network uses each recording
     articulation : lean on the table of articulation
     """
 
@@ -44,7 +44,6 @@ class TrainingOptions:
     shared_ridge: float
     ridge_frames: float
     joint_recogniser: bool
-    conditions: int
     epochs: int
     articulation: bool
 
