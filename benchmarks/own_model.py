@@ -3,7 +3,7 @@
     python benchmarks/own_model.py VIDEO [VIDEO ...] [--model FILE] [--pieces 2,4,8]
 
 Each video, or folder of videos, is one talker. It is cut into pieces of five seconds; the first four fifths train, the
-last fifth is judged; no transcripts. With ``--pieces``, models are also trained on the first 2, 4, 8 ... pieces alone: a
+last fifth is judged; no transcripts. With ``--pieces``, models are trained on the first 2, 4, 8 ... pieces, too: a
 learning curve. Printed: mean correlation of each channel over the judged pieces, for
 
 own        : ``train`` with the model of ``--model`` (default: the one that ships) to start from
