@@ -1,0 +1,147 @@
+"""Word stress of phones in time, by rules: neither the dictionary nor a timeline says which syllable is stressed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+
+from lipmotion.types import Timeline, Unit
+from lipmotion.units.classes import phone_classes
+from lipmotion.units.lexicon import REDUCED_VOWELS, WEAK_WORDS, Lexicon
+from lipmotion.units.phones import is_silent
+
+REDUCED = frozenset({*REDUCED_VOWELS.values(), "el", "em", "en"})
+"""Vowels, and consonants in the place of a vowel, that are not stressed in a word with a full vowel."""
+NUCLEI = phone_classes()["vowel"] | REDUCED
+"""The phones that make a syllable."""
+UNSTRESSED_WORDS = WEAK_WORDS | frozenset(
+    "am are as at be been by can could did do does had has have he him his i me my or our shall she should so some "
+    "them they to us we will with would you".split()
+)
+"""Words of one syllable that are unstressed in running speech."""
+PATTERNS: dict[str, int] = {
+    "Fx": 0, "FF": 0, "xF": 1, "Fxx": 0, "FxF": 0, "FFx": 1, "FFF": 1, "xFx": 1, "xFF": 1, "xxF": 2, "FxFx": 2,
+    "FxFF": 2, "FFxF": 1, "FFFx": 2, "FFFF": 2, "FFxx": 1, "Fxxx": 0, "FxxF": 0, "xFxx": 1, "xxFx": 2, "xFxF": 1,
+    "FxxFx": 3, "FxxxF": 2, "FxFxx": 2,
+}  # fmt: skip
+"""The full (F) and reduced (x) vowels of a word, and the number of its stressed one."""
+ENDINGS: dict[str, int] = {
+    ending: place
+    for place, endings in {
+        -1: "ese ore ette elle oy ect",
+        -2: "ion ions ic ics ish io",
+        -3: "ity ia ian ians ious ium ical ier",
+        -4: "ated ary ator ately izing izes usly ating",
+    }.items()
+    for ending in endings.split()
+}
+"""Spellings at the end of a word, and its stressed vowel, counted from the end."""
+UNSTRESSED_PREFIXES = ("be", "de", "dis")
+"""Beginnings of words of two syllables that leave the stress to the second one, where their vowel is one of
+``PREFIX_VOWELS``."""
+PREFIX_VOWELS = frozenset("ih iy eh".split())
+LEADS = frozenset("p b t d k g f v th s sh".split())
+GLIDES = frozenset("l r w y".split())
+"""A sound of ``GLIDES`` begins a syllable together with one of ``LEADS`` before it."""
+
+
+def stress_of(units: Timeline[Unit], lexicon: Lexicon | None = None) -> tuple[int | None, ...]:
+    """Return for each unit whether its syllable is stressed: 1 yes, 0 no, None where it is not known.
+
+    units   : phones in time, recognised, aligned or given
+    lexicon : pronunciations; they tell a word that is said twice from one word (None: those of the dictionary)
+    Known is the stress of every phone that has a word. In a word of several syllables one is stressed: that of its only
+    full vowel, or the one that the spelling of the end (``ENDINGS``), a prefix, or else the pattern of full and reduced
+    vowels (``PATTERNS``) has most often. A word of one syllable is stressed if it is not one of ``UNSTRESSED_WORDS``.
+    Not known is secondary stress, which counts as none, and which words a sentence emphasises. A phone without a word
+    is unstressed if it is a reduced vowel, else not known. Silence has no stress: None.
+    A consonant has the stress of its syllable.
+    Source: our own counts. The patterns come from half of CMUdict, whose entries have stress, the endings and prefixes
+    were chosen with all of it. In the other half the rule is right for 83 % of the words of several syllables, 85 %
+    when words count as often as they are used; the first syllable always is right for 67 % and 67 %.
+
+    >>> from lipmotion.types import Span
+    >>> phones = [Unit(phone, word="again") for phone in "ax g eh n".split()]
+    >>> stress_of(Timeline(tuple(Span(n / 10, (n + 1) / 10, unit) for n, unit in enumerate(phones))))
+    (0, 1, 1, 1)
+    """
+    labels = [span.label for span in units]
+    stresses: list[int | None] = [0 if label.phone in REDUCED else None for label in labels]
+    for first, stop in _spoken_words(labels, lexicon or Lexicon()):
+        phones = [label.phone for label in labels[first:stop]]
+        stresses[first:stop] = _stress_of_phones(labels[first].word, phones)
+    return tuple(stresses)
+
+
+def stressed_vowel(word: str, vowels: Sequence[str]) -> int | None:
+    """Return the number of the stressed vowel of a word, by the rule of ``stress_of``; None: none is stressed.
+
+    word   : in lower case
+    vowels : its vowels and syllabic consonants, in order
+
+    >>> stressed_vowel("television", ["eh", "ax", "ih", "ax"]), stressed_vowel("the", ["ax"])
+    (2, None)
+    """
+    full = [number for number, vowel in enumerate(vowels) if vowel not in REDUCED]
+    if len(vowels) < 2:
+        return 0 if full and word not in UNSTRESSED_WORDS else None
+    if len(full) == 1:
+        return full[0]
+    plain = word.removesuffix("'s")
+    endings = (plain[-size:] for size in range(5, 1, -1) if len(plain) > size + 1)
+    place = next((ENDINGS[ending] + len(vowels) for ending in endings if ending in ENDINGS), -1)
+    if place >= 0 and (place in full or not full):
+        return place
+    if len(vowels) == 2 and plain.startswith(UNSTRESSED_PREFIXES) and vowels[0] in PREFIX_VOWELS:
+        return 1
+    pattern = "".join("x" if vowel in REDUCED else "F" for vowel in vowels)
+    return PATTERNS.get(pattern, full[len(full) // 2] if full else 0)
+
+
+def _spoken_words(labels: Sequence[Unit], lexicon: Lexicon) -> Iterator[tuple[int, int]]:
+    """Yield the first unit of every spoken word, and the one after its last."""
+    first = 0
+    while first < len(labels):
+        stop = first + 1
+        word = labels[first].word
+        while stop < len(labels) and labels[stop].word == word and not is_silent(labels[stop].phone):
+            stop += 1
+        if word and not is_silent(labels[first].phone):
+            each = _length_once(word, [label.phone for label in labels[first:stop]], lexicon)
+            yield from ((start, start + each) for start in range(first, stop, each))
+        first = stop
+
+
+def _length_once(word: str, phones: list[str], lexicon: Lexicon) -> int:
+    """Return how many of the phones of a word, perhaps said several times without a pause, are of it once."""
+    count = len(phones)
+    for each in range(1, count // 2 + 1):
+        repeated = count % each == 0 and phones[:each] * (count // each) == phones
+        if repeated and tuple(phones[:each]) in lexicon.pronunciations(word):
+            return each
+    return count
+
+
+def _stress_of_phones(word: str, phones: Sequence[str]) -> list[int | None]:
+    """Return the stress of each phone of a word."""
+    nuclei = [place for place, phone in enumerate(phones) if phone in NUCLEI]
+    stressed = stressed_vowel(word, [phones[place] for place in nuclei])
+    if not nuclei:
+        return [None] * len(phones)
+    starts = [0, *(_onset(phones, before, here) for before, here in pairwise(nuclei)), len(phones)]
+    return [
+        int(number == stressed) for number, (start, stop) in enumerate(pairwise(starts)) for _ in range(start, stop)
+    ]
+
+
+def _onset(phones: Sequence[str], before: int, here: int) -> int:
+    """Return where the syllable of the vowel ``here`` begins: at most two consonants after the vowel ``before``.
+
+    Deviation from the maximal onset principle (Kahn 1976): s before a stop stays with the syllable before.
+    """
+    start = here
+    if here - before > 1 and phones[here - 1] != "ng":
+        start = here - 1
+        if start - before > 1 and phones[start] in GLIDES and phones[start - 1] in LEADS:
+            start -= 1
+    return start
