@@ -15,13 +15,8 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.stats.block_code import checked_ranges
-from lipmotion.stats.low_rank_code import (
-    LOW_RANK_ARRAYS,
-    LowRankCode,
-    compress_table,
-    low_rank_arrays,
-    low_rank_from_arrays,
-)
+from lipmotion.stats.low_rank_code import LOW_RANK_ARRAYS, LowRankCode, low_rank_arrays, low_rank_from_arrays
+from lipmotion.stats.low_rank_search import compress_table
 from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, checked_arrays, format_errors, refuse_undeclared
 from lipmotion.types import Channel
 
@@ -40,11 +35,12 @@ AXES = ("x_", "y_", "z_")
 class MotionStore:
     """Motion of P channels in T frames, compressed.
 
-    table   : the compressed values
-    rate_hz : frames per second
-    groups  : the number of the point that each channel belongs to [shape=(P,)]
-    error   : of each point the 99th percentile of its distance from where it was, over all frames, as a share of the
-              tolerance: the largest of all points; at most 1
+    table     : the compressed values
+    rate_hz   : frames per second
+    tolerance : the allowed error of the point of each channel, in the channel's unit [shape=(P,)]
+    groups    : the number of the point that each channel belongs to [shape=(P,)]
+    error     : of each point the 99th percentile of its distance from where it was, over all frames, as a share of the
+                  tolerance: the largest of all points; at most 1
 
     >>> import numpy as np
     >>> motion = np.sin(np.arange(500)[:, None] / 20 + np.arange(6))
@@ -55,6 +51,7 @@ class MotionStore:
 
     table: LowRankCode
     rate_hz: float
+    tolerance: Array
     groups: NDArray[np.intp]
     error: float
 
@@ -65,11 +62,6 @@ class MotionStore:
     def kept(self) -> NDArray[np.intp]:
         """First frame and the one after the last of each range that is stored [shape=(R, 2)]."""
         return self.table.code.layout.kept
-
-    @property
-    def tolerance(self) -> Array:
-        """The allowed error of the point of each channel, in the channel's unit [shape=(P,)]."""
-        return self.table.scale
 
     @property
     def knot_rate_hz(self) -> float:
@@ -132,14 +124,14 @@ def compress(
     if not all(np.isfinite(values[first:stop]).all() for first, stop in ranges):
         raise InputError("motion with values that are not finite; give ranges of frames (kept) without them")
     numbers = _checked_groups(groups, values.shape[1])
-    scale = _checked_tolerance(tolerance, numbers)
+    allowed = _checked_tolerance(tolerance, numbers)
     spacings = [1.0, *(rate_hz / camera for camera in CAMERA_RATES_HZ if camera < rate_hz)]
 
     def excess(restored: Array, true: NDArray[Any]) -> Array:
-        return point_distances((restored - true) / scale, numbers)
+        return point_distances((restored - true) / allowed, numbers)
 
-    table, error = compress_table(values, ranges, scale=scale, spacings=spacings, excess=excess)
-    return MotionStore(table, float(rate_hz), numbers, error)
+    coded = compress_table(values, ranges, allowed, numbers, excess, spacings=spacings)
+    return MotionStore(coded.code, float(rate_hz), allowed, numbers, coded.error)
 
 
 def point_groups(channels: Sequence[Channel]) -> NDArray[np.intp]:
@@ -178,8 +170,8 @@ def point_distances(differences: Array, groups: NDArray[np.intp]) -> Array:
 
 def motion_store_arrays(store: MotionStore) -> dict[str, NDArray[Any]]:
     """Serialise a store."""
-    own = {"rate_hz": np.array(store.rate_hz), "groups": store.groups, "error": np.array(store.error)}
-    return own | low_rank_arrays(store.table)
+    own = {"rate_hz": np.array(store.rate_hz), "tolerance": store.tolerance, "groups": store.groups}
+    return own | {"error": np.array(store.error)} | low_rank_arrays(store.table)
 
 
 def motion_store_from_arrays(arrays: Arrays) -> MotionStore:
@@ -191,11 +183,12 @@ def motion_store_from_arrays(arrays: Arrays) -> MotionStore:
         groups = stored["groups"]
         if len(np.unique(groups)) != groups.max() + 1:
             raise ValueError(f"groups up to {groups.max()} with gaps, required every number")
-        return MotionStore(table, float(stored["rate_hz"]), groups, float(stored["error"]))
+        return MotionStore(table, float(stored["rate_hz"]), stored["tolerance"], groups, float(stored["error"]))
 
 
 MOTION_STORE = {
     "rate_hz": ArraySpec(np.float64, "", POSITIVE, 1e9),
+    "tolerance": ArraySpec(np.float64, "P", POSITIVE),
     "groups": ArraySpec(np.intp, "P", 0, 1e9),
     "error": ArraySpec(np.float64, "", 0, 1),
 }

@@ -21,7 +21,7 @@ LARGEST_LEVEL = 2**31 - 1
 """No quantised coefficient is larger."""
 MOST_FRAMES = 10**9
 """No store has more frames, nor a longer block."""
-FLATNESS = 1e-6
+FLATNESS = 3e-4
 """Weight of the second differences of spline coefficients beside the fit: they decide only where no frame does; as
 much less again the first ones, which decide where a range is a single frame."""
 
@@ -68,14 +68,18 @@ class BlockLayout:
         """
         from scipy.fft import dct
 
-        blocks, starts = np.empty((self.first_blocks[-1], self.length, curves.shape[1]), np.float32), self.first_blocks
-        flat = blocks.reshape(-1, curves.shape[1])
+        starts, width = self.first_blocks, curves.shape[1]
+        flat = np.empty((starts[-1] * self.length, width), np.float32)
         for (first, stop), count, start, end in zip(self.kept, self.values, starts[:-1], starts[1:], strict=True):
             part = flat[start * self.length : end * self.length]
             part[:count] = curves[first:stop] if self.is_plain else _spline(curves[first:stop], self.spacing, count)
             part[count:] = part[count - 1]
+        blocks = flat.reshape(starts[-1], self.length, width)
+        if not blocks.size:
+            return blocks
         coefficients: NDArray[np.float32] = dct(blocks, axis=1, norm="ortho", overwrite_x=True)
-        return coefficients * self.gains.astype(np.float32)[:, None]
+        coefficients *= self.gains.astype(np.float32)[:, None]
+        return coefficients
 
     @property
     def gains(self) -> Array:
@@ -152,7 +156,7 @@ class BlockCode:
 
         places, weights = self.layout.places(frames)
         blocks, position = np.unique(places // self.layout.length, return_inverse=True)
-        values = self._blocks(blocks).reshape(-1, self.count)
+        values = self._blocks(blocks).reshape(len(blocks) * self.layout.length, self.count)
         columns = position.reshape(places.shape) * self.layout.length + places % self.layout.length
         if self.layout.is_plain:
             return values[columns[:, 0]]
@@ -166,7 +170,9 @@ class BlockCode:
         from scipy.fft import idct
 
         coefficients = np.zeros((len(blocks), self.layout.length, self.count))
-        flat = coefficients.reshape(len(blocks), -1)
+        if not coefficients.size:
+            return coefficients
+        flat = coefficients.reshape(len(blocks), self.layout.length * self.count)
         place = self.used[:, 0] * self.count + self.used[:, 1]
         flat[:, place[: len(self.low)]] = self.low[:, blocks].T
         flat[:, place[len(self.low) :]] = self.high[:, blocks].T
@@ -206,7 +212,7 @@ def quantise_blocks(layout: BlockLayout, coefficients: NDArray[np.float32], step
     )
 
 
-def checked_ranges(kept: Sequence[tuple[int, int]] | Indices | None, frames: int) -> Indices:
+def checked_ranges(kept: Sequence[tuple[int, int]] | NDArray[np.integer[Any]] | None, frames: int) -> Indices:
     """Return ranges of frames [shape=(R, 2)]; None: all frames.
 
     Raises InputError: ranges that are empty, overlap, are not in order, or go beyond the frames.
