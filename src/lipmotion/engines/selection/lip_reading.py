@@ -29,7 +29,7 @@ TABLE_1: Overlaps = {
     (NORMAL, NORMAL): 0.50,
 }
 """Table 1 as printed. Its rows (forward) are the phone before, its columns (backward) the phone after."""
-SYMMETRIC: Overlaps = TABLE_1 | {(NORMAL, INVISIBLE): 0.73}
+SYMMETRIC: Overlaps = {**TABLE_1, (NORMAL, INVISIBLE): 0.73}
 """Table 1 with the one entry changed that makes it symmetric: 73/27 opposite to 27/73."""
 MIDDLE: Overlaps = dict.fromkeys(TABLE_1, 0.5)
 OVERLAPS: Mapping[str, Overlaps] = {"printed": TABLE_1, "symmetric": SYMMETRIC, "middle": MIDDLE}

@@ -1,0 +1,129 @@
+"""The unit selection engine."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.engines.base import Arrays, Engine, Fit
+from lipmotion.engines.selection.concatenation import concatenated, pieces_of
+from lipmotion.engines.selection.config import SelectionConfig
+from lipmotion.engines.selection.costs import Costs, Target
+from lipmotion.engines.selection.model import SelectionModel, model_arrays, model_from_arrays
+from lipmotion.engines.selection.report import coverage_text, unit_names
+from lipmotion.engines.selection.search import select
+from lipmotion.engines.selection.targets import target_of
+from lipmotion.engines.selection.train import fit_selection
+from lipmotion.motion.frame_labels import with_unit_names
+from lipmotion.motion.generation import Statistics
+from lipmotion.motion.predictors import LEAST_NETWORK_S
+from lipmotion.motion.prior_regression import PriorRegression
+from lipmotion.motion.rest import unheard_frames
+from lipmotion.stats.delta_windows import with_dynamics
+from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
+from lipmotion.types import (
+    FRAME_RATE_HZ,
+    Configuration,
+    Constraints,
+    Example,
+    Generation,
+    Monitor,
+    Speech,
+    StateTrace,
+    Timeline,
+    Unit,
+)
+
+Array = NDArray[np.float64]
+
+
+@final
+@dataclass(frozen=True)
+class SelectionEngine(Engine[SelectionModel]):
+    """Unit selection: recorded motion of phones in context, chosen by dynamic programming, warped in time and joined.
+
+    Source: Minnis & Breen 2000.  Deviations: the motion that a guide predicts from the sound is part of the target
+    costs; joins cost what the recorded motions differ by; overlaps are raised cosines.
+    """
+
+    config: SelectionConfig
+    name: ClassVar[str] = "selection"
+    Config: ClassVar[type[Configuration]] = SelectionConfig
+
+    @property
+    def wants_f0(self) -> bool:  # noqa: D102
+        return self.config.joint_recogniser
+
+    def fit(  # noqa: D102
+        self, examples: Sequence[Example], monitor: Monitor, checkpoint: Checkpoint = NO_CHECKPOINT
+    ) -> Fit[SelectionModel]:
+        model, deviations = fit_selection(examples, self.config, monitor, checkpoint)
+        frames = sum(int(example.valid.sum()) for example in examples)
+        figures = {"frames": frames, "units": int(model.inventory.usable.sum()), "deviation": float(deviations[0])}
+        return Fit(model, figures)
+
+    def conditions(self, motion_s: float) -> int:  # noqa: D102
+        return self.config.conditions if self.config.guide and motion_s >= LEAST_NETWORK_S else 0
+
+    def stands_on_prior(self, model: SelectionModel) -> bool:  # noqa: D102
+        return model.guide is not None and isinstance(model.guide.predictor, PriorRegression)
+
+    def recognise(self, model: SelectionModel, speech: Speech) -> Timeline[Unit] | None:  # noqa: D102
+        return model.phone_recogniser.phones(speech) if model.phone_recogniser is not None else None
+
+    def without_closures(self) -> SelectionEngine:  # noqa: D102
+        return replace(self, config=replace(self.config, closures=False))
+
+    def generate(self, model: SelectionModel, speech: Speech, constraints: Constraints | None = None) -> Generation:  # noqa: D102
+        costs = model.costs(self.config)
+        frames = len(speech.features.values)
+        target = target_of(model, costs, speech)
+        units = select(costs, target).units
+        track = concatenated(model.inventory, target, pieces_of(costs, target, units), frames)
+        means = with_dynamics(track)
+        unheard = unheard_frames(np.asarray(speech.features.values), speech.units)
+        means[unheard] = 0
+        means[unheard, 0] = model.rest
+        precisions = np.broadcast_to(1 / model.variances, means.shape)
+
+        def statistics(block: slice) -> Statistics:
+            return means[block].copy(), precisions[block].copy()
+
+        motion, variance = model.motion.generate(
+            statistics,
+            frames,
+            speech.units,
+            constraints,
+            close=self.config.closures,
+            reliability=_substituted(costs, target, units, frames),
+        )
+        positions = np.searchsorted(target.windows.times_s[:, 0], np.arange(frames) / FRAME_RATE_HZ, side="right") - 1
+        trace = StateTrace(unit_names(model.inventory, units), np.maximum(positions, 0).astype(np.intp))
+        return Generation(motion, variance, with_unit_names(speech.units), trace)
+
+    def describe(self, model: SelectionModel) -> str:  # noqa: D102
+        return coverage_text(model.inventory)
+
+    def to_arrays(self, model: SelectionModel) -> dict[str, NDArray[Any]]:  # noqa: D102
+        return model_arrays(model)
+
+    def from_arrays(self, arrays: Arrays) -> SelectionModel:  # noqa: D102
+        return model_from_arrays(arrays)
+
+
+def _substituted(costs: Costs, target: Target, units: NDArray[np.intp], frames: int) -> Array:
+    """Return 1 in the frames whose unit was recorded between other phones than are wanted, else 0 [shape=(T,)].
+
+    There the table of articulation says more than the unit; elsewhere the unit is a recording of what is wanted.
+    """
+    middle = costs.config.window // 2
+    around = slice(middle - 1, middle + 2)
+    differs = (costs.index.contexts[units][:, around] != target.contexts[:, around]).any(axis=1)
+    result = np.zeros(frames)
+    for (start_s, end_s), other in zip(target.windows.times_s.tolist(), differs.tolist(), strict=True):
+        result[int(start_s * FRAME_RATE_HZ) : int(np.ceil(end_s * FRAME_RATE_HZ))] = float(other)
+    return result
