@@ -80,14 +80,7 @@ class MotionStore:
         Only the blocks that hold them are decoded.
         Raises InputError: a frame that was not recorded, or that was left out.
         """
-        if isinstance(frames, slice):
-            return self.table.rows(np.arange(*frames.indices(len(self)), dtype=np.intp))
-        numbers = np.asarray(frames)
-        if numbers.ndim != 1 or (numbers.size and numbers.dtype.kind not in "iu"):
-            raise InputError(
-                f"frames of shape {numbers.shape} and type {numbers.dtype}, required a slice or a row of whole numbers"
-            )
-        return self.table.rows(numbers.astype(np.intp))
+        return self.table.rows(self.table.code.layout.numbers(frames))
 
 
 def compress(
