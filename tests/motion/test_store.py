@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import doctest
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline
 
 from lipmotion.errors import InputError, ModelFormatError
+from lipmotion.motion import store as store_module
 from lipmotion.motion.store import (
     MotionStore,
     compress,
@@ -18,6 +20,7 @@ from lipmotion.motion.store import (
     motion_store_from_arrays,
     point_distances,
     point_groups,
+    ranges_without_silence,
 )
 from lipmotion.storage.archive import read_archive, write_archive
 from lipmotion.types import Channel
@@ -136,6 +139,49 @@ def test_frames_that_are_left_out_take_no_space_and_keep_their_numbers(tmp_path)
         short.rows([5, 300])
     with pytest.raises(InputError, match="frame 200 was left out"):
         short.rows(slice(190, 201))
+
+
+def without_silence_slowly(silent: list[bool], longest: int, ranges: list[tuple[int, int]]) -> set[int]:
+    """Walk through all frames: one is kept if speech is near enough on either side, or the silence is short."""
+    kept = set()
+    for first, stop in ranges:
+        for frame in range(first, stop):
+            before = next((n for n in range(frame, first - 1, -1) if not silent[n]), None)
+            after = next((n for n in range(frame, stop) if not silent[n]), None)
+            near = (before is not None and frame - before <= (longest + 1) // 2) or (
+                after is not None and after - frame <= longest // 2
+            )
+            short = before is not None and after is not None and after - before - 1 <= longest
+            if near or short:
+                kept.add(frame)
+    return kept
+
+
+@given(
+    silent=st.lists(st.booleans() | st.just(True), min_size=1, max_size=60),
+    longest=st.integers(0, 12),
+    cut=st.integers(0, 60),
+)
+def test_long_silence_is_left_out(silent, longest, cut) -> None:
+    ranges = [span for span in ((0, min(cut, len(silent))), (cut, len(silent))) if span[0] < span[1]]
+    found = ranges_without_silence(np.array(silent), longest, ranges)
+    frames = [frame for first, stop in found for frame in range(first, stop)]
+    assert len(set(frames)) == len(frames)
+    assert set(frames) == without_silence_slowly(silent, longest, ranges)
+    assert len(compress(np.ones((len(silent), 2)), 25.0, 0.1, kept=found).kept) == len(found)
+
+
+@pytest.mark.parametrize(
+    ("silent", "longest"), [(np.zeros(3), 1), (np.zeros((3, 1), bool), 1), (np.zeros(3, bool), -1)]
+)
+def test_bad_silence_is_refused(silent, longest) -> None:
+    with pytest.raises(InputError, match="truth values"):
+        ranges_without_silence(silent, longest)
+
+
+def test_the_example_runs() -> None:
+    failed, tried = doctest.testmod(store_module)
+    assert (failed, tried > 2) == (0, True)
 
 
 @pytest.mark.parametrize(

@@ -80,14 +80,7 @@ class MotionStore:
         Only the blocks that hold them are decoded.
         Raises InputError: a frame that was not recorded, or that was left out.
         """
-        if isinstance(frames, slice):
-            return self.table.rows(np.arange(*frames.indices(len(self)), dtype=np.intp))
-        numbers = np.asarray(frames)
-        if numbers.ndim != 1 or (numbers.size and numbers.dtype.kind not in "iu"):
-            raise InputError(
-                f"frames of shape {numbers.shape} and type {numbers.dtype}, required a slice or a row of whole numbers"
-            )
-        return self.table.rows(numbers.astype(np.intp))
+        return self.table.rows(self.table.code.layout.numbers(frames))
 
 
 def compress(
@@ -132,6 +125,39 @@ def compress(
 
     coded = compress_table(values, ranges, allowed, numbers, excess, spacings=spacings)
     return MotionStore(coded.code, float(rate_hz), allowed, numbers, coded.error)
+
+
+def ranges_without_silence(
+    is_silent: NDArray[np.bool_],
+    longest: int,
+    ranges: Sequence[tuple[int, int]] | NDArray[np.integer[Any]] | None = None,
+) -> NDArray[np.intp]:
+    """Return the ranges of frames that are kept when long silence is left out [shape=(R', 2)], for ``compress``.
+
+    is_silent : whether each frame is silent [shape=(T,)]
+    longest   : of each silence so many frames stay: half of them at its beginning and half at its end, except where
+                a range begins or ends
+    ranges    : utterances, as ``kept`` of ``compress``; ranges that are silent throughout are left out. None: one
+                range of all frames
+    Raises InputError: not truth values in a row, a negative number of frames, or ranges that do not fit.
+    Frames keep their numbers: motion and sound of the frames that are kept stay in step.
+    Source: Minnis & Breen 2000, §6 (silence is edited out, synchronisation maintained).
+    """
+    silent = np.asarray(is_silent)
+    if silent.ndim != 1 or silent.dtype != np.bool_ or longest < 0:
+        raise InputError(
+            f"silence of shape {silent.shape} and type {silent.dtype}, at most {longest} frames of it: required a row "
+            "of truth values, and 0 frames or more"
+        )
+    kept = []
+    for first, stop in checked_ranges(ranges, len(silent)):
+        spoken = np.flatnonzero(~silent[first:stop]) + first
+        if len(spoken):
+            gaps = np.flatnonzero(np.diff(spoken) - 1 > longest)
+            starts = np.append(spoken[0], spoken[gaps + 1]) - longest // 2
+            stops = np.append(spoken[gaps], spoken[-1]) + 1 + (longest + 1) // 2
+            kept += list(zip(np.maximum(starts, first), np.minimum(stops, stop), strict=True))
+    return np.array(kept, np.intp).reshape(-1, 2)
 
 
 def point_groups(channels: Sequence[Channel]) -> NDArray[np.intp]:

@@ -29,14 +29,16 @@ FIRST_COMPONENTS = 64
 """Components of a large table at first; twice as many where they do not suffice."""
 MOST_ROWS = 20_000
 """Frames that the components are computed of; of tables with more than ``EXACT`` columns, ``EXACT``."""
-SAMPLE = 2048
-"""Frames by which a step is chosen; in the end all are restored and verified."""
+SAMPLE, MOST_SAMPLED = 2048, 1 << 25
+"""Frames by which a step is chosen, at last as many as hold the second count of numbers; all are verified."""
 PART, PIECE = 8192, 512
 """Layout and weights are chosen on pieces of at most so many frames, as many together as the first number says."""
 FIRST_STEP = 2.0
-ROUNDS = 8
-"""Steps that are tried on the sample."""
-NEAR, NEARLY = 0.96, 0.985
+ROUNDS, MOST_ROUNDS = 8, 24
+"""Steps that are tried on the sample; more where none of the first will do."""
+LEAST_STEP = 1e-3
+"""No smaller step is tried, in units of the tolerance: where it will not do, the errors come from elsewhere."""
+NEAR, NEARLY = 0.975, 0.99
 """A step is good enough where the error is at least the first part of what is allowed; it aims at the second."""
 SMALLER, MOST_STEPS = 0.97, 100
 """Factor of the step where the promise is not kept on all frames, and how often it is tried."""
@@ -165,27 +167,33 @@ class _Projection:
     space: _Space
     curves: NDArray[np.float32]
 
-    def searched(self, layout: BlockLayout) -> LowRankCode | None:
-        """Return the code of one layout with about the largest step that a sample allows; None: no step does."""
+    def searched(self, layout: BlockLayout, most: int = SAMPLE) -> LowRankCode | None:
+        """Return the code of one layout with about the largest step that a sample of frames allows, or None."""
         coefficients = layout.forward(self.curves)
-        some = self.table.frames[evenly_spaced(SAMPLE, len(self.table.frames))]
-        best, step = None, FIRST_STEP
-        for _ in range(ROUNDS):
+        some = self.table.frames[evenly_spaced(most, len(self.table.frames))]
+        best, step, small, large = None, FIRST_STEP, 0.0, np.inf  # a step that will do, and one that will not
+        for tried in range(MOST_ROUNDS):
+            if step < LEAST_STEP or (best is not None and tried >= ROUNDS):
+                break
             try:
                 code = _coded(layout, coefficients, step, self.space)
             except InputError:  # levels are too large: no step will do
                 break
             error = float(self.table.errors(code, some).max())
             if error <= 1:
-                best = code
+                best, small = code, step
+            else:
+                large = step
             if NEAR <= error <= 1 or (error <= 1 and not len(code.code.used)):
                 break
             step *= float(np.clip(NEARLY / max(error, 1e-9), 0.1, 4))
+            if not small < step < large:
+                step = float(np.sqrt(small * large)) if small > 0 else large / 2
         return best
 
     def verified(self, layout: BlockLayout) -> CodedTable:
         """Return the code of one layout whose errors are allowed in all frames. Raises InputError: there is none."""
-        code = self.searched(layout)
+        code = self.searched(layout, max(SAMPLE, MOST_SAMPLED // self.table.values.shape[1]))
         coefficients = layout.forward(self.curves)
         for _ in range(MOST_STEPS):
             if code is None:
