@@ -48,9 +48,10 @@ class Inventory:
         if len(rows) == len(frames):
             return rows
         edges = [self.first[:-1], self.first[1:] - 1]
-        nearest = [np.searchsorted(stored, edges[0]), np.searchsorted(stored, edges[1], side="right") - 1]
+        after = np.minimum(np.searchsorted(stored, edges[0]), len(stored) - 1)
+        before = np.maximum(np.searchsorted(stored, edges[1], side="right") - 1, 0)
         knots = np.concatenate([stored, *edges])
-        values = np.concatenate([rows, *(rows[place] for place in nearest)])
+        values = np.concatenate([rows, rows[after], rows[before]])
         knots, order = np.unique(knots, return_index=True)
         return np.stack([np.interp(frames, knots, column) for column in values[order].T], axis=1)
 

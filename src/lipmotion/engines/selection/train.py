@@ -146,20 +146,20 @@ def _of_recording(windows: PhoneWindows, number: int) -> PhoneWindows:
 def _stored(
     examples: Sequence[Example], values: Sequence[Array], first: NDArray[np.intp], space: MotionSpace
 ) -> MotionStore:
-    """Return the motion, compressed; without the middle of long silences."""
+    """Return the motion, compressed; without the middle of long silences, and without what was not measured."""
     ranges = []
     for example, begin, x in zip(examples, first[:-1].tolist(), values, strict=True):
         time_s = np.arange(len(x)) / FRAME_RATE_HZ
-        near = ~away_from_speech(time_s, speech_intervals(example.speech.units), KEPT_SILENCE_S)
-        near[[0, -1]] |= ~near.any()
+        near = example.valid & ~away_from_speech(time_s, speech_intervals(example.speech.units), KEPT_SILENCE_S)
         edges = np.flatnonzero(np.diff(np.concatenate([[False], near, [False]])))
         ranges += [(begin + start, begin + stop) for start, stop in edges.reshape(-1, 2).tolist()]
     everything = np.concatenate(values)
+    measured = np.concatenate([everything[start:stop] for start, stop in ranges])
     names = [channel.name for channel in space.channels]
-    spread = np.ptp(np.percentile(everything, [1, 99], axis=0), axis=0)
+    spread = np.ptp(np.percentile(measured, [1, 99], axis=0), axis=0)
     tolerance = np.maximum(LIP_WIDTH_SHARE * spread, 1e-6)
     if "width" in names and "width" in space.direct_names:
-        width = float(np.median(everything[:, space.direct_names.index("width")]))
+        width = float(np.median(measured[:, space.direct_names.index("width")]))
         tolerance = np.full(len(spread), max(LIP_WIDTH_SHARE * width, 1e-6))
     return compress(everything, FRAME_RATE_HZ, tolerance, kept=ranges)
 
