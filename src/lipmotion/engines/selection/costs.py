@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from lipmotion.engines.selection.config import SelectionConfig
 from lipmotion.engines.selection.inventory import (
+    RecordedUnits,
     UnitIndex,
-    UnitInventory,
     UnitNumbers,
     replaced,
     standing_in,
@@ -65,7 +65,7 @@ class Costs:
     scale : factors of the dimensions of motion in all comparisons [shape=(Q,)]
     """
 
-    inventory: UnitInventory
+    inventory: RecordedUnits
     config: SelectionConfig
     scale: Array
 

@@ -19,7 +19,7 @@ UnitNumbers = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
-class UnitInventory:
+class RecordedUnits:
     """Recorded phones, called units, and their motion.
 
     names     : of the recordings
@@ -120,7 +120,7 @@ class UnitIndex:
         return np.unique(np.concatenate(found)) if found else np.zeros(0, np.intp)
 
 
-def unit_index(inventory: UnitInventory, invisible: Collection[str], window: int) -> UnitIndex:
+def unit_index(inventory: RecordedUnits, invisible: Collection[str], window: int) -> UnitIndex:
     """Return the index of an inventory.
 
     invisible : phones that are one symbol

@@ -7,21 +7,21 @@ from textwrap import wrap
 
 import numpy as np
 
-from lipmotion.engines.selection.inventory import UnitInventory, standing_in
+from lipmotion.engines.selection.inventory import RecordedUnits, standing_in
 from lipmotion.units import PHONES
 
 LINE = 110
 """Width of a line of text, in characters."""
 
 
-def source_of(inventory: UnitInventory, unit: int) -> str:
+def source_of(inventory: RecordedUnits, unit: int) -> str:
     """Return the recording of a unit, and its time and phone there: ``bbaf2n 0.530-0.610 s b``."""
     windows = inventory.windows
     start_s, end_s = windows.times_s[unit].tolist()
     return f"{inventory.names[windows.recording[unit]]} {start_s:.3f}-{end_s:.3f} s {PHONES[windows.phones[unit]]}"
 
 
-def units_by_source(inventory: UnitInventory, sources: Iterable[str]) -> dict[str, int]:
+def units_by_source(inventory: RecordedUnits, sources: Iterable[str]) -> dict[str, int]:
     """Return the units that some texts of ``source_of`` name; other texts are left out."""
     wanted = set(sources)
     recordings = {source.split(" ")[0] for source in wanted}
@@ -31,7 +31,7 @@ def units_by_source(inventory: UnitInventory, sources: Iterable[str]) -> dict[st
     return {source: named[source] for source in wanted if source in named}
 
 
-def inventory_text(inventory: UnitInventory) -> str:
+def inventory_text(inventory: RecordedUnits) -> str:
     """Return how many units each phone has, and what stands in for phones without units."""
     windows, usable = inventory.windows, inventory.usable
     counts = {phone: int((usable & (windows.phones == n)).sum()) for n, phone in enumerate(PHONES)}

@@ -12,7 +12,7 @@ from lipmotion.engines.selection.concatenation import concatenated, pieces_of
 from lipmotion.engines.selection.config import SelectionConfig
 from lipmotion.engines.selection.costs import Costs
 from lipmotion.engines.selection.guide import Guide, at_points, fit_guide
-from lipmotion.engines.selection.inventory import UnitInventory
+from lipmotion.engines.selection.inventory import RecordedUnits
 from lipmotion.engines.selection.model import SelectionModel
 from lipmotion.engines.selection.search import select
 from lipmotion.engines.selection.targets import target_of
@@ -77,7 +77,7 @@ def fit_selection(
 
 def inventory_of(
     examples: Sequence[Example], values: Sequence[Array], space: MotionSpace, guide: Guide | None
-) -> UnitInventory:
+) -> RecordedUnits:
     """Return the inventory of some examples.
 
     values : motion of each in the motion space [each shape=(T, Q)]
@@ -103,7 +103,7 @@ def inventory_of(
             [at_points(guide.predict(e.speech), _of_recording(windows, n)) for n, e in enumerate(examples)]
         ).astype(np.float16)
     names = tuple(example.name for example in examples)
-    return UnitInventory(names, windows, usable, first, _stored(examples, values, first, space), predicted)
+    return RecordedUnits(names, windows, usable, first, _stored(examples, values, first, space), predicted)
 
 
 def comparison_scale(recorded: Array, space: MotionSpace) -> Array:
