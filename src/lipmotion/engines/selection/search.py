@@ -45,9 +45,11 @@ def select(
 
     excluded : units that must not be used [shape=(all units,)]
     given    : units that must be used, by the number of their phone in the target
-    prune    : leave out candidates that cannot be part of the best sequence
+    prune    : leave out candidates that cannot be part of the best sequence, and those beyond the beam
     A candidate whose target cost exceeds the least one of its phone by more than two joins can cost is never the best:
-    the one of least target cost in its place would be better. So pruning does not change the cost of the result.
+    the one of least target cost in its place would be better. So this
+    does not change the cost of the result. Of the others, the beam keeps those of the least target costs: by how much
+    that changes the cost was measured (docs/results/selection.md).
     Source: Minnis & Breen 2000, §3.
     """
     given = given or {}
@@ -89,6 +91,8 @@ def _candidates(
         units = costs.index.candidates(target.contexts[number], costs.config.candidates)
     each = costs.target_costs(target, number, units)
     if prune:
-        kept = each <= each.min() + 2 * costs.config.most
+        kept = np.flatnonzero(each <= each.min() + 2 * costs.config.most)
+        if len(kept) > costs.config.beam:
+            kept = np.sort(kept[np.argsort(each[kept], kind="stable")[: costs.config.beam]])
         units, each = units[kept], each[kept]
     return units, each
