@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import argparse
+from typing import TYPE_CHECKING
 
 from lipmotion.cli.options import add_machine_readable
 from lipmotion.cli.paths import add_input
 from lipmotion.cli.results import add_result_arguments, check_results, write_results
 from lipmotion.cli.speech import add_lexicon_argument, add_model_argument, add_speaker_argument
+
+if TYPE_CHECKING:
+    from lipmotion.cli.progress import Report
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -41,7 +45,7 @@ def run(options: argparse.Namespace) -> None:
             _speak(options, report)
 
 
-def _list_voices(report) -> None:
+def _list_voices(report: Report) -> None:
     from lipmotion.speech.voices.installed import all_voices
 
     voices = all_voices()
@@ -51,7 +55,7 @@ def _list_voices(report) -> None:
     )
 
 
-def _speak(options: argparse.Namespace, report) -> None:
+def _speak(options: argparse.Namespace, report: Report) -> None:
     from lipmotion.pipeline.model import load_model
     from lipmotion.pipeline.speak import read_text, speak
     from lipmotion.units import Lexicon

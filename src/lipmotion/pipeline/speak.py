@@ -16,7 +16,6 @@ from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.request import SpeechRequest
 from lipmotion.pipeline.speakers import speaker_map
 from lipmotion.speech.audio_files import SPEECH_RATE_HZ
-from lipmotion.speech.noise import noisy_audio
 from lipmotion.speech.recogniser import SHORT_PAUSE_S
 from lipmotion.speech.voices.installed import default_voice, voice_named, voiced_sentences
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
@@ -32,6 +31,9 @@ FLOOR_DB = 50.0
 all, which would shift features that are normalised over the recording. The sound that is returned has none."""
 AT_ONCE = 20
 """Sentences that one run of a synthesiser speaks; only their files are on the disk at a time."""
+BLOCK = 1 << 20
+"""Samples of noise that are drawn at a time."""
+_Part = tuple[int, NDArray[np.float32]]
 LARGEST_TEXT = 4 * MOST_CHARACTERS
 """Most bytes of a text file: a character takes up to four."""
 
@@ -79,8 +81,7 @@ def speak(
     loaded = model if isinstance(model, Model) else load_model(model)
     speaker_map(loaded.speakers, speaker)  # an unknown one is reported before anything is spoken
     sound, speech, units = _said(sentences, chosen, lexicon)
-    heard = noisy_audio(speech, "white", FLOOR_DB)
-    request = SpeechRequest(heard, units=units, speaker=speaker)
+    request = SpeechRequest(_with_floor(speech, units), units=units, speaker=speaker)
     return SpokenText(sound, animate(request, model=loaded, constraints=constraints))
 
 
@@ -93,26 +94,25 @@ def _said(
     sentences: Sequence[str], voice: SyntheticVoice, lexicon: Lexicon | None
 ) -> tuple[Audio, Audio, Timeline[Unit]]:
     """Return sentences one after the other: at the synthesiser's rate, at 16 kHz, and their phones in time."""
-    sounds: list[NDArray[np.float32]] = []
-    speech: list[tuple[float, NDArray[np.float32]]] = []
+    sounds: list[_Part] = []
+    speech: list[_Part] = []
     spans: list[Span[Unit]] = []
-    now_s, rate_hz = 0.0, SPEECH_RATE_HZ
+    rate_hz, at = SPEECH_RATE_HZ, 0
     for start in range(0, len(sentences), AT_ONCE):
         with closing(voiced_sentences(sentences[start : start + AT_ONCE], voice, lexicon)) as said:
             for sentence in said:
                 sound = sentence.own_sound()
                 if not spans:
                     rate_hz = sound.rate_hz
-                    now_s = _rest_samples(sentence.units[0], rate_hz) / rate_hz
-                sounds.append(sound.samples)
-                speech.append((now_s, sentence.audio.samples))
-                spans += sentence.units.shifted(now_s)
-                now_s += sound.duration_s
-    before = round(speech[0][0] * rate_hz)
-    after = _rest_samples(spans[-1], rate_hz)
-    silence = np.zeros(before, np.float32), np.zeros(after, np.float32)
-    whole = Audio(np.concatenate([silence[0], *sounds, silence[1]]), rate_hz)
-    return whole, _placed(speech, whole.duration_s), Timeline(tuple(_joined(spans, whole.duration_s)))
+                    at = _rest_samples(sentence.units[0], rate_hz)
+                sounds.append((at, sound.samples))
+                speech.append((round(at / rate_hz * SPEECH_RATE_HZ), sentence.audio.samples))
+                spans += sentence.units.shifted(at / rate_hz)
+                at += len(sound.samples)
+    count = at + _rest_samples(spans[-1], rate_hz)
+    units = Timeline(tuple(_joined(spans, count / rate_hz)))
+    whole = Audio(_placed(sounds, count), rate_hz)
+    return whole, Audio(_placed(speech, round(count / rate_hz * SPEECH_RATE_HZ)), SPEECH_RATE_HZ), units
 
 
 def _rest_samples(edge: Span[Unit], rate_hz: int) -> int:
@@ -121,13 +121,27 @@ def _rest_samples(edge: Span[Unit], rate_hz: int) -> int:
     return max(round(rest_s * rate_hz), 0)
 
 
-def _placed(parts: Sequence[tuple[float, NDArray[np.float32]]], duration_s: float) -> Audio:
-    """Return parts of sound at 16 kHz as one, each at its time: rounding does not add up."""
-    samples = np.zeros(round(duration_s * SPEECH_RATE_HZ), np.float32)
-    for start_s, part in parts:
-        first = round(start_s * SPEECH_RATE_HZ)
-        samples[first : first + len(part)] = part[: max(len(samples) - first, 0)]
-    return Audio(samples, SPEECH_RATE_HZ)
+def _placed(parts: list[_Part], count: int) -> NDArray[np.float32]:
+    """Return parts of sound as one sound [shape=(count,)], silent between them; the list is empty afterwards."""
+    samples = np.zeros(count, np.float32)
+    while parts:
+        first, part = parts.pop()
+        samples[first : first + len(part)] = part[: max(count - first, 0)]
+    return samples
+
+
+def _with_floor(speech: Audio, units: Timeline[Unit]) -> Audio:
+    """Return speech with white noise ``FLOOR_DB`` under its phones; the samples are changed in place."""
+    samples, rate_hz = speech.samples, speech.rate_hz
+    spoken = [span for span in units if not is_silent(span.label.phone)]
+    slices = [samples[round(span.start_s * rate_hz) : round(span.end_s * rate_hz)] for span in spoken]
+    power = sum(float(part @ part) for part in slices) / max(sum(map(len, slices)), 1)
+    gain = np.float32(np.sqrt(power) * 10 ** (-FLOOR_DB / 20))
+    rng = np.random.default_rng(0)
+    for start in range(0, len(samples), BLOCK):
+        part = samples[start : start + BLOCK]
+        part += gain * rng.standard_normal(len(part), np.float32)
+    return speech
 
 
 def _joined(spans: Sequence[Span[Unit]], duration_s: float) -> Iterator[Span[Unit]]:

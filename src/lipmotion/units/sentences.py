@@ -16,7 +16,9 @@ LONGEST_SENTENCE = 400
 LONGEST_WORD = 200
 """Most characters without a blank in scripts that have blanks; a longer one is no word, but would be spoken for
 minutes."""
-ABBREVIATIONS = "mr mrs ms dr prof st jr sr vs etc no vol fig inc ltd co gen col capt lt sgt rev hon e.g i.e a.m p.m approx"
+ABBREVIATIONS = (
+    "mr mrs ms dr prof st jr sr vs etc no vol fig inc ltd co gen col capt lt sgt rev hon e.g i.e a.m p.m approx"
+)
 """What ends in a full stop that does not end a sentence, without its last stop."""
 _ABBREVIATED = frozenset(ABBREVIATIONS.split())
 _END = re.compile(r"""(?:[.!?…]+["')\]”’»]*(?=\s)|[。！？]+["')\]”’»」』]*)\s*""")
@@ -29,7 +31,9 @@ def clean_text(text: str) -> str:
     An empty line ends a sentence, as a full stop does.
     """
     ended = re.sub(r"(\w)[ \t]*\r?\n[ \t]*\r?\n", r"\1.\n", text)
-    return " ".join("".join(" " if unicodedata.category(c) in ("Cc", "Cs", "Co", "Cn", "Zl", "Zp") else c for c in ended).split())
+    return " ".join(
+        "".join(" " if unicodedata.category(c) in ("Cc", "Cs", "Co", "Cn", "Zl", "Zp") else c for c in ended).split()
+    )
 
 
 def sentences_of(text: str) -> list[str]:
@@ -63,7 +67,7 @@ def _ended(text: str) -> Iterator[str]:
     """Yield the sentences of a text as punctuation divides it."""
     start = 0
     for end in _END.finditer(text):
-        before = text[start : end.start()].split(" ")[-1].lstrip("\"'(“‘«")
+        before = text[start : end.start()].rsplit(" ", maxsplit=1)[-1].lstrip("\"'(“‘«")
         is_initial = len(before) == 1 and before.isalpha() and before.isupper() and before != "I"
         if text[end.start()] == "." and (before.lower() in _ABBREVIATED or is_initial):
             continue

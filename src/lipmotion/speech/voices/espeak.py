@@ -13,6 +13,7 @@ import json
 import logging
 import shutil
 import sys
+from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from functools import cache
 from importlib.util import find_spec
@@ -22,8 +23,9 @@ from typing import Any
 
 from lipmotion.errors import InputError, LipMotionError
 from lipmotion.speech.audio_files import read_audio
+from lipmotion.speech.voices.espeak_events import PART, SILENCE
 from lipmotion.speech.voices.espeak_times import corrected_phone_times
-from lipmotion.speech.voices.ipa_phones import ipa_map
+from lipmotion.speech.voices.ipa_phones import complete_map
 from lipmotion.speech.voices.phone_maps import ESPEAK_PHONES, PhoneMap
 from lipmotion.speech.voices.synthesiser import SynthesisedSentence, Synthesiser, SyntheticVoice, program_output
 from lipmotion.types import Span, Timeline
@@ -37,7 +39,7 @@ PROGRAM = [sys.executable, "-I", str(Path(__file__).with_name("espeak_events.py"
 DATA = "espeak-ng-data"
 STRESS_MARKS = "',%="
 """What version 1.52 writes before the vowel of a stressed syllable; 1.51 does not."""
-SILENCES: PhoneMap = {label: phones for label, phones in ESPEAK_PHONES.items() if label in ("_", "_:", ";")}
+NO_IPA: PhoneMap = {SILENCE: ESPEAK_PHONES[SILENCE], PART: ESPEAK_PHONES[PART]}
 LARGEST_VOICE = 1 << 16
 """Most bytes of a file that describes a voice."""
 Start = tuple[str, float, int]
@@ -114,33 +116,34 @@ def _synthesise(voice: str, texts: Sequence[str], folder: Path) -> Iterator[Synt
     ipa = voice.partition("+")[0] != LANGUAGE
     task = {"voice": voice, "texts": list(texts), "folder": str(folder), "ipa": ipa} | _library()
     sentences = _answer(program_output(PROGRAM, PACKAGE, len(texts), json.dumps(task)))
-    unknown = ""
+    labels = (label.lstrip(STRESS_MARKS) for said in sentences for label, _, _ in said)
+    phone_map, unknown = complete_map(labels, NO_IPA if ipa else ESPEAK_PHONES, ipa=ipa)
+    if unknown:
+        LOG.warning("espeak-ng says phones that no table has, shown as the nearest or as ax: %s", " ".join(unknown))
     for number, (text, said) in enumerate(zip(texts, sentences, strict=True)):
         path = folder / f"{number}.wav"
         audio = read_audio(path)
         starts = [(label.lstrip(STRESS_MARKS), start_s) for label, start_s, _ in said]
-        phone_map, letters = ipa_map((label for label, _ in starts), SILENCES) if ipa else (ESPEAK_PHONES, "")
-        unknown += "".join(letter for letter in letters if letter not in unknown)
         phones = corrected_phone_times(starts, audio, phone_map)
         words = _written_words(phones, [place for _, _, place in said], text)
         yield SynthesisedSentence(audio, phones, path, words, phone_map)
         path.unlink()
-    if unknown:
-        LOG.warning("espeak-ng says phones that no table has, spoken here as ax: %s", " ".join(unknown))
 
 
 def _written_words(phones: Timeline[str], places: Sequence[int], text: str) -> Timeline[str]:
-    """Return the words of a text in time: what stands between blanks.
+    """Return the words of a text in time: what stands between blanks. Words that are said as one (*on the*) are one.
 
     places : of each phone, where its word, or a part of it, begins in the text
     """
     words = text.split()
     starts = [at for at in range(len(text)) if not text[at].isspace() and (at == 0 or text[at - 1].isspace())]
-    numbers = [max(sum(start <= place for start in starts) - 1, 0) for place in places]
+    numbers = [max(bisect_right(starts, place) - 1, 0) for place in places]
+    groups = [(number, list(group)) for number, group in groupby(range(len(phones)), key=numbers.__getitem__)]
+    following = [*(number for number, _ in groups[1:]), len(words)]
     spans = []
-    for number, group in groupby(zip(phones, numbers, strict=True), key=lambda pair: pair[1]):
-        said = [span for span, _ in group]
-        spans.append(Span(said[0].start_s, said[-1].end_s, words[number]))
+    for place, ((number, said), stop) in enumerate(zip(groups, following, strict=True)):
+        written = words[number if place else 0 : max(stop, number + 1)]
+        spans.append(Span(phones[said[0]].start_s, phones[said[-1]].end_s, " ".join(written)))
     return Timeline(tuple(spans))
 
 

@@ -1,11 +1,11 @@
 """A stand-alone program: texts to wav files and the start times of their phones, by the library of espeak-ng.
 
-It reads a task as JSON: ``{"voice", "texts", "folder", "ipa"}``, and optionally ``"library"`` and ``"data"``, the paths
-of the library and of the folder that holds ``espeak-ng-data``. It writes a list of ``[label, start_s, place]`` for every
-text as JSON, and the sound of text n to ``folder/n.wav``. A label is espeak-ng's mnemonic, or with ``"ipa"`` the phone in
-the International Phonetic Alphabet; ``place`` is where the written word begins in the text, in characters. Without
-``"voice"`` it writes ``{"version", "data"}``: what is installed. It imports nothing of this package, so that it starts
-fast.
+It reads a task as JSON: ``{"voice", "texts", "folder", "ipa"}``, and optionally ``"library"`` and ``"data"``: the
+paths of the library and of the folder that holds ``espeak-ng-data``. It writes a list of ``[label, start_s, place]``
+for every text as JSON, and the sound of text n to ``folder/n.wav``. A label is espeak-ng's mnemonic, or with ``"ipa"``
+the phone in the International Phonetic Alphabet; ``place`` is where the written word begins in the text, in characters.
+Without ``"voice"`` it writes ``{"version", "data"}``: what is installed. It imports nothing of this package, so that it
+starts fast.
 """
 
 from __future__ import annotations

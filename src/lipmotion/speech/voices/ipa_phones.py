@@ -1,4 +1,4 @@
-"""Phones of other languages, in the International Phonetic Alphabet, to the inventory's phones of the nearest mouth shape.
+"""Phones of other languages, in the International Phonetic Alphabet, to the phones of the nearest mouth shape.
 
 What the lips do decides: French y (*rue*) is spoken with rounded lips and so becomes uw, although its tongue is that of
 iy. Marks of length, tone, stress and of the way of speaking are not needed for that, and are left out.
@@ -11,6 +11,7 @@ from collections.abc import Iterable
 from functools import cache
 
 from lipmotion.speech.voices.phone_maps import PhoneMap
+from lipmotion.units import SILENCE
 
 _IPA: dict[str, str] = {
     # vowels; y ø œ are rounded, ɯ ɤ ɨ are not
@@ -55,7 +56,9 @@ def ipa_phones(label: str) -> tuple[tuple[str, ...], str]:
     phones: list[str] = []
     unknown, at = "", 0
     while at < len(text):
-        symbol = next((text[at : at + size] for size in range(_LONGEST, 0, -1) if text[at : at + size] in IPA_PHONES), "")
+        symbol = next(
+            (text[at : at + size] for size in range(_LONGEST, 0, -1) if text[at : at + size] in IPA_PHONES), ""
+        )
         if symbol:
             phones += IPA_PHONES[symbol]
         elif not _is_mark(text[at]):
@@ -65,18 +68,24 @@ def ipa_phones(label: str) -> tuple[tuple[str, ...], str]:
     return tuple(phones), unknown
 
 
-def ipa_map(labels: Iterable[str], silences: PhoneMap) -> tuple[PhoneMap, str]:
-    """Return a map for labels in IPA, and the letters among them that are in no table.
+def complete_map(labels: Iterable[str], table: PhoneMap, *, ipa: bool) -> tuple[PhoneMap, tuple[str, ...]]:
+    """Return a map for all labels, and what of them no table has.
 
-    silences : labels that are no IPA, with their phones
+    table : labels with their phones, which count first
+    ipa   : whether the other labels are IPA; else those that are not in the table are read as if they were, and are
+            reported. A label that begins with ``_`` is a silence.
     """
     found: dict[str, tuple[str, ...]] = {}
-    unknown = ""
-    for label in dict.fromkeys(labels):
-        phones, letters = (silences[label], "") if label in silences else ipa_phones(label)
-        found[label] = phones
-        unknown += "".join(letter for letter in letters if letter not in unknown)
-    return found, unknown
+    unknown: dict[str, None] = {}
+    for label in labels:
+        if label in table:
+            found[label] = table[label]
+        elif label.startswith("_"):
+            found[label] = (SILENCE,)
+        elif label not in found:
+            found[label], letters = ipa_phones(label)
+            unknown |= dict.fromkeys(letters if ipa else [label])
+    return found, tuple(unknown)
 
 
 def _is_mark(letter: str) -> bool:
