@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.base import Arrays, Engine, Fit
+from lipmotion.engines.base import Arrays, Engine, Fit, SourcePiece
 from lipmotion.engines.selection.concatenation import concatenated, pieces_of
 from lipmotion.engines.selection.config import SelectionConfig
 from lipmotion.engines.selection.costs import Costs, Target
 from lipmotion.engines.selection.model import SelectionModel, model_arrays, model_from_arrays
 from lipmotion.engines.selection.report import inventory_text, source_of, units_by_source
 from lipmotion.engines.selection.search import select
+from lipmotion.engines.selection.sources import source_pieces, typical_duration_s, with_sources
 from lipmotion.engines.selection.targets import target_of
 from lipmotion.engines.selection.train import fit_selection
 from lipmotion.motion.generation import Statistics
@@ -106,7 +107,18 @@ class SelectionEngine(Engine[SelectionModel]):
         starts_s = target.windows.times_s[:, 0]
         positions = np.searchsorted(starts_s, np.arange(frames) / FRAME_RATE_HZ + ROUNDING_S, side="right") - 1
         trace = StateTrace(tuple(sources), np.maximum(positions, 0).astype(np.intp))
-        return Generation(motion, variance, _with_sources(speech.units, starts_s, sources), trace)
+        return Generation(motion, variance, with_sources(speech.units, starts_s, sources), trace)
+
+    def recordings(self, model: SelectionModel) -> tuple[str, ...]:  # noqa: D102
+        return model.inventory.names
+
+    def typical_duration_s(self, model: SelectionModel, phone: str) -> float:  # noqa: D102
+        return typical_duration_s(model.inventory, phone)
+
+    def source_pieces(  # noqa: D102
+        self, model: SelectionModel, units: Timeline[Unit], heard: Mapping[str, NDArray[np.floating[Any]]]
+    ) -> tuple[tuple[SourcePiece, ...], Timeline[Unit]]:
+        return source_pieces(model, self.config, units, heard)
 
     def describe(self, model: SelectionModel) -> str:  # noqa: D102
         return inventory_text(model.inventory)
@@ -134,19 +146,6 @@ def _given(model: SelectionModel, target: Target, units: Timeline[Unit]) -> dict
         if model.inventory.windows.phones[unit] == target.windows.phones[number]:
             given[number] = unit
     return given
-
-
-def _with_sources(units: Timeline[Unit], starts_s: Array, sources: Sequence[str]) -> Timeline[Unit]:
-    """Return the timeline with the source of the unit of every phone as the name of its unit.
-
-    starts_s : start of every phone of the target
-    """
-    return Timeline(
-        tuple(
-            replace(span, label=replace(span.label, unit=sources[int(np.argmin(np.abs(starts_s - span.start_s)))]))
-            for span in units
-        )
-    )
 
 
 def _substituted(costs: Costs, target: Target, units: NDArray[np.intp], frames: int) -> Array:
