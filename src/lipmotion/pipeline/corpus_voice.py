@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines.base import SelectsRecordings, SourcePiece
@@ -50,8 +51,8 @@ def speak_from_corpus(text: str, corpus: Corpus, model: Model, *, lexicon: Lexic
     missing = [name for name in names if name not in corpus.names(None)]
     if missing:
         raise InputError(
-            f"the corpus {corpus.path} lacks {len(missing)} of {len(names)} recordings of the model ({missing[0]} ...); "
-            "give the corpus that it was trained on"
+            f"the corpus {corpus.path} lacks {len(missing)} of {len(names)} recordings of the model, {missing[0]} "
+            "among them; give the corpus that it was trained on"
         )
     target = _target(text, lexicon or Lexicon(), engine, model)
     utterances = {name: corpus.utterance(name) for name in names}
@@ -60,8 +61,11 @@ def speak_from_corpus(text: str, corpus: Corpus, model: Model, *, lexicon: Lexic
     sounds = [np.asarray(utterances[piece.recording].audio.samples) for piece in pieces]
     rate_hz = utterances[names[0]].audio.rate_hz
     joined = overlapped(sounds, [(piece.start_s, piece.end_s) for piece in pieces], rate_hz)
-    spoken = _in_time(units, pieces, joined.starts, len(joined.samples), rate_hz)
-    audio = Audio(joined.samples, rate_hz)
+    begin_s = _begin_s(len(units), pieces, joined.starts, len(joined.samples) / rate_hz, rate_hz)
+    first, last = (round(begin_s[number] * rate_hz) for number in (0, -1))
+    audio = Audio(joined.samples[first:last], rate_hz)
+    edges_s = np.clip(begin_s - begin_s[0], 0, audio.duration_s).tolist()
+    spoken = Timeline(tuple(Span(a, b, s.label) for a, b, s in zip(edges_s, edges_s[1:], units, strict=False)))
     return SpokenText(audio, animate(SpeechRequest(audio, units=spoken), model=model))
 
 
@@ -84,22 +88,22 @@ def _target(text: str, lexicon: Lexicon, engine: SelectsRecordings, model: Model
     return Timeline(tuple(spans))
 
 
-def _in_time(
-    units: Timeline[Unit], pieces: Sequence[SourcePiece], starts: Sequence[int], samples: int, rate_hz: int
-) -> Timeline[Unit]:
-    """Return phones with the times that they have in the joined sound."""
-    begin_s = np.full(len(units) + 1, np.nan)
-    begin_s[0], begin_s[-1] = 0.0, samples / rate_hz
+def _begin_s(
+    count: int, pieces: Sequence[SourcePiece], starts: Sequence[int], duration_s: float, rate_hz: int
+) -> NDArray[np.float64]:
+    """Return when each of some phones begins in the joined sound, and when the last one ends [shape=(count + 1,)].
+
+    Of the silences at both ends, ``REST_S`` are kept.
+    """
+    begin_s = np.full(count + 1, np.nan)
+    begin_s[0], begin_s[-1] = 0.0, duration_s
     for piece, start in zip(pieces, starts, strict=True):
         for number, time_s in piece.phones_s.items():
             if number:
                 begin_s[number] = start / rate_hz + (time_s - piece.start_s)
     known = np.isfinite(begin_s)
-    begin_s = np.interp(np.arange(len(begin_s)), np.flatnonzero(known), begin_s[known])
-    begin_s = np.minimum(np.maximum.accumulate(begin_s), begin_s[-1])
-    return Timeline(
-        tuple(
-            Span(float(first), float(last), span.label)
-            for span, first, last in zip(units, begin_s, begin_s[1:], strict=False)
-        )
-    )
+    begin_s = np.maximum.accumulate(np.interp(np.arange(count + 1), np.flatnonzero(known), begin_s[known]))
+    begin_s = np.minimum(begin_s, duration_s)
+    begin_s[0] = max(begin_s[1] - REST_S, 0.0)
+    begin_s[-1] = min(begin_s[-2] + REST_S, duration_s)
+    return begin_s
