@@ -42,8 +42,9 @@ NEAR, NEARLY = 0.975, 0.99
 """A step is good enough where the error is at least the first part of what is allowed; it aims at the second."""
 SMALLER, MOST_STEPS = 0.97, 100
 """Factor of the step where the promise is not kept on all frames, and how often it is tried."""
-BASIS_SHARE = 0.25
-"""Rounding of the basis changes values by about this share of the step."""
+BASIS_SHARE = 1.0
+"""Rounding of an entry of the basis changes all values together by so many times as much as rounding of a coefficient:
+with 1, a bit more in either of them helps as much."""
 FINEST = 1e-9
 """Smallest step of the basis, so that its levels are 32-bit numbers."""
 EQUAL_ROUNDS, EQUAL_POWER = 4, 0.7
@@ -103,13 +104,13 @@ def compress_table(
 @dataclass(frozen=True, eq=False)
 class _Space:
     """Principal components of scaled values: mean [shape=(P,)] in the values' unit, scale [shape=(P,)], basis
-    [shape=(K, P)]; sizes of the curves [shape=(K,)].
+    [shape=(K, P)]; norms of the curves [shape=(K,)].
     """
 
     mean: Array
     scale: Array
     basis: Array
-    sizes: Array
+    norms: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,8 +150,8 @@ class _Table:
             for start in range(first, stop, self.chunk):
                 rows = slice(start, min(start + self.chunk, stop))
                 curves[rows] = space.project(self.values[rows] / scale)
-        sizes = np.sqrt(np.square(curves).sum(axis=0, dtype=np.float64) / len(self.frames))
-        return _Projection(self, _Space(space.mean * scale, scale, space.basis, sizes), curves)
+        norms = np.sqrt(np.square(curves).sum(axis=0, dtype=np.float64))
+        return _Projection(self, _Space(space.mean * scale, scale, space.basis, norms), curves)
 
     def errors(self, code: LowRankCode, frames: Indices) -> Array:
         """Return the 99th percentile of each group's error in some frames [shape=(G,)]."""
@@ -171,7 +172,8 @@ class _Projection:
         """Return the code of one layout with about the largest step that a sample of frames allows, or None."""
         coefficients = layout.forward(self.curves)
         some = self.table.frames[evenly_spaced(most, len(self.table.frames))]
-        best, step, small, large = None, FIRST_STEP, 0.0, np.inf  # a step that will do, and one that will not
+        best, step, last = None, FIRST_STEP, np.inf
+        small, large = 0.0, np.inf  # a step that will do, and one that will not
         for tried in range(MOST_ROUNDS):
             if step < LEAST_STEP or (best is not None and tried >= ROUNDS):
                 break
@@ -182,8 +184,10 @@ class _Projection:
             error = float(self.table.errors(code, some).max())
             if error <= 1:
                 best, small = code, step
+            elif error > NEAR * last and step < large / 2:  # what is left is not from quantisation
+                break
             else:
-                large = step
+                large, last = step, error
             if NEAR <= error <= 1 or (error <= 1 and not len(code.code.used)):
                 break
             step *= float(np.clip(NEARLY / max(error, 1e-9), 0.1, 4))
@@ -239,8 +243,7 @@ def _coded(layout: BlockLayout, coefficients: NDArray[np.float32], step: float, 
     code = quantise_blocks(layout, coefficients, step)
     used, numbers = np.unique(code.used[:, 1], return_inverse=True)
     code = replace(code, count=len(used), used=np.stack([code.used[:, 0], numbers.ravel()], axis=1))
-    share = BASIS_SHARE * step / np.sqrt(max(len(used), 1))
-    steps = np.clip(share / np.maximum(space.sizes[used], step), FINEST, 0.5)
+    steps = np.clip(BASIS_SHARE * step / np.maximum(space.norms[used], LEAST_STEP), FINEST, 0.5)
     levels = np.rint(space.basis[used] / steps[:, None]).astype(np.int32)
     return LowRankCode(space.mean, space.scale, levels, steps, code)
 
