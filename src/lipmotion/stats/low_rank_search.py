@@ -49,6 +49,8 @@ FINEST = 1e-9
 """Smallest step of the basis, so that its levels are 32-bit numbers."""
 EQUAL_ROUNDS, EQUAL_POWER = 4, 0.7
 """How often, and by which power of its error, the weight of each group is changed until all have the same error."""
+FULL_ROUNDS = 2
+"""How often weights are changed once more by the errors in all frames; the smallest code is taken."""
 CHUNK = 1 << 23
 """Numbers that are computed at a time."""
 
@@ -98,7 +100,14 @@ def compress_table(
     if not found:
         raise _refusal(table)
     layout = replace(min(found, key=packed_size).code.layout, kept=kept)
-    return table.projected(scale, count).verified(layout)
+    coded, scale = table.verified(layout, scale, count)
+    for _ in range(FULL_ROUNDS if groups.max() else 0):
+        try:
+            other, scale = table.verified(layout, scale, count)
+        except InputError:  # the weights before were better
+            break
+        coded = min(coded, other, key=lambda each: packed_size(each.code))
+    return coded
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,6 +168,32 @@ class _Table:
         errors = [self.excess(code.rows(part), self.values[part]).astype(np.float32) for part in parts]
         return np.percentile(np.concatenate(errors), PERCENTILE, axis=0, overwrite_input=True).astype(np.float64)
 
+    def verified(self, layout: BlockLayout, scale: Array, count: int) -> tuple[CodedTable, Array]:
+        """Return the code of one layout whose errors are allowed in all frames, and a scale that may be better.
+
+        Raises InputError: there is none.
+        """
+        projection = self.projected(scale, count)
+        code = projection.searched(layout, max(SAMPLE, MOST_SAMPLED // self.values.shape[1]))
+        coefficients = layout.forward(projection.curves)
+        for _ in range(MOST_STEPS):
+            if code is None:
+                break
+            errors = self.errors(code, self.frames)
+            if errors.max() <= 1:
+                return CodedTable(code, float(errors.max())), self.reweighted(scale, errors)
+            code = _coded(layout, coefficients, SMALLER * code.code.step, projection.space)
+        raise _refusal(self)
+
+    def reweighted(self, scale: Array, errors: Array) -> Array:
+        """Return scales of the columns with which the errors of all groups are closer to each other."""
+        if not errors.max() > 0:
+            return scale
+        weights = np.maximum(errors / errors.max(), 0.05) ** EQUAL_POWER
+        changed = scale / weights[self.groups]
+        scaled: Array = changed * np.exp(np.log(self.tolerance / changed).mean())
+        return scaled
+
 
 @dataclass(frozen=True, eq=False)
 class _Projection:
@@ -195,19 +230,6 @@ class _Projection:
                 step = float(np.sqrt(small * large)) if small > 0 else large / 2
         return best
 
-    def verified(self, layout: BlockLayout) -> CodedTable:
-        """Return the code of one layout whose errors are allowed in all frames. Raises InputError: there is none."""
-        code = self.searched(layout, max(SAMPLE, MOST_SAMPLED // self.table.values.shape[1]))
-        coefficients = layout.forward(self.curves)
-        for _ in range(MOST_STEPS):
-            if code is None:
-                break
-            error = float(self.table.errors(code, self.table.frames).max())
-            if error <= 1:
-                return CodedTable(code, error)
-            code = _coded(layout, coefficients, SMALLER * code.code.step, self.space)
-        raise _refusal(self.table)
-
 
 def _equalised(table: _Table, length: int) -> tuple[Array, int]:
     """Return scales of the columns with which all groups have about the same error, and the number of components."""
@@ -225,11 +247,9 @@ def _equalised(table: _Table, length: int) -> tuple[Array, int]:
             elif code is None:
                 raise _refusal(table)
         errors = table.errors(code, table.frames)
-        if len(errors) == 1 or not errors.max() > 0:
+        if len(errors) == 1:
             break
-        weights = np.maximum(errors / errors.max(), 0.05) ** EQUAL_POWER
-        scale /= weights[table.groups]
-        scale *= np.exp(np.log(table.tolerance / scale).mean())
+        scale = table.reweighted(scale, errors)
     return scale, count
 
 
