@@ -1,7 +1,7 @@
 """Size, error and speed of the stores of motion and of mouth pictures.
 
     python benchmarks/motion_store.py CORPUS --grid ../shared/corpora/grid-s1 [--only tracks paper pictures]
-        [--clips 150] [--mesh FILE.npz] [--minutes 40] [--noise 0] [--psnr 30 34 38]
+        [--clips 150] [--mesh FILE.npz] [--minutes 40] [--psnr 30 34 38]
 
 CORPUS is a prepared corpus with mouth pictures. Prints one JSON object per case. ``paper`` is the scale of Minnis &
 Breen 2000, 2,000 vertices at 30 Hz for 40 minutes, made of the clips in --grid (``paper_scale`` says how); --mesh keeps
@@ -49,9 +49,6 @@ def main() -> None:
     parser.add_argument("--clips", type=int, default=150)
     parser.add_argument("--mesh", type=Path)
     parser.add_argument("--minutes", type=float, default=40)
-    parser.add_argument(
-        "--noise", type=float, default=0, help="more of it on every coordinate of paper, %% of lip width"
-    )
     parser.add_argument("--psnr", type=float, nargs="*", default=[30, 34, 38])
     options = parser.parse_args()
     corpus = Corpus.open(options.corpus)
@@ -60,7 +57,7 @@ def main() -> None:
         for rate_hz in (VIDEO_HZ, 100.0):
             report(f"tracks at {rate_hz:g} Hz", *tracks(corpus, names, rate_hz))
     if "paper" in options.only:
-        report("paper", *paper_scale(meshes(options.grid, options.mesh), options.minutes, options.noise))
+        report("paper", *paper_scale(meshes(options.grid, options.mesh), options.minutes))
     if "pictures" in options.only:
         pictures(corpus, names, options.psnr)
 
@@ -103,17 +100,14 @@ def mesh(path: Path) -> Array:
     return np.array(rows, np.float32)
 
 
-def paper_scale(
-    clips: dict[str, Array], minutes: float, more: float = 0
-) -> tuple[Array, float, float, Array, list[Any]]:
+def paper_scale(clips: dict[str, Array], minutes: float) -> tuple[Array, float, float, Array, list[Any]]:
     """Return motion of 2,000 vertices, its rate, the tolerance, the points, and the range of each clip.
 
     The 468 points of the face mesh, tracked in real clips, without head motion, go from 25 to 30 Hz by the spline of
     the models. The other 1,532 vertices lie at random places in the triangles of the mesh: mixtures of three points
     that are weighted by their place. Such mixtures are smoother than tracked points; so each has noise of its own,
     white in time, as strong as the part of the tracked points' noise that their neighbours do not share: second
-    differences over time of a point minus the mean of its neighbours; ``more`` is added to it, per cent of the width of
-    the lips, and every vertex has that. After the last clip the first follows, with other
+    differences over time of a point minus the mean of its neighbours. After the last clip the first follows, with other
     noise.
     """
     draw = np.random.default_rng(0)
@@ -135,9 +129,6 @@ def paper_scale(
     noise = np.sqrt(np.square(own).mean(axis=0) / 6 / (1 + 1 / near.sum(axis=1))[:, None])
     spread = np.sqrt(np.square(mixing) @ np.square(noise))  # of the mixtures
     added = np.sqrt(np.maximum(np.square(mixing @ noise) - np.square(spread), 0)).astype(np.float32)
-    widths = [np.linalg.norm(h[:, CORNERS[0]] - h[:, CORNERS[1]], axis=1) for h in heads]
-    tolerance = 0.005 * float(np.median(np.concatenate(widths)))
-    added = np.sqrt(np.square(added) + np.square(more / 0.5 * tolerance)).astype(np.float32)
     curves: list[Array] = []
     while sum(map(len, curves)) < minutes * 60 * PAPER_HZ:
         head = heads[len(curves) % len(heads)].reshape(-1, POINTS * 3)
@@ -146,6 +137,8 @@ def paper_scale(
         vertices = np.einsum("vp,tpc->tvc", mixing, moved.reshape(-1, POINTS, 3), optimize=True)
         vertices += draw.standard_normal(vertices.shape, np.float32) * added
         curves.append(vertices.reshape(frames, VERTICES * 3))
+    widths = [np.linalg.norm(h[:, CORNERS[0]] - h[:, CORNERS[1]], axis=1) for h in heads]
+    tolerance = 0.005 * float(np.median(np.concatenate(widths)))
     show({"paper": "noise", "added, % of lip width": percent(np.median(added[POINTS:]), tolerance)})
     return np.concatenate(curves), PAPER_HZ, tolerance, np.repeat(np.arange(VERTICES), 3), ranges(curves)
 
