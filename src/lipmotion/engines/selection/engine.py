@@ -22,7 +22,7 @@ from lipmotion.engines.selection.train import fit_selection
 from lipmotion.motion.generation import Statistics
 from lipmotion.motion.predictors import LEAST_NETWORK_S
 from lipmotion.motion.prior_regression import PriorRegression
-from lipmotion.motion.rest import unheard_frames
+from lipmotion.motion.rest import away_from_speech, speech_intervals, unheard_frames
 from lipmotion.stats.delta_windows import with_dynamics
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import (
@@ -40,6 +40,8 @@ from lipmotion.types import (
 
 Array = NDArray[np.float64]
 ROUNDING_S = 1e-6
+SETTLED_S = 0.06
+"""Half of the rest pose is left so long before the first phone, and reached so long after the last one."""
 
 
 @final
@@ -86,10 +88,8 @@ class SelectionEngine(Engine[SelectionModel]):
         given = _given(model, target, speech.units)
         units = select(costs, target, given=given).units
         track = concatenated(model.inventory, target, pieces_of(costs, target, units), frames)
-        means = with_dynamics(track)
-        unheard = unheard_frames(np.asarray(speech.features.values), speech.units)
-        means[unheard] = 0
-        means[unheard, 0] = model.rest
+        resting = _resting(np.asarray(speech.features.values), speech.units)[:, None]
+        means = with_dynamics(track + resting * (model.rest - track))
         precisions = np.broadcast_to(1 / model.variances, means.shape)
 
         def statistics(block: slice) -> Statistics:
@@ -128,6 +128,28 @@ class SelectionEngine(Engine[SelectionModel]):
 
     def from_arrays(self, arrays: Arrays) -> SelectionModel:  # noqa: D102
         return model_from_arrays(arrays)
+
+
+def _resting(features: NDArray[np.floating], units: Timeline[Unit]) -> Array:
+    """Return the weight of the rest pose in every frame, 0 to 1 [shape=(T,)].
+
+    It is 1 in silence of which some is digital, and falls to 0 before the next phone and after the last one: in digital
+    silence there is no breath, as there may be in the silence that was recorded with the unit.
+    features : acoustic features [shape=(T, D)]
+    """
+    unheard = unheard_frames(features, units)
+    if not unheard.any():
+        return np.zeros(len(features))
+    away = away_from_speech(np.arange(len(features)) / FRAME_RATE_HZ, speech_intervals(units), SETTLED_S)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], away, [False]])))
+    resting = np.zeros(len(features))
+    for first, stop in edges.reshape(-1, 2):
+        resting[first:stop] = float(unheard[first:stop].any())
+    width = round(SETTLED_S * FRAME_RATE_HZ)
+    window = np.hanning(2 * width + 1)
+    padded = np.pad(resting, width, mode="edge")
+    weights: Array = np.convolve(padded, window / window.sum(), "valid")
+    return weights
 
 
 def _given(model: SelectionModel, target: Target, units: Timeline[Unit]) -> dict[int, int]:

@@ -22,7 +22,7 @@ SILENT = PHONE_NUMBER[SILENCE]
 VISEME_NUMBER = np.array([*(list(VISEMES).index(VISEME_OF[phone]) for phone in PHONES), len(VISEMES)])
 """The viseme of every symbol."""
 UNKNOWN_STRESS = -1
-LEAST_GAP_S = 1e-3
+LEAST_GAP_S, SHORTEST_S = 1e-3, 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +74,7 @@ class PhoneWindows:
 
 
 def without_gaps(units: Timeline[Unit], duration_s: float) -> Timeline[Unit]:
-    """Return phones in time with silence wherever there was none, from 0 s to the end.
+    """Return phones in time with silence wherever there was none, from 0 s to the end; at least one.
 
     duration_s : of the recording
     """
@@ -86,7 +86,7 @@ def without_gaps(units: Timeline[Unit], duration_s: float) -> Timeline[Unit]:
         if span.duration_s > 0:
             spans.append(span)
         end_s = max(end_s, span.end_s)
-    return Timeline(tuple(spans))
+    return Timeline(tuple(spans or [Span(0.0, SHORTEST_S, Unit(SILENCE))]))
 
 
 def phone_windows(timelines: Sequence[Timeline[Unit]]) -> PhoneWindows:
