@@ -22,7 +22,8 @@ _IPA: dict[str, str] = {
     "p": "p", "b ɓ": "b", "m": "m", "f ɸ Φ pɸ": "f", "v ʋ β ɱ ⱱ": "v", "w ʍ ɥ": "w",
     # tongue and teeth, tongue and palate
     "t ʈ": "t", "d ɖ ɗ": "d", "n ɲ ɳ": "n", "θ": "th", "ð": "dh", "s": "s", "z": "z", "l ɫ ɭ ʎ ɬ ɮ ɺ ʟ": "l",
-    "ʃ ɕ ʂ S": "sh", "ʒ ʑ ʐ": "zh", "tʃ tɕ tʂ ʧ": "ch", "dʒ dʑ dʐ ʤ": "jh", "ʦ": "t s", "ʣ": "d z", "r ɹ ɾ ɽ ɻ": "r", "j ç ʝ": "y",
+    "ʃ ɕ ʂ S": "sh", "ʒ ʑ ʐ": "zh", "tʃ tɕ tʂ ʧ": "ch", "dʒ dʑ dʐ ʤ": "jh", "ʦ": "t s", "ʣ": "d z",
+    "r ɹ ɾ ɽ ɻ": "r", "j ç ʝ": "y",
     # tongue and soft palate, throat
     "k c q x χ ɧ": "k", "g ɡ ɟ ɢ ɠ ɣ ɰ ʛ ʄ": "g", "ŋ ɴ": "ng", "h ɦ ħ ʕ ʁ ʀ ʜ ʢ": "hh",
     # consonants that are a syllable, a stop of the throat
