@@ -112,10 +112,15 @@ def stress(texts: list[str]) -> dict[str, object]:
             if len(pairs) > 1 and word:
                 words.append(all(agree))
     return {
-        "vowels of longer words": [len(several), round(float(np.mean(several)), 3)],
-        "longer words": [len(words), round(float(np.mean(words)), 3)],
-        "words of one vowel": [len(single), round(float(np.mean(single)), 3)],
+        "vowels of longer words": [len(several), share(several)],
+        "longer words": [len(words), share(words)],
+        "words of one vowel": [len(single), share(single)],
     }
+
+
+def share(agree: list[bool]) -> float | None:
+    """Return the share of those that agree; None: there are none."""
+    return round(float(np.mean(agree)), 3) if agree else None
 
 
 def is_vowel(unit: Unit) -> bool:
