@@ -14,9 +14,8 @@ from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.animate import animate
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import SpeechRequest
-from lipmotion.pipeline.speak import SpokenText
 from lipmotion.speech.overlap_add import overlapped
-from lipmotion.types import Audio, Span, Timeline, Unit
+from lipmotion.types import Audio, Constraints, Span, SpokenText, Timeline, Unit
 from lipmotion.units import SILENCE, Lexicon, words_of
 from lipmotion.units.sentences import sentences_of
 
@@ -29,12 +28,21 @@ FEATURES = 13
 
 
 @one_thread()
-def speak_from_corpus(text: str, corpus: Corpus, model: Model, *, lexicon: Lexicon | None = None) -> SpokenText:
+def speak_from_corpus(
+    text: str,
+    corpus: Corpus,
+    model: Model,
+    *,
+    constraints: Constraints | None = None,
+    lexicon: Lexicon | None = None,
+    speaker: str = "",
+) -> SpokenText:
     """Return a text as the joined sound of recordings, and the motion that was recorded with it.
 
     text    : one sentence or several, in English words that the dictionary or ``lexicon`` pronounces
     corpus  : the corpus that the model was trained on
     model   : of an engine that ``SelectsRecordings`` (``selection``)
+    constraints, speaker : as of ``speak``
     lexicon : pronunciations of words, ahead of those of the dictionary
     The sound is not changed but at the joins, where successive pieces are shifted by up to 8 ms to fit and overlap: how
     fast and how high words are spoken is what was recorded. Phones that were never recorded are replaced by similar
@@ -66,7 +74,8 @@ def speak_from_corpus(text: str, corpus: Corpus, model: Model, *, lexicon: Lexic
     audio = Audio(joined.samples[first:last], rate_hz)
     edges_s = np.clip(begin_s - begin_s[0], 0, audio.duration_s).tolist()
     spoken = Timeline(tuple(Span(a, b, s.label) for a, b, s in zip(edges_s, edges_s[1:], units, strict=False)))
-    return SpokenText(audio, animate(SpeechRequest(audio, units=spoken), model=model))
+    request = SpeechRequest(audio, units=spoken, speaker=speaker)
+    return SpokenText(audio, animate(request, model=model, constraints=constraints))
 
 
 def _target(text: str, lexicon: Lexicon, engine: SelectsRecordings, model: Model) -> Timeline[Unit]:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.types.audio import Audio
 from lipmotion.types.features import Features
 from lipmotion.types.motion import Motion, between_frames
 from lipmotion.types.timeline import Timeline, Unit
@@ -240,3 +241,14 @@ class Generation:
             reduced = between_frames(self.spread.reduced, self.motion.rate_hz, time_s)
             return replace(self.spread, reduced=reduced)
         return between_frames(self.spread, self.motion.rate_hz, time_s)
+
+
+class SpokenText(NamedTuple):
+    """A text that a synthetic voice has said, with the motion of its lips.
+
+    sound      : at the synthesiser's own rate
+    generation : as of ``animate``; its units are the synthesiser's phones in time
+    """
+
+    sound: Audio
+    generation: Generation
