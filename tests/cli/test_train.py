@@ -55,7 +55,7 @@ def test_speakers_are_chosen(run: RunCommand, toy_corpus: Corpus, here: Path) ->
     assert load_model(here / "m").about["speakers"] == ["anna", "ben"]
     assert run("evaluate", "m", "corpus", "--speaker", "carl", "--split", "train").out[0].startswith("split train: 1 ")
     assert (
-        "speakers     anna (2, 0.1 minutes), ben (2, 0.1 minutes), carl (1, 0.0 minutes)"
+        "speakers     anna (2, 5.5 seconds), ben (2, 5.1 seconds), carl (1, 2.8 seconds)"
         in run("corpus", "info", "corpus").out
     )
 
