@@ -16,7 +16,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = verbs.add_parser("animate", help="turn speech into lip motion or an animated face")
     add_speech_arguments(parser)
     outputs: dict[str, Any] = {"type": str, "nargs": "+", "action": "extend", "required": True}
-    add_output(parser, "-o", "--output", force=True, help="FILE.mp4 .json .csv .npz, or several", **outputs)
+    add_output(parser, "-o", "--output", force=True, help="FILE.mp4 .json .csv .npz .TextGrid, or several", **outputs)
     parser.add_argument("--rate", type=float, metavar="HZ", help="frames per second of motion files (default: 100)")
     parser.add_argument("--channels", metavar="NAME,NAME", help="write only these to motion files: opening,width,...")
     parser.add_argument("--fps", type=float, default=25.0, help="frames per second of videos (default: 25)")
