@@ -156,6 +156,11 @@ def test_an_engine_without_a_use_for_voices(
         (["CORPUS", "-o", "m", "--split", "tset"], 4, "no utterances of split 'tset' (there are train: 8, val: 2"),
         (["CORPUS", "-o", "m", "--speaker", "dora"], 4, "no speaker 'dora' (there are: no speaker by name)"),
         (["CORPUS", "-o", "m", "--lexicon", "missing"], 3, "missing: no such lexicon file"),
+        (
+            ["CORPUS", "-o", "m", "--from", "nofile"],
+            3,
+            "nofile: no such model; train one (lipmotion train), or use the one",
+        ),
         (["CORPUS", "-o", "m", "--units", "evis"], 3, "no unit set 'evis'; there are: 2vis, sVis, pbVis"),
         (["CORPUS", "-o", "m", "--units", "folder"], 3, "folder: "),
         (["CORPUS", "-o", "m", "--engine", "coupled", "--recordings", "missing"], 4, "missing: no such folder"),

@@ -65,3 +65,11 @@ def test_whole_timelines_stay_as_they_are() -> None:
 
 def test_a_last_phone_without_an_end_ends_with_the_recording() -> None:
     assert phones(without_gaps(timeline((0.0, float("inf"), "aa")), 0.8)) == [(0.0, 0.8, "aa")]
+
+
+def test_other_files_are_no_units(tmp_path: Path) -> None:
+    (tmp_path / "a.wav").write_bytes(b"RIFF")
+    with pytest.raises(
+        InputError, match=r"a\.wav: cannot read phones from '\.wav'; use one of \.json, \.npz, \.TextGrid"
+    ):
+        read_units(tmp_path / "a.wav")
