@@ -13,6 +13,7 @@ import numpy as np
 from lipmotion.engines import Animator
 from lipmotion.engines.base import HearsConditions, RecognisesPhones, WantsF0
 from lipmotion.errors import AlignmentError, InputError
+from lipmotion.pipeline.given_units import without_gaps
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.prior import with_prior
 from lipmotion.pipeline.request import SpeechRequest
@@ -75,7 +76,7 @@ def _understood(
     phones = cached_recogniser(model.phones, "auto" if installed else request.recogniser, model.adaptation)
     if request.units is not None:
         _check_units(request.units, audio.duration_s)
-        return speech_of(model.engine, audio, audio.mfcc(), request.units)
+        return speech_of(model.engine, audio, audio.mfcc(), without_gaps(request.units, audio.duration_s))
     words = _words(request.transcript, audio.duration_s)
     if installed and words is None:
         words = recognise_words(audio, request.recogniser)
@@ -151,10 +152,11 @@ def _check_units(units: Timeline[Unit], duration_s: float) -> None:
     """Raise InputError if given units are empty or too many; log a warning if they end after the recording."""
     if not len(units):
         raise InputError(
-            "the units are an empty list (a .csv has none); give those of a .json or .npz, or leave them out"
+            "the units are an empty list (a .csv has none); give those of a .json, .npz or label file, or leave "
+            "them out"
         )
     check_phones(len(units), duration_s)
-    if units[-1].end_s > duration_s + LATE_S:
+    if duration_s + LATE_S < units[-1].end_s < np.inf:
         LOG.warning(
             "the units go on to %.2f s, the recording ends at %.2f s: are they those of another recording?",
             units[-1].end_s,

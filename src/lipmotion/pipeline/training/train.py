@@ -307,6 +307,14 @@ def _train_phone_models(
     if not transcribed and not labelled:
         LOG.warning("no transcripts in the corpus: its phones are recognised by the shipped model")
         return load_model().phones
+    unknown = sum(utterance.phones is None and not utterance.words for utterance in utterances)
+    if unknown:
+        LOG.warning(
+            "%d of %d recordings have no words: their phones are recognised, which is less sure; write the words "
+            "into a .txt beside each (docs/corpora.md)",
+            unknown,
+            len(utterances),
+        )
     vocabulary = dict.fromkeys(word for _, words in transcribed for word in words)
     warn_of_guesses(tuple(vocabulary), lexicon)
     pronunciations = {" ".join(run): (run,) for _, runs in labelled for run in runs}
