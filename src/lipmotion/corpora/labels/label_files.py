@@ -141,6 +141,7 @@ def _read(path: Path, *, unknown_json: bool) -> RecordingLabels | None:
     if len(tokens) > 1 and one_a_line and all(map(phone_named, tokens)):
         raise InputError(f"{path}: a list of phones without times; add their times, or give the words instead")
     if not tokens:
+        LOG.warning("%s: is empty: it counts as no transcript; write the words that are said, or remove it", path)
         return RecordingLabels()
     return RecordingLabels(TimedTranscript((TranscriptLine(tuple(map(TimedWord, words_of(text)))),)))
 
