@@ -158,4 +158,4 @@ def _write_video(generation: Generation, path: Path, speech: Path, fps: float, f
     from lipmotion.export.video import write_mp4
 
     frames = face.render(generation.motion, generation.units, fps=fps)
-    write_mp4(path, frames, fps=fps, audio=read_audio(speech, SOUND_RATE_HZ))
+    write_mp4(path, frames, fps=fps, audio=read_audio(speech, SOUND_RATE_HZ, warn=False))
