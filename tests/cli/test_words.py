@@ -41,7 +41,11 @@ def test_for_programs(run: RunCommand) -> None:
         (["words", "missing.wav"], 3, "no such file"),
         (["words", WELCOME, "-o", "words.csv"], 7, "unknown format '.csv'; required one of: .txt .json"),
         (["words", WELCOME, "--recogniser", "best"], 3, "unknown recogniser 'best'"),
-        (["words", WELCOME, "--recogniser", "fast"], 3, "'fast' recognises phones, not words; required one of: auto, w"),
+        (
+            ["words", WELCOME, "--recogniser", "fast"],
+            3,
+            "'fast' recognises phones, not words; required one of: auto, w",
+        ),
         (["words", WELCOME, "--recogniser", "own"], 3, "'own' recognises phones, not words; required one of: auto, wo"),
     ],
 )

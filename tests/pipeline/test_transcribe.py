@@ -82,7 +82,9 @@ def test_a_transcript_of_something_else_is_doubted(
     transcribe(Recogniser(toy_model.phones, "auto"), audio, features, WRONG, Lexicon())
     (record,) = caplog.records
     assert (record.name, record.levelname) == ("lipmotion", "WARNING")
-    message = r"the transcript seems not to be what is said \(.* at -\d+\.\d, required -4\.2 or more\).*; check it, or .*"
+    message = (
+        r"the transcript seems not to be what is said \(.* at -\d+\.\d, required -4\.2 or more\).*; check it, or .*"
+    )
     assert re.fullmatch(message, record.getMessage())
 
 
@@ -117,7 +119,9 @@ def test_speech_that_the_transcript_leaves_out_is_reported_with_its_times(
     assert part.fit is not None
     assert part.fit.share < 0.8
     (record,) = caplog.records
-    assert re.search(r"to leave out words at \d\.\d to \d\.\d s.* \(\d\.\d of \d\.\d s of speech\)", record.getMessage())
+    assert re.search(
+        r"to leave out words at \d\.\d to \d\.\d s.* \(\d\.\d of \d\.\d s of speech\)", record.getMessage()
+    )
     said = {span.label.word: span for span in whole.units}
     left_out = [said[word] for word in set(words) - set(words[kept])]
     for start_s, end_s in part.fit.missing:  # each stretch covers a part of what was left out

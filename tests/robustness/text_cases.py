@@ -155,7 +155,10 @@ ASS = "[Script Info]\n\n[Events]\nDialogue: 0,0:00:00.50,0:00:02.00,Default,,0,0
 _transcript_file("SubStation subtitles", ASS, 0, "the words do not fit the sound, first at 0.50 s")
 _transcript_file("SubStation subtitles with damaged times", ASS.replace("0:00:02.00", "2"), 3, "line 4 is 'Dialogue:")
 _transcript_file(
-    "subtitles with a damaged arrow", b"1\n00:00:00,500 - -> 00:00:02,000\npapa mama\n", 0, "fit the sound, first at 0.50 s"
+    "subtitles with a damaged arrow",
+    b"1\n00:00:00,500 - -> 00:00:02,000\npapa mama\n",
+    0,
+    "fit the sound, first at 0.50 s",
 )
 _transcript_file(
     "subtitles without arrows", b"1\n00:00:00,500 00:00:02,000\npapa\n", 3, "two times as in subtitles; required"

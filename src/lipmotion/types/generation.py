@@ -148,8 +148,8 @@ class Outlook:
     words      : where the phones come from: ``transcript``, ``given units``, ``own model`` (the engine's own
                  recognition of a speaker that it was trained on), ``words`` or ``phones`` (recognised, for the most
                  part), ``no speech`` (none was found)
-    confidence : 0 to 1, of recognised words, by their share of the speech; of a transcript, the share of the speech that
-                 it fits (1 where that is not known); 1 where units were given
+    confidence : 0 to 1, of recognised words, by their share of the speech; of a transcript, the share of the speech
+                 that it fits (1 where that is not known); 1 where units were given
     voice      : 0 (unknown) to 1 (as in the training); None where it was not needed
     range_db   : decibels between loud and quiet moments; under 20 the recording is noisy
     advice     : what would help, the most helpful first

@@ -78,8 +78,8 @@ class Lexicon:
     def pronunciations(self, word: str) -> tuple[Pronunciation, ...]:
         """Return every pronunciation of a lower-case word.
 
-        Of an unknown one: those of the same word without accents, if the dictionary has it (``cafe`` for ``café``), else
-        that of the letter-to-sound rules.
+        Of an unknown one: those of the same word without accents, if the dictionary has it (``cafe`` for ``café``),
+        else that of the letter-to-sound rules.
         """
         if word in self.user:
             return self.user[word]

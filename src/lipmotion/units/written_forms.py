@@ -6,7 +6,9 @@ import re
 
 ORDINAL = r"(?<!\w)\d{1,12}(?:st|nd|rd|th)(?![^\W_])"
 """``1st``, ``22nd``, in lower case."""
-MONEY = re.compile(r"([$£€])\s?(\d{1,12})(?:\.(\d{1,2}))?(?![\w.,]*\d)(\s(?:hundred|thousand|million|billion|trillion)\b)?")
+MONEY = re.compile(
+    r"([$£€])\s?(\d{1,12})(?:\.(\d{1,2}))?(?![\w.,]*\d)(\s(?:hundred|thousand|million|billion|trillion)\b)?"
+)
 PERCENT = re.compile(r"(?<=\d)\s?%")
 AND = re.compile(r"&(?!#?\w{1,8};)")
 """``&``, but not the start of a character reference (``&amp;``)."""
@@ -35,7 +37,7 @@ def ordinal_word(word: str) -> str:
 
 
 def as_spoken(text: str) -> str:
-    """Return a text in lower case with sums of money, ``%`` and ``&`` in the words and the order in which they are said.
+    """Return a text in lower case with sums of money, ``%`` and ``&`` in the words and the order of speech.
 
     Numbers stay digits: ``$5.50`` becomes ``5 dollars and 50 cents``, ``7%`` ``7 percent``.
     """

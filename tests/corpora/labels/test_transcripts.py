@@ -426,9 +426,15 @@ def test_anything_is_read_or_refused(folder: Path, content: str | bytes, start: 
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (SRT.replace("-->", ","), "two times as in subtitles; required: times as in 00:00:01,000 --> 00:00:02,500, or the"),
+        (
+            SRT.replace("-->", ","),
+            "two times as in subtitles; required: times as in 00:00:01,000 --> 00:00:02,500, or the",
+        ),
         (SRT.replace("-->", "", 1), "line 2 is '00:00:01,000  00:00:02,500'; required times as in"),
-        (SRT.replace("-->", "->").replace("02,500", "2x"), "line 2 is '00:00:01,000 -> 00:00:2x'; required times as in"),
+        (
+            SRT.replace("-->", "->").replace("02,500", "2x"),
+            "line 2 is '00:00:01,000 -> 00:00:2x'; required times as in",
+        ),
         (ASS.replace("0:00:04.00", "later"), "line 12 is 'Dialogue: 0,0:00:02.75,later"),
         (ASS.replace("0:00:04.00", "0:00:00.10"), "line 12 ends at 0.1 s, before its start at 2.75 s; correct it"),
         (ASS.replace(",0,0,0,,How", ""), "line 12 is 'Dialogue: 0,0:00:02.75"),

@@ -61,7 +61,9 @@ def test_words_that_are_left_out(labelled: Labelled, caplog: pytest.LogCaptureFi
     half = [replace(span, label=Unit("sil")) if number > 2 else span for number, span in enumerate(spans)]
     merged = [*half[:3], replace(half[3], end_s=half[-1].end_s)]
     warn_of_doubtful_transcripts([(utterance, Timeline(tuple(merged)))])
-    assert [text[:62] for text in messages(caplog)] == ["1 of 1 transcripts seem to leave out words that are said (toy0"]
+    assert [text[:62] for text in messages(caplog)] == [
+        "1 of 1 transcripts seem to leave out words that are said (toy0"
+    ]
 
 
 def test_labelled_phones_are_believed(labelled: Labelled, caplog: pytest.LogCaptureFixture) -> None:

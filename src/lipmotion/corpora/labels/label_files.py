@@ -97,8 +97,8 @@ def _named(recording: Path, suffix: str) -> list[Path]:
 def read_labels(path: Path) -> RecordingLabels:
     """Return the words and phones of one file.
 
-    Read are TextGrids, labels with times (HTK, Audacity), subtitles (SubRip, WebVTT, SubStation), the JSON and tables of
-    recognisers (Whisper, Vosk), NIST's CTM, and plain text; the content decides, not the name.
+    Read are TextGrids, labels with times (HTK, Audacity), subtitles (SubRip, WebVTT, SubStation), the JSON and tables
+    of recognisers (Whisper, Vosk), NIST's CTM, and plain text; the content decides, not the name.
     Raises InputError: not text, damaged, overlapping labels, or labels among phones that are no phones.
     """
     return _read(path, unknown_json=False) or RecordingLabels()

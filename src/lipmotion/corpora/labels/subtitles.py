@@ -17,7 +17,8 @@ from lipmotion.units.spoken_text import check_word_count, line_words, speaker_na
 ARROW = r"(?:(?:[-=–—−]\s?){1,3}(?:[>›»]|&gt;)|→)"
 """The arrow between the times, also as people and programs damage it: ``->``, ``- ->``, ``–>``, ``--&gt;``."""
 CUE = re.compile(
-    rf"^.{{0,40}}\d\s*-->\s*\d|^.{{0,20}}:\d{{1,2}}(?:[.,]\d{{1,6}})?\s{{0,4}}{ARROW}\s{{0,4}}\d{{1,4}}:\d", re.MULTILINE
+    rf"^.{{0,40}}\d\s*-->\s*\d|^.{{0,20}}:\d{{1,2}}(?:[.,]\d{{1,6}})?\s{{0,4}}{ARROW}\s{{0,4}}\d{{1,4}}:\d",
+    re.MULTILINE,
 )
 """The times of a subtitle."""
 FULL_CLOCK = r"(?:\d{1,4}:\d{1,2}:\d{1,2}(?:[.,]\d{1,6})?|\d{1,2}:\d{1,2}[.,]\d{1,6})"
