@@ -120,7 +120,9 @@ def write(
         if path in sounds and sound is not None:
             write_sound(path, sound)
         elif path in videos:
-            _write_video(generation, path, sound or read_audio(Path(str(recording)), SOUND_RATE_HZ), fps, drawn_face)
+            _write_video(
+                generation, path, sound or read_audio(Path(str(recording)), SOUND_RATE_HZ, warn=False), fps, drawn_face
+            )
         elif path.suffix.lower() == TEXTGRID_SUFFIX.lower():
             write_textgrid(path, generation.units)
         else:

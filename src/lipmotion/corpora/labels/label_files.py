@@ -23,7 +23,7 @@ from lipmotion.units import phone_named, words_of
 from lipmotion.units.length_limits import LARGEST_TRANSCRIPT
 
 LOG = logging.getLogger("lipmotion")
-RECOGNISED = (".srt", ".vtt", ".json", ".ctm", ".tsv")
+RECOGNISED = (".srt", ".vtt", ".ass", ".ssa", ".json", ".ctm", ".tsv")
 """Suffixes of subtitles and of what recognisers write."""
 FOR_WORDS = (".txt", ".TextGrid", ".textgrid", ".lab", *RECOGNISED)
 """Suffixes in whose files words are searched, in order: plain text first, as labels in time may not be words, and what
@@ -97,8 +97,8 @@ def _named(recording: Path, suffix: str) -> list[Path]:
 def read_labels(path: Path) -> RecordingLabels:
     """Return the words and phones of one file.
 
-    Read are TextGrids, labels with times (HTK, Audacity), subtitles (SubRip, WebVTT), the JSON and tables of
-    recognisers (Whisper, Vosk), NIST's CTM, and plain text; the content decides, not the name.
+    Read are TextGrids, labels with times (HTK, Audacity), subtitles (SubRip, WebVTT, SubStation), the JSON and tables
+    of recognisers (Whisper, Vosk), NIST's CTM, and plain text; the content decides, not the name.
     Raises InputError: not text, damaged, overlapping labels, or labels among phones that are no phones.
     """
     return _read(path, unknown_json=False) or RecordingLabels()
@@ -173,6 +173,7 @@ def _read(path: Path, *, unknown_json: bool) -> RecordingLabels | None:
     if len(tokens) > 1 and one_a_line and all(map(phone_named, tokens)):
         raise InputError(f"{path}: a list of phones without times; add their times, or give the words instead")
     if not tokens:
+        LOG.warning("%s: is empty: it counts as no transcript; write the words that are said, or remove it", path)
         return RecordingLabels()
     return RecordingLabels(TimedTranscript((TranscriptLine(tuple(map(TimedWord, words_of(text)))),)))
 
