@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.pipeline.given_units import read_units, without_gaps
+from lipmotion.pipeline.given_units import read_units
 from lipmotion.types import Span, Timeline, Unit
+from lipmotion.units import without_gaps
 
 ROWS = [(0.0, 0.4, "sil"), (0.4, 0.5, "m"), (0.5, 0.7, "aa")]
 

@@ -13,7 +13,6 @@ import numpy as np
 from lipmotion.engines import Animator
 from lipmotion.engines.base import HearsConditions, RecognisesPhones, WantsF0
 from lipmotion.errors import AlignmentError, InputError
-from lipmotion.pipeline.given_units import without_gaps
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.prior import with_prior
 from lipmotion.pipeline.request import SpeechRequest
@@ -26,7 +25,7 @@ from lipmotion.speech.installed_recognisers import INSTALLED_RECOGNISERS, recogn
 from lipmotion.speech.recogniser import RECOGNISER_KINDS, Recogniser, cached_recogniser
 from lipmotion.speech.recognition import Recognition, level_range_db
 from lipmotion.types import Audio, Features, ParallelMap, Speech, TimedTranscript, Timeline, Unit
-from lipmotion.units import Lexicon, check_phones, check_text, is_silent, words_of
+from lipmotion.units import Lexicon, check_phones, check_text, is_silent, without_gaps, words_of
 
 LATE_S = 0.1
 """Seconds by which given units may end after the sound; editing programs round times."""
