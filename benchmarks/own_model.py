@@ -1,9 +1,10 @@
 """A model of one's own from less than a minute of recordings, beside simple alternatives.
 
-    python benchmarks/own_model.py VIDEO [VIDEO ...] [--model FILE]
+    python benchmarks/own_model.py VIDEO [VIDEO ...] [--model FILE] [--pieces 2,4,8]
 
 Each video, or folder of videos, is one talker. It is cut into pieces of five seconds; the first four fifths train, the
-last fifth is judged; no transcripts. Printed: mean correlation of each channel over the judged pieces, for
+last fifth is judged; no transcripts. With ``--pieces``, models are trained on the first 2, 4, 8 ... pieces, too: a
+learning curve. Printed: mean correlation of each channel over the judged pieces, for
 
 own        : ``train`` with the model of ``--model`` (default: the one that ships) to start from
 alone      : ``train`` with no model to start from
@@ -25,6 +26,7 @@ from numpy.typing import NDArray
 
 from lipmotion import Corpus, animate, load_model, train
 from lipmotion.corpora.store import Selection
+from lipmotion.errors import CorpusError
 from lipmotion.pipeline.model import Model
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.spectrum import spectrum
@@ -41,22 +43,35 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("talkers", nargs="+", type=Path)
     parser.add_argument("--model", type=Path, help="to start from; default: the one that ships")
+    parser.add_argument("--pieces", default="", metavar="N,N", help="also train on the first N pieces alone")
     options = parser.parse_args()
     prior = load_model(options.model)
     for path in options.talkers:
         files = sorted(path.glob("*.mp4")) if path.is_dir() else [path]
         utterances = [utterance(name, audio, track) for file in files for name, audio, track in pieces(file)]
         count = len(utterances) * 4 // 5
-        training, judged = utterances[:count], utterances[count:]
-        figures: dict[str, object] = {"talker": path.stem, "pieces": [len(training), len(judged)]}
-        for name, start in (("own", prior), ("alone", None)):
-            begin = time.perf_counter()
+        sizes = [int(size) for size in options.pieces.split(",") if size and int(size) < count]
+        for size in [*sizes, count]:
+            print(
+                json.dumps({"talker": path.stem, **compare(utterances[:size], utterances[count:], prior)}), flush=True
+            )
+
+
+def compare(training: list[Utterance], judged: list[Utterance], prior: Model) -> dict[str, object]:
+    """Return the figures of all four on one talker, and the seconds of training."""
+    figures: dict[str, object] = {"pieces": [len(training), len(judged)]}
+    for name, start in (("own", prior), ("alone", None)):
+        begin = time.perf_counter()
+        try:
             model = trained(training, start)
-            figures[f"{name}_s"] = round(time.perf_counter() - begin, 1)
-            figures[name] = mean([animate(u.audio, model=model).motion for u in judged], judged)
-        figures["ridge"] = mean(ridge(training, judged), judged)
-        figures["mapped"] = mean(mapped(prior, training, judged), judged)
-        print(json.dumps(figures), flush=True)
+        except CorpusError as error:
+            figures[name] = str(error)
+            continue
+        figures[f"{name}_s"] = round(time.perf_counter() - begin, 1)
+        figures[name] = mean([animate(u.audio, model=model).motion for u in judged], judged)
+    figures["ridge"] = mean(ridge(training, judged), judged)
+    figures["mapped"] = mean(mapped(prior, training, judged), judged)
+    return figures
 
 
 def utterance(name: str, audio: Audio, track: Track) -> Utterance:

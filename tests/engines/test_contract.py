@@ -148,7 +148,7 @@ def test_a_model_comes_back_from_arrays(trained):
 
 def test_trees_can_be_read(trained):
     text = trained.engine.describe(trained.model)
-    assert ("leaf (" in text) is (trained.engine.name != "coupled")  # whose states are tied by unit alone
+    assert ("leaf (" in text) is (trained.engine.name in ("trajectory", "joint"))  # the others have no trees
     assert text
     assert max(map(len, text.splitlines())) < 200
 

@@ -34,7 +34,8 @@ def heard_example(seed: int, tempos: tuple[float, ...] = (1.0,)) -> tuple[Exampl
     for tempo in tempos:
         positions = np.minimum(np.round(np.arange(int(frames / tempo)) * tempo).astype(int), frames - 1)
         versions.append(HeardSpectrum(spectrum[positions].astype(np.float16), tempo, float(tempo != 1)))
-    return replace(one, heard=tuple(versions)), slow * [0.1, 0.02] + [0.3, 0.6]
+    speech = replace(one.speech, spectrum=spectrum.astype(np.float32))
+    return replace(one, speech=speech, heard=tuple(versions)), slow * [0.1, 0.02] + [0.3, 0.6]
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +52,7 @@ def trained() -> AcousticNetwork:
 
 def test_it_predicts_motion_of_speech_that_it_did_not_hear(trained: AcousticNetwork) -> None:
     one, values = heard_example(99)
-    motion, distortion = trained.predict(one.heard[0].values)
+    motion, distortion = trained.predict(one.speech)
     assert motion.shape == values.shape
     assert distortion.shape == (len(values),)
     for column in range(2):
@@ -73,8 +74,8 @@ def test_a_straight_line_stays_straight_inside() -> None:
 def test_it_is_the_same_after_serialisation_but_for_half_precision(trained: AcousticNetwork) -> None:
     again = acoustic_network_from_arrays(acoustic_network_arrays(trained), 2)
     assert again is not None
-    spectrum = heard_example(5)[0].heard[0].values
-    np.testing.assert_allclose(again.predict(spectrum)[0], trained.predict(spectrum)[0], atol=3e-3)
+    speech = heard_example(5)[0].speech
+    np.testing.assert_allclose(again.predict(speech)[0], trained.predict(speech)[0], atol=3e-3)
 
 
 @pytest.mark.parametrize("name", ["network_first", "network_layers", "network_biases", "network_output"])

@@ -16,6 +16,7 @@ ENGINES: Registry[type[Engine[Any]]] = Registry(
         "trajectory": "lipmotion.engines.trajectory.engine:TrajectoryEngine",
         "coupled": "lipmotion.engines.coupled.engine:CoupledEngine",
         "joint": "lipmotion.engines.joint.engine:JointEngine",
+        "selection": "lipmotion.engines.selection.engine:SelectionEngine",
     },
 )
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.errors import InputError
 from lipmotion.stats.convolution import (
     TAPS,
     ConvolutionalNetwork,
@@ -21,7 +22,7 @@ from lipmotion.stats.convolution import (
 from lipmotion.stats.delta_windows import dynamics_known, with_dynamics
 from lipmotion.storage.checkpoint import Checkpoint
 from lipmotion.storage.schema import POSITIVE, STANDARD, Arrays, ArraySpec, checked_arrays
-from lipmotion.types import SPECTRUM_BANDS, Example, HeardSpectrum, Monitor, Progress
+from lipmotion.types import SPECTRUM_BANDS, Example, HeardSpectrum, Monitor, Progress, Speech
 
 Array = NDArray[np.float64]
 STEP = 4
@@ -53,11 +54,17 @@ class AcousticNetwork:
     scale: Array
     variances: Array
 
-    def predict(self, spectrum: NDArray[np.floating]) -> tuple[Array, Array]:
-        """Return motion in the motion space [shape=(T, Q)] and the distortion, 0 to 1 [shape=(T,)].
+    def predict(self, speech: Speech) -> tuple[Array, Array]:
+        """Return motion in the motion space [shape=(T, Q)] and the distortion of the sound, 0 to 1 [shape=(T,)].
 
-        spectrum : normalised log mel spectrum [shape=(T, 40)]
+        Raises InputError: speech without a spectrum.
         """
+        if speech.spectrum is None:
+            raise InputError("the speech has no spectrum; an engine that uses one says so by ``conditions``")
+        return self._predict(speech.spectrum)
+
+    def _predict(self, spectrum: NDArray[np.floating]) -> tuple[Array, Array]:
+        """Return motion and distortion, from a normalised log mel spectrum [shape=(T, 40)]."""
         steps = self.network(_steps(spectrum)).astype(float)
         outputs = between_steps(steps, len(spectrum))
         return outputs[:, :-1] * self.scale + self.mean, np.clip(outputs[:, -1], 0, 1)
@@ -222,7 +229,7 @@ def _error_variances(acoustic: AcousticNetwork, examples: Sequence[Example], val
     squares, count = np.zeros((3, len(acoustic.mean))), 0
     for example, x in zip(examples, values, strict=True):
         frames = dynamics_known(example.valid)
-        predicted, _ = acoustic.predict(example.heard[0].values)
+        predicted, _ = acoustic._predict(example.heard[0].values)
         squares += np.square(with_dynamics(x - predicted)[frames]).sum(axis=0)
         count += int(frames.sum())
     floor = 1e-4 * np.square(acoustic.scale) + 1e-12

@@ -7,10 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.types import Timeline, Unit
+from lipmotion.types import ENERGY_FEATURE, FRAME_RATE_HZ, Timeline, Unit
 from lipmotion.units import is_silent
 
 Array = NDArray[np.float64]
+BEFORE_SPEECH_S = 0.05
+"""Mouths open or close for the first phone this long before it."""
+LEAST_SILENCE_S, FLOOR_MARGIN = 0.05, 1e-4
 
 
 def away_from_speech(time_s: Array, speech_s: Sequence[tuple[float, float]], margin_s: float) -> NDArray[np.bool_]:
@@ -30,3 +33,19 @@ def away_from_speech(time_s: Array, speech_s: Sequence[tuple[float, float]], mar
 def speech_intervals(units: Timeline[Unit]) -> list[tuple[float, float]]:
     """Return start and end, in seconds, of every phone that is not silence."""
     return [(span.start_s, span.end_s) for span in units if not is_silent(span.label.phone)]
+
+
+def unheard_frames(features: NDArray[np.floating], units: Timeline[Unit]) -> NDArray[np.bool_]:
+    """Return the frames of digital silence, in which the mouth rests: not even a breath is heard [shape=(T,)].
+
+    features : acoustic features [shape=(T, D)]
+    The log energy stays at its floor for ``LEAST_SILENCE_S``, and speech is further away than ``BEFORE_SPEECH_S``.
+    """
+    energy = features[:, ENERGY_FEATURE]
+    at_floor = energy <= energy.min() + FLOOR_MARGIN
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], at_floor, [False]])))
+    silent = np.zeros(len(energy), bool)
+    for first, stop in edges.reshape(-1, 2):
+        silent[first:stop] = stop - first >= LEAST_SILENCE_S * FRAME_RATE_HZ
+    time_s = np.arange(len(energy)) / FRAME_RATE_HZ
+    return silent & away_from_speech(time_s, speech_intervals(units), BEFORE_SPEECH_S)

@@ -171,12 +171,12 @@ def a_model_comes_back_from_arrays(trained: TrainedEngine) -> None:
 
 
 def damaged_arrays_are_format_errors(trained: TrainedEngine) -> None:
-    """An array is missing, unknown, cut short, or lacks a column."""
+    """An array is missing, unknown, cut short, lacks a column, or is two values instead of one."""
     engine, arrays = trained.engine, trained.engine.to_arrays(trained.model)
     for name in arrays:
         missing: Mapping[str, Any] = {key: array for key, array in arrays.items() if key != name}
         require_error(ModelFormatError, partial(engine.from_arrays, missing), f"{name!r} missing")
-        short = arrays | {name: arrays[name][:-1]}
+        short = arrays | {name: arrays[name][:-1] if arrays[name].ndim else np.repeat(arrays[name], 2)}
         require_error(ModelFormatError, partial(engine.from_arrays, short), f"{name!r} cut short")
         if arrays[name].ndim > 1:
             narrow = arrays | {name: arrays[name][..., :-1]}

@@ -10,13 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.base import Arrays, Engine, Fit
-from lipmotion.engines.trajectory.experts import Experts, unheard_frames
+from lipmotion.engines.trajectory.experts import Experts
 from lipmotion.engines.trajectory.model import TrajectoryModel, model_arrays, model_from_arrays
-from lipmotion.engines.trajectory.train import LEAST_NETWORK_S, fit_trajectory
+from lipmotion.engines.trajectory.train import fit_trajectory
 from lipmotion.engines.trajectory.training_data import TrainingOptions
 from lipmotion.motion.acoustic_network import AcousticNetwork
 from lipmotion.motion.frame_labels import StateLayout, full_context_states, with_unit_names
+from lipmotion.motion.predictors import LEAST_NETWORK_S
 from lipmotion.motion.prior_regression import PriorRegression
+from lipmotion.motion.rest import unheard_frames
 from lipmotion.printable import printable
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import (

@@ -9,21 +9,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.trajectory.emission import Emission
-from lipmotion.motion.acoustic_network import AcousticNetwork
 from lipmotion.motion.articulation import ArticulationPrior, dynamics_of
 from lipmotion.motion.generation import Statistics
+from lipmotion.motion.predictors import Predictor
 from lipmotion.motion.prior_regression import PriorRegression
-from lipmotion.motion.rest import away_from_speech, speech_intervals
-from lipmotion.types import ENERGY_FEATURE, FRAME_RATE_HZ, Speech, Timeline, Unit
+from lipmotion.motion.rest import speech_intervals
+from lipmotion.types import FRAME_RATE_HZ, Speech
 
 Array = NDArray[np.float64]
+NETWORK_SHARE = 0.5
+"""Weight of the network beside the states, 0 to 1, in models that have no other."""
 DISTORTIONS = (0.2, 0.35)
 """Recognised phones are relied on up to the first distortion of the sound, and from the second one on not at all. The
 network finds 0.17 to 0.27 in quiet recordings of its speaker, 0.40 to 0.50 in white noise at 20 dB, 0.45 to 0.63 in
 babble at 20 dB."""
-BEFORE_SPEECH_S = 0.05
-"""Mouths open or close for the first phone this long before it."""
-LEAST_SILENCE_S, FLOOR_MARGIN = 0.05, 1e-4
 DISTORTION_S = 1.0
 """Seconds before and after a frame over which the distortion is averaged."""
 
@@ -33,7 +32,7 @@ class Experts:
     """The states and the network on one recording.
 
     emission, rows : densities, and the one of each frame [shape=(T,)]; the last density is that of the rest pose
-    network        : motion from the sound alone (None: there was too little speech to train it)
+    network        : predicts motion without the states (None: there was too little speech to train it)
     network_share  : weight of the network, 0 to 1, in contexts that training knows well
     prior          : says how well training knows a phone in its context (None: taken as well known)
     """
@@ -41,9 +40,9 @@ class Experts:
     emission: Emission
     rows: NDArray[np.intp]
     speech: Speech
-    network: AcousticNetwork | PriorRegression | None
+    network: Predictor | None
     prior: ArticulationPrior | None
-    network_share: float = 0.5
+    network_share: float = NETWORK_SHARE
 
     def statistics(self, frames: slice) -> Statistics:
         """Return means and precisions of a range of N frames [each shape=(N, 3, Q)]: weighted means of both."""
@@ -74,11 +73,9 @@ class Experts:
     @cached_property
     def _heard(self) -> tuple[Array, Array] | None:
         """Motion [shape=(T, Q)] and distortion [shape=(T,)] by the network."""
-        if isinstance(self.network, PriorRegression):
-            return self.network.predict(self.speech)
-        if self.network is None or self.speech.spectrum is None:
+        if self.network is None or (self.speech.spectrum is None and self.speech.prior is None):
             return None
-        return self.network.predict(self.speech.spectrum)
+        return self.network.predict(self.speech)
 
     @cached_property
     def _share(self) -> Array:
@@ -95,19 +92,3 @@ class Experts:
         states = (1 - self.network_share) * self.reliability * familiarity
         network = self.network_share * np.where(resting, 1 - self.reliability, 1.0)
         return network / np.maximum(states + network, 1e-12)
-
-
-def unheard_frames(features: NDArray[np.floating], units: Timeline[Unit]) -> NDArray[np.bool_]:
-    """Return the frames of digital silence, in which the mouth rests: not even a breath is heard [shape=(T,)].
-
-    features : acoustic features [shape=(T, D)]
-    The log energy stays at its floor for ``LEAST_SILENCE_S``, and speech is further away than ``BEFORE_SPEECH_S``.
-    """
-    energy = features[:, ENERGY_FEATURE]
-    at_floor = energy <= energy.min() + FLOOR_MARGIN
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], at_floor, [False]])))
-    silent = np.zeros(len(energy), bool)
-    for first, stop in edges.reshape(-1, 2):
-        silent[first:stop] = stop - first >= LEAST_SILENCE_S * FRAME_RATE_HZ
-    time_s = np.arange(len(energy)) / FRAME_RATE_HZ
-    return silent & away_from_speech(time_s, speech_intervals(units), BEFORE_SPEECH_S)

@@ -11,17 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.trajectory.emission import EMISSION, Emission, emission_arrays, emission_from_arrays
-from lipmotion.engines.trajectory.phone_recogniser import (
+from lipmotion.engines.trajectory.experts import NETWORK_SHARE
+from lipmotion.hmm.multistream.phone_recogniser import (
     JOINT_PREFIX,
     OwnPhoneRecogniser,
     recogniser_arrays,
     recogniser_from_arrays,
-)
-from lipmotion.motion.acoustic_network import (
-    NETWORK_ARRAYS,
-    AcousticNetwork,
-    acoustic_network_arrays,
-    acoustic_network_from_arrays,
 )
 from lipmotion.motion.arrays import MOTION_ARRAYS, motion_arrays, motion_from_arrays
 from lipmotion.motion.articulation import ArticulationPrior
@@ -29,12 +24,8 @@ from lipmotion.motion.closure import Closure
 from lipmotion.motion.frame_labels import StateLayout
 from lipmotion.motion.generation import LearnedMotion
 from lipmotion.motion.limits import MotionLimits, check_poses, limits_of
-from lipmotion.motion.prior_regression import (
-    PRIOR_ARRAYS,
-    PriorRegression,
-    prior_regression_arrays,
-    prior_regression_from_arrays,
-)
+from lipmotion.motion.predictors import PREDICTOR_ARRAYS, Predictor, predictor_arrays, predictor_from_arrays
+from lipmotion.motion.prior_regression import PriorRegression
 from lipmotion.motion.space import MotionSpace
 from lipmotion.motion.variance_scaling import VarianceScaling
 from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, checked_arrays, format_errors, refuse_undeclared
@@ -63,9 +54,9 @@ class TrajectoryModel:
     variance_factors: NDArray[np.float64]
     closure: Closure | None
     phone_recogniser: OwnPhoneRecogniser | None = None
-    network: AcousticNetwork | PriorRegression | None = None
+    network: Predictor | None = None
     prior: ArticulationPrior | None = None
-    network_share: float = 0.5
+    network_share: float = NETWORK_SHARE
 
     @cached_property
     def limits(self) -> MotionLimits:
@@ -90,11 +81,7 @@ def model_arrays(model: TrajectoryModel) -> dict[str, NDArray[Any]]:
     """Serialise a model."""
     arrays = motion_arrays(model.units, model.space, model.closure, model.prior) | {"gain": model.variance_factors}
     recogniser = recogniser_arrays(model.phone_recogniser) if model.phone_recogniser is not None else {}
-    network = {}
-    if isinstance(model.network, AcousticNetwork):
-        network = acoustic_network_arrays(model.network)
-    elif model.network is not None:
-        network = prior_regression_arrays(model.network)
+    network = predictor_arrays(model.network)
     if model.network is not None:
         network |= {"network_share": np.array([model.network_share])}
     return arrays | emission_arrays(model.emission) | network | recogniser
@@ -109,18 +96,13 @@ def model_from_arrays(arrays: Arrays, layout: Callable[[UnitSet], StateLayout], 
     """
     with format_errors("the trajectory model"):
         joint = (name for name in arrays if name.startswith(JOINT_PREFIX))
-        refuse_undeclared(arrays, MOTION_ARRAYS, EMISSION, VARIANCE_FACTORS, NETWORK_ARRAYS, PRIOR_ARRAYS, SHARE, joint)
+        refuse_undeclared(arrays, MOTION_ARRAYS, EMISSION, VARIANCE_FACTORS, PREDICTOR_ARRAYS, SHARE, joint)
         unit_set, space, closure, prior = motion_from_arrays(arrays, units)
         emission = emission_from_arrays(arrays, layout(unit_set), space.dimensions)
         factors = checked_arrays(arrays, VARIANCE_FACTORS, Q=space.dimensions)["gain"]
-        recogniser, network = recogniser_from_arrays(arrays), acoustic_network_from_arrays(arrays, space.dimensions)
-        regression = prior_regression_from_arrays(arrays, space.dimensions)
-        (share,) = checked_arrays(arrays, SHARE)["network_share"].tolist() if "network_share" in arrays else (0.5,)
-        if network is not None and regression is not None:
-            raise ValueError("a network and a regression on another model, required one of them")
-        model = TrajectoryModel(
-            unit_set, space, emission, factors, closure, recogniser, network or regression, prior, share
-        )
+        recogniser, network = recogniser_from_arrays(arrays), predictor_from_arrays(arrays, space.dimensions)
+        share = float(checked_arrays(arrays, SHARE)["network_share"][0]) if "network_share" in arrays else NETWORK_SHARE
+        model = TrajectoryModel(unit_set, space, emission, factors, closure, recogniser, network, prior, share)
         check_poses(model.poses, space, closure)
         return model
 

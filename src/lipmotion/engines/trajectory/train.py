@@ -9,31 +9,26 @@ from numpy.typing import NDArray
 
 from lipmotion.engines.trajectory.acoustic_regression import fit_acoustic_regression
 from lipmotion.engines.trajectory.emission import Emission
-from lipmotion.engines.trajectory.experts import Experts
+from lipmotion.engines.trajectory.experts import NETWORK_SHARE, Experts
 from lipmotion.engines.trajectory.model import TrajectoryModel
-from lipmotion.engines.trajectory.phone_recogniser import fit_phone_recogniser
 from lipmotion.engines.trajectory.training_data import TrainingClip, TrainingOptions, density_rows
 from lipmotion.errors import CorpusError
+from lipmotion.hmm.multistream.phone_recogniser import fit_phone_recogniser
 from lipmotion.kernels.banded import generate
-from lipmotion.motion.acoustic_network import AcousticNetwork, fit_acoustic_network
+from lipmotion.motion.acoustic_network import fit_acoustic_network
 from lipmotion.motion.articulation import ArticulationPrior, fit_articulation_prior
 from lipmotion.motion.closure import fit_closure
 from lipmotion.motion.frame_labels import FullContextState, StateLayout, full_context_states
-from lipmotion.motion.prior_regression import PriorRegression, fit_prior_regression, folds
+from lipmotion.motion.predictors import Predictor, stands_on_another
+from lipmotion.motion.prior_regression import fit_prior_regression, folds
 from lipmotion.motion.space import fit_reduced_motion
 from lipmotion.motion.variance_scaling import scaling_factors
 from lipmotion.stats.delta_windows import dynamics_known, with_dynamics
 from lipmotion.stats.trees import Question, Tree, gaussian_log_likelihood, grow_tree
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
-from lipmotion.types import FRAME_RATE_HZ, Example, Monitor, Progress, sub_monitor
+from lipmotion.types import Example, Monitor, Progress, sub_monitor
 
 Array = NDArray[np.float64]
-NETWORK_SHARE = 0.5
-"""Weight of the network beside the states, 0 to 1."""
-LEAST_NETWORK_S = 120.0
-"""The acoustic network is trained from this much measured motion on,"""
-LEAST_OWN_S = 480.0
-"""and from this much on where the model could stand on another one instead."""
 LEAST_VARIANCE_SHARE, LEAST_VARIANCE = 1e-3, 1e-12
 """Smallest variance: a share of the variance of all frames, and a constant for dimensions that never move."""
 
@@ -64,10 +59,9 @@ def fit_trajectory(
         monitor(Progress(_STAGE, 2, 3, 0.3))
         emission = fit_acoustic_regression(emission, clips, options)
     prior = fit_articulation_prior(space, values, examples) if options.articulation else None
-    network: AcousticNetwork | PriorRegression | None = None
+    network: Predictor | None = None
     share = NETWORK_SHARE
-    motion_s = sum(int(example.valid.sum()) for example in examples) / FRAME_RATE_HZ
-    if motion_s < LEAST_OWN_S and all(example.speech.prior is not None for example in examples):
+    if stands_on_another(examples):
         network, predictions = fit_prior_regression(examples, values, len(space.direct))
         share = _share_of_regression(predictions, clips, options, len(space.direct))
     elif all(example.heard for example in examples):
@@ -115,7 +109,7 @@ def _share_of_regression(
 
 def _scaling_factors(
     emission: Emission,
-    network: AcousticNetwork | PriorRegression | None,
+    network: Predictor | None,
     prior: ArticulationPrior | None,
     share: float,
     clips: Sequence[TrainingClip],

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from lipmotion.engines import engine_named
-from lipmotion.engines.trajectory import phone_recogniser as module
 from lipmotion.errors import ModelFormatError
+from lipmotion.hmm.multistream import phone_recogniser as module
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
 from lipmotion.testing.examples import example, examples, speech, timeline
 from lipmotion.types import Features, Timeline

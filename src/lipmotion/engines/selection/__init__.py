@@ -1,0 +1,1 @@
+"""The unit selection engine: recorded motion, chosen and joined (Minnis & Breen 2000)."""

@@ -1,0 +1,190 @@
+"""Concatenation: recorded motion of the chosen units, warped to the times of the target, overlapping where joined.
+
+Source: Minnis & Breen 2000, §4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator
+
+from lipmotion.engines.selection.costs import AFTER, BEFORE, HARD, NONE, Costs, Target
+from lipmotion.engines.selection.inventory import RecordedUnits, UnitNumbers
+from lipmotion.engines.selection.lip_reading import PROTECTED_PHONES
+from lipmotion.types import FRAME_RATE_HZ
+from lipmotion.units import PHONES, is_silent
+
+Array = NDArray[np.float64]
+HARD_SMOOTHING = 0.05
+"""Share of two abutting pieces, at the end of the first and at the start of the second, that is smoothed (§4)."""
+LEAST_OVERLAP_S, MOST_OVERLAP_S = 0.02, 0.15
+"""Pieces overlap from at least so much, two frames, to at most so much before and after a soft join."""
+LEAST_WEIGHT = 1e-9
+SHORTEST_S = 1e-3
+"""Two joins are never closer."""
+
+
+@dataclass(frozen=True)
+class Piece:
+    """Units that were recorded in succession, and where they are used.
+
+    first, stop : the phones of the target
+    unit        : the unit of the first phone; the others follow it in the inventory
+    join        : kind of the join with the piece before: ``HARD``, ``BEFORE`` or ``AFTER``
+    start_s     : time of that join in the target; the piece counts for half there
+    overlap_s   : the pieces overlap from so much before this time to so much after it; 0 for a hard join
+    """
+
+    first: int
+    stop: int
+    unit: int
+    join: int
+    start_s: float
+    overlap_s: float
+
+
+def pieces_of(costs: Costs, target: Target, units: UnitNumbers) -> list[Piece]:
+    """Return the pieces that a selection consists of, in order.
+
+    units : one for each phone of the target
+    """
+    kinds = [HARD] + [
+        costs.join_kind(target, number, int(units[number - 1]), int(units[number])) for number in range(1, len(units))
+    ]
+    firsts = [number for number, kind in enumerate(kinds) if number == 0 or kind != NONE]
+    times_s = target.windows.times_s
+    pieces = []
+    latest_s = -np.inf
+    for first, stop in zip(firsts, [*firsts[1:], len(units)], strict=True):
+        start_s, overlap_s = float(times_s[first, 0]), 0.0
+        if first and kinds[first] in (BEFORE, AFTER):
+            shared = first - 1 if kinds[first] == BEFORE else first
+            share, (begin_s, end_s) = costs.forward_share(target, shared), times_s[shared].tolist()
+            start_s = begin_s + share * (end_s - begin_s)
+            overlap_s = float(np.clip(min(share, 1 - share) * (end_s - begin_s), LEAST_OVERLAP_S, MOST_OVERLAP_S))
+        start_s = latest_s = max(start_s, latest_s + SHORTEST_S)
+        pieces.append(Piece(first, stop, int(units[first]), kinds[first], start_s, overlap_s))
+    return pieces
+
+
+def concatenated(inventory: RecordedUnits, target: Target, pieces: list[Piece], frames: int) -> Array:
+    """Return the motion of some pieces in the motion space, 100 frames a second [shape=(frames, Q)].
+
+    Where pieces overlap, the weight of the next one rises from 0 to 1 along a raised cosine. Abutting pieces are bent
+    towards the middle of their ends, by a raised cosine over the last and the first 5 %, on the side of a phone that
+    is not protected alone.
+    """
+    time_s = np.arange(frames) / FRAME_RATE_HZ
+    result, total = np.zeros((frames, inventory.values.shape[1])), np.zeros((frames, 1))
+    for number, piece in enumerate(pieces):
+        following = pieces[number + 1] if number + 1 < len(pieces) else None
+        begin_s = piece.start_s - piece.overlap_s if number else -np.inf
+        end_s = following.start_s + following.overlap_s if following is not None else np.inf
+        used = np.flatnonzero((time_s >= begin_s) & (time_s <= end_s))
+        if not len(used):
+            continue
+        clock = TimeMap.of(inventory, target, piece, following)
+        motion = inventory.at(np.full(len(used), inventory.windows.recording[piece.unit]), clock(time_s[used]))
+        weight = _rise(time_s[used], piece) if number else np.ones(len(used))
+        if following is not None:
+            weight = weight * (1 - _rise(time_s[used], following))
+        result[used] += weight[:, None] * motion
+        total[used] += weight[:, None]
+    result /= np.maximum(total, LEAST_WEIGHT)
+    for before, after in pairwise(pieces):
+        if after.join == HARD:
+            _smooth(inventory, target, before, after, time_s, result)
+    return result
+
+
+@dataclass(frozen=True, eq=False)
+class TimeMap:
+    """The time in a recording for every time in the target, for one piece: monotone and smooth.
+
+    target_s, recorded_s : times that belong together [each shape=(K,)]
+    Edges of phones fall on edges of phones. A silence is not stretched: what is missing in its middle is a pause in
+    which the motion stands still. Outside, the recording goes on at its own speed.
+    """
+
+    target_s: Array
+    recorded_s: Array
+
+    @classmethod
+    def of(cls, inventory: RecordedUnits, target: Target, piece: Piece, following: Piece | None) -> TimeMap:
+        """Return the map of a piece.
+
+        following : the piece after it (None: it is the last)
+        """
+        first = piece.first - (piece.join == BEFORE)
+        stop = piece.stop + (following is not None and following.join == AFTER)
+        shift = piece.unit - piece.first
+        times = np.array([pair for number in range(first, stop) for pair in _knots(inventory, target, number, shift)])
+        kept = np.append(np.diff(times[:, 0]) > SHORTEST_S, True)
+        return cls(times[kept, 0], times[kept, 1])
+
+    def __call__(self, time_s: Array) -> Array:
+        """Return times in the recording [shape=(N,)]."""
+        if len(self.target_s) < 2:
+            return self.recorded_s[0] + time_s - self.target_s[0]
+        inside = np.clip(time_s, self.target_s[0], self.target_s[-1])
+        mapped: Array = PchipInterpolator(self.target_s, self.recorded_s)(inside) + (time_s - inside)
+        return mapped
+
+
+def _knots(inventory: RecordedUnits, target: Target, number: int, shift: int) -> Iterator[tuple[float, float]]:
+    """Yield the start and the end of a phone, in the target and in the recording; of a silence, its pause as well."""
+    start_s, end_s = target.windows.times_s[number].tolist()
+    from_s, to_s = inventory.windows.times_s[number + shift].tolist()
+    yield start_s, from_s
+    missing_s = (end_s - start_s) - (to_s - from_s)
+    if is_silent(PHONES[target.windows.phones[number]]) and missing_s > 0:
+        half_s = (to_s - from_s) / 2
+        yield start_s + half_s, from_s + half_s
+        yield end_s - half_s, from_s + half_s
+    yield end_s, to_s
+
+
+def _rise(time_s: Array, piece: Piece) -> Array:
+    """Return the weight of a piece beside the one before it, 0 to 1 [shape=(N,)]."""
+    if not piece.overlap_s:
+        return (time_s >= piece.start_s).astype(float)
+    phase = np.clip((time_s - piece.start_s) / piece.overlap_s, -1, 1)
+    return (1 + np.sin(phase * np.pi / 2)) / 2
+
+
+def _smooth(
+    inventory: RecordedUnits, target: Target, before: Piece, after: Piece, time_s: Array, motion: Array
+) -> None:
+    """Bend two abutting pieces towards one another, in place.
+
+    The jump is divided between both sides; a side that is a protected phone keeps its shape, the other one takes all.
+    """
+    join_s, times_s = after.start_s, target.windows.times_s
+    recording = inventory.windows.recording
+    left, right = (
+        inventory.at(recording[[piece.unit]], TimeMap.of(inventory, target, piece, None)(np.array([join_s])))[0]
+        for piece in (before, after)
+    )
+    jump = right - left
+    kept = [is_protected(target, number) for number in (after.first - 1, after.first)]
+    shares = (0.0, 1.0) if kept[0] and not kept[1] else (1.0, 0.0) if kept[1] and not kept[0] else (0.5, 0.5)
+    spans_s = (
+        HARD_SMOOTHING * (join_s - times_s[before.first, 0]),
+        HARD_SMOOTHING * (times_s[after.stop - 1, 1] - join_s),
+    )
+    for side, (share, span_s) in enumerate(zip(shares, spans_s, strict=True)):
+        width_s = max(float(span_s), LEAST_OVERLAP_S)
+        away_s = (join_s - time_s) if side == 0 else (time_s - join_s)
+        near = (away_s > 0 if side == 0 else away_s >= 0) & (away_s < width_s)
+        bend = (1 + np.cos(np.pi * away_s[near] / width_s)) / 2
+        motion[near] += (share if side == 0 else -share) * bend[:, None] * jump
+
+
+def is_protected(target: Target, number: int) -> bool:
+    """Return whether the lip shape of a phone of the target must be preserved."""
+    return PHONES[target.windows.phones[number]] in PROTECTED_PHONES

@@ -1,0 +1,86 @@
+"""The configuration of the unit selection engine."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from lipmotion.engines.selection.lip_reading import OVERLAPS, parsed_invisible
+from lipmotion.errors import InputError
+from lipmotion.types import Configuration, Rule, option
+
+NOT_NEGATIVE = Rule(least=0)
+
+
+@dataclass(frozen=True)
+class SelectionConfig(Configuration):
+    """Options of the unit selection engine; the default values were chosen on the validation list (docs/selection.md).
+
+    window     : phones of a window, N: odd, 3 to 11
+    candidates : units that are looked up for each phone and each bias
+    beam       : of all these, so many of the least target costs are candidates in the search
+    invisible  : phones without a lip shape of their own, those of the print by default (add ``l`` for faces without a
+                 tongue): they count as one phone, and their neighbours choose the unit; empty: none
+    overlap    : how units overlap in a phone that they share: ``learned``, ``printed`` (Table 1),
+                 ``symmetric``, ``middle``
+    context    : target cost of another phone beside the phone, ``farther`` times as much for each phone further away;
+                 half as much where both are of one viseme
+    farther    : see ``context``
+    word       : target cost of another edge of a word, at either end
+    stress     : target cost of another stress
+    duration   : target cost of another duration, for each unit of its natural logarithm
+    guide      : target cost of motion that differs from what the guide predicts from the sound, for each tenth of a
+                 second and squared deviation; 0: no guide, the phones alone choose
+    trust      : deviations between the predictions for two sounds from which on they count as different: a unit that
+                 sounds the same as the target need not agree with the guide
+    join       : join cost for each squared deviation between two units where they are joined
+    velocity   : seconds; weight of velocities in these deviations
+    hard       : join cost where units have no phone in common
+    protected  : join cost beside or inside a phone whose lip shape must be preserved
+    cluster    : join cost between two consonants of one word
+    most       : no join costs more than this; so candidates can be left out without a change of the result
+    components : principal components that all point channels are reduced to
+    conditions, epochs : of the acoustic network that is the guide, as of the trajectory engine
+    joint_recogniser : train the joint model as well, where there is enough speech: it recognises phones of this speaker
+    closures   : make the lips meet in every p, b and m
+    articulation : lean on the table of English articulation in contexts that training saw little of
+    """
+
+    window: int = option(5, Rule(least=3, odd=True))
+    candidates: int = option(300, Rule(least=1))
+    beam: int = option(25, Rule(least=1))
+    invisible: str = "t d g k"
+    overlap: str = option("printed", Rule(choices=tuple(OVERLAPS)))
+    context: float = option(0.3, NOT_NEGATIVE)
+    farther: float = option(0.3, NOT_NEGATIVE)
+    word: float = option(0.05, NOT_NEGATIVE)
+    stress: float = option(0.05, NOT_NEGATIVE)
+    duration: float = option(0.3, NOT_NEGATIVE)
+    guide: float = option(20.0, NOT_NEGATIVE)
+    trust: float = option(0.1, NOT_NEGATIVE)
+    join: float = option(0.1, NOT_NEGATIVE)
+    velocity: float = option(0.05, NOT_NEGATIVE)
+    hard: float = option(0.15, NOT_NEGATIVE)
+    protected: float = option(1.0, NOT_NEGATIVE)
+    cluster: float = option(0.1, NOT_NEGATIVE)
+    most: float = option(3.0, Rule(above=0))
+    components: int = option(16, Rule(least=1))
+    conditions: int = option(15, Rule(least=0))
+    epochs: int = option(100, Rule(least=1))
+    joint_recogniser: bool = True
+    closures: bool = True
+    articulation: bool = True
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        parsed_invisible(self.invisible)
+        if self.window > LARGEST_WINDOW:
+            raise InputError(f"window is {self.window}, required an odd number from 3 to {LARGEST_WINDOW}")
+
+    @property
+    def invisible_phones(self) -> frozenset[str]:
+        """The phones of ``invisible``."""
+        return parsed_invisible(self.invisible)
+
+
+LARGEST_WINDOW = 11
+"""Keys of larger windows do not fit into 64 bits."""

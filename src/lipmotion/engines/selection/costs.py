@@ -1,0 +1,200 @@
+"""Target costs of single units, and join costs of pairs of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.engines.selection.config import SelectionConfig
+from lipmotion.engines.selection.inventory import (
+    RecordedUnits,
+    UnitIndex,
+    UnitNumbers,
+    replaced,
+    standing_in,
+    unit_index,
+)
+from lipmotion.engines.selection.lip_reading import OVERLAPS, PROTECTED_PHONES, lip_reading_class
+from lipmotion.engines.selection.windows import INVISIBLE_SYMBOL, SILENT, VISEME_NUMBER, PhoneWindows
+from lipmotion.units import PHONES
+from lipmotion.units.classes import CLASSES
+
+Array = NDArray[np.float64]
+POINTS = 5
+"""Points of a phone at which motions are compared."""
+FRACTIONS = (np.arange(POINTS) + 0.5) / POINTS
+PER_S = 10.0
+"""Costs of the guide are given for a tenth of a second."""
+LEAST_S = 0.01
+HARD, BEFORE, AFTER, NONE = 0, 1, 2, 3
+"""Kinds of a join: units abut; they overlap in the phone before it; in the phone after it; they were recorded in
+succession, so that nothing is joined."""
+_CONSONANTS = frozenset(PHONES) - frozenset(CLASSES["vowel"]) - frozenset(CLASSES["silence"])
+
+
+@dataclass(frozen=True, eq=False)
+class Target:
+    """The phones that units are wanted for.
+
+    windows  : the phones, each present in the inventory or replaced by one that is [U phones]
+    contexts : the symbols of their windows [shape=(U, N)]
+    guided   : the motion that the guide predicts, as wide as recorded motion, times ``scale`` [shape=(U, POINTS, Q)]
+    heard    : what it predicts, as it is, times ``scale`` [shape=(U, POINTS, Q)]; both None: there is no guide
+    """
+
+    windows: PhoneWindows
+    contexts: NDArray[np.intp]
+    guided: Array | None
+    heard: Array | None
+
+    def __len__(self) -> int:
+        return len(self.windows)
+
+    def symbol(self, number: int) -> int:
+        """Return the symbol of a phone; silence beyond both ends."""
+        return int(self.contexts[number, self.contexts.shape[1] // 2]) if 0 <= number < len(self) else SILENT
+
+
+@dataclass(frozen=True, eq=False)
+class Costs:
+    """Costs of the units of one inventory.
+
+    scale : factors of the dimensions of motion in all comparisons [shape=(Q,)]
+    """
+
+    inventory: RecordedUnits
+    config: SelectionConfig
+    scale: Array
+
+    @cached_property
+    def index(self) -> UnitIndex:
+        """The index of the windows."""
+        return unit_index(self.inventory, self.config.invisible_phones, self.config.window)
+
+    @cached_property
+    def stand_ins(self) -> dict[str, str]:
+        """The phone that stands in for each phone which the inventory lacks."""
+        return standing_in(self.inventory.windows, self.inventory.usable)
+
+    def target(self, windows: PhoneWindows, guided: Array | None, heard: Array | None) -> Target:
+        """Return phones in a form that can be compared with units.
+
+        guided, heard : predicted motion at ``POINTS`` of each phone [each shape=(U, POINTS, Q)]
+        """
+        known = replaced(windows, self.stand_ins)
+        contexts = known.contexts(self.config.invisible_phones, self.config.window // 2)
+        if guided is None or heard is None:
+            return Target(known, contexts, None, None)
+        return Target(known, contexts, guided * self.scale, heard * self.scale)
+
+    def target_costs(self, target: Target, number: int, units: UnitNumbers) -> Array:
+        """Return the cost of each of some units for one phone [shape=(N,)]."""
+        config, windows = self.config, self.inventory.windows
+        differs = self.index.contexts[units] != target.contexts[number]
+        differs_much = VISEME_NUMBER[self.index.contexts[units]] != VISEME_NUMBER[target.contexts[number]]
+        costs = (differs + differs_much) @ (self._context_weights / 2)
+        costs += config.word * (windows.words[units] != target.windows.words[number]).sum(axis=1)
+        stress, wanted = windows.stress[units], target.windows.stress[number]
+        costs += config.stress * ((stress != wanted) & (stress >= 0) & (wanted >= 0))
+        duration_s = max(float(target.windows.durations_s[number]), LEAST_S)
+        costs += config.duration * np.abs(np.log(np.maximum(windows.durations_s[units], LEAST_S) / duration_s))
+        is_shown = target.symbol(number) != INVISIBLE_SYMBOL
+        if is_shown and target.guided is not None and target.heard is not None and self._recorded is not None:
+            distance = np.square(self._recorded[units] - target.guided[number]).mean(axis=1).sum(axis=1)
+            if self._predicted is not None and config.trust:
+                unlike = np.square(self._predicted[units] - target.heard[number]).mean(axis=1).sum(axis=1)
+                distance *= np.minimum(unlike / config.trust**2, 1)
+            costs += config.guide * PER_S * duration_s * distance
+        return costs
+
+    def join_costs(self, target: Target, number: int, left: UnitNumbers, right: UnitNumbers) -> Array:
+        """Return the costs of joining units of one phone with units of the next [shape=(len(left), len(right))].
+
+        number : of the phone of ``right``
+        """
+        costs = np.minimum.reduce(self._joins(target, number, left, right))
+        np.minimum(costs, self.config.most, out=costs)
+        costs[self._succeed(left, right)] = 0
+        return costs
+
+    def join_kind(self, target: Target, number: int, left: int, right: int) -> int:
+        """Return how a unit is joined with that of the next phone, which has this number."""
+        pair = np.array([left]), np.array([right])
+        if self._succeed(*pair)[0, 0]:
+            return NONE
+        return int(np.argmin([cost[0, 0] for cost in self._joins(target, number, *pair)]))
+
+    def forward_share(self, target: Target, shared: int) -> float:
+        """Return the forward share of a phone of the target in which units overlap."""
+        invisible = self.config.invisible_phones
+        phones = [PHONES[target.windows.phones[n]] if 0 <= n < len(target) else "sil" for n in (shared - 1, shared + 1)]
+        before, after = (lip_reading_class(phone, invisible) for phone in phones)
+        return OVERLAPS[self.config.overlap][before, after]
+
+    def _joins(self, target: Target, number: int, left: UnitNumbers, right: UnitNumbers) -> tuple[Array, Array, Array]:
+        """Return the costs of the joins of kind ``HARD``, ``BEFORE`` and ``AFTER``; infinite where there is none."""
+        config, continues, symbols = self.config, self.inventory.windows.continues, self.index.contexts
+        middle = symbols.shape[1] // 2
+        before, after = (PHONES[target.windows.phones[n]] for n in (number - 1, number))
+        protects = [config.protected * (phone in PROTECTED_PHONES) for phone in (before, after)]
+        inside = config.cluster * (
+            before in _CONSONANTS and after in _CONSONANTS and not target.windows.words[number, 0]
+        )
+        hard = self._distances(left, 1.0, right, 0.0) + config.hard + max(protects) + inside
+        earlier, later = np.maximum(right - 1, 0), np.minimum(left + 1, len(continues) - 1)
+        usable = self.inventory.usable
+        shares_before = usable[earlier] & continues[earlier] & (right > 0)
+        shares_before &= symbols[earlier, middle] == target.symbol(number - 1)
+        shares_after = usable[later] & continues[left] & (symbols[later, middle] == target.symbol(number))
+        fraction = self.forward_share(target, number - 1)
+        soft_before = self._distances(left, fraction, earlier, fraction) + protects[0]
+        fraction = self.forward_share(target, number)
+        soft_after = self._distances(later, fraction, right, fraction) + protects[1]
+        soft_before[:, ~shares_before] = np.inf
+        soft_after[~shares_after] = np.inf
+        return hard, soft_before, soft_after
+
+    def _succeed(self, left: UnitNumbers, right: UnitNumbers) -> NDArray[np.bool_]:
+        """Return which pairs were recorded in succession [shape=(len(left), len(right))]."""
+        result: NDArray[np.bool_] = (left[:, None] + 1 == right) & self.inventory.windows.continues[left][:, None]
+        return result
+
+    def _distances(self, left: UnitNumbers, at_left: float, right: UnitNumbers, at_right: float) -> Array:
+        """Return the squared deviations between units at fractions of their durations, weighted."""
+        a, b = self._states(at_left)[left], self._states(at_right)[right]
+        squares = np.square(a).sum(axis=1)[:, None] + np.square(b).sum(axis=1)
+        return self.config.join * np.maximum(squares - 2 * a @ b.T, 0)
+
+    def _states(self, fraction: float) -> Array:
+        """Return position and velocity of all units at a fraction of their durations [shape=(U, 2Q)]."""
+        if fraction not in self._known_states:
+            units, inventory = np.arange(len(self.inventory.windows)), self.inventory
+            velocities = inventory.velocities(units, fraction) * self.config.velocity
+            state = np.concatenate([inventory.poses(units, fraction), velocities], axis=1) * np.tile(self.scale, 2)
+            self._known_states[fraction] = state
+        return self._known_states[fraction]
+
+    @cached_property
+    def _known_states(self) -> dict[float, Array]:
+        return {}
+
+    @cached_property
+    def _context_weights(self) -> Array:
+        offsets = np.abs(np.arange(self.config.window) - self.config.window // 2)
+        return np.where(offsets > 0, self.config.context * self.config.farther ** np.maximum(offsets - 1, 0), 0.0)
+
+    @cached_property
+    def _recorded(self) -> Array | None:
+        """The motion at ``POINTS`` of every unit, times ``scale`` [shape=(U, POINTS, Q)]; None: there is no guide."""
+        if self.inventory.predicted is None or not self.config.guide:
+            return None
+        units = np.arange(len(self.inventory.windows))
+        return np.stack([self.inventory.poses(units, fraction) for fraction in FRACTIONS], axis=1) * self.scale
+
+    @cached_property
+    def _predicted(self) -> Array | None:
+        """What the guide predicts at ``POINTS`` of every unit, times ``scale`` [shape=(U, POINTS, Q)]."""
+        return self.inventory.predicted.astype(float) * self.scale if self.inventory.predicted is not None else None

@@ -1,0 +1,184 @@
+"""The unit selection engine."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.engines.base import Arrays, Engine, Fit, SourcePiece
+from lipmotion.engines.selection.concatenation import concatenated, pieces_of
+from lipmotion.engines.selection.config import SelectionConfig
+from lipmotion.engines.selection.costs import Costs, Target
+from lipmotion.engines.selection.model import SelectionModel, model_arrays, model_from_arrays
+from lipmotion.engines.selection.report import inventory_text, source_of, units_by_source
+from lipmotion.engines.selection.search import select
+from lipmotion.engines.selection.sources import source_pieces, typical_duration_s, with_sources
+from lipmotion.engines.selection.targets import target_of
+from lipmotion.engines.selection.train import fit_selection
+from lipmotion.motion.generation import Statistics
+from lipmotion.motion.predictors import LEAST_NETWORK_S
+from lipmotion.motion.prior_regression import PriorRegression
+from lipmotion.motion.rest import away_from_speech, speech_intervals, unheard_frames
+from lipmotion.stats.delta_windows import with_dynamics
+from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
+from lipmotion.types import (
+    FRAME_RATE_HZ,
+    Configuration,
+    Constraints,
+    Example,
+    Generation,
+    Monitor,
+    Speech,
+    StateTrace,
+    Timeline,
+    Unit,
+)
+
+Array = NDArray[np.float64]
+ROUNDING_S = 1e-6
+SETTLED_S = 0.06
+"""Half of the rest pose is left so long before the first phone, and reached so long after the last one."""
+
+
+@final
+@dataclass(frozen=True)
+class SelectionEngine(Engine[SelectionModel]):
+    """Unit selection: recorded motion of phones in context, chosen by dynamic programming, warped in time and joined.
+
+    Source: Minnis & Breen 2000.  Deviations: the motion that a guide predicts from the sound is part of the target
+    costs; joins cost what the recorded motions differ by; overlaps are raised cosines.
+    """
+
+    config: SelectionConfig
+    name: ClassVar[str] = "selection"
+    Config: ClassVar[type[Configuration]] = SelectionConfig
+
+    @property
+    def wants_f0(self) -> bool:  # noqa: D102
+        return self.config.joint_recogniser
+
+    def fit(  # noqa: D102
+        self, examples: Sequence[Example], monitor: Monitor, checkpoint: Checkpoint = NO_CHECKPOINT
+    ) -> Fit[SelectionModel]:
+        model, deviations = fit_selection(examples, self.config, monitor, checkpoint)
+        frames = sum(int(example.valid.sum()) for example in examples)
+        figures = {"frames": frames, "units": int(model.inventory.usable.sum()), "deviation": float(deviations[0])}
+        return Fit(model, figures)
+
+    def conditions(self, motion_s: float) -> int:  # noqa: D102
+        return self.config.conditions if self.config.guide and motion_s >= LEAST_NETWORK_S else 0
+
+    def stands_on_prior(self, model: SelectionModel) -> bool:  # noqa: D102
+        return model.guide is not None and isinstance(model.guide.predictor, PriorRegression)
+
+    def recognise(self, model: SelectionModel, speech: Speech) -> Timeline[Unit] | None:  # noqa: D102
+        return model.phone_recogniser.phones(speech) if model.phone_recogniser is not None else None
+
+    def without_closures(self) -> SelectionEngine:  # noqa: D102
+        return replace(self, config=replace(self.config, closures=False))
+
+    def generate(self, model: SelectionModel, speech: Speech, constraints: Constraints | None = None) -> Generation:  # noqa: D102
+        costs = model.costs(self.config)
+        frames = len(speech.features.values)
+        target = target_of(model, costs, speech)
+        given = _given(model, target, speech.units)
+        units = select(costs, target, given=given).units
+        track = concatenated(model.inventory, target, pieces_of(costs, target, units), frames)
+        resting = _resting(np.asarray(speech.features.values), speech.units)[:, None]
+        means = with_dynamics(track + resting * (model.rest - track))
+        precisions = np.broadcast_to(1 / model.variances, means.shape)
+
+        def statistics(block: slice) -> Statistics:
+            return means[block].copy(), precisions[block].copy()
+
+        motion, variance = model.motion.generate(
+            statistics,
+            frames,
+            speech.units,
+            constraints,
+            close=self.config.closures,
+            reliability=_substituted(costs, target, units, frames),
+        )
+        sources = [source_of(model.inventory, unit) for unit in units.tolist()]
+        starts_s = target.windows.times_s[:, 0]
+        positions = np.searchsorted(starts_s, np.arange(frames) / FRAME_RATE_HZ + ROUNDING_S, side="right") - 1
+        trace = StateTrace(tuple(sources), np.maximum(positions, 0).astype(np.intp))
+        return Generation(motion, variance, with_sources(speech.units, starts_s, sources), trace)
+
+    def recordings(self, model: SelectionModel) -> tuple[str, ...]:  # noqa: D102
+        return model.inventory.names
+
+    def typical_duration_s(self, model: SelectionModel, phone: str) -> float:  # noqa: D102
+        return typical_duration_s(model.inventory, phone)
+
+    def source_pieces(  # noqa: D102
+        self, model: SelectionModel, units: Timeline[Unit], heard: Mapping[str, NDArray[np.floating[Any]]]
+    ) -> tuple[tuple[SourcePiece, ...], Timeline[Unit]]:
+        return source_pieces(model, self.config, units, heard)
+
+    def describe(self, model: SelectionModel) -> str:  # noqa: D102
+        return inventory_text(model.inventory)
+
+    def to_arrays(self, model: SelectionModel) -> dict[str, NDArray[Any]]:  # noqa: D102
+        return model_arrays(model)
+
+    def from_arrays(self, arrays: Arrays) -> SelectionModel:  # noqa: D102
+        return model_from_arrays(arrays)
+
+
+def _resting(features: NDArray[np.floating], units: Timeline[Unit]) -> Array:
+    """Return the weight of the rest pose in every frame, 0 to 1 [shape=(T,)].
+
+    It is 1 in silence of which some is digital, and falls to 0 before the next phone and after the last one: in digital
+    silence there is no breath, as there may be in the silence that was recorded with the unit.
+    features : acoustic features [shape=(T, D)]
+    """
+    unheard = unheard_frames(features, units)
+    if not unheard.any():
+        return np.zeros(len(features))
+    away = away_from_speech(np.arange(len(features)) / FRAME_RATE_HZ, speech_intervals(units), SETTLED_S)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], away, [False]])))
+    resting = np.zeros(len(features))
+    for first, stop in edges.reshape(-1, 2):
+        resting[first:stop] = float(unheard[first:stop].any())
+    width = round(SETTLED_S * FRAME_RATE_HZ)
+    window = np.hanning(2 * width + 1)
+    padded = np.pad(resting, width, mode="edge")
+    weights: Array = np.convolve(padded, window / window.sum(), "valid")
+    return weights
+
+
+def _given(model: SelectionModel, target: Target, units: Timeline[Unit]) -> dict[int, int]:
+    """Return the units that edited labels name, by the number of their phone in the target.
+
+    A label names a unit where its phone is that of the unit: an edited phone is selected again.
+    """
+    named = units_by_source(model.inventory, (span.label.unit for span in units if span.label.unit))
+    starts_s = target.windows.times_s[:, 0]
+    given = {}
+    for span in units:
+        unit = named.get(span.label.unit)
+        if unit is None or span.duration_s <= 0:
+            continue
+        number = int(np.argmin(np.abs(starts_s - span.start_s)))
+        if model.inventory.windows.phones[unit] == target.windows.phones[number]:
+            given[number] = unit
+    return given
+
+
+def _substituted(costs: Costs, target: Target, units: NDArray[np.intp], frames: int) -> Array:
+    """Return 1 in the frames whose unit was recorded between other phones than are wanted, else 0 [shape=(T,)].
+
+    There the table of articulation says more than the unit; elsewhere the unit is a recording of what is wanted.
+    """
+    middle = costs.config.window // 2
+    around = slice(middle - 1, middle + 2)
+    differs = (costs.index.contexts[units][:, around] != target.contexts[:, around]).any(axis=1)
+    result = np.zeros(frames)
+    for (start_s, end_s), other in zip(target.windows.times_s.tolist(), differs.tolist(), strict=True):
+        result[int(start_s * FRAME_RATE_HZ) : int(np.ceil(end_s * FRAME_RATE_HZ))] = float(other)
+    return result

@@ -1,0 +1,63 @@
+"""The guide: motion predicted from the sound, which the recorded motion of units is compared with."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.engines.selection.costs import FRACTIONS
+from lipmotion.engines.selection.windows import PhoneWindows
+from lipmotion.motion.predictors import Predictor
+from lipmotion.types import FRAME_RATE_HZ, Example, Speech
+
+Array = NDArray[np.float64]
+LEAST_EXPANSION, MOST_EXPANSION = 1.0, 1.6
+UNHEARD_EXPANSION = 1.05
+"""Predictions for new recordings are so much narrower again than those for recordings of the training."""
+
+
+@dataclass(frozen=True, eq=False)
+class Guide:
+    """A predictor of motion, and how much narrower its predictions are than recorded motion.
+
+    predictor : an acoustic network, or a regression
+    centre    : mean of the recorded motion [shape=(Q,)]
+    expansion : standard deviation of recorded by that of predicted motion [shape=(Q,)]
+    """
+
+    predictor: Predictor
+    centre: Array
+    expansion: Array
+
+    def predict(self, speech: Speech) -> Array:
+        """Return the predicted motion [shape=(T, Q)]."""
+        return self.predictor.predict(speech)[0]
+
+    def expanded(self, predicted: Array) -> Array:
+        """Return predicted motion [shape=(..., Q)] as wide as recorded motion."""
+        return self.centre + (predicted - self.centre) * self.expansion
+
+
+def fit_guide(predictor: Predictor, examples: Sequence[Example], values: Sequence[Array]) -> Guide:
+    """Return a guide.
+
+    values : motion of each example in the motion space [each shape=(T, Q)]
+    """
+    recorded = np.concatenate([x[example.valid] for x, example in zip(values, examples, strict=True)])
+    predicted = np.concatenate([predictor.predict(e.speech)[0][e.valid] for e in examples])
+    ratio = UNHEARD_EXPANSION * recorded.std(axis=0) / np.maximum(predicted.std(axis=0), 1e-9)
+    return Guide(predictor, recorded.mean(axis=0), np.clip(ratio, LEAST_EXPANSION, MOST_EXPANSION))
+
+
+def at_points(motion: Array, windows: PhoneWindows) -> Array:
+    """Return motion of one recording [shape=(T, Q)] at the points of each of its phones [shape=(U, POINTS, Q)]."""
+    start_s, duration_s = windows.times_s[:, 0], windows.durations_s
+    position = (start_s[:, None] + FRACTIONS * duration_s[:, None]) * FRAME_RATE_HZ
+    position = np.clip(position, 0, len(motion) - 1)
+    before = np.minimum(position.astype(np.intp), max(len(motion) - 2, 0))
+    share = (position - before)[..., None]
+    result: Array = motion[before] * (1 - share) + motion[np.minimum(before + 1, len(motion) - 1)] * share
+    return result

@@ -1,0 +1,190 @@
+"""The inventory: every recorded phone in its window, with the motion that was recorded, and an index of the windows."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.engines.selection.windows import PHONE_NUMBER, SYMBOLS, PhoneWindows
+from lipmotion.motion.store import MotionStore
+from lipmotion.types import FRAME_RATE_HZ
+from lipmotion.units import PHONES, most_similar_phone
+
+Array = NDArray[np.float64]
+UnitNumbers = NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedUnits:
+    """Recorded phones, called units, and their motion.
+
+    names     : of the recordings
+    windows   : the units, recording by recording; times are seconds in their recording
+    usable    : whether the motion of each unit was measured throughout [shape=(U,)]
+    first     : the row of ``motion`` at which each recording begins; the last number is that of all rows [shape=(R+1,)]
+    motion    : of all recordings in the motion space, 100 rows a second [shape=(F, Q)]
+    predicted : what the guide predicts at ``POINTS`` of each unit, reduced [shape=(U, POINTS, D)]; None: no guide
+    """
+
+    names: tuple[str, ...]
+    windows: PhoneWindows
+    usable: NDArray[np.bool_]
+    first: NDArray[np.intp]
+    motion: MotionStore
+    predicted: NDArray[np.float16] | None
+
+    @cached_property
+    def values(self) -> Array:
+        """The motion of all recordings, decoded [shape=(F, Q)].
+
+        Where silence is not stored, it is a line between its edges in the recording.
+        """
+        stored = np.concatenate([np.arange(first, stop) for first, stop in self.motion.kept.tolist()])
+        rows, frames = self.motion.rows(stored), np.arange(len(self.motion))
+        if len(rows) == len(frames):
+            return rows
+        edges = [self.first[:-1], self.first[1:] - 1]
+        after = np.minimum(np.searchsorted(stored, edges[0]), len(stored) - 1)
+        before = np.maximum(np.searchsorted(stored, edges[1], side="right") - 1, 0)
+        knots = np.concatenate([stored, *edges])
+        values = np.concatenate([rows, rows[after], rows[before]])
+        knots, order = np.unique(knots, return_index=True)
+        return np.stack([np.interp(frames, knots, column) for column in values[order].T], axis=1)
+
+    def recorded(self, recording: int) -> Array:
+        """Return the motion of one recording [shape=(T, Q)]."""
+        return self.values[self.first[recording] : self.first[recording + 1]]
+
+    def poses(self, units: UnitNumbers, fraction: float | Array) -> Array:
+        """Return the motion at a fraction of the duration of some units [shape=(N, Q)].
+
+        fraction : 0 (start) to 1 (end), one for all, or one each [shape=(N,)]
+        """
+        start_s, end_s = self.windows.times_s[units].T
+        return self.at(self.windows.recording[units], start_s + fraction * (end_s - start_s))
+
+    def velocities(self, units: UnitNumbers, fraction: float) -> Array:
+        """Return the change of the motion per second, at a fraction of the duration of some units [shape=(N, Q)]."""
+        start_s, end_s = self.windows.times_s[units].T
+        time_s, recording = start_s + fraction * (end_s - start_s), self.windows.recording[units]
+        step_s = 1 / FRAME_RATE_HZ
+        return (self.at(recording, time_s + step_s) - self.at(recording, time_s - step_s)) / (2 * step_s)
+
+    def at(self, recording: NDArray[np.integer], time_s: Array) -> Array:
+        """Return the motion of recordings at times, interpolated; held beyond their ends [shape=(N, Q)]."""
+        first, last = self.first[recording], self.first[recording + 1] - 1
+        position = np.clip(first + time_s * FRAME_RATE_HZ, first, last)
+        before = np.minimum(position.astype(np.intp), np.maximum(last - 1, first))
+        after = np.minimum(before + 1, last)
+        share = (position - before)[:, None]
+        result: Array = self.values[before] * (1 - share) + self.values[after] * share
+        return result
+
+
+@dataclass(frozen=True, eq=False)
+class UnitIndex:
+    """An index of the windows of an inventory: three orders, of left, right and no bias.
+
+    contexts : symbols of the window of every unit [shape=(U, N)]
+    orders   : for each bias, the usable units in the order of their keys
+    keys     : for each bias, the keys in this order
+    The digits of a key are the symbols of a window to the base ``SYMBOLS``, the phone itself first: then all on the
+    left and all on the right (left bias), the reverse (right bias), or left and right in turns (no bias). Units that
+    agree in the first digits are neighbours in the order, so that they are found by bisection.
+    Source: Minnis & Breen 2000, §3.
+    """
+
+    contexts: NDArray[np.intp]
+    orders: tuple[UnitNumbers, ...]
+    keys: tuple[NDArray[np.int64], ...]
+
+    def candidates(
+        self, window: NDArray[np.intp], count: int, excluded: NDArray[np.bool_] | None = None
+    ) -> UnitNumbers:
+        """Return the units whose windows agree best with a window, in ascending order.
+
+        window   : symbols [shape=(N,)]; the phone itself is in the middle
+        count    : for each bias so many of the longest agreement; of equally long ones those of the lowest keys
+        excluded : units that are not wanted [shape=(U,)]
+        Empty, if no unit has the phone.
+        """
+        found = [
+            each
+            for bias, (order, keys) in enumerate(zip(self.orders, self.keys, strict=True))
+            for each in _longest(order, keys, window[digits(bias, len(window))], count, excluded)
+        ]
+        return np.unique(np.concatenate(found)) if found else np.zeros(0, np.intp)
+
+
+def unit_index(inventory: RecordedUnits, invisible: Collection[str], window: int) -> UnitIndex:
+    """Return the index of an inventory.
+
+    invisible : phones that are one symbol
+    window    : phones of a window, N, an odd number
+    """
+    contexts = inventory.windows.contexts(invisible, window // 2)
+    usable = np.flatnonzero(inventory.usable)
+    orders, keys = [], []
+    for bias in range(3):
+        key = _keys(contexts[usable][:, digits(bias, window)])
+        order = np.argsort(key, kind="stable")
+        orders.append(usable[order])
+        keys.append(key[order])
+    return UnitIndex(contexts, tuple(orders), tuple(keys))
+
+
+def digits(bias: int, window: int) -> list[int]:
+    """Return the columns of a window in the order of a key; bias 0 is left, 1 right, 2 none."""
+    middle = window // 2
+    left, right = list(range(middle - 1, -1, -1)), list(range(middle + 1, window))
+    sides = (left + right, right + left, [column for pair in zip(left, right, strict=True) for column in pair])
+    return [middle, *sides[bias]]
+
+
+def standing_in(windows: PhoneWindows, usable: NDArray[np.bool_]) -> dict[str, str]:
+    """Return for every phone that no usable unit has the phone that stands in for it."""
+    known = {PHONES[number] for number in np.unique(windows.phones[usable])}
+    return {phone: most_similar_phone(phone, known) for phone in PHONES if phone not in known} if known else {}
+
+
+def replaced(windows: PhoneWindows, stand_ins: dict[str, str]) -> PhoneWindows:
+    """Return windows in which each missing phone is the one that stands in for it."""
+    table = np.array([PHONE_NUMBER[stand_ins.get(phone, phone)] for phone in PHONES], np.int16)
+    return PhoneWindows(windows.recording, table[windows.phones], windows.times_s, windows.words, windows.stress)
+
+
+def _keys(columns: NDArray[np.intp]) -> NDArray[np.int64]:
+    keys = np.zeros(len(columns), np.int64)
+    for column in columns.T:
+        keys = keys * SYMBOLS + column
+    return keys
+
+
+def _longest(
+    order: UnitNumbers,
+    keys: NDArray[np.int64],
+    symbols: NDArray[np.intp],
+    count: int,
+    excluded: NDArray[np.bool_] | None,
+) -> Iterator[UnitNumbers]:
+    """Yield units in the order of the length of their agreement, until there are ``count``."""
+    inner: tuple[int, int] | None = None
+    for length in range(len(symbols), 0, -1):
+        low = int(_keys(symbols[None, :length])[0]) * SYMBOLS ** (len(symbols) - length)
+        first, stop = np.searchsorted(keys, [low, low + SYMBOLS ** (len(symbols) - length)]).tolist()
+        outside = [(first, stop)] if inner is None else [(first, inner[0]), (inner[1], stop)]
+        inner = (first, stop)
+        for begin, end in outside:
+            units = order[begin:end]
+            if excluded is not None:
+                units = units[~excluded[units]]
+            units = units[:count]
+            count -= len(units)
+            if len(units):
+                yield units
+            if count <= 0:
+                return

@@ -1,0 +1,117 @@
+"""Phones in context: the N-phone window of every phone, with words, position, stress and duration."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import InputError
+from lipmotion.types import Span, Timeline, Unit
+from lipmotion.units import PHONES, SILENCE, is_silent, unknown_phone_message
+from lipmotion.units.stress import stress_of
+from lipmotion.units.visemes import VISEME_OF, VISEMES
+
+INVISIBLE_SYMBOL = len(PHONES)
+"""The symbol of all suppressed phones."""
+SYMBOLS = len(PHONES) + 1
+PHONE_NUMBER = {phone: number for number, phone in enumerate(PHONES)}
+SILENT = PHONE_NUMBER[SILENCE]
+VISEME_NUMBER = np.array([*(list(VISEMES).index(VISEME_OF[phone]) for phone in PHONES), len(VISEMES)])
+"""The viseme of every symbol."""
+UNKNOWN_STRESS = -1
+LEAST_GAP_S, SHORTEST_S = 1e-3, 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class PhoneWindows:
+    """The phones of one or several recordings, in context: one row a phone.
+
+    recording : number of the recording of each phone [shape=(U,)]
+    phones    : number of each phone in ``PHONES`` [shape=(U,)]
+    times_s   : its start and its end in the recording [shape=(U, 2)]
+    words     : whether it begins a word, and whether it ends one [bool, shape=(U, 2)]
+    stress    : 0, 1 or 2, as dictionaries mark vowels; -1: not a vowel, or not known [shape=(U,)]
+    """
+
+    recording: NDArray[np.int32]
+    phones: NDArray[np.int16]
+    times_s: NDArray[np.float64]
+    words: NDArray[np.bool_]
+    stress: NDArray[np.int8]
+
+    def __len__(self) -> int:
+        return len(self.phones)
+
+    @property
+    def durations_s(self) -> NDArray[np.float64]:
+        """The duration of every phone [shape=(U,)]."""
+        return self.times_s[:, 1] - self.times_s[:, 0]
+
+    def symbols(self, invisible: Collection[str]) -> NDArray[np.intp]:
+        """Return the symbol of every phone [shape=(U,)]: pauses are silence, suppressed phones are one symbol."""
+        table = np.array([SILENT if is_silent(p) else INVISIBLE_SYMBOL if p in invisible else n
+                          for n, p in enumerate(PHONES)], np.intp)  # fmt: skip
+        return table[self.phones]
+
+    def contexts(self, invisible: Collection[str], reach: int) -> NDArray[np.intp]:
+        """Return the symbols around every phone [shape=(U, 2·reach + 1)]; beyond a recording there is silence."""
+        symbols = self.symbols(invisible)
+        numbers = np.arange(len(self))
+        columns = []
+        for offset in range(-reach, reach + 1):
+            there = np.clip(numbers + offset, 0, len(self) - 1)
+            inside = (there == numbers + offset) & (self.recording[there] == self.recording)
+            columns.append(np.where(inside, symbols[there], SILENT))
+        return np.stack(columns, axis=1)
+
+    @property
+    def continues(self) -> NDArray[np.bool_]:
+        """Whether the phone after each one is of the same recording [shape=(U,)]."""
+        return np.append(self.recording[1:] == self.recording[:-1], False)
+
+
+def without_gaps(units: Timeline[Unit], duration_s: float) -> Timeline[Unit]:
+    """Return phones in time with silence wherever there was none, from 0 s to the end; at least one.
+
+    duration_s : of the recording
+    """
+    spans: list[Span[Unit]] = []
+    end_s = 0.0
+    for span in [*units, Span(max(duration_s, end_s), max(duration_s, end_s), Unit(SILENCE))]:
+        if span.start_s - end_s > LEAST_GAP_S:
+            spans.append(Span(end_s, span.start_s, Unit(SILENCE)))
+        if span.duration_s > 0:
+            spans.append(span)
+        end_s = max(end_s, span.end_s)
+    return Timeline(tuple(spans or [Span(0.0, SHORTEST_S, Unit(SILENCE))]))
+
+
+def phone_windows(timelines: Sequence[Timeline[Unit]]) -> PhoneWindows:
+    """Return the phones of some recordings. Raises InputError: an unknown phone."""
+    recording, phones, times_s, words, stress = [], [], [], [], []
+    for number, units in enumerate(timelines):
+        for span in units:
+            if span.label.phone not in PHONE_NUMBER:
+                raise InputError(unknown_phone_message(span.label.phone, f" at {span.start_s} s"))
+        spoken = [(span.label.word, is_silent(span.label.phone)) for span in units]
+        for position, span in enumerate(units):
+            recording.append(number)
+            phones.append(PHONE_NUMBER[span.label.phone])
+            times_s.append((span.start_s, span.end_s))
+            words.append(
+                tuple(
+                    not 0 <= other < len(spoken) or spoken[other] != spoken[position]
+                    for other in (position - 1, position + 1)
+                )
+            )
+        stress += [UNKNOWN_STRESS if each is None else each for each in stress_of(units)]
+    return PhoneWindows(
+        np.array(recording, np.int32),
+        np.array(phones, np.int16),
+        np.array(times_s, float).reshape(-1, 2),
+        np.array(words, bool).reshape(-1, 2),
+        np.array(stress, np.int8),
+    )
