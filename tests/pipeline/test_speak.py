@@ -14,10 +14,10 @@ from lipmotion.export.base import read_motion
 from lipmotion.pipeline import speak as module
 from lipmotion.pipeline.animate import write
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.pipeline.speak import REST_S, SpokenText, read_text, speak
+from lipmotion.pipeline.speak import REST_S, read_text, speak
 from lipmotion.speech.voices import installed
 from lipmotion.speech.voices.installed import default_voice, installed_voices
-from lipmotion.types import Constraints, Pin, Span, Unit
+from lipmotion.types import Constraints, Pin, Span, SpokenText, Unit
 from lipmotion.units import LIP_CLOSING, is_silent
 from speech import stand_in_voice
 
