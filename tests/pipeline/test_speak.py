@@ -109,7 +109,7 @@ def test_files(spoken: SpokenText, toy_model: Model, tmp_path: Path) -> None:
 
 
 def test_a_recording_is_not_written_as_sound(spoken: SpokenText, toy_speech: Path, tmp_path: Path) -> None:
-    with pytest.raises(ExportError, match=r"unknown format '.wav'; required one of: .json .csv .npz .mp4$"):
+    with pytest.raises(ExportError, match=r"unknown format '.wav'; required one of: (?!.* \.wav)"):
         write(spoken.generation, tmp_path / "a.wav", speech=toy_speech)
     with pytest.raises(ExportError, match="a video needs the recording"):
         write(spoken.generation, tmp_path / "a.mp4")

@@ -257,6 +257,12 @@ class SpokenText(NamedTuple):
 
     sound      : at the synthesiser's own rate
     generation : as of ``animate``; its units are the synthesiser's phones in time
+
+    >>> import lipmotion, numpy
+    >>> silence = lipmotion.Audio(numpy.zeros(22_050, numpy.float32), 22_050)
+    >>> sound, result = SpokenText(silence, lipmotion.animate("examples/welcome.flac"))
+    >>> sound.duration_s, result.units[0].label.phone
+    (1.0, 'sil')
     """
 
     sound: Audio
