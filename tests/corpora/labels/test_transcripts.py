@@ -241,7 +241,7 @@ def test_what_is_said_twice_stays(read: Read) -> None:
         ("ANNA: hi\nBOB #2: you", "hi you"),
         ("Speaker 1: hi\n[SPEAKER_02]: you", "hi you"),
         ("It is AT 10:30 now", "it is at ten thirty now"),
-        ("Tom &amp; Jerry&#39;s", "tom jerry's"),
+        ("Tom &amp; Jerry&#39;s", "tom and jerry's"),
         ("♪ la la ♪", "la la"),
         ("(all) hi [laughs\nloudly] you", "hi you"),
         ("5 < 6 and 7 > 3", "five six and seven three"),
