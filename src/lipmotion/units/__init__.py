@@ -11,6 +11,7 @@ from lipmotion.units.phones import (
     SILENCE,
     SIMILAR_PHONES,
     is_silent,
+    most_similar_lips,
     most_similar_phone,
     unknown_phone_message,
 )
@@ -35,6 +36,7 @@ __all__ = [
     "check_text",
     "check_words",
     "is_silent",
+    "most_similar_lips",
     "most_similar_phone",
     "phone_classes",
     "phone_named",

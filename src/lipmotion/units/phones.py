@@ -95,3 +95,15 @@ def most_similar_phone(phone: str, known: Collection[str]) -> str:
         queue += [similar for similar in SIMILAR_PHONES[candidate] if similar not in queue]
     same_viseme = [other for other in VISEMES[VISEME_OF[phone]] if other in known]
     return same_viseme[0] if same_viseme else min(known)
+
+
+def most_similar_lips(phone: str, known: Collection[str]) -> str:
+    """Return the phone itself if it is known, else the known phone whose lips look most alike.
+
+    A phone of the same viseme comes first, of several the most similar one; else it is ``most_similar_phone``.
+
+    >>> most_similar_lips("m", ["n", "p"]), most_similar_lips("m", ["n", "t"])
+    ('p', 'n')
+    """
+    same_viseme = [other for other in VISEMES[VISEME_OF[phone]] if other in known]
+    return most_similar_phone(phone, same_viseme or known)

@@ -10,6 +10,7 @@ import pytest
 from lipmotion.engines import engine_named
 from lipmotion.engines.selection.engine import SelectionEngine
 from lipmotion.engines.selection.model import SelectionModel
+from lipmotion.engines.selection.targets import SEGMENT_S, target_of
 from lipmotion.errors import InputError
 from lipmotion.testing.examples import examples, speech, timeline
 from lipmotion.types import Constraints, Pin, Span, Timeline, Unit
@@ -90,3 +91,20 @@ def test_silence_longer_than_any_recorded_one_stands_still(model: SelectionModel
     units = Timeline((*timeline(("b", "aa")).spans[:-1], Span(0.8, 9.0, Unit("sil")), Span(9.0, 9.2, Unit("aa"))))
     opening = engine.generate(model, speech(units)).motion["opening"]
     assert np.abs(np.diff(opening[200:800])).max() < 1e-3
+
+
+def test_in_noise_the_sound_alone_chooses(model: SelectionModel, engine: SelectionEngine, monkeypatch) -> None:
+    costs = model.costs(engine.config)
+    unsure = replace(SPOKEN, units_known=False, confidence=0.0)
+    assert not target_of(model, costs, unsure).by_sound
+    guide = model.guide
+    assert guide is not None
+    distorted = (guide.predict(unsure)[0], np.ones(len(unsure.features.values)))
+    monkeypatch.setattr(type(guide), "predict", lambda *_: distorted)
+    target = target_of(model, costs, unsure)
+    assert target.by_sound
+    assert target.windows.durations_s == pytest.approx(SEGMENT_S, rel=0.1)
+    assert not target_of(model, costs, SPOKEN).by_sound  # phones that are known are relied on
+    result = engine.generate(model, unsure)
+    assert np.corrcoef(result.motion["opening"], distorted[0][:, 0])[0, 1] > 0.8
+    assert len(result.units) == len(unsure.units)

@@ -43,12 +43,14 @@ class Target:
     contexts : the symbols of their windows [shape=(U, N)]
     guided   : the motion that the guide predicts, as wide as recorded motion, times ``scale`` [shape=(U, POINTS, Q)]
     heard    : what it predicts, as it is, times ``scale`` [shape=(U, POINTS, Q)]; both None: there is no guide
+    by_sound : whether the phones are not known, so that the guide alone chooses
     """
 
     windows: PhoneWindows
     contexts: NDArray[np.intp]
     guided: Array | None
     heard: Array | None
+    by_sound: bool = False
 
     def __len__(self) -> int:
         return len(self.windows)
@@ -79,19 +81,37 @@ class Costs:
         """The phone that stands in for each phone which the inventory lacks."""
         return standing_in(self.inventory.windows, self.inventory.usable)
 
-    def target(self, windows: PhoneWindows, guided: Array | None, heard: Array | None) -> Target:
+    def target(
+        self, windows: PhoneWindows, guided: Array | None, heard: Array | None, *, by_sound: bool = False
+    ) -> Target:
         """Return phones in a form that can be compared with units.
 
+        by_sound : as of ``Target``
         guided, heard : predicted motion at ``POINTS`` of each phone [each shape=(U, POINTS, Q)]
         """
         known = replaced(windows, self.stand_ins)
         contexts = known.contexts(self.config.invisible_phones, self.config.window // 2)
         if guided is None or heard is None:
             return Target(known, contexts, None, None)
-        return Target(known, contexts, guided * self.scale, heard * self.scale)
+        return Target(known, contexts, guided * self.scale, heard * self.scale, by_sound)
 
     def target_costs(self, target: Target, number: int, units: UnitNumbers) -> Array:
         """Return the cost of each of some units for one phone [shape=(N,)]."""
+        config, windows = self.config, self.inventory.windows
+        costs = np.zeros(len(units)) if target.by_sound else self._context_costs(target, number, units)
+        duration_s = max(float(target.windows.durations_s[number]), LEAST_S)
+        costs += config.duration * np.abs(np.log(np.maximum(windows.durations_s[units], LEAST_S) / duration_s))
+        is_shown = target.by_sound or target.symbol(number) != INVISIBLE_SYMBOL
+        if is_shown and target.guided is not None and target.heard is not None and self._recorded is not None:
+            distance = np.square(self._recorded[units] - target.guided[number]).mean(axis=1).sum(axis=1)
+            if self._predicted is not None and config.trust:
+                unlike = np.square(self._predicted[units] - target.heard[number]).mean(axis=1).sum(axis=1)
+                distance *= np.minimum(unlike / config.trust**2, 1)
+            costs += config.guide * PER_S * duration_s * distance
+        return costs
+
+    def _context_costs(self, target: Target, number: int, units: UnitNumbers) -> Array:
+        """Return what the phones around, words and stress of each of some units cost for one phone [shape=(N,)]."""
         config, windows = self.config, self.inventory.windows
         differs = self.index.contexts[units] != target.contexts[number]
         differs_much = VISEME_NUMBER[self.index.contexts[units]] != VISEME_NUMBER[target.contexts[number]]
@@ -99,15 +119,6 @@ class Costs:
         costs += config.word * (windows.words[units] != target.windows.words[number]).sum(axis=1)
         stress, wanted = windows.stress[units], target.windows.stress[number]
         costs += config.stress * ((stress != wanted) & (stress >= 0) & (wanted >= 0))
-        duration_s = max(float(target.windows.durations_s[number]), LEAST_S)
-        costs += config.duration * np.abs(np.log(np.maximum(windows.durations_s[units], LEAST_S) / duration_s))
-        is_shown = target.symbol(number) != INVISIBLE_SYMBOL
-        if is_shown and target.guided is not None and target.heard is not None and self._recorded is not None:
-            distance = np.square(self._recorded[units] - target.guided[number]).mean(axis=1).sum(axis=1)
-            if self._predicted is not None and config.trust:
-                unlike = np.square(self._predicted[units] - target.heard[number]).mean(axis=1).sum(axis=1)
-                distance *= np.minimum(unlike / config.trust**2, 1)
-            costs += config.guide * PER_S * duration_s * distance
         return costs
 
     def join_costs(self, target: Target, number: int, left: UnitNumbers, right: UnitNumbers) -> Array:

@@ -159,8 +159,8 @@ def _given(model: SelectionModel, target: Target, units: Timeline[Unit]) -> dict
     """
     named = units_by_source(model.inventory, (span.label.unit for span in units if span.label.unit))
     starts_s = target.windows.times_s[:, 0]
-    given = {}
-    for span in units:
+    given: dict[int, int] = {}
+    for span in () if target.by_sound else units:
         unit = named.get(span.label.unit)
         if unit is None or span.duration_s <= 0:
             continue
@@ -177,7 +177,7 @@ def _substituted(costs: Costs, target: Target, units: NDArray[np.intp], frames: 
     """
     middle = costs.config.window // 2
     around = slice(middle - 1, middle + 2)
-    differs = (costs.index.contexts[units][:, around] != target.contexts[:, around]).any(axis=1)
+    differs = (costs.index.contexts[units][:, around] != target.contexts[:, around]).any(axis=1) & (not target.by_sound)
     result = np.zeros(frames)
     for (start_s, end_s), other in zip(target.windows.times_s.tolist(), differs.tolist(), strict=True):
         result[int(start_s * FRAME_RATE_HZ) : int(np.ceil(end_s * FRAME_RATE_HZ))] = float(other)

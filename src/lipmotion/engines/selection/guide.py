@@ -32,9 +32,9 @@ class Guide:
     centre: Array
     expansion: Array
 
-    def predict(self, speech: Speech) -> Array:
-        """Return the predicted motion [shape=(T, Q)]."""
-        return self.predictor.predict(speech)[0]
+    def predict(self, speech: Speech) -> tuple[Array, Array]:
+        """Return the predicted motion [shape=(T, Q)] and the distortion of the sound, 0 to 1 [shape=(T,)]."""
+        return self.predictor.predict(speech)
 
     def expanded(self, predicted: Array) -> Array:
         """Return predicted motion [shape=(..., Q)] as wide as recorded motion."""

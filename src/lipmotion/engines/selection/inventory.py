@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from lipmotion.engines.selection.windows import PHONE_NUMBER, SYMBOLS, PhoneWindows
 from lipmotion.motion.store import MotionStore
 from lipmotion.types import FRAME_RATE_HZ
-from lipmotion.units import PHONES, most_similar_phone
+from lipmotion.units import PHONES, most_similar_lips
 
 Array = NDArray[np.float64]
 UnitNumbers = NDArray[np.intp]
@@ -148,7 +148,7 @@ def digits(bias: int, window: int) -> list[int]:
 def standing_in(windows: PhoneWindows, usable: NDArray[np.bool_]) -> dict[str, str]:
     """Return for every phone that no usable unit has the phone that stands in for it."""
     known = {PHONES[number] for number in np.unique(windows.phones[usable])}
-    return {phone: most_similar_phone(phone, known) for phone in PHONES if phone not in known} if known else {}
+    return {phone: most_similar_lips(phone, known) for phone in PHONES if phone not in known} if known else {}
 
 
 def replaced(windows: PhoneWindows, stand_ins: dict[str, str]) -> PhoneWindows:

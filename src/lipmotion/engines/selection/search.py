@@ -86,7 +86,11 @@ def _candidates(
     if given is not None:
         units = np.array([given], np.intp)
         return units, costs.target_costs(target, number, units)
-    units = costs.index.candidates(target.contexts[number], costs.config.candidates, excluded)
+    if target.by_sound:
+        usable = costs.inventory.usable
+        units = np.flatnonzero(usable if excluded is None else usable & ~excluded)
+    else:
+        units = costs.index.candidates(target.contexts[number], costs.config.candidates, excluded)
     if not len(units):
         units = costs.index.candidates(target.contexts[number], costs.config.candidates)
     each = costs.target_costs(target, number, units)

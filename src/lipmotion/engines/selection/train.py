@@ -100,7 +100,7 @@ def inventory_of(
     predicted = None
     if guide is not None:
         predicted = np.concatenate(
-            [at_points(guide.predict(e.speech), _of_recording(windows, n)) for n, e in enumerate(examples)]
+            [at_points(guide.predict(e.speech)[0], _of_recording(windows, n)) for n, e in enumerate(examples)]
         ).astype(np.float16)
     names = tuple(example.name for example in examples)
     return RecordedUnits(names, windows, usable, first, _stored(examples, values, first, space), predicted)

@@ -13,18 +13,12 @@ from lipmotion.motion.articulation import ArticulationPrior, dynamics_of
 from lipmotion.motion.generation import Statistics
 from lipmotion.motion.predictors import Predictor
 from lipmotion.motion.prior_regression import PriorRegression
-from lipmotion.motion.rest import speech_intervals
-from lipmotion.types import FRAME_RATE_HZ, Speech
+from lipmotion.motion.reliability import phone_reliability
+from lipmotion.types import Speech
 
 Array = NDArray[np.float64]
 NETWORK_SHARE = 0.5
 """Weight of the network beside the states, 0 to 1, in models that have no other."""
-DISTORTIONS = (0.2, 0.35)
-"""Recognised phones are relied on up to the first distortion of the sound, and from the second one on not at all. The
-network finds 0.17 to 0.27 in quiet recordings of its speaker, 0.40 to 0.50 in white noise at 20 dB, 0.45 to 0.63 in
-babble at 20 dB."""
-DISTORTION_S = 1.0
-"""Seconds before and after a frame over which the distortion is averaged."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,19 +50,8 @@ class Experts:
 
     @cached_property
     def reliability(self) -> Array:
-        """How far the phones in time can be relied on, 0 to 1 [shape=(T,)].
-
-        Fully, where they are known; also where there are none: noise alone moves no mouth.
-        """
-        if self.speech.units_known or self._heard is None or not speech_intervals(self.speech.units):
-            return np.ones(len(self.rows))
-        reach = int(DISTORTION_S * FRAME_RATE_HZ)
-        total, numbers = np.concatenate([[0.0], np.cumsum(self._heard[1])]), np.arange(len(self.rows))
-        first, stop = np.maximum(numbers - reach, 0), np.minimum(numbers + reach + 1, len(self.rows))
-        mean = (total[stop] - total[first]) / (stop - first)
-        return np.maximum(
-            np.clip((DISTORTIONS[1] - mean) / (DISTORTIONS[1] - DISTORTIONS[0]), 0, 1), self.speech.confidence
-        )
+        """How far the phones in time can be relied on, 0 to 1 [shape=(T,)]."""
+        return phone_reliability(self.speech, None if self._heard is None else self._heard[1], len(self.rows))
 
     @cached_property
     def _heard(self) -> tuple[Array, Array] | None:
