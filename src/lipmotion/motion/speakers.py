@@ -197,7 +197,7 @@ def mean_person_examples(examples: Sequence[Example], speakers: Sequence[str]) -
     no more. Closed lips map onto closed lips and, in silence, rest pose onto rest pose. Ranges of people who say little
     are drawn towards the mean person's. Points share one gain for each axis, so that faces keep their shape.
     """
-    maps = _fit_maps(examples, speakers)
+    maps = fit_maps(examples, speakers)
     mapped = []
     for example, speaker in zip(examples, speakers, strict=True):
         motion = example.motion
@@ -258,8 +258,14 @@ class _Person:
     speech_s: float
 
 
-def _fit_maps(examples: Sequence[Example], speakers: Sequence[str]) -> SpeakerMaps:
-    """Return the maps of all people, also of the one without a name."""
+def fit_maps(examples: Sequence[Example], speakers: Sequence[str], most_gain: float = MOST_GAIN) -> SpeakerMaps:
+    """Return the maps of all people, also of the one without a name; nobody has habits yet.
+
+    examples  : with the same channels
+    speakers  : the name of each example's speaker
+    most_gain : gains lie between its inverse and itself
+    The maps are those of ``mean_person_examples``.
+    """
     names = tuple(sorted(set(speakers)))
     channels = examples[0].motion.channels
     column = examples[0].motion.names.index(OPENING) if OPENING in examples[0].motion.names else None
@@ -269,7 +275,7 @@ def _fit_maps(examples: Sequence[Example], speakers: Sequence[str]) -> SpeakerMa
     closed = np.array([person.closed for person in people])
     parted = rests[:, column] - closed if column is not None else np.zeros(len(people))
     anchors = rests - parted[:, None] * follow  # the rest poses, but with lips that touch
-    gain = _gains(people, channels)
+    gain = _gains(people, channels, most_gain)
     offset = anchors - gain * anchors.mean(axis=0)
     rest = rests - offset - gain * rests.mean(axis=0)
     shut = float(closed.mean())
@@ -326,7 +332,7 @@ def _rest_poses(people: Sequence[_Person]) -> Array:
     return np.where(known[:, None], rests, spoken + usual)
 
 
-def _gains(people: Sequence[_Person], channels: Sequence[Channel]) -> Array:
+def _gains(people: Sequence[_Person], channels: Sequence[Channel], most_gain: float) -> Array:
     """Return the range of each person as a multiple of the mean person's [shape=(S, P)]."""
     ranges = np.stack([person.range for person in people])
     moves = (ranges > LEAST_RANGE * ranges.max(axis=0)).all(axis=0) & (ranges > 0).all(axis=0)
@@ -342,7 +348,7 @@ def _gains(people: Sequence[_Person], channels: Sequence[Channel]) -> Array:
     trust = speech_s / (speech_s + RANGE_PRIOR_S)
     shrunk = np.exp(np.log(ratio) * trust[:, None])
     shrunk /= np.exp(np.log(shrunk).mean(axis=0))  # the geometric mean of all gains is 1
-    gains: Array = np.clip(shrunk, LEAST_GAIN, MOST_GAIN)
+    gains: Array = np.clip(shrunk, 1 / most_gain, most_gain)
     return gains
 
 
