@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from lipmotion.pipeline.explain import explain
     from lipmotion.pipeline.model import Model, load_model, save_model
     from lipmotion.pipeline.request import SpeechRequest
+    from lipmotion.pipeline.speak import SpokenText, speak
     from lipmotion.pipeline.state_runs import state_runs
     from lipmotion.pipeline.training.train import Run, train
     from lipmotion.pipeline.transfer import map_onto, with_person
@@ -45,6 +46,7 @@ __all__ = [
     "Selection",
     "Span",
     "SpeechRequest",
+    "SpokenText",
     "Timeline",
     "Unit",
     "adapt",
@@ -58,6 +60,7 @@ __all__ = [
     "prepare",
     "read_motion",
     "save_model",
+    "speak",
     "state_runs",
     "train",
     "with_person",
@@ -84,6 +87,8 @@ _HOMES = {
     "prepare": "lipmotion.pipeline.corpus.prepare",
     "read_motion": "lipmotion.export.base",
     "save_model": "lipmotion.pipeline.model",
+    "SpokenText": "lipmotion.pipeline.speak",
+    "speak": "lipmotion.pipeline.speak",
     "state_runs": "lipmotion.pipeline.state_runs",
     "train": "lipmotion.pipeline.training.train",
     "with_person": "lipmotion.pipeline.transfer",

@@ -39,6 +39,11 @@ def add_recording_arguments(parser: argparse.ArgumentParser) -> None:
     edited = "phones in time from an earlier .json or .npz, edited or not"
     add_input(parser, "--units", what="units file", replaceable=True, metavar="FILE", help=edited)
     add_recogniser_argument(parser)
+    add_speaker_argument(parser)
+
+
+def add_speaker_argument(parser: argparse.ArgumentParser) -> None:
+    """Add ``--speaker``: one of the people of the model."""
     whose = "whose motion, of the people that the model was trained on (default: the mean person; see lipmotion info)"
     parser.add_argument("--speaker", default="", metavar="NAME", help=whose)
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from lipmotion.engines.selection.costs import AFTER, BEFORE, HARD, NONE, Costs, Target
-from lipmotion.engines.selection.inventory import Inventory, UnitNumbers
+from lipmotion.engines.selection.inventory import RecordedUnits, UnitNumbers
 from lipmotion.engines.selection.lip_reading import PROTECTED_PHONES
 from lipmotion.types import FRAME_RATE_HZ
 from lipmotion.units import PHONES, is_silent
@@ -72,7 +72,7 @@ def pieces_of(costs: Costs, target: Target, units: UnitNumbers) -> list[Piece]:
     return pieces
 
 
-def concatenated(inventory: Inventory, target: Target, pieces: list[Piece], frames: int) -> Array:
+def concatenated(inventory: RecordedUnits, target: Target, pieces: list[Piece], frames: int) -> Array:
     """Return the motion of some pieces in the motion space, 100 frames a second [shape=(frames, Q)].
 
     Where pieces overlap, the weight of the next one rises from 0 to 1 along a raised cosine. Abutting pieces are bent
@@ -115,7 +115,7 @@ class TimeMap:
     recorded_s: Array
 
     @classmethod
-    def of(cls, inventory: Inventory, target: Target, piece: Piece, following: Piece | None) -> TimeMap:
+    def of(cls, inventory: RecordedUnits, target: Target, piece: Piece, following: Piece | None) -> TimeMap:
         """Return the map of a piece.
 
         following : the piece after it (None: it is the last)
@@ -136,7 +136,7 @@ class TimeMap:
         return mapped
 
 
-def _knots(inventory: Inventory, target: Target, number: int, shift: int) -> Iterator[tuple[float, float]]:
+def _knots(inventory: RecordedUnits, target: Target, number: int, shift: int) -> Iterator[tuple[float, float]]:
     """Yield the start and the end of a phone, in the target and in the recording; of a silence, its pause as well."""
     start_s, end_s = target.windows.times_s[number].tolist()
     from_s, to_s = inventory.windows.times_s[number + shift].tolist()
@@ -157,7 +157,9 @@ def _rise(time_s: Array, piece: Piece) -> Array:
     return (1 + np.sin(phase * np.pi / 2)) / 2
 
 
-def _smooth(inventory: Inventory, target: Target, before: Piece, after: Piece, time_s: Array, motion: Array) -> None:
+def _smooth(
+    inventory: RecordedUnits, target: Target, before: Piece, after: Piece, time_s: Array, motion: Array
+) -> None:
     """Bend two abutting pieces towards one another, in place.
 
     The jump is divided between both sides; a side that is a protected phone keeps its shape, the other one takes all.

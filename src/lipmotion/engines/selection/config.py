@@ -17,9 +17,11 @@ class SelectionConfig(Configuration):
 
     window     : phones of a window, N: odd, 3 to 11
     candidates : units that are looked up for each phone and each bias
+    beam       : of all these, so many of the least target costs are candidates in the search
     invisible  : phones without a lip shape of their own, those of the print by default (add ``l`` for faces without a
                  tongue): they count as one phone, and their neighbours choose the unit; empty: none
-    overlap    : how units overlap in a phone that they share: ``printed`` (Table 1), ``symmetric``, ``middle``
+    overlap    : how units overlap in a phone that they share: ``learned``, ``printed`` (Table 1),
+                 ``symmetric``, ``middle``
     context    : target cost of another phone beside the phone, ``farther`` times as much for each phone further away;
                  half as much where both are of one viseme
     farther    : see ``context``
@@ -44,7 +46,8 @@ class SelectionConfig(Configuration):
     """
 
     window: int = option(5, Rule(least=3, odd=True))
-    candidates: int = option(50, Rule(least=1))
+    candidates: int = option(300, Rule(least=1))
+    beam: int = option(25, Rule(least=1))
     invisible: str = "t d g k"
     overlap: str = option("printed", Rule(choices=tuple(OVERLAPS)))
     context: float = option(0.3, NOT_NEGATIVE)

@@ -9,7 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.selection.config import SelectionConfig
-from lipmotion.engines.selection.inventory import Inventory, UnitIndex, UnitNumbers, replaced, standing_in, unit_index
+from lipmotion.engines.selection.inventory import (
+    RecordedUnits,
+    UnitIndex,
+    UnitNumbers,
+    replaced,
+    standing_in,
+    unit_index,
+)
 from lipmotion.engines.selection.lip_reading import OVERLAPS, PROTECTED_PHONES, lip_reading_class
 from lipmotion.engines.selection.windows import INVISIBLE_SYMBOL, SILENT, VISEME_NUMBER, PhoneWindows
 from lipmotion.units import PHONES
@@ -58,7 +65,7 @@ class Costs:
     scale : factors of the dimensions of motion in all comparisons [shape=(Q,)]
     """
 
-    inventory: Inventory
+    inventory: RecordedUnits
     config: SelectionConfig
     scale: Array
 

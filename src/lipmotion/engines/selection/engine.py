@@ -14,11 +14,10 @@ from lipmotion.engines.selection.concatenation import concatenated, pieces_of
 from lipmotion.engines.selection.config import SelectionConfig
 from lipmotion.engines.selection.costs import Costs, Target
 from lipmotion.engines.selection.model import SelectionModel, model_arrays, model_from_arrays
-from lipmotion.engines.selection.report import coverage_text, unit_names
+from lipmotion.engines.selection.report import inventory_text, source_of, units_by_source
 from lipmotion.engines.selection.search import select
 from lipmotion.engines.selection.targets import target_of
 from lipmotion.engines.selection.train import fit_selection
-from lipmotion.motion.frame_labels import with_unit_names
 from lipmotion.motion.generation import Statistics
 from lipmotion.motion.predictors import LEAST_NETWORK_S
 from lipmotion.motion.prior_regression import PriorRegression
@@ -39,6 +38,7 @@ from lipmotion.types import (
 )
 
 Array = NDArray[np.float64]
+ROUNDING_S = 1e-6
 
 
 @final
@@ -82,7 +82,8 @@ class SelectionEngine(Engine[SelectionModel]):
         costs = model.costs(self.config)
         frames = len(speech.features.values)
         target = target_of(model, costs, speech)
-        units = select(costs, target).units
+        given = _given(model, target, speech.units)
+        units = select(costs, target, given=given).units
         track = concatenated(model.inventory, target, pieces_of(costs, target, units), frames)
         means = with_dynamics(track)
         unheard = unheard_frames(np.asarray(speech.features.values), speech.units)
@@ -101,18 +102,51 @@ class SelectionEngine(Engine[SelectionModel]):
             close=self.config.closures,
             reliability=_substituted(costs, target, units, frames),
         )
-        positions = np.searchsorted(target.windows.times_s[:, 0], np.arange(frames) / FRAME_RATE_HZ, side="right") - 1
-        trace = StateTrace(unit_names(model.inventory, units), np.maximum(positions, 0).astype(np.intp))
-        return Generation(motion, variance, with_unit_names(speech.units), trace)
+        sources = [source_of(model.inventory, unit) for unit in units.tolist()]
+        starts_s = target.windows.times_s[:, 0]
+        positions = np.searchsorted(starts_s, np.arange(frames) / FRAME_RATE_HZ + ROUNDING_S, side="right") - 1
+        trace = StateTrace(tuple(sources), np.maximum(positions, 0).astype(np.intp))
+        return Generation(motion, variance, _with_sources(speech.units, starts_s, sources), trace)
 
     def describe(self, model: SelectionModel) -> str:  # noqa: D102
-        return coverage_text(model.inventory)
+        return inventory_text(model.inventory)
 
     def to_arrays(self, model: SelectionModel) -> dict[str, NDArray[Any]]:  # noqa: D102
         return model_arrays(model)
 
     def from_arrays(self, arrays: Arrays) -> SelectionModel:  # noqa: D102
         return model_from_arrays(arrays)
+
+
+def _given(model: SelectionModel, target: Target, units: Timeline[Unit]) -> dict[int, int]:
+    """Return the units that edited labels name, by the number of their phone in the target.
+
+    A label names a unit where its phone is that of the unit: an edited phone is selected again.
+    """
+    named = units_by_source(model.inventory, (span.label.unit for span in units if span.label.unit))
+    starts_s = target.windows.times_s[:, 0]
+    given = {}
+    for span in units:
+        unit = named.get(span.label.unit)
+        if unit is None or span.duration_s <= 0:
+            continue
+        number = int(np.argmin(np.abs(starts_s - span.start_s)))
+        if model.inventory.windows.phones[unit] == target.windows.phones[number]:
+            given[number] = unit
+    return given
+
+
+def _with_sources(units: Timeline[Unit], starts_s: Array, sources: Sequence[str]) -> Timeline[Unit]:
+    """Return the timeline with the source of the unit of every phone as the name of its unit.
+
+    starts_s : start of every phone of the target
+    """
+    return Timeline(
+        tuple(
+            replace(span, label=replace(span.label, unit=sources[int(np.argmin(np.abs(starts_s - span.start_s)))]))
+            for span in units
+        )
+    )
 
 
 def _substituted(costs: Costs, target: Target, units: NDArray[np.intp], frames: int) -> Array:

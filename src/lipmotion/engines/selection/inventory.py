@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.selection.windows import PHONE_NUMBER, SILENT, SYMBOLS, PhoneWindows
+from lipmotion.engines.selection.windows import PHONE_NUMBER, SYMBOLS, PhoneWindows
 from lipmotion.motion.store import MotionStore
 from lipmotion.types import FRAME_RATE_HZ
 from lipmotion.units import PHONES, most_similar_phone
@@ -19,7 +19,7 @@ UnitNumbers = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
-class Inventory:
+class RecordedUnits:
     """Recorded phones, called units, and their motion.
 
     names     : of the recordings
@@ -120,7 +120,7 @@ class UnitIndex:
         return np.unique(np.concatenate(found)) if found else np.zeros(0, np.intp)
 
 
-def unit_index(inventory: Inventory, invisible: Collection[str], window: int) -> UnitIndex:
+def unit_index(inventory: RecordedUnits, invisible: Collection[str], window: int) -> UnitIndex:
     """Return the index of an inventory.
 
     invisible : phones that are one symbol
@@ -188,31 +188,3 @@ def _longest(
                 yield units
             if count <= 0:
                 return
-
-
-def coverage(
-    windows: PhoneWindows, usable: NDArray[np.bool_], wanted: Sequence[tuple[str, ...]]
-) -> dict[int, list[str]]:
-    """Return the phones, diphones and triphones of some texts that the units lack, by length, most frequent first.
-
-    wanted : phones of texts, silence between them
-    """
-    symbols = windows.symbols(())
-    follows = windows.continues
-    missing: dict[int, list[str]] = {}
-    for length in (1, 2, 3):
-        complete = usable.copy()
-        for offset in range(1, length):
-            complete[:-offset] &= usable[offset:] & follows[offset - 1 : len(follows) - 1]
-            complete[-offset:] = False
-        starts = np.flatnonzero(complete)
-        known = {tuple(symbols[starts + offset][n] for offset in range(length)) for n in range(len(starts))}
-        counts: dict[tuple[int, ...], int] = {}
-        for phones in wanted:
-            numbers = [PHONE_NUMBER.get(phone, SILENT) for phone in phones]
-            for start in range(len(numbers) - length + 1):
-                gram = tuple(numbers[start : start + length])
-                counts[gram] = counts.get(gram, 0) + 1
-        lacking = sorted((gram for gram in counts if gram not in known), key=lambda gram: (-counts[gram], gram))
-        missing[length] = [" ".join(PHONES[number] for number in gram) for gram in lacking]
-    return missing

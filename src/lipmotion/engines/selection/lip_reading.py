@@ -32,7 +32,9 @@ TABLE_1: Overlaps = {
 SYMMETRIC: Overlaps = {**TABLE_1, (NORMAL, INVISIBLE): 0.73}
 """Table 1 with the one entry changed that makes it symmetric: 73/27 opposite to 27/73."""
 MIDDLE: Overlaps = dict.fromkeys(TABLE_1, 0.5)
-OVERLAPS: Mapping[str, Overlaps] = {"printed": TABLE_1, "symmetric": SYMMETRIC, "middle": MIDDLE}
+LEARNED: Overlaps = {**MIDDLE, (NORMAL, PROTECTED): 0.1}
+"""The shares with the least errors of joined motion on the training list of GRID s1 (docs/results/selection.md)."""
+OVERLAPS: Mapping[str, Overlaps] = {"learned": LEARNED, "printed": TABLE_1, "symmetric": SYMMETRIC, "middle": MIDDLE}
 """Tables of overlaps by name."""
 
 

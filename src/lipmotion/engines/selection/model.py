@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from lipmotion.engines.selection.config import SelectionConfig
 from lipmotion.engines.selection.costs import POINTS, Costs
 from lipmotion.engines.selection.guide import Guide
-from lipmotion.engines.selection.inventory import Inventory
+from lipmotion.engines.selection.inventory import RecordedUnits
 from lipmotion.engines.selection.windows import PhoneWindows
 from lipmotion.hmm.multistream.phone_recogniser import (
     JOINT_PREFIX,
@@ -54,7 +54,7 @@ class SelectionModel:
     """
 
     motion: LearnedMotion
-    inventory: Inventory
+    inventory: RecordedUnits
     scale: Array
     rest: Array
     variances: Array
@@ -118,7 +118,7 @@ def model_from_arrays(arrays: Arrays) -> SelectionModel:
             guide, predicted = Guide(predictor, *guided["guide_range"]), guided["unit_predicted"].astype(np.float16)
             if not (guide.expansion > 0).all():
                 raise ValueError("guide_range with an expansion that is not more than 0")
-        inventory = Inventory(
+        inventory = RecordedUnits(
             tuple(map(str, stored["recordings"].tolist())),
             PhoneWindows(
                 stored["unit_recording"],
@@ -163,7 +163,7 @@ GUIDE = {
 }
 
 
-def _check(inventory: Inventory, dimensions: int) -> None:
+def _check(inventory: RecordedUnits, dimensions: int) -> None:
     """Raise ValueError if the parts of an inventory contradict one another."""
     windows, first, motion = inventory.windows, inventory.first, inventory.motion
     if len(first) != len(inventory.names) + 1 or first[0] != 0 or (np.diff(first) < 1).any():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +15,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Selection:
+class SelectedUnits:
     """The chosen units.
 
     units        : one for each phone of the target [shape=(U,)]
@@ -32,16 +33,27 @@ class Selection:
         return float(self.target_costs.sum() + self.join_costs.sum())
 
 
-def select(costs: Costs, target: Target, excluded: NDArray[np.bool_] | None = None, *, prune: bool = True) -> Selection:
+def select(
+    costs: Costs,
+    target: Target,
+    excluded: NDArray[np.bool_] | None = None,
+    *,
+    given: Mapping[int, int] | None = None,
+    prune: bool = True,
+) -> SelectedUnits:
     """Return the candidates of least total cost.
 
     excluded : units that must not be used [shape=(all units,)]
-    prune    : leave out candidates that cannot be part of the best sequence
+    given    : units that must be used, by the number of their phone in the target
+    prune    : leave out candidates that cannot be part of the best sequence, and those beyond the beam
     A candidate whose target cost exceeds the least one of its phone by more than two joins can cost is never the best:
-    the one of least target cost in its place would be better. So pruning does not change the cost of the result.
+    the one of least target cost in its place would be better. So this
+    does not change the cost of the result. Of the others, the beam keeps those of the least target costs: by how much
+    that changes the cost was measured (docs/results/selection.md).
     Source: Minnis & Breen 2000, §3.
     """
-    found = [_candidates(costs, target, number, excluded, prune) for number in range(len(target))]
+    given = given or {}
+    found = [_candidates(costs, target, number, excluded, given.get(number), prune) for number in range(len(target))]
     total, backward, joins = found[0][1].copy(), [], []
     for number in range(1, len(found)):
         (left, _), (right, right_costs) = found[number - 1], found[number]
@@ -57,7 +69,7 @@ def select(costs: Costs, target: Target, excluded: NDArray[np.bool_] | None = No
     for best in reversed(backward):
         places.append(int(best[places[-1]]))
     places.reverse()
-    return Selection(
+    return SelectedUnits(
         np.array([units[n] for (units, _), n in zip(found, places, strict=True)], np.intp),
         np.array([each[n] for (_, each), n in zip(found, places, strict=True)]),
         np.array([0.0, *(join[n] for join, n in zip(joins, places[1:], strict=True))]),
@@ -65,17 +77,22 @@ def select(costs: Costs, target: Target, excluded: NDArray[np.bool_] | None = No
 
 
 def _candidates(
-    costs: Costs, target: Target, number: int, excluded: NDArray[np.bool_] | None, prune: bool
+    costs: Costs, target: Target, number: int, excluded: NDArray[np.bool_] | None, given: int | None, prune: bool
 ) -> tuple[UnitNumbers, Array]:
     """Return the candidates for one phone, and their target costs.
 
     Where all units of the phone are excluded, they are allowed.
     """
+    if given is not None:
+        units = np.array([given], np.intp)
+        return units, costs.target_costs(target, number, units)
     units = costs.index.candidates(target.contexts[number], costs.config.candidates, excluded)
     if not len(units):
         units = costs.index.candidates(target.contexts[number], costs.config.candidates)
     each = costs.target_costs(target, number, units)
     if prune:
-        kept = each <= each.min() + 2 * costs.config.most
+        kept = np.flatnonzero(each <= each.min() + 2 * costs.config.most)
+        if len(kept) > costs.config.beam:
+            kept = np.sort(kept[np.argsort(each[kept], kind="stable")[: costs.config.beam]])
         units, each = units[kept], each[kept]
     return units, each

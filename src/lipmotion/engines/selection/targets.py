@@ -16,7 +16,7 @@ def target_of(model: SelectionModel, costs: Costs, speech: Speech) -> Target:
     Raises InputError: an unknown phone.
     """
     frames = len(speech.features.values)
-    windows = phone_windows([without_gaps(speech.units, frames / FRAME_RATE_HZ)])
+    windows = phone_windows([without_gaps(speech.units, (frames - 1) / FRAME_RATE_HZ)])
     guide = model.guide
     if guide is None or (isinstance(guide.predictor, AcousticNetwork) and speech.spectrum is None):
         return costs.target(windows, None, None)

@@ -12,7 +12,7 @@ from lipmotion.engines.selection.concatenation import concatenated, pieces_of
 from lipmotion.engines.selection.config import SelectionConfig
 from lipmotion.engines.selection.costs import Costs
 from lipmotion.engines.selection.guide import Guide, at_points, fit_guide
-from lipmotion.engines.selection.inventory import Inventory
+from lipmotion.engines.selection.inventory import RecordedUnits
 from lipmotion.engines.selection.model import SelectionModel
 from lipmotion.engines.selection.search import select
 from lipmotion.engines.selection.targets import target_of
@@ -77,13 +77,13 @@ def fit_selection(
 
 def inventory_of(
     examples: Sequence[Example], values: Sequence[Array], space: MotionSpace, guide: Guide | None
-) -> Inventory:
+) -> RecordedUnits:
     """Return the inventory of some examples.
 
     values : motion of each in the motion space [each shape=(T, Q)]
     Raises CorpusError: the motion of no phone of speech was measured throughout.
     """
-    timelines = [without_gaps(e.speech.units, len(e.valid) / FRAME_RATE_HZ) for e in examples]
+    timelines = [without_gaps(e.speech.units, (len(e.valid) - 1) / FRAME_RATE_HZ) for e in examples]
     windows = phone_windows(timelines)
     first = np.concatenate([[0], np.cumsum([len(x) for x in values])]).astype(np.intp)
     known = np.concatenate([example.valid for example in examples])
@@ -103,7 +103,7 @@ def inventory_of(
             [at_points(guide.predict(e.speech), _of_recording(windows, n)) for n, e in enumerate(examples)]
         ).astype(np.float16)
     names = tuple(example.name for example in examples)
-    return Inventory(names, windows, usable, first, _stored(examples, values, first, space), predicted)
+    return RecordedUnits(names, windows, usable, first, _stored(examples, values, first, space), predicted)
 
 
 def comparison_scale(recorded: Array, space: MotionSpace) -> Array:

@@ -22,7 +22,7 @@ SILENT = PHONE_NUMBER[SILENCE]
 VISEME_NUMBER = np.array([*(list(VISEMES).index(VISEME_OF[phone]) for phone in PHONES), len(VISEMES)])
 """The viseme of every symbol."""
 UNKNOWN_STRESS = -1
-LEAST_GAP_S = 1e-6
+LEAST_GAP_S = 1e-3
 
 
 @dataclass(frozen=True, eq=False)

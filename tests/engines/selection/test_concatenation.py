@@ -1,0 +1,133 @@
+"""Pieces of recorded motion: their times, overlaps and joins."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lipmotion.engines.selection.concatenation import TimeMap, concatenated, pieces_of
+from lipmotion.engines.selection.costs import HARD
+from lipmotion.engines.selection.engine import SelectionEngine
+from lipmotion.engines.selection.lip_reading import OVERLAPS, TABLE_1, lip_reading_class, parsed_invisible
+from lipmotion.engines.selection.model import SelectionModel
+from lipmotion.engines.selection.search import select
+from lipmotion.engines.selection.targets import target_of
+from lipmotion.errors import InputError
+from lipmotion.testing.examples import OPENINGS, example, speech, timeline
+from lipmotion.types import Timeline, silent_monitor
+
+SENTENCES = st.lists(st.sampled_from(tuple(OPENINGS)), min_size=2, max_size=8)
+
+
+def laid_out(model: SelectionModel, engine: SelectionEngine, units: Timeline):
+    costs = model.costs(engine.config)
+    target = target_of(model, costs, speech(units))
+    pieces = pieces_of(costs, target, select(costs, target).units)
+    return target, pieces
+
+
+@settings(max_examples=40, deadline=None)
+@given(SENTENCES, st.floats(0.04, 0.3))
+def test_edges_of_phones_fall_on_edges_of_phones(
+    model: SelectionModel, engine: SelectionEngine, phones: list[str], duration_s: float
+) -> None:
+    target, pieces = laid_out(model, engine, timeline(phones, duration_s))
+    recorded = model.inventory.windows.times_s
+    for piece, following in zip(pieces, [*pieces[1:], None], strict=True):
+        clock = TimeMap.of(model.inventory, target, piece, following)
+        starts = target.windows.times_s[piece.first : piece.stop, 0]
+        wanted = recorded[piece.unit : piece.unit + len(starts), 0]
+        assert clock(starts) == pytest.approx(wanted, abs=2e-3)
+        assert (np.diff(clock(np.arange(0, target.windows.times_s[-1, 1], 0.005))) > -1e-9).all()
+
+
+@settings(max_examples=40, deadline=None)
+@given(SENTENCES)
+def test_pieces_cover_all_phones_in_order(model: SelectionModel, engine: SelectionEngine, phones: list[str]) -> None:
+    target, pieces = laid_out(model, engine, timeline(phones))
+    assert pieces[0].first == 0
+    assert pieces[-1].stop == len(target)
+    assert all(one.stop == two.first and one.start_s < two.start_s for one, two in pairwise(pieces))
+
+
+@settings(max_examples=40, deadline=None)
+@given(SENTENCES)
+def test_motion_stays_within_what_was_recorded(
+    model: SelectionModel, engine: SelectionEngine, phones: list[str]
+) -> None:
+    target, pieces = laid_out(model, engine, timeline(phones))
+    frames = int(target.windows.times_s[-1, 1] * 100)
+    motion, recorded = concatenated(model.inventory, target, pieces, frames), model.inventory.values
+    jump = np.ptp(recorded, axis=0) / 2  # a hard join bends both sides by half the jump
+    assert (motion >= recorded.min(axis=0) - jump).all()
+    assert (motion <= recorded.max(axis=0) + jump).all()
+
+
+@settings(max_examples=40, deadline=None)
+@given(SENTENCES)
+def test_no_join_is_a_jump(model: SelectionModel, engine: SelectionEngine, phones: list[str]) -> None:
+    target, pieces = laid_out(model, engine, timeline(phones))
+    frames = int(target.windows.times_s[-1, 1] * 100)
+    motion = concatenated(model.inventory, target, pieces, frames)
+    largest = np.abs(np.diff(model.inventory.values, axis=0)).max(axis=0)
+    if not any(piece.join == HARD for piece in pieces[1:]):
+        assert (np.abs(np.diff(motion, axis=0)).max(axis=0) < 3 * largest).all()
+
+
+@pytest.mark.parametrize("before", ["aa", "t", "s", "uw"])
+@pytest.mark.parametrize("after", ["iy", "t", "s", "b"])
+@pytest.mark.parametrize("closed", ["p", "b", "m"])
+def test_closures_survive_every_join(
+    model: SelectionModel, engine: SelectionEngine, before: str, closed: str, after: str
+) -> None:
+    units = timeline((before, closed, after, closed, before))
+    motion = engine.generate(model, speech(units)).motion
+    for number in (2, 4):
+        inside = slice(int(units[number].start_s * 100), int(units[number].end_s * 100) + 1)
+        assert motion["opening"][inside].min() < 0.25 * OPENINGS["aa"] / 2
+
+
+def test_a_recorded_sentence_comes_back_as_it_was_recorded() -> None:
+    engine = SelectionEngine(replace(_plain(), guide=0.0))
+    recorded = [example(phones, seed) for seed, phones in enumerate((("b", "aa", "t", "iy"), ("m", "uw", "s", "p")))]
+    model = engine.fit(recorded, silent_monitor).model
+    for one in recorded:
+        again = engine.generate(model, one.speech)
+        assert len({source.split(" ")[0] for source in again.trace.states}) == 1
+        near = slice(20, len(one.motion.values) - 20)  # silence far from speech is not stored
+        difference = np.abs(again.motion.values - one.motion.values)[near, :2]
+        assert np.percentile(difference, 99) < 0.02  # recorded motion has noise that few components leave out
+
+
+def test_a_guide_does_not_change_a_recorded_sentence(model: SelectionModel, engine: SelectionEngine) -> None:
+    from lipmotion.testing.examples import examples
+
+    for number in (0, 5):
+        sources = engine.generate(model, examples()[number].speech).trace.states
+        spoken = {source.split(" ")[0] for source in sources[1:-1]}
+        assert spoken == {examples()[number].name}
+
+
+def test_table_1_is_the_printed_one() -> None:
+    forward = [round(100 * TABLE_1[pair]) for pair in TABLE_1]
+    assert forward == [50, 77, 55, 23, 50, 27, 45, 77, 50]
+    assert OVERLAPS["symmetric"]["normal", "invisible"] == pytest.approx(1 - TABLE_1["invisible", "normal"])
+
+
+def test_classes_of_lip_reading() -> None:
+    classes = [lip_reading_class(phone, parsed_invisible("t d g k")) for phone in ("b", "t", "l", "aa")]
+    assert classes == ["protected", "invisible", "normal", "normal"]
+    for text in ("t xx", "sil", "p"):
+        with pytest.raises(InputError, match="cannot be invisible"):
+            parsed_invisible(text)
+
+
+def _plain():
+    from tests.engines.selection.conftest import SETTINGS
+
+    return SETTINGS
