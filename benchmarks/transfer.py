@@ -1,6 +1,6 @@
 """Transfer onto another face: how near the rest pose and the range of generated motion come to a person's own.
 
-    python benchmarks/transfer.py MODEL CORPUS [--speaker NAME] [--fit half,all,N] [--recogniser fast]
+    python benchmarks/transfer.py MODEL CORPUS [--speaker NAME] [--fit half,all,N] [--recogniser auto]
 
 The map is fitted on the first half of the person's utterances (or all, or the first N) and judged on the second half,
 or on the same one where there is only one. Every utterance is generated once without and once with the map, of the
@@ -46,10 +46,9 @@ def main() -> None:
     parser.add_argument("corpus", type=Path)
     parser.add_argument("--speaker", default="")
     parser.add_argument("--fit", default="half")
-    parser.add_argument("--recogniser", default=transfer.FOOTAGE_RECOGNISER, help="for the footage that is fitted on")
+    parser.add_argument("--recogniser", default="auto", help="for the footage that is fitted on")
     parser.add_argument("--no-transcripts", action="store_true", help="in the footage that is fitted on")
     options = parser.parse_args()
-    transfer.FOOTAGE_RECOGNISER = options.recogniser
     corpus, model = Corpus.open(options.corpus), load_model(options.model)
     names = corpus.names(None, [options.speaker] if options.speaker else [])
     half = (len(names) + 1) // 2
@@ -58,7 +57,7 @@ def main() -> None:
     for fit in options.fit.split(","):
         count = {"half": half, "all": len(names)}.get(fit) or int(fit)
         start_s = time.perf_counter()
-        person = fitted_map(model, [corpus.utterance(name) for name in names[:count]], not options.no_transcripts)
+        person = fitted_map(model, [corpus.utterance(name) for name in names[:count]], options)
         fit_s = time.perf_counter() - start_s
         gain = {channel.name: round(float(gain), 3) for channel, gain in zip(person.channels, person.gain, strict=True)}
         about = {"person": options.speaker or corpus.path.name, "fitted": count, "judged": len(judged), "fit_s": fit_s}
@@ -66,16 +65,17 @@ def main() -> None:
         print(json.dumps(about | {"gain": {name: gain[name] for name in CHANNELS}} | figures), flush=True)
 
 
-def request_of(utterance: Utterance, transcripts: bool = True) -> SpeechRequest:
+def request_of(utterance: Utterance, transcripts: bool = True, recogniser: str = "auto") -> SpeechRequest:
     """Return an utterance as a request, with its words if it has any."""
-    return SpeechRequest(utterance.audio, " ".join(utterance.words) if utterance.words and transcripts else None)
+    words = " ".join(utterance.words) if utterance.words and transcripts else None
+    return SpeechRequest(utterance.audio, words, recogniser=recogniser)
 
 
-def fitted_map(model: Model, utterances: list[Utterance], transcripts: bool) -> SpeakerMap:
+def fitted_map(model: Model, utterances: list[Utterance], options: argparse.Namespace) -> SpeakerMap:
     """Return the map of ``map_onto``, of some utterances of a corpus."""
     source, target = [], []
     for utterance in utterances:
-        request = request_of(utterance, transcripts)
+        request = request_of(utterance, not options.no_transcripts, options.recogniser)
         pair = transfer.measured_pair(model, None, utterance.name, request, utterance.track, "corpus")
         source.append(pair[0])
         target.append(pair[1])

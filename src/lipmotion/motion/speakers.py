@@ -197,7 +197,7 @@ def mean_person_examples(examples: Sequence[Example], speakers: Sequence[str]) -
     no more. Closed lips map onto closed lips and, in silence, rest pose onto rest pose. Ranges of people who say little
     are drawn towards the mean person's. Points share one gain for each axis, so that faces keep their shape.
     """
-    maps = fit_maps(examples, speakers)
+    maps = _fit_maps(examples, speakers)
     mapped = []
     for example, speaker in zip(examples, speakers, strict=True):
         motion = example.motion
@@ -239,7 +239,7 @@ def speakers_from_arrays(arrays: Arrays) -> SpeakerMaps:
 
 
 @dataclass(frozen=True, eq=False)
-class _Person:
+class PersonStatistics:
     """Statistics of one person's motion.
 
     rest     : rest pose, NaN where there is no silence [shape=(P,)]
@@ -258,24 +258,18 @@ class _Person:
     speech_s: float
 
 
-def fit_maps(examples: Sequence[Example], speakers: Sequence[str], most_gain: float = MOST_GAIN) -> SpeakerMaps:
-    """Return the maps of all people, also of the one without a name; nobody has habits yet.
-
-    examples  : with the same channels
-    speakers  : the name of each example's speaker
-    most_gain : gains lie between its inverse and itself
-    The maps are those of ``mean_person_examples``.
-    """
+def _fit_maps(examples: Sequence[Example], speakers: Sequence[str]) -> SpeakerMaps:
+    """Return the maps of all people, also of the one without a name."""
     names = tuple(sorted(set(speakers)))
     channels = examples[0].motion.channels
     column = examples[0].motion.names.index(OPENING) if OPENING in examples[0].motion.names else None
     groups = [[e for e, speaker in zip(examples, speakers, strict=True) if speaker == name] for name in names]
-    people = [_measured(group, column) for group in groups]
-    rests, follow = _rest_poses(people), np.mean([person.follow for person in people], axis=0)
+    people = [measured_person(group, column) for group in groups]
+    rests, follow = rest_poses(people), np.mean([person.follow for person in people], axis=0)
     closed = np.array([person.closed for person in people])
     parted = rests[:, column] - closed if column is not None else np.zeros(len(people))
     anchors = rests - parted[:, None] * follow  # the rest poses, but with lips that touch
-    gain = _gains(people, channels, most_gain)
+    gain = person_gains(people, channels)
     offset = anchors - gain * anchors.mean(axis=0)
     rest = rests - offset - gain * rests.mean(axis=0)
     shut = float(closed.mean())
@@ -284,7 +278,7 @@ def fit_maps(examples: Sequence[Example], speakers: Sequence[str], most_gain: fl
     return SpeakerMaps(channels, names, gain, offset, rest, habits, (shut, shut + WHOLLY * wide))
 
 
-def _measured(examples: Sequence[Example], column: int | None) -> _Person:
+def measured_person(examples: Sequence[Example], column: int | None) -> PersonStatistics:
     """Return the statistics of one person's motion.
 
     column : of the opening (None: there is no such channel)
@@ -313,7 +307,9 @@ def _measured(examples: Sequence[Example], column: int | None) -> _Person:
         follow[column] = 1
         closed = float(np.median(smallest)) if smallest else float(np.percentile(speech[:, column], 1))
     rest = np.median(quiet, axis=0) if quiet is not None else np.full(speech.shape[1], np.nan)
-    return _Person(rest, np.median(speech, axis=0), high - low, follow, max(closed, 0.0), len(speech) / FRAME_RATE_HZ)
+    return PersonStatistics(
+        rest, np.median(speech, axis=0), high - low, follow, max(closed, 0.0), len(speech) / FRAME_RATE_HZ
+    )
 
 
 def _first_long(candidates: Sequence[Array]) -> Array | None:
@@ -321,7 +317,7 @@ def _first_long(candidates: Sequence[Array]) -> Array | None:
     return next((frames for frames in candidates if len(frames) >= LEAST_FRAMES), None)
 
 
-def _rest_poses(people: Sequence[_Person]) -> Array:
+def rest_poses(people: Sequence[PersonStatistics]) -> Array:
     """Return the rest poses of all people [shape=(S, P)].
 
     Whoever is never silent rests as far from their median pose in speech as the others do.
@@ -332,8 +328,14 @@ def _rest_poses(people: Sequence[_Person]) -> Array:
     return np.where(known[:, None], rests, spoken + usual)
 
 
-def _gains(people: Sequence[_Person], channels: Sequence[Channel], most_gain: float) -> Array:
-    """Return the range of each person as a multiple of the mean person's [shape=(S, P)]."""
+def person_gains(
+    people: Sequence[PersonStatistics], channels: Sequence[Channel], most_gain: float = MOST_GAIN
+) -> Array:
+    """Return the range of each person as a multiple of the mean person's [shape=(S, P)].
+
+    most_gain : gains lie between its inverse and itself
+    Points share one gain for each axis. Of people who say little, gains are drawn towards 1 (``RANGE_PRIOR_S``).
+    """
     ranges = np.stack([person.range for person in people])
     moves = (ranges > LEAST_RANGE * ranges.max(axis=0)).all(axis=0) & (ranges > 0).all(axis=0)
     ratio = np.ones(ranges.shape)

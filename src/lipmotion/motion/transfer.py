@@ -10,31 +10,67 @@ from collections.abc import Sequence
 import numpy as np
 
 from lipmotion.errors import InputError
+from lipmotion.motion.closure import OPENING
 from lipmotion.motion.rest import away_from_speech, speech_intervals
-from lipmotion.motion.speakers import MOST_GAIN, SpeakerMap, fit_maps
+from lipmotion.motion.speakers import (
+    LEAST_FRAMES,
+    MOST_GAIN,
+    NEAR_SPEECH_S,
+    VISEME_NAMES,
+    SpeakerMap,
+    measured_person,
+    person_gains,
+    rest_poses,
+)
 from lipmotion.types import FRAME_RATE_HZ, Channel, Example, Motion
 
-SOURCE, TARGET = "source", "target"
-"""Names of the two people while their maps are fitted."""
+CLOSED_PERCENTILE = 1.0
+"""The target's lips touch where they are open no more than in this share of all frames: phones that were recognised
+wrongly must not let p, b and m stay open."""
+PAUSE_PRIOR = 1.0
+"""Pauses that count as much as the assumption that the target rests as the source does."""
 
 
 def transfer_map(source: Sequence[Example], target: Sequence[Example]) -> SpeakerMap:
-    """Return the map from the motion of a source person to that of a target person, in the same speech.
+    """Return the map from the motion of a source person to that of a target person, fitted in the same speech.
 
     source : generated motion of the source, for the speech of the target
     target : measured motion of the target; the same channels
-    Closed lips map onto closed lips, and in silence rest pose onto rest pose. Ranges in speech (5th to 95th percentile)
-    map onto each other; points share one gain for each axis, so that the face keeps the shape of the target. With S
-    seconds of speech the logarithm of a gain counts S / (S + 2): a short recording gives the rest pose and the shape
-    alone. Gains lie between 1 / ``MOST_GAIN`` and ``MOST_GAIN``. The map has no habits (``SpeakerMap.habits`` is 0).
+    - Closed lips map onto closed lips. The median pose of all other channels in speech maps onto the target's.
+    - The range in speech (5th to 95th percentile) maps onto the target's; points share one gain for each axis, so that
+      the face keeps the shape of the target. With S seconds of speech the logarithm of a gain counts S / (S + 2), and
+      gains lie between 1 / ``MOST_GAIN`` and ``MOST_GAIN``: a short recording gives place and shape alone.
+    - In silence away from speech the rest pose maps onto the target's; with N pauses the difference from the map in
+      speech counts N / (N + 1).
+    The map has no habits (``SpeakerMap.habits`` is 0). Alternatives that were measured: docs/results/selection-transfer.md.
     """
-    names = [SOURCE] * len(source) + [TARGET] * len(target)
-    maps = fit_maps([*source, *target], names, float(np.sqrt(MOST_GAIN)))
-    first, second = maps.of(SOURCE), maps.of(TARGET)
-    gain = second.gain / first.gain
-    offset = second.offset - gain * first.offset
-    rest = second.rest - gain * first.rest
-    return SpeakerMap(first.channels, gain, offset, rest, np.zeros_like(first.habits), first.lips)
+    channels = source[0].motion.channels
+    names = [channel.name for channel in channels]
+    column = names.index(OPENING) if OPENING in names else None
+    people = [measured_person(examples, column) for examples in (source, target)]
+    gains, rests = person_gains(people, channels, float(np.sqrt(MOST_GAIN))), rest_poses(people)
+    gain = gains[1] / gains[0]
+    offset = people[1].spoken - gain * people[0].spoken
+    closed = people[0].closed
+    if column is not None:
+        openings = np.concatenate([example.motion.values[example.valid, column] for example in target])
+        smallest = float(np.percentile(openings, CLOSED_PERCENTILE)) if len(openings) else people[1].closed
+        offset[column] = max(min(people[1].closed, smallest), 0.0) - gain[column] * closed
+    pauses = _pauses(target)
+    rest = (rests[1] - offset - gain * rests[0]) * pauses / (pauses + PAUSE_PRIOR)
+    habits = np.zeros((len(VISEME_NAMES), len(channels)))
+    return SpeakerMap(channels, gain, offset, rest, habits, (closed, closed + 1))
+
+
+def _pauses(examples: Sequence[Example]) -> int:
+    """Return the number of pauses in which the rest pose of some examples was measured."""
+    count = 0
+    for example in examples:
+        time_s = np.arange(len(example.valid)) / FRAME_RATE_HZ
+        silent = example.valid & away_from_speech(time_s, speech_intervals(example.speech.units), NEAR_SPEECH_S)
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], silent, [False]])))
+        count += int((edges[1::2] - edges[::2] >= LEAST_FRAMES).sum())
+    return count
 
 
 def composed(first: SpeakerMap | None, second: SpeakerMap) -> SpeakerMap:

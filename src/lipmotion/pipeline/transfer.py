@@ -32,13 +32,17 @@ MOST_FOOTAGE_S = 60.0
 """Seconds of footage that are used: the first of a video, utterances spread evenly over a corpus."""
 LEAST_SPEECH_S = 0.5
 """Fewest seconds of speech, with the face measured, of which a map is made."""
-FOOTAGE_RECOGNISER = "fast"
-"""How footage without a transcript is recognised."""
 
 
 @one_thread()
 def map_onto(
-    model: Model, onto: Onto, *, speaker: str = "", onto_speaker: str = "", speech: SpeechRequest | None = None
+    model: Model,
+    onto: Onto,
+    *,
+    speaker: str = "",
+    onto_speaker: str = "",
+    recogniser: str = "auto",
+    speech: SpeechRequest | None = None,
 ) -> SpeakerMap:
     """Return the map from the motion that a model generates to that of another person; ``SpeechRequest.onto`` takes it.
 
@@ -46,6 +50,8 @@ def map_onto(
     onto         : the person: a video, a prepared corpus, or another model
     speaker      : whose motion is mapped, of the people whom ``model`` was trained on; empty: the mean person
     onto_speaker : onto whose motion, where a corpus or another model has several people
+    recogniser   : how the person's recordings without a transcript are recognised, as of ``SpeechRequest``; best the
+                   one of the speech that is animated, for motion of doubtful phones is smaller
     speech       : another model's person is measured in this speech; not used for videos and corpora
     The model generates motion for the person's own recordings, and the person's motion is measured in the same frames,
     so that both say the same. Transcripts are not needed; those of a corpus are used.
@@ -62,7 +68,8 @@ def map_onto(
     opened, where = _opened(onto)
     source, target = [], []
     for name, request, measured in _takes(opened, where, onto_speaker, speech):
-        pair = measured_pair(model, person, name, request, measured, where, onto_speaker)
+        recognised = replace(request, recogniser=recogniser)
+        pair = measured_pair(model, person, name, recognised, measured, where, onto_speaker)
         source.append(pair[0])
         target.append(pair[1])
     spoken_s = measured_speech_s(target)
@@ -205,12 +212,10 @@ def _names(corpus: Corpus, where: str, speaker: str) -> tuple[str, ...]:
 
 def _understood(model: Model, request: SpeechRequest) -> Speech:
     """Return the speech of a recording; without its transcript where that cannot be aligned."""
-    if request.transcript is None and request.units is None:
-        request = replace(request, recogniser=FOOTAGE_RECOGNISER)
     try:
         return understand(model, request)
     except AlignmentError:
-        return understand(model, replace(request, transcript=None, recogniser=FOOTAGE_RECOGNISER))
+        return understand(model, replace(request, transcript=None))
 
 
 def _measured(
