@@ -21,7 +21,7 @@ from lipmotion.pipeline.model import Model, load_model, save_model
 from lipmotion.pipeline.request import Onto, SpeechRequest
 from lipmotion.pipeline.training.train import train
 from lipmotion.pipeline.transfer import map_onto, with_person
-from lipmotion.testing.toy import ToySentence, toy_utterances
+from lipmotion.testing.toy import ToySentence, toy_motion, toy_utterances
 from lipmotion.types import Channel, Constraints, Motion, Pin, Track, Utterance
 from lipmotion.vision.frames import VideoSpan
 
@@ -69,10 +69,10 @@ def request(sentence: ToySentence, onto: Onto | None = None, **more: str) -> Spe
 def is_like_ben(model: Model, sentence: ToySentence, onto: Onto, **more: str) -> None:
     """Raise AssertionError unless the motion is that of the model, in ben's place and range."""
     own, mapped = animate(request(sentence), model=model), animate(request(sentence, onto, **more), model=model)
-    ratio = np.ptp(mapped.motion.values, axis=0) / np.ptp(own.motion.values, axis=0)
-    np.testing.assert_allclose(ratio, GAIN, atol=0.2)
-    assert ratio[0] < 0.7
-    assert ratio[1] > 1.05
+    wanted = OFFSET + GAIN * toy_motion(sentence.units, 100.0).values
+    ranges = [np.ptp(np.percentile(values, [2, 98], axis=0), axis=0) for values in (mapped.motion.values, wanted)]
+    np.testing.assert_allclose(ranges[0] / ranges[1], 1, atol=0.25)
+    assert np.abs(np.median(mapped.motion.values, axis=0) - np.median(wanted, axis=0)).max() < 0.03
     for name in own.motion.names:
         assert np.corrcoef(own.motion[name], mapped.motion[name])[0, 1] > 0.98
     for frames in closable_ranges(sentence.units, len(mapped.motion.values)):
@@ -87,7 +87,9 @@ def test_onto_the_person_of_a_corpus(toy_model: Model, toy_sentence: ToySentence
 @pytest.mark.long
 @pytest.mark.parametrize("engine", ["joint", "coupled", "selection"])
 def test_every_engine(toy_corpus: Corpus, toy_sentence: ToySentence, ben: Corpus, engine: str) -> None:
-    settings = {"chains": "sVis 2vis", "mixtures": 2} if engine == "coupled" else {}
+    settings: dict[str, object] = {"articulation": False}  # the toy's mouth does not move as English ones do
+    if engine == "coupled":
+        settings |= {"chains": "sVis 2vis", "mixtures": 2}
     model, _ = train(toy_corpus, recogniser=HmmConfig(mixtures=1, iterations=2), engine=engine_named(engine, settings))
     is_like_ben(model, toy_sentence, ben)
 
@@ -230,4 +232,4 @@ def test_onto_a_real_person(recordings: Path) -> None:
     video = recordings / "grid-others" / "brbk7n.mpg"
     rest = np.median(track(video, crops=False).motion["opening"][:8])
     own, mapped = (lipmotion.animate(SpeechRequest(video, onto=onto)).motion["opening"] for onto in (None, video))
-    assert abs(np.median(mapped[:20]) - rest) < 0.02 < abs(np.median(own[:20]) - rest)
+    assert abs(np.median(mapped[:20]) - rest) < 0.5 * abs(np.median(own[:20]) - rest)

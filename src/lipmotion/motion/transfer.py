@@ -13,9 +13,7 @@ from lipmotion.errors import InputError
 from lipmotion.motion.closure import OPENING
 from lipmotion.motion.rest import away_from_speech, speech_intervals
 from lipmotion.motion.speakers import (
-    LEAST_FRAMES,
     MOST_GAIN,
-    NEAR_SPEECH_S,
     VISEME_NAMES,
     SpeakerMap,
     measured_person,
@@ -27,8 +25,6 @@ from lipmotion.types import FRAME_RATE_HZ, Channel, Example, Motion
 CLOSED_PERCENTILE = 1.0
 """The target's lips touch where they are open no more than in this share of all frames: phones that were recognised
 wrongly must not let p, b and m stay open."""
-PAUSE_PRIOR = 1.0
-"""Pauses that count as much as the assumption that the target rests as the source does."""
 
 
 def transfer_map(source: Sequence[Example], target: Sequence[Example]) -> SpeakerMap:
@@ -40,9 +36,9 @@ def transfer_map(source: Sequence[Example], target: Sequence[Example]) -> Speake
     - The range in speech (5th to 95th percentile) maps onto the target's; points share one gain for each axis, so that
       the face keeps the shape of the target. With S seconds of speech the logarithm of a gain counts S / (S + 2), and
       gains lie between 1 / ``MOST_GAIN`` and ``MOST_GAIN``: a short recording gives place and shape alone.
-    - In silence away from speech the rest pose maps onto the target's; with N pauses the difference from the map in
-      speech counts N / (N + 1).
-    The map has no habits (``SpeakerMap.habits`` is 0). Alternatives that were measured: docs/results/selection-transfer.md.
+    - In silence away from speech the rest pose maps onto the target's.
+    The map has no habits (``SpeakerMap.habits`` is 0).
+    Alternatives that were measured: docs/results/selection-transfer.md.
     """
     channels = source[0].motion.channels
     names = [channel.name for channel in channels]
@@ -56,21 +52,9 @@ def transfer_map(source: Sequence[Example], target: Sequence[Example]) -> Speake
         openings = np.concatenate([example.motion.values[example.valid, column] for example in target])
         smallest = float(np.percentile(openings, CLOSED_PERCENTILE)) if len(openings) else people[1].closed
         offset[column] = max(min(people[1].closed, smallest), 0.0) - gain[column] * closed
-    pauses = _pauses(target)
-    rest = (rests[1] - offset - gain * rests[0]) * pauses / (pauses + PAUSE_PRIOR)
+    rest = rests[1] - offset - gain * rests[0]
     habits = np.zeros((len(VISEME_NAMES), len(channels)))
     return SpeakerMap(channels, gain, offset, rest, habits, (closed, closed + 1))
-
-
-def _pauses(examples: Sequence[Example]) -> int:
-    """Return the number of pauses in which the rest pose of some examples was measured."""
-    count = 0
-    for example in examples:
-        time_s = np.arange(len(example.valid)) / FRAME_RATE_HZ
-        silent = example.valid & away_from_speech(time_s, speech_intervals(example.speech.units), NEAR_SPEECH_S)
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], silent, [False]])))
-        count += int((edges[1::2] - edges[::2] >= LEAST_FRAMES).sum())
-    return count
 
 
 def composed(first: SpeakerMap | None, second: SpeakerMap) -> SpeakerMap:
