@@ -21,7 +21,7 @@ def add_speech_arguments(parser: argparse.ArgumentParser) -> None:
     add_recording_arguments(parser)
     add_model_argument(parser)
     face = "another person, onto whose face the motion is mapped: a video of them, a prepared corpus or a model"
-    add_input(parser, "--onto", what="other person", metavar="VIDEO|CORPUS|MODEL", help=face)
+    add_input(parser, "--onto", what="footage of the other person", metavar="VIDEO|CORPUS|MODEL", help=face)
     which = "which person, if the corpus or the model of --onto has several"
     parser.add_argument("--onto-speaker", default="", metavar="NAME", help=which)
 
