@@ -24,11 +24,22 @@ if TYPE_CHECKING:
     from lipmotion.pipeline.explain import explain
     from lipmotion.pipeline.model import Model, load_model, save_model
     from lipmotion.pipeline.request import SpeechRequest
-    from lipmotion.pipeline.speak import SpokenText, speak
+    from lipmotion.pipeline.speak import speak
     from lipmotion.pipeline.state_runs import state_runs
     from lipmotion.pipeline.training.train import Run, train
     from lipmotion.pipeline.transfer import map_onto, with_person
-    from lipmotion.types import Audio, Constraints, Explanation, Generation, Motion, Pin, Span, Timeline, Unit
+    from lipmotion.types import (
+        Audio,
+        Constraints,
+        Explanation,
+        Generation,
+        Motion,
+        Pin,
+        Span,
+        SpokenText,
+        Timeline,
+        Unit,
+    )
     from lipmotion.units import Lexicon
 
 __all__ = [
@@ -87,7 +98,7 @@ _HOMES = {
     "prepare": "lipmotion.pipeline.corpus.prepare",
     "read_motion": "lipmotion.export.base",
     "save_model": "lipmotion.pipeline.model",
-    "SpokenText": "lipmotion.pipeline.speak",
+    "SpokenText": "lipmotion.types",
     "speak": "lipmotion.pipeline.speak",
     "state_runs": "lipmotion.pipeline.state_runs",
     "train": "lipmotion.pipeline.training.train",

@@ -14,10 +14,10 @@ from lipmotion.export.base import read_motion
 from lipmotion.pipeline import speak as module
 from lipmotion.pipeline.animate import write
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.pipeline.speak import REST_S, SpokenText, read_text, speak
+from lipmotion.pipeline.speak import REST_S, read_text, speak
 from lipmotion.speech.voices import installed
 from lipmotion.speech.voices.installed import default_voice, installed_voices
-from lipmotion.types import Constraints, Pin, Span, Unit
+from lipmotion.types import Constraints, Pin, Span, SpokenText, Unit
 from lipmotion.units import LIP_CLOSING, is_silent
 from speech import stand_in_voice
 
@@ -109,7 +109,7 @@ def test_files(spoken: SpokenText, toy_model: Model, tmp_path: Path) -> None:
 
 
 def test_a_recording_is_not_written_as_sound(spoken: SpokenText, toy_speech: Path, tmp_path: Path) -> None:
-    with pytest.raises(ExportError, match=r"unknown format '.wav'; required one of: .json .csv .npz .mp4$"):
+    with pytest.raises(ExportError, match=r"unknown format '.wav'; required one of: (?!.* \.wav)"):
         write(spoken.generation, tmp_path / "a.wav", speech=toy_speech)
     with pytest.raises(ExportError, match="a video needs the recording"):
         write(spoken.generation, tmp_path / "a.mp4")

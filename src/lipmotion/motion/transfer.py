@@ -22,10 +22,6 @@ from lipmotion.motion.speakers import (
 )
 from lipmotion.types import FRAME_RATE_HZ, Channel, Example, Motion
 
-CLOSED_PERCENTILE = 1.0
-"""The target's lips touch where they are open no more than in this share of all frames: phones that were recognised
-wrongly must not let p, b and m stay open."""
-
 
 def transfer_map(source: Sequence[Example], target: Sequence[Example]) -> SpeakerMap:
     """Return the map from the motion of a source person to that of a target person, fitted in the same speech.
@@ -49,9 +45,7 @@ def transfer_map(source: Sequence[Example], target: Sequence[Example]) -> Speake
     offset = people[1].spoken - gain * people[0].spoken
     closed = people[0].closed
     if column is not None:
-        openings = np.concatenate([example.motion.values[example.valid, column] for example in target])
-        smallest = float(np.percentile(openings, CLOSED_PERCENTILE)) if len(openings) else people[1].closed
-        offset[column] = max(min(people[1].closed, smallest), 0.0) - gain[column] * closed
+        offset[column] = people[1].closed - gain[column] * closed
     rest = rests[1] - offset - gain * rests[0]
     habits = np.zeros((len(VISEME_NAMES), len(channels)))
     return SpeakerMap(channels, gain, offset, rest, habits, (closed, closed + 1))

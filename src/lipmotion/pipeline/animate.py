@@ -9,6 +9,7 @@ from pathlib import Path
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export.base import check_motion, motion_suffixes, write_motion
 from lipmotion.export.sound import SOUND_CODECS, write_sound
+from lipmotion.export.textgrid import TEXTGRID_SUFFIX, write_textgrid
 from lipmotion.faces.base import Face
 from lipmotion.faces.registry import face_named
 from lipmotion.kernels.threads import one_thread
@@ -81,8 +82,8 @@ def write(
     """Write generated motion to one or several files, each in the format of its suffix.
 
     generation : from ``animate``
-    outputs  : paths of files: ``.json``, ``.csv``, ``.npz`` (motion) or ``.mp4`` (a drawn face, with sound); where
-               ``speech`` is a sound, also ``.wav``, ``.flac``, ``.ogg``
+    outputs  : paths of files: ``.json``, ``.csv``, ``.npz`` (motion), ``.TextGrid`` (phones in time) or ``.mp4`` (a
+               drawn face, with sound); where ``speech`` is a sound, also ``.wav``, ``.flac``, ``.ogg``
     speech   : the recording that was animated, or the sound, as of ``speak``; a video needs it for its sound
     model    : the model that generated the motion; motion files then name its corpus and licence
     channels : channels of motion files, in this order; None: all
@@ -114,13 +115,17 @@ def write(
         written = written.resampled(rate_hz)
     sounds = [path for path in paths if path.suffix.lower() in SOUND_CODECS]
     for path in paths:
-        if path not in videos and path not in sounds:
+        if path.suffix.lower() in motion_suffixes():
             check_motion(path, written.motion)
     for path in paths:
         if path in sounds and sound is not None:
             write_sound(path, sound)
         elif path in videos:
-            _write_video(generation, path, sound or read_audio(Path(str(recording)), SOUND_RATE_HZ), fps, drawn_face)
+            _write_video(
+                generation, path, sound or read_audio(Path(str(recording)), SOUND_RATE_HZ, warn=False), fps, drawn_face
+            )
+        elif path.suffix.lower() == TEXTGRID_SUFFIX.lower():
+            write_textgrid(path, generation.units)
         else:
             _write_motion(written, path, recording, model)
 
@@ -143,10 +148,10 @@ def check_outputs(
         if hertz is not None and not SLOWEST_HZ <= hertz <= FASTEST_HZ:
             raise InputError(f"the frame rate is {hertz}, required {SLOWEST_HZ:.0f} to {FASTEST_HZ:.0f} a second")
     face_named(face)
-    suffixes = (*motion_suffixes(), VIDEO_SUFFIX, *(SOUND_CODECS if with_sound else ()))
+    suffixes = (*motion_suffixes(), VIDEO_SUFFIX, TEXTGRID_SUFFIX, *(SOUND_CODECS if with_sound else ()))
     check_distinct([Path(path) for path in outputs])
     for path in map(Path, outputs):
-        if path.suffix.lower() not in suffixes:
+        if path.suffix.lower() not in map(str.lower, suffixes):
             raise ExportError(f"{path}: unknown format {path.suffix!r}; required one of: {' '.join(suffixes)}")
         check_target(path, speech)
         if path.suffix.lower() == VIDEO_SUFFIX and speech is None and not with_sound:

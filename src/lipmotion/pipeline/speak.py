@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import closing
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.corpora.store import Corpus
+from lipmotion.errors import InputError
 from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.animate import animate
+from lipmotion.pipeline.corpus_voice import speak_from_corpus
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.request import SpeechRequest
 from lipmotion.pipeline.speakers import speaker_map
@@ -20,10 +22,12 @@ from lipmotion.speech.recogniser import SHORT_PAUSE_S
 from lipmotion.speech.voices.installed import default_voice, voice_named, voiced_sentences
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.storage.files import read_text_file
-from lipmotion.types import Audio, Constraints, Generation, Span, Timeline, Unit
+from lipmotion.types import Audio, Constraints, Span, SpokenText, Timeline, Unit
 from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent
 from lipmotion.units.sentences import MOST_CHARACTERS, sentences_of
 
+CORPUS_VOICE = "corpus"
+"""The name of the voice that is a corpus."""
 REST_S = 0.25
 """Silence before the first and after the last sound."""
 FLOOR_DB = 50.0
@@ -38,22 +42,12 @@ LARGEST_TEXT = 4 * MOST_CHARACTERS
 """Most bytes of a text file: a character takes up to four."""
 
 
-class SpokenText(NamedTuple):
-    """A text that a synthetic voice has said, with the motion of its lips.
-
-    sound      : at the synthesiser's own rate
-    generation : as of ``animate``; its units are the synthesiser's phones in time
-    """
-
-    sound: Audio
-    generation: Generation
-
-
 @one_thread()
 def speak(
     text: str,
     *,
     voice: str | SyntheticVoice | None = None,
+    corpus: Corpus | None = None,
     model: Model | str | Path | None = None,
     constraints: Constraints | None = None,
     lexicon: Lexicon | None = None,
@@ -63,7 +57,8 @@ def speak(
 
     text        : one sentence or many, at most 50,000 characters; the synthesiser reads numbers and abbreviations
     voice       : ``flite:slt``, ``espeak-ng:de``, or a name alone where only one synthesiser has it; None: the first of
-                  ``DEFAULT_VOICES`` that is installed
+                  ``DEFAULT_VOICES`` that is installed; ``corpus``: the recordings of ``corpus``
+    corpus      : the corpus that a model of unit selection was trained on, for the voice ``corpus``
     model       : from ``load_model``, or the path of a model file; None: the shipped model
     constraints : values that the motion must take exactly, in the units of the speaker
     lexicon     : pronunciations of English words; they tell which vowels are reduced, not how the voice says the words
@@ -76,6 +71,11 @@ def speak(
     >>> sound, result = lipmotion.speak("Please speak.")  # doctest: +SKIP
     >>> lipmotion.write(result, ["hello.mp4", "hello.wav"], speech=sound)  # doctest: +SKIP
     """
+    if voice == CORPUS_VOICE or corpus is not None:
+        if voice != CORPUS_VOICE or corpus is None:
+            raise InputError("a corpus that speaks needs both: the voice 'corpus', and the corpus (--corpus FOLDER)")
+        loaded = model if isinstance(model, Model) else load_model(model)
+        return speak_from_corpus(text, corpus, loaded, constraints=constraints, lexicon=lexicon, speaker=speaker)
     sentences = sentences_of(text)
     chosen = voice_named(voice) if isinstance(voice, str) else voice or default_voice()
     loaded = model if isinstance(model, Model) else load_model(model)

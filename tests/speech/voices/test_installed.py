@@ -193,6 +193,15 @@ def test_the_default_voice_is_the_first_that_there_is(faked: Path) -> None:
     assert default_voice().full_name == "festival:cmu_us_slt_arctic_hts"
 
 
+def test_a_synthesiser_that_does_not_work_is_left_out(faked: Path, caplog: pytest.LogCaptureFixture) -> None:
+    (faked.parent / "programs" / "festival").write_text("#!/bin/sh\nexit 3\n")
+    assert [voice.synthesiser for voice in all_voices()] == ["flite", "flite", *["espeak-ng"] * 5]
+    assert voice_named("slt").full_name == "flite:slt"
+    assert "festival is left out: festival failed with 3" in caplog.text
+    with pytest.raises(InputError, match="festival failed with 3"):
+        voice_named("festival:kal_diphone")
+
+
 @pytest.mark.usefixtures("faked")
 def test_all_voices_are_the_english_ones_and_the_languages() -> None:
     assert all_voices()[: len(FAKED)] == tuple(FAKED)

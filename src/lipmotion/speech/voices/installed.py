@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import tempfile
 import wave
 from collections.abc import Generator, Sequence
@@ -9,7 +10,7 @@ from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
-from lipmotion.errors import InputError, MissingDependencyError, shortened
+from lipmotion.errors import InputError, LipMotionError, MissingDependencyError, shortened
 from lipmotion.speech.audio_files import read_audio
 from lipmotion.speech.voices.espeak import ESPEAK_NG
 from lipmotion.speech.voices.festival import FESTIVAL
@@ -19,6 +20,7 @@ from lipmotion.speech.voices.synthesiser import Synthesiser, SyntheticVoice
 from lipmotion.types import Audio, Timeline, Unit
 from lipmotion.units import Lexicon, words_of
 
+LOG = logging.getLogger("lipmotion")
 SYNTHESISERS: dict[str, Synthesiser] = {synthesiser.name: synthesiser for synthesiser in (FLITE, FESTIVAL, ESPEAK_NG)}
 
 DEFAULT_VOICES = (("espeak-ng", "en-us+f2"), ("flite", "slt"))
@@ -54,9 +56,23 @@ def installed_voices() -> tuple[SyntheticVoice, ...]:
 
 
 def all_voices() -> tuple[SyntheticVoice, ...]:
-    """Return the installed voices of all languages: those of ``installed_voices`` first."""
-    others = (voice for synthesiser in SYNTHESISERS.values() for voice in synthesiser.others())
-    return (*installed_voices(), *others)
+    """Return the installed voices of all languages: the American English ones first.
+
+    A synthesiser that is installed and does not work is left out, with a warning.
+    """
+    working = [synthesiser for synthesiser in SYNTHESISERS.values() if _works(synthesiser)]
+    english = tuple(voice for synthesiser in working for voice in synthesiser.voices())
+    return (*english, *(voice for synthesiser in working for voice in synthesiser.others()))
+
+
+def _works(synthesiser: Synthesiser) -> bool:
+    """Return whether a synthesiser can list its voices; if not, log why."""
+    try:
+        synthesiser.voices()
+    except LipMotionError as error:
+        LOG.warning("%s is left out: %s", synthesiser.name, error)
+        return False
+    return True
 
 
 def voice_named(name: str) -> SyntheticVoice:
@@ -70,10 +86,11 @@ def voice_named(name: str) -> SyntheticVoice:
     maker, colon, rest = name.rpartition(":")
     if colon and maker not in SYNTHESISERS:
         raise InputError(f"unknown synthesiser {shortened(maker)!r}; required one of: {', '.join(SYNTHESISERS)}")
-    if not colon and not installed_voices():
+    asked = [SYNTHESISERS[maker]] if colon else [each for each in SYNTHESISERS.values() if _works(each)]
+    if not colon and not any(synthesiser.voices() for synthesiser in asked):
         raise nothing_installed()
     found = []
-    for synthesiser in (SYNTHESISERS[maker],) if colon else SYNTHESISERS.values():
+    for synthesiser in asked:
         listed = {voice.name: voice for voice in (*synthesiser.others(), *synthesiser.voices())}
         if rest in listed:
             found.append(listed[rest])
@@ -99,7 +116,7 @@ def default_voice() -> SyntheticVoice:
         voice = next((voice for voice in SYNTHESISERS[maker].voices() if voice.name == name), None)
         if voice is not None:
             return voice
-    voice = next(iter(installed_voices()), None)
+    voice = next(iter(all_voices()), None)
     if voice is None:
         raise nothing_installed()
     return voice

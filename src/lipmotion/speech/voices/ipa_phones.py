@@ -16,13 +16,14 @@ from lipmotion.units import SILENCE
 _IPA: dict[str, str] = {
     # vowels; y ø œ are rounded, ɯ ɤ ɨ are not
     "aɪ ai aɪ̯": "ay", "aʊ au ɑu": "aw", "ɔɪ ɔʏ ɔy oɪ oi": "oy", "eɪ ei ɛɪ": "ey", "oʊ əʊ ou": "ow",
-    "i": "iy", "ɪ": "ih", "e ɛ": "eh", "eː": "ey", "æ": "ae", "a ɑ ɶ": "aa", "ɐ ʌ": "ah", "ɒ ɔ": "ao", "o": "ow",
+    "i": "iy", "ɪ": "ih", "e ɛ ε": "eh", "eː": "ey", "æ": "ae", "a ɑ ɶ A": "aa", "ɐ ʌ": "ah", "ɒ ɔ": "ao", "o": "ow",
     "ʊ ʏ œ ɵ": "uh", "u y ø ʉ": "uw", "ə ɤ ɘ": "ax", "ɚ": "axr", "ɜ ɝ ɞ": "er", "ɯ ɨ ᵻ": "ix",
     # lips, and lips and teeth; β and ɸ do not close the lips
-    "p": "p", "b ɓ": "b", "m": "m", "f ɸ pɸ": "f", "v ʋ β ɱ ⱱ": "v", "w ʍ ɥ": "w",
+    "p": "p", "b ɓ": "b", "m": "m", "f ɸ Φ pɸ": "f", "v ʋ β ɱ ⱱ": "v", "w ʍ ɥ": "w",
     # tongue and teeth, tongue and palate
     "t ʈ": "t", "d ɖ ɗ": "d", "n ɲ ɳ": "n", "θ": "th", "ð": "dh", "s": "s", "z": "z", "l ɫ ɭ ʎ ɬ ɮ ɺ ʟ": "l",
-    "ʃ ɕ ʂ": "sh", "ʒ ʑ ʐ": "zh", "tʃ tɕ tʂ": "ch", "dʒ dʑ dʐ": "jh", "r ɹ ɾ ɽ ɻ": "r", "j ç ʝ": "y",
+    "ʃ ɕ ʂ S": "sh", "ʒ ʑ ʐ": "zh", "tʃ tɕ tʂ ʧ": "ch", "dʒ dʑ dʐ ʤ": "jh", "ʦ": "t s", "ʣ": "d z",
+    "r ɹ ɾ ɽ ɻ": "r", "j ç ʝ": "y",
     # tongue and soft palate, throat
     "k c q x χ ɧ": "k", "g ɡ ɟ ɢ ɠ ɣ ɰ ʛ ʄ": "g", "ŋ ɴ": "ng", "h ɦ ħ ʕ ʁ ʀ ʜ ʢ": "hh",
     # consonants that are a syllable, a stop of the throat
@@ -35,7 +36,7 @@ IPA_PHONES: dict[str, tuple[str, ...]] = {
 }
 """IPA symbols to phones of the inventory; the longest symbol counts."""
 _LONGEST = max(map(len, IPA_PHONES))
-_IGNORED = frozenset("'\"ˈˌː.|‿^-_*!?;:,ˑʰʲʷˤˠʼ˞ʱⁿˡ0123456789()")
+_IGNORED = frozenset("'#\"ˈˌː.|‿^-_*!?;:,ˑʰʲʷˤˠʼ˞ʱⁿˡ0123456789()")
 """Marks that no mouth shape depends on; further ones are combining marks and tones."""
 UNKNOWN = ("ax",)
 """What a letter becomes of which nothing is known: the mouth at ease, slightly open."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -95,15 +96,16 @@ def program_output(command: Sequence[str], package: str, sentences: int = 1, giv
     if program is None:
         raise MissingDependencyError(f"{command[0]} is not installed; install it: apt install {package}")
     limit_s = START_S + EACH_S * sentences
+    name = package if command[0] == sys.executable else command[0]
     try:
         done = subprocess.run(
             [program, *command[1:]], input=given, capture_output=True, encoding="utf-8", timeout=limit_s, check=False
         )
     except subprocess.TimeoutExpired as error:
-        raise InputError(f"{command[0]} did not end within {limit_s:.0f} s; give shorter or fewer texts") from error
+        raise InputError(f"{name} did not end within {limit_s:.0f} s; give shorter or fewer texts") from error
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{command[0]} cannot be run ({error}); install it again: apt install {package}") from error
+        raise InputError(f"{name} cannot be run ({error}); install it again: apt install {package}") from error
     if done.returncode:
         message = " ".join(done.stderr.split())[:SHOWN] or "no message"
-        raise InputError(f"{command[0]} failed with {done.returncode} ({message}); try another text or voice")
+        raise InputError(f"{name} failed with {done.returncode} ({message}); try another text or voice")
     return done.stdout
