@@ -49,7 +49,7 @@ def test_a_video(run: RunCommand, basics: tuple[object, ...], here: Path) -> Non
 
 @pytest.mark.parametrize("as_file", [True, False])
 def test_a_transcript(run: RunCommand, basics: tuple[object, ...], here: Path, as_file: bool) -> None:
-    words = "See Bob, papa & mama!"
+    words = "See Bob, papa — mama!"
     (here / "words.lab").write_text("\ufeff" + words, encoding="utf-8")
     done = run(*basics, "-o", "a.json", "--transcript", "words.lab" if as_file else words)
     assert (done.code, done.err) == (0, [])
