@@ -25,7 +25,9 @@ if TYPE_CHECKING:
     from lipmotion.pipeline.model import Model, load_model, save_model
     from lipmotion.pipeline.request import SpeechRequest
     from lipmotion.pipeline.speak import speak
+    from lipmotion.pipeline.state_runs import state_runs
     from lipmotion.pipeline.training.train import Run, train
+    from lipmotion.pipeline.transfer import map_onto, with_person
     from lipmotion.types import (
         Audio,
         Constraints,
@@ -65,11 +67,14 @@ __all__ = [
     "evaluate",
     "explain",
     "load_model",
+    "map_onto",
     "prepare",
     "read_motion",
     "save_model",
     "speak",
+    "state_runs",
     "train",
+    "with_person",
     "write",
     "write_cues",
 ]
@@ -89,12 +94,15 @@ _HOMES = {
     "evaluate": "lipmotion.pipeline.evaluation.evaluate",
     "explain": "lipmotion.pipeline.explain",
     "load_model": "lipmotion.pipeline.model",
+    "map_onto": "lipmotion.pipeline.transfer",
     "prepare": "lipmotion.pipeline.corpus.prepare",
     "read_motion": "lipmotion.export.base",
     "save_model": "lipmotion.pipeline.model",
     "SpokenText": "lipmotion.types",
     "speak": "lipmotion.pipeline.speak",
+    "state_runs": "lipmotion.pipeline.state_runs",
     "train": "lipmotion.pipeline.training.train",
+    "with_person": "lipmotion.pipeline.transfer",
     "write": "lipmotion.pipeline.animate",
     "write_cues": "lipmotion.pipeline.cues",
 }

@@ -244,3 +244,29 @@ def test_one_of_several_people(
     done = run("animate", toy_speech, "--model", "m", "--speaker", "cleo", "-o", "cleo.json")
     assert is_one_error(done, 3)
     assert "no speaker 'cleo', only: anna, ben" in done.err[0]
+
+
+def test_onto_another_person(
+    run: RunCommand, here: Path, toy_model_file: Path, toy_speech: Path, toy_corpus: Corpus
+) -> None:
+    given = ["animate", toy_speech, "--model", toy_model_file, "-o", "one.npz"]
+    assert run(*given, "--onto", toy_corpus.path).code == 0
+    assert (here / "one.npz").is_file()
+    for options, code, words in (
+        (["--onto", "missing.mp4"], 3, "missing.mp4: no such file"),
+        (["--onto", toy_speech.parent], 4, "not a corpus"),
+        (["--onto-speaker", "ben"], 3, "onto the speaker 'ben', but of what?"),
+        (["--onto", toy_corpus.path, "--onto-speaker", "ben"], 3, "no speaker 'ben'"),
+    ):
+        done = run(*given, *options)
+        assert is_one_error(done, code)
+        assert words in done.err[0]
+
+
+def test_the_other_person_is_not_replaced(
+    run: RunCommand, toy_model_file: Path, toy_speech: Path, toy_corpus: Corpus
+) -> None:
+    inside = toy_corpus.path / "one.json"
+    done = run("animate", toy_speech, "--model", toy_model_file, "--onto", toy_corpus.path, "-o", inside)
+    assert done.code != 0
+    assert not inside.exists()

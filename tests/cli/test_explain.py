@@ -50,8 +50,16 @@ def test_what_cannot_be_explained(
     assert words in done.err[0]
 
 
-def test_a_time_is_needed(run: RunCommand, coupled_model_file: Path, toy_speech: Path) -> None:
-    assert run("explain", coupled_model_file, toy_speech).code == 2
+def test_without_a_time_all_states_are_listed(run: RunCommand, toy_model_file: Path, toy_speech: Path) -> None:
+    listed = run("explain", toy_model_file, toy_speech)
+    documents = [json.loads(line) for line in run("explain", toy_model_file, toy_speech, "--json").out]
+    assert (listed.code, listed.err) == (0, [])
+    assert listed.out[0].split() == ["from", "to", "phone", "word", "state"]
+    assert [line[:8].strip() for line in listed.out[1:]] == [f"{document['start_s']:.2f}" for document in documents]
+    assert {document["state"] for document in documents} >= {"rest"}
+    few = run("explain", toy_model_file, toy_speech, "--count", "2")
+    assert few.out[1:3] == listed.out[1:3]
+    assert few.out[3] == f"and {len(documents) - 2} more (--count N prints N, --json all)"
 
 
 def test_without_a_model_it_is_the_shipped_one_and_the_former_order_is_understood(

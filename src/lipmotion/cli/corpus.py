@@ -1,10 +1,10 @@
-"""``lipmotion corpus prepare|info|sync|prompts``: make a corpus of recordings, inspect and correct it."""
+"""``lipmotion corpus prepare|info|sync|prompts|coverage``: make a corpus of recordings, inspect and correct it."""
 
 from __future__ import annotations
 
 import argparse
 
-from lipmotion.cli import corpus_info, corpus_prompts, corpus_sync
+from lipmotion.cli import corpus_coverage, corpus_info, corpus_prompts, corpus_sync
 from lipmotion.cli.options import add_machine_readable, add_workers
 from lipmotion.cli.paths import add_input, add_output
 
@@ -24,6 +24,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     corpus_info.add(actions)
     corpus_sync.add(actions)
     corpus_prompts.add(actions)
+    corpus_coverage.add(actions)
 
 
 def run_prepare(options: argparse.Namespace) -> None:

@@ -17,9 +17,13 @@ MODEL = "trained model (default: the one that ships with the package)"
 
 
 def add_speech_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the recording, its transcript, lexicon, units, recogniser and speaker, and the model."""
+    """Add the recording, its transcript, lexicon, units, recogniser and speaker, the model, and another person."""
     add_recording_arguments(parser)
     add_model_argument(parser)
+    face = "another person, onto whose face the motion is mapped: a video of them, a prepared corpus or a model"
+    add_input(parser, "--onto", what="footage of the other person", metavar="VIDEO|CORPUS|MODEL", help=face)
+    which = "which person, if the corpus or the model of --onto has several"
+    parser.add_argument("--onto-speaker", default="", metavar="NAME", help=which)
 
 
 def add_recording_arguments(parser: argparse.ArgumentParser) -> None:
@@ -84,5 +88,7 @@ def request_and_model(options: argparse.Namespace) -> tuple[SpeechRequest, Model
         lexicon=Lexicon.from_file(options.lexicon) if options.lexicon else None,
         recogniser=options.recogniser,
         speaker=options.speaker,
+        onto=options.onto,
+        onto_speaker=options.onto_speaker,
     )
     return request, load_model(options.model)

@@ -239,7 +239,7 @@ def speakers_from_arrays(arrays: Arrays) -> SpeakerMaps:
 
 
 @dataclass(frozen=True, eq=False)
-class _Person:
+class PersonStatistics:
     """Statistics of one person's motion.
 
     rest     : rest pose, NaN where there is no silence [shape=(P,)]
@@ -264,12 +264,12 @@ def _fit_maps(examples: Sequence[Example], speakers: Sequence[str]) -> SpeakerMa
     channels = examples[0].motion.channels
     column = examples[0].motion.names.index(OPENING) if OPENING in examples[0].motion.names else None
     groups = [[e for e, speaker in zip(examples, speakers, strict=True) if speaker == name] for name in names]
-    people = [_measured(group, column) for group in groups]
-    rests, follow = _rest_poses(people), np.mean([person.follow for person in people], axis=0)
+    people = [measured_person(group, column) for group in groups]
+    rests, follow = rest_poses(people), np.mean([person.follow for person in people], axis=0)
     closed = np.array([person.closed for person in people])
     parted = rests[:, column] - closed if column is not None else np.zeros(len(people))
     anchors = rests - parted[:, None] * follow  # the rest poses, but with lips that touch
-    gain = _gains(people, channels)
+    gain = person_gains(people, channels)
     offset = anchors - gain * anchors.mean(axis=0)
     rest = rests - offset - gain * rests.mean(axis=0)
     shut = float(closed.mean())
@@ -278,7 +278,7 @@ def _fit_maps(examples: Sequence[Example], speakers: Sequence[str]) -> SpeakerMa
     return SpeakerMaps(channels, names, gain, offset, rest, habits, (shut, shut + WHOLLY * wide))
 
 
-def _measured(examples: Sequence[Example], column: int | None) -> _Person:
+def measured_person(examples: Sequence[Example], column: int | None) -> PersonStatistics:
     """Return the statistics of one person's motion.
 
     column : of the opening (None: there is no such channel)
@@ -308,7 +308,7 @@ def _measured(examples: Sequence[Example], column: int | None) -> _Person:
         follow[column] = 1
         closed = closed_opening(smallest, speech[:, column], np.concatenate(measured)[:, column])
     rest = np.median(quiet, axis=0) if quiet is not None else np.full(speech.shape[1], np.nan)
-    return _Person(rest, np.median(speech, axis=0), high - low, follow, closed, len(speech) / FRAME_RATE_HZ)
+    return PersonStatistics(rest, np.median(speech, axis=0), high - low, follow, closed, len(speech) / FRAME_RATE_HZ)
 
 
 def _first_long(candidates: Sequence[Array]) -> Array | None:
@@ -316,7 +316,7 @@ def _first_long(candidates: Sequence[Array]) -> Array | None:
     return next((frames for frames in candidates if len(frames) >= LEAST_FRAMES), None)
 
 
-def _rest_poses(people: Sequence[_Person]) -> Array:
+def rest_poses(people: Sequence[PersonStatistics]) -> Array:
     """Return the rest poses of all people [shape=(S, P)].
 
     Whoever is never silent rests as far from their median pose in speech as the others do.
@@ -327,8 +327,14 @@ def _rest_poses(people: Sequence[_Person]) -> Array:
     return np.where(known[:, None], rests, spoken + usual)
 
 
-def _gains(people: Sequence[_Person], channels: Sequence[Channel]) -> Array:
-    """Return the range of each person as a multiple of the mean person's [shape=(S, P)]."""
+def person_gains(
+    people: Sequence[PersonStatistics], channels: Sequence[Channel], most_gain: float = MOST_GAIN
+) -> Array:
+    """Return the range of each person as a multiple of the mean person's [shape=(S, P)].
+
+    most_gain : gains lie between its inverse and itself
+    Points share one gain for each axis. Of people who say little, gains are drawn towards 1 (``RANGE_PRIOR_S``).
+    """
     ranges = np.stack([person.range for person in people])
     moves = (ranges > LEAST_RANGE * ranges.max(axis=0)).all(axis=0) & (ranges > 0).all(axis=0)
     ratio = np.ones(ranges.shape)
@@ -343,7 +349,7 @@ def _gains(people: Sequence[_Person], channels: Sequence[Channel]) -> Array:
     trust = speech_s / (speech_s + RANGE_PRIOR_S)
     shrunk = np.exp(np.log(ratio) * trust[:, None])
     shrunk /= np.exp(np.log(shrunk).mean(axis=0))  # the geometric mean of all gains is 1
-    gains: Array = np.clip(shrunk, LEAST_GAIN, MOST_GAIN)
+    gains: Array = np.clip(shrunk, 1 / most_gain, most_gain)
     return gains
 
 

@@ -16,7 +16,8 @@ from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.outlook import outlook_of
 from lipmotion.pipeline.request import SpeechInput, request_of
-from lipmotion.pipeline.speakers import generate_for, speaker_map
+from lipmotion.pipeline.speakers import generate_for
+from lipmotion.pipeline.transfer import person_of
 from lipmotion.pipeline.understand import understood_speech
 from lipmotion.pipeline.workers import map_in_processes
 from lipmotion.speech.audio_files import read_audio
@@ -61,7 +62,7 @@ def animate(
     """
     chosen = model if isinstance(model, Model) else load_model(model)
     request = request_of(speech, transcript)
-    person = speaker_map(chosen.speakers, request.speaker)
+    person = person_of(chosen, request)
     understood = understood_speech(chosen, request, map_in_processes(workers))
     generation = generate_for(person, chosen.engine, chosen.learned, understood.speech, constraints)
     return replace(generation, outlook=outlook_of(request, understood))

@@ -13,7 +13,8 @@ from lipmotion.errors import InputError
 from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.request import SpeechInput, request_of
-from lipmotion.pipeline.speakers import explanation_for, generate_for, speaker_map
+from lipmotion.pipeline.speakers import explanation_for, generate_for
+from lipmotion.pipeline.transfer import person_of
 from lipmotion.pipeline.understand import audio_of, understand
 from lipmotion.printable import printable
 from lipmotion.speech.mfcc import frame_count
@@ -61,7 +62,7 @@ def explain(
     times = [at] if isinstance(at, int | float) else at
     count = frame_count(audio.samples)
     frames = [_frame(time_s, count) for time_s in times]
-    person = speaker_map(chosen.speakers, request.speaker)
+    person = person_of(chosen, request)
     understood = understand(chosen, replace(request, recording=audio))
     if isinstance(chosen.engine, Explains):
         explained = chosen.engine.explain(chosen.learned, understood, frames)

@@ -12,7 +12,8 @@ from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outlook import outlook_of
 from lipmotion.pipeline.request import SpeechInput, request_of
-from lipmotion.pipeline.speakers import generate_for, speaker_map
+from lipmotion.pipeline.speakers import generate_for
+from lipmotion.pipeline.transfer import person_of
 from lipmotion.pipeline.understand import understood_speech
 from lipmotion.storage.files import check_target, whole_file
 from lipmotion.types import ChainPosteriors, Generation
@@ -34,7 +35,7 @@ def animate_with_posteriors(speech: SpeechInput, *, model: Model) -> tuple[Gener
             f"was trained with --engine {' or '.join(having)}"
         )
     request = request_of(speech)
-    person = speaker_map(model.speakers, request.speaker)
+    person = person_of(model, request)
     understood = understood_speech(model, request)
     generation = generate_for(person, engine, learned, understood.speech)
     outlook = outlook_of(request, understood)

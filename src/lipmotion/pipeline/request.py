@@ -5,9 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from lipmotion.corpora.store import Corpus
 from lipmotion.errors import InputError
+from lipmotion.motion.speakers import SpeakerMap
+from lipmotion.pipeline.model import Model
 from lipmotion.types import Audio, TimedTranscript, Timeline, Unit
 from lipmotion.units import Lexicon
+
+Onto = str | Path | Corpus | Model | SpeakerMap
+"""Another person: a video, the folder of a corpus or a model file, or the value of one of them, or a finished map."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +34,9 @@ class SpeechRequest:
                  transcript is
     speaker    : whose motion is generated, of the people whom the model was trained on; empty: the mean person, or the
                  only one
+    onto       : another person, onto whose face the motion is mapped (``map_onto``): a video of them, a prepared
+                 corpus, another model, or a map that was made before. None: the motion is that of the speaker
+    onto_speaker : which person, where the corpus or the other model has several
 
     >>> import lipmotion
     >>> request = lipmotion.SpeechRequest("examples/welcome.flac", recogniser="general")
@@ -41,6 +50,8 @@ class SpeechRequest:
     lexicon: Lexicon | None = None
     recogniser: str = "auto"
     speaker: str = ""
+    onto: Onto | None = None
+    onto_speaker: str = ""
 
 
 SpeechInput = str | Path | Audio | SpeechRequest

@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib import resources
-from itertools import groupby, pairwise
+from itertools import chain, pairwise
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.corpora.entry import read_entry
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import InputError
-from lipmotion.pipeline.transcribe import read_plain_text
-from lipmotion.units import SILENCE, VISEME_OF, Lexicon, is_silent, words_of
+from lipmotion.pipeline.corpus.sentences import pronounced_sentences, recorded_phones
+from lipmotion.units import SILENCE, VISEME_OF, Lexicon
 
-SHIPPED = "english.txt"
 PHONE, DIPHONE, CONTEXT = "phone", "diphone", "beside"
 WEIGHTS = {PHONE: 8.0, DIPHONE: 2.0, CONTEXT: 1.0}
 """Weight of the first occurrence of each kind of unit: a phone; a phone after a phone; a phone beside a viseme class.
@@ -69,14 +66,16 @@ def prompts(
     if count < 1:
         raise InputError(f"{count} prompts asked for, required at least 1")
     lexicon = lexicon or Lexicon()
-    path = Path(text) if text is not None else Path(str(resources.files("lipmotion") / "prompts" / SHIPPED))
-    usable, left_out = _pronounced(_lines(path), lexicon)
-    if not usable:
-        reason = f"; {next(iter(left_out.values()))!r} is not in the dictionary: --lexicon" if left_out else ""
-        raise InputError(f"{path}: no sentence to choose from{reason}; required: a sentence a line")
+    usable, left_out = pronounced_sentences(text, lexicon)
     index: dict[UnitName, int] = {}
     units = [_numbered(units_of(phones), index) for phones in usable.values()]
-    recorded = _numbered({unit for run in _recorded(have, lexicon) for unit in units_of(run)}, index) if have else None
+    recorded = (
+        _numbered(
+            {unit for run in chain.from_iterable(recorded_phones(have, lexicon)) for unit in units_of(run)}, index
+        )
+        if have
+        else None
+    )
     weights = np.array([WEIGHTS[name[0]] for name in index])
     if recorded is not None:
         weights[recorded] = 0
@@ -128,39 +127,6 @@ def greedy_cover(
             taken.append(i)
             weights[sets[i]] = 0
     return taken
-
-
-def _lines(path: Path) -> list[str]:
-    lines = (" ".join(line.split()) for line in read_plain_text(path).splitlines())
-    return list(dict.fromkeys(line for line in lines if line))
-
-
-def _pronounced(lines: Iterable[str], lexicon: Lexicon) -> tuple[dict[str, tuple[str, ...]], dict[str, str]]:
-    """Return the phones of the sentences that can be used, and the unknown word of every other sentence."""
-    usable: dict[str, tuple[str, ...]] = {}
-    left_out: dict[str, str] = {}
-    for line in lines:
-        try:
-            words = words_of(line)
-        except InputError:  # a line of dashes
-            continue
-        unknown = next((word for word in words if not lexicon.known(word)), None)
-        if unknown is None:
-            usable[line] = tuple(phone for word in words for phone in lexicon.pronunciations(word)[0])
-        else:
-            left_out[line] = unknown
-    return usable, left_out
-
-
-def _recorded(corpus: Corpus, lexicon: Lexicon) -> Iterator[tuple[str, ...]]:
-    """Yield the sequences of phones between silences in the utterances of a corpus."""
-    for name in corpus.names():
-        entry = read_entry(corpus.folder(name))
-        if entry.get("phones"):
-            phones = [row[2] for row in entry["phones"]]
-            yield from (tuple(run) for silent, run in groupby(phones, key=is_silent) if not silent)
-        elif entry["words"] and all(map(lexicon.known, entry["words"])):
-            yield tuple(phone for word in entry["words"] for phone in lexicon.pronunciations(word)[0])
 
 
 def _numbered(units: set[UnitName], index: dict[UnitName, int]) -> NDArray[np.intp]:

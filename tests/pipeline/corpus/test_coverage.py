@@ -1,0 +1,148 @@
+"""What a corpus has of the sounds of a text."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lipmotion.corpora.store import Corpus
+from lipmotion.errors import CorpusError, InputError
+from lipmotion.pipeline.corpus.coverage import coverage, coverage_document, coverage_lines, phone_distances
+from lipmotion.testing.toy import toy_utterances
+from lipmotion.types import Span, Timeline, Unit
+from lipmotion.units import PHONES, VISEME_OF, Lexicon, most_similar_phone
+
+WORDS = Lexicon({"pab": (("p", "aa", "b"),), "tib": (("t", "iy", "b"),), "zog": (("zh", "oy", "g"),)})
+
+
+def corpus_of(folder: Path, *texts: str | None) -> Corpus:
+    corpus = Corpus.create(folder)
+    for utterance, text in zip(toy_utterances(max(len(texts), 3)), texts, strict=False):
+        corpus.add(replace(utterance, words=tuple(text.split()) if text else None, phones=None))
+    return corpus
+
+
+def text_of(path: Path, *lines: str) -> Path:
+    path.write_text("\n".join(lines))
+    return path
+
+
+def test_counts_and_shares(tmp_path: Path) -> None:
+    corpus = corpus_of(tmp_path / "corpus", "pab")
+    found = coverage(corpus, text_of(tmp_path / "text", "pab", "tib", "pab tib"), lexicon=WORDS)
+    phones, diphones, triphones = found.kinds
+    assert (phones.needed, phones.covered) == (5, 3)
+    assert phones.share == pytest.approx(8 / 12)
+    assert [(unit.unit, unit.count) for unit in phones.missing] == [("iy", 2), ("t", 2)]
+    assert [(unit.unit, unit.count) for unit in diphones.missing] == [
+        *[("iy-b", 2), ("t-iy", 2)],
+        *[("b-t", 1), ("sil-t", 1)],
+    ]
+    assert (diphones.needed, diphones.covered) == (8, 4)
+    assert diphones.share == pytest.approx(1 - 6 / 15)
+    assert diphones.missing[0].share == pytest.approx(2 / 15)
+    assert triphones.share == pytest.approx(5 / 12)
+    assert {unit.unit for unit in triphones.missing} == {"sil-t-iy", "t-iy-b", "iy-b-sil", "aa-b-t", "b-t-iy"}
+
+
+def test_what_stands_in(tmp_path: Path) -> None:
+    corpus = corpus_of(tmp_path / "corpus", "pab pab tib")
+    lexicon = Lexicon(WORDS.user | {"bad": (("b", "aa", "d"),), "dib": (("d", "iy", "m"),)})
+    phones, diphones, triphones = coverage(corpus, text_of(tmp_path / "text", "bad dib"), lexicon=lexicon).kinds
+    stand_ins = {unit.unit: (unit.stand_in, unit.recorded) for unit in phones.missing}
+    assert stand_ins["d"] == ("t", 1)
+    assert stand_ins["m"][0] == most_similar_phone("m", {"p", "aa", "b", "t", "iy"})
+    nearest = {unit.unit: (unit.stand_in, unit.recorded) for unit in diphones.missing}
+    assert nearest["sil-b"] == ("sil-p", 1)
+    assert nearest["b-aa"] == ("p-aa", 2)
+    assert nearest["d-iy"] == ("t-iy", 1)
+    assert nearest["iy-m"] == ("iy-b", 1)
+    assert {unit.unit: unit.stand_in for unit in triphones.missing}["d-iy-m"] == "t-iy-b"
+
+
+def test_the_nearest_has_the_least_distance(tmp_path: Path, toy_corpus: Corpus) -> None:
+    """Recomputed one by one, in plain Python."""
+    distances, number = phone_distances(), {phone: n for n, phone in enumerate(PHONES)}
+    lexicon = Lexicon()
+    recorded: Counter[tuple[str, ...]] = Counter()
+    for name in toy_corpus.names():
+        phones = [p for word in toy_corpus.utterance(name).words or () for p in lexicon.pronunciations(word)[0]]
+        recorded.update(zip(["sil", *phones[:-1]], phones, [*phones[1:], "sil"], strict=True))
+    _, _, triphones = coverage(toy_corpus, text_of(tmp_path / "text", "please judge the toys")).kinds
+    assert triphones.missing
+
+    def cost(wanted: tuple[str, ...], other: tuple[str, ...]) -> float:
+        each = [distances[number[a], number[b]] for a, b in zip(wanted, other, strict=True)]
+        return float(each[0] + 2 * each[1] + each[2])
+
+    for unit in triphones.missing:
+        wanted, chosen = tuple(unit.unit.split("-")), tuple(unit.stand_in.split("-"))
+        assert cost(wanted, chosen) == pytest.approx(min(cost(wanted, other) for other in recorded))
+        assert unit.recorded == recorded[chosen]
+
+
+def test_distances_of_phones() -> None:
+    distances = phone_distances()
+    assert distances.min() >= 0
+    assert distances.max() <= 2.5
+    assert np.abs(np.diag(distances)).max() < 1e-12
+    number = {phone: n for n, phone in enumerate(PHONES)}
+    assert distances[number["p"], number["b"]] < distances[number["p"], number["t"]] < distances[
+        number["p"], number["iy"]
+    ]  # fmt: skip
+    same = np.array([[VISEME_OF[a] == VISEME_OF[b] for b in PHONES] for a in PHONES])
+    assert distances[~same].min() >= 1
+
+
+def test_labelled_phones_count_and_silence_divides_them(tmp_path: Path) -> None:
+    corpus = Corpus.create(tmp_path / "corpus")
+    utterance = toy_utterances(3)[0]
+    names = ["sil", "p", "aa", "sp", "b", "sil"]
+    step_s = utterance.audio.duration_s / len(names)
+    spans = tuple(Span(n * step_s, (n + 1) * step_s, Unit(name)) for n, name in enumerate(names))
+    corpus.add(replace(utterance, phones=Timeline(spans), words=("tib",)))
+    phones, diphones, _ = coverage(corpus, text_of(tmp_path / "text", "pab tib"), lexicon=WORDS).kinds
+    assert {unit.unit for unit in phones.missing} == {"t", "iy"}
+    assert "aa-b" in {unit.unit for unit in diphones.missing}
+    assert "p-aa" not in {unit.unit for unit in diphones.missing}
+
+
+def test_everything_is_covered(tmp_path: Path) -> None:
+    corpus = corpus_of(tmp_path / "corpus", "pab tib")
+    found = coverage(corpus, text_of(tmp_path / "text", "pab tib"), lexicon=WORDS)
+    assert [(kind.covered, kind.missing) for kind in found.kinds] == [(5, ()), (7, ()), (6, ())]
+    assert all(kind.share == pytest.approx(1) for kind in found.kinds)
+
+
+def test_sentences_of_the_package_and_what_is_not_counted(tmp_path: Path) -> None:
+    corpus = corpus_of(tmp_path / "corpus", "see bob", "qwrtzx", None)
+    found = coverage(corpus)
+    assert (found.utterances, found.unknown, found.left_out) == (3, 2, {})
+    assert [kind.needed for kind in found.kinds[:2]] == [42, 1047]
+    assert found.kinds[0].share > found.kinds[1].share > found.kinds[2].share > 0
+
+
+def test_what_cannot_be_counted(tmp_path: Path) -> None:
+    with pytest.raises(CorpusError, match="none of 1 utterances has labelled phones or words that are known"):
+        coverage(corpus_of(tmp_path / "unknown", None))
+    with pytest.raises(InputError, match="no sentence to choose from"):
+        coverage(corpus_of(tmp_path / "known", "see"), text_of(tmp_path / "text", ""))
+
+
+def test_text_is_bounded_and_json_holds_everything(tmp_path: Path) -> None:
+    found = coverage(corpus_of(tmp_path / "corpus", "see bob"))
+    lines = list(coverage_lines(found, 5))
+    assert len(lines) == 4 + 3 * (2 + 5 + 1)
+    assert max(map(len, lines)) < 80
+    missing = [len(kind.missing) - 5 for kind in found.kinds]
+    assert [line for line in lines if line.startswith("and ")] == [
+        f"and {count} more {kind.kind}" for count, kind in zip(missing, found.kinds, strict=True)
+    ]
+    document = json.loads(json.dumps(coverage_document(found)))
+    assert [len(kind["missing"]) for kind in document["kinds"]] == [len(kind.missing) for kind in found.kinds]
+    assert set(document["kinds"][0]["missing"][0]) == {"unit", "count", "share", "stand_in", "recorded"}

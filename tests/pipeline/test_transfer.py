@@ -1,0 +1,235 @@
+"""Generated motion onto the face of another person: of a corpus, a video, another model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import lipmotion
+from lipmotion.corpora.store import Corpus
+from lipmotion.engines import engine_named
+from lipmotion.errors import CorpusError, InputError
+from lipmotion.hmm.model import HmmConfig
+from lipmotion.motion.closure import closable_ranges
+from lipmotion.pipeline.animate import animate
+from lipmotion.pipeline.explain import explain
+from lipmotion.pipeline.model import Model, load_model, save_model
+from lipmotion.pipeline.request import Onto, SpeechRequest
+from lipmotion.pipeline.training.train import train
+from lipmotion.pipeline.transfer import map_onto, with_person
+from lipmotion.testing.toy import ToySentence, toy_motion, toy_utterances
+from lipmotion.types import Channel, Constraints, Motion, Pin, Track, Utterance
+from lipmotion.vision.frames import VideoSpan
+
+GAIN, OFFSET = np.array([0.5, 1.2, 0.6]), np.array([0.04, -0.05, 0.1])
+"""How ben's opening, width and outer differ from those of the toy."""
+
+
+def of_ben(utterance: Utterance, speaker: str = "ben") -> Utterance:
+    motion = utterance.track.motion
+    changed = Motion(OFFSET + GAIN * motion.values, motion.rate_hz, motion.channels)
+    return replace(utterance, track=replace(utterance.track, motion=changed), speaker=speaker)
+
+
+def corpus_of(folder: Path, utterances: Sequence[Utterance]) -> Corpus:
+    corpus = Corpus.create(folder)
+    for utterance in utterances:
+        corpus.add(utterance)
+    return corpus
+
+
+@pytest.fixture(scope="module")
+def ben(tmp_path_factory: pytest.TempPathFactory) -> Corpus:
+    return corpus_of(tmp_path_factory.mktemp("ben") / "corpus", [of_ben(each) for each in toy_utterances(8, seed=1)])
+
+
+@pytest.fixture(scope="module")
+def of_two(tmp_path_factory: pytest.TempPathFactory) -> Corpus:
+    utterances = [
+        replace(each, speaker="anna") if number % 2 else of_ben(each)
+        for number, each in enumerate(toy_utterances(12, seed=1))
+    ]
+    return corpus_of(tmp_path_factory.mktemp("two") / "corpus", utterances)
+
+
+@pytest.fixture(scope="module")
+def two_model(of_two: Corpus) -> Model:
+    engine = engine_named("trajectory", {"articulation": False})
+    return train(of_two, recogniser=HmmConfig(mixtures=1, iterations=2), engine=engine)[0]
+
+
+def request(sentence: ToySentence, onto: Onto | None = None, **more: str) -> SpeechRequest:
+    return SpeechRequest(sentence.audio, units=sentence.units, onto=onto, **more)
+
+
+def is_like_ben(model: Model, sentence: ToySentence, onto: Onto, **more: str) -> None:
+    """Raise AssertionError unless the motion is that of the model, in ben's place and range."""
+    own, mapped = animate(request(sentence), model=model), animate(request(sentence, onto, **more), model=model)
+    wanted = OFFSET + GAIN * toy_motion(sentence.units, 100.0).values
+    ranges = [np.ptp(np.percentile(values, [2, 98], axis=0), axis=0) for values in (mapped.motion.values, wanted)]
+    np.testing.assert_allclose(ranges[0] / ranges[1], 1, atol=0.25)
+    assert np.abs(np.median(mapped.motion.values, axis=0) - np.median(wanted, axis=0)).max() < 0.03
+    for name in own.motion.names:
+        assert np.corrcoef(own.motion[name], mapped.motion[name])[0, 1] > 0.98
+    for frames in closable_ranges(sentence.units, len(mapped.motion.values)):
+        assert mapped.motion["opening"][frames].min() == pytest.approx(OFFSET[0], abs=0.02)
+
+
+def test_onto_the_person_of_a_corpus(toy_model: Model, toy_sentence: ToySentence, ben: Corpus) -> None:
+    is_like_ben(toy_model, toy_sentence, ben)
+    is_like_ben(toy_model, toy_sentence, ben.path)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("engine", ["joint", "coupled", "selection"])
+def test_every_engine(toy_corpus: Corpus, toy_sentence: ToySentence, ben: Corpus, engine: str) -> None:
+    settings: dict[str, object] = {"articulation": False}  # the toy's mouth does not move as English ones do
+    if engine == "coupled":
+        settings |= {"chains": "sVis 2vis", "mixtures": 2}
+    model, _ = train(toy_corpus, recogniser=HmmConfig(mixtures=1, iterations=2), engine=engine_named(engine, settings))
+    is_like_ben(model, toy_sentence, ben)
+
+
+def test_variance_and_pins_and_explanations_are_of_the_person(
+    toy_model: Model, toy_sentence: ToySentence, ben: Corpus
+) -> None:
+    person = map_onto(toy_model, ben)
+    own, mapped = (animate(request(toy_sentence, onto), model=toy_model) for onto in (None, person))
+    np.testing.assert_allclose(mapped.variance, own.variance * np.square(person.gain))
+    pins = Constraints((Pin(0.9, "opening", 0.17), Pin(1.2, "width", 0.5)))
+    pinned = animate(request(toy_sentence, person), model=toy_model, constraints=pins).motion
+    for pin in pins.pins:
+        assert pinned[pin.channel][round(pin.time_s * 100)] == pytest.approx(pin.value, abs=1e-9)
+    (explanation,) = explain(request(toy_sentence, person), at=0.9, model=toy_model)
+    assert explanation.motion["opening"].value == pytest.approx(mapped.motion["opening"][90], abs=1e-9)
+
+
+def test_a_person_of_the_model_onto_another(two_model: Model, toy_sentence: ToySentence, ben: Corpus) -> None:
+    """Whoever of the model's people speaks, the motion is in ben's place and range."""
+    people = [animate(request(toy_sentence, ben, speaker=name), model=two_model).motion for name in ("", "anna", "ben")]
+    ranges = np.stack([np.ptp(np.percentile(motion.values, [5, 95], axis=0), axis=0) for motion in people])
+    np.testing.assert_allclose(ranges / ranges[2], 1, atol=0.15)
+    anna = animate(request(toy_sentence, speaker="anna"), model=two_model).motion
+    assert np.ptp(anna["opening"]) > 1.3 * np.ptp(people[1]["opening"])
+    with pytest.raises(InputError, match="no speaker 'cleo', only: anna, ben"):
+        animate(request(toy_sentence, ben, speaker="cleo"), model=two_model)
+
+
+def test_onto_one_person_of_a_corpus_of_several(toy_model: Model, toy_sentence: ToySentence, of_two: Corpus) -> None:
+    is_like_ben(toy_model, toy_sentence, of_two, onto_speaker="ben")
+    for more, found in (({}, "2 speakers"), ({"onto_speaker": "cleo"}, "no speaker 'cleo'")):
+        with pytest.raises(InputError, match=rf"{found}, required one of: anna, ben; name it \(--onto-speaker\)"):
+            animate(request(toy_sentence, of_two, **more), model=toy_model)
+
+
+def test_onto_a_person_of_another_model(
+    toy_model: Model, two_model: Model, toy_sentence: ToySentence, tmp_path: Path
+) -> None:
+    save_model(two_model, tmp_path / "two.lipmotion")
+    mapped = animate(request(toy_sentence, tmp_path / "two.lipmotion", onto_speaker="ben"), model=toy_model).motion
+    wanted = animate(request(toy_sentence, speaker="ben"), model=two_model).motion
+    own = animate(request(toy_sentence), model=toy_model).motion
+    assert np.abs(mapped.values - wanted.values).mean() < 0.4 * np.abs(own.values - wanted.values).mean()
+    with pytest.raises(InputError, match="no speaker 'cleo', only: anna, ben"):
+        animate(request(toy_sentence, two_model, onto_speaker="cleo"), model=toy_model)
+    with pytest.raises(InputError, match=r"measured in some speech; give a request \(speech=\.\.\.\)"):
+        map_onto(toy_model, two_model)
+
+
+def test_onto_the_person_of_a_video(
+    toy_model: Model, toy_sentence: ToySentence, toy_speech: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The video is as short as a sentence, so that the gain counts in part."""
+    tracked = []
+
+    def track(path: Path, *, crops: bool, span: VideoSpan) -> Track:
+        tracked.append((path, crops, span.end_s))
+        return of_ben(toy_utterances(3)[0]).track
+
+    monkeypatch.setattr("lipmotion.pipeline.transfer.track", track)
+    own, mapped = (animate(request(toy_sentence, onto), model=toy_model).motion for onto in (None, toy_speech))
+    assert tracked == [(toy_speech, False, 60.0)]
+    ratio = np.ptp(mapped["opening"]) / np.ptp(own["opening"])
+    assert GAIN[0] < ratio < 0.95
+    assert mapped["width"].mean() == pytest.approx(OFFSET[1] + GAIN[1] * own["width"].mean(), abs=0.03)
+    with pytest.raises(InputError, match="a video has no speaker 'ben' by name"):
+        map_onto(toy_model, toy_speech, onto_speaker="ben")
+
+
+def test_a_map_is_kept_in_a_model(toy_model: Model, toy_sentence: ToySentence, ben: Corpus, tmp_path: Path) -> None:
+    person = map_onto(toy_model, ben)
+    known = with_person(with_person(toy_model, "ben", person), "cleo", replace(person, gain=2 * person.gain))
+    save_model(known, tmp_path / "known.lipmotion")
+    again = load_model(tmp_path / "known.lipmotion")
+    assert again.about["speakers"] == ["ben", "cleo"]
+    wanted = animate(request(toy_sentence, person), model=toy_model).motion
+    found = animate(request(toy_sentence, speaker="ben"), model=again).motion
+    np.testing.assert_allclose(found.values, wanted.values, atol=1e-3)
+    unmapped = animate(request(toy_sentence), model=toy_model).motion
+    np.testing.assert_allclose(animate(request(toy_sentence), model=again).motion.values, unmapped.values, atol=1e-3)
+    for name in ("ben", ""):
+        with pytest.raises(InputError, match="required another name than: , ben, cleo"):
+            with_person(known, name, person)
+
+
+def test_a_person_joins_those_of_a_model(two_model: Model, toy_sentence: ToySentence, ben: Corpus) -> None:
+    person = map_onto(two_model, ben)
+    known = with_person(two_model, "other", person)
+    found = animate(request(toy_sentence, speaker="other"), model=known).motion
+    np.testing.assert_allclose(found.values, animate(request(toy_sentence, person), model=two_model).motion.values)
+    anna, same = (
+        animate(request(toy_sentence, speaker="anna"), model=model).motion.values for model in (known, two_model)
+    )
+    np.testing.assert_allclose(anna, same)
+
+
+def test_other_channels_are_refused(toy_model: Model, toy_sentence: ToySentence, tmp_path: Path) -> None:
+    def weights(utterance: Utterance) -> Utterance:
+        channels = tuple(Channel(name, "weight") for name in ("jaw", "width", "outer"))
+        motion = replace(utterance.track.motion, channels=channels)
+        return replace(utterance, track=replace(utterance.track, motion=motion))
+
+    corpus = corpus_of(tmp_path / "weights", [weights(each) for each in toy_utterances(3)])
+    with pytest.raises(InputError, match=r"weights: its motion has no channel 'opening'.*3 of 3 are missing"):
+        animate(request(toy_sentence, corpus), model=toy_model)
+
+
+def test_no_face_and_no_speech_are_refused(toy_model: Model, toy_sentence: ToySentence, tmp_path: Path) -> None:
+    def unseen(utterance: Utterance) -> Utterance:
+        return replace(utterance, track=replace(utterance.track, seen=np.zeros_like(utterance.track.seen)))
+
+    corpus = corpus_of(tmp_path / "unseen", [unseen(each) for each in toy_utterances(3)])
+    with pytest.raises(InputError, match=r"unseen: 0\.00 s of speech with a measured face, required 0\.5 s or more"):
+        animate(request(toy_sentence, corpus), model=toy_model)
+    with pytest.raises(InputError, match="the corpus is empty"):
+        animate(request(toy_sentence, Corpus.create(tmp_path / "empty")), model=toy_model)
+
+
+def test_what_is_no_person(toy_model: Model, toy_sentence: ToySentence, tmp_path: Path) -> None:
+    (tmp_path / "empty.mp4").touch()
+    for onto, error, message in (
+        (tmp_path, CorpusError, "not a corpus"),
+        (tmp_path / "missing.mp4", InputError, "no such file"),
+        (tmp_path / "empty.mp4", InputError, "the file is empty; give a video"),
+    ):
+        with pytest.raises(error, match=message):
+            animate(request(toy_sentence, onto), model=toy_model)
+    with pytest.raises(InputError, match="onto the speaker 'ben', but of what"):
+        animate(request(toy_sentence, onto_speaker="ben"), model=toy_model)
+
+
+@pytest.mark.recordings
+@pytest.mark.video
+def test_onto_a_real_person(recordings: Path) -> None:
+    """A face that rests with parted lips: the rest pose of the result is the tracked one."""
+    pytest.importorskip("mediapipe")
+    from lipmotion.vision.track import track
+
+    video = recordings / "grid-others" / "brbk7n.mpg"
+    rest = np.median(track(video, crops=False).motion["opening"][:8])
+    own, mapped = (lipmotion.animate(SpeechRequest(video, onto=onto)).motion["opening"] for onto in (None, video))
+    assert abs(np.median(mapped[:20]) - rest) < 0.5 * abs(np.median(own[:20]) - rest)
