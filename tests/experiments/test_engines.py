@@ -85,6 +85,15 @@ def test_every_system_in_every_condition(figures: dict[str, Any]) -> None:
     assert (figures["split"], figures["clips"]) == ("test", 2)
 
 
+def test_differences_are_paired(figures: dict[str, Any]) -> None:
+    for condition in figures["conditions"].values():
+        rows = condition["systems"]
+        for name in ENGINES_COMPARED:
+            assert rows[name]["acc_gain_95"][name] == pytest.approx((0, 0))
+        for engine, (low, high) in rows[HYBRID]["acc_gain_95"].items():
+            assert low - 1e-9 <= rows[HYBRID]["acc"] - rows[engine]["acc"] <= high + 1e-9
+
+
 @pytest.mark.parametrize("engine", ENGINES_COMPARED)
 def test_the_figures_are_those_of_the_verb_evaluate(
     figures: dict[str, Any], folder: Path, toy_corpus: Corpus, engine: str
@@ -153,7 +162,7 @@ def test_the_table_has_every_system_and_every_clip(figures: dict[str, Any], toy_
         confidences = [float(x) for x in next(line for line in lines if line.startswith(f"  {name}")).split()[1:]]
         clip = figures["conditions"]["audio only"]["disagreement"]["clips"][name]
         assert confidences == pytest.approx(clip["confidence"], abs=0.005)
-    assert "1 where trajectory, coupled and selection agree, 0 where" in table(figures)
+    assert "1 where trajectory, coupled and selection agree, 0 where they are" in table(figures)
 
 
 def test_the_guide_decides_what_is_selected(hybrid: tuple[Hybrid, HybridModel]) -> None:
@@ -203,8 +212,9 @@ def test_guides_that_cannot_be(hybrid: tuple[Hybrid, HybridModel]) -> None:
 
 
 def clip(original: Any, generated: Any) -> ComparedClip:
-    time_s = np.arange(len(original)) / 10
-    return ComparedClip(np.reshape(original, (-1, 1)), np.reshape(generated, (-1, 1)), time_s, ())
+    """Ten frames a second, with speech from 0.5 s to 1.2 s."""
+    time_s, spoken = np.arange(len(original)) / 10, ((0.5, 0.9, "aa"), (0.9, 1.2, "p"))
+    return ComparedClip(np.reshape(original, (-1, 1)), np.reshape(generated, (-1, 1)), time_s, spoken)
 
 
 def test_disagreement_by_hand() -> None:
@@ -221,8 +231,23 @@ def test_disagreement_by_hand() -> None:
     assert np.isnan(differs[2])
     assert opening.error("b")[:2] == pytest.approx([0, 3])
     assert opening.movement("a")[:2] == pytest.approx([1, 1])
+    assert opening.speech()[:2] == pytest.approx([0.5, 0.2])
     assert confidence_of(differs)[:2] == pytest.approx([1, 0])
-    assert confidence_of(np.array([0.25, np.nan]))[0] == pytest.approx(0.75)
+    assert confidence_of(np.array([0.2, np.nan]))[0] == pytest.approx(0.6)
+
+
+def test_silence_that_is_right_says_nothing_about_speech() -> None:
+    """Disagreement and error are drawn apart in speech and are small in silence."""
+    draw = np.random.default_rng(2)
+    openings = []
+    for _ in range(40):
+        loud = np.repeat([1.0, 1.0, 0.01], 25)
+        mean, apart = (np.repeat(draw.uniform(0.2, 1, 3), 25) * loud for _ in range(2))
+        made = {"a": mean - apart, "b": mean + apart, "m": mean}
+        openings.append(OpeningOfClip(np.arange(75) / 25, np.zeros(75), made, np.arange(75) < 50))
+    found = disagreement_figures(openings, ("a", "b"), "m", [str(number) for number in range(40)], 0)
+    assert found["rank_correlation"]["m"]["value"] > 0.5
+    assert abs(found["in_speech"]["m"]["value"]) < 0.25
 
 
 def test_the_mean_is_the_mean() -> None:
@@ -248,13 +273,25 @@ def test_disagreement_that_is_error_is_a_confidence() -> None:
         spread = np.repeat(draw.uniform(0.1, 1, 3), 25)
         original = np.sin(np.arange(75) / 3)
         made = {name: original + spread * draw.normal(size=75) for name in ("a", "b")}
-        openings.append(OpeningOfClip(np.arange(75) / 25, original, made | {"m": (made["a"] + made["b"]) / 2}))
+        made["m"] = (made["a"] + made["b"]) / 2
+        openings.append(OpeningOfClip(np.arange(75) / 25, original, made, np.arange(75) < 50))
     names = [str(number) for number in range(20)]
     found = disagreement_figures(openings, ("a", "b"), "m", names, 0)
     low, high = found["rank_correlation"]["m"]["95"]
     assert 0.7 < low < found["rank_correlation"]["m"]["value"] < high
+    assert (found["seconds"], found["seconds_of_speech"]) == (60, 40)
+    assert found["in_speech"]["m"]["value"] > 0.7
     errors = [part["error"] for part in found["quarters"]]
     assert errors == sorted(errors)
     assert [part["seconds"] for part in found["quarters"]] == [15] * 4
     assert list(found["clips"]) == names
     assert json.dumps(found)
+
+
+@pytest.mark.parametrize(("split", "clips"), [("val", 22), ("test", 50)])
+def test_the_document_shows_the_figures_beside_it(split: str, clips: int) -> None:
+    results = Path(__file__).parents[2] / "docs" / "results"
+    figures = json.loads((results / f"engines-{split}.json").read_text(encoding="utf-8"))
+    shown = table(figures).partition("\n\nconfidence in every second")[0]
+    assert f"```text\n{shown}\n```" in (results / "engines.md").read_text(encoding="utf-8")
+    assert (figures["split"], figures["clips"]) == (split, clips)

@@ -40,7 +40,7 @@ WIDTH = "width"
 
 
 @dataclass(frozen=True, eq=False)
-class ComparedSystem:
+class ComparedEngine:
     """A system with its model of motion.
 
     speakers : maps of the people whom the model knows, or None
@@ -104,16 +104,16 @@ def engines(
     return figures
 
 
-def compared_systems(trained: Mapping[str, EngineModel]) -> dict[str, ComparedSystem]:
+def compared_systems(trained: Mapping[str, EngineModel]) -> dict[str, ComparedEngine]:
     """Return the engines and the hybrid, by name.
 
     trained : from ``engine_models``
     """
     models = {name: each.model for name, each in trained.items()}
-    systems = {name: ComparedSystem(model.engine, model.learned, model.speakers) for name, model in models.items()}
+    systems = {name: ComparedEngine(model.engine, model.learned, model.speakers) for name, model in models.items()}
     guiding, selecting = systems["trajectory"], systems["selection"]
     hybrid: Any = Hybrid
-    systems[HYBRID] = ComparedSystem(
+    systems[HYBRID] = ComparedEngine(
         hybrid(guiding.engine, selecting.engine), HybridModel(guiding.learned, selecting.learned), selecting.speakers
     )
     return systems
@@ -129,7 +129,7 @@ def _about(trained: EngineModel) -> dict[str, Any]:
     }
 
 
-def _made(recordings: HeldOutRecordings, condition: str, system: ComparedSystem) -> _MadeClips:
+def _made(recordings: HeldOutRecordings, condition: str, system: ComparedEngine) -> _MadeClips:
     """Return what a system generates under a condition."""
     known = replace(recordings, speakers=system.speakers)
     speech = speech_of_condition(known, condition, system.engine, system.learned)
@@ -159,26 +159,34 @@ def _condition(recordings: HeldOutRecordings, made: Mapping[str, _MadeClips], se
     )
     everything = {**made, MEAN: mean}
     pinned = {name: each.pinned for name, each in everything.items()}
-    reference = pinned[REFERENCE_ENGINE]
+    references = {name: pinned[name] for name in ENGINES_COMPARED}
     openings, deviation = openings_of_clips(pinned, recordings.channels.index(OPENING))
     names = [utterance.name for utterance in recordings.utterances]
     disagreement = disagreement_figures(openings, ENGINES_COMPARED, MEAN, names, seed)
     return {
-        "systems": {name: _row(recordings, each, reference, seed) for name, each in everything.items()},
+        "systems": {name: _row(recordings, each, references, seed) for name, each in everything.items()},
         "disagreement": {"deviation": deviation} | disagreement,
     }
 
 
 def _row(
-    recordings: HeldOutRecordings, made: _MadeClips, reference: Sequence[ComparedClip], seed: int
+    recordings: HeldOutRecordings, made: _MadeClips, references: Mapping[str, Sequence[ComparedClip]], seed: int
 ) -> dict[str, Any]:
-    """Return the figures of one system; ``unpinned``: those of the opening without forced closures."""
-    own, others = (correlation_statistic(*opening_curves(recordings, clips)) for clips in (made.pinned, reference))
+    """Return the figures of one system; ``unpinned``: those of the opening without forced closures.
+
+    ``acc_gain_95`` has the paired 95 % interval of its ACC minus that of each engine.
+    """
+    own = correlation_statistic(*opening_curves(recordings, made.pinned))
+    gains = {
+        name: own.gain(correlation_statistic(*opening_curves(recordings, clips)), seed)
+        for name, clips in references.items()
+    }
     figures = figures_of(made.pinned, recordings, seed)
     width = figures["channels"].get(WIDTH, {})
-    row = _opening(figures) | {"acc_gain_95": own.gain(others, seed)}
+    row = _opening(figures) | {"acc_gain_95": gains}
     row |= {f"{WIDTH}_{name}": width.get(name) for name in ("acc", "nrmse", "global_variance")}
-    return row | {"lag_ms": figures["lag_ms"], "unpinned": _opening(figures_of(made.free, recordings, seed))}
+    row |= {"jerk": figures["channels"][OPENING]["jerk"], "lag_ms": figures["lag_ms"]}
+    return row | {"unpinned": _opening(figures_of(made.free, recordings, seed))}
 
 
 def _opening(figures: Mapping[str, Any]) -> dict[str, Any]:

@@ -21,7 +21,11 @@ Array = NDArray[np.float64]
 LEAST_FRAMES = 5
 """A second with fewer measured frames has no figures."""
 ROUNDING_S = 1e-6
+ERROR_SHARE = 2.0
+"""Error for one unit of disagreement that a confidence supposes."""
 QUARTERS = 4
+SPOKEN_SHARE = 0.5
+"""A second counts as speech from this share of it on."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,11 +35,13 @@ class OpeningOfClip:
     time_s    : time of every frame in seconds [shape=(N,)]
     original  : in units of the recordings' deviation [shape=(N,)]
     generated : by each system, in the same unit [each shape=(N,)]
+    spoken    : whether a phone of speech is said in the frame [shape=(N,)]
     """
 
     time_s: Array
     original: Array
     generated: Mapping[str, Array]
+    spoken: NDArray[np.bool_]
 
     def disagreement(self, systems: Sequence[str]) -> Array:
         """Return the standard deviation between systems in every second [shape=(S,)].
@@ -54,6 +60,10 @@ class OpeningOfClip:
         curve = self.generated[system]
         squares = self._per_second(np.square(curve)) ** 2 - self._per_second(curve, root=False) ** 2
         return np.sqrt(np.maximum(squares, 0))
+
+    def speech(self) -> Array:
+        """Return the share of speech in every second, 0 to 1 [shape=(S,)]; NaN as above."""
+        return self._per_second(self.spoken.astype(float), root=False)
 
     def _per_second(self, values: Array, *, root: bool = True) -> Array:
         """Return the (root of the) mean of values [shape=(N,)] in every second [shape=(S,)]."""
@@ -78,18 +88,28 @@ def openings_of_clips(clips: Mapping[str, Sequence[ComparedClip]], column: int) 
             clip.time_s,
             clip.original[:, column] / unit,
             {name: made[number].generated[:, column] / unit for name, made in clips.items()},
+            _spoken_frames(clip),
         )
         for number, clip in enumerate(first)
     ]
     return openings, deviation
 
 
-def confidence_of(disagreement: Array) -> Array:
-    """Return a confidence from 0 to 1 [same shape]: 1 - disagreement, 0 where it is 1 or more; NaN stays.
+def _spoken_frames(clip: ComparedClip) -> NDArray[np.bool_]:
+    spoken = np.zeros(len(clip.time_s), bool)
+    for start_s, end_s, _ in clip.spoken:
+        spoken |= (clip.time_s >= start_s) & (clip.time_s < end_s)
+    return spoken
 
-    So 1 means that the engines agree, and 0 that they differ by as much as the mouth moves in the recordings.
+
+def confidence_of(disagreement: Array) -> Array:
+    """Return a confidence from 0 to 1 [same shape]: 1 - 2 · disagreement, but at least 0; NaN stays.
+
+    So 1 means that the engines agree, and 0 that they are half a deviation of the recorded opening apart or more. On
+    the list ``val`` of the speaker GRID s1 the error was two to three times the disagreement where the mouth moves
+    (docs/results/engines.md): the confidence is about 1 minus the error that is to be expected.
     """
-    result: Array = np.clip(1 - disagreement, 0, 1)
+    result: Array = np.clip(1 - ERROR_SHARE * disagreement, 0, 1)
     return result
 
 
@@ -124,12 +144,15 @@ def disagreement_figures(
     mean     : name of the system that is the mean of these
     names    : of the clips
     seed     : of the bootstrap intervals over clips
-    ``rank_correlation`` has, for each system, Spearman's correlation of disagreement and error over all seconds;
-    ``movement``, for comparison, that of the error of the mean with how much the mean moves in this second, and
+    ``rank_correlation`` has, for each system, Spearman's correlation of disagreement and error over all seconds,
+    ``in_speech`` that over the seconds of which at least half is speech: in silence all engines agree and are right,
+    so that the former would be high even if disagreement told no more than whether somebody speaks.
+    ``movement``, for comparison, is that of the error of the mean with how much the mean moves in this second, and
     ``beyond_movement`` the partial one of disagreement and error at equal movement. ``quarters`` has the error of the
     mean in the quarters of the seconds, from the least disagreement to the greatest.
     """
     known = [~np.isnan(clip.disagreement(engines)) for clip in openings]
+    spoken = [clip.speech()[kept] >= SPOKEN_SHARE for clip, kept in zip(openings, known, strict=True)]
     differing = [clip.disagreement(engines)[kept] for clip, kept in zip(openings, known, strict=True)]
     errors = {
         name: [clip.error(name)[kept] for clip, kept in zip(openings, known, strict=True)]
@@ -147,11 +170,20 @@ def disagreement_figures(
     return {
         "seconds": int(sum(map(len, differing))),
         "rank_correlation": {name: _with_interval(differing, error, seed) for name, error in errors.items()},
+        "seconds_of_speech": int(sum(map(np.count_nonzero, spoken))),
+        "in_speech": {
+            name: _with_interval(_chosen(differing, spoken), _chosen(error, spoken), seed)
+            for name, error in errors.items()
+        },
         "movement": _with_interval(moving, errors[mean], seed),
         "beyond_movement": partial_rank_correlation(differing, errors[mean], moving),
         "quarters": _quarters(np.concatenate(differing), np.concatenate(errors[mean])),
         "clips": clips,
     }
+
+
+def _chosen(values: Sequence[Array], chosen: Sequence[NDArray[np.bool_]]) -> list[Array]:
+    return [x[kept] for x, kept in zip(values, chosen, strict=True)]
 
 
 def _with_interval(some: Sequence[Array], others: Sequence[Array], seed: int) -> dict[str, Any]:
