@@ -43,7 +43,7 @@ def test_names_and_loading(installed: None) -> None:  # noqa: ARG001
 
 
 def test_built_in_extensions_are_of_their_kinds() -> None:
-    assert [issubclass(ENGINES.load(name), Engine) for name in ENGINES.built_in] == [True] * 3
+    assert [issubclass(ENGINES.load(name), Engine) for name in ENGINES.built_in] == [True] * 4
     assert [ENGINES.load(name).name for name in ENGINES.built_in] == list(ENGINES.built_in)
     assert all(issubclass(FACES.load(name), Face) for name in FACES.built_in)
     assert all(isinstance(MOTION_FORMATS.load(name), MotionFormat) for name in MOTION_FORMATS.built_in)

@@ -24,8 +24,20 @@ if TYPE_CHECKING:
     from lipmotion.pipeline.explain import explain
     from lipmotion.pipeline.model import Model, load_model, save_model
     from lipmotion.pipeline.request import SpeechRequest
+    from lipmotion.pipeline.speak import speak
     from lipmotion.pipeline.training.train import Run, train
-    from lipmotion.types import Audio, Constraints, Explanation, Generation, Motion, Pin, Span, Timeline, Unit
+    from lipmotion.types import (
+        Audio,
+        Constraints,
+        Explanation,
+        Generation,
+        Motion,
+        Pin,
+        Span,
+        SpokenText,
+        Timeline,
+        Unit,
+    )
     from lipmotion.units import Lexicon
 
 __all__ = [
@@ -43,6 +55,7 @@ __all__ = [
     "Selection",
     "Span",
     "SpeechRequest",
+    "SpokenText",
     "Timeline",
     "Unit",
     "adapt",
@@ -55,6 +68,7 @@ __all__ = [
     "prepare",
     "read_motion",
     "save_model",
+    "speak",
     "train",
     "write",
     "write_cues",
@@ -78,6 +92,8 @@ _HOMES = {
     "prepare": "lipmotion.pipeline.corpus.prepare",
     "read_motion": "lipmotion.export.base",
     "save_model": "lipmotion.pipeline.model",
+    "SpokenText": "lipmotion.types",
+    "speak": "lipmotion.pipeline.speak",
     "train": "lipmotion.pipeline.training.train",
     "write": "lipmotion.pipeline.animate",
     "write_cues": "lipmotion.pipeline.cues",

@@ -13,6 +13,7 @@ LIPMOTION, EIGENLIPS, ADAPTATION, GRID = "lipmotion", "xieliu2007", "gales1998",
 ENGINE_KEYS: Mapping[str, tuple[str, ...]] = {
     "trajectory": ("hofer2008", "tokuda2000", "tokuda1999", "shinoda2000", "fujinaga2001", "silen2012"),
     "coupled": ("xieliu2007", "tokuda2000", "fujinaga2001", "silen2012"),
+    "selection": ("minnisbreen2000", "verhelst1993"),
     "joint": ("hofer2008", "tokuda2000", "tokuda1999", "shinoda2000"),
 }
 """Keys of the papers that each built-in engine implements, with its default options."""

@@ -49,7 +49,7 @@ def test_a_video(run: RunCommand, basics: tuple[object, ...], here: Path) -> Non
 
 @pytest.mark.parametrize("as_file", [True, False])
 def test_a_transcript(run: RunCommand, basics: tuple[object, ...], here: Path, as_file: bool) -> None:
-    words = "See Bob, papa & mama!"
+    words = "See Bob, papa — mama!"
     (here / "words.lab").write_text("\ufeff" + words, encoding="utf-8")
     done = run(*basics, "-o", "a.json", "--transcript", "words.lab" if as_file else words)
     assert (done.code, done.err) == (0, [])
@@ -173,6 +173,24 @@ def test_edited_units_are_used(run: RunCommand, basics: tuple[object, ...], here
     after = json.loads((here / "b.json").read_text(encoding="utf-8"))
     assert [unit["phone"] for unit in after["units"]] == [unit["phone"] for unit in document["units"]]
     assert [channel["name"] for channel in after["channels"]] == ["opening"]
+
+
+def test_a_textgrid_goes_out_and_comes_back(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:
+    assert run(*basics, "-o", "a.json", "a.TextGrid").out == ["a.json", "a.TextGrid"]
+    assert run(*basics, "-o", "b.json", "--units", "a.TextGrid").code == 0
+    first, again = (json.loads((here / name).read_text(encoding="utf-8")) for name in ("a.json", "b.json"))
+    assert first["values"] == again["values"]
+
+
+def test_units_with_a_gap_are_silent_there(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:
+    run(*basics, "-o", "a.json")
+    units = json.loads((here / "a.json").read_text(encoding="utf-8"))["units"]
+    rows = [{key: row[key] for key in ("start_s", "end_s", "phone")} for row in units]
+    (here / "cut.json").write_text(json.dumps({"units": rows[:3] + rows[5:]}), encoding="utf-8")
+    assert run(*basics, "-o", "b.json", "--units", "cut.json").code == 0
+    after = json.loads((here / "b.json").read_text(encoding="utf-8"))["units"]
+    assert [row["phone"] for row in after[2:5]] == [rows[2]["phone"], "sil", rows[5]["phone"]]
+    assert after[3]["end_s"] == rows[5]["start_s"]
 
 
 def test_units_that_cannot_be_used(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:

@@ -1,11 +1,12 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from cli.conftest import RunCommand, is_one_error
-from lipmotion.pipeline.model import VERSION, read_header, shipped_path
+from lipmotion.pipeline.model import VERSION, load_model, read_header, save_model, shipped_path
 
 
 def test_a_model_says_whose_recordings_it_comes_from(run: RunCommand, toy_model_file: Path) -> None:
@@ -18,6 +19,20 @@ def test_a_model_says_whose_recordings_it_comes_from(run: RunCommand, toy_model_
     assert header["utterances"] == "8"
     assert "states=5" in header["configuration"]
     assert [line.split()[0] for line in done.out[1:]] == list(read_header(toy_model_file))
+
+
+def test_the_model_inside_is_named_with_its_rights(run: RunCommand, toy_model_file: Path, here: Path) -> None:
+    model = load_model(toy_model_file)
+    about = {**model.about, "licence": [], "attribution": []}
+    save_model(replace(model, about=about, prior=load_model()), here / "on.lipmotion")
+    done = run("info", here / "on.lipmotion")
+    assert done.code == 0
+    assert not [line for line in done.out if "{" in line]
+    own = [line.split(maxsplit=1)[1] for line in done.out if line.startswith(("licence", "attribution"))]
+    assert own == ["none stated", "none stated"]
+    prior = {line.split()[1]: line.split(maxsplit=2)[2] for line in done.out if line.startswith("prior ")}
+    assert (prior["engine"], prior["utterances"], prior["licence"]) == ("trajectory", "524", "CC BY 4.0")
+    assert prior["attribution"].startswith("GRID corpus")
 
 
 def test_its_trees_can_be_printed(run: RunCommand, toy_model_file: Path) -> None:

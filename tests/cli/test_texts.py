@@ -35,6 +35,16 @@ def test_subtitles_keep_their_times(here: Path) -> None:
     assert (transcript.lines[0].start_s, transcript.lines[0].end_s) == pytest.approx((1.0, 2.5))
 
 
+@pytest.mark.parametrize("name", ["subs/nofile", "./nofile", "../nofile", "subs/../nofile"])
+def test_a_name_in_a_folder_that_exists_is_no_text(here: Path, name: str) -> None:
+    (here / "subs").mkdir()
+    with pytest.raises(InputError, match="nofile: no such transcript file"):
+        text_or_file_content(name)
+    assert text_or_file_content("either/or") == "either/or"
+    assert text_or_file_content("subs/ nofile") == "subs/ nofile"
+    assert text_or_file_content("x" * 5000 + "/a") == "x" * 5000 + "/a"
+
+
 @pytest.mark.usefixtures("here")
 def test_a_file_that_is_not_there() -> None:
     with pytest.raises(InputError, match=r"words.txt: no such transcript file"):

@@ -55,7 +55,7 @@ def test_speakers_are_chosen(run: RunCommand, toy_corpus: Corpus, here: Path) ->
     assert load_model(here / "m").about["speakers"] == ["anna", "ben"]
     assert run("evaluate", "m", "corpus", "--speaker", "carl", "--split", "train").out[0].startswith("split train: 1 ")
     assert (
-        "speakers     anna (2, 0.1 minutes), ben (2, 0.1 minutes), carl (1, 0.0 minutes)"
+        "speakers     anna (2, 5.5 seconds), ben (2, 5.1 seconds), carl (1, 2.8 seconds)"
         in run("corpus", "info", "corpus").out
     )
 
@@ -156,6 +156,11 @@ def test_an_engine_without_a_use_for_voices(
         (["CORPUS", "-o", "m", "--split", "tset"], 4, "no utterances of split 'tset' (there are train: 8, val: 2"),
         (["CORPUS", "-o", "m", "--speaker", "dora"], 4, "no speaker 'dora' (there are: no speaker by name)"),
         (["CORPUS", "-o", "m", "--lexicon", "missing"], 3, "missing: no such lexicon file"),
+        (
+            ["CORPUS", "-o", "m", "--from", "nofile"],
+            3,
+            "nofile: no such model; train one (lipmotion train), or use the one",
+        ),
         (["CORPUS", "-o", "m", "--units", "evis"], 3, "no unit set 'evis'; there are: 2vis, sVis, pbVis"),
         (["CORPUS", "-o", "m", "--units", "folder"], 3, "folder: "),
         (["CORPUS", "-o", "m", "--engine", "coupled", "--recordings", "missing"], 4, "missing: no such folder"),

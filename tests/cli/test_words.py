@@ -35,17 +35,18 @@ def test_for_programs(run: RunCommand) -> None:
     assert 0 < success["confidence"] < 1
 
 
-def test_without_words_there_is_nothing(run: RunCommand) -> None:
-    done = run("words", WELCOME, "--recogniser", "fast", "--machine-readable")
-    assert json.loads(done.out[-1])["words"] == []
-
-
 @pytest.mark.parametrize(
     ("line", "code", "said"),
     [
         (["words", "missing.wav"], 3, "no such file"),
         (["words", WELCOME, "-o", "words.csv"], 7, "unknown format '.csv'; required one of: .txt .json"),
         (["words", WELCOME, "--recogniser", "best"], 3, "unknown recogniser 'best'"),
+        (
+            ["words", WELCOME, "--recogniser", "fast"],
+            3,
+            "'fast' recognises phones, not words; required one of: auto, w",
+        ),
+        (["words", WELCOME, "--recogniser", "own"], 3, "'own' recognises phones, not words; required one of: auto, wo"),
     ],
 )
 def test_errors(run: RunCommand, line: list[object], code: int, said: str) -> None:

@@ -41,3 +41,24 @@ def test_a_list_is_small(tmp_path: Path) -> None:
     (tmp_path / "train.txt").write_bytes(b"\n" * (LARGEST_LIST + 1))
     with pytest.raises(CorpusError, match="required at most 16777216: is it a list"):
         read_names(tmp_path / "train.txt")
+
+
+def test_a_list_may_name_files(tmp_path: Path) -> None:
+    (tmp_path / "test.txt").write_text("name1.wav\nname2.mkv\nname7.wav\n")
+    dotted = RecordingFolder("folder", (*recordings(3).recordings, SourceRecording("name0.b", Path("c"), None)))
+    (tmp_path / "val.txt").write_text("name0.b\n")
+    found = assign_splits(dotted, tmp_path)
+    assert {item.name: item.split for item in found.recordings} == {
+        "name0": "train",
+        "name1": "test",
+        "name2": "test",
+        "name0.b": "val",
+    }
+    assert list(found.problems) == ["name7.wav"]
+
+
+def test_a_file_and_its_name_in_two_lists_are_an_error(tmp_path: Path) -> None:
+    (tmp_path / "test.txt").write_text("name1.wav\n")
+    (tmp_path / "val.txt").write_text("name1\n")
+    with pytest.raises(CorpusError, match=r"name1 is in val\.txt and in test\.txt"):
+        assign_splits(recordings(3), tmp_path)

@@ -231,12 +231,13 @@ def test_speakers(tmp_path):
     assert corpus.names("train", ["anna", "ben"]) == ("a", "c")
     assert corpus.required("test", ["anna"]) == ("b",)
     with pytest.raises(
-        CorpusError, match=r"no utterances of split 'val' by anna \(there are train: 1, val: 0, test: 1"
+        CorpusError,
+        match=r"no utterances of split 'val' by anna \(there are train: 1, val: 0, test: 1\); choose .*test\.txt",
     ):
         corpus.required("val", ["anna"])
     with pytest.raises(CorpusError, match=r"no speaker 'bob' \(there are: anna, ben\)"):
         corpus.required(None, ["anna", "bob"])
-    assert corpus.summary()["speakers"] == "unknown (1, 0.0 minutes), anna (2, 0.0 minutes), ben (1, 0.0 minutes)"
+    assert corpus.summary()["speakers"] == "unknown (1, 1.0 seconds), anna (2, 2.0 seconds), ben (1, 1.0 seconds)"
     assert corpus.summary()["motion"] == "2 channels (opening, jaw) at 25 Hz"
     assert corpus.summary()["labelled"] == "0 with phones in time"
 
@@ -256,7 +257,7 @@ def test_the_first_version_is_read_and_can_be_added_to(corpus):
     old = Corpus.open(corpus.path)
     assert (old.utterance("one").speaker, old.utterance("one").phones) == ("", None)
     assert old.names("train") == ("one", "two")
-    assert old.summary()["speakers"] == "unknown (3, 0.1 minutes)"
+    assert old.summary()["speakers"] == "unknown (3, 3.0 seconds)"
     old.add(replace(utterance("four"), speaker="anna"))
     assert json.loads(manifest.read_text())["version"] == 2
     assert Corpus.open(corpus.path).speakers == {"": (3, 3.0), "anna": (1, 1.0)}

@@ -116,6 +116,17 @@ def test_the_figures_of_the_readme_stand_in_the_results() -> None:
     assert given - set(re.findall(r"\b0\.\d+", results)) == set()
 
 
+def test_all_pages_say_the_same_of_how_long_training_takes() -> None:
+    pages = [(ROOT / name).read_text(encoding="utf-8") for name in ("README.md", "docs/verbs.md")]
+    said = [re.findall(r"(\w+ \w+ \w+) for 22 minutes of recordings", page) for page in pages]
+    assert said == [["about three minutes"], ["about three minutes"]]
+    speed = (DOCS / "results" / "figures.md").read_text(encoding="utf-8").split("## Speed")[1]
+    seconds, clips = re.findall(r"`train`, (\d+) clips .* about three minutes for the 452 .* \| (\d+) s \|", speed)[0][
+        ::-1
+    ]
+    assert 150 <= float(seconds) * 452 / float(clips) <= 210
+
+
 def test_no_package_registry_and_no_absolute_path_is_named() -> None:
     listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=False)
     if listed.returncode:

@@ -171,4 +171,4 @@ def test_the_document_shows_the_figures_beside_it() -> None:
     results = Path(__file__).parents[2] / "docs" / "results"
     figures = json.loads((results / "learning-curve.json").read_text(encoding="utf-8"))
     assert f"```text\n{table(figures)}\n```" in (results / "learning-curve.md").read_text(encoding="utf-8")
-    assert [row["names"] for row in figures["rows"]] == [*SIZES, 452]
+    assert [row["names"] for row in figures["rows"]] == [4, 10, *SIZES, 452]

@@ -86,6 +86,23 @@ def test_every_figure_is_printed_as_often_as_it_is_there():
         assert name in text
 
 
+def test_no_line_holds_a_line_break_or_its_escape():
+    result, _ = figures()
+    text = figures_table(result)
+    assert "p, b and m are pinned" in text
+    assert "\\n" not in text
+    assert max(map(len, text.splitlines())) <= 120
+
+
+def test_what_limits_the_figures_is_said():
+    result, _ = figures()
+    assert "trained on some of these" not in figures_table(result)
+    assert "have no words" not in figures_table(result)
+    text = figures_table(result | {"seen_in_training": True, "without_words": 5, "clips": 18})
+    assert "the model was trained on some of these recordings" in text
+    assert "no figures with transcript: 5 of 18 clips have no words" in text
+
+
 def test_columns_line_up():
     result, _ = figures()
     lines = figures_table(result).splitlines()

@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lipmotion.engines import engine_named
-from lipmotion.motion.closure import Closure, closable_ranges, closure_from_motion, frames_to_close
+from lipmotion.motion.closure import Closure, closable_ranges, closed_opening, closure_from_motion, frames_to_close
 from lipmotion.testing.examples import PHONES, examples, speech
 from lipmotion.types import Constraints, Pin, Span, Timeline, Unit
 from lipmotion.types.progress import silent_monitor
@@ -102,7 +102,25 @@ def test_a_mouth_closes_to_nothing_less():
     assert closure_from_motion([x], [np.ones(30, bool)], [units], column=0).closed == 0
 
 
-def test_without_p_b_or_m_the_first_percentile_is_closed():
+def test_without_p_b_or_m_the_second_percentile_is_closed():
     x = np.linspace(0, 1, 101)[:, None]
     closure = closure_from_motion([x], [np.ones(101, bool)], [Timeline((Span(0.0, 1.0, Unit("aa")),))], column=0)
-    assert closure.closed == pytest.approx(0.01)
+    assert closure.closed == pytest.approx(0.02)
+
+
+def test_lips_that_a_wrong_phone_shows_open_are_closed_as_far_as_the_frames_say():
+    rng = np.random.default_rng(0)
+    frames = np.concatenate([rng.uniform(0.0, 0.01, 40), rng.uniform(0.05, 0.2, 960)])
+    assert closed_opening([0.126], frames) <= 0.01
+    assert closed_opening([], frames) <= 0.01
+    assert closed_opening([0.003, 0.004, 0.005], frames) == 0.004
+    assert closed_opening([0.126], frames + 0.1, frames) == closed_opening([0.126], frames)
+    assert closed_opening([-0.02], frames) == 0
+    assert closed_opening([], np.empty(0)) == 0
+
+
+def test_a_closure_of_one_clip_with_wrong_phones():
+    opening = np.concatenate([np.zeros(20), np.full(80, 0.1)])[:, None]
+    units = Timeline((Span(0.0, 0.5, Unit("aa")), Span(0.5, 0.6, Unit("m")), Span(0.6, 1.0, Unit("aa"))))
+    found = closure_from_motion([opening], [np.ones(100, bool)], [units], 0)
+    assert found.closed == 0

@@ -295,3 +295,21 @@ def test_missing_arrays_are_refused(name: str) -> None:
     del arrays[name]
     with pytest.raises(ModelFormatError, match=name):
         speakers_from_arrays(arrays)
+
+
+def test_wrong_phones_of_one_clip_do_not_keep_the_lips_of_a_person_open() -> None:
+    clip = ben(3)[0]
+    labels = []
+    for span in clip.speech.units:
+        middle_s = 0.5 * (span.start_s + span.end_s)
+        if span.label.phone == "aa":  # an m that was recognised where the mouth is open
+            labels.append(Span(middle_s - 0.03, middle_s - 0.01, Unit("m")))
+        else:
+            labels.append(replace(span, label=Unit("t" if span.label.phone in ("p", "b", "m") else span.label.phone)))
+    recognised = replace(clip, speech=replace(clip.speech, units=Timeline(tuple(labels))))
+    opened = [clip.motion.values[f, 0].min() for f in closable_ranges(recognised.speech.units, 10_000)]
+    assert np.median(opened) > closed([clip]) + 0.02
+    _, maps = both(anna(), [recognised])
+    shut = np.full((1, 3), maps.lips[0])
+    person = maps.of("ben").to_person(shut, np.zeros(1))[0, 0]
+    assert person == pytest.approx(closed([clip]), abs=0.01)

@@ -272,6 +272,18 @@ def test_bad_frames_are_refused(frames) -> None:
         compress(**GOOD).rows(frames)
 
 
+def test_more_components_than_channels_are_refused() -> None:
+    arrays = {name: ARRAYS[name] for name in ARRAYS}
+    arrays["basis"], arrays["steps"] = np.zeros((9, 8), np.int8), np.full(9, 0.1)
+    with pytest.raises(ModelFormatError, match="9 components of 8 columns"):
+        motion_store_from_arrays(arrays)
+
+
+def test_a_very_high_rate_is_allowed() -> None:
+    values = motion(50)
+    assert largest_error(compress(values, 1e6, 0.1), values) <= 1
+
+
 def test_the_arrays_survive_a_file(tmp_path) -> None:
     values = motion(500)
     store = compress(values, 100.0, 0.02, groups=GROUPS, kept=[(0, 100), (150, 500)])
@@ -326,6 +338,8 @@ def test_every_array_is_needed() -> None:
         ("spacing", np.array(7.0), "blocks"),
         ("length", np.array(0), "required 1"),
         ("length", np.array(3), "required"),
+        ("length", np.array(257), "required 1 to 256"),
+        ("spacing", np.array(101.0), "required 1 to 100"),
         ("step", np.array(0.0), "more than 0"),
         ("step", np.array(np.inf), "finite"),
         ("used", ARRAYS["used"][:-1], "places"),

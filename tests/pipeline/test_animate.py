@@ -174,7 +174,7 @@ def test_an_unknown_word_is_guessed_and_reported(move: Animate, caplog: pytest.L
     ("transcript", "error", "message"),
     [
         ("", InputError, "holds no word"),
-        ("näh", InputError, "how 'näh' is said"),
+        ("真", InputError, "how '真' is said"),
         ("five " * 100, AlignmentError, "the recording is too short"),
     ],
 )

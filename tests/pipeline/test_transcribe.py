@@ -1,17 +1,21 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import pytest
 
 from lipmotion.errors import AlignmentError, InputError
-from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.transcribe import MOST_WARNINGS, transcribe, warn_of_guesses
+from lipmotion.pipeline.model import Model, load_model
+from lipmotion.pipeline.transcribe import MOST_WARNINGS, transcribe, warn_of_guesses, warn_of_misfit
+from lipmotion.speech.agreement import TranscriptFit
+from lipmotion.speech.analysed_audio import AnalysedAudio, analysed
+from lipmotion.speech.audio_files import read_audio
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.recogniser import Recogniser
 from lipmotion.testing.toy import ToySentence
-from lipmotion.types import Audio, Features
-from lipmotion.units import Lexicon
+from lipmotion.types import Audio, Features, TimedTranscript, TimedWord, TranscriptLine
+from lipmotion.units import Lexicon, words_of
 
 
 @pytest.fixture
@@ -32,14 +36,14 @@ def phones(toy_model: Model) -> Recogniser:
 def test_known_words_are_aligned(
     phones: Recogniser, audio: Audio, toy_sentence: ToySentence, features: Features
 ) -> None:
-    units = transcribe(phones, audio, features, toy_sentence.words, Lexicon())
+    units, _ = transcribe(phones, audio, features, toy_sentence.words, Lexicon())
     assert [span.label for span in units] == [span.label for span in toy_sentence.units]
 
 
 def test_unknown_words_are_recognised(
     phones: Recogniser, audio: Audio, toy_sentence: ToySentence, features: Features
 ) -> None:
-    units = transcribe(phones, audio, features, None, Lexicon())
+    units, _ = transcribe(phones, audio, features, None, Lexicon())
     assert [span.label.phone for span in units] == [span.label.phone for span in toy_sentence.units]
     assert not any(span.label.word for span in units)
 
@@ -59,7 +63,7 @@ def test_what_the_user_s_lexicon_knows_is_not_reported(
     phones: Recogniser, audio: Audio, features: Features, caplog: pytest.LogCaptureFixture
 ) -> None:
     lexicon = Lexicon({"bimab": (("b", "aa", "b"),)})
-    units = transcribe(phones, audio, features, ("see", "bimab", "papa", "mama"), lexicon)
+    units, _ = transcribe(phones, audio, features, ("see", "bimab", "papa", "mama"), lexicon)
     assert [span.label.phone for span in units if span.label.word == "bimab"] == ["b", "aa", "b"]
     assert not caplog.records
 
@@ -78,7 +82,9 @@ def test_a_transcript_of_something_else_is_doubted(
     transcribe(Recogniser(toy_model.phones, "auto"), audio, features, WRONG, Lexicon())
     (record,) = caplog.records
     assert (record.name, record.levelname) == ("lipmotion", "WARNING")
-    message = r"the transcript seems not to be what is said \(.* at -\d+\.\d, required -4\.2 or more\); check it, or .*"
+    message = (
+        r"the transcript seems not to be what is said \(.* at -\d+\.\d, required -4\.2 or more\).*; check it, or .*"
+    )
     assert re.fullmatch(message, record.getMessage())
 
 
@@ -88,6 +94,58 @@ def test_the_right_one_is_not(
     for words in (toy_sentence.words, None):
         transcribe(Recogniser(toy_model.phones, "auto"), audio, features, words, Lexicon())
     assert not caplog.records
+
+
+WELCOME = Path("examples/welcome.flac")
+
+
+@pytest.fixture(scope="module")
+def welcome() -> tuple[AnalysedAudio, tuple[str, ...]]:
+    """Real speech of five seconds, and its words."""
+    return analysed(read_audio(WELCOME)), words_of(WELCOME.with_suffix(".txt").read_text())
+
+
+@pytest.mark.parametrize("kept", [slice(0, 7), slice(7, None), slice(0, 3)])
+def test_speech_that_the_transcript_leaves_out_is_reported_with_its_times(
+    welcome: tuple[AnalysedAudio, tuple[str, ...]], kept: slice, caplog: pytest.LogCaptureFixture
+) -> None:
+    (audio, words), phones = welcome, Recogniser(load_model().phones, "auto")
+    whole = transcribe(phones, audio, audio.mfcc(), words, Lexicon())
+    assert whole.fit is not None
+    assert whole.fit.missing == ()
+    assert whole.fit.share == pytest.approx(1)
+    assert not caplog.records
+    part = transcribe(phones, audio, audio.mfcc(), words[kept], Lexicon())
+    assert part.fit is not None
+    assert part.fit.share < 0.8
+    (record,) = caplog.records
+    assert re.search(
+        r"to leave out words at \d\.\d to \d\.\d s.* \(\d\.\d of \d\.\d s of speech\)", record.getMessage()
+    )
+    said = {span.label.word: span for span in whole.units}
+    left_out = [said[word] for word in set(words) - set(words[kept])]
+    for start_s, end_s in part.fit.missing:  # each stretch covers a part of what was left out
+        assert any(start_s < span.end_s and span.start_s < end_s for span in left_out)
+
+
+def test_speech_outside_of_the_times_of_a_transcript_is_reported(
+    welcome: tuple[AnalysedAudio, tuple[str, ...]], caplog: pytest.LogCaptureFixture
+) -> None:
+    audio, words = welcome
+    first = TranscriptLine(tuple(map(TimedWord, words[:2])), 0.3, 0.9)
+    part = transcribe(Recogniser(load_model().phones), audio, audio.mfcc(), TimedTranscript((first,)), Lexicon())
+    assert part.fit is not None
+    assert part.fit.share < 0.5
+    (record,) = caplog.records
+    assert "to leave out words at" in record.getMessage()
+
+
+def test_three_stretches_are_named(caplog: pytest.LogCaptureFixture) -> None:
+    warn_of_misfit(TranscriptFit(-2.0, ((0.0, 2.0), (3.0, 3.5), (5.0, 9.0), (10.0, 11.04)), 20.0))
+    assert caplog.messages == [
+        "the transcript seems to leave out words at 0.0 to 2.0 s, 5.0 to 9.0 s, 10.0 to 11.0 s and at 1 more places "
+        "(7.5 of 20.0 s of speech): the lips are wrong there; add the words, or leave the whole transcript out"
+    ]
 
 
 def test_without_general_models_nothing_is_doubted(
@@ -104,8 +162,8 @@ def test_a_long_word_is_not_repeated_in_full(caplog: pytest.LogCaptureFixture) -
 
 
 def test_it_says_what_is_wrong(phones: Recogniser, audio: Audio, features: Features) -> None:
-    with pytest.raises(InputError, match="how 'näh' is said"):
-        transcribe(phones, audio, features, ("näh",), Lexicon())
+    with pytest.raises(InputError, match="how '真' is said"):
+        transcribe(phones, audio, features, ("真",), Lexicon())
     with pytest.raises(AlignmentError, match="too short"):
         transcribe(phones, audio, features, ("five",) * 60, Lexicon())
 

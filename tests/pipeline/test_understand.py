@@ -14,8 +14,10 @@ from lipmotion.engines import Engine
 from lipmotion.errors import InputError
 from lipmotion.pipeline import understand as pipeline_understand
 from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.outlook import WHOLE_TRANSCRIPT, outlook_of
 from lipmotion.pipeline.request import SpeechRequest, request_of
-from lipmotion.pipeline.understand import recognised_speech, speech_of, understand
+from lipmotion.pipeline.understand import recognised_speech, speech_of, understand, understood_speech
+from lipmotion.speech.agreement import TranscriptFit
 from lipmotion.speech.f0 import log_f0
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.recogniser import Recogniser
@@ -157,3 +159,50 @@ def test_a_transcript_beside_a_request_is_taken_if_there_is_no_other() -> None:
     assert request_of("a.wav", "papa").transcript == "papa"
     with pytest.raises(InputError, match="give one"):
         request_of(SpeechRequest("a.wav", "mama"), "papa")
+
+
+def test_every_recogniser_is_named(toy_model: Model, toy_sentence: ToySentence) -> None:
+    with pytest.raises(InputError) as refused:
+        understand(toy_model, SpeechRequest(toy_sentence.audio, recogniser="best"))
+    required = "required one of: auto, words, fast, own, general, whisper, vosk"
+    assert str(refused.value) == f"unknown recogniser 'best'; {required}"
+
+
+@pytest.mark.parametrize("kind", ["own", "auto"])
+def test_a_recording_without_speech(toy_model: Model, kind: str, caplog: pytest.LogCaptureFixture) -> None:
+    request = SpeechRequest(Audio(np.zeros(16_000, np.float32), 16_000), recogniser=kind)
+    understood = understood_speech(toy_model, request)
+    (text,) = caplog.messages
+    assert text.startswith("no speech found in the recording: the mouth rests; give a recording in which something")
+    assert understood.is_without_speech
+    outlook = outlook_of(request, understood)
+    assert (outlook.words, outlook.advice, outlook.text) == ("no speech", (), "no speech found; levels 0 dB apart")
+
+
+def test_a_recording_with_speech(toy_model: Model, toy_sentence: ToySentence, caplog: pytest.LogCaptureFixture) -> None:
+    understood = understood_speech(toy_model, SpeechRequest(toy_sentence.audio, recogniser="own"))
+    assert not understood.is_without_speech
+    assert not caplog.records
+
+
+def test_a_transcript_beside_units_is_not_used(
+    toy_model: Model, toy_sentence: ToySentence, caplog: pytest.LogCaptureFixture
+) -> None:
+    request = SpeechRequest(toy_sentence.audio, transcript="hello", units=toy_sentence.units)
+    assert understand(toy_model, request).units == toy_sentence.units
+    assert caplog.messages == [
+        "the transcript is not used: the units already say what is spoken; leave one of them out"
+    ]
+
+
+def test_the_outlook_says_how_much_of_the_speech_a_transcript_fits(toy_model: Model, toy_sentence: ToySentence) -> None:
+    request = SpeechRequest(toy_sentence.audio, transcript=" ".join(toy_sentence.words))
+    understood = replace(understood_speech(toy_model, request), range_db=30.0)
+    assert understood.fit is not None
+    whole = outlook_of(request, understood)
+    assert (whole.confidence, whole.text) == (pytest.approx(1), "words: transcript; levels 30 dB apart")
+    part = outlook_of(request, replace(understood, fit=TranscriptFit(-2.0, ((0.0, 3.0),), 4.0)))
+    assert (part.confidence, part.advice) == (pytest.approx(0.25), (WHOLE_TRANSCRIPT,))
+    assert part.text.startswith("words: transcript, which fits 25% of the speech; levels 30 dB apart; would help most")
+    wrong = outlook_of(request, replace(understood, fit=TranscriptFit(-7.0, (), 4.0)))
+    assert wrong.confidence == pytest.approx(0)

@@ -51,6 +51,20 @@ def test_a_recording_may_have_any_name(result: Generation, toy_model: Model, tmp
     assert len(read_motion(tmp_path / "a.npz")[1]) == len(result.units)
 
 
+def test_the_sound_of_a_video_is_read_without_a_second_warning(
+    result: Generation, toy_speech: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    warns = []
+
+    def read(*_: object, warn: bool = True) -> None:
+        warns.append(warn)
+
+    monkeypatch.setattr("lipmotion.pipeline.animate.read_audio", read)
+    monkeypatch.setattr("lipmotion.export.video.write_mp4", lambda *_, **__: None)
+    write(result, [tmp_path / "a.mp4"], speech=toy_speech)
+    assert warns == [False]
+
+
 def test_another_rate(result: Generation, toy_model: Model, tmp_path: Path) -> None:
     write(result, [tmp_path / "a.json", tmp_path / "a.csv"], model=toy_model, rate_hz=30)
     for name in ("a.json", "a.csv"):

@@ -10,9 +10,11 @@ import pytest
 
 from cli.conftest import here, run, run_outside
 from lipmotion.corpora.store import Corpus
+from robustness import spoken_cases
 from robustness.case import Bench
+from speech import stand_in_voice
 
-__all__ = ["bench", "here", "run", "run_outside", "watched"]
+__all__ = ["bench", "here", "run", "run_outside", "stand_in", "watched"]
 HANGS_S = 120
 
 
@@ -29,6 +31,14 @@ def bench(
     folder = tmp_path / "bad"
     folder.mkdir()
     return Bench(folder, toy_speech, toy_model_file, toy_corpus.path, coupled_model_file, pictured_model_file)
+
+
+@pytest.fixture(autouse=True)
+def stand_in(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Make the stand-in the only synthesiser where texts are spoken."""
+    case = getattr(request.node, "callspec", None)
+    if case is not None and case.params["case"].group == spoken_cases.GROUP:
+        stand_in_voice.install(monkeypatch)
 
 
 @pytest.fixture(autouse=True)

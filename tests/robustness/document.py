@@ -5,10 +5,19 @@ from __future__ import annotations
 from itertools import groupby
 from pathlib import Path
 
-from robustness import corpus_cases, model_cases, motion_cases, option_cases, speech_cases, text_cases, video_cases
+from robustness import (
+    corpus_cases,
+    model_cases,
+    motion_cases,
+    option_cases,
+    speech_cases,
+    spoken_cases,
+    text_cases,
+    video_cases,
+)
 from robustness.case import CASES
 
-MODULES = (speech_cases, text_cases, motion_cases, model_cases, corpus_cases, option_cases, video_cases)
+MODULES = (speech_cases, spoken_cases, text_cases, motion_cases, model_cases, corpus_cases, option_cases, video_cases)
 DOCUMENT = Path(__file__).parent / "table.md"
 HEAD = """# Bad input, row by row
 

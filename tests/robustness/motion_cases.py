@@ -150,6 +150,6 @@ def _(bench: Bench) -> list[object]:
     return bench.animate(None, "--units", bench.folder / "units.json")
 
 
-@case(GROUP, "a recording as units", 3, "cannot read motion from '.wav'; use one of .json, .csv, .npz")
+@case(GROUP, "a recording as units", 3, "cannot read phones from '.wav'; use one of .json, .npz, .TextGrid")
 def _(bench: Bench) -> list[object]:
     return bench.animate(None, "--units", bench.speech)

@@ -16,6 +16,7 @@ from speech.sound import tone, write_constant_flac, write_pictures, write_sound,
 
 GROUP = "recordings"
 NO_RECORDING = ("not a readable recording", "give an audio or video file")
+NO_SPEECH = ("no speech found in the recording: the mouth rests; give a recording in which something is said",)
 CUT = ("cut short: it states 3", "s of sound and holds")
 CONTAINERS: dict[str, tuple[str, dict[float, Any]]] = {
     "wav": ("pcm_s16le", {0.6: (0,), 0.004: (3, "holds", "required at least 100 ms")}),
@@ -114,7 +115,7 @@ for _name, _samples in {
     "all but inaudible": lambda samples: samples * np.float32(1e-12),
 }.items():
 
-    @case(GROUP, _name, 0)
+    @case(GROUP, _name, 0, *(NO_SPEECH if _name in ("a constant", "digital silence") else ()))
     def _(bench: Bench, change=_samples) -> list[object]:
         return bench.animate(bench.sound(change(bench.samples())))
 

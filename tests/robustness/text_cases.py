@@ -27,7 +27,8 @@ _transcript("NUL bytes among words", "papa\0 mama", 0)
 _transcript("lone surrogates", "\udcff\udcfe", 3, *NO_WORD)
 _transcript("another script", "真っ昼間なのに", 3, "cannot guess how", "add it to a lexicon file")
 _transcript("right to left among left to right", "papa \u202eשלום\u202c mama", 3, "cannot guess how 'שלום' is said")
-_transcript("accents", "näh", 3, "cannot guess how 'näh' is said", "add it to a lexicon file")
+_transcript("accents", "pàpa", 0, "'pàpa' is not in the dictionary; read as 'p aa p ax'; a lexicon file can say better")
+_transcript("money, ordinals, signs", "$1 & 2%", 0)
 _transcript("a number of thirty digits", "9" * 30, 0)
 _transcript("numbers of other scripts", "٣", 0)
 _transcript("a number of 1,000 digits", "7" * 1000, 5, *TOO_MUCH)
@@ -149,6 +150,18 @@ _transcript_file(
 )
 _transcript_file(
     "UTF-16 without its mark", "papa".encode("utf-16-le"), 3, "holds NUL characters: is it UTF-16 without its mark?"
+)
+ASS = "[Script Info]\n\n[Events]\nDialogue: 0,0:00:00.50,0:00:02.00,Default,,0,0,0,,{\\an8}papa mama\n"
+_transcript_file("SubStation subtitles", ASS, 0, "the words do not fit the sound, first at 0.50 s")
+_transcript_file("SubStation subtitles with damaged times", ASS.replace("0:00:02.00", "2"), 3, "line 4 is 'Dialogue:")
+_transcript_file(
+    "subtitles with a damaged arrow",
+    b"1\n00:00:00,500 - -> 00:00:02,000\npapa mama\n",
+    0,
+    "fit the sound, first at 0.50 s",
+)
+_transcript_file(
+    "subtitles without arrows", b"1\n00:00:00,500 00:00:02,000\npapa\n", 3, "two times as in subtitles; required"
 )
 _transcript_file("a sound as a transcript", b"RIFF\x80\x81\x82", 3, "is not UTF-8 text; save it as UTF-8")
 

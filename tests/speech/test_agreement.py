@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,14 +8,21 @@ import pytest
 
 from lipmotion.corpora.grid import words_of_name
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.speech.agreement import DOUBTFUL_SCORE, FRAME_STEP, agreement_score
+from lipmotion.speech.agreement import (
+    DOUBTFUL_SCORE,
+    FRAME_STEP,
+    TranscriptFit,
+    _joined,
+    agreement_score,
+    transcript_fit,
+)
 from lipmotion.speech.audio_files import read_audio
 from lipmotion.speech.general.acoustic import PHONES, general_model
 from lipmotion.speech.general.front_end import general_features
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.recogniser import Recogniser
 from lipmotion.testing.toy import ToySentence, toy_sentences
-from lipmotion.types import Span, Timeline, Unit
+from lipmotion.types import Audio, Span, Timeline, Unit
 from lipmotion.units import Lexicon
 
 
@@ -58,6 +66,66 @@ def test_silence_agrees_with_everything(sentences: list[ToySentence]) -> None:
     audio = sentences[0].audio
     assert agreement_score(audio, Timeline((Span(0.0, audio.duration_s, Unit("sil")),))) == 0
     assert agreement_score(audio, Timeline((Span(0.5, 0.5, Unit("p")),))) == 0
+
+
+def test_loud_silence_is_missing_speech(sentences: list[ToySentence]) -> None:
+    audio, units = sentences[0].audio, sentences[0].units
+    fit = transcript_fit(audio, Timeline((Span(0.0, audio.duration_s, Unit("sil")),)))
+    ((start_s, end_s),) = fit.missing
+    spoken = [span for span in units if span.label.phone != "sil"]
+    assert (start_s, end_s) == pytest.approx((spoken[0].start_s, spoken[-1].end_s), abs=0.2)
+    assert fit.speech_s == pytest.approx(fit.missing_s)
+    assert fit.share == pytest.approx(0)
+    assert transcript_fit(audio, units).missing == ()
+
+
+def test_long_phones_are_judged_by_their_sound(sentences: list[ToySentence]) -> None:
+    """A vowel that is drawn out is right; another phone in its place is stretched over speech that is left out."""
+    said, longer_s = sentences[0], 0.6
+    spans = list(said.units)
+    place = next(number for number, span in enumerate(spans) if span.label.phone == "iy")
+    rate_hz = said.audio.rate_hz
+    first, stop = (round(time_s * rate_hz) for time_s in (spans[place].start_s + 0.03, spans[place].end_s - 0.03))
+    samples = said.audio.samples
+    vowel = np.resize(samples[first:stop], round(longer_s * rate_hz))
+    audio = Audio(np.concatenate([samples[:stop], vowel, samples[stop:]]), rate_hz)
+    end_s = spans[place].end_s + longer_s
+    later = [replace(s, start_s=s.start_s + longer_s, end_s=s.end_s + longer_s) for s in spans[place + 1 :]]
+
+    def labelled(phone: str) -> Timeline[Unit]:
+        return Timeline((*spans[:place], replace(spans[place], end_s=end_s, label=Unit(phone)), *later))
+
+    assert transcript_fit(audio, labelled("iy")).missing == ()
+    fit = transcript_fit(audio, labelled("m"))
+    assert fit.missing == ((spans[place].start_s, end_s),)
+    assert fit.share < 0.8
+
+
+def test_a_transcript_of_something_else_fits_nothing() -> None:
+    assert TranscriptFit(DOUBTFUL_SCORE - 0.1, (), 10.0).share == pytest.approx(0)
+
+
+def test_places_near_one_another_are_one_stretch() -> None:
+    assert _joined([(0.0, 1.0), (1.4, 2.0), (3.0, 3.5)]) == ((0.0, 2.0), (3.0, 3.5))
+    fit = TranscriptFit(-1.0, ((0.0, 2.0), (3.0, 3.5)), 10.0)
+    assert fit.missing_s == pytest.approx(2.5)
+    assert fit.share == pytest.approx(0.75)
+
+
+@pytest.mark.recordings
+def test_a_part_of_a_transcript_is_noticed_and_a_whole_one_is_not(recordings: Path) -> None:
+    """Docs/robustness.md."""
+    names = (recordings / "grid-s1" / "val.txt").read_text().split()
+    phones, whole, half = Recogniser(load_model().phones, "auto"), 0, 0
+    for name in names:
+        audio, words = read_audio(recordings / "grid-s1" / "clips" / f"{name}.mkv"), words_of_name(name)
+        assert words is not None
+        for said, kept in ((words, True), (words[:3], False)):
+            units = phones.align(audio, mfcc(audio), said, Lexicon())
+            noticed = bool(transcript_fit(audio, units).missing)
+            whole, half = whole + (kept and noticed), half + (noticed and not kept)
+    assert whole == 0
+    assert half > 0.7 * len(names)
 
 
 @pytest.mark.recordings

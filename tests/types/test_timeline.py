@@ -57,6 +57,14 @@ def test_shifting_moves_every_time_and_nothing_else(steps_s: list[float], offset
     assert [span.end_s for span in moved] == [span.end_s + offset_s for span in spans]
 
 
+def test_a_phone_is_named_as_users_know_it() -> None:
+    spans = (Span(0.0, 0.5, Unit("d", "sil-d+m")), Span(0.4, 0.6, Unit("m", "d-m+ih", "midnight")))
+    with pytest.raises(InputError, match=r"^the phone 'm' starts at 0.4 s, before the previous span ends \(0.5 s\)"):
+        Timeline(spans)
+    with pytest.raises(InputError, match=r"^the unit 'bilabial' ends at 0\.5 s"):
+        Timeline((Span(1.0, 0.5, Unit("", "bilabial")),))
+
+
 def test_values_cannot_change() -> None:
     span = Span(0.0, 1.0, Unit("aa"))
     with pytest.raises(FrozenInstanceError):

@@ -30,6 +30,19 @@ from lipmotion.units.transcript import MOST_MARKS, ONES, SCALES, TENS, normalise
         ("1,234 and 12,34", "one thousand two hundred thirty four and twelve thirty four"),
         ("007", "zero zero seven"),
         ("٣", "three"),
+        ("the 3rd, 21ST and 12th", "the third twenty first and twelfth"),
+        ("30th 100th 1,000th", "thirtieth one hundredth one thousandth"),
+        ("3 rd 3rds x3rd", "three rd three rds x three rd"),
+        ("$5.50", "five dollars and fifty cents"),
+        ("$1 £1.01 €0.50", "one dollar one pound and one penny fifty cents"),
+        ("$1,234.05", "one thousand two hundred thirty four dollars and five cents"),
+        ("$3 million, £2.5 billion", "three million dollars two point five billion pounds"),
+        ("$0 $0.00 $5.5", "zero dollars zero dollars five point five dollars"),
+        ("$ 7", "seven dollars"),
+        ("$1.2.3 $x", "one two three x"),
+        ("7% 8 % ٩٪ %", "seven percent eight percent nine"),
+        ("you & me, AT&T", "you and me at and t"),
+        ("you &amp; me", "you amp me"),  # references are resolved in subtitles alone
     ],
 )
 def test_texts(text: str, words: str) -> None:

@@ -7,6 +7,9 @@ import argparse
 from lipmotion.cli.output import print_line, print_lines
 from lipmotion.cli.paths import add_input
 
+OF_PRIOR = ("engine", "corpus", "split", "utterances", "minutes", "licence", "attribution")
+"""What is printed of the model on which a model stands and which is part of its file."""
+
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb to the parser of the command line."""
@@ -33,8 +36,12 @@ def run(options: argparse.Namespace) -> None:
         return
     header = read_header(path)
     print_line(f"{'file':14} {path} ({path.stat().st_size / 1e6:.1f} MB)")
+    inside = header.pop("prior", None)
     for name, value in header.items():
-        print_line(f"{name:14} {_plain(value)}")
+        print_line(f"{name:14} {_plain(value) or 'none stated'}")
+    for name, value in (inside or {}).items():
+        if name in OF_PRIOR and value:
+            print_line(f"prior {name:12} {_plain(value)}")
 
 
 def _plain(value: object) -> str:

@@ -32,9 +32,14 @@ def add_recording_arguments(parser: argparse.ArgumentParser) -> None:
     }
     add_input(parser, "--transcript", what="transcript", replaceable=True, **transcript)
     add_lexicon_argument(parser)
-    edited = "phones in time from an earlier .json or .npz, edited or not"
+    edited = "phones in time from an earlier .json, .npz or .TextGrid, edited or not, or from Audacity labels"
     add_input(parser, "--units", what="units file", replaceable=True, metavar="FILE", help=edited)
     add_recogniser_argument(parser)
+    add_speaker_argument(parser)
+
+
+def add_speaker_argument(parser: argparse.ArgumentParser) -> None:
+    """Add ``--speaker``: one of the people of the model."""
     whose = "whose motion, of the people that the model was trained on (default: the mean person; see lipmotion info)"
     parser.add_argument("--speaker", default="", metavar="NAME", help=whose)
 
@@ -67,7 +72,7 @@ def add_recogniser_argument(parser: argparse.ArgumentParser) -> None:
 def request_and_model(options: argparse.Namespace) -> tuple[SpeechRequest, Model]:
     """Return the request of the arguments of ``add_speech_arguments``, files read, and the model."""
     from lipmotion.cli.texts import text_or_file_content
-    from lipmotion.export.base import read_motion
+    from lipmotion.pipeline.given_units import read_units
     from lipmotion.pipeline.model import load_model
     from lipmotion.pipeline.request import SpeechRequest
     from lipmotion.units import Lexicon
@@ -75,7 +80,7 @@ def request_and_model(options: argparse.Namespace) -> tuple[SpeechRequest, Model
     request = SpeechRequest(
         options.speech,
         transcript=text_or_file_content(options.transcript) if options.transcript is not None else None,
-        units=read_motion(options.units)[1] if options.units else None,
+        units=read_units(options.units) if options.units else None,
         lexicon=Lexicon.from_file(options.lexicon) if options.lexicon else None,
         recogniser=options.recogniser,
         speaker=options.speaker,

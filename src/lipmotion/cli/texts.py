@@ -14,8 +14,17 @@ def text_or_file_content(argument: str) -> str | TimedTranscript:
     Raises InputError: the argument looks like a file name but no such file exists, or the file cannot be read.
     """
     path = Path(argument)
-    looks_like_path = " " not in argument and path.suffix[1:].isalpha()
+    looks_like_path = " " not in argument and (path.suffix[1:].isalpha() or _is_in_a_folder(argument))
     return read_transcript(path) if looks_like_path or _file_exists(path) else argument
+
+
+def _is_in_a_folder(argument: str) -> bool:
+    """Return whether an argument without blanks names a place in a folder that exists, as ``subtitles/take1``."""
+    folder, separator, name = argument.rpartition("/")
+    try:
+        return bool(separator and name) and not any(map(str.isspace, argument)) and Path(folder or "/").is_dir()
+    except (OSError, ValueError):  # too long for a path, or with a character that no path has
+        return False
 
 
 def _file_exists(path: Path) -> bool:

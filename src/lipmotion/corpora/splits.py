@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Set
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,11 +23,12 @@ def assign_splits(folder: RecordingFolder, directory: Path) -> RecordingFolder:
 
     Without lists all are ``train``. With a train.txt, recordings that are in no list become problems, because they are
     not meant for training; so do names without a recording.
+    A list may name files (``take08.mkv``): where no recording has that name, the suffix is left out.
     Raises CorpusError: a name is in two lists, or more than ``MOST_MISSING`` names have no recording.
     """
-    split_of = _read_lists(directory)
-    rest = None if (directory / "train.txt").is_file() else "train"
     known = {recording.name for recording in folder.recordings} | folder.problems.keys()
+    split_of = _read_lists(directory, known)
+    rest = None if (directory / "train.txt").is_file() else "train"
     problems = {
         name: f"listed in {split}.txt, but there is no such recording"
         for name, split in split_of.items()
@@ -47,12 +49,18 @@ def assign_splits(folder: RecordingFolder, directory: Path) -> RecordingFolder:
     return RecordingFolder(folder.kind, tuple(recordings), folder.problems | problems)
 
 
-def _read_lists(directory: Path) -> dict[str, str]:
-    """Return the split of every listed name. Raises CorpusError: a name is in two lists."""
+def _read_lists(directory: Path, known: Set[str]) -> dict[str, str]:
+    """Return the split of every listed name, without the suffix of a file if the recording's name has none.
+
+    known : names of the recordings
+    Raises CorpusError: a name is in two lists.
+    """
     split_of: dict[str, str] = {}
     for split in SPLITS:
         path = directory / f"{split}.txt"
-        for name in read_names(path) if path.is_file() else ():
+        for listed in read_names(path) if path.is_file() else ():
+            stem = listed.rpartition(".")[0]
+            name = stem if listed not in known and stem in known else listed
             if split_of.setdefault(name, split) != split:
                 raise CorpusError(f"{name} is in {split_of[name]}.txt and in {split}.txt of {directory}; keep one")
     return split_of

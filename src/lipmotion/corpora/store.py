@@ -127,7 +127,10 @@ class Corpus:
         if not names:
             found = ", ".join(f"{each}: {len(self.names(each, speakers))}" for each in SPLITS)
             who = f" by {', '.join(speakers)}" if speakers else ""
-            raise CorpusError(f"{self.path}: no utterances of split {split!r}{who} (there are {found})")
+            raise CorpusError(
+                f"{self.path}: no utterances of split {split!r}{who} (there are {found}); choose another split, or "
+                "name recordings in a list beside them, test.txt for instance, and prepare them again (docs/corpora.md)"
+            )
         return names
 
     def selected(self, selection: Selection) -> tuple[str, ...]:
@@ -152,7 +155,7 @@ class Corpus:
             "labelled": f"{sum(entry.get('phones') is not None for entry in sources)} with phones in time",
             "minutes": f"{seconds / 60:.1f}",
             "speakers": ", ".join(
-                f"{speaker or 'unknown'} ({count}, {spoken_s / 60:.1f} minutes)"
+                f"{speaker or 'unknown'} ({count}, {_length(spoken_s)})"
                 for speaker, (count, spoken_s) in self.speakers.items()
             ),
             "frames": f"{frames}, {unseen} without a face",
@@ -211,6 +214,11 @@ def _make_folder(path: Path) -> None:
 def _summary(entry: dict[str, Any]) -> dict[str, Any]:
     kept = {key: entry[key] for key in ("split", "duration_s", "frames", "unseen_frames")}
     return kept | {"speaker": entry.get("speaker", "")}
+
+
+def _length(seconds: float) -> str:
+    """Return a length for users: in minutes, or in seconds if it is shorter than one minute."""
+    return f"{seconds / 60:.1f} minutes" if seconds >= 60 else f"{seconds:.1f} seconds"
 
 
 def _motion(entry: dict[str, Any]) -> str:

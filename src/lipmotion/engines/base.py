@@ -173,6 +173,42 @@ class HasPosteriors(Protocol):
         """Return, for every chain, the posterior probability of each of its units in every frame."""
 
 
+@dataclass(frozen=True)
+class SourcePiece:
+    """A piece of one recording that says several phones.
+
+    recording     : its name
+    start_s, end_s : of the piece, in the recording
+    phones_s      : where phones begin, in the recording, by their number in what is said
+    """
+
+    recording: str
+    start_s: float
+    end_s: float
+    phones_s: Mapping[int, float]
+
+
+@runtime_checkable
+class SelectsRecordings(Protocol):
+    """An engine whose models know recordings of which pieces, one after the other, say any phones."""
+
+    def recordings(self, model: Any) -> tuple[str, ...]:
+        """Return the names of the recordings."""
+
+    def typical_duration_s(self, model: Any, phone: str) -> float:
+        """Return the median duration of a phone in the recordings."""
+
+    def source_pieces(
+        self, model: Any, units: Timeline[Unit], heard: Mapping[str, NDArray[np.floating[Any]]]
+    ) -> tuple[tuple[SourcePiece, ...], Timeline[Unit]]:
+        """Return the pieces of recordings that say some phones best, and the phones with the sources of their units.
+
+        units : phones in time, from 0 s
+        heard : acoustic features of every recording, by its name [each shape=(T, D)]; pieces join where these agree
+        Raises InputError: an unknown phone, or features of other recordings.
+        """
+
+
 @runtime_checkable
 class Describes(Protocol):
     """An engine that can describe its models as text."""

@@ -17,6 +17,9 @@ About = Mapping[str, str]
 LARGEST_MOTION = 1 << 31
 """Most bytes of a motion file: four hours of a hundred channels."""
 
+LARGEST_UNITS = 1 << 28
+"""Most bytes of a file of units alone: phones of a day."""
+
 
 @dataclass(frozen=True)
 class MotionFormat:
@@ -25,11 +28,13 @@ class MotionFormat:
     write : writes a generation to a path; the mappings describe the origin of its speech and of its model
     read  : returns motion and units of a file, or raises InputError; None: the format cannot be read
     check : raises ExportError for motion that does not fit into such a file
+    units : returns the units of a file that holds units alone, and None of other files; None: there are no such files
     """
 
     write: Callable[[Path, Generation, About, About], None]
     read: Callable[[Path], tuple[Motion, Timeline[Unit]]] | None = None
     check: Callable[[Motion], None] = lambda _: None
+    units: Callable[[Path], Timeline[Unit] | None] | None = None
 
 
 MOTION_FORMATS: Registry[MotionFormat] = Registry(
@@ -104,6 +109,24 @@ def read_motion(path: str | Path) -> tuple[Motion, Timeline[Unit]]:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
+
+
+def read_units(path: Path) -> Timeline[Unit]:
+    """Return the units of a motion file, or of a ``.json`` that holds the member ``units`` without motion.
+
+    Raises InputError: as ``read_motion``.
+    """
+    read = _format_of(path).units if path.suffix.lower() in motion_suffixes() else None
+    if read is not None and path.is_file() and path.stat().st_size <= LARGEST_UNITS:
+        try:
+            units = read(path)
+        except OSError as error:
+            raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
+        except InputError as error:
+            raise InputError(f"{path}: {error}") from error
+        if units is not None:
+            return units
+    return read_motion(path)[1]
 
 
 def _format_of(path: Path) -> MotionFormat:

@@ -8,9 +8,11 @@ from typing import Any
 from lipmotion.printable import printable
 
 PINNED = (
-    "p, b and m are pinned: lips are made to meet where the recogniser, with transcript the alignment that places the "
-    "reference, too,\nputs them. What the model does by itself stands under 'without pins'"
+    "p, b and m are pinned: lips are made to meet where the recogniser, with transcript the alignment that places the",
+    "reference, too, puts them. What the model does by itself stands under 'without pins'",
 )
+"""Two lines of the table."""
+SEEN = "the model was trained on some of these recordings: figures of recordings that it does not know are lower"
 
 
 def figures_table(figures: Mapping[str, Any]) -> str:
@@ -21,7 +23,10 @@ def figures_table(figures: Mapping[str, Any]) -> str:
     lines += [f"left out, for they do not move: {', '.join(still)}"] if still else []
     strangers = [name or "speakers without a name" for name in figures.get("strangers", ())]
     lines += [f"unknown to the model, compared with the mean person: {', '.join(strangers)}"] if strangers else []
-    lines += [PINNED] if any("unpinned" in condition for condition in figures["conditions"].values()) else []
+    lines += [SEEN] if figures.get("seen_in_training") else []
+    silent = figures.get("without_words", 0)
+    lines += [f"no figures with transcript: {silent} of {figures['clips']} clips have no words"] if silent else []
+    lines += PINNED if any("unpinned" in condition for condition in figures["conditions"].values()) else []
     for name, condition in figures["conditions"].items():
         rows = condition["channels"] | _eigenlips_row(condition)
         size = max(9, *map(len, rows))

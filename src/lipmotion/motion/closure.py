@@ -14,6 +14,10 @@ from lipmotion.units import LIP_CLOSING
 OPENING = "opening"
 REACH_S = 0.02
 """Seconds before and after the span of a phone in which the lips may close: the accuracy of alignments."""
+CLOSED_PERCENTILE = 2.0
+"""Lips that touch are open no further than this percentile of all frames, nor than that of the frames of speech. Of six
+GRID speakers with transcripts the median over p, b and m is no more than either; of recognised phones it may be
+anything."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +51,19 @@ def closable_ranges(units: Timeline[Unit], frames: int, closing_units: Container
     return ranges
 
 
+def closed_opening(smallest: Sequence[float], *groups: NDArray[np.float64]) -> float:
+    """Return the opening at which a person's lips touch, in the unit of the openings, at least 0.
+
+    smallest : smallest opening in each p, b and m; may be empty, and wrong where phones were recognised
+    groups   : openings in groups of frames, for instance in all frames and in those of speech [each shape=(N,)]
+    The median over p, b and m, but no more than ``CLOSED_PERCENTILE`` of each group that has a frame: phones that were
+    recognised in a single clip may be others, and then the lips would never meet.
+    """
+    bounds = [float(np.percentile(group, CLOSED_PERCENTILE)) for group in groups if len(group)]
+    middle = [float(np.median(smallest))] if len(smallest) else []
+    return max(min([*middle, *bounds], default=0.0), 0.0)
+
+
 def closure_from_motion(
     values: Sequence[NDArray[np.float64]],
     valid: Sequence[NDArray[np.bool_]],
@@ -59,7 +76,7 @@ def closure_from_motion(
     valid     : the frames of each that were measured [each shape=(T,)]
     timelines : the phones of each
     column    : of the opening
-    ``closed`` is the median over all p, b, m of the smallest opening in each; without any, the first percentile.
+    ``closed`` is from ``closed_opening``, of all measured frames.
     """
     smallest = [
         float(x[frames][known[frames], column].min())
@@ -70,8 +87,8 @@ def closure_from_motion(
     poses = np.concatenate([x[known] for x, known in zip(values, valid, strict=True)])
     centred = poses - poses.mean(axis=0)
     opening = centred[:, column]
-    closed = float(np.median(smallest)) if smallest else float(np.percentile(poses[:, column], 1))
-    return Closure(column, max(closed, 0.0), opening @ centred / max(float(opening @ opening), 1e-12))
+    closed = closed_opening(smallest, poses[:, column])
+    return Closure(column, closed, opening @ centred / max(float(opening @ opening), 1e-12))
 
 
 def frames_to_close(

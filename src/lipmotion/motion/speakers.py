@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import convolve1d
 
 from lipmotion.errors import InputError
-from lipmotion.motion.closure import OPENING, closable_ranges
+from lipmotion.motion.closure import OPENING, closable_ranges, closed_opening
 from lipmotion.motion.rest import away_from_speech, speech_intervals
 from lipmotion.storage.schema import Arrays, ArraySpec, checked_arrays, format_errors, refuse_undeclared
 from lipmotion.types import FRAME_RATE_HZ, Channel, Example, Timeline, Unit
@@ -283,20 +283,21 @@ def _measured(examples: Sequence[Example], column: int | None) -> _Person:
 
     column : of the opening (None: there is no such channel)
     """
-    silent, silence, spoken, smallest = [], [], [], []
+    silent, silence, spoken, measured, smallest = [], [], [], [], []
     for example in examples:
         values, valid = np.asarray(example.motion.values, float), example.valid
         time_s = np.arange(len(values)) / FRAME_RATE_HZ
         speech_s = speech_intervals(example.speech.units)
         silent.append(values[valid & away_from_speech(time_s, speech_s, FAR_FROM_SPEECH_S)])
         silence.append(values[valid & away_from_speech(time_s, speech_s, NEAR_SPEECH_S)])
+        measured.append(values[valid])
         spoken.append(values[valid & np.logical_not(away_from_speech(time_s, speech_s, 0.0))])
         if column is not None:
             ranges = closable_ranges(example.speech.units, len(values))
             smallest += [values[frames, column][valid[frames]].min() for frames in ranges if valid[frames].any()]
     quiet, speech = _first_long([*map(np.concatenate, (silent, silence))]), np.concatenate(spoken)
     if not len(speech):
-        speech = np.concatenate([np.asarray(e.motion.values, float)[e.valid] for e in examples])
+        speech = np.concatenate(measured)
     if not len(speech):
         speech = np.zeros((1, examples[0].motion.values.shape[1]))
     low, high = np.percentile(speech, RANGE_PERCENTILES, axis=0)
@@ -305,9 +306,9 @@ def _measured(examples: Sequence[Example], column: int | None) -> _Person:
         centred = speech - speech.mean(axis=0)
         follow = centred[:, column] @ centred / max(float(centred[:, column] @ centred[:, column]), 1e-12)
         follow[column] = 1
-        closed = float(np.median(smallest)) if smallest else float(np.percentile(speech[:, column], 1))
+        closed = closed_opening(smallest, speech[:, column], np.concatenate(measured)[:, column])
     rest = np.median(quiet, axis=0) if quiet is not None else np.full(speech.shape[1], np.nan)
-    return _Person(rest, np.median(speech, axis=0), high - low, follow, max(closed, 0.0), len(speech) / FRAME_RATE_HZ)
+    return _Person(rest, np.median(speech, axis=0), high - low, follow, closed, len(speech) / FRAME_RATE_HZ)
 
 
 def _first_long(candidates: Sequence[Array]) -> Array | None:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.stats.block_code import checked_ranges
+from lipmotion.stats.block_code import WIDEST, checked_ranges
 from lipmotion.stats.low_rank_code import LOW_RANK_ARRAYS, LowRankCode, low_rank_arrays, low_rank_from_arrays
 from lipmotion.stats.low_rank_search import compress_table
 from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, checked_arrays, format_errors, refuse_undeclared
@@ -118,7 +118,7 @@ def compress(
         raise InputError("motion with values that are not finite; give ranges of frames (kept) without them")
     numbers = _checked_groups(groups, values.shape[1])
     allowed = _checked_tolerance(tolerance, numbers)
-    spacings = [1.0, *(rate_hz / camera for camera in CAMERA_RATES_HZ if camera < rate_hz)]
+    spacings = [1.0, *(rate_hz / camera for camera in CAMERA_RATES_HZ if camera < rate_hz <= WIDEST * camera)]
 
     def excess(restored: Array, true: NDArray[Any]) -> Array:
         return point_distances((restored - true) / allowed, numbers)

@@ -8,6 +8,8 @@ from pathlib import Path
 
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export.base import check_motion, motion_suffixes, write_motion
+from lipmotion.export.sound import SOUND_CODECS, write_sound
+from lipmotion.export.textgrid import TEXTGRID_SUFFIX, write_textgrid
 from lipmotion.faces.base import Face
 from lipmotion.faces.registry import face_named
 from lipmotion.kernels.threads import one_thread
@@ -19,7 +21,7 @@ from lipmotion.pipeline.understand import understood_speech
 from lipmotion.pipeline.workers import map_in_processes
 from lipmotion.speech.audio_files import read_audio
 from lipmotion.storage.files import as_text, check_distinct, check_target
-from lipmotion.types import Constraints, Generation, TimedTranscript
+from lipmotion.types import Audio, Constraints, Generation, TimedTranscript
 
 VIDEO_SUFFIX = ".mp4"
 SOUND_RATE_HZ = 48_000
@@ -69,7 +71,7 @@ def write(
     generation: Generation,
     outputs: str | Path | Sequence[str | Path],
     *,
-    speech: str | Path | None = None,
+    speech: str | Path | Audio | None = None,
     model: Model | None = None,
     channels: Sequence[str] | None = None,
     rate_hz: float | None = None,
@@ -79,8 +81,9 @@ def write(
     """Write generated motion to one or several files, each in the format of its suffix.
 
     generation : from ``animate``
-    outputs  : paths of files: ``.json``, ``.csv``, ``.npz`` (motion) or ``.mp4`` (a drawn face, with sound)
-    speech   : the recording that was animated; a video needs it for its sound
+    outputs  : paths of files: ``.json``, ``.csv``, ``.npz`` (motion), ``.TextGrid`` (phones in time) or ``.mp4`` (a
+               drawn face, with sound); where ``speech`` is a sound, also ``.wav``, ``.flac``, ``.ogg``
+    speech   : the recording that was animated, or the sound, as of ``speak``; a video needs it for its sound
     model    : the model that generated the motion; motion files then name its corpus and licence
     channels : channels of motion files, in this order; None: all
     rate_hz  : frames per second of motion files, 1 to 1000; None: the 100 of the model
@@ -99,7 +102,9 @@ def write(
     time_s,opening,width
     """
     paths = [Path(output) for output in ([outputs] if isinstance(outputs, str | Path) else outputs)]
-    check_outputs(paths, speech, rate_hz=rate_hz, fps=fps, face=face)
+    sound = speech if isinstance(speech, Audio) else None
+    recording = None if isinstance(speech, Audio) else speech
+    check_outputs(paths, recording, rate_hz=rate_hz, fps=fps, face=face, with_sound=sound is not None)
     videos = [path for path in paths if path.suffix.lower() == VIDEO_SUFFIX]
     if videos and "opening" not in generation.motion.names:
         raise ExportError(f"{videos[0]}: the motion has no channel 'opening' to draw a face from; write motion files")
@@ -107,14 +112,21 @@ def write(
     written = generation.selected(channels) if channels is not None else generation
     if rate_hz is not None:
         written = written.resampled(rate_hz)
+    sounds = [path for path in paths if path.suffix.lower() in SOUND_CODECS]
     for path in paths:
-        if path not in videos:
+        if path.suffix.lower() in motion_suffixes():
             check_motion(path, written.motion)
     for path in paths:
-        if path.suffix.lower() == VIDEO_SUFFIX:
-            _write_video(generation, path, Path(str(speech)), fps, drawn_face)
+        if path in sounds and sound is not None:
+            write_sound(path, sound)
+        elif path in videos:
+            _write_video(
+                generation, path, sound or read_audio(Path(str(recording)), SOUND_RATE_HZ, warn=False), fps, drawn_face
+            )
+        elif path.suffix.lower() == TEXTGRID_SUFFIX.lower():
+            write_textgrid(path, generation.units)
         else:
-            _write_motion(written, path, speech, model)
+            _write_motion(written, path, recording, model)
 
 
 def check_outputs(
@@ -124,22 +136,24 @@ def check_outputs(
     rate_hz: float | None = None,
     fps: float = 25.0,
     face: str = "portrait",
+    with_sound: bool = False,
 ) -> None:
     """Raise ExportError or InputError if an output cannot be written; called before long work begins.
 
     outputs, speech, rate_hz, fps, face : as of ``write``
+    with_sound : the speech is, or will be, a sound that is in no file
     """
     for hertz in (fps, rate_hz):
         if hertz is not None and not SLOWEST_HZ <= hertz <= FASTEST_HZ:
             raise InputError(f"the frame rate is {hertz}, required {SLOWEST_HZ:.0f} to {FASTEST_HZ:.0f} a second")
     face_named(face)
-    suffixes = (*motion_suffixes(), VIDEO_SUFFIX)
+    suffixes = (*motion_suffixes(), VIDEO_SUFFIX, TEXTGRID_SUFFIX, *(SOUND_CODECS if with_sound else ()))
     check_distinct([Path(path) for path in outputs])
     for path in map(Path, outputs):
-        if path.suffix.lower() not in suffixes:
+        if path.suffix.lower() not in map(str.lower, suffixes):
             raise ExportError(f"{path}: unknown format {path.suffix!r}; required one of: {' '.join(suffixes)}")
         check_target(path, speech)
-        if path.suffix.lower() == VIDEO_SUFFIX and speech is None:
+        if path.suffix.lower() == VIDEO_SUFFIX and speech is None and not with_sound:
             raise ExportError(f"{path}: a video needs the recording: write(..., speech=FILE)")
 
 
@@ -154,8 +168,8 @@ def _text(value: object) -> str:
     return as_text("; ".join(map(str, value)) if isinstance(value, list) else str(value))
 
 
-def _write_video(generation: Generation, path: Path, speech: Path, fps: float, face: Face) -> None:
+def _write_video(generation: Generation, path: Path, sound: Audio, fps: float, face: Face) -> None:
     from lipmotion.export.video import write_mp4
 
     frames = face.render(generation.motion, generation.units, fps=fps)
-    write_mp4(path, frames, fps=fps, audio=read_audio(speech, SOUND_RATE_HZ))
+    write_mp4(path, frames, fps=fps, audio=sound)

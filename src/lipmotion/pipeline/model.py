@@ -114,7 +114,10 @@ def load_model(path: str | Path | None = None) -> Model:
         return _shipped()
     path = Path(path)
     if not path.is_file():
-        raise InputError(f"{path}: no such model; train one (lipmotion train) or leave --model out")
+        raise InputError(
+            f"{path}: no such model; train one (lipmotion train), or use the one that ships: lipmotion "
+            "info names its file"
+        )
     return _read(path)
 
 

@@ -4,21 +4,26 @@ from __future__ import annotations
 
 from lipmotion.pipeline.request import SpeechRequest
 from lipmotion.pipeline.understand import UnderstoodSpeech
+from lipmotion.speech.agreement import LEAST_FITTING_SHARE
 from lipmotion.speech.recogniser import FULL_WEIGHT_SCORE, NO_WEIGHT_SCORE
 from lipmotion.speech.recognition import CONFIDENCES, NOISY_DB
 from lipmotion.types import Outlook
 
 TRANSCRIPT = "the words that are spoken (--transcript)"
 OWN_MODEL = "recordings of this person (lipmotion adapt for the sound alone, lipmotion train with video)"
+WHOLE_TRANSCRIPT = "a transcript of all that is said, and of nothing else"
 LESS_NOISE = "a recording with less noise"
 
 
 def outlook_of(request: SpeechRequest, understood: UnderstoodSpeech) -> Outlook:
     """Return what to expect of the motion of some speech."""
     found, speech = understood.recognition, understood.speech
+    if understood.is_without_speech:
+        return Outlook("no speech", 0.0, None, understood.range_db, ())
     if found is None:
         words = "given units" if request.units is not None else "transcript" if speech.units_known else "own model"
-        return Outlook(words, 1.0, 1.0 if words == "own model" else None, understood.range_db, _advice(understood))
+        share = understood.fit.share if understood.fit else 1.0
+        return Outlook(words, share, 1.0 if words == "own model" else None, understood.range_db, _advice(understood))
     words = "words" if found.word_s > found.phone_s else "phones"
     voice = None
     if found.similarity is not None:
@@ -39,4 +44,6 @@ def _advice(understood: UnderstoodSpeech) -> tuple[str, ...]:
     if understood.range_db < NOISY_DB:
         unsure = found is None or (found.confidence or 0.0) < CONFIDENCES[0]
         advice.insert(0 if unsure else len(advice), LESS_NOISE)
+    if understood.fit is not None and understood.fit.share < LEAST_FITTING_SHARE:
+        advice.insert(0, WHOLE_TRANSCRIPT)
     return tuple(advice)

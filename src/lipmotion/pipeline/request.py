@@ -19,7 +19,7 @@ class SpeechRequest:
                  or a ``TimedTranscript``; with a transcript, phones are aligned instead of recognised, and within the
                  times that it gives
     units      : phones in time, for instance those of an earlier generation, edited; with units, phones are neither
-                 recognised nor aligned
+                 recognised nor aligned. Gaps between them are silence
     lexicon    : pronunciations of words, ahead of those of the dictionary
     recogniser : how speech without a transcript is recognised. ``auto``: English words where they fit the sound, phones
                  elsewhere; ``words``: words alone; ``fast``: phones alone, by the phone models of the model and those

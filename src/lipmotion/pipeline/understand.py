@@ -17,17 +17,20 @@ from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.prior import with_prior
 from lipmotion.pipeline.request import SpeechRequest
 from lipmotion.pipeline.transcribe import read_transcript, transcribe
+from lipmotion.speech.agreement import TranscriptFit
 from lipmotion.speech.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.audio_files import read_audio
 from lipmotion.speech.f0 import log_f0
 from lipmotion.speech.installed_recognisers import INSTALLED_RECOGNISERS, recognise_words
-from lipmotion.speech.recogniser import Recogniser, cached_recogniser
+from lipmotion.speech.recogniser import RECOGNISER_KINDS, Recogniser, cached_recogniser
 from lipmotion.speech.recognition import Recognition, level_range_db
 from lipmotion.types import Audio, Features, ParallelMap, Speech, TimedTranscript, Timeline, Unit
-from lipmotion.units import Lexicon, check_phones, check_text, words_of
+from lipmotion.units import Lexicon, check_phones, check_text, is_silent, without_gaps, words_of
 
 LATE_S = 0.1
 """Seconds by which given units may end after the sound; editing programs round times."""
+LEAST_SPEECH_S = 0.2
+"""Less recognised speech than this is none: the edge of a tone or of noise, taken as a consonant."""
 LOG = logging.getLogger("lipmotion")
 
 
@@ -35,13 +38,25 @@ LOG = logging.getLogger("lipmotion")
 class UnderstoodSpeech:
     """The speech of a recording as input of an engine, and what was recognised in it.
 
-    range_db    : decibels between the loud and the quiet moments of the recording
     recognition : None where words or phones were given, or the engine's own model recognised the speaker
+    range_db    : decibels between the loud and the quiet moments of the recording
+    fit         : of the transcript; None where there was none, or it was not compared with the sound
     """
 
     speech: Speech
     recognition: Recognition | None
     range_db: float
+    fit: TranscriptFit | None = None
+
+    @property
+    def speech_s(self) -> float:
+        """Seconds of speech, by the phones in time."""
+        return sum(span.duration_s for span in self.speech.units if not is_silent(span.label.phone))
+
+    @property
+    def is_without_speech(self) -> bool:
+        """Whether no speech was recognised."""
+        return not self.speech.units_known and self.speech_s < LEAST_SPEECH_S
 
 
 def understand(model: Model, request: SpeechRequest, each: ParallelMap = map) -> Speech:
@@ -56,39 +71,42 @@ def understand(model: Model, request: SpeechRequest, each: ParallelMap = map) ->
 
 def understood_speech(model: Model, request: SpeechRequest, each: ParallelMap = map) -> UnderstoodSpeech:
     """Return the speech of a request as ``understand`` does, with what was recognised."""
-    found: list[Recognition] = []
     audio = analysed(audio_of(request))
-    speech = _understood(model, request, audio, each, found)
-    return UnderstoodSpeech(
-        with_prior(model.prior, speech), found[0] if found else None, level_range_db(audio.log_energy)
-    )
+    understood = _understood(model, request, audio, each)
+    if understood.is_without_speech:
+        LOG.warning("no speech found in the recording: the mouth rests; give a recording in which something is said")
+    return replace(understood, speech=with_prior(model.prior, understood.speech))
 
 
-def _understood(
-    model: Model, request: SpeechRequest, audio: AnalysedAudio, each: ParallelMap, found: list[Recognition]
-) -> Speech:
-    """Return the speech of a request, without what the model that this one stands on makes of it.
-
-    found : what is recognised is added
-    """
+def _understood(model: Model, request: SpeechRequest, audio: AnalysedAudio, each: ParallelMap) -> UnderstoodSpeech:
+    """Return the speech of a request, without what the model that this one stands on makes of it."""
+    kinds = (*RECOGNISER_KINDS, *INSTALLED_RECOGNISERS)
+    if request.recogniser not in kinds:
+        raise InputError(f"unknown recogniser {request.recogniser!r}; required one of: {', '.join(kinds)}")
+    range_db = level_range_db(audio.log_energy)
     installed = request.recogniser in INSTALLED_RECOGNISERS
     phones = cached_recogniser(model.phones, "auto" if installed else request.recogniser, model.adaptation)
     if request.units is not None:
+        if request.transcript is not None:
+            LOG.warning("the transcript is not used: the units already say what is spoken; leave one of them out")
         _check_units(request.units, audio.duration_s)
-        return speech_of(model.engine, audio, audio.mfcc(), request.units)
+        units = without_gaps(request.units, audio.duration_s)
+        return UnderstoodSpeech(speech_of(model.engine, audio, audio.mfcc(), units), None, range_db)
     words = _words(request.transcript, audio.duration_s)
     if installed and words is None:
         words = recognise_words(audio, request.recogniser)
     features = audio.mfcc()
     if words is not None:
-        units = transcribe(phones, audio, features, words, request.lexicon or Lexicon())
-        return speech_of(model.engine, audio, features, units)
+        units, fit = transcribe(phones, audio, features, words, request.lexicon or Lexicon())
+        return UnderstoodSpeech(speech_of(model.engine, audio, features, units), None, range_db, fit)
+    found: list[Recognition] = []
 
     def recognise() -> Recognition:
         found.append(phones.recognition(audio, features, each))
         return found[-1]
 
-    return recognised_speech(model.engine, model.learned, audio, features, phones, recognise)
+    speech = recognised_speech(model.engine, model.learned, audio, features, phones, recognise)
+    return UnderstoodSpeech(speech, found[0] if found else None, range_db)
 
 
 def audio_of(request: SpeechRequest) -> Audio:
@@ -151,10 +169,11 @@ def _check_units(units: Timeline[Unit], duration_s: float) -> None:
     """Raise InputError if given units are empty or too many; log a warning if they end after the recording."""
     if not len(units):
         raise InputError(
-            "the units are an empty list (a .csv has none); give those of a .json or .npz, or leave them out"
+            "the units are an empty list (a .csv has none); give those of a .json, .npz or label file, or leave "
+            "them out"
         )
     check_phones(len(units), duration_s)
-    if units[-1].end_s > duration_s + LATE_S:
+    if duration_s + LATE_S < units[-1].end_s < np.inf:
         LOG.warning(
             "the units go on to %.2f s, the recording ends at %.2f s: are they those of another recording?",
             units[-1].end_s,

@@ -6,20 +6,21 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from lipmotion.errors import ExportError
+from lipmotion.errors import ExportError, InputError
 from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.request import SpeechInput, request_of
 from lipmotion.pipeline.understand import audio_of
 from lipmotion.pipeline.workers import map_in_processes
 from lipmotion.speech.analysed_audio import analysed
-from lipmotion.speech.recogniser import cached_recogniser
+from lipmotion.speech.recogniser import RECOGNISER_KINDS, USING_WORDS, cached_recogniser
 from lipmotion.speech.recognition import HeardWord, Recognition
 from lipmotion.storage.files import check_distinct, check_target, whole_file
 from lipmotion.storage.json_text import as_json
 from lipmotion.types import Span, Timeline
 
 TEXT, JSON = ".txt", ".json"
+WITHOUT_WORDS = tuple(kind for kind in RECOGNISER_KINDS if kind not in USING_WORDS)
 LINE_PAUSE_S = 0.5
 """A longer pause between words ends a line of text."""
 
@@ -31,7 +32,7 @@ def recognise_words(speech: SpeechInput, *, model: Model | str | Path | None = N
     speech  : an audio or video file, samples at 16 kHz, or a ``SpeechRequest``, of which the transcript is not used
     model   : whose phone models align the words: from ``load_model``, or a path; None: the shipped one
     workers : as of ``animate``
-    Raises InputError: the recording is not usable.
+    Raises InputError: the recording is not usable, or the recogniser does not recognise words.
     Raises MissingDependencyError: pocketsphinx is not installed.
 
     >>> from lipmotion.pipeline.words import recognise_words
@@ -41,6 +42,11 @@ def recognise_words(speech: SpeechInput, *, model: Model | str | Path | None = N
     """
     chosen = model if isinstance(model, Model) else load_model(model)
     request = request_of(speech)
+    if request.recogniser in WITHOUT_WORDS:
+        raise InputError(
+            f"the recogniser {request.recogniser!r} recognises phones, not words; required one of: "
+            f"{', '.join(USING_WORDS)}"
+        )
     audio = analysed(audio_of(request))
     recogniser = cached_recogniser(chosen.phones, request.recogniser, chosen.adaptation)
     return recogniser.recognition(audio, audio.mfcc(), map_in_processes(workers))

@@ -24,15 +24,18 @@ CANCELLED = 0.05
 """The mean of the channels must have this share of the loudest channel's energy; else they cancel one another."""
 USABLE = 0.5
 """A damaged recording is refused when less than this share of its sound can be decoded."""
+LEAST_HOLES_S = 0.005
+"""Holes that last less together are not mentioned: they would be rounded to 0."""
 CUT_SHORT = 0.9
 """A recording is called cut short when it holds less than this share of the duration that it states."""
 
 
-def read_audio(path: Path, rate_hz: int = SPEECH_RATE_HZ) -> Audio:
+def read_audio(path: Path, rate_hz: int = SPEECH_RATE_HZ, *, warn: bool = True) -> Audio:
     """Return the first sound track of a file, the mean of its channels.
 
     path    : audio or video file, anything FFmpeg decodes
     rate_hz : rate to resample to
+    warn    : log warnings; False where the same file was read before, so that none is said twice
     Time 0 is the start of the container, so sound and picture of a video agree: a track that starts later
     is preceded by silence, one that starts earlier is cut. In a file without video it is the first sample.
     Holes in the sound (damage, lost packets) become silence, so that what follows keeps its time. Where the channels
@@ -45,14 +48,15 @@ def read_audio(path: Path, rate_hz: int = SPEECH_RATE_HZ) -> Audio:
     sound = _decoded(path, rate_hz, None)
     if sound.mean_energy < CANCELLED * max(sound.energies, default=0.0):
         loudest = int(np.argmax(sound.energies))
-        LOG.warning(
+        LOG.log(
+            logging.WARNING if warn else logging.DEBUG,
             "%s: its %d channels cancel one another in their mean; channel %d, the loudest, is used",
             path,
             len(sound.energies),
             loudest + 1,
         )
         sound = _decoded(path, rate_hz, loudest)
-    _report_damage(path, sound)
+    _check_damage(path, sound, logging.WARNING if warn else logging.DEBUG)
     return _checked(path, Audio(sound.samples, rate_hz))
 
 
@@ -83,15 +87,17 @@ def _check_stream(path: Path, stream: Any) -> None:
     check_sound_format(str(path), stream.rate or 0, stream.channels or 0)
 
 
-def _report_damage(path: Path, sound: DecodedAudio) -> None:
+def _check_damage(path: Path, sound: DecodedAudio, level: int) -> None:
+    """Log damage at a level of ``logging``. Raises InputError: too little of the sound can be decoded."""
     held_s = len(sound.samples) / sound.rate_hz - sound.silence_s
     found = f"{sound.damaged} of {sound.packets} packets of sound cannot be decoded"
     if sound.damaged > (1 - USABLE) * sound.packets:
         raise InputError(f"{path}: damaged: {found}; required: at least half of them; export the recording again")
     if sound.damaged or sound.silence_s >= SHORTEST_S:
-        LOG.warning("%s: damaged: %s; holes of %.2f s became silence", path, found, sound.silence_s)
+        holes = f"; holes of {sound.silence_s:.2f} s became silence" if sound.silence_s >= LEAST_HOLES_S else ""
+        LOG.log(level, "%s: damaged: %s%s", path, found, holes)
     if held_s < CUT_SHORT * sound.stated_s:
-        LOG.warning("%s: cut short: it states %.1f s of sound and holds %.1f s", path, sound.stated_s, held_s)
+        LOG.log(level, "%s: cut short: it states %.1f s of sound and holds %.1f s", path, sound.stated_s, held_s)
 
 
 def _checked(path: Path, audio: Audio) -> Audio:

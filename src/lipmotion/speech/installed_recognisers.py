@@ -50,14 +50,15 @@ def recognise_words(audio: Audio, kind: str) -> TimedTranscript | None:
     Raises MissingDependencyError: the package is not installed. Raises InputError: no model, or one it cannot read.
     """
     recogniser = INSTALLED_RECOGNISERS[kind]
-    folder = _folder(recogniser, kind)
     os.environ.setdefault("HF_HUB_OFFLINE", "1")  # faster-whisper reads it when it is imported
     try:
         module = import_module(recogniser.package)
     except ImportError as error:
         raise MissingDependencyError(
-            f"the recogniser {kind!r} needs {recogniser.package}: pip install 'lipmotion[{recogniser.extra}]'"
+            f"the recogniser {kind!r} needs {recogniser.package}: pip install 'lipmotion[{recogniser.extra}]'; then "
+            f"set {recogniser.variable} to the folder of its model (docs/transcripts.md)"
         ) from error
+    folder = _folder(recogniser, kind)
     lines = recogniser.words(module, folder, audio)
     if lines is None:
         return None

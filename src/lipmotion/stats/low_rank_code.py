@@ -77,6 +77,8 @@ def low_rank_arrays(code: LowRankCode) -> dict[str, NDArray[Any]]:
 def low_rank_from_arrays(arrays: Arrays) -> LowRankCode:
     """Deserialise a code; other arrays are ignored. Raises as ``block_code_from_arrays``."""
     stored = checked_arrays(arrays, LOW_RANK)
+    if stored.sizes["k"] > stored.sizes["P"]:
+        raise ValueError(f"{stored.sizes['k']} components of {stored.sizes['P']} columns, required at most as many")
     return LowRankCode(
         stored["mean"], stored["scale"], stored["basis"], stored["steps"],
         block_code_from_arrays(arrays, stored.sizes["k"]),

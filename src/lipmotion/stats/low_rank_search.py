@@ -42,12 +42,15 @@ NEAR, NEARLY = 0.975, 0.99
 """A step is good enough where the error is at least the first part of what is allowed; it aims at the second."""
 SMALLER, MOST_STEPS = 0.97, 100
 """Factor of the step where the promise is not kept on all frames, and how often it is tried."""
-BASIS_SHARE = 0.25
-"""Rounding of the basis changes values by about this share of the step."""
+BASIS_SHARE = 1.0
+"""Rounding of an entry of the basis changes all values together by so many times as much as rounding of a coefficient:
+with 1, a bit more in either of them helps as much."""
 FINEST = 1e-9
 """Smallest step of the basis, so that its levels are 32-bit numbers."""
 EQUAL_ROUNDS, EQUAL_POWER = 4, 0.7
 """How often, and by which power of its error, the weight of each group is changed until all have the same error."""
+FULL_ROUNDS = 2
+"""How often weights are changed once more by the errors in all frames; the smallest code is taken."""
 CHUNK = 1 << 23
 """Numbers that are computed at a time."""
 
@@ -97,19 +100,26 @@ def compress_table(
     if not found:
         raise _refusal(table)
     layout = replace(min(found, key=packed_size).code.layout, kept=kept)
-    return table.projected(scale, count).verified(layout)
+    coded, scale = table.verified(layout, scale, count)
+    for _ in range(FULL_ROUNDS if groups.max() else 0):
+        try:
+            other, scale = table.verified(layout, scale, count)
+        except InputError:  # the weights before were better
+            break
+        coded = min(coded, other, key=lambda each: packed_size(each.code))
+    return coded
 
 
 @dataclass(frozen=True, eq=False)
 class _Space:
     """Principal components of scaled values: mean [shape=(P,)] in the values' unit, scale [shape=(P,)], basis
-    [shape=(K, P)]; sizes of the curves [shape=(K,)].
+    [shape=(K, P)]; norms of the curves [shape=(K,)].
     """
 
     mean: Array
     scale: Array
     basis: Array
-    sizes: Array
+    norms: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,14 +159,40 @@ class _Table:
             for start in range(first, stop, self.chunk):
                 rows = slice(start, min(start + self.chunk, stop))
                 curves[rows] = space.project(self.values[rows] / scale)
-        sizes = np.sqrt(np.square(curves).sum(axis=0, dtype=np.float64) / len(self.frames))
-        return _Projection(self, _Space(space.mean * scale, scale, space.basis, sizes), curves)
+        norms = np.sqrt(np.square(curves).sum(axis=0, dtype=np.float64))
+        return _Projection(self, _Space(space.mean * scale, scale, space.basis, norms), curves)
 
     def errors(self, code: LowRankCode, frames: Indices) -> Array:
         """Return the 99th percentile of each group's error in some frames [shape=(G,)]."""
         parts = (frames[start : start + self.chunk] for start in range(0, len(frames), self.chunk))
         errors = [self.excess(code.rows(part), self.values[part]).astype(np.float32) for part in parts]
         return np.percentile(np.concatenate(errors), PERCENTILE, axis=0, overwrite_input=True).astype(np.float64)
+
+    def verified(self, layout: BlockLayout, scale: Array, count: int) -> tuple[CodedTable, Array]:
+        """Return the code of one layout whose errors are allowed in all frames, and a scale that may be better.
+
+        Raises InputError: there is none.
+        """
+        projection = self.projected(scale, count)
+        code = projection.searched(layout, max(SAMPLE, MOST_SAMPLED // self.values.shape[1]))
+        coefficients = layout.forward(projection.curves)
+        for _ in range(MOST_STEPS):
+            if code is None:
+                break
+            errors = self.errors(code, self.frames)
+            if errors.max() <= 1:
+                return CodedTable(code, float(errors.max())), self.reweighted(scale, errors)
+            code = _coded(layout, coefficients, SMALLER * code.code.step, projection.space)
+        raise _refusal(self)
+
+    def reweighted(self, scale: Array, errors: Array) -> Array:
+        """Return scales of the columns with which the errors of all groups are closer to each other."""
+        if not errors.max() > 0:
+            return scale
+        weights = np.maximum(errors / errors.max(), 0.05) ** EQUAL_POWER
+        changed = scale / weights[self.groups]
+        scaled: Array = changed * np.exp(np.log(self.tolerance / changed).mean())
+        return scaled
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,7 +207,8 @@ class _Projection:
         """Return the code of one layout with about the largest step that a sample of frames allows, or None."""
         coefficients = layout.forward(self.curves)
         some = self.table.frames[evenly_spaced(most, len(self.table.frames))]
-        best, step, small, large = None, FIRST_STEP, 0.0, np.inf  # a step that will do, and one that will not
+        best, step, last = None, FIRST_STEP, np.inf
+        small, large = 0.0, np.inf  # a step that will do, and one that will not
         for tried in range(MOST_ROUNDS):
             if step < LEAST_STEP or (best is not None and tried >= ROUNDS):
                 break
@@ -182,27 +219,16 @@ class _Projection:
             error = float(self.table.errors(code, some).max())
             if error <= 1:
                 best, small = code, step
+            elif error > NEAR * last and step < large / 2:  # what is left is not from quantisation
+                break
             else:
-                large = step
+                large, last = step, error
             if NEAR <= error <= 1 or (error <= 1 and not len(code.code.used)):
                 break
             step *= float(np.clip(NEARLY / max(error, 1e-9), 0.1, 4))
             if not small < step < large:
                 step = float(np.sqrt(small * large)) if small > 0 else large / 2
         return best
-
-    def verified(self, layout: BlockLayout) -> CodedTable:
-        """Return the code of one layout whose errors are allowed in all frames. Raises InputError: there is none."""
-        code = self.searched(layout, max(SAMPLE, MOST_SAMPLED // self.table.values.shape[1]))
-        coefficients = layout.forward(self.curves)
-        for _ in range(MOST_STEPS):
-            if code is None:
-                break
-            error = float(self.table.errors(code, self.table.frames).max())
-            if error <= 1:
-                return CodedTable(code, error)
-            code = _coded(layout, coefficients, SMALLER * code.code.step, self.space)
-        raise _refusal(self.table)
 
 
 def _equalised(table: _Table, length: int) -> tuple[Array, int]:
@@ -221,11 +247,9 @@ def _equalised(table: _Table, length: int) -> tuple[Array, int]:
             elif code is None:
                 raise _refusal(table)
         errors = table.errors(code, table.frames)
-        if len(errors) == 1 or not errors.max() > 0:
+        if len(errors) == 1:
             break
-        weights = np.maximum(errors / errors.max(), 0.05) ** EQUAL_POWER
-        scale /= weights[table.groups]
-        scale *= np.exp(np.log(table.tolerance / scale).mean())
+        scale = table.reweighted(scale, errors)
     return scale, count
 
 
@@ -239,8 +263,7 @@ def _coded(layout: BlockLayout, coefficients: NDArray[np.float32], step: float, 
     code = quantise_blocks(layout, coefficients, step)
     used, numbers = np.unique(code.used[:, 1], return_inverse=True)
     code = replace(code, count=len(used), used=np.stack([code.used[:, 0], numbers.ravel()], axis=1))
-    share = BASIS_SHARE * step / np.sqrt(max(len(used), 1))
-    steps = np.clip(share / np.maximum(space.sizes[used], step), FINEST, 0.5)
+    steps = np.clip(BASIS_SHARE * step / np.maximum(space.norms[used], LEAST_STEP), FINEST, 0.5)
     levels = np.rint(space.basis[used] / steps[:, None]).astype(np.int32)
     return LowRankCode(space.mean, space.scale, levels, steps, code)
 

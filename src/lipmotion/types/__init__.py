@@ -22,6 +22,7 @@ from lipmotion.types.generation import (
     PriorOutput,
     ReducedVariance,
     Speech,
+    SpokenText,
     StateTrace,
 )
 from lipmotion.types.motion import EYE_DISTANCE, GREY, WEIGHT, Channel, Motion, check_curves, check_magnitude
@@ -65,6 +66,7 @@ __all__ = [
     "Rule",
     "Span",
     "Speech",
+    "SpokenText",
     "StateTrace",
     "TimedTranscript",
     "TimedWord",

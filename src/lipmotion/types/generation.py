@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.types.audio import Audio
 from lipmotion.types.features import Features
 from lipmotion.types.motion import Motion, between_frames
 from lipmotion.types.timeline import Timeline, Unit
@@ -137,14 +138,19 @@ class ReducedVariance:
     mixing: NDArray[np.floating[Any]]
 
 
+ALL_FITS = 0.995
+"""A transcript that fits as large a share of the speech fits all of it, rounded."""
+
+
 @dataclass(frozen=True)
 class Outlook:
     """What to expect of generated motion: how well the model knew the words and the voice.
 
     words      : where the phones come from: ``transcript``, ``given units``, ``own model`` (the engine's own
                  recognition of a speaker that it was trained on), ``words`` or ``phones`` (recognised, for the most
-                 part)
-    confidence : 0 to 1, of recognised words, by their share of the speech; 1 where words or units were given
+                 part), ``no speech`` (none was found)
+    confidence : 0 to 1, of recognised words, by their share of the speech; of a transcript, the share of the speech
+                 that it fits (1 where that is not known); 1 where units were given
     voice      : 0 (unknown) to 1 (as in the training); None where it was not needed
     range_db   : decibels between loud and quiet moments; under 20 the recording is noisy
     advice     : what would help, the most helpful first
@@ -164,6 +170,10 @@ class Outlook:
         """The outlook in one line."""
         recognised = self.words in ("words", "phones")
         parts = [f"{self.words} recognised, confidence {self.confidence:.2f}" if recognised else f"words: {self.words}"]
+        if self.words == "no speech":
+            parts = ["no speech found"]
+        elif self.words == "transcript" and self.confidence < ALL_FITS:
+            parts[0] += f", which fits {self.confidence:.0%} of the speech"
         if self.voice is not None:
             parts.append(f"voice {self.voice:.2f}")
         parts.append(f"levels {self.range_db:.0f} dB apart")
@@ -240,3 +250,20 @@ class Generation:
             reduced = between_frames(self.spread.reduced, self.motion.rate_hz, time_s)
             return replace(self.spread, reduced=reduced)
         return between_frames(self.spread, self.motion.rate_hz, time_s)
+
+
+class SpokenText(NamedTuple):
+    """A text that a synthetic voice has said, with the motion of its lips.
+
+    sound      : at the synthesiser's own rate
+    generation : as of ``animate``; its units are the synthesiser's phones in time
+
+    >>> import lipmotion, numpy
+    >>> silence = lipmotion.Audio(numpy.zeros(22_050, numpy.float32), 22_050)
+    >>> sound, result = SpokenText(silence, lipmotion.animate("examples/welcome.flac"))
+    >>> sound.duration_s, result.units[0].label.phone
+    (1.0, 'sil')
+    """
+
+    sound: Audio
+    generation: Generation

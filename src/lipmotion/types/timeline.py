@@ -66,10 +66,11 @@ class Timeline(Generic[LabelT]):
         end_s = float("-inf")
         for span in self.spans:
             if not span.start_s <= span.end_s:
-                raise InputError(f"span {span.label!r} ends at {span.end_s} s, before its start at {span.start_s} s")
+                raise InputError(f"{_described(span)} ends at {span.end_s} s, before its start at {span.start_s} s")
             if span.start_s < end_s - 1e-9:
                 raise InputError(
-                    f"span {span.label!r} starts at {span.start_s} s, before the previous span ends ({end_s} s)"
+                    f"{_described(span)} starts at {span.start_s} s, before the previous span ends ({end_s} s); they "
+                    "must not overlap: correct one of the times"
                 )
             end_s = span.end_s
 
@@ -85,3 +86,11 @@ class Timeline(Generic[LabelT]):
     def shifted(self, offset_s: float) -> Timeline[LabelT]:
         """Return the timeline with ``offset_s`` seconds added to all times."""
         return Timeline(tuple(replace(s, start_s=s.start_s + offset_s, end_s=s.end_s + offset_s) for s in self.spans))
+
+
+def _described(span: Span[LabelT]) -> str:
+    """Return what a span is, for messages: the phone, the unit, or another label."""
+    label = span.label
+    if isinstance(label, Unit):
+        return f"the phone {label.phone!r}" if label.phone else f"the unit {label.unit!r}"
+    return f"the span {label!r}"

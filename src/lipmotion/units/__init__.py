@@ -1,6 +1,7 @@
 """Phones, visemes, unit sets, and words with their pronunciations. Data and look-ups, no audio."""
 
 from lipmotion.units.classes import phone_classes
+from lipmotion.units.gaps import without_gaps
 from lipmotion.units.length_limits import check_phones, check_text, check_words
 from lipmotion.units.lexicon import Lexicon, Pronunciation, phone_named, with_reduced_vowels
 from lipmotion.units.phones import (
@@ -40,6 +41,7 @@ __all__ = [
     "unit_set",
     "unknown_phone_message",
     "with_reduced_vowels",
+    "without_gaps",
     "words_in",
     "words_of",
 ]

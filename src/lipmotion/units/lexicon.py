@@ -12,7 +12,7 @@ from pathlib import Path
 from lipmotion.errors import InputError, MissingDependencyError, shortened
 from lipmotion.storage.files import read_text_file
 from lipmotion.units.phones import PHONES, is_silent
-from lipmotion.units.spelling import guess_pronunciation
+from lipmotion.units.spelling import guess_pronunciation, without_accents
 from lipmotion.units.transcript import normalised_text
 
 Pronunciation = tuple[str, ...]
@@ -76,10 +76,14 @@ class Lexicon:
         return word in self.user or bool(_dictionary_entries(word))
 
     def pronunciations(self, word: str) -> tuple[Pronunciation, ...]:
-        """Return every pronunciation of a lower-case word; of an unknown one, that of the letter-to-sound rules."""
+        """Return every pronunciation of a lower-case word.
+
+        Of an unknown one: those of the same word without accents, if the dictionary has it (``cafe`` for ``café``),
+        else that of the letter-to-sound rules.
+        """
         if word in self.user:
             return self.user[word]
-        entries = _dictionary_entries(word)
+        entries = _dictionary_entries(word) or _dictionary_entries(without_accents(word))
         variants = [with_reduced_vowels(word, entry) for entry in entries]
         return tuple(dict.fromkeys(variants)) or (with_reduced_vowels(word, guess_pronunciation(word)),)
 

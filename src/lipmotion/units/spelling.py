@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 
 from lipmotion.errors import InputError, shortened
 
@@ -85,6 +86,8 @@ SPELLINGS: dict[str, str] = {
     "'": "",
 }
 LONG_VOWELS = {"a": "ey", "e": "iy", "i": "ay", "o": "ow", "u": "uw"}
+ACCENTS = re.compile("[\u0300-\u036f]")
+"""The accents of Latin letters; the marks of other scripts are sounds."""
 _LONGEST = max(map(len, SPELLINGS))
 _SILENT_E = re.compile(r"e'?s?")
 """A silent e, with or without an s, at the end of a word."""
@@ -92,19 +95,33 @@ _LONG_VOWEL = re.compile(r"[aeiou][bcdfgklmnpstvz]e('?s)?$")
 """A long vowel: vowel, consonant, final e."""
 
 
+PLAIN = str.maketrans({"ß": "ss", "æ": "ae", "œ": "oe", "ø": "o", "đ": "d", "ð": "th", "þ": "th", "ł": "l", "ı": "i"})
+"""Letters of Latin alphabets that Unicode does not divide into a letter and an accent."""
+
+
+def without_accents(word: str) -> str:
+    """Return a lower-case word in plain letters, as far as its letters are Latin: ``café`` as ``cafe``."""
+    if word.isascii():
+        return word
+    divided = unicodedata.normalize("NFKD", word.translate(PLAIN))
+    return "".join(letter for letter in divided if not ACCENTS.fullmatch(letter))
+
+
 def guess_pronunciation(word: str) -> tuple[str, ...]:
     """Return a guessed pronunciation of a lower-case word, in ARPAbet.
 
-    Raises InputError: a character is not a letter of the English alphabet.
+    Accents are left out: ``é`` is read as ``e``.
+    Raises InputError: a character is not a letter of the Latin alphabet.
     """
-    foreign = sorted(set(re.sub(r"[a-z']", "", word)))
-    if foreign or not word.strip("'"):
+    plain = without_accents(word)
+    foreign = sorted(letter for letter in set(word) if re.search(r"[^a-z']", without_accents(letter)))
+    if foreign or not plain.strip("'"):
         raise InputError(
             f"cannot guess how {shortened(word)!r} is said ({shortened(' '.join(foreign)) or 'no letters'}): "
             "add it to a lexicon file"
         )
     phones: list[str] = []
-    letters = re.sub(r"([b-df-hj-np-tv-z])\1", r"\1", word)  # doubled consonants sound once
+    letters = re.sub(r"([b-df-hj-np-tv-z])\1", r"\1", plain)  # doubled consonants sound once
     at = 0
     while at < len(letters):
         taken, sound = _next_sound(letters, at, begun=bool(phones))

@@ -6,19 +6,22 @@ import re
 import unicodedata
 
 from lipmotion.errors import InputError
+from lipmotion.units.written_forms import ORDINAL, as_spoken, ordinal_word
 
 ONES = (
     "zero one two three four five six seven eight nine ten eleven twelve thirteen fourteen fifteen sixteen "
     "seventeen eighteen nineteen"
 ).split()
 TENS = "_ _ twenty thirty forty fifty sixty seventy eighty ninety".split()
+TOKEN = re.compile(rf"{ORDINAL}|[^\W\d_]+(?:'[^\W\d_]+)*|\d+")
+"""An ordinal in digits, a word, or a whole number."""
 MOST_MARKS = 30
 """Most accents on one letter; no language has so many."""
 SCALES = ((10**9, "billion"), (10**6, "million"), (1000, "thousand"), (100, "hundred"))
 
 
 def words_of(text: str) -> tuple[str, ...]:
-    """Return the lower-case words of a text: punctuation dropped, hyphens split, whole numbers spelled out.
+    """Return the lower-case words of a text: punctuation dropped, hyphens split, numbers and money spelled out.
 
     Raises InputError: there is no word in it.
     """
@@ -31,8 +34,15 @@ def words_of(text: str) -> tuple[str, ...]:
 def words_in(text: str) -> tuple[str, ...]:
     """Return the words of a text as ``words_of`` does; none where there is none."""
     words: list[str] = []
-    for token in re.findall(r"[^\W\d_]+(?:'[^\W\d_]+)*|\d+", re.sub(r"(?<=\d),(?=\d{3})", "", normalised_text(text))):
-        words += number_words(token) if token.isdecimal() else [token]
+    text = as_spoken(re.sub(r"(?<=\d),(?=\d{3})", "", normalised_text(text)))
+    for token in TOKEN.findall(text):
+        if token.isdecimal():
+            words += number_words(token)
+        elif token[0].isdecimal():
+            *before, last = number_words(token[:-2])
+            words += [*before, ordinal_word(last)]
+        else:
+            words.append(token)
     return tuple(words)
 
 

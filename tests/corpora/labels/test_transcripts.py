@@ -51,7 +51,37 @@ def clock(time_s: float, mark: str = ",") -> str:
 
 
 SRT = "1\n00:00:01,000 --> 00:00:02,500\nHello there!\n\n2\n00:00:02,750 --> 00:00:04,000\nHow are\nyou?\n"
+ASS = """[Script Info]
+Title: no words
+ScriptType: v4.00+
+
+[V4+ Styles]
+Format: Name, Fontname, Fontsize
+Style: Default,Arial,20
+
+[Events]
+Format: Layer, Start, End, Style, Name, MarginL, MarginR, MarginV, Effect, Text
+Comment: 0,0:00:00.00,0:00:09.00,Default,,0,0,0,,not said
+Dialogue: 0,0:00:02.75,0:00:04.00,Default,Bob,0,0,0,,How\\Nare, {\\i1}you{\\i0}?
+Dialogue: 1,0:00:01.00,0:00:02.50,Default,,0,0,0,,{\\an8\\fad(100,100)}Hello\\hthere!
+Dialogue: 1,0:00:01.00,0:00:02.50,Default,,0,0,0,,{\\p1}m 0 0 l 100 0{\\c&HFF&} 100 100{\\p0}
+"""
+SSA = """[Script Info]
+ScriptType: v4.00
+
+[Events]
+Format: Marked, Start, End, Style, Name, MarginL, MarginR, MarginV, Effect, Text
+Dialogue: Marked=0,0:00:01.00,0:00:02.50,Default,,0,0,0,,Hello there
+Dialogue: Marked=0,0:00:02.75,0:00:04.00,Default,,0,0,0,,How are you
+"""
 OF_LINES = {
+    "SubStation": ASS,
+    "SubStation of Windows": "\ufeff" + ASS.replace("\n", "\r\n"),
+    "SubStation's dialogue alone": "".join(line for line in ASS.splitlines(keepends=True) if line[:8] == "Dialogue"),
+    "SubStation 4": SSA,
+    **{f"SubRip with {arrow} as arrow": SRT.replace("-->", arrow) for arrow in ("->", "- ->", "–>", "—>", "→", "==>")},
+    "SubRip with escaped arrows": SRT.replace("-->", "--&gt;"),
+    "SubRip with one damaged arrow": SRT.replace("-->", "->", 1),
     "SubRip": SRT,
     "SubRip of Windows": "\ufeff" + SRT.replace("\n", "\r\n"),
     "SubRip without blank lines": SRT.replace("\n\n", "\n"),
@@ -211,7 +241,7 @@ def test_what_is_said_twice_stays(read: Read) -> None:
         ("ANNA: hi\nBOB #2: you", "hi you"),
         ("Speaker 1: hi\n[SPEAKER_02]: you", "hi you"),
         ("It is AT 10:30 now", "it is at ten thirty now"),
-        ("Tom &amp; Jerry&#39;s", "tom jerry's"),
+        ("Tom &amp; Jerry&#39;s", "tom and jerry's"),
         ("♪ la la ♪", "la la"),
         ("(all) hi [laughs\nloudly] you", "hi you"),
         ("5 < 6 and 7 > 3", "five six and seven three"),
@@ -391,3 +421,49 @@ def test_anything_is_read_or_refused(folder: Path, content: str | bytes, start: 
     for line in transcript.lines if transcript else ():
         assert line.words
         assert line.start_s is None or math.isfinite(line.start_s)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (
+            SRT.replace("-->", ","),
+            "two times as in subtitles; required: times as in 00:00:01,000 --> 00:00:02,500, or the",
+        ),
+        (SRT.replace("-->", "", 1), "line 2 is '00:00:01,000  00:00:02,500'; required times as in"),
+        (
+            SRT.replace("-->", "->").replace("02,500", "2x"),
+            "line 2 is '00:00:01,000 -> 00:00:2x'; required times as in",
+        ),
+        (ASS.replace("0:00:04.00", "later"), "line 12 is 'Dialogue: 0,0:00:02.75,later"),
+        (ASS.replace("0:00:04.00", "0:00:00.10"), "line 12 ends at 0.1 s, before its start at 2.75 s; correct it"),
+        (ASS.replace(",0,0,0,,How", ""), "line 12 is 'Dialogue: 0,0:00:02.75"),
+        (ASS[: ASS.index("Dialogue")], "the transcript holds no word"),
+    ],
+)
+def test_times_are_never_spoken(tmp_path: Path, content: str, message: str) -> None:
+    path = tmp_path / "a.txt"
+    path.write_text(content)
+    with pytest.raises(InputError) as refused:
+        read_transcript(path)
+    assert message in str(refused.value)
+
+
+@pytest.mark.parametrize("text", ["The 5:30 - 6:00 train", "5:30 - 6:00", "a -> b", "3 - 4 -> 5"])
+def test_texts_with_times_of_day_or_arrows_are_texts(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "a.txt"
+    path.write_text(text)
+    assert read_transcript(path) == text
+
+
+@pytest.mark.parametrize("suffix", [".ass", ".ssa"])
+def test_substation_beside_a_recording(tmp_path: Path, suffix: str) -> None:
+    (tmp_path / f"take1{suffix}").write_text(ASS)
+    assert labels_beside(tmp_path / "take1.mp4").words == ("hello", "there", "how", "are", "you")
+
+
+def test_an_empty_file_is_no_transcript(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    (tmp_path / "take1.txt").write_text(" \n")
+    assert labels_beside(tmp_path / "take1.mp4").words is None
+    (text,) = caplog.messages
+    assert "take1.txt: is empty: it counts as no transcript" in text

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from lipmotion.engines.selection.inventory import digits, standing_in
 from lipmotion.engines.selection.model import SelectionModel
-from lipmotion.engines.selection.windows import INVISIBLE_SYMBOL, PHONE_NUMBER, SILENT, phone_windows, without_gaps
+from lipmotion.engines.selection.windows import INVISIBLE_SYMBOL, PHONE_NUMBER, SILENT, covering, phone_windows
 from lipmotion.errors import InputError
 from lipmotion.testing.examples import PHONES as SPOKEN
 from lipmotion.types import Span, Timeline, Unit
@@ -43,7 +43,7 @@ def test_words_begin_and_end_where_the_word_changes() -> None:
 
 
 def test_gaps_are_silence() -> None:
-    filled = without_gaps(Timeline((Span(0.2, 0.3, Unit("b")), Span(0.5, 0.6, Unit("aa")))), 1.0)
+    filled = covering(Timeline((Span(0.2, 0.3, Unit("b")), Span(0.5, 0.6, Unit("aa")))), 1.0)
     assert [(span.start_s, span.end_s, span.label.phone) for span in filled] == [
         (0.0, 0.2, "sil"),
         (0.2, 0.3, "b"),

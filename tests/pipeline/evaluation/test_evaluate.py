@@ -203,7 +203,21 @@ def test_the_seed_decides(toy_model: Model, toy_corpus: Corpus) -> None:
 def test_without_transcripts_there_is_audio_only(toy_model: Model, toy_corpus: Corpus, tmp_path: Path) -> None:
     first, second = held_out(toy_corpus)
     untold = corpus_of([replace(first, words=None), second], tmp_path)
-    assert list(evaluate(toy_model, untold)["conditions"]) == ["audio only"]
+    figures = evaluate(toy_model, untold)
+    assert list(figures["conditions"]) == ["audio only"]
+    assert figures["without_words"] == 1
+
+
+def test_a_model_on_its_own_training_list_is_named(toy_model: Model, toy_corpus: Corpus) -> None:
+    assert "seen_in_training" not in evaluate(toy_model, toy_corpus)
+    training = Selection(names=toy_corpus.names("train")[:1])
+    assert evaluate(toy_model, toy_corpus, selection=training)["seen_in_training"] is True
+    everything = replace(toy_model, about={**toy_model.about, "split": "all"})
+    assert evaluate(everything, toy_corpus)["seen_in_training"] is True
+    other = replace(toy_model, about={**toy_model.about, "corpus": ["another"]})
+    assert "seen_in_training" not in evaluate(other, toy_corpus, selection=training)
+    of_ben = replace(toy_model, about={**toy_model.about, "speakers": ["ben"]})
+    assert "seen_in_training" not in evaluate(of_ben, toy_corpus, selection=training)
 
 
 def test_a_lexicon_gives_pronunciations(toy_model: Model, toy_corpus: Corpus, tmp_path: Path) -> None:

@@ -171,6 +171,18 @@ def test_without_any_transcript_the_shipped_phones_are_used(
     assert "no transcripts in the corpus: its phones are recognised by the shipped model" in caplog.text
 
 
+def test_recordings_without_words_are_counted(
+    toy_corpus: Corpus, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    utterances = some(toy_corpus)
+    utterances[3] = replace(utterances[3], words=None)
+    train(corpus_of(utterances, tmp_path), recogniser=SMALL)
+    assert "1 of 5 recordings have no words: their phones are recognised" in caplog.text
+    caplog.clear()
+    train(corpus_of(some(toy_corpus), tmp_path / "told"), recogniser=SMALL)
+    assert "have no words" not in caplog.text
+
+
 def test_guessed_words_are_reported(toy_corpus: Corpus, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     utterances = some(toy_corpus)
     renamed = {"papa": "pahpa"}

@@ -20,6 +20,7 @@ def bare(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     programs.mkdir()
     temporary.mkdir()
     monkeypatch.setenv("PATH", str(programs))
+    monkeypatch.setattr(espeak, "wheel_folder", lambda: None)
     monkeypatch.setattr(tempfile, "tempdir", str(temporary))
     return programs
 
@@ -30,5 +31,6 @@ def faked(bare: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     if os.name != "posix":
         pytest.skip("the fakes are scripts")
     fakes.install(bare)
+    espeak._system_data.cache_clear()
     monkeypatch.setattr(espeak, "PROGRAM", [str(bare / "espeak-events")])
     return bare.parent / "temporary"

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 COMMON = f"""#!{sys.executable}
-import json, math, re, struct, sys, time, wave
+import json, math, os, re, struct, sys, time, wave
 
 def tone(path, seconds):
     count = round(16000 * seconds)
@@ -51,25 +51,41 @@ for text, path in re.findall(r"^\\(say " + quoted + " " + quoted + r"\\)$", scri
     print("nonsense" if "nonsense" in text else "\\n".join(segments))
 """
 ESPEAK = """
-print("Pty Language       Age/Gender VoiceName          File                 Other Languages")
-print(" 5  variant         --/F      female2            !v/f2                ")
-print(" 5  variant         --/M      Robosoft           !v/robosoft          ")
+sys.exit("only its library is asked")
 """
 ESPEAK_EVENTS = """
 task = json.load(sys.stdin)
+if "voice" not in task:
+    data = os.path.join(os.path.dirname(os.path.dirname(sys.argv[0])), "data")
+    print(json.dumps({"version": "1.52.0", "data": data}))
+    sys.exit()
 said = []
 for number, text in enumerate(task["texts"]):
     misbehave(text)
     tone(f"{task['folder']}/{number}.wav", 1.0)
-    said.append([["_", 0.0], ["h", 0.2], ["@", 0.3], ["l", 0.4], ["oU", 0.5], ["_:", 0.9]])
+    labels = "_", "h", "@", "l", "'oU", "_:"
+    if task["ipa"]:
+        labels = "_", "h", "ə", "ɬ", "ˈøː" if "strange" not in text else "ꙮ", "_"
+    said.append([[label, start, 0] for label, start in zip(labels, (0.0, 0.2, 0.3, 0.4, 0.5, 0.9))])
 print("nonsense" if "nonsense" in text else json.dumps(said))
 """
 PROGRAMS = {"flite": FLITE, "festival": FESTIVAL, "espeak-ng": ESPEAK, "espeak-events": ESPEAK_EVENTS}
 
 
 def install(folder: Path) -> None:
-    """Write the programs."""
+    """Write the programs, and the data of espeak-ng in a folder beside them."""
+    install_data(folder.parent / "data")
     for name, text in PROGRAMS.items():
         path = folder / name
         path.write_text(COMMON + text, encoding="utf-8")
         path.chmod(0o755)
+
+
+def install_data(data: Path) -> None:
+    """Write data as espeak-ng has them: the language files of German and of both Englishes, and two variants."""
+    files = {"lang/gmw/de": "name German\nlanguage de\n", "lang/gmw/en": "language en-gb  2\nlanguage en 2\n"}
+    files |= {"lang/gmw/en-US": "name English (America)\nlanguage en-us 2\n"}
+    for name, text in (files | {"voices/!v/f2": "language variant\n", "voices/!v/robosoft": "\n"}).items():
+        path = data / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import closing
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -15,7 +17,16 @@ from lipmotion.speech.noise import noisy_audio
 from lipmotion.speech.recogniser import Recogniser
 from lipmotion.speech.voices import espeak_events, synthesiser
 from lipmotion.speech.voices.flite import parse_phone_ends
-from lipmotion.speech.voices.installed import SYNTHESISERS, installed_voices, speak_sentence, speak_sentences
+from lipmotion.speech.voices.installed import (
+    SYNTHESISERS,
+    all_voices,
+    default_voice,
+    installed_voices,
+    speak_sentence,
+    speak_sentences,
+    voice_named,
+    voiced_sentences,
+)
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.units import PHONES, Lexicon, is_silent, words_of
 
@@ -126,6 +137,87 @@ def test_unknown_voices(voice: SyntheticVoice, message: str) -> None:
         speak_sentence("Hello", voice)
 
 
+@pytest.mark.parametrize(
+    ("name", "full_name"),
+    [
+        ("flite:slt", "flite:slt"),
+        ("slt", "flite:slt"),
+        ("kal_diphone", "festival:kal_diphone"),
+        ("en-us+f2", "espeak-ng:en-us+f2"),
+        ("espeak-ng:de", "espeak-ng:de"),
+        ("de+f2", "espeak-ng:de+f2"),
+    ],
+)
+@pytest.mark.usefixtures("faked")
+def test_voices_by_name(name: str, full_name: str) -> None:
+    assert voice_named(name).full_name == full_name
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("dectalk:paul", "unknown synthesiser 'dectalk'; required one of: flite, festival, espeak-ng"),
+        ("paul", "no voice 'paul' is installed; lipmotion speak --voices lists"),
+        ("flite:de", "no voice 'flite:de' is installed"),
+        ("de+robosoft", "no voice 'de.robosoft' is installed"),
+    ],
+)
+@pytest.mark.usefixtures("faked")
+def test_names_of_no_voice(name: str, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        voice_named(name)
+
+
+@pytest.mark.usefixtures("faked")
+def test_a_name_of_several_voices(monkeypatch: pytest.MonkeyPatch) -> None:
+    twice = replace(SYNTHESISERS["festival"], voices=SYNTHESISERS["flite"].voices)
+    monkeypatch.setitem(SYNTHESISERS, "festival", twice)
+    with pytest.raises(InputError, match="several voices are called 'slt'; give one of: flite:slt, flite:slt"):
+        voice_named("slt")
+
+
+@pytest.mark.usefixtures("bare")
+def test_without_synthesisers_it_says_what_to_install() -> None:
+    for find in (default_voice, lambda: voice_named("slt")):
+        with pytest.raises(MissingDependencyError, match=r"pip install 'lipmotion\[text\]', or: apt install flite"):
+            find()
+    with pytest.raises(MissingDependencyError, match="flite is not installed: apt install flite"):
+        voice_named("flite:slt")
+
+
+def test_the_default_voice_is_the_first_that_there_is(faked: Path) -> None:
+    assert default_voice().full_name == "espeak-ng:en-us+f2"
+    (faked.parent / "programs" / "espeak-ng").unlink()
+    assert default_voice().full_name == "flite:slt"
+    (faked.parent / "programs" / "flite").unlink()
+    assert default_voice().full_name == "festival:cmu_us_slt_arctic_hts"
+
+
+def test_a_synthesiser_that_does_not_work_is_left_out(faked: Path, caplog: pytest.LogCaptureFixture) -> None:
+    (faked.parent / "programs" / "festival").write_text("#!/bin/sh\nexit 3\n")
+    assert [voice.synthesiser for voice in all_voices()] == ["flite", "flite", *["espeak-ng"] * 5]
+    assert voice_named("slt").full_name == "flite:slt"
+    assert "festival is left out: festival failed with 3" in caplog.text
+    with pytest.raises(InputError, match="festival failed with 3"):
+        voice_named("festival:kal_diphone")
+
+
+@pytest.mark.usefixtures("faked")
+def test_all_voices_are_the_english_ones_and_the_languages() -> None:
+    assert all_voices()[: len(FAKED)] == tuple(FAKED)
+    assert [voice.language for voice in all_voices()[len(FAKED) :]] == ["de", "en", "en-gb", "en-us"]
+
+
+@pytest.mark.usefixtures("faked")
+def test_a_sound_is_there_until_the_next() -> None:
+    with closing(voiced_sentences(["hello", "hello"], FAKED[0])) as said:
+        first = next(said)
+        assert first.own_sound().rate_hz == 16_000
+        list(said)
+    with pytest.raises(InputError, match="no sound that can be read"):
+        first.own_sound()
+
+
 def test_flite_begins_again_at_each_utterance() -> None:
     phones = parse_phone_ends("pau:0.2 ay:0.5 \npau:0.1 y:0.3 \n")
     assert [(span.label, span.start_s, span.end_s) for span in phones] == [
@@ -139,7 +231,7 @@ def test_flite_begins_again_at_each_utterance() -> None:
 def test_without_the_library_the_program_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(espeak_events, "LIBRARIES", ("libnothing.so.0",))
     with pytest.raises(SystemExit, match=r"libnothing.so.0 is installed; apt install libespeak-ng1"):
-        espeak_events._library()
+        espeak_events._library("")
 
 
 @pytest.fixture(params=sorted(SYNTHESISERS))

@@ -1,6 +1,12 @@
 """Transcripts and labels of a recording, from text files beside it."""
 
-from lipmotion.corpora.labels.label_files import RecordingLabels, labels_beside, read_labels, read_transcript
+from lipmotion.corpora.labels.label_files import (
+    RecordingLabels,
+    labels_beside,
+    read_labels,
+    read_phones,
+    read_transcript,
+)
 from lipmotion.corpora.labels.plain_text import check_plain_text
 
-__all__ = ["RecordingLabels", "check_plain_text", "labels_beside", "read_labels", "read_transcript"]
+__all__ = ["RecordingLabels", "check_plain_text", "labels_beside", "read_labels", "read_phones", "read_transcript"]

@@ -23,7 +23,7 @@ from lipmotion.units import phone_named, words_of
 from lipmotion.units.length_limits import LARGEST_TRANSCRIPT
 
 LOG = logging.getLogger("lipmotion")
-RECOGNISED = (".srt", ".vtt", ".json", ".ctm", ".tsv")
+RECOGNISED = (".srt", ".vtt", ".ass", ".ssa", ".json", ".ctm", ".tsv")
 """Suffixes of subtitles and of what recognisers write."""
 FOR_WORDS = (".txt", ".TextGrid", ".textgrid", ".lab", *RECOGNISED)
 """Suffixes in whose files words are searched, in order: plain text first, as labels in time may not be words, and what
@@ -97,8 +97,8 @@ def _named(recording: Path, suffix: str) -> list[Path]:
 def read_labels(path: Path) -> RecordingLabels:
     """Return the words and phones of one file.
 
-    Read are TextGrids, labels with times (HTK, Audacity), subtitles (SubRip, WebVTT), the JSON and tables of
-    recognisers (Whisper, Vosk), NIST's CTM, and plain text; the content decides, not the name.
+    Read are TextGrids, labels with times (HTK, Audacity), subtitles (SubRip, WebVTT, SubStation), the JSON and tables
+    of recognisers (Whisper, Vosk), NIST's CTM, and plain text; the content decides, not the name.
     Raises InputError: not text, damaged, overlapping labels, or labels among phones that are no phones.
     """
     return _read(path, unknown_json=False) or RecordingLabels()
@@ -124,6 +124,38 @@ def read_transcript(path: Path) -> str | TimedTranscript:
     return labels.transcript
 
 
+def read_phones(path: Path) -> Timeline[Unit]:
+    """Return the phones in time of a TextGrid or of a file of labels with times; they may have gaps.
+
+    Vowels stay as they are labelled, whatever words another tier has; the end of the last phone may be infinite.
+    Raises InputError: no such file, as ``read_labels``, or no phones in time.
+    """
+    check_regular(path, "units file")
+    if not path.exists():
+        raise InputError(f"{path}: no such units file")
+    text, where = _text(path), str(path)
+    if is_textgrid(text):
+        tiers = parse_interval_tiers(text, where)
+    else:
+        lines = parse_timed_lines(text, where)
+        tiers = [lines] if lines is not None else []
+    phones = _tiers_of_phones(tiers, where)
+    if not phones:
+        raise InputError(
+            f"{where}: holds no phones in time, required a motion file (.json, .npz), a TextGrid with a tier of "
+            "phones, or labels with times, one phone a line"
+        )
+    return phone_timeline(phones[0], None, where, with_gaps=True)
+
+
+def _tiers_of_phones(tiers: list[LabelTier], where: str) -> list[LabelTier]:
+    """Return the tier of phones, or an empty list. Raises InputError: there are several."""
+    phones = [tier for tier in tiers if holds_phones(tier)]
+    if len(phones) > 1:
+        raise InputError(f"{where}: {phones[0].name} and {phones[1].name} both hold phones; keep one")
+    return phones
+
+
 def _read(path: Path, *, unknown_json: bool) -> RecordingLabels | None:
     """Return the labels of a file; None for JSON of another kind, if that is expected, else an error."""
     if unknown_json and path.stat().st_size > LARGEST_LABELS:
@@ -141,6 +173,7 @@ def _read(path: Path, *, unknown_json: bool) -> RecordingLabels | None:
     if len(tokens) > 1 and one_a_line and all(map(phone_named, tokens)):
         raise InputError(f"{path}: a list of phones without times; add their times, or give the words instead")
     if not tokens:
+        LOG.warning("%s: is empty: it counts as no transcript; write the words that are said, or remove it", path)
         return RecordingLabels()
     return RecordingLabels(TimedTranscript((TranscriptLine(tuple(map(TimedWord, words_of(text)))),)))
 
@@ -174,9 +207,7 @@ def check_size(path: Path, text: str) -> None:
 
 def _chosen(tiers: list[LabelTier], where: str) -> RecordingLabels:
     """Return the phones of the only tier of phones, and the words of the tier named so, else of the first other."""
-    phones = [tier for tier in tiers if holds_phones(tier)]
-    if len(phones) > 1:
-        raise InputError(f"{where}: {phones[0].name} and {phones[1].name} both hold phones; keep one")
+    phones = _tiers_of_phones(tiers, where)
     others = [tier for tier in tiers if tier not in phones and any(label.text for label in tier.labels)]
     words = next(filter(is_named_as_words, others), others[0] if others else None)
     if not phones and words is None:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from io import StringIO
 from itertools import islice
 
-from lipmotion.corpora.labels.subtitles import CUE
+from lipmotion.corpora.labels.subtitles import NO_ARROW, is_subtitles
 from lipmotion.corpora.labels.textgrid import is_textgrid
 from lipmotion.corpora.labels.timed_lines import parse_timed_lines
 from lipmotion.errors import InputError, shortened
@@ -42,8 +42,14 @@ def check_no_labels(text: str, where: str) -> None:
         raise InputError(f"{where}: is a master label file of many recordings; write a .lab beside each")
     if MARKUP.match(start):
         raise InputError(f"{where}: begins with {shortened(start[:20])!r}, required the words alone; save it as text")
-    if CUE.search(text):
+    if is_subtitles(text):
         raise InputError(f"{where}: is a file of subtitles, required the words alone; write them into a text file")
+    found = NO_ARROW.search(text)
+    if found:
+        raise InputError(
+            f"{where}: has the line {shortened(found[0].strip())!r}, two times as in subtitles; required: times as in "
+            "00:00:01,000 --> 00:00:02,500, or the words alone"
+        )
     if _seems_timed(text):
         raise InputError(
             f"{where}: its lines hold times, but not as in a TextGrid, HTK's or Audacity's labels; save it in one of "

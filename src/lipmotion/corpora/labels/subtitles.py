@@ -1,21 +1,30 @@
-"""Subtitles: SubRip (``.srt``), WebVTT (``.vtt``), and Whisper's table of lines (``.tsv``)."""
+"""Subtitles: SubRip (``.srt``), WebVTT (``.vtt``), SubStation (``.ass``), and Whisper's table of lines (``.tsv``)."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from io import StringIO
 
+from lipmotion.corpora.labels.cue import CLOCK, SubtitleCue, checked_cue, clock_seconds
+from lipmotion.corpora.labels.substation import is_substation, substation_cues
 from lipmotion.corpora.labels.tier import check_count
 from lipmotion.errors import InputError, shortened
 from lipmotion.types import TimedTranscript, TimedWord, TranscriptLine, in_order
 from lipmotion.units.spoken_text import check_word_count, line_words, speaker_names, spoken_text, timed_words
 
-CUE = re.compile(r"^.{0,40}\d\s*-->\s*\d", re.MULTILINE)
+ARROW = r"(?:(?:[-=–—−]\s?){1,3}(?:[>›»]|&gt;)|→)"
+"""The arrow between the times, also as people and programs damage it: ``->``, ``- ->``, ``–>``, ``--&gt;``."""
+CUE = re.compile(
+    rf"^.{{0,40}}\d\s*-->\s*\d|^.{{0,20}}:\d{{1,2}}(?:[.,]\d{{1,6}})?\s{{0,4}}{ARROW}\s{{0,4}}\d{{1,4}}:\d",
+    re.MULTILINE,
+)
 """The times of a subtitle."""
-CLOCK = r"(?:(\d{1,4}):)?(\d{1,2}):(\d{1,2})(?:[.,](\d{1,6}))?"
-TIMES = re.compile(rf"\s*{CLOCK}\s*-->\s*{CLOCK}(?:\s.*)?")
+FULL_CLOCK = r"(?:\d{1,4}:\d{1,2}:\d{1,2}(?:[.,]\d{1,6})?|\d{1,2}:\d{1,2}[.,]\d{1,6})"
+NO_ARROW = re.compile(rf"^\s{{0,20}}{FULL_CLOCK}[^\w\n]{{1,12}}{FULL_CLOCK}\s{{0,20}}$", re.MULTILINE)
+"""A line of two times without an arrow that is known; times of day, as 5:30, do not count."""
+TIMES = re.compile(rf"\s*{CLOCK}\s*{ARROW}\s*{CLOCK}(?:\s.*)?")
 WORD_TIME = re.compile(rf"<{CLOCK}>")
 """The time at which the words after it are said, as in the captions that YouTube makes."""
 NO_CUE = re.compile(r"(?:NOTE|STYLE|REGION)(?:\s|$)")
@@ -28,22 +37,10 @@ BRIDGE_S, BRIDGES_SHARE, NEAR_S = 0.1, 0.2, 0.1
 of a file are bridges, lines that the cue before, which ends so near, showed already are left out."""
 
 
-@dataclass(frozen=True)
-class SubtitleCue:
-    """Some lines of text that are shown together.
-
-    number : of the line of the file that holds its times
-    """
-
-    number: int
-    start_s: float
-    end_s: float
-    lines: tuple[str, ...]
-
-
 def is_subtitles(text: str) -> bool:
     """Return whether a text is a file of subtitles, or Whisper's table of lines."""
-    return text.startswith("WEBVTT") or text.startswith(HEADER) or CUE.search(text) is not None
+    begins = text.startswith(("WEBVTT", HEADER))
+    return begins or is_substation(text) or CUE.search(text) is not None
 
 
 def parse_subtitles(text: str, where: str) -> TimedTranscript:
@@ -54,7 +51,7 @@ def parse_subtitles(text: str, where: str) -> TimedTranscript:
     where : the file's name, for messages
     Raises InputError: times that are damaged or end before they start, with their line; too many cues or words.
     """
-    cues = list(_rows(text, where) if text.startswith(HEADER) else _cues(text, where))
+    cues = list(_all_cues(text, where))
     names = speaker_names("\n".join(cue.lines) for cue in cues)
     lines, count = [], 0
     for cue in _without_repetitions(cues):
@@ -65,12 +62,18 @@ def parse_subtitles(text: str, where: str) -> TimedTranscript:
     return in_order(lines)
 
 
+def _all_cues(text: str, where: str) -> Iterator[SubtitleCue]:
+    if text.startswith(HEADER):
+        return _rows(text, where)
+    return substation_cues(text, where) if is_substation(text) else _cues(text, where)
+
+
 def _cues(text: str, where: str) -> Iterator[SubtitleCue]:
     cue, lines, count = None, list[str](), 0
     for number, row in enumerate(StringIO(text), 1):
         line = row.rstrip("\r\n")
-        times = TIMES.fullmatch(line) if "-->" in line else None
-        if times is None and "-->" in line and CUE.match(line):
+        times = TIMES.fullmatch(line) if ":" in line else None
+        if times is None and (CUE.match(line) or NO_ARROW.match(line)):
             wanted = "00:00:01,000 --> 00:00:02,500"
             raise InputError(f"{where}: line {number} is {shortened(line.strip())!r}; required times as in {wanted}")
         if times is None:
@@ -80,23 +83,9 @@ def _cues(text: str, where: str) -> Iterator[SubtitleCue]:
             yield replace(cue, lines=_shown(lines))
         count += 1
         check_count(count, where)
-        cue, lines = _checked(SubtitleCue(number, _seconds(times, 1), _seconds(times, 5), ()), where), []
+        cue, lines = checked_cue(SubtitleCue(number, clock_seconds(times, 1), clock_seconds(times, 5), ()), where), []
     if cue is not None:
         yield replace(cue, lines=_shown([*lines, "", ""]))
-
-
-def _seconds(match: re.Match[str], group: int) -> float:
-    """Return the time of four groups of a match: hours, minutes, seconds, and their fraction."""
-    hours, minutes, seconds, fraction = match.group(group, group + 1, group + 2, group + 3)
-    return int(hours or 0) * 3600 + int(minutes) * 60 + float(f"{seconds}.{fraction or 0}")
-
-
-def _checked(cue: SubtitleCue, where: str) -> SubtitleCue:
-    if cue.end_s < cue.start_s:
-        raise InputError(
-            f"{where}: line {cue.number} ends at {cue.end_s:g} s, before its start at {cue.start_s:g} s; correct it"
-        )
-    return cue
 
 
 def _shown(lines: list[str]) -> tuple[str, ...]:
@@ -123,7 +112,7 @@ def _rows(text: str, where: str) -> Iterator[SubtitleCue]:
         found = ROW.fullmatch(line)
         if found is None:
             raise InputError(f"{where}: line {number} is {shortened(line)!r}; required: start, end and text, with tabs")
-        yield _checked(SubtitleCue(number, int(found[1]) / 1000, int(found[2]) / 1000, (found[3],)), where)
+        yield checked_cue(SubtitleCue(number, int(found[1]) / 1000, int(found[2]) / 1000, (found[3],)), where)
 
 
 def _without_repetitions(cues: list[SubtitleCue]) -> list[SubtitleCue]:
@@ -156,7 +145,7 @@ def _words(cue: SubtitleCue, names: frozenset[str], where: str) -> list[TimedWor
     marks = list(WORD_TIME.finditer(text))
     edges = [0, *(mark.end() for mark in marks)]
     ends = [*(mark.start() for mark in marks), len(text)]
-    times_s = [cue.start_s, *(min(max(_seconds(mark, 1), cue.start_s), cue.end_s) for mark in marks), cue.end_s]
+    times_s = [cue.start_s, *(min(max(clock_seconds(mark, 1), cue.start_s), cue.end_s) for mark in marks), cue.end_s]
     return [
         word
         for first, end, start_s, end_s in zip(edges, ends, times_s, times_s[1:], strict=False)

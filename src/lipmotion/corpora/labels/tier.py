@@ -92,16 +92,17 @@ def tier_transcript(tier: LabelTier, where: str) -> TimedTranscript:
     return TimedTranscript(tuple(lines))
 
 
-def phone_timeline(tier: LabelTier, words: LabelTier | None, where: str) -> Timeline[Unit]:
+def phone_timeline(tier: LabelTier, words: LabelTier | None, where: str, *, with_gaps: bool = False) -> Timeline[Unit]:
     """Return the phones of a tier in time.
 
     words : the words of the same recording in time, or None; if the phones have no stress marks, the lexicon's rule
             reduces the vowels of each word
+    with_gaps : gaps between labels are allowed, and stay
     Raises InputError: a label that is no phone, or labels that overlap or leave a gap.
     """
     _check_order(tier, where)
     for before, label in zip(tier.labels, tier.labels[1:], strict=False):
-        if label.start_s > before.end_s + ROUNDING_S:
+        if not with_gaps and label.start_s > before.end_s + ROUNDING_S:
             raise InputError(
                 f"{where}: {label.position} starts at {label.start_s:g} s, the one before it ends at {before.end_s:g} "
                 "s; phones must follow each other without a gap: label silence as sil"
@@ -112,7 +113,10 @@ def phone_timeline(tier: LabelTier, words: LabelTier | None, where: str) -> Time
     if words is not None and not marked:
         phones = _reduced(labels, phones, words)
     starts_s = [label.start_s for label in labels]
-    ends_s = [*starts_s[1:], labels[-1].end_s]
+    ends_s = [
+        label.end_s if following_s > label.end_s + ROUNDING_S else following_s
+        for label, following_s in zip(labels, starts_s[1:], strict=False)
+    ] + [labels[-1].end_s]
     return Timeline(tuple(Span(*row) for row in zip(starts_s, ends_s, map(Unit, phones), strict=True)))
 
 

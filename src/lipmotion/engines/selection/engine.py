@@ -2,27 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.base import Arrays, Engine, Fit
+from lipmotion.engines.base import Arrays, Engine, Fit, SourcePiece
 from lipmotion.engines.selection.concatenation import concatenated, pieces_of
 from lipmotion.engines.selection.config import SelectionConfig
 from lipmotion.engines.selection.costs import Costs, Target
 from lipmotion.engines.selection.model import SelectionModel, model_arrays, model_from_arrays
 from lipmotion.engines.selection.report import inventory_text, source_of, units_by_source
 from lipmotion.engines.selection.search import select
+from lipmotion.engines.selection.sources import source_pieces, typical_duration_s, with_sources
 from lipmotion.engines.selection.targets import target_of
 from lipmotion.engines.selection.train import fit_selection
 from lipmotion.errors import InputError
 from lipmotion.motion.generation import Statistics
 from lipmotion.motion.predictors import LEAST_NETWORK_S
 from lipmotion.motion.prior_regression import PriorRegression
-from lipmotion.motion.rest import unheard_frames
+from lipmotion.motion.rest import away_from_speech, speech_intervals, unheard_frames
 from lipmotion.stats.delta_windows import with_dynamics
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import (
@@ -40,6 +41,8 @@ from lipmotion.types import (
 
 Array = NDArray[np.float64]
 ROUNDING_S = 1e-6
+SETTLED_S = 0.06
+"""Half of the rest pose is left so long before the first phone, and reached so long after the last one."""
 
 
 @final
@@ -114,10 +117,8 @@ class SelectionEngine(Engine[SelectionModel]):
         given = _given(model, target, speech.units)
         units = select(costs, target, given=given).units
         track = concatenated(model.inventory, target, pieces_of(costs, target, units), frames)
-        means = with_dynamics(track)
-        unheard = unheard_frames(np.asarray(speech.features.values), speech.units)
-        means[unheard] = 0
-        means[unheard, 0] = model.rest
+        resting = _resting(np.asarray(speech.features.values), speech.units)[:, None]
+        means = with_dynamics(track + resting * (model.rest - track))
         precisions = np.broadcast_to(1 / model.variances, means.shape)
 
         def statistics(block: slice) -> Statistics:
@@ -135,7 +136,18 @@ class SelectionEngine(Engine[SelectionModel]):
         starts_s = target.windows.times_s[:, 0]
         positions = np.searchsorted(starts_s, np.arange(frames) / FRAME_RATE_HZ + ROUNDING_S, side="right") - 1
         trace = StateTrace(tuple(sources), np.maximum(positions, 0).astype(np.intp))
-        return Generation(motion, variance, _with_sources(speech.units, starts_s, sources), trace)
+        return Generation(motion, variance, with_sources(speech.units, starts_s, sources), trace)
+
+    def recordings(self, model: SelectionModel) -> tuple[str, ...]:  # noqa: D102
+        return model.inventory.names
+
+    def typical_duration_s(self, model: SelectionModel, phone: str) -> float:  # noqa: D102
+        return typical_duration_s(model.inventory, phone)
+
+    def source_pieces(  # noqa: D102
+        self, model: SelectionModel, units: Timeline[Unit], heard: Mapping[str, NDArray[np.floating[Any]]]
+    ) -> tuple[tuple[SourcePiece, ...], Timeline[Unit]]:
+        return source_pieces(model, self.config, units, heard)
 
     def describe(self, model: SelectionModel) -> str:  # noqa: D102
         return inventory_text(model.inventory)
@@ -145,6 +157,28 @@ class SelectionEngine(Engine[SelectionModel]):
 
     def from_arrays(self, arrays: Arrays) -> SelectionModel:  # noqa: D102
         return model_from_arrays(arrays)
+
+
+def _resting(features: NDArray[np.floating], units: Timeline[Unit]) -> Array:
+    """Return the weight of the rest pose in every frame, 0 to 1 [shape=(T,)].
+
+    It is 1 in silence of which some is digital, and falls to 0 before the next phone and after the last one: in digital
+    silence there is no breath, as there may be in the silence that was recorded with the unit.
+    features : acoustic features [shape=(T, D)]
+    """
+    unheard = unheard_frames(features, units)
+    if not unheard.any():
+        return np.zeros(len(features))
+    away = away_from_speech(np.arange(len(features)) / FRAME_RATE_HZ, speech_intervals(units), SETTLED_S)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], away, [False]])))
+    resting = np.zeros(len(features))
+    for first, stop in edges.reshape(-1, 2):
+        resting[first:stop] = float(unheard[first:stop].any())
+    width = round(SETTLED_S * FRAME_RATE_HZ)
+    window = np.hanning(2 * width + 1)
+    padded = np.pad(resting, width, mode="edge")
+    weights: Array = np.convolve(padded, window / window.sum(), "valid")
+    return weights
 
 
 def _given(model: SelectionModel, target: Target, units: Timeline[Unit]) -> dict[int, int]:
@@ -163,19 +197,6 @@ def _given(model: SelectionModel, target: Target, units: Timeline[Unit]) -> dict
         if model.inventory.windows.phones[unit] == target.windows.phones[number]:
             given[number] = unit
     return given
-
-
-def _with_sources(units: Timeline[Unit], starts_s: Array, sources: Sequence[str]) -> Timeline[Unit]:
-    """Return the timeline with the source of the unit of every phone as the name of its unit.
-
-    starts_s : start of every phone of the target
-    """
-    return Timeline(
-        tuple(
-            replace(span, label=replace(span.label, unit=sources[int(np.argmin(np.abs(starts_s - span.start_s)))]))
-            for span in units
-        )
-    )
 
 
 def _substituted(costs: Costs, target: Target, units: NDArray[np.intp], frames: int) -> Array:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from lipmotion.engines.selection.costs import Costs, Target
 from lipmotion.engines.selection.guide import at_points
 from lipmotion.engines.selection.model import SelectionModel
-from lipmotion.engines.selection.windows import phone_windows, without_gaps
+from lipmotion.engines.selection.windows import covering, phone_windows
 from lipmotion.motion.acoustic_network import AcousticNetwork
 from lipmotion.types import FRAME_RATE_HZ, Speech
 
@@ -23,7 +23,7 @@ def target_of(
     Raises InputError: an unknown phone.
     """
     frames = len(speech.features.values)
-    windows = phone_windows([without_gaps(speech.units, (frames - 1) / FRAME_RATE_HZ)])
+    windows = phone_windows([covering(speech.units, (frames - 1) / FRAME_RATE_HZ)])
     guide = model.guide
     if guide is None or (isinstance(guide.predictor, AcousticNetwork) and speech.spectrum is None):
         return costs.target(windows, None, None)

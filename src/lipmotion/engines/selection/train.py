@@ -16,7 +16,7 @@ from lipmotion.engines.selection.inventory import RecordedUnits
 from lipmotion.engines.selection.model import SelectionModel
 from lipmotion.engines.selection.search import select
 from lipmotion.engines.selection.targets import target_of
-from lipmotion.engines.selection.windows import PhoneWindows, phone_windows, without_gaps
+from lipmotion.engines.selection.windows import PhoneWindows, covering, phone_windows
 from lipmotion.errors import CorpusError
 from lipmotion.hmm.multistream.phone_recogniser import fit_phone_recogniser
 from lipmotion.motion.acoustic_network import fit_acoustic_network
@@ -83,7 +83,7 @@ def inventory_of(
     values : motion of each in the motion space [each shape=(T, Q)]
     Raises CorpusError: the motion of no phone of speech was measured throughout.
     """
-    timelines = [without_gaps(e.speech.units, (len(e.valid) - 1) / FRAME_RATE_HZ) for e in examples]
+    timelines = [covering(e.speech.units, (len(e.valid) - 1) / FRAME_RATE_HZ) for e in examples]
     windows = phone_windows(timelines)
     first = np.concatenate([[0], np.cumsum([len(x) for x in values])]).astype(np.intp)
     known = np.concatenate([example.valid for example in examples])

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.types import Span, Timeline, Unit
-from lipmotion.units import PHONES, SILENCE, is_silent, unknown_phone_message
+from lipmotion.units import PHONES, SILENCE, is_silent, unknown_phone_message, without_gaps
 from lipmotion.units.stress import stress_of
 from lipmotion.units.visemes import VISEME_OF, VISEMES
 
@@ -22,7 +22,7 @@ SILENT = PHONE_NUMBER[SILENCE]
 VISEME_NUMBER = np.array([*(list(VISEMES).index(VISEME_OF[phone]) for phone in PHONES), len(VISEMES)])
 """The viseme of every symbol."""
 UNKNOWN_STRESS = -1
-LEAST_GAP_S = 1e-3
+SHORTEST_S = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,20 +73,13 @@ class PhoneWindows:
         return np.append(self.recording[1:] == self.recording[:-1], False)
 
 
-def without_gaps(units: Timeline[Unit], duration_s: float) -> Timeline[Unit]:
-    """Return phones in time with silence wherever there was none, from 0 s to the end.
+def covering(units: Timeline[Unit], duration_s: float) -> Timeline[Unit]:
+    """Return phones in time without gaps, and without phones of no duration; at least one.
 
     duration_s : of the recording
     """
-    spans: list[Span[Unit]] = []
-    end_s = 0.0
-    for span in [*units, Span(max(duration_s, end_s), max(duration_s, end_s), Unit(SILENCE))]:
-        if span.start_s - end_s > LEAST_GAP_S:
-            spans.append(Span(end_s, span.start_s, Unit(SILENCE)))
-        if span.duration_s > 0:
-            spans.append(span)
-        end_s = max(end_s, span.end_s)
-    return Timeline(tuple(spans))
+    spans = tuple(span for span in without_gaps(units, duration_s) if span.duration_s > 0)
+    return Timeline(spans or (Span(0.0, SHORTEST_S, Unit(SILENCE)),))
 
 
 def phone_windows(timelines: Sequence[Timeline[Unit]]) -> PhoneWindows:

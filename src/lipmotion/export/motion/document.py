@@ -43,11 +43,26 @@ def parse(document: Any, values: Any) -> tuple[Motion, Timeline[Unit]]:
     try:
         channels = tuple(Channel(str(channel["name"]), str(channel["unit"])) for channel in document["channels"])
         motion = Motion(_array(values, len(channels)), float(document["rate_hz"]), channels)
-        return motion, Timeline(tuple(_span(row) for row in document["units"]))
+        return motion, parse_units(document["units"])
     except InputError:
         raise
     except KeyError as error:
         raise InputError(f"the motion document has no {error}; export it again") from error
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"the motion document is damaged ({error}); export it again") from error
+
+
+def parse_units(rows: Any) -> Timeline[Unit]:
+    """Return the units of the member ``units``: objects with ``start_s``, ``end_s`` and ``phone`` or ``unit``.
+
+    Raises InputError: rows of another kind, without a time or a name, or with times that no recording has.
+    """
+    try:
+        return Timeline(tuple(_span(row) for row in rows))
+    except InputError:
+        raise
+    except KeyError as error:
+        raise InputError(f"a unit has no {error}; export it again, or give start_s, end_s and phone") from error
     except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"the motion document is damaged ({error}); export it again") from error
 
@@ -79,7 +94,7 @@ def _row(span: Span[Unit]) -> dict[str, Any]:
 
 def _span(row: Any) -> Span[Unit]:
     start_s, end_s = float(row["start_s"]), float(row["end_s"])
-    span = Span(start_s, end_s, Unit(str(row["phone"]), str(row["unit"]), str(row.get("word", ""))))
+    span = Span(start_s, end_s, Unit(str(row["phone"]), str(row.get("unit", "")), str(row.get("word", ""))))
     if not span.start_s >= 0 or span.end_s == float("inf"):
         raise InputError(
             f"the unit {span.label.phone!r} lasts from {span.start_s} to {span.end_s} s, required: finite times from 0"

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from lipmotion.errors import InputError
 from lipmotion.export.base import MotionFormat
-from lipmotion.export.motion.document import FORMAT, header, parse, units_and_origin
+from lipmotion.export.motion.document import FORMAT, header, parse, parse_units, units_and_origin
 from lipmotion.export.motion.json_stream import read_members
 from lipmotion.export.motion.rounded import formatted_rows
 from lipmotion.storage.json_text import as_json
@@ -42,4 +42,19 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
     return parse(document, document.get("values"))
 
 
-MOTION_FORMAT = MotionFormat(write, read)
+def read_units(path: Path) -> Timeline[Unit] | None:
+    """Return the units of a file with the member ``units`` and neither values nor channels; None of any other file.
+
+    Raises InputError: units that are damaged.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+        document = json.loads(text) if '"values"' not in text and text.lstrip().startswith("{") else None
+    except (ValueError, RecursionError):  # reported by ``read``
+        return None
+    if document is None or "units" not in document or "channels" in document:
+        return None
+    return parse_units(document["units"])
+
+
+MOTION_FORMAT = MotionFormat(write, read, units=read_units)

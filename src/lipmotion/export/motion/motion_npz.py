@@ -16,12 +16,22 @@ from lipmotion.storage.archive import UNREADABLE, array_in, check_archive
 from lipmotion.storage.json_text import as_json
 from lipmotion.types import Generation, Motion, Timeline, Unit
 
+FRAMES_AT_ONCE = 4096
+"""Frames whose variance is computed at once."""
+
 
 def write(path: Path, generation: Generation, source: Mapping[str, str], model: Mapping[str, str]) -> None:
-    """Write the arrays ``values`` [shape=(T, P)] and ``document``, the JSON document without its values."""
+    """Write ``values`` and ``standard_deviations`` [each shape=(T, P)] and ``document``, the JSON without its values.
+
+    A standard deviation is the model's, in the unit of its channel: the square root of ``Generation.variance``.
+    """
     document = as_json({**header(generation), **units_and_origin(generation, source, model)}, ensure_ascii=False)
     with path.open("wb") as file:  # given a path, NumPy would add a suffix of its own
-        np.savez(file, values=generation.motion.values, document=np.array(document))
+        deviations = np.empty(generation.motion.values.shape, np.float32)
+        for start in range(0, len(deviations), FRAMES_AT_ONCE):
+            frames = slice(start, start + FRAMES_AT_ONCE)
+            deviations[frames] = np.sqrt(np.maximum(generation.variance_of(frames), 0))
+        np.savez(file, values=generation.motion.values, standard_deviations=deviations, document=np.array(document))
 
 
 def read(path: Path) -> tuple[Motion, Timeline[Unit]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, TypeVar
 
 from lipmotion.corpora.store import Corpus, Selection
@@ -10,6 +11,7 @@ from lipmotion.engines.base import ForcesClosures
 from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.evaluation.conditions import (
     TEST_LIST,
+    WITH_TRANSCRIPT,
     HeldOutRecordings,
     compare_with_recorded,
     held_out_recordings,
@@ -19,7 +21,7 @@ from lipmotion.pipeline.evaluation.figures import figures_of
 from lipmotion.pipeline.model import Model
 from lipmotion.speech.recogniser import cached_recogniser
 from lipmotion.storage.json_text import nan_as_null
-from lipmotion.types import Monitor, silent_monitor
+from lipmotion.types import Monitor, Utterance, silent_monitor
 from lipmotion.units import Lexicon
 
 ModelT = TypeVar("ModelT")
@@ -47,7 +49,9 @@ def evaluate(
     Compared are the lip distances or, in a corpus without them, every channel that moves in the recordings; in addition
     or instead, the eigenlips of the model. Figures of closures and of silence need the channel ``opening``. Figures
     that cannot be computed are None. A model of several people generates the motion of each utterance's speaker; of
-    speakers whom it does not know, named under ``strangers``, that of the mean person.
+    speakers whom it does not know, named under ``strangers``, that of the mean person. ``without_words`` is the number
+    of utterances without words or labelled phones, if there is one; ``seen_in_training`` is there, and True, if the
+    model's header says that it was trained on some of the utterances.
     If the engine makes the lips meet in p, b and m, ``unpinned`` holds the figures of its motion without that.
     The reference for speech and for p, b and m are the labelled phones, or the forced alignment, or the recognised
     phones of utterances without transcript. The threshold of a closed mouth is computed from the corpus's training
@@ -89,10 +93,29 @@ def evaluate(
             for name in recordings.conditions
         },
     }
+    if WITH_TRANSCRIPT not in recordings.conditions:
+        figures["without_words"] = sum(not (each.words or each.phones) for each in recordings.utterances)
+    if _was_trained_on(model, recordings.utterances, corpus.path.name):
+        figures["seen_in_training"] = True
     if model.speakers is not None:
         figures["strangers"] = list(recordings.strangers)
     plain: dict[str, Any] = nan_as_null(figures)
     return plain
+
+
+def _was_trained_on(model: Model, utterances: Sequence[Utterance], folder: str) -> bool:
+    """Return whether a model was trained on some utterances, as far as its header says: corpus, list, speakers.
+
+    folder : name of the corpus, where the recordings do not say of which collection they are
+    """
+    about = model.about
+    split, speakers, corpora = about.get("split"), about.get("speakers"), about.get("corpus", ())
+    return any(
+        utterance.source.get("collection", folder) in corpora
+        and split in (utterance.split, "all")
+        and (not speakers or utterance.speaker in speakers)
+        for utterance in utterances
+    )
 
 
 def _figures_with_and_without_closures(

@@ -33,6 +33,7 @@ from lipmotion.pipeline.training.channels import (
 from lipmotion.pipeline.training.conditions import with_conditions
 from lipmotion.pipeline.training.fingerprint import fingerprint
 from lipmotion.pipeline.training.labels import label_utterances
+from lipmotion.pipeline.training.transcripts import warn_of_doubtful_transcripts, warn_of_missing_transcripts
 from lipmotion.pipeline.training.voices import VoiceExample
 from lipmotion.pipeline.transcribe import phones_in_time, warn_of_guesses
 from lipmotion.pipeline.workers import worker_pool
@@ -307,6 +308,14 @@ def _train_phone_models(
     if not transcribed and not labelled:
         LOG.warning("no transcripts in the corpus: its phones are recognised by the shipped model")
         return load_model().phones
+    unknown = sum(utterance.phones is None and not utterance.words for utterance in utterances)
+    if unknown:
+        LOG.warning(
+            "%d of %d recordings have no words: their phones are recognised, which is less sure; write the words "
+            "into a .txt beside each (docs/corpora.md)",
+            unknown,
+            len(utterances),
+        )
     vocabulary = dict.fromkeys(word for _, words in transcribed for word in words)
     warn_of_guesses(tuple(vocabulary), lexicon)
     pronunciations = {" ".join(run): (run,) for _, runs in labelled for run in runs}
@@ -340,17 +349,21 @@ def _examples(
     """Return the examples for an engine, and the reason for every utterance that is not used."""
     examples: list[Example] = []
     skipped: dict[str, str] = {}
+    labelled: list[tuple[Utterance, Timeline[Unit]]] = []
+    warn_of_missing_transcripts(utterances)
     labeller = partial(phones_of, phones=phones, lexicon=lexicon)
     for utterance, units in label_utterances(utterances, labeller, monitor, checkpoint, each):
         if isinstance(units, str):
             skipped[utterance.name] = units
             continue
+        labelled.append((utterance, units))
         motion, valid = model_motion(utterance.track, len(utterance.features.values))
         speech = Speech(utterance.features, units, log_f0(utterance.audio), spectrum=spectrum(utterance.audio))
         examples.append(Example(utterance.name, speech, motion, valid))
     if not examples:
         name, reason = next(iter(skipped.items()))
         raise CorpusError(f"none of {len(skipped)} utterances could be used; the first, {name}: {reason}")
+    warn_of_doubtful_transcripts(labelled)
     return examples, skipped
 
 

@@ -1,47 +1,150 @@
-"""espeak-ng: American English by formants, in the variants that sound like people; one program run for all sentences.
+"""espeak-ng: English and many other languages by formants, in the variants that sound like people.
 
 Only its library tells when each phone begins. The library is called in a process of its own (``espeak_events``), so
-that its state, its crashes and its licence (GPL) stay there.
+that its state, its crashes and its licence (GPL) stay there. One such process speaks all sentences.
+
+The library of the Python package ``espeakng-loader`` comes first, that of the system second: the package's version is
+pinned, so that the same text gives the same sound on every machine.
 """
 
 from __future__ import annotations
 
 import json
+import logging
 import shutil
 import sys
+from bisect import bisect_right
 from collections.abc import Iterator, Sequence
+from functools import cache
+from importlib.util import find_spec
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
-from lipmotion.errors import InputError
+from lipmotion.errors import InputError, LipMotionError
 from lipmotion.speech.audio_files import read_audio
+from lipmotion.speech.voices.espeak_events import PART, SILENCE
 from lipmotion.speech.voices.espeak_times import corrected_phone_times
-from lipmotion.speech.voices.phone_maps import ESPEAK_PHONES
+from lipmotion.speech.voices.ipa_phones import complete_map
+from lipmotion.speech.voices.phone_maps import ESPEAK_PHONES, PhoneMap
 from lipmotion.speech.voices.synthesiser import SynthesisedSentence, Synthesiser, SyntheticVoice, program_output
+from lipmotion.types import Span, Timeline
 
-PACKAGE = "espeak-ng"
+LOG = logging.getLogger("lipmotion")
+PACKAGE, WHEEL, EXTRA = "espeak-ng", "espeakng_loader", "lipmotion[text]"
 LANGUAGE = "en-us"
 VARIANTS = ("f1", "f2", "f3", "f4", "m1", "m2", "m3", "m4", "m7", "m8")
 """The variants with the vocal tract, pitch and breath of a person; not the robots, whispers, echoes and growls."""
 PROGRAM = [sys.executable, "-I", str(Path(__file__).with_name("espeak_events.py"))]
+DATA = "espeak-ng-data"
+STRESS_MARKS = "',%="
+"""What version 1.52 writes before the vowel of a stressed syllable; 1.51 does not."""
+NO_IPA: PhoneMap = {SILENCE: ESPEAK_PHONES[SILENCE], PART: ESPEAK_PHONES[PART]}
+LARGEST_VOICE = 1 << 16
+"""Most bytes of a file that describes a voice."""
+Start = tuple[str, float, int]
+
+
+def wheel_folder() -> Path | None:
+    """Return the folder of the Python package with library and data; None: it is not installed."""
+    spec = find_spec(WHEEL)  # it is not imported
+    folders = list(spec.submodule_search_locations or ()) if spec else []
+    return Path(folders[0]) if folders and (Path(folders[0]) / DATA).is_dir() else None
+
+
+def _library() -> dict[str, str]:
+    """Return the paths of the library and of its data for a task; none for those of the system."""
+    folder = wheel_folder()
+    if folder is None:
+        return {}
+    names = ("libespeak-ng.so", "libespeak-ng.dylib", "espeak-ng.dll")
+    path = next((folder / name for name in names if (folder / name).exists()), folder / names[0])
+    return {"library": str(path), "data": str(folder)}
+
+
+def _data() -> Path | None:
+    """Return the folder of languages and variants; None: espeak-ng is not installed."""
+    folder = wheel_folder()
+    if folder is not None:
+        return folder / DATA
+    return _system_data(shutil.which("espeak-ng"))
+
+
+@cache
+def _system_data(program: str | None) -> Path | None:
+    """Return the data folder of the system's library, of which ``program`` tells that it is installed."""
+    if program is None:
+        return None
+    try:
+        about = json.loads(program_output(PROGRAM, PACKAGE, given="{}"))
+        return Path(about["data"])
+    except (LipMotionError, ValueError, KeyError, TypeError):  # the library or its data are missing
+        return None
+
+
+def _variants(data: Path) -> tuple[str, ...]:
+    return tuple(name for name in VARIANTS if (data / "voices" / "!v" / name).is_file())
 
 
 def _voices() -> tuple[SyntheticVoice, ...]:
-    if shutil.which("espeak-ng") is None:
+    data = _data()
+    if data is None:
         return ()
-    listed = program_output(["espeak-ng", "--voices=variant"], PACKAGE)
-    names = [name for name in VARIANTS if f"!v/{name} " in f"{listed} "]
-    return tuple(SyntheticVoice(f"{LANGUAGE}+{name}", "espeak-ng", f"espeak-{name}") for name in names)
+    return tuple(SyntheticVoice(f"{LANGUAGE}+{name}", "espeak-ng", f"espeak-{name}") for name in _variants(data))
+
+
+def _others() -> tuple[SyntheticVoice, ...]:
+    """Return a voice of every language; its name and ``+`` and one of ``VARIANTS`` name a voice, too."""
+    data = _data()
+    if data is None:
+        return ()
+    names = _languages(data)
+    return tuple(SyntheticVoice(name, "espeak-ng", f"espeak-{name}", name) for name in names)
+
+
+def _languages(data: Path) -> list[str]:
+    """Return the names of all languages in the data, without duplicates, in alphabetical order."""
+    names = set()
+    for path in (data / "lang").rglob("*"):
+        if path.is_file() and path.stat().st_size <= LARGEST_VOICE:
+            lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+            names |= {line.split()[1].lower() for line in lines if line.startswith("language ") and line.split()[1:]}
+    return sorted(names)
 
 
 def _synthesise(voice: str, texts: Sequence[str], folder: Path) -> Iterator[SynthesisedSentence]:
-    task = json.dumps({"voice": voice, "texts": list(texts), "folder": str(folder)})
-    sentences = _answer(program_output(PROGRAM, PACKAGE, len(texts), task))
-    for number, sentence in enumerate(sentences):
+    ipa = voice.partition("+")[0] != LANGUAGE
+    task = {"voice": voice, "texts": list(texts), "folder": str(folder), "ipa": ipa} | _library()
+    sentences = _answer(program_output(PROGRAM, PACKAGE, len(texts), json.dumps(task)))
+    labels = (label.lstrip(STRESS_MARKS) for said in sentences for label, _, _ in said)
+    phone_map, unknown = complete_map(labels, NO_IPA if ipa else ESPEAK_PHONES, ipa=ipa)
+    if unknown:
+        LOG.warning("espeak-ng says phones that no table has, shown as the nearest or as ax: %s", " ".join(unknown))
+    for number, (text, said) in enumerate(zip(texts, sentences, strict=True)):
         path = folder / f"{number}.wav"
         audio = read_audio(path)
-        yield SynthesisedSentence(audio, corrected_phone_times(sentence, audio))
+        starts = [(label.lstrip(STRESS_MARKS), start_s) for label, start_s, _ in said]
+        phones = corrected_phone_times(starts, audio, phone_map)
+        words = _written_words(phones, [place for _, _, place in said], text)
+        yield SynthesisedSentence(audio, phones, path, words, phone_map)
         path.unlink()
+
+
+def _written_words(phones: Timeline[str], places: Sequence[int], text: str) -> Timeline[str]:
+    """Return the words of a text in time: what stands between blanks. Words that are said as one (*on the*) are one.
+
+    places : of each phone, where its word, or a part of it, begins in the text
+    """
+    words = text.split()
+    starts = [at for at in range(len(text)) if not text[at].isspace() and (at == 0 or text[at - 1].isspace())]
+    numbers = [max(bisect_right(starts, place) - 1, 0) for place in places]
+    groups = [(number, list(group)) for number, group in groupby(range(len(phones)), key=numbers.__getitem__)]
+    following = [*(number for number, _ in groups[1:]), len(words)]
+    spans = []
+    for place, ((number, said), stop) in enumerate(zip(groups, following, strict=True)):
+        written = words[number if place else 0 : max(stop, number + 1)]
+        spans.append(Span(phones[said[0]].start_s, phones[said[-1]].end_s, " ".join(written)))
+    return Timeline(tuple(spans))
 
 
 def _answer(printed: str) -> Any:
@@ -52,4 +155,4 @@ def _answer(printed: str) -> Any:
         raise InputError(f"espeak-ng's library answers {printed[:40]!r}; install it again: {PACKAGE}") from error
 
 
-ESPEAK_NG = Synthesiser("espeak-ng", PACKAGE, _voices, _synthesise, ESPEAK_PHONES)
+ESPEAK_NG = Synthesiser("espeak-ng", PACKAGE, _voices, _synthesise, ESPEAK_PHONES, _others, EXTRA)

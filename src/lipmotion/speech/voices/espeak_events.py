@@ -1,21 +1,28 @@
 """A stand-alone program: texts to wav files and the start times of their phones, by the library of espeak-ng.
 
-It reads ``{"voice", "texts", "folder"}`` as JSON, and writes a list of ``[label, start_s]`` for every text as JSON and
-the sound of text n to ``folder/n.wav``. It imports nothing of this package, so that it starts fast.
+It reads a task as JSON: ``{"voice", "texts", "folder", "ipa"}``, and optionally ``"library"`` and ``"data"``: the
+paths of the library and of the folder that holds ``espeak-ng-data``. It writes a list of ``[label, start_s, place]``
+for every text as JSON, and the sound of text n to ``folder/n.wav``. A label is espeak-ng's mnemonic, or with ``"ipa"``
+the phone in the International Phonetic Alphabet; ``place`` is where the written word begins in the text, in characters.
+Without ``"voice"`` it writes ``{"version", "data"}``: what is installed. It imports nothing of this package, so that it
+starts fast.
 """
 
 from __future__ import annotations
 
 import ctypes
 import json
+import os
 import sys
 import wave
 from pathlib import Path
 from typing import Any
 
 LIBRARIES = ("libespeak-ng.so.1", "libespeak-ng.1.dylib", "libespeak-ng.dll")
-SYNCHRONOUS, PHONEME_EVENTS, UTF_8 = 2, 1, 1
-END, PHONEME = 0, 7
+SYNCHRONOUS, PHONEME_EVENTS, IPA, UTF_8 = 2, 1, 2, 1
+END, WORD, PHONEME = 0, 1, 7
+SILENCE, PART = "_", ";"
+"""The mnemonics of a silence, and of a part of the phone before. Both have no IPA."""
 
 
 class _Event(ctypes.Structure):
@@ -33,29 +40,49 @@ class _Event(ctypes.Structure):
     )
 
 
+class _Voice(ctypes.Structure):
+    """``espeak_VOICE`` of speak_lib.h; only ``languages`` is filled in."""
+
+    _fields_ = (
+        ("name", ctypes.c_char_p),
+        ("languages", ctypes.c_char_p),
+        ("identifier", ctypes.c_char_p),
+        ("gender_age_variant", ctypes.c_ubyte * 4),
+        ("score", ctypes.c_int),
+        ("spare", ctypes.c_void_p),
+    )
+
+
 _Callback = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_int, ctypes.POINTER(_Event))
 
 
-def _library() -> Any:
-    for name in LIBRARIES:
+def _library(path: str) -> Any:
+    for name in (path,) if path else LIBRARIES:
         try:
             return ctypes.CDLL(name)
         except OSError:
             continue
-    sys.exit(f"none of {', '.join(LIBRARIES)} is installed; apt install libespeak-ng1")
+    sys.exit(f"none of {path or ', '.join(LIBRARIES)} is installed; apt install libespeak-ng1")
 
 
-def _speak(library: Any, rate_hz: int, text: str, path: Path) -> list[tuple[str, float]]:
-    """Write the sound of a text, and return its phones with their start times, s."""
+def _speak(library: Any, rate_hz: int, text: str, path: Path) -> list[tuple[str, float, int]]:
+    """Write the sound of a text, and return its phones with their start times, s, and the places of their words."""
     sound, starts = bytearray(), []
+    word_position = 1
 
     def collect(samples: int | None, count: int, events: Any) -> int:
+        nonlocal word_position
         if samples and count > 0:
             sound.extend(ctypes.string_at(samples, 2 * count))
         index = 0
         while events[index].type != END:
-            if events[index].type == PHONEME and events[index].label:
-                starts.append((events[index].label.decode(), events[index].sample / rate_hz))
+            event = events[index]
+            if event.type == WORD:
+                word_position = event.text_position
+            elif event.type == PHONEME:
+                unnamed = PART if event.text_position == word_position else SILENCE
+                label = event.label.decode(errors="ignore") or unnamed
+                starts.append((label, event.sample / rate_hz, word_position - 1))
             index += 1
         return 0
 
@@ -73,14 +100,32 @@ def _speak(library: Any, rate_hz: int, text: str, path: Path) -> list[tuple[str,
     return starts
 
 
+def _about(library: Any) -> dict[str, str]:
+    library.espeak_Info.restype = ctypes.c_char_p
+    data = ctypes.c_char_p()
+    version = library.espeak_Info(ctypes.byref(data))
+    return {"version": version.decode(), "data": os.path.realpath((data.value or b"").decode())}
+
+
 def main() -> None:
-    """Synthesise the texts of the task on the standard input."""
+    """Carry out the task on the standard input."""
     task = json.load(sys.stdin)
-    library = _library()
-    rate_hz = library.espeak_Initialize(SYNCHRONOUS, 0, None, PHONEME_EVENTS)
+    library = _library(task.get("library", ""))
+    data = None
+    if task.get("data"):
+        os.chdir(task["data"])  # the library cuts long paths
+        data = b"."
+    options = PHONEME_EVENTS | (IPA if task.get("ipa") else 0)
+    rate_hz = library.espeak_Initialize(SYNCHRONOUS, 0, data, options)
     if rate_hz <= 0:
         sys.exit("espeak-ng finds no data; apt install espeak-ng-data")
-    if library.espeak_SetVoiceByName(task["voice"].encode()):
+    if "voice" not in task:
+        json.dump(_about(library), sys.stdout)
+        return
+    voice = task["voice"].encode()
+    if library.espeak_SetVoiceByName(voice) and library.espeak_SetVoiceByProperties(
+        ctypes.byref(_Voice(languages=voice))
+    ):
         sys.exit(f"no voice {task['voice']!r}")
     folder = Path(task["folder"])
     starts = [_speak(library, rate_hz, text, folder / f"{number}.wav") for number, text in enumerate(task["texts"])]

@@ -11,14 +11,14 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.speech.voices.phone_maps import ESPEAK_PHONES
+from lipmotion.speech.voices.phone_maps import ESPEAK_PHONES, PhoneMap
 from lipmotion.types import Audio, Span, Timeline
 from lipmotion.units import SILENCE, phone_classes
 
 CLOSING = phone_classes()["stop"] | phone_classes()["affricate"]
 VOWELS = phone_classes()["vowel"]
-CLOSED = 0.005
-"""Share of the largest sample that no sample of a closure exceeds."""
+CLOSED = 0.03
+"""Share of the largest sample that no sample of a closure exceeds: some variants have breath in it."""
 LONGEST_CLOSURE_S = 0.06
 LATE_L_S, SHARE_OF_L = 0.045, 0.45
 """An l that is reported so shortly before its end is late; it then gets this share of the vowel and l together, as in
@@ -27,13 +27,16 @@ the project's own alignments."""
 Starts = Sequence[tuple[str, float]]
 
 
-def corrected_phone_times(starts: Starts, audio: Audio) -> Timeline[str]:
-    """Return phones in time: each from its corrected start to that of the next, or to the end of the sound."""
+def corrected_phone_times(starts: Starts, audio: Audio, phone_map: PhoneMap = ESPEAK_PHONES) -> Timeline[str]:
+    """Return phones in time: each from its corrected start to that of the next, or to the end of the sound.
+
+    phone_map : the labels to phones of the inventory
+    """
     labels = [label for label, _ in starts]
     edges_s = [*(start_s for _, start_s in starts), audio.duration_s]
     closed = np.abs(audio.samples) < CLOSED * np.abs(audio.samples).max(initial=0)
     for index in range(1, len(labels)):
-        before, here = _phone(labels[index - 1]), _phone(labels[index])
+        before, here = _phone(labels[index - 1], phone_map), _phone(labels[index], phone_map)
         if here in CLOSING and before != SILENCE:
             edges_s[index] = max(_closure_s(closed, edges_s[index], audio.rate_hz), edges_s[index - 1])
         elif here == "l" and before in VOWELS and edges_s[index + 1] - edges_s[index] < LATE_L_S:
@@ -43,9 +46,9 @@ def corrected_phone_times(starts: Starts, audio: Audio) -> Timeline[str]:
     return Timeline(tuple(Span(start_s, max(start_s, end_s), label) for start_s, end_s, label in spans))
 
 
-def _phone(label: str) -> str:
+def _phone(label: str, phone_map: PhoneMap) -> str:
     """Return the last phone of a label; empty for a label that is part of another phone or unknown."""
-    return (ESPEAK_PHONES.get(label) or ("",))[-1]
+    return (phone_map.get(label) or ("",))[-1]
 
 
 def _closure_s(closed: NDArray[np.bool_], burst_s: float, rate_hz: int) -> float:

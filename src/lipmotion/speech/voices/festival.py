@@ -52,7 +52,7 @@ def _synthesise(voice: str, texts: Sequence[str], folder: Path) -> Iterator[Synt
     if len(parts) != len(texts):
         raise InputError(f"festival said {len(parts)} of {len(texts)} sentences; try another text or voice")
     for path, part in zip(paths, parts, strict=True):
-        yield SynthesisedSentence(read_audio(path), parse_segments(part))
+        yield SynthesisedSentence(read_audio(path), parse_segments(part), path)
         path.unlink()
 
 

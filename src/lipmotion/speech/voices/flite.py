@@ -29,7 +29,7 @@ def _synthesise(voice: str, texts: Sequence[str], folder: Path) -> Iterator[Synt
     path = folder / "flite.wav"
     for text in texts:
         printed = program_output(["flite", "-voice", voice, "-psdur", "-o", str(path), "-t", text], PACKAGE)
-        yield SynthesisedSentence(read_audio(path), parse_phone_ends(printed))
+        yield SynthesisedSentence(read_audio(path), parse_phone_ends(printed), path)
 
 
 def parse_phone_ends(printed: str) -> Timeline[str]:

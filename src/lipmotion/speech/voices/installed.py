@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import logging
 import tempfile
+import wave
 from collections.abc import Generator, Sequence
 from contextlib import closing
+from dataclasses import dataclass
 from pathlib import Path
 
-from lipmotion.errors import InputError, MissingDependencyError
+from lipmotion.errors import InputError, LipMotionError, MissingDependencyError, shortened
+from lipmotion.speech.audio_files import read_audio
 from lipmotion.speech.voices.espeak import ESPEAK_NG
 from lipmotion.speech.voices.festival import FESTIVAL
 from lipmotion.speech.voices.flite import FLITE
@@ -16,12 +20,114 @@ from lipmotion.speech.voices.synthesiser import Synthesiser, SyntheticVoice
 from lipmotion.types import Audio, Timeline, Unit
 from lipmotion.units import Lexicon, words_of
 
+LOG = logging.getLogger("lipmotion")
 SYNTHESISERS: dict[str, Synthesiser] = {synthesiser.name: synthesiser for synthesiser in (FLITE, FESTIVAL, ESPEAK_NG)}
+
+DEFAULT_VOICES = (("espeak-ng", "en-us+f2"), ("flite", "slt"))
+"""Synthesiser and name of the voices that speak where none is asked for: that of the Python package first."""
+
+
+@dataclass(frozen=True, eq=False)
+class VoicedSentence:
+    """A sentence that a voice has said.
+
+    audio : the sound at 16 kHz
+    units : phones in time, from 0 s to the end of the sound
+    sound : the file with the sound at the synthesiser's own rate; it is there until the next sentence is asked for
+    """
+
+    audio: Audio
+    units: Timeline[Unit]
+    sound: Path
+
+    def own_sound(self) -> Audio:
+        """Return the sound at the synthesiser's own rate. Raises InputError: its file is gone, or no sound file."""
+        try:
+            with wave.open(str(self.sound)) as file:
+                rate_hz = file.getframerate()
+        except (OSError, EOFError, wave.Error) as error:
+            raise InputError(f"the synthesiser wrote no sound that can be read ({error}); try another voice") from error
+        return read_audio(self.sound, rate_hz)
 
 
 def installed_voices() -> tuple[SyntheticVoice, ...]:
-    """Return the English voices of the synthesisers that are installed; none where none is."""
+    """Return the American English voices of the synthesisers that are installed; none where none is."""
     return tuple(voice for synthesiser in SYNTHESISERS.values() for voice in synthesiser.voices())
+
+
+def all_voices() -> tuple[SyntheticVoice, ...]:
+    """Return the installed voices of all languages: the American English ones first.
+
+    A synthesiser that is installed and does not work is left out, with a warning.
+    """
+    working = [synthesiser for synthesiser in SYNTHESISERS.values() if _works(synthesiser)]
+    english = tuple(voice for synthesiser in working for voice in synthesiser.voices())
+    return (*english, *(voice for synthesiser in working for voice in synthesiser.others()))
+
+
+def _works(synthesiser: Synthesiser) -> bool:
+    """Return whether a synthesiser can list its voices; if not, log why."""
+    try:
+        synthesiser.voices()
+    except LipMotionError as error:
+        LOG.warning("%s is left out: %s", synthesiser.name, error)
+        return False
+    return True
+
+
+def voice_named(name: str) -> SyntheticVoice:
+    """Return the installed voice of a name.
+
+    name : ``SYNTHESISER:VOICE``, as in ``flite:slt`` or ``espeak-ng:de``; or the voice's name alone, where only one
+           synthesiser has it. A language of espeak-ng may be followed by a variant: ``espeak-ng:de+f3``.
+    Raises MissingDependencyError: no synthesiser is installed, or not that one. Raises InputError: no such voice, or
+    several.
+    """
+    maker, colon, rest = name.rpartition(":")
+    if colon and maker not in SYNTHESISERS:
+        raise InputError(f"unknown synthesiser {shortened(maker)!r}; required one of: {', '.join(SYNTHESISERS)}")
+    asked = [SYNTHESISERS[maker]] if colon else [each for each in SYNTHESISERS.values() if _works(each)]
+    if not colon and not any(synthesiser.voices() for synthesiser in asked):
+        raise nothing_installed()
+    found = []
+    for synthesiser in asked:
+        listed = {voice.name: voice for voice in (*synthesiser.others(), *synthesiser.voices())}
+        if rest in listed:
+            found.append(listed[rest])
+        elif listed and _is_other(rest, synthesiser):
+            language = rest.partition("+")[0]
+            found.append(SyntheticVoice(rest, synthesiser.name, f"espeak-{rest}", language))
+        elif colon and not listed:
+            raise MissingDependencyError(f"{maker} is not installed: {how_to_install(synthesiser)}")
+    if len(found) == 1:
+        return found[0]
+    if found:
+        names = ", ".join(f"{voice.synthesiser}:{voice.name}" for voice in found)
+        raise InputError(f"several voices are called {name!r}; give one of: {names}")
+    raise InputError(f"no voice {shortened(name)!r} is installed; lipmotion speak --voices lists those that are")
+
+
+def default_voice() -> SyntheticVoice:
+    """Return the first of ``DEFAULT_VOICES`` that is installed, else the first installed voice.
+
+    Raises MissingDependencyError: no synthesiser is installed.
+    """
+    for maker, name in DEFAULT_VOICES:
+        voice = next((voice for voice in SYNTHESISERS[maker].voices() if voice.name == name), None)
+        if voice is not None:
+            return voice
+    voice = next(iter(all_voices()), None)
+    if voice is None:
+        raise nothing_installed()
+    return voice
+
+
+def nothing_installed() -> MissingDependencyError:
+    """Return the error that says how to install a synthesiser."""
+    debian = " ".join(synthesiser.package for synthesiser in SYNTHESISERS.values())
+    return MissingDependencyError(
+        f"no speech synthesiser is installed; install one: pip install '{ESPEAK_NG.extra}', or: apt install {debian}"
+    )
 
 
 def speak_sentence(text: str, voice: SyntheticVoice, lexicon: Lexicon | None = None) -> tuple[Audio, Timeline[Unit]]:
@@ -42,15 +148,26 @@ def speak_sentences(
     Raises MissingDependencyError: the synthesiser is not installed (the message names the package).
     Raises InputError: no such synthesiser or voice, a text without a word, or one that the synthesiser cannot say.
     """
-    lexicon = lexicon or Lexicon()
+    with closing(voiced_sentences(texts, voice, lexicon)) as sentences:
+        for sentence in sentences:
+            yield sentence.audio, sentence.units
+
+
+def voiced_sentences(
+    texts: Sequence[str], voice: SyntheticVoice, lexicon: Lexicon | None = None
+) -> Generator[VoicedSentence, None, None]:
+    """Yield several sentences in a voice, as ``speak_sentences``, each with the sound at the synthesiser's own rate."""
     synthesiser = _synthesiser(voice)
     words = [words_of(text) for text in texts]
+    known = (lexicon or Lexicon()) if voice.is_english else None
     with tempfile.TemporaryDirectory(prefix="lipmotion-voices-") as folder:
         plain = [" ".join(text.split()) for text in texts]
         sentences = synthesiser.synthesise(voice.name, plain, Path(folder)) if plain else iter(())
-        for sentence, its_words in zip(sentences, words, strict=True):
-            audio, phone_map = sentence.audio, synthesiser.phone_map
-            yield audio, inventory_timeline(sentence.phones, phone_map, its_words, lexicon, audio.duration_s)
+        for said, its_words in zip(sentences, words, strict=True):
+            phone_map = said.phone_map or synthesiser.phone_map
+            written = its_words if said.words is None else said.words
+            units = inventory_timeline(said.phones, phone_map, written, known, said.audio.duration_s)
+            yield VoicedSentence(said.audio, units, said.sound)
 
 
 def _synthesiser(voice: SyntheticVoice) -> Synthesiser:
@@ -60,8 +177,21 @@ def _synthesiser(voice: SyntheticVoice) -> Synthesiser:
     names = [known.name for known in synthesiser.voices()]
     if not names:
         raise MissingDependencyError(
-            f"{synthesiser.name} is not installed, or has no English voice: apt install {synthesiser.package}"
+            f"{synthesiser.name} is not installed, or has no English voice: {how_to_install(synthesiser)}"
         )
-    if voice.name not in names:
+    if voice.name not in names and not _is_other(voice.name, synthesiser):
         raise InputError(f"{synthesiser.name} has no voice {voice.name!r} here; it has: {', '.join(names)}")
     return synthesiser
+
+
+def _is_other(name: str, synthesiser: Synthesiser) -> bool:
+    """Return whether a name is that of a voice of another language, as it is or in a variant of an English voice."""
+    language, plus, variant = name.partition("+")
+    variants = {voice.name.partition("+")[2] for voice in synthesiser.voices()}
+    return language in {voice.name for voice in synthesiser.others()} and (not plus or variant in variants)
+
+
+def how_to_install(synthesiser: Synthesiser) -> str:
+    """Return the commands that install a synthesiser, for a message."""
+    package = f"apt install {synthesiser.package}"
+    return f"{package}, or pip install '{synthesiser.extra}'" if synthesiser.extra else package

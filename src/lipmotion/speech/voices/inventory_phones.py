@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+import unicodedata
+from bisect import bisect_right
 from collections.abc import Sequence
 from itertools import groupby
 
@@ -9,32 +12,43 @@ from lipmotion.errors import InputError
 from lipmotion.speech.recogniser import SHORT_PAUSE_S
 from lipmotion.speech.voices.phone_maps import PhoneMap
 from lipmotion.types import Span, Timeline, Unit
-from lipmotion.units import PAUSE, SILENCE, VISEME_OF, Lexicon, is_silent, phone_classes
+from lipmotion.units import PAUSE, SILENCE, VISEME_OF, Lexicon, Pronunciation, is_silent, phone_classes, words_in
 from lipmotion.units.lexicon import REDUCED_VOWELS
+from lipmotion.units.transcript import normalised_text
 
 GAP, ALIKE, OTHER, UNLIKE = 0.7, 0.3, 0.8, 1.5
 """Costs of matching a phone with none, with a form of itself, with another of its kind (vowel or consonant), and with
 one of the other kind."""
 VOWELS = phone_classes()["vowel"]
+WRITTEN_EDGES = re.compile(r"^[^\w]+|[^\w]+$")
+"""Punctuation at the ends of a written word."""
 Phones = Sequence[tuple[str, float, float]]
 
 
 def inventory_timeline(
-    labels: Timeline[str], phone_map: PhoneMap, words: Sequence[str], lexicon: Lexicon, duration_s: float
+    labels: Timeline[str],
+    phone_map: PhoneMap,
+    words: Sequence[str] | Timeline[str],
+    lexicon: Lexicon | None,
+    duration_s: float,
 ) -> Timeline[Unit]:
     """Return the phones of a synthesised sentence in time, as forced alignment would label them.
 
     labels     : of the synthesiser, in time
     phone_map  : labels to phones (``phone_maps``)
-    words      : of the sentence
+    words      : of the sentence; or what is written of it between blanks, in time, where the synthesiser tells
+    lexicon    : pronunciations of the words (None: the sentence is not English, its words stay as they are written)
     duration_s : of the sound; what no label covers is silence
     Raises InputError: a label that is not in the map, or no phone at all.
     """
     phones = _joined(_covered(_translated(labels, phone_map), duration_s))
-    spoken = [phone for phone, _, _ in phones if not is_silent(phone)]
+    spoken = [phone for phone in phones if not is_silent(phone[0])]
     if not spoken:
         raise InputError("the synthesiser says no phone; give another text")
-    named = iter(with_words(spoken, words, lexicon))
+    if isinstance(words, Timeline):
+        named = iter(_with_written_words(spoken, words, lexicon))
+    else:
+        named = iter(with_words([phone for phone, _, _ in spoken], words, lexicon or Lexicon()))
     last = len(phones) - 1
     spans = [
         Span(start, end, Unit(_silence(0 < place < last, end - start)))
@@ -51,11 +65,39 @@ def with_words(phones: Sequence[str], words: Sequence[str], lexicon: Lexicon) ->
     Both follow from the cheapest match with the words' first pronunciations; a phone that matches none belongs to the
     word before it.
     """
-    expected = [(phone, word) for word in words for phone in lexicon.pronunciations(word)[0]]
-    units, word = [], expected[0][1]
+    expected = [(phone, word) for word in words for phone in _pronunciation(word, lexicon)]
+    units, word = [], expected[0][1] if expected else words[0]
     for phone, match in zip(phones, matches(phones, [phone for phone, _ in expected]), strict=True):
         in_lexicon, word = expected[match] if match >= 0 else ("", word)
         units.append(Unit(in_lexicon if REDUCED_VOWELS.get(phone) == in_lexicon else phone, word=word))
+    return units
+
+
+def _pronunciation(word: str, lexicon: Lexicon) -> Pronunciation:
+    """Return the first pronunciation of a word; of one with letters that English has not, that of its plain letters."""
+    try:
+        return lexicon.pronunciations(word)[0]
+    except InputError:
+        plain = unicodedata.normalize("NFKD", word).encode("ascii", "ignore").decode()
+        return lexicon.pronunciations(plain)[0] if plain.strip("'") else ()
+
+
+def _with_written_words(phones: Phones, written: Timeline[str], lexicon: Lexicon | None) -> list[Unit]:
+    """Return the units of phones that are said within written words.
+
+    A text between blanks may be several words, or a number: these share its phones (``with_words``).
+    """
+    starts_s = [span.start_s for span in written]
+    numbers = [max(bisect_right(starts_s, (start + end) / 2) - 1, 0) for _, start, end in phones]
+    units: list[Unit] = []
+    for number, group in groupby(zip(phones, numbers, strict=True), key=lambda pair: pair[1]):
+        names = [phone for (phone, _, _), _ in group]
+        text = written[number].label
+        words = words_in(text)
+        if lexicon is not None and words:
+            units += with_words(names, words, lexicon)
+        else:
+            units += [Unit(name, word=WRITTEN_EDGES.sub("", normalised_text(text))) for name in names]
     return units
 
 

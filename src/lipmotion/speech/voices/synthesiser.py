@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,23 +26,41 @@ class SyntheticVoice:
     name        : by which the synthesiser knows it
     synthesiser : ``flite``, ``festival`` or ``espeak-ng``
     speaker     : whose voice it is: two voices made from recordings of one person have the same speaker
+    language    : what it speaks, as in ``en-us``, ``de``, ``pt-br``
     """
 
     name: str
     synthesiser: str
     speaker: str
+    language: str = "en-us"
+
+    @property
+    def full_name(self) -> str:
+        """The name by which people ask for it: ``espeak-ng:en-us+f2``."""
+        return f"{self.synthesiser}:{self.name}"
+
+    @property
+    def is_english(self) -> bool:
+        """Whether it speaks English, so that the dictionary knows its words."""
+        return self.language.partition("-")[0] == "en"
 
 
 @dataclass(frozen=True, eq=False)
 class SynthesisedSentence:
     """One sentence from a synthesiser.
 
-    audio  : at 16 kHz
-    phones : in time, by the synthesiser's own names
+    audio   : at 16 kHz
+    phones  : in time, by the synthesiser's own names
+    sound   : the file with the sound at the synthesiser's own rate; it is there until the next sentence is asked for
+    words   : as they are written, in time, where the synthesiser tells (None: it does not)
+    phone_map : its names to phones of the inventory, where they are not those of the synthesiser's English (None)
     """
 
     audio: Audio
     phones: Timeline[str]
+    sound: Path
+    words: Timeline[str] | None = None
+    phone_map: PhoneMap | None = None
 
 
 @dataclass(frozen=True)
@@ -49,9 +68,11 @@ class Synthesiser:
     """A speech synthesis program.
 
     package    : the Debian package with it
-    voices     : returns its installed voices; none where it is not installed
+    voices     : returns its installed American English voices; none where it is not installed
     synthesise : yields the sentences of some texts in a voice (name, texts, a folder for temporary files), in order
     phone_map  : its phones to those of the inventory (``phone_maps``)
+    others     : returns its voices of other languages and kinds of English
+    extra      : what pip installs it by; empty: it is no Python package
     """
 
     name: str
@@ -59,6 +80,8 @@ class Synthesiser:
     voices: Callable[[], tuple[SyntheticVoice, ...]]
     synthesise: Callable[[str, Sequence[str], Path], Iterator[SynthesisedSentence]]
     phone_map: PhoneMap
+    others: Callable[[], tuple[SyntheticVoice, ...]] = tuple
+    extra: str = ""
 
 
 def program_output(command: Sequence[str], package: str, sentences: int = 1, given: str = "") -> str:
@@ -73,15 +96,16 @@ def program_output(command: Sequence[str], package: str, sentences: int = 1, giv
     if program is None:
         raise MissingDependencyError(f"{command[0]} is not installed; install it: apt install {package}")
     limit_s = START_S + EACH_S * sentences
+    name = package if command[0] == sys.executable else command[0]
     try:
         done = subprocess.run(
             [program, *command[1:]], input=given, capture_output=True, encoding="utf-8", timeout=limit_s, check=False
         )
     except subprocess.TimeoutExpired as error:
-        raise InputError(f"{command[0]} did not end within {limit_s:.0f} s; give shorter or fewer texts") from error
+        raise InputError(f"{name} did not end within {limit_s:.0f} s; give shorter or fewer texts") from error
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{command[0]} cannot be run ({error}); install it again: apt install {package}") from error
+        raise InputError(f"{name} cannot be run ({error}); install it again: apt install {package}") from error
     if done.returncode:
         message = " ".join(done.stderr.split())[:SHOWN] or "no message"
-        raise InputError(f"{command[0]} failed with {done.returncode} ({message}); try another text or voice")
+        raise InputError(f"{name} failed with {done.returncode} ({message}); try another text or voice")
     return done.stdout

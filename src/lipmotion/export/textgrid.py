@@ -1,0 +1,63 @@
+"""Phones in time as a TextGrid, which Praat and other label editors open."""
+
+from __future__ import annotations
+
+from itertools import groupby
+from pathlib import Path
+
+from lipmotion.storage.files import whole_file
+from lipmotion.types import Timeline, Unit
+
+TEXTGRID_SUFFIX = ".TextGrid"
+"""As Praat writes it; case does not matter."""
+Interval = tuple[float, float, str]
+"""Start and end in seconds, and the text."""
+
+
+def write_textgrid(path: Path, units: Timeline[Unit]) -> None:
+    """Write phones in time to a TextGrid in long text form, with the tiers ``phones`` and ``words``.
+
+    units : the phones; where a label has no phone, the name of its unit is written
+    Equal neighbours in the tier ``words`` are one interval. After a failure there is no partial file.
+    Raises ExportError: the file cannot be written.
+    Source: Praat manual, "TextGrid file formats".
+    """
+    phones = [(span.start_s, span.end_s, span.label.phone or span.label.unit) for span in units]
+    words = []
+    for word, spans in groupby(units, key=lambda span: span.label.word):
+        run = list(spans)
+        words.append((run[0].start_s, run[-1].end_s, word))
+    end_s = max((span.end_s for span in units), default=0.0)
+    lines = ['File type = "ooTextFile"', 'Object class = "TextGrid"', "", "xmin = 0", f"xmax = {end_s:.9g}"]
+    lines += ["tiers? <exists>", "size = 2", "item []:"]
+    for number, (name, intervals) in enumerate((("phones", phones), ("words", words)), 1):
+        lines += _tier(number, name, _without_gaps(intervals), end_s)
+    with whole_file(path) as temporary:
+        temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _without_gaps(intervals: list[Interval]) -> list[Interval]:
+    """Return intervals from 0 s on that follow each other; what was a gap has no text. Praat requires that."""
+    whole: list[Interval] = []
+    end_s = 0.0
+    for start_s, stop_s, text in intervals:
+        if start_s > end_s:
+            whole.append((end_s, start_s, ""))
+        whole.append((end_s if start_s < end_s else start_s, stop_s, text))
+        end_s = stop_s
+    return whole
+
+
+def _tier(number: int, name: str, intervals: list[Interval], end_s: float) -> list[str]:
+    """Return the lines of one tier."""
+    lines = [f"    item [{number}]:", '        class = "IntervalTier"', f'        name = "{name}"']
+    lines += ["        xmin = 0", f"        xmax = {end_s:.9g}", f"        intervals: size = {len(intervals)}"]
+    for place, (start_s, stop_s, text) in enumerate(intervals, 1):
+        quoted = text.replace('"', '""')
+        lines += [
+            f"        intervals [{place}]:",
+            f"            xmin = {start_s:.9g}",
+            f"            xmax = {stop_s:.9g}",
+        ]
+        lines.append(f'            text = "{quoted}"')
+    return lines

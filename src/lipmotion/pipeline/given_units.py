@@ -1,0 +1,29 @@
+"""Phones in time that a user gives: from motion files and label files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from lipmotion.corpora.labels import read_phones
+from lipmotion.errors import InputError
+from lipmotion.export.base import motion_suffixes
+from lipmotion.export.base import read_units as read_units_of_motion
+from lipmotion.types import Timeline, Unit
+
+LABEL_SUFFIXES = (".textgrid", ".lab", ".txt")
+"""Suffixes of label files, in lower case; their content decides which form they have."""
+
+
+def read_units(path: str | Path) -> Timeline[Unit]:
+    """Return the phones in time of a file.
+
+    path : a motion file (``.json``, ``.npz``); a ``.json`` with the member ``units`` alone; or any file of labels that
+           corpora may have (``LABEL_SUFFIXES``): a TextGrid with a tier of phones, Audacity's or HTK's labels
+    Raises InputError: no such file, not one of these, or without phones.
+    """
+    path = Path(path)
+    if path.suffix.lower() in motion_suffixes():
+        return read_units_of_motion(path)
+    if path.suffix.lower() in LABEL_SUFFIXES:
+        return read_phones(path)
+    raise InputError(f"{path}: cannot read phones from {path.suffix!r}; use one of .json, .npz, .TextGrid, .lab, .txt")

@@ -1,0 +1,121 @@
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from cli.conftest import RunCommand, is_one_error
+from lipmotion.export.base import read_motion
+from lipmotion.pipeline.animate import write
+from lipmotion.pipeline.model import load_model
+from lipmotion.pipeline.speak import speak
+from lipmotion.speech.voices import installed
+from speech import stand_in_voice
+
+pytestmark = pytest.mark.usefixtures("here")
+TEXT = "Papa, see Bob."
+
+
+@pytest.fixture(autouse=True)
+def stand_in(monkeypatch: pytest.MonkeyPatch) -> None:
+    stand_in_voice.install(monkeypatch)
+
+
+@pytest.fixture
+def basics(toy_model_file: Path) -> tuple[object, ...]:
+    return ("speak", TEXT, "--model", toy_model_file)
+
+
+def test_files(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:
+    names = ["a.mp4", "a.wav", "a.json", "a.csv"]
+    assert run(*basics, "--fps", "5", "--rate", "50", "-o", *names) == (0, names, [])
+    assert sorted(path.name for path in here.iterdir()) == sorted(names)
+    motion, units = read_motion(here / "a.json")
+    assert motion.rate_hz == 50
+    assert [span.label.phone for span in units][:3] == ["sil", "p", "aa"]
+
+
+def test_it_is_the_function_of_the_same_name(
+    run: RunCommand, basics: tuple[object, ...], toy_model_file: Path, here: Path
+) -> None:
+    run(*basics, "--voice", "one", "-o", "command.json", "command.wav")
+    model = load_model(toy_model_file)
+    sound, result = speak(TEXT, voice="stand-in:one", model=model)
+    write(result, ["function.json", "function.wav"], speech=sound, model=model)
+    for suffix in ("json", "wav"):
+        assert (here / f"command.{suffix}").read_bytes() == (here / f"function.{suffix}").read_bytes()
+
+
+def test_a_text_file(run: RunCommand, toy_model_file: Path, here: Path) -> None:
+    (here / "text.txt").write_text("\ufeff" + TEXT, encoding="utf-8")
+    assert run("speak", "--text", "text.txt", "--model", toy_model_file, "-o", "a.json").code == 0
+    words = [unit.get("word") for unit in json.loads((here / "a.json").read_text())["units"]]
+    assert list(dict.fromkeys(filter(None, words))) == ["papa", "see", "bob"]
+
+
+def test_for_programs(run: RunCommand, basics: tuple[object, ...]) -> None:
+    done = run(*basics, "-o", "a.wav", "--machine-readable")
+    start, success = map(json.loads, done.out)
+    assert (start["type"], success["type"], success["files"]) == ("start", "success", ["a.wav"])
+    assert success["seconds"] == pytest.approx(1.31, abs=0.02)
+
+
+def test_voices(run: RunCommand, monkeypatch: pytest.MonkeyPatch) -> None:
+    done = run("speak", "--voices")
+    assert [line.split() for line in done.out] == [["stand-in:one", "en-us"], ["stand-in:two", "en-us"]]
+    success = json.loads(run("speak", "--voices", "--machine-readable").out[-1])
+    assert success["voices"][0] == {"name": "stand-in:one", "language": "en-us"}
+    monkeypatch.setattr(installed, "SYNTHESISERS", {})
+    assert run("speak", "--voices") == (0, ["no voice is installed"], [])
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        (["speak", TEXT], "required: -o FILE, or --voices"),
+        (["speak", "--voices", "-o", "a.wav"], "required: -o FILE, or --voices"),
+        (["speak", "-o", "a.wav"], "required: a text, or --text FILE"),
+        (["speak", TEXT, "--text", "text.txt", "-o", "a.wav"], "required: a text, or --text FILE"),
+    ],
+)
+def test_wrong_command_lines(run: RunCommand, line: list[str], said: str) -> None:
+    done = run(*line)
+    assert (done.code, done.out) == (2, [])
+    assert said in done.err[-1]
+
+
+@pytest.mark.parametrize(
+    ("more", "code", "said"),
+    [
+        (["-o", "a.mp3"], 7, ".wav .flac .ogg"),
+        (["-o", "no/a.wav"], 7, "does not exist"),
+        (["-o", "a.wav", "./a.wav"], 7, "is given twice"),
+        (["-o", "a.wav", "--voice", "three"], 3, "no voice 'three' is installed; lipmotion speak --voices"),
+        (["-o", "a.wav", "--voice", "stand-out:one"], 3, "unknown synthesiser 'stand-out'"),
+        (["-o", "a.json", "--channels", "smile"], 3, "no motion channel 'smile'"),
+        (["-o", "a.json", "--speaker", "nobody"], 3, "no 'nobody'"),
+    ],
+)
+def test_errors(run: RunCommand, basics: tuple[object, ...], here: Path, more: list[str], code: int, said: str) -> None:
+    done = run(*basics, *more)
+    assert is_one_error(done, code)
+    assert said in done.err[0]
+    assert list(here.iterdir()) == []
+
+
+def test_without_a_synthesiser_it_says_what_to_install(
+    run: RunCommand, basics: tuple[object, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    only = installed.SYNTHESISERS["stand-in"]
+    monkeypatch.setattr(installed, "SYNTHESISERS", {"stand-in": replace(only, voices=tuple)})
+    done = run(*basics, "-o", "a.wav")
+    assert is_one_error(done, 8)
+    assert "pip install 'lipmotion[text]', or: apt install stand-in" in done.err[0]
+
+
+def test_an_output_never_replaces_the_model(run: RunCommand, basics: tuple[object, ...], toy_model_file: Path) -> None:
+    done = run(*basics, "-o", toy_model_file)
+    assert done.code == 7
+    assert toy_model_file.exists()

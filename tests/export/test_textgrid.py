@@ -1,0 +1,25 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+from lipmotion.corpora.labels import read_labels, read_phones
+from lipmotion.export.textgrid import write_textgrid
+from lipmotion.types import Span, Timeline, Unit
+
+WORDS = [(0.0, 0.31, "sil", ""), (0.31, 0.4, "m", "ma"), (0.4, 0.52, "aa", "ma"), (0.52, 0.7, "dh", 'a "the"')]
+
+
+def test_phones_and_words_are_read_back(tmp_path: Path) -> None:
+    units = Timeline(tuple(Span(a, b, Unit(phone, "", word)) for a, b, phone, word in WORDS))
+    write_textgrid(tmp_path / "a.TextGrid", units)
+    again = read_phones(tmp_path / "a.TextGrid")
+    assert [(s.start_s, s.end_s, s.label.phone) for s in again] == [row[:3] for row in WORDS]
+    assert read_labels(tmp_path / "a.TextGrid").words == ("ma", "a", "the")
+
+
+def test_gaps_become_intervals_without_text(tmp_path: Path) -> None:
+    units = Timeline((Span(0.1, 0.2, Unit("m")), Span(0.3, 0.4, Unit("aa"))))
+    write_textgrid(tmp_path / "a.TextGrid", units)
+    again = read_phones(tmp_path / "a.TextGrid")
+    assert [s.label.phone for s in again] == ["sil", "m", "sil", "aa"]
+    assert [s.end_s for s in again] == [0.1, 0.2, 0.3, 0.4]

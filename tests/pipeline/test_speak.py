@@ -1,0 +1,172 @@
+"""Text to sound and motion, with a stand-in for the synthesiser and with real ones where they are installed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lipmotion.errors import ExportError, InputError, MissingDependencyError
+from lipmotion.export.base import read_motion
+from lipmotion.pipeline import speak as module
+from lipmotion.pipeline.animate import write
+from lipmotion.pipeline.model import Model, load_model
+from lipmotion.pipeline.speak import REST_S, read_text, speak
+from lipmotion.speech.voices import installed
+from lipmotion.speech.voices.installed import default_voice, installed_voices
+from lipmotion.types import Constraints, Pin, Span, SpokenText, Unit
+from lipmotion.units import LIP_CLOSING, is_silent
+from speech import stand_in_voice
+
+TEXT = "Papa, see Bob. Mama!"
+
+
+@pytest.fixture
+def stand_in(monkeypatch: pytest.MonkeyPatch) -> None:
+    stand_in_voice.install(monkeypatch)
+
+
+@pytest.fixture
+def spoken(stand_in: None, toy_model: Model) -> SpokenText:  # noqa: ARG001
+    return speak(TEXT, model=toy_model)
+
+
+def phones(spoken: SpokenText) -> str:
+    return " ".join(span.label.phone for span in spoken.generation.units)
+
+
+def test_sound_and_motion_are_of_the_same_length(spoken: SpokenText) -> None:
+    sound, generation = spoken
+    assert sound.rate_hz == stand_in_voice.RATE_HZ
+    assert len(generation.motion.values) == round(sound.duration_s * 100) + 1
+    assert phones(spoken) == "sil p aa p ax s iy b aa b sp m aa m ax sil"
+    assert list(dict.fromkeys(span.label.word for span in generation.units)) == ["", "papa", "see", "bob", "mama"]
+    assert generation.outlook is not None
+    assert generation.outlook.words == "given units"
+
+
+def test_the_units_cover_all_with_rest_at_both_ends(spoken: SpokenText) -> None:
+    units = spoken.generation.units
+    assert units[0].start_s == 0
+    assert units[0].end_s == pytest.approx(REST_S, abs=1e-3)
+    assert units[-1].end_s == pytest.approx(spoken.sound.duration_s)
+    assert units[-1].duration_s == pytest.approx(REST_S, abs=1e-3)
+    assert all(a.end_s == b.start_s for a, b in pairwise(units))
+
+
+def test_the_sound_is_silent_where_the_units_are(spoken: SpokenText) -> None:
+    samples, rate_hz = spoken.sound.samples, spoken.sound.rate_hz
+    assert not samples[: round(0.1 * rate_hz)].any()
+    loud = {
+        span.label.phone: float(np.abs(samples[round(span.start_s * rate_hz) : round(span.end_s * rate_hz)]).max())
+        for span in spoken.generation.units
+    }
+    assert loud["aa"] > 5 * loud["sil"]
+
+
+def test_sentences_go_to_the_synthesiser_a_few_at_a_time(
+    stand_in: None,  # noqa: ARG001
+    toy_model: Model,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked: list[int] = []
+    real = installed.voiced_sentences
+
+    def count(texts, voice, lexicon):  # type: ignore[no-untyped-def]
+        asked.append(len(texts))
+        return real(texts, voice, lexicon)
+
+    monkeypatch.setattr(module, "voiced_sentences", count)
+    monkeypatch.setattr(module, "AT_ONCE", 2)
+    together = speak("See Bob. Mama. Papa. See. Bob.", model=toy_model)
+    assert asked == [2, 2, 1]
+    monkeypatch.setattr(module, "AT_ONCE", 20)
+    again = speak("See Bob. Mama. Papa. See. Bob.", model=toy_model)
+    assert np.array_equal(together.sound.samples, again.sound.samples)
+    assert np.array_equal(together.generation.motion.values, again.generation.motion.values)
+
+
+def test_pins_hold(stand_in: None, toy_model: Model) -> None:  # noqa: ARG001
+    told = Constraints((Pin(0.5, "opening", 0.07),))
+    result = speak(TEXT, model=toy_model, constraints=told).generation
+    assert result.motion["opening"][50] == pytest.approx(0.07)
+
+
+def test_voices_differ(spoken: SpokenText, toy_model: Model) -> None:
+    other = speak(TEXT, model=toy_model, voice="one")
+    assert len(other.sound.samples) == len(spoken.sound.samples)
+    assert np.array_equal(spoken.sound.samples, speak(TEXT, model=toy_model, voice="stand-in:two").sound.samples)
+
+
+def test_files(spoken: SpokenText, toy_model: Model, tmp_path: Path) -> None:
+    names = ["a.mp4", "a.wav", "a.flac", "a.ogg", "a.json"]
+    write(spoken.generation, [tmp_path / name for name in names], speech=spoken.sound, model=toy_model, fps=5)
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(names)
+    assert len(read_motion(tmp_path / "a.json")[1]) == len(spoken.generation.units)
+
+
+def test_a_recording_is_not_written_as_sound(spoken: SpokenText, toy_speech: Path, tmp_path: Path) -> None:
+    with pytest.raises(ExportError, match=r"unknown format '.wav'; required one of: (?!.* \.wav)"):
+        write(spoken.generation, tmp_path / "a.wav", speech=toy_speech)
+    with pytest.raises(ExportError, match="a video needs the recording"):
+        write(spoken.generation, tmp_path / "a.mp4")
+
+
+@pytest.mark.parametrize(
+    ("text", "more", "message"),
+    [
+        ("...", {}, "holds no word"),
+        (TEXT, {"voice": "three"}, "no voice 'three' is installed; lipmotion speak --voices lists"),
+        (TEXT, {"speaker": "nobody"}, "no 'nobody'"),
+    ],
+)
+def test_what_cannot_be_said(stand_in: None, toy_model: Model, text: str, more: dict[str, str], message: str) -> None:  # noqa: ARG001
+    with pytest.raises(InputError, match=message):
+        speak(text, model=toy_model, **more)
+
+
+def test_without_a_synthesiser(toy_model: Model, monkeypatch: pytest.MonkeyPatch) -> None:
+    nothing = {name: replace(each, voices=tuple, others=tuple) for name, each in installed.SYNTHESISERS.items()}
+    monkeypatch.setattr(installed, "SYNTHESISERS", nothing)
+    with pytest.raises(MissingDependencyError, match=r"pip install 'lipmotion\[text\]', or: apt install flite"):
+        speak(TEXT, model=toy_model)
+
+
+def test_a_text_file(tmp_path: Path) -> None:
+    (tmp_path / "text.txt").write_text("\ufeffHellö", encoding="utf-8")
+    assert read_text(tmp_path / "text.txt") == "Hellö"
+
+
+def test_neighbouring_silences_are_one_and_short_ones_are_pauses() -> None:
+    spans = [
+        Span(0.3, 0.5, Unit("aa")),
+        Span(0.5, 0.6, Unit("sil")),
+        Span(0.6, 0.65, Unit("sil")),
+        Span(0.65, 0.8, Unit("p")),
+        Span(0.8, 1.0, Unit("sil")),
+        Span(1.05, 1.2, Unit("p")),
+    ]
+    joined = [(span.label.phone, span.start_s, span.end_s) for span in module._joined(spans, 1.5)]
+    assert joined == [
+        ("sil", 0.0, 0.3),
+        ("aa", 0.3, 0.5),
+        ("sp", 0.5, 0.65),
+        ("p", 0.65, 0.8),
+        ("sil", 0.8, 1.05),
+        ("p", 1.05, 1.2),
+        ("sil", 1.2, 1.5),
+    ]
+
+
+@pytest.mark.skipif(not installed_voices(), reason="no synthesiser is installed")
+def test_a_real_voice_closes_the_lips_in_time() -> None:
+    spoken = speak("Please bring my mother the blue ball.", voice=default_voice(), model=load_model())
+    opening = spoken.generation.motion["opening"]
+    closing = [span for span in spoken.generation.units if span.label.phone in LIP_CLOSING]
+    assert [span.label.word for span in closing] == ["please", "bring", "my", "mother", "blue", "ball"]
+    for span in closing:
+        assert opening[round(span.start_s * 100) : round(span.end_s * 100) + 1].min() < 0.1 * np.percentile(opening, 95)
+    assert is_silent(spoken.generation.units[0].label.phone)

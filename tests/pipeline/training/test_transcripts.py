@@ -1,0 +1,94 @@
+from __future__ import annotations
+
+import logging
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from lipmotion.corpora.store import Corpus
+from lipmotion.errors import MissingDependencyError
+from lipmotion.hmm.model import HmmConfig
+from lipmotion.pipeline.training import transcripts as module
+from lipmotion.pipeline.training.train import train
+from lipmotion.pipeline.training.transcripts import (
+    MOST_NAMED,
+    warn_of_doubtful_transcripts,
+    warn_of_missing_transcripts,
+)
+from lipmotion.testing.toy import toy_sentences, toy_utterances
+from lipmotion.types import Timeline, Unit, Utterance
+
+SMALL = HmmConfig(mixtures=1, iterations=2)
+Labelled = list[tuple[Utterance, Timeline[Unit]]]
+
+
+@pytest.fixture
+def labelled() -> Labelled:
+    """Utterances whose transcripts are right, with their phones in time."""
+    sentences = toy_sentences(12)[:3]
+    return [(utterance, said.units) for utterance, said in zip(toy_utterances(12), sentences, strict=False)]
+
+
+def messages(caplog: pytest.LogCaptureFixture) -> list[str]:
+    assert all(record.levelno == logging.WARNING for record in caplog.records)
+    return [record.getMessage() for record in caplog.records]
+
+
+def test_training_names_the_transcripts_of_something_else_and_what_has_none(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    corpus = Corpus.create(tmp_path / "corpus")
+    changed = {2: ("squash", "six", "fish", "chefs"), 4: None, 5: ()}
+    for number, utterance in enumerate(toy_utterances(12)):
+        corpus.add(replace(utterance, words=changed.get(number, utterance.words), phones=None))
+    train(corpus, recogniser=SMALL)
+    missing, wrong = (text for text in messages(caplog) if "transcript" in text)
+    assert missing.startswith("2 of 8 recordings have no transcript, or an empty one (toy04, toy05): their phones are")
+    assert wrong.startswith("1 of 6 transcripts seem not to be what is said (toy02): the model learns wrong lips")
+
+
+def test_right_transcripts_are_not_named(labelled: Labelled, caplog: pytest.LogCaptureFixture) -> None:
+    warn_of_doubtful_transcripts(labelled)
+    warn_of_missing_transcripts([utterance for utterance, _ in labelled])
+    assert not caplog.records
+
+
+def test_words_that_are_left_out(labelled: Labelled, caplog: pytest.LogCaptureFixture) -> None:
+    """Half of the sentence stands as silence."""
+    utterance, units = labelled[0]
+    spans = list(units)
+    half = [replace(span, label=Unit("sil")) if number > 2 else span for number, span in enumerate(spans)]
+    merged = [*half[:3], replace(half[3], end_s=half[-1].end_s)]
+    warn_of_doubtful_transcripts([(utterance, Timeline(tuple(merged)))])
+    assert [text[:62] for text in messages(caplog)] == [
+        "1 of 1 transcripts seem to leave out words that are said (toy0"
+    ]
+
+
+def test_labelled_phones_are_believed(labelled: Labelled, caplog: pytest.LogCaptureFixture) -> None:
+    (utterance, units), (_, others) = labelled[:2]
+    warn_of_doubtful_transcripts([(replace(utterance, phones=units), others)])
+    assert not caplog.records
+
+
+def test_without_general_models_nothing_is_measured(
+    labelled: Labelled, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def missing(*_: object) -> None:
+        raise MissingDependencyError("no pocketsphinx")
+
+    monkeypatch.setattr(module, "transcript_fit", missing)
+    warn_of_doubtful_transcripts([(labelled[0][0], labelled[1][1])])
+    assert not caplog.records
+
+
+def test_only_some_are_named(labelled: Labelled, caplog: pytest.LogCaptureFixture) -> None:
+    named = labelled[0][0]
+    many = [replace(named, name=f"take{number:02d}", words=None, phones=None) for number in range(MOST_NAMED + 4)]
+    warn_of_missing_transcripts([named, *many])
+    (text,) = messages(caplog)
+    assert "14 of 15 recordings" in text
+    assert "take09 and 4 more)" in text
+    warn_of_missing_transcripts(many)  # that none has words is said elsewhere
+    assert len(caplog.records) == 1

@@ -1,0 +1,43 @@
+"""A synthesiser for machines without any: the project's own, saying words as the dictionary has them."""
+
+from __future__ import annotations
+
+import wave
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lipmotion.speech.audio_files import read_audio
+from lipmotion.speech.formant_synthesiser import synthesise
+from lipmotion.speech.voices import installed
+from lipmotion.speech.voices.phone_maps import ARPABET_PHONES
+from lipmotion.speech.voices.synthesiser import SynthesisedSentence, Synthesiser, SyntheticVoice
+from lipmotion.types import Span, Timeline
+from lipmotion.units import Lexicon, words_of
+
+RATE_HZ, EACH_S = 22_050, 0.09
+VOICES = (SyntheticVoice("one", "stand-in", "nobody"), SyntheticVoice("two", "stand-in", "nobody"))
+
+
+def say(voice: str, texts: Sequence[str], folder: Path) -> Iterator[SynthesisedSentence]:
+    """Yield texts, every phone of the same length, between short pauses."""
+    path = folder / "said.wav"
+    for text in texts:
+        lexicon = Lexicon()
+        words = [phone for word in words_of(text) for phone in lexicon.pronunciations(word)[0]]
+        labels = ["sil", *words, "sil"]
+        audio, timeline = synthesise([(label, EACH_S) for label in labels], rate_hz=RATE_HZ, seed=len(voice))
+        with wave.open(str(path), "wb") as file:
+            file.setparams((1, 2, RATE_HZ, 0, "NONE", ""))
+            file.writeframes(np.round(np.clip(audio.samples, -1, 1) * 32_767).astype("<i2").tobytes())
+        spans = tuple(Span(span.start_s, span.end_s, span.label.phone) for span in timeline)
+        yield SynthesisedSentence(read_audio(path), Timeline(spans), path)
+
+
+def install(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Make it the only synthesiser."""
+    only = Synthesiser("stand-in", "stand-in", lambda: VOICES, say, ARPABET_PHONES)
+    monkeypatch.setattr(installed, "SYNTHESISERS", {"stand-in": only})
+    monkeypatch.setattr(installed, "DEFAULT_VOICES", (("stand-in", "two"),))

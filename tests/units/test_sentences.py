@@ -1,0 +1,72 @@
+"""Text to sentences that a synthesiser can say."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lipmotion.errors import InputError
+from lipmotion.units.sentences import LONGEST_SENTENCE, LONGEST_WORD, MOST_CHARACTERS, clean_text, sentences_of
+from lipmotion.units.transcript import words_in
+
+
+@pytest.mark.parametrize(
+    ("text", "sentences"),
+    [
+        ("One. Two! Three? Four", ["One.", "Two!", "Three?", "Four"]),
+        ("Dr. Smith, e.g. J. Smith, came at 3 p.m. today.", ["Dr. Smith, e.g. J. Smith, came at 3 p.m. today."]),
+        ("It was I. Then he left.", ["It was I.", "Then he left."]),
+        ('He said "stop." Then (he) left.', ['He said "stop."', "Then (he) left."]),
+        ("3.5 per cent of a.b", ["3.5 per cent of a.b"]),
+        ("A title\n\nA text\nthat goes on", ["A title.", "A text that goes on"]),
+        ("One. ... !? Two.", ["One.", "Two."]),
+        ("你好。再见。", ["你好。", "再见。"]),
+        ("Wait... what?", ["Wait...", "what?"]),
+        ("a\x00b\x1b[31m c\ud800d\u2028e", ["a b [31m c d e"]),
+    ],
+)
+def test_sentences(text: str, sentences: list[str]) -> None:
+    assert sentences_of(text) == sentences
+
+
+def test_a_long_sentence_is_divided_at_a_comma_else_between_words() -> None:
+    clause = "a b c d e f g h " * 15
+    first, second = sentences_of(f"{clause}, {clause}.")
+    assert first.endswith("h ,")
+    assert second.endswith("h .")
+    parts = sentences_of("word " * 200)
+    assert max(map(len, parts)) <= LONGEST_SENTENCE
+    assert " ".join(parts) == ("word " * 200).strip()
+
+
+def test_scripts_without_blanks_are_cut() -> None:
+    parts = sentences_of("好" * 900)
+    assert [len(part) for part in parts] == [400, 400, 100]
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.text(max_size=300))
+def test_no_word_is_lost_or_made(text: str) -> None:
+    words = words_in(clean_text(text))
+    if words:
+        parts = sentences_of(text)
+        assert tuple(word for part in parts for word in words_in(part)) == words
+    else:
+        with pytest.raises(InputError, match="holds no word"):
+            sentences_of(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "'' holds no word; give the words to be spoken"),
+        (" \t\n", "holds no word"),
+        ("... 🙂 !", "holds no word"),
+        ("x" * (LONGEST_WORD + 1), "a word of 201 characters .*required at most 200"),
+        ("a " * MOST_CHARACTERS, "has 100000 characters, required at most 50000, about an hour of speech"),
+    ],
+)
+def test_what_cannot_be_said(text: str, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        sentences_of(text)
