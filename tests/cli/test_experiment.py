@@ -9,6 +9,7 @@ import pytest
 from cli.conftest import RunCommand, is_one_error
 from lipmotion.corpora.store import Corpus
 from lipmotion.experiments import comparison, folds, learning_curve
+from lipmotion.experiments.engines import disagreement, text
 from lipmotion.experiments.hofer2008 import unit_sets
 from lipmotion.experiments.xie_liu2007 import table3_text
 from lipmotion.measures.bootstrap import bootstrap_interval
@@ -18,7 +19,7 @@ from lipmotion.pipeline.evaluation import figures as evaluation_figures
 @pytest.fixture(autouse=True)
 def few_draws(monkeypatch: pytest.MonkeyPatch) -> None:
     """Few draws of the bootstrap intervals, and only three of the paper's unit sets."""
-    for module in (comparison, evaluation_figures):
+    for module in (comparison, evaluation_figures, disagreement):
         monkeypatch.setattr(module, "bootstrap_interval", partial(bootstrap_interval, draws=20))
     monkeypatch.setattr(
         unit_sets, "PAPER_SCORES", {name: unit_sets.PAPER_SCORES[name] for name in ("2vis", "pbVis", "phone")}
@@ -83,7 +84,23 @@ def test_table3_of_some_systems(run: RunCommand, toy_corpus: Corpus, here: Path)
     assert len(list((here / "pictures").iterdir())) == 3
 
 
+@pytest.mark.long
+def test_all_engines(run: RunCommand, toy_corpus: Corpus, here: Path) -> None:
+    chosen = ("--split", "test", "--models", "models", "-o", "a.json", "--workers", "1")
+    done = run("experiment", "engines", toy_corpus.path, *chosen)
+    assert (done.code, done.err) == (0, [])
+    figures = json.loads((here / "a.json").read_text())
+    assert "\n".join(done.out) == text.table(figures)
+    assert (figures["split"], figures["clips"]) == ("test", 2)
+    kept = sorted(path.name for path in (here / "models").iterdir())
+    assert kept == ["coupled.lipmotion", "selection.lipmotion", "trajectory.lipmotion"]
+    assert run("experiment", "engines", toy_corpus.path, *chosen).out == done.out
+    (here / "models" / "coupled.lipmotion").write_bytes(b"no model")
+    assert is_one_error(run("experiment", "engines", toy_corpus.path, *chosen), 6)
+
+
 LEARNING_CURVE, FOLDS, TABLE3 = "learning-curve CORPUS", "folds CORPUS", "table3 CORPUS"
+ENGINES = "engines CORPUS"
 
 
 @pytest.mark.parametrize(
@@ -102,6 +119,9 @@ LEARNING_CURVE, FOLDS, TABLE3 = "learning-curve CORPUS", "folds CORPUS", "table3
         (f"{TABLE3} --noise babble", 3, "a babble of 0 talkers; required at least 2: --talkers"),
         (f"{TABLE3} --talkers missing", 3, "missing: no such folder; give one with recordings of other people"),
         (f"{TABLE3} --plots missing/a", 7, "the folder missing does not exist"),
+        (f"{ENGINES} --split train", 4, "are in the split that is compared with"),
+        (f"{ENGINES} --models CORPUS", 7, "is the corpus itself; give another name"),
+        (f"{ENGINES} --models empty.txt", 7, "empty.txt: cannot be a folder for models: File exists"),
         ("folds missing", 4, "missing: no such corpus; make one"),
     ],
 )

@@ -19,6 +19,7 @@ from lipmotion.engines.selection.search import select
 from lipmotion.engines.selection.sources import source_pieces, typical_duration_s, with_sources
 from lipmotion.engines.selection.targets import target_of
 from lipmotion.engines.selection.train import fit_selection
+from lipmotion.errors import InputError
 from lipmotion.motion.generation import Statistics
 from lipmotion.motion.predictors import LEAST_NETWORK_S
 from lipmotion.motion.prior_regression import PriorRegression
@@ -83,8 +84,36 @@ class SelectionEngine(Engine[SelectionModel]):
 
     def generate(self, model: SelectionModel, speech: Speech, constraints: Constraints | None = None) -> Generation:  # noqa: D102
         costs = model.costs(self.config)
+        return self._generated(model, costs, target_of(model, costs, speech), speech, constraints)
+
+    def generate_guided(
+        self, model: SelectionModel, speech: Speech, guide: Array, constraints: Constraints | None = None
+    ) -> Generation:
+        """Return the motion of one recording, as ``generate``, from units that resemble somebody else's motion of it.
+
+        guide       : motion in the model's motion space, as wide as recorded motion [shape=(T, Q)]; it takes the place
+                      of what the model's own guide predicts. How far it counts for a unit still depends on how much
+                      the sounds differ for the own guide (option ``trust``).
+        constraints : values that the motion must take
+        Raises InputError: as ``generate``; a guide of another shape; or a model or speech without a guide of its own.
+        """
+        wanted = len(speech.features.values), model.motion.space.dimensions
+        if guide.shape != wanted:
+            raise InputError(f"a guide of shape {guide.shape}, required {wanted}: frames, dimensions of the motion")
+        costs = model.costs(self.config)
+        target = target_of(model, costs, speech, guide)
+        if target.guided is None:
+            raise InputError(
+                "the model of recorded units does not compare motion; train one with the option guide more than 0, "
+                "and give speech with its spectrum"
+            )
+        return self._generated(model, costs, target, speech, constraints)
+
+    def _generated(
+        self, model: SelectionModel, costs: Costs, target: Target, speech: Speech, constraints: Constraints | None
+    ) -> Generation:
+        """Return the motion of the units that are selected for a target."""
         frames = len(speech.features.values)
-        target = target_of(model, costs, speech)
         given = _given(model, target, speech.units)
         units = select(costs, target, given=given).units
         track = concatenated(model.inventory, target, pieces_of(costs, target, units), frames)

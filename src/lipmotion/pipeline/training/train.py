@@ -180,7 +180,7 @@ def train(
     if not (isinstance(engine, StandsOnPrior) and engine.stands_on_prior(fit.model)):
         prior = None
     used = tuple(example.name for example in examples)
-    about = _about(
+    about = about_training(
         corpus, utterances, "given names" if selection.names is not None else selection.split or "all", len(used)
     )
     if selection.speakers and selection.names is None:
@@ -367,8 +367,13 @@ def _examples(
     return examples, skipped
 
 
-def _about(corpus: Corpus, utterances: Sequence[Utterance], split: str, used: int) -> dict[str, Any]:
-    """Return the part of the header of a model that is for users: corpus, licence, attribution, versions."""
+def about_training(corpus: Corpus, utterances: Sequence[Utterance], split: str, used: int) -> dict[str, Any]:
+    """Return the part of the header of a model that is for users: corpus, licence, attribution, versions.
+
+    utterances : all that the training was given
+    split      : name of their list, ``all``, or ``given names``
+    used       : how many of them could be used
+    """
     sources = [utterance.source for utterance in utterances]
     minutes = sum(utterance.audio.duration_s for utterance in utterances) / 60
     return {
