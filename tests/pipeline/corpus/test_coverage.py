@@ -15,7 +15,7 @@ from lipmotion.errors import CorpusError, InputError
 from lipmotion.pipeline.corpus.coverage import coverage, coverage_document, coverage_lines, phone_distances
 from lipmotion.testing.toy import toy_utterances
 from lipmotion.types import Span, Timeline, Unit
-from lipmotion.units import PHONES, VISEME_OF, Lexicon, most_similar_phone
+from lipmotion.units import PHONES, VISEME_OF, Lexicon, most_similar_lips
 
 WORDS = Lexicon({"pab": (("p", "aa", "b"),), "tib": (("t", "iy", "b"),), "zog": (("zh", "oy", "g"),)})
 
@@ -56,7 +56,7 @@ def test_what_stands_in(tmp_path: Path) -> None:
     phones, diphones, triphones = coverage(corpus, text_of(tmp_path / "text", "bad dib"), lexicon=lexicon).kinds
     stand_ins = {unit.unit: (unit.stand_in, unit.recorded) for unit in phones.missing}
     assert stand_ins["d"] == ("t", 1)
-    assert stand_ins["m"][0] == most_similar_phone("m", {"p", "aa", "b", "t", "iy"})
+    assert stand_ins["m"][0] == most_similar_lips("m", {"p", "aa", "b", "t", "iy"}) == "p"
     nearest = {unit.unit: (unit.stand_in, unit.recorded) for unit in diphones.missing}
     assert nearest["sil-b"] == ("sil-p", 1)
     assert nearest["b-aa"] == ("p-aa", 2)
