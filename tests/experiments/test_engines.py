@@ -184,7 +184,7 @@ def test_its_own_guide_given_is_its_own_motion(hybrid: tuple[Hybrid, HybridModel
     engine, model = hybrid
     guide = model.selecting.guide
     assert guide is not None
-    own = guide.expanded(guide.predict(SPOKEN))
+    own = guide.expanded(guide.predict(SPOKEN)[0])
     wanted = engine.selecting.generate(model.selecting, SPOKEN).motion.values
     given = engine.selecting.generate_guided(model.selecting, SPOKEN, own).motion.values
     assert np.abs(given - wanted).max() < 1e-9
