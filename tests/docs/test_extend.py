@@ -89,7 +89,7 @@ def test_an_installed_engine_trains_saves_loads_and_animates(
         check=False,
     )
     assert missing.returncode == 6
-    assert "no engine 'ridge'; there are: trajectory, coupled, joint; install the package" in missing.stderr
+    assert "no engine 'ridge'; there are: trajectory, coupled, joint, selection; install the package" in missing.stderr
 
 
 @pytest.mark.long
