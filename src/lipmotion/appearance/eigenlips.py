@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError, ModelFormatError
+from lipmotion.errors import InputError
 from lipmotion.stats.pca import check_orthonormal, fit_pca
-from lipmotion.storage.schema import Arrays, ArraySpec, checked_arrays, refuse_undeclared
+from lipmotion.storage.schema import Arrays, ArraySpec, checked_arrays, format_errors, refuse_undeclared
 from lipmotion.types import GREY, Channel
 
 COLOURS = "rgb"
@@ -109,15 +109,13 @@ def eigenlips_arrays(eigenlips: Eigenlips) -> dict[str, NDArray[Any]]:
 
 def eigenlips_from_arrays(arrays: Arrays) -> Eigenlips:
     """Deserialise eigenlips. Raises ModelFormatError: an array is missing, or they do not fit together."""
-    try:
+    with format_errors("the eigenlips", "train the model again", verb="are"):
         refuse_undeclared(arrays, SIZE, SPACES)
         height, width = checked_arrays(arrays, SIZE)["size"].tolist()
         spaces = checked_arrays(arrays, SPACES, D=height * width)
         for basis in spaces["basis"]:
             check_orthonormal("basis", basis)
         return Eigenlips(spaces["mean"], spaces["basis"], spaces["explained"], (height, width))
-    except (KeyError, ValueError, TypeError, IndexError) as error:
-        raise ModelFormatError(f"the eigenlips are damaged ({error}); train the model again") from error
 
 
 SIZE = {"size": ArraySpec(np.intp, "2", 1, 10_000)}

@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import ModelFormatError
 from lipmotion.hmm.states import StateTable, plain_states
 from lipmotion.stats.bigram import BIGRAM, Bigram, bigram_from_array
 from lipmotion.stats.mixture import MIXTURES, Mixtures, mixtures_from_arrays
-from lipmotion.storage.schema import NEGATIVE, Arrays, ArraySpec, checked_arrays, refuse_undeclared
+from lipmotion.storage.schema import NEGATIVE, Arrays, ArraySpec, checked_arrays, format_errors, refuse_undeclared
 from lipmotion.types import Configuration
 
 
@@ -89,7 +88,7 @@ def hmm_arrays(hmm: UnitHmm, precision: type[np.floating[Any]] = np.float16) -> 
 
 def hmm_from_arrays(arrays: Arrays, config: HmmConfig) -> UnitHmm:
     """Deserialise models. Raises ModelFormatError: an array is missing, undeclared, inconsistent or out of range."""
-    try:
+    with format_errors("the phone models", "train or download the model again", verb="are"):
         refuse_undeclared(arrays, NAMES, MODELS)
         named = checked_arrays(arrays, NAMES)
         units, counts, names, free = (tuple(named[key].tolist()) for key in ("units", "counts", "names", "free"))
@@ -100,8 +99,6 @@ def hmm_from_arrays(arrays: Arrays, config: HmmConfig) -> UnitHmm:
         return UnitHmm(
             config, table, mixtures_from_arrays(stored), stored["log_stay"], bigram, float(stored["typical_fit"][0])
         )
-    except (KeyError, ValueError, TypeError, IndexError, OverflowError) as error:
-        raise ModelFormatError(f"the phone models are damaged ({error}); train or download the model again") from error
 
 
 NAMES = {

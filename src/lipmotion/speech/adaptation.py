@@ -8,12 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import ModelFormatError
 from lipmotion.speech.analysed_audio import AnalysedAudio
 from lipmotion.speech.general.acoustic import STREAMS
 from lipmotion.speech.mfcc import FEATURES
 from lipmotion.stats.affine import identity, transformed
-from lipmotion.storage.schema import STANDARD, Arrays, ArraySpec, checked_arrays, refuse_undeclared
+from lipmotion.storage.schema import STANDARD, Arrays, ArraySpec, checked_arrays, format_errors, refuse_undeclared
 
 LARGEST_WARP = 2.0
 """Frequencies are not stretched by more, nor by less than its inverse."""
@@ -60,15 +59,13 @@ def adaptation_arrays(adaptation: Adaptation) -> dict[str, NDArray[Any]]:
 
 def adaptation_from_arrays(arrays: Arrays) -> Adaptation:
     """Deserialise an adaptation. Raises ModelFormatError: an array is missing, or cannot be a transform."""
-    try:
+    with format_errors("the adaptation", "adapt the model again"):
         refuse_undeclared(arrays, ADAPTATION_ARRAYS)
         checked = checked_arrays(arrays, ADAPTATION_ARRAYS)
         warp, own_weight = checked["numbers"].tolist()
         if not 1 / LARGEST_WARP <= warp <= LARGEST_WARP or not 0 <= own_weight <= 1:
             raise ValueError(f"a warp of {warp} and a weight of the own models of {own_weight}")
         return Adaptation(warp, own_weight, checked["own"], checked["general"])
-    except (KeyError, ValueError, TypeError) as error:
-        raise ModelFormatError(f"the adaptation is damaged ({error}); adapt the model again") from error
 
 
 ADAPTATION_ARRAYS = {

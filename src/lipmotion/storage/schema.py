@@ -70,15 +70,16 @@ class CheckedArrays:
 
 
 @contextmanager
-def format_errors(what: str, remedy: str = "train or download it again") -> Iterator[None]:
+def format_errors(what: str, remedy: str = "train or download it again", *, verb: str = "is") -> Iterator[None]:
     """Turn the errors of damaged arrays that are raised inside into a ModelFormatError.
 
     what, remedy : what is damaged, as ``the joint model``, and what its user can do
+    verb : ``are`` where ``what`` is a plural
     """
     try:
         yield
-    except (KeyError, ValueError, IndexError, TypeError) as error:
-        raise ModelFormatError(f"{what} is damaged ({error}); {remedy}") from error
+    except (KeyError, ValueError, IndexError, TypeError, OverflowError) as error:
+        raise ModelFormatError(f"{what} {verb} damaged ({error}); {remedy}") from error
 
 
 def checked_arrays(arrays: Arrays, table: Mapping[str, ArraySpec], **sizes: int) -> CheckedArrays:

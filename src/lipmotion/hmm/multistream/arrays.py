@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import ModelFormatError
 from lipmotion.hmm.multistream.densities import LEAST_SCALE, StreamScale, TiedDensities
 from lipmotion.hmm.multistream.forest import Forest
 from lipmotion.hmm.multistream.inventory import Inventory
@@ -24,6 +23,7 @@ from lipmotion.storage.schema import (
     ArraySpec,
     arrays_under,
     checked_arrays,
+    format_errors,
     refuse_undeclared,
 )
 
@@ -59,7 +59,7 @@ def joint_arrays(hmm: JointHmm, precision: type[np.floating[Any]] = np.float16) 
 
 def joint_from_arrays(arrays: Arrays, config: JointConfig) -> JointHmm:
     """Deserialise a model. Raises ModelFormatError: an array is missing, undeclared, inconsistent or out of range."""
-    try:
+    with format_errors("the joint model"):
         named = checked_arrays(arrays, NAMES)
         units, free, streams = (tuple(named[key].tolist()) for key in ("units", "free", "streams"))
         refuse_undeclared(
@@ -77,8 +77,6 @@ def joint_from_arrays(arrays: Arrays, config: JointConfig) -> JointHmm:
         models = {name: _stream_model(name, arrays_under(arrays, f"{name}/"), inventory) for name in streams}
         bigram = bigram_from_array(units, stored["bigram"])
         return JointHmm(config, inventory, models, stored["log_stay"], stored["durations"], spoken, bigram)
-    except (KeyError, ValueError, TypeError, IndexError, OverflowError) as error:
-        raise ModelFormatError(f"the joint model is damaged ({error}); train or download it again") from error
 
 
 NAMES = {
