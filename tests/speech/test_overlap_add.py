@@ -38,6 +38,20 @@ def test_a_tone_goes_on_in_phase(phase: float) -> None:
     assert abs(len(joined.samples) - 8000) <= REACH_S * RATE_HZ + 1
 
 
+def test_a_shifted_piece_says_so() -> None:
+    marked = tone(100, 0.5, np.pi / 2)
+    joined = overlapped([tone(100, 0.5), marked], [(0.0, 0.2), (0.25, 0.5)], RATE_HZ)
+    begins = 0.25 + joined.shifts[1] / RATE_HZ
+    place = joined.starts[1] + round((0.4 - begins) * RATE_HZ)
+    np.testing.assert_allclose(joined.samples[place : place + 200], marked[6400:6600], atol=1e-5)
+    assert joined.shifts[1] != 0
+
+
+def test_a_short_first_piece_makes_no_click() -> None:
+    joined = overlapped([np.ones(8000, np.float32)] * 2, [(0.1, 0.101), (0.2, 0.4)], RATE_HZ)
+    np.testing.assert_allclose(joined.samples, 1, atol=1e-6)
+
+
 def test_pieces_at_the_edges_of_a_recording_are_filled_with_silence() -> None:
     joined = overlapped([tone(100, 0.1), tone(100, 0.1)], [(-0.05, 0.15), (0.0, 0.2)], RATE_HZ)
     assert not joined.samples[: int(0.04 * RATE_HZ)].any()

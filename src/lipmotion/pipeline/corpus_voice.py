@@ -14,7 +14,7 @@ from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.animate import animate
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import SpeechRequest
-from lipmotion.speech.overlap_add import overlapped
+from lipmotion.speech.overlap_add import JoinedPieces, overlapped
 from lipmotion.types import Audio, Constraints, Span, SpokenText, Timeline, Unit
 from lipmotion.units import SILENCE, Lexicon, words_of
 from lipmotion.units.sentences import sentences_of
@@ -47,7 +47,8 @@ def speak_from_corpus(
     The sound is not changed but at the joins, where successive pieces are shifted by up to 8 ms to fit and overlap: how
     fast and how high words are spoken is what was recorded. Phones that were never recorded are replaced by similar
     ones.
-    Raises InputError: another engine, another corpus, a text without words, or a word that nobody can pronounce.
+    Raises InputError: another engine, another corpus, recordings of several people, a text without words, or a word
+    that nobody can pronounce.
     Source: Minnis & Breen 2000, §2 and §3.
     """
     engine = model.engine
@@ -64,12 +65,18 @@ def speak_from_corpus(
         )
     target = _target(text, lexicon or Lexicon(), engine, model)
     utterances = {name: corpus.utterance(name) for name in names}
+    people = sorted({utterance.speaker for utterance in utterances.values()})
+    if len(people) > 1:
+        raise InputError(
+            f"the model has recordings of {len(people)} people ({', '.join(people)}), whose voices cannot be joined; "
+            "train one on the recordings of a single person"
+        )
     heard = {name: np.asarray(utterance.features.values)[:, :FEATURES] for name, utterance in utterances.items()}
     pieces, units = engine.source_pieces(model.learned, target, heard)
     sounds = [np.asarray(utterances[piece.recording].audio.samples) for piece in pieces]
     rate_hz = utterances[names[0]].audio.rate_hz
     joined = overlapped(sounds, [(piece.start_s, piece.end_s) for piece in pieces], rate_hz)
-    begin_s = _begin_s(len(units), pieces, joined.starts, len(joined.samples) / rate_hz, rate_hz)
+    begin_s = _begin_s(len(units), pieces, joined, rate_hz)
     first, last = (round(begin_s[number] * rate_hz) for number in (0, -1))
     audio = Audio(joined.samples[first:last], rate_hz)
     edges_s = np.clip(begin_s - begin_s[0], 0, audio.duration_s).tolist()
@@ -97,19 +104,18 @@ def _target(text: str, lexicon: Lexicon, engine: SelectsRecordings, model: Model
     return Timeline(tuple(spans))
 
 
-def _begin_s(
-    count: int, pieces: Sequence[SourcePiece], starts: Sequence[int], duration_s: float, rate_hz: int
-) -> NDArray[np.float64]:
+def _begin_s(count: int, pieces: Sequence[SourcePiece], joined: JoinedPieces, rate_hz: int) -> NDArray[np.float64]:
     """Return when each of some phones begins in the joined sound, and when the last one ends [shape=(count + 1,)].
 
     Of the silences at both ends, ``REST_S`` are kept.
     """
+    duration_s = len(joined.samples) / rate_hz
     begin_s = np.full(count + 1, np.nan)
     begin_s[0], begin_s[-1] = 0.0, duration_s
-    for piece, start in zip(pieces, starts, strict=True):
+    for piece, start, shift in zip(pieces, joined.starts, joined.shifts, strict=True):
         for number, time_s in piece.phones_s.items():
             if number:
-                begin_s[number] = start / rate_hz + (time_s - piece.start_s)
+                begin_s[number] = (start - shift) / rate_hz + (time_s - piece.start_s)
     known = np.isfinite(begin_s)
     begin_s = np.maximum.accumulate(np.interp(np.arange(count + 1), np.flatnonzero(known), begin_s[known]))
     begin_s = np.minimum(begin_s, duration_s)

@@ -26,10 +26,12 @@ class JoinedPieces(NamedTuple):
 
     samples : the sound [shape=(N,)]
     starts  : the number of the sample at which each piece begins, in the middle of its overlap with the one before
+    shifts  : by how many samples later than wanted it begins in its recording
     """
 
     samples: Samples
     starts: list[int]
+    shifts: list[int]
 
 
 def overlapped(sounds: Sequence[Samples], pieces_s: Sequence[tuple[float, float]], rate_hz: int) -> JoinedPieces:
@@ -40,23 +42,26 @@ def overlapped(sounds: Sequence[Samples], pieces_s: Sequence[tuple[float, float]
     rate_hz  : sampling rate of all recordings
     """
     half, reach = round(OVERLAP_S * rate_hz / 2), round(REACH_S * rate_hz)
-    fade = (1 + np.cos(np.linspace(-np.pi, 0, 2 * half))) / 2  # 0 to 1
     result = np.zeros(0)
     starts: list[int] = []
+    shifts: list[int] = []
     for sound, (start_s, end_s) in zip(sounds, pieces_s, strict=True):
         start, end = round(start_s * rate_hz), round(end_s * rate_hz)
         if not starts:
             result = _cut(sound, start, end + half)
             starts.append(0)
+            shifts.append(0)
             continue
         tail = result[-2 * half :]
-        start += _best_shift(tail, sound, start - half, reach)
+        shifts.append(_best_shift(tail, sound, start - half, reach))
+        start += shifts[-1]
         piece = _cut(sound, start - half, max(end, start + 1) + half)
         count = min(2 * half, len(tail), len(piece))
-        mixed = tail[-count:] * (1 - fade[:count]) + piece[:count] * fade[:count]
+        fade = (1 + np.cos(np.linspace(-np.pi, 0, count))) / 2  # 0 to 1
+        mixed = tail[-count:] * (1 - fade) + piece[:count] * fade
         starts.append(len(result) - half)
         result = np.concatenate([result[: len(result) - count], mixed, piece[count:]])
-    return JoinedPieces(result[: max(len(result) - half, 0)].astype(np.float32), starts)
+    return JoinedPieces(result[: max(len(result) - half, 0)].astype(np.float32), starts, shifts)
 
 
 def _cut(sound: Samples, start: int, end: int) -> NDArray[np.float64]:

@@ -11,9 +11,9 @@ from lipmotion.engines import engine_named
 from lipmotion.engines.selection.engine import SelectionEngine
 from lipmotion.engines.selection.model import SelectionModel
 from lipmotion.engines.selection.targets import SEGMENT_S, target_of
-from lipmotion.errors import InputError
+from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.testing.examples import examples, speech, timeline
-from lipmotion.types import Constraints, Pin, Span, Timeline, Unit
+from lipmotion.types import Constraints, Pin, Span, Timeline, Unit, silent_monitor
 
 SPOKEN = speech(timeline(("b", "aa", "t", "iy", "m", "uw")))
 
@@ -28,7 +28,7 @@ def test_every_unit_says_which_recording_it_comes_from(model: SelectionModel, en
         assert float(times.split("-")[0]) < float(times.split("-")[1])
         assert span.label.phone in (phone, "t")  # t is suppressed
     assert len(result.trace.frames) == len(result.motion.values)
-    assert set(result.trace.states) == {span.label.unit for span in result.units}
+    assert {span.label.unit for span in result.units} <= set(result.trace.states)
 
 
 def test_given_sources_are_kept(model: SelectionModel, engine: SelectionEngine) -> None:
@@ -108,3 +108,44 @@ def test_in_noise_the_sound_alone_chooses(model: SelectionModel, engine: Selecti
     result = engine.generate(model, unsure)
     assert np.corrcoef(result.motion["opening"], distorted[0][:, 0])[0, 1] > 0.8
     assert len(result.units) == len(unsure.units)
+
+
+def test_without_recorded_silence_the_mouth_rests(engine: SelectionEngine) -> None:
+    trimmed = []
+    for each in examples():
+        inside = [n for n, span in enumerate(each.speech.units) if span.label.phone != "sil"]
+        first, last = (each.speech.units[inside[n]] for n in (0, -1))
+        valid = each.valid.copy()
+        valid[: int(first.start_s * 100) + 1] = False
+        valid[int(last.end_s * 100) :] = False
+        trimmed.append(replace(each, valid=valid))
+    learned = engine.fit(trimmed, silent_monitor).model
+    opening = engine.generate(learned, SPOKEN).motion["opening"]
+    assert np.abs(opening[:40] - learned.rest[0]).max() < 0.03
+
+
+@pytest.mark.parametrize("damage", ["nothing stored", "late units", "silence without end"])
+def test_models_that_contradict_themselves_are_refused(
+    model: SelectionModel, engine: SelectionEngine, damage: str
+) -> None:
+    arrays = engine.to_arrays(model)
+    if damage == "nothing stored":
+        arrays["store_kept"] = arrays["store_kept"][:0]
+    elif damage == "late units":
+        arrays["unit_times"] = arrays["unit_times"] * 1e3
+    else:
+        arrays["recording_first"] = arrays["recording_first"].copy()
+        arrays["recording_first"][-1] += 10**7
+        arrays["store_frames"] = arrays["store_frames"] + 10**7
+    with pytest.raises(ModelFormatError):
+        engine.from_arrays(arrays)
+
+
+def test_no_guide_means_no_guide_in_noise(model: SelectionModel, engine: SelectionEngine, monkeypatch) -> None:
+    unsure = replace(SPOKEN, units_known=False, confidence=0.0)
+    plain = SelectionEngine(replace(engine.config, guide=0.0))
+    distorted = (np.zeros((len(unsure.features.values), len(model.rest))), np.ones(len(unsure.features.values)))
+    monkeypatch.setattr(type(model.guide), "predict", lambda *_: distorted)
+    assert not target_of(model, model.costs(plain.config), unsure).by_sound
+    with pytest.raises(InputError, match="guide"):
+        plain.generate_guided(model, unsure, distorted[0])

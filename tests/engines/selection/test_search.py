@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -10,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lipmotion.engines.selection.costs import Costs, Target
+from lipmotion.engines.selection.engine import SelectionEngine
 from lipmotion.engines.selection.model import SelectionModel
 from lipmotion.engines.selection.search import select
 from lipmotion.engines.selection.targets import target_of
@@ -52,7 +54,8 @@ def test_no_sequence_of_candidates_is_cheaper(model: SelectionModel, engine, pho
 @settings(max_examples=30, deadline=None)
 @given(SENTENCES)
 def test_pruning_does_not_change_the_cost(model: SelectionModel, engine, phones: list[str]) -> None:
-    costs, target = wanted(model, engine, phones)
+    wide = SelectionEngine(replace(engine.config, beam=10**6, most=0.4))
+    costs, target = wanted(model, wide, phones)
     assert select(costs, target).cost == pytest.approx(select(costs, target, prune=False).cost)
 
 

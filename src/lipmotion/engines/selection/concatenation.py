@@ -5,7 +5,7 @@ Source: Minnis & Breen 2000, §4.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -25,6 +25,7 @@ HARD_SMOOTHING = 0.05
 LEAST_OVERLAP_S, MOST_OVERLAP_S = 0.02, 0.15
 """Pieces overlap from at least so much, two frames, to at most so much before and after a soft join."""
 LEAST_WEIGHT = 1e-9
+ROUNDING_S = 1e-6
 SHORTEST_S = 1e-3
 """Two joins are never closer."""
 
@@ -52,10 +53,13 @@ def pieces_of(costs: Costs, target: Target, units: UnitNumbers) -> list[Piece]:
     """Return the pieces that a selection consists of, in order.
 
     units : one for each phone of the target
+    In one phone there is one overlap at most: where the search has two, the second join is of the next best kind.
     """
-    kinds = [HARD] + [
-        costs.join_kind(target, number, int(units[number - 1]), int(units[number])) for number in range(1, len(units))
-    ]
+    kinds = [HARD]
+    for number in range(1, len(units)):
+        pair = int(units[number - 1]), int(units[number])
+        is_cut = kinds[-1] == AFTER  # the phone before is one in which two pieces overlap already
+        kinds.append(costs.join_kind(target, number, *pair, may_be_before=not is_cut))
     firsts = [number for number, kind in enumerate(kinds) if number == 0 or kind != NONE]
     times_s = target.windows.times_s
     pieces = []
@@ -76,8 +80,7 @@ def concatenated(inventory: RecordedUnits, target: Target, pieces: list[Piece], 
     """Return the motion of some pieces in the motion space, 100 frames a second [shape=(frames, Q)].
 
     Where pieces overlap, the weight of the next one rises from 0 to 1 along a raised cosine. Abutting pieces are bent
-    towards the middle of their ends, by a raised cosine over the last and the first 5 %, on the side of a phone that
-    is not protected alone.
+    towards one another.
     """
     time_s = np.arange(frames) / FRAME_RATE_HZ
     result, total = np.zeros((frames, inventory.values.shape[1])), np.zeros((frames, 1))
@@ -100,6 +103,19 @@ def concatenated(inventory: RecordedUnits, target: Target, pieces: list[Piece], 
         if after.join == HARD:
             _smooth(inventory, target, before, after, time_s, result)
     return result
+
+
+def shown_units(target: Target, pieces: Sequence[Piece], frames: int) -> UnitNumbers:
+    """Return the unit that leads in every frame: where pieces overlap, the one with the larger weight [shape=(T,)]."""
+    time_s = np.arange(frames) / FRAME_RATE_HZ + ROUNDING_S
+    leading = np.maximum(np.searchsorted([piece.start_s for piece in pieces], time_s, side="right") - 1, 0)
+    numbers = np.maximum(np.searchsorted(target.windows.times_s[:, 0], time_s, side="right") - 1, 0)
+    followed = [piece.join == AFTER for piece in pieces[1:]] + [False]
+    lowest = np.array([piece.first - (piece.join == BEFORE) for piece in pieces])[leading]
+    highest = np.array([piece.stop - 1 + more for piece, more in zip(pieces, followed, strict=True)])[leading]
+    shift = np.array([piece.unit - piece.first for piece in pieces])[leading]
+    shown: UnitNumbers = np.clip(numbers, lowest, highest) + shift
+    return shown
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +158,8 @@ def _knots(inventory: RecordedUnits, target: Target, number: int, shift: int) ->
     from_s, to_s = inventory.windows.times_s[number + shift].tolist()
     yield start_s, from_s
     missing_s = (end_s - start_s) - (to_s - from_s)
-    if is_silent(PHONES[target.windows.phones[number]]) and missing_s > 0:
+    silent = is_silent(PHONES[target.windows.phones[number]]) and not target.by_sound
+    if silent and missing_s > 0:
         half_s = (to_s - from_s) / 2
         yield start_s + half_s, from_s + half_s
         yield end_s - half_s, from_s + half_s
@@ -162,7 +179,8 @@ def _smooth(
 ) -> None:
     """Bend two abutting pieces towards one another, in place.
 
-    The jump is divided between both sides; a side that is a protected phone keeps its shape, the other one takes all.
+    The jump is divided between both sides; a side that is a protected phone keeps its shape and the other one takes
+    all, unless both are protected. Bent are 5 % of each piece, but 20 ms at least and 150 ms at most.
     """
     join_s, times_s = after.start_s, target.windows.times_s
     recording = inventory.windows.recording
@@ -178,7 +196,7 @@ def _smooth(
         HARD_SMOOTHING * (times_s[after.stop - 1, 1] - join_s),
     )
     for side, (share, span_s) in enumerate(zip(shares, spans_s, strict=True)):
-        width_s = max(float(span_s), LEAST_OVERLAP_S)
+        width_s = float(np.clip(span_s, LEAST_OVERLAP_S, MOST_OVERLAP_S))
         away_s = (join_s - time_s) if side == 0 else (time_s - join_s)
         near = (away_s > 0 if side == 0 else away_s >= 0) & (away_s < width_s)
         bend = (1 + np.cos(np.pi * away_s[near] / width_s)) / 2

@@ -36,7 +36,7 @@ class SelectionConfig(Configuration):
     velocity   : seconds; weight of velocities in these deviations
     hard       : join cost where units have no phone in common
     protected  : join cost beside or inside a phone whose lip shape must be preserved
-    cluster    : join cost between two consonants of one word
+    cluster    : join cost where units abut between two consonants of one word
     most       : no join costs more than this; so candidates can be left out without a change of the result
     components : principal components that all point channels are reduced to
     conditions, epochs : of the acoustic network that is the guide, as of the trajectory engine

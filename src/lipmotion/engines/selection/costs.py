@@ -116,10 +116,9 @@ class Costs:
         differs = self.index.contexts[units] != target.contexts[number]
         differs_much = VISEME_NUMBER[self.index.contexts[units]] != VISEME_NUMBER[target.contexts[number]]
         costs = (differs + differs_much) @ (self._context_weights / 2)
-        costs += config.word * (windows.words[units] != target.windows.words[number]).sum(axis=1)
-        stress, wanted = windows.stress[units], target.windows.stress[number]
-        costs += config.stress * ((stress != wanted) & (stress >= 0) & (wanted >= 0))
-        return costs
+        if target.windows.words_known:
+            costs += config.word * (windows.words[units] != target.windows.words[number]).sum(axis=1)
+        return costs + config.stress * _differ(windows.stress[units], target.windows.stress[number])
 
     def join_costs(self, target: Target, number: int, left: UnitNumbers, right: UnitNumbers) -> Array:
         """Return the costs of joining units of one phone with units of the next [shape=(len(left), len(right))].
@@ -131,12 +130,18 @@ class Costs:
         costs[self._succeed(left, right)] = 0
         return costs
 
-    def join_kind(self, target: Target, number: int, left: int, right: int) -> int:
-        """Return how a unit is joined with that of the next phone, which has this number."""
+    def join_kind(self, target: Target, number: int, left: int, right: int, *, may_be_before: bool = True) -> int:
+        """Return how a unit is joined with that of the next phone, which has this number.
+
+        may_be_before : whether they may overlap in the phone before
+        """
         pair = np.array([left]), np.array([right])
         if self._succeed(*pair)[0, 0]:
             return NONE
-        return int(np.argmin([cost[0, 0] for cost in self._joins(target, number, *pair)]))
+        costs = [cost[0, 0] for cost in self._joins(target, number, *pair)]
+        if not may_be_before:
+            costs[BEFORE] = np.inf
+        return int(np.argmin(costs))
 
     def forward_share(self, target: Target, shared: int) -> float:
         """Return the forward share of a phone of the target in which units overlap."""
@@ -152,18 +157,26 @@ class Costs:
         before, after = (PHONES[target.windows.phones[n]] for n in (number - 1, number))
         protects = [config.protected * (phone in PROTECTED_PHONES) for phone in (before, after)]
         inside = config.cluster * (
-            before in _CONSONANTS and after in _CONSONANTS and not target.windows.words[number, 0]
+            before in _CONSONANTS
+            and after in _CONSONANTS
+            and target.windows.words_known
+            and not target.windows.words[number, 0]
         )
         hard = self._distances(left, 1.0, right, 0.0) + config.hard + max(protects) + inside
         earlier, later = np.maximum(right - 1, 0), np.minimum(left + 1, len(continues) - 1)
         usable = self.inventory.usable
         shares_before = usable[earlier] & continues[earlier] & (right > 0)
-        shares_before &= symbols[earlier, middle] == target.symbol(number - 1)
-        shares_after = usable[later] & continues[left] & (symbols[later, middle] == target.symbol(number))
+        shares_after = usable[later] & continues[left]
+        if not target.by_sound:
+            shares_before &= symbols[earlier, middle] == target.symbol(number - 1)
+            shares_after &= symbols[later, middle] == target.symbol(number)
         fraction = self.forward_share(target, number - 1)
+        stress = self.inventory.windows.stress
         soft_before = self._distances(left, fraction, earlier, fraction) + protects[0]
+        soft_before += config.stress * _differ(stress[left][:, None], stress[earlier])
         fraction = self.forward_share(target, number)
         soft_after = self._distances(later, fraction, right, fraction) + protects[1]
+        soft_after += config.stress * _differ(stress[later][:, None], stress[right])
         soft_before[:, ~shares_before] = np.inf
         soft_after[~shares_after] = np.inf
         return hard, soft_before, soft_after
@@ -188,6 +201,19 @@ class Costs:
             self._known_states[fraction] = state
         return self._known_states[fraction]
 
+    def nearest(self, target: Target, number: int, units: UnitNumbers) -> UnitNumbers:
+        """Return those of some units whose mean pose is nearest to what is wanted, ``candidates`` of them at most."""
+        if target.guided is None or self._recorded is None or len(units) <= self.config.candidates:
+            return units
+        distance = np.square(self._mean_poses[units] - target.guided[number].mean(axis=0)).sum(axis=1)
+        order = np.argpartition(distance, self.config.candidates)[: self.config.candidates]
+        return np.sort(units[order])
+
+    @cached_property
+    def _mean_poses(self) -> Array:
+        """The mean over ``POINTS`` of the motion of every unit, times ``scale`` [shape=(U, Q)]."""
+        return np.zeros((0, 0)) if self._recorded is None else self._recorded.mean(axis=1)
+
     @cached_property
     def _known_states(self) -> dict[float, Array]:
         return {}
@@ -209,3 +235,9 @@ class Costs:
     def _predicted(self) -> Array | None:
         """What the guide predicts at ``POINTS`` of every unit, times ``scale`` [shape=(U, POINTS, Q)]."""
         return self.inventory.predicted.astype(float) * self.scale if self.inventory.predicted is not None else None
+
+
+def _differ(one: NDArray[np.int8], other: NDArray[np.int8]) -> NDArray[np.bool_]:
+    """Return where two stresses are known and differ; the shapes are broadcast."""
+    result: NDArray[np.bool_] = (one != other) & (one >= 0) & (other >= 0)
+    return result

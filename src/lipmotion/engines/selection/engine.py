@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.base import Arrays, Engine, Fit, SourcePiece
-from lipmotion.engines.selection.concatenation import concatenated, pieces_of
+from lipmotion.engines.selection.concatenation import concatenated, pieces_of, shown_units
 from lipmotion.engines.selection.config import SelectionConfig
 from lipmotion.engines.selection.costs import Costs, Target
 from lipmotion.engines.selection.model import SelectionModel, model_arrays, model_from_arrays
@@ -38,9 +38,9 @@ from lipmotion.types import (
     Timeline,
     Unit,
 )
+from lipmotion.units import SILENCE, is_silent
 
 Array = NDArray[np.float64]
-ROUNDING_S = 1e-6
 SETTLED_S = 0.06
 """Half of the rest pose is left so long before the first phone, and reached so long after the last one."""
 
@@ -51,7 +51,8 @@ class SelectionEngine(Engine[SelectionModel]):
     """Unit selection: recorded motion of phones in context, chosen by dynamic programming, warped in time and joined.
 
     Source: Minnis & Breen 2000.  Deviations: the motion that a guide predicts from the sound is part of the target
-    costs; joins cost what the recorded motions differ by; overlaps are raised cosines.
+    costs; joins cost what the recorded motions differ by; overlaps are raised cosines; the suppressed phones are
+    one symbol, so that units may merge in any of them.
     """
 
     config: SelectionConfig
@@ -114,10 +115,12 @@ class SelectionEngine(Engine[SelectionModel]):
     ) -> Generation:
         """Return the motion of the units that are selected for a target."""
         frames = len(speech.features.values)
-        given = _given(model, target, speech.units)
+        given = _given(costs, target, speech.units)
         units = select(costs, target, given=given).units
-        track = concatenated(model.inventory, target, pieces_of(costs, target, units), frames)
-        resting = _resting(np.asarray(speech.features.values), speech.units)[:, None]
+        pieces = pieces_of(costs, target, units)
+        track = concatenated(model.inventory, target, pieces, frames)
+        always = not is_silent(costs.stand_ins.get(SILENCE, SILENCE))
+        resting = _resting(np.asarray(speech.features.values), speech.units, always=always)[:, None]
         means = with_dynamics(track + resting * (model.rest - track))
         precisions = np.broadcast_to(1 / model.variances, means.shape)
 
@@ -134,8 +137,8 @@ class SelectionEngine(Engine[SelectionModel]):
         )
         sources = [source_of(model.inventory, unit) for unit in units.tolist()]
         starts_s = target.windows.times_s[:, 0]
-        positions = np.searchsorted(starts_s, np.arange(frames) / FRAME_RATE_HZ + ROUNDING_S, side="right") - 1
-        trace = StateTrace(tuple(sources), np.maximum(positions, 0).astype(np.intp))
+        heard, places = np.unique(shown_units(target, pieces, frames), return_inverse=True)
+        trace = StateTrace(tuple(source_of(model.inventory, unit) for unit in heard.tolist()), places.astype(np.intp))
         return Generation(motion, variance, with_sources(speech.units, starts_s, sources), trace)
 
     def recordings(self, model: SelectionModel) -> tuple[str, ...]:  # noqa: D102
@@ -159,14 +162,15 @@ class SelectionEngine(Engine[SelectionModel]):
         return model_from_arrays(arrays)
 
 
-def _resting(features: NDArray[np.floating], units: Timeline[Unit]) -> Array:
+def _resting(features: NDArray[np.floating], units: Timeline[Unit], *, always: bool) -> Array:
     """Return the weight of the rest pose in every frame, 0 to 1 [shape=(T,)].
 
     It is 1 in silence of which some is digital, and falls to 0 before the next phone and after the last one: in digital
     silence there is no breath, as there may be in the silence that was recorded with the unit.
     features : acoustic features [shape=(T, D)]
+    always   : whether it is 1 in every silence, for no silence was recorded
     """
-    unheard = unheard_frames(features, units)
+    unheard = np.ones(len(features), bool) if always else unheard_frames(features, units)
     if not unheard.any():
         return np.zeros(len(features))
     away = away_from_speech(np.arange(len(features)) / FRAME_RATE_HZ, speech_intervals(units), SETTLED_S)
@@ -181,20 +185,22 @@ def _resting(features: NDArray[np.floating], units: Timeline[Unit]) -> Array:
     return weights
 
 
-def _given(model: SelectionModel, target: Target, units: Timeline[Unit]) -> dict[int, int]:
+def _given(costs: Costs, target: Target, units: Timeline[Unit]) -> dict[int, int]:
     """Return the units that edited labels name, by the number of their phone in the target.
 
-    A label names a unit where its phone is that of the unit: an edited phone is selected again.
+    A label names a unit where both have one symbol: an edited phone is selected again.
     """
-    named = units_by_source(model.inventory, (span.label.unit for span in units if span.label.unit))
-    starts_s = target.windows.times_s[:, 0]
-    given: dict[int, int] = {}
-    for span in () if target.by_sound else units:
+    if target.by_sound:
+        return {}
+    named = units_by_source(costs.inventory, (span.label.unit for span in units if span.label.unit))
+    starts_s, symbols = target.windows.times_s[:, 0], costs.index.contexts[:, costs.config.window // 2]
+    given = {}
+    for span in units:
         unit = named.get(span.label.unit)
         if unit is None or span.duration_s <= 0:
             continue
         number = int(np.argmin(np.abs(starts_s - span.start_s)))
-        if model.inventory.windows.phones[unit] == target.windows.phones[number]:
+        if symbols[unit] == target.symbol(number):
             given[number] = unit
     return given
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -154,7 +154,7 @@ def standing_in(windows: PhoneWindows, usable: NDArray[np.bool_]) -> dict[str, s
 def replaced(windows: PhoneWindows, stand_ins: dict[str, str]) -> PhoneWindows:
     """Return windows in which each missing phone is the one that stands in for it."""
     table = np.array([PHONE_NUMBER[stand_ins.get(phone, phone)] for phone in PHONES], np.int16)
-    return PhoneWindows(windows.recording, table[windows.phones], windows.times_s, windows.words, windows.stress)
+    return replace(windows, phones=table[windows.phones])
 
 
 def _keys(columns: NDArray[np.intp]) -> NDArray[np.int64]:

@@ -33,9 +33,14 @@ from lipmotion.storage.schema import (
     format_errors,
     refuse_undeclared,
 )
+from lipmotion.types import FRAME_RATE_HZ
 from lipmotion.units import PHONES
 
 Array = NDArray[np.float64]
+MOST_SILENCE = 100
+"""Of so many frames one is stored, at least."""
+LATE_S = 1.0
+"""Units end at most so long after the motion of their recording."""
 STORE_PREFIX = "store_"
 """Beginning of the names of the arrays of the motion store."""
 
@@ -155,11 +160,11 @@ UNITS = {
     "unit_usable": ArraySpec(np.bool_, "U"),
     "selection_scale": ArraySpec(np.float64, "Q", POSITIVE, 1e9),
     "selection_rest": ArraySpec(np.float64, "Q", -1e6, 1e6),
-    "selection_variances": ArraySpec(np.float64, "3 Q", POSITIVE),
+    "selection_variances": ArraySpec(np.float64, "3 Q", 1e-30),
 }
 GUIDE = {
     "guide_range": ArraySpec(np.float64, "2 Q", -1e6, 1e6),
-    "unit_predicted": ArraySpec(np.float32, f"U {POINTS} Q", -1e6, 1e6),
+    "unit_predicted": ArraySpec(np.float32, f"U {POINTS} Q", -6e4, 6e4),
 }
 
 
@@ -174,3 +179,9 @@ def _check(inventory: RecordedUnits, dimensions: int) -> None:
         raise ValueError("units that are not in the order of the recordings")
     if (windows.durations_s < 0).any() or not inventory.usable.any():
         raise ValueError("units of negative duration, or none that is usable")
+    stored = int(np.diff(motion.kept, axis=1).sum())
+    if len(motion) > MOST_SILENCE * stored:
+        raise ValueError(f"{stored} of {len(motion)} frames of motion are stored, required 1 of {MOST_SILENCE}")
+    ends_s = np.diff(first)[windows.recording] / FRAME_RATE_HZ + LATE_S
+    if (windows.times_s[:, 1] > ends_s).any():
+        raise ValueError("units beyond the end of their recording")

@@ -89,6 +89,7 @@ def _candidates(
     if target.by_sound:
         usable = costs.inventory.usable
         units = np.flatnonzero(usable if excluded is None else usable & ~excluded)
+        units = costs.nearest(target, number, units) if prune else units
     else:
         units = costs.index.candidates(target.contexts[number], costs.config.candidates, excluded)
     if not len(units):

@@ -29,14 +29,15 @@ def target_of(
 
     guiding : motion in the motion space, as wide as recorded motion, that guides instead of the prediction
               [shape=(T, Q)]; what is ``heard`` is still the model's own prediction. None: the prediction guides
-    Where noise makes recognised phones unreliable, the target is segments of equal duration, for which the sound alone
-    chooses.
+    Where noise makes the recognised phones of a recording unreliable on the whole, the target is segments of equal
+    duration, for which the sound alone chooses.
     Raises InputError: an unknown phone.
     """
     frames = len(speech.features.values)
     duration_s = (frames - 1) / FRAME_RATE_HZ
     units, guide = covering(speech.units, duration_s), model.guide
-    if guide is None or (isinstance(guide.predictor, AcousticNetwork) and speech.spectrum is None):
+    unheard = guide is not None and isinstance(guide.predictor, AcousticNetwork) and speech.spectrum is None
+    if guide is None or unheard or not costs.config.guide:
         return costs.target(phone_windows([units]), None, None)
     motion, distortion = guide.predict(speech)
     by_sound = bool(phone_reliability(speech, distortion, frames).mean() < LEAST_RELIABILITY)

@@ -93,6 +93,7 @@ def inventory_of(
     last = first[windows.recording + 1]
     usable = (missed[np.minimum(end, last)] == missed[np.minimum(begin, last)]) & (begin < last)
     spoken = ~np.array([is_silent(span.label.phone) for units in timelines for span in units], bool)
+    usable &= np.isin(windows.recording, windows.recording[spoken])  # of others, no motion is stored
     if not (usable & spoken).any():
         raise CorpusError(
             f"no phone in {len(examples)} recordings has its motion measured throughout; record more speech"
@@ -203,7 +204,7 @@ def _error_variances(
         if frames.any():
             generated = generated_motion(model, costs, example, model.inventory.windows.recording == number)
             errors.append(with_dynamics(values[number] - generated)[frames])
-    variances: Array = np.square(np.concatenate(errors)).mean(axis=0) if errors else floor
+    variances: Array = np.square(np.concatenate(errors)).mean(axis=0) if errors else with_dynamics(recorded).var(axis=0)
     return np.maximum(variances, floor)
 
 

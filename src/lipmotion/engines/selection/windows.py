@@ -33,7 +33,8 @@ class PhoneWindows:
     phones    : number of each phone in ``PHONES`` [shape=(U,)]
     times_s   : its start and its end in the recording [shape=(U, 2)]
     words     : whether it begins a word, and whether it ends one [bool, shape=(U, 2)]
-    stress    : 0, 1 or 2, as dictionaries mark vowels; -1: not a vowel, or not known [shape=(U,)]
+    stress    : whether its syllable is stressed, 1 or 0; -1: not known [shape=(U,)]
+    words_known : whether phones know their words
     """
 
     recording: NDArray[np.int32]
@@ -41,6 +42,7 @@ class PhoneWindows:
     times_s: NDArray[np.float64]
     words: NDArray[np.bool_]
     stress: NDArray[np.int8]
+    words_known: bool = True
 
     def __len__(self) -> int:
         return len(self.phones)
@@ -107,4 +109,5 @@ def phone_windows(timelines: Sequence[Timeline[Unit]]) -> PhoneWindows:
         np.array(times_s, float).reshape(-1, 2),
         np.array(words, bool).reshape(-1, 2),
         np.array(stress, np.int8),
+        any(span.label.word for units in timelines for span in units),
     )
