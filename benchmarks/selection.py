@@ -45,7 +45,7 @@ Array = NDArray[np.float64]
 OPTIONS: dict[str, dict[str, Any]] = {
     "as it is": {},
     "no guide": {"guide": 0.0},
-    "printed overlaps": {"overlap": "printed"},
+    "learned overlaps": {"overlap": "learned"},
     "symmetric": {"overlap": "symmetric"},
     "middle": {"overlap": "middle"},
     "nothing invisible": {"invisible": ""},
