@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -85,3 +87,20 @@ def test_another_corpus_is_refused(selection_model: Model, tmp_path) -> None:
 def test_a_text_without_words_is_refused(toy_corpus: Corpus, selection_model: Model) -> None:
     with pytest.raises(InputError):
         speak_from_corpus(" ... ", toy_corpus, selection_model)
+
+
+def test_phones_that_were_never_recorded_are_named(
+    toy_corpus: Corpus, selection_model: Model, caplog: pytest.LogCaptureFixture
+) -> None:
+    speak_from_corpus("baby blue", toy_corpus, selection_model)
+    assert "do not have" not in caplog.text
+    speak_from_corpus("judge", toy_corpus, selection_model)
+    assert "jh (" in caplog.text
+
+
+def test_recordings_of_several_people_are_refused(toy_corpus: Corpus, selection_model: Model, monkeypatch) -> None:
+    names = iter("ab" * 20)
+    known = toy_corpus.utterance
+    monkeypatch.setattr(toy_corpus, "utterance", lambda name: replace(known(name), speaker=next(names)))
+    with pytest.raises(InputError, match="recordings of 2 people"):
+        speak_from_corpus("baby blue", toy_corpus, selection_model)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from lipmotion.cli.options import add_machine_readable
@@ -36,7 +37,9 @@ def run(options: argparse.Namespace) -> None:
     if options.voices == bool(options.output):
         options.wrong("required: -o FILE, or --voices")
     if not options.voices and (options.words is None) == (options.text is None):
-        options.wrong("required: a text, or --text FILE")
+        options.wrong("required: a text, or --text FILE, not both")
+    if options.words is not None and len(options.words) < 256 and Path(options.words).is_file():
+        options.wrong(f"{options.words} is the name of a file; to say what is in it: --text {options.words}")
     from lipmotion.cli.progress import reporting
     from lipmotion.cli.voices import list_voices
 

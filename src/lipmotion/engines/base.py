@@ -195,6 +195,9 @@ class SelectsRecordings(Protocol):
     def recordings(self, model: Any) -> tuple[str, ...]:
         """Return the names of the recordings."""
 
+    def stand_ins(self, model: Any) -> Mapping[str, str]:
+        """Return the recorded phone in place of each phone that was never recorded."""
+
     def typical_duration_s(self, model: Any, phone: str) -> float:
         """Return the median duration of a phone in the recordings."""
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import logging
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,7 @@ REST_S = 0.25
 """Silence before the first and after the last word,"""
 BETWEEN_S = 0.35
 """and between two sentences."""
+LOG = logging.getLogger("lipmotion")
 FEATURES = 13
 """The static acoustic features, whose differences joins cost."""
 
@@ -46,7 +48,7 @@ def speak_from_corpus(
     lexicon : pronunciations of words, ahead of those of the dictionary
     The sound is not changed but at the joins, where successive pieces are shifted by up to 8 ms to fit and overlap: how
     fast and how high words are spoken is what was recorded. Phones that were never recorded are replaced by similar
-    ones.
+    ones, with a warning.
     Raises InputError: another engine, another corpus, recordings of several people, a text without words, or a word
     that nobody can pronounce.
     Source: Minnis & Breen 2000, §2 and §3.
@@ -72,6 +74,7 @@ def speak_from_corpus(
             "train one on the recordings of a single person"
         )
     heard = {name: np.asarray(utterance.features.values)[:, :FEATURES] for name, utterance in utterances.items()}
+    _warn_of_stand_ins(engine.stand_ins(model.learned), target)
     pieces, units = engine.source_pieces(model.learned, target, heard)
     sounds = [np.asarray(utterances[piece.recording].audio.samples) for piece in pieces]
     rate_hz = utterances[names[0]].audio.rate_hz
@@ -102,6 +105,16 @@ def _target(text: str, lexicon: Lexicon, engine: SelectsRecordings, model: Model
                 add(phone, word, engine.typical_duration_s(model.learned, phone))
     add(SILENCE, "", REST_S)
     return Timeline(tuple(spans))
+
+
+def _warn_of_stand_ins(stand_ins: Mapping[str, str], target: Timeline[Unit]) -> None:
+    """Log a warning that names the phones which were never recorded."""
+    missing = dict.fromkeys(span.label.phone for span in target if span.label.phone in stand_ins)
+    if missing:
+        named = ", ".join(f"{phone} ({stand_ins[phone]})" for phone in missing)
+        LOG.warning(
+            "phones that the recordings do not have, and what is said instead: %s; see lipmotion corpus coverage", named
+        )
 
 
 def _begin_s(count: int, pieces: Sequence[SourcePiece], joined: JoinedPieces, rate_hz: int) -> NDArray[np.float64]:

@@ -149,3 +149,16 @@ def test_no_guide_means_no_guide_in_noise(model: SelectionModel, engine: Selecti
     assert not target_of(model, model.costs(plain.config), unsure).by_sound
     with pytest.raises(InputError, match="guide"):
         plain.generate_guided(model, unsure, distorted[0])
+
+
+def test_sources_that_cannot_be_used_are_reported(
+    model: SelectionModel, engine: SelectionEngine, caplog: pytest.LogCaptureFixture
+) -> None:
+    first = engine.generate(model, SPOKEN)
+    engine.generate(model, replace(SPOKEN, units=first.units))
+    assert not caplog.records
+    spans = list(first.units)
+    spans[2] = replace(spans[2], label=replace(spans[2].label, unit="nosuch 1.000-1.100 s aa"))
+    engine.generate(model, replace(SPOKEN, units=Timeline(tuple(spans))))
+    assert "1 of 8 units name no recorded unit" in caplog.text
+    assert "'nosuch 1.000-1.100 s aa'" in caplog.text

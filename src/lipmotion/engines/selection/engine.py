@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, final
@@ -14,7 +15,7 @@ from lipmotion.engines.selection.concatenation import concatenated, pieces_of, s
 from lipmotion.engines.selection.config import SelectionConfig
 from lipmotion.engines.selection.costs import Costs, Target
 from lipmotion.engines.selection.model import SelectionModel, model_arrays, model_from_arrays
-from lipmotion.engines.selection.report import inventory_text, source_of, units_by_source
+from lipmotion.engines.selection.report import inventory_text, is_source, source_of, units_by_source
 from lipmotion.engines.selection.search import select
 from lipmotion.engines.selection.sources import source_pieces, typical_duration_s, with_sources
 from lipmotion.engines.selection.targets import target_of
@@ -24,6 +25,7 @@ from lipmotion.motion.generation import Statistics
 from lipmotion.motion.predictors import LEAST_NETWORK_S
 from lipmotion.motion.prior_regression import PriorRegression
 from lipmotion.motion.rest import away_from_speech, speech_intervals, unheard_frames
+from lipmotion.printable import printable
 from lipmotion.stats.delta_windows import with_dynamics
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import (
@@ -41,6 +43,9 @@ from lipmotion.types import (
 from lipmotion.units import SILENCE, is_silent
 
 Array = NDArray[np.float64]
+LOG = logging.getLogger("lipmotion")
+SHOWN = 3
+"""Units that one warning names."""
 SETTLED_S = 0.06
 """Half of the rest pose is left so long before the first phone, and reached so long after the last one."""
 
@@ -144,6 +149,9 @@ class SelectionEngine(Engine[SelectionModel]):
     def recordings(self, model: SelectionModel) -> tuple[str, ...]:  # noqa: D102
         return model.inventory.names
 
+    def stand_ins(self, model: SelectionModel) -> Mapping[str, str]:  # noqa: D102
+        return model.costs(self.config).stand_ins
+
     def typical_duration_s(self, model: SelectionModel, phone: str) -> float:  # noqa: D102
         return typical_duration_s(model.inventory, phone)
 
@@ -194,14 +202,21 @@ def _given(costs: Costs, target: Target, units: Timeline[Unit]) -> dict[int, int
         return {}
     named = units_by_source(costs.inventory, (span.label.unit for span in units if span.label.unit))
     starts_s, symbols = target.windows.times_s[:, 0], costs.index.contexts[:, costs.config.window // 2]
-    given = {}
+    given, useless = {}, []
     for span in units:
-        unit = named.get(span.label.unit)
-        if unit is None or span.duration_s <= 0:
+        if span.duration_s <= 0 or not is_source(span.label.unit):
             continue
-        number = int(np.argmin(np.abs(starts_s - span.start_s)))
-        if symbols[unit] == target.symbol(number):
+        unit, number = named.get(span.label.unit), int(np.argmin(np.abs(starts_s - span.start_s)))
+        if unit is not None and symbols[unit] == target.symbol(number):
             given[number] = unit
+        else:
+            useless.append(f"{span.label.phone} at {span.start_s:.2f} s: {span.label.unit!r}")
+    if useless:
+        more = f" and {len(useless) - SHOWN} more" if len(useless) > SHOWN else ""
+        LOG.warning(
+            "%d of %d units name no recorded unit of their phone in this model (%s%s); these phones are selected again",
+            *(len(useless), len(units), printable("; ".join(useless[:SHOWN])), more),
+        )
     return given
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from textwrap import wrap
 
@@ -19,6 +20,11 @@ def source_of(inventory: RecordedUnits, unit: int) -> str:
     windows = inventory.windows
     start_s, end_s = windows.times_s[unit].tolist()
     return f"{inventory.names[windows.recording[unit]]} {start_s:.3f}-{end_s:.3f} s {PHONES[windows.phones[unit]]}"
+
+
+def is_source(text: str) -> bool:
+    """Return whether a text has the form of ``source_of``: a recording, two times, and a phone."""
+    return re.search(r" \d+\.\d+-\d+\.\d+ s \S+$", text) is not None
 
 
 def units_by_source(inventory: RecordedUnits, sources: Iterable[str]) -> dict[str, int]:

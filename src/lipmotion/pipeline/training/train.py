@@ -363,7 +363,8 @@ def _examples(
     if not examples:
         name, reason = next(iter(skipped.items()))
         raise CorpusError(f"none of {len(skipped)} utterances could be used; the first, {name}: {reason}")
-    warn_of_doubtful_transcripts(labelled)
+    general = Recogniser(phones.own, "general")
+    warn_of_doubtful_transcripts(labelled, partial(phones_of, phones=general, lexicon=lexicon))
     return examples, skipped
 
 

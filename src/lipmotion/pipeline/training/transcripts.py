@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
-from lipmotion.errors import MissingDependencyError
+from lipmotion.errors import AlignmentError, MissingDependencyError
 from lipmotion.printable import printable
-from lipmotion.speech.agreement import DOUBTFUL_SCORE, LEAST_FITTING_SHARE, transcript_fit
+from lipmotion.speech.agreement import DOUBTFUL_SCORE, LEAST_FITTING_SHARE, TranscriptFit, transcript_fit
 from lipmotion.types import Timeline, Unit, Utterance
 
 LOG = logging.getLogger("lipmotion")
@@ -15,10 +15,15 @@ MOST_NAMED = 10
 """Largest number of recordings that one warning names."""
 
 
-def warn_of_doubtful_transcripts(labelled: Iterable[tuple[Utterance, Timeline[Unit]]]) -> None:
+def warn_of_doubtful_transcripts(
+    labelled: Iterable[tuple[Utterance, Timeline[Unit]]],
+    realigned: Callable[[Utterance], Timeline[Unit]] | None = None,
+) -> None:
     """Log a warning that names the utterances whose transcripts do not fit the sound.
 
     labelled : utterances with their aligned phones; those without words, or with labelled phones, are passed over
+    realigned : aligns the words of an utterance once more, by the models of many voices: what little speech has taught
+               may place them badly. A transcript is doubtful if it fits neither way
     The measure is that of ``animate`` (``speech.agreement``). Without pocketsphinx nothing is measured.
     """
     wrong, short, count = list[str](), list[str](), 0
@@ -26,6 +31,8 @@ def warn_of_doubtful_transcripts(labelled: Iterable[tuple[Utterance, Timeline[Un
         for utterance, units in labelled:
             if utterance.phones is None and utterance.words:
                 fit, count = transcript_fit(utterance.audio, units), count + 1
+                if realigned is not None and (fit.score < DOUBTFUL_SCORE or fit.share < LEAST_FITTING_SHARE):
+                    fit = _better(fit, utterance, realigned)
                 if fit.score < DOUBTFUL_SCORE:
                     wrong.append(utterance.name)
                 elif fit.share < LEAST_FITTING_SHARE:
@@ -39,6 +46,17 @@ def warn_of_doubtful_transcripts(labelled: Iterable[tuple[Utterance, Timeline[Un
                 "train again",
                 *(len(names), count, problem, _listed(names)),
             )
+
+
+def _better(
+    fit: TranscriptFit, utterance: Utterance, realigned: Callable[[Utterance], Timeline[Unit]]
+) -> TranscriptFit:
+    """Return the fit of the words aligned once more, if it is better than a fit."""
+    try:
+        other = transcript_fit(utterance.audio, realigned(utterance))
+    except AlignmentError:
+        return fit
+    return max(fit, other, key=lambda each: (each.score >= DOUBTFUL_SCORE, each.share))
 
 
 def warn_of_missing_transcripts(utterances: Sequence[Utterance]) -> None:
