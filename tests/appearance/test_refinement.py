@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from appearance.test_eigenlips import pictures
-from lipmotion.appearance.candidates import make_candidates
+from lipmotion.appearance.candidates import choose_candidates, make_candidates
 from lipmotion.appearance.eigenlips import Eigenlips, fit_eigenlips
 from lipmotion.appearance.refinement import PAPER, RefinementOptions, Refiner, best_sequence, moving_average
+from lipmotion.corpora.store import Corpus
 from lipmotion.errors import InputError
 from lipmotion.stats.pca import fit_pca
 
@@ -164,3 +165,25 @@ def test_the_moving_average_is_that_of_the_definition() -> None:
             moving_average(values, frames)
     with pytest.raises(InputError, match="curves of shape"):
         moving_average(values[:, 0])
+
+
+def test_the_mouths_of_a_corpus_become_sharper(toy_corpus: Corpus) -> None:
+    crops = {split: mouths(toy_corpus, split) for split in ("train", "val")}
+    space = fit_eigenlips(crops["train"][::4], 2)
+    known = space.project(crops["train"])
+    refiner = Refiner(space, make_candidates(space, crops["train"][choose_candidates(known, 100)]))
+    wanted = space.project(crops["val"])
+    true, blurred, refined = map(edges, (crops["val"], space.restore(wanted), refiner.refine(wanted)))
+    assert blurred < 0.97 * true
+    assert abs(refined - true) < 0.5 * (true - blurred)
+
+
+def mouths(corpus: Corpus, split: str) -> np.ndarray:
+    """The mouth pictures of all utterances of a split."""
+    tracks = [corpus.utterance(name).track for name in corpus.names(split)]
+    return np.concatenate([track.crops for track in tracks if track.crops is not None])
+
+
+def edges(images: np.ndarray) -> float:
+    """The energy of the gradient."""
+    return float(sum(np.square(np.diff(images.astype(float), axis=axis)).mean() for axis in (1, 2)))
