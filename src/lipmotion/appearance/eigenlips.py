@@ -65,6 +65,13 @@ class Eigenlips:
 
         Raises InputError: another number of coefficients.
         """
+        return np.clip(np.rint(self.expand(coefficients)), 0, 255).astype(np.uint8)
+
+    def expand(self, coefficients: NDArray[np.floating[Any]]) -> NDArray[np.float32]:
+        """Return the same pictures before they are rounded, float32 [shape=(T, H, W, 3)], in grey levels.
+
+        Raises InputError: another number of coefficients.
+        """
         wanted = self.basis.shape[0] * self.basis.shape[1]
         if coefficients.ndim != 2 or coefficients.shape[1] != wanted:
             raise InputError(
@@ -72,7 +79,7 @@ class Eigenlips:
             )
         parts = np.split(coefficients.astype(np.float32), len(COLOURS), axis=1)
         flat = np.stack([part @ self.basis[c] + self.mean[c] for c, part in enumerate(parts)], axis=-1)
-        return np.clip(np.rint(flat), 0, 255).astype(np.uint8).reshape(-1, *self.size, len(COLOURS))
+        return flat.reshape(-1, *self.size, len(COLOURS))
 
 
 def fit_eigenlips(images: Images, components: int = COMPONENTS) -> Eigenlips:

@@ -1,0 +1,188 @@
+"""Refinement: generated eigenlips become pictures with the detail of recorded mouths, which does not flicker."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.appearance.candidates import BLOCK, Candidates, squared_distances
+from lipmotion.appearance.eigenlips import COLOURS, Eigenlips
+from lipmotion.errors import InputError
+
+Values = NDArray[np.floating[Any]]
+Costs = NDArray[np.float32]
+Index = NDArray[np.intp]
+Pictures = NDArray[np.uint8]
+
+FILTER_FRAMES = 3
+"""Width of the moving average, in frames of the video. Source: Xie & Liu 2007, §6."""
+
+
+@dataclass(frozen=True)
+class RefinementOptions:
+    """How the detail of each frame is chosen.
+
+    together   : one candidate for all three colours; False: one for each colour, as in the paper
+    steadiness : weight of the change of detail between frames, beside the distance in the space of eigenlips; both
+                 are squared grey levels. 0: the nearest candidate in every frame, as in the paper
+    neighbours : number of nearest candidates of a frame that are considered, at most
+    """
+
+    together: bool = True
+    steadiness: float = 1.0
+    neighbours: int = 20
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.steadiness < np.inf:
+            raise InputError(f"steadiness {self.steadiness:g}, required a number from 0")
+        if self.neighbours < 1:
+            raise InputError(f"{self.neighbours} neighbours, required at least 1")
+
+
+PAPER = RefinementOptions(together=False, steadiness=0.0, neighbours=1)
+"""The refinement of the paper: the nearest candidate of every colour and frame."""
+
+
+@dataclass(frozen=True, eq=False)
+class Refiner:
+    """Turns eigenlips into pictures with recorded detail.
+
+    eigenlips  : the space of mouth pictures
+    candidates : recorded mouths in the same space
+    options    : how detail is chosen
+    Raises InputError: the candidates are of other eigenlips.
+    """
+
+    eigenlips: Eigenlips
+    candidates: Candidates
+    options: RefinementOptions = RefinementOptions()
+
+    def __post_init__(self) -> None:
+        wanted, found = (len(self.eigenlips.channels), self.eigenlips.size), self.candidates
+        if (found.coefficients.shape[1], found.size) != wanted:
+            raise InputError(
+                f"candidates of {found.coefficients.shape[1]} coefficients and {found.size} px, required {wanted[0]} "
+                f"and {wanted[1]} px; make them with the same eigenlips"
+            )
+
+    def refine(self, coefficients: Values) -> Pictures:
+        """Return the pictures [shape=(T, H, W, 3)] at some eigenlips [shape=(T, 3·K)], one a frame of the video.
+
+        Raises InputError: as ``choose``.
+        """
+        return self.pictures(coefficients, self.choose(coefficients))
+
+    def choose(self, coefficients: Values) -> Index:
+        """Return for each frame and colour the candidate whose detail it gets [shape=(T, 3)].
+
+        coefficients : eigenlips at the frame rate of the video [shape=(T, 3·K)]
+        Raises InputError: another number of coefficients, or values that are not finite.
+        Source: Xie & Liu 2007, Eq. 15, if ``steadiness`` is 0. Otherwise the sequence j that minimises
+        Σ ‖ô_t − g_j(t)‖² + steadiness · Σ ‖d_j(t) − d_j(t−1)‖², over the nearest candidates of each frame, where d is
+        the detail; found exactly by dynamic programming.
+        Cost: O(T·N·K) for distances, O(T·neighbours²) for the search.
+        """
+        numbers, costs = self._nearest(self._by_colour(coefficients))
+        if self.options.steadiness:
+            changes = self.candidates.detail_distances
+            if self.options.together:
+                changes = changes.sum(axis=0, keepdims=True)
+            path = best_sequence(costs, numbers, np.float32(self.options.steadiness) * changes)
+        else:
+            path = numbers[:, :, 0]
+        return np.broadcast_to(path, (len(COLOURS), path.shape[1])).T.copy()
+
+    def pictures(self, coefficients: Values, chosen: Index) -> Pictures:
+        """Return the pictures [shape=(T, H, W, 3)] of eigenlips [shape=(T, 3·K)] with the detail of candidates.
+
+        chosen : of ``choose``, or a part of it: pictures of long speech are made a few frames at a time
+        Raises InputError: another number of coefficients.
+        Source: Xie & Liu 2007, Eq. 16.
+        """
+        levels = self.eigenlips.expand(coefficients)
+        if (chosen == chosen[:, :1]).all():
+            levels += self.candidates.details[chosen[:, 0]]
+        else:
+            for colour in range(len(COLOURS)):
+                levels[..., colour] += self.candidates.details[chosen[:, colour], :, :, colour]
+        np.rint(levels, out=levels)
+        return np.clip(levels, 0, 255, out=levels).astype(np.uint8)
+
+    def _by_colour(self, coefficients: Values) -> Costs:
+        """Return coefficients of each colour [shape=(3, T, K)]. Raises InputError: as ``choose``."""
+        wanted = len(self.eigenlips.channels)
+        if coefficients.ndim != 2 or coefficients.shape[1] != wanted or not np.isfinite(coefficients).all():
+            raise InputError(
+                f"coefficients of shape {coefficients.shape}, required finite ones of shape (T, {wanted}), "
+                "as Eigenlips.project gives them"
+            )
+        return np.stack(np.split(coefficients.astype(np.float32), len(COLOURS), axis=1))
+
+    def _nearest(self, wanted: Costs) -> tuple[Index, Costs]:
+        """Return the nearest candidates of each frame, nearest first, and their costs [each shape=(C, T, n)].
+
+        C is 1 if all colours have one candidate, otherwise 3; n is the number of neighbours.
+        """
+        count = min(self.options.neighbours, len(self.candidates))
+        frames = wanted.shape[1]
+        rows = 1 if self.options.together else len(COLOURS)
+        numbers, costs = np.empty((rows, frames, count), np.intp), np.empty((rows, frames, count), np.float32)
+        for start in range(0, frames, BLOCK):
+            part = slice(start, start + BLOCK)
+            pairs = zip(wanted[:, part], self.candidates.by_colour, strict=True)
+            distances = np.stack([squared_distances(frame, candidate) for frame, candidate in pairs])
+            if self.options.together:
+                distances = distances.sum(axis=0, keepdims=True)
+            least = np.argpartition(distances, count - 1, axis=2)[:, :, :count]
+            order = np.argsort(np.take_along_axis(distances, least, axis=2), axis=2, kind="stable")
+            numbers[:, part] = np.take_along_axis(least, order, axis=2)
+            costs[:, part] = np.take_along_axis(distances, numbers[:, part], axis=2)
+        return numbers, costs
+
+
+def best_sequence(costs: Costs, numbers: Index, changes: Costs) -> Index:
+    """Return the cheapest sequence of candidates, for each of some searches at once [shape=(C, T)].
+
+    costs   : of every choice [shape=(C, T, n)]
+    numbers : the candidates that are the choices [shape=(C, T, n)]
+    changes : cost of going from one candidate to another [shape=(C, N, N)]
+    Cost: O(C·T·n²).
+    """
+    searches, frames, count = costs.shape
+    if not frames:
+        return np.zeros((searches, 0), np.intp)
+    before = np.zeros((frames, searches, count), np.intp)
+    row = np.arange(searches)[:, None]
+    total = costs[:, 0].astype(np.float64)
+    for frame in range(1, frames):
+        steps = changes[row[:, :, None], numbers[:, frame, :, None], numbers[:, frame - 1, None, :]] + total[:, None, :]
+        before[frame] = steps.argmin(axis=2)
+        total = np.take_along_axis(steps, before[frame][:, :, None], axis=2)[:, :, 0] + costs[:, frame]
+    place = total.argmin(axis=1)
+    path = np.empty((searches, frames), np.intp)
+    for frame in range(frames - 1, -1, -1):
+        path[:, frame] = numbers[row[:, 0], frame, place]
+        place = before[frame, row[:, 0], place]
+    return path
+
+
+def moving_average(coefficients: Values, frames: int = FILTER_FRAMES) -> NDArray[np.float64]:
+    """Return curves [shape=(T, C)] smoothed by a moving average, at the frame rate of the video.
+
+    frames : its width, odd; at the ends it is narrower, so that it stays centred
+    Raises InputError: a width that is even or below 1, or no table of curves.
+    Source: Xie & Liu 2007, §6.
+    """
+    if frames < 1 or frames % 2 == 0:
+        raise InputError(f"a moving average of {frames} frames, required an odd number from 1")
+    if coefficients.ndim != 2:
+        raise InputError(f"curves of shape {coefficients.shape}, required (T, C)")
+    count = len(coefficients)
+    sums = np.concatenate([np.zeros((1, coefficients.shape[1])), np.cumsum(coefficients, axis=0, dtype=np.float64)])
+    middle = np.arange(count)
+    half = np.minimum(frames // 2, np.minimum(middle, count - 1 - middle))
+    averages: NDArray[np.float64] = (sums[middle + half + 1] - sums[middle - half]) / (2 * half + 1)[:, None]
+    return averages

@@ -1,0 +1,155 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from appearance.test_eigenlips import pictures
+from lipmotion.appearance.candidates import (
+    Candidates,
+    candidates_arrays,
+    candidates_from_arrays,
+    choose_candidates,
+    make_candidates,
+    squared_distances,
+)
+from lipmotion.appearance.eigenlips import Eigenlips, fit_eigenlips
+from lipmotion.errors import InputError, ModelFormatError
+from lipmotion.storage.archive import read_archive, write_archive
+
+HELD_OUT = pictures(count=160)[120:]
+
+
+@pytest.fixture
+def space() -> Eigenlips:
+    return fit_eigenlips(pictures(count=160)[:120], 4)
+
+
+def mouths(seed: int = 0) -> np.ndarray:
+    """Coefficients of a mouth that is mostly still, sometimes moves, and rarely opens wide."""
+    draw = np.random.default_rng(seed)
+    rare = draw.normal(0, 1, (8, 6)) + 60
+    return np.concatenate([draw.normal(0, 1, (900, 6)), draw.normal(0, 8, (300, 6)), rare]).astype(np.float32)
+
+
+def coverage(values: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+    """Distance of every mouth to the nearest chosen one: the definition."""
+    return np.array([np.sqrt(np.square(values[chosen] - value).sum(axis=1)).min() for value in values])
+
+
+def test_chosen_mouths_cover_the_others_better_than_evenly_spaced_and_random_ones() -> None:
+    values = mouths()
+    ours = coverage(values, choose_candidates(values, 60))
+    even = coverage(values, np.linspace(0, len(values) - 1, 60).round().astype(int))
+    drawn = coverage(values, np.random.default_rng(0).choice(len(values), 60, replace=False))
+    for others in (even, drawn):
+        assert ours.mean() < others.mean()
+        assert ours.max() < 0.9 * others.max()
+
+
+def test_the_choice_is_ascending_distinct_and_repeatable() -> None:
+    chosen = choose_candidates(mouths(), 50)
+    assert (np.diff(chosen) > 0).all()
+    assert 45 <= len(chosen) <= 50
+    assert np.array_equal(chosen, choose_candidates(mouths(), 50))
+
+
+def test_all_are_chosen_where_there_are_few_and_equal_ones_once() -> None:
+    few = mouths()[:7]
+    assert choose_candidates(few, 500).tolist() == list(range(7))
+    assert len(choose_candidates(np.repeat(few, 3, axis=0), 500)) == 7
+    assert len(choose_candidates(np.ones((5, 3)), 3)) == 1
+
+
+def test_more_candidates_than_a_block_of_mouths(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = choose_candidates(mouths(), 40)
+    monkeypatch.setattr("lipmotion.appearance.candidates.BLOCK", 17)
+    assert np.array_equal(choose_candidates(mouths(), 40), whole)
+
+
+@pytest.mark.parametrize(
+    ("values", "count", "says"),
+    [
+        (np.zeros((0, 6)), 5, r"shape \(0, 6\), required finite"),
+        (np.zeros(6), 5, r"shape \(6,\)"),
+        (np.full((4, 6), np.nan), 5, "finite"),
+        (np.zeros((4, 6)), 0, "0 candidate mouths asked for, required at least 1"),
+    ],
+)
+def test_what_nothing_can_be_chosen_from(values: np.ndarray, count: int, says: str) -> None:
+    with pytest.raises(InputError, match=says):
+        choose_candidates(values, count)
+
+
+def test_squared_distances_are_those_of_the_definition() -> None:
+    some, others = mouths(1)[:9], mouths(2)[:5]
+    expected = [[float(np.square(a.astype(float) - b).sum()) for b in others] for a in some]
+    assert squared_distances(some, others) == pytest.approx(np.array(expected), rel=1e-4, abs=1e-2)
+
+
+def test_a_candidate_is_its_eigenlips_and_its_detail(space: Eigenlips) -> None:
+    images = HELD_OUT[:20]
+    candidates = make_candidates(space, images)
+    assert (len(candidates), candidates.size) == (20, (9, 12))
+    again = np.rint(space.expand(candidates.coefficients) + candidates.details)
+    assert np.abs(again - images).max() <= 1
+    detail_coefficients = np.stack(
+        [candidates.details[..., c].reshape(20, -1).astype(float) @ space.basis[c].T for c in range(3)]
+    )
+    assert np.abs(detail_coefficients).max() < 3  # of rounding alone: detail has no part in the space of the eigenlips
+
+
+def test_a_damaged_picture_is_no_candidate(space: Eigenlips) -> None:
+    images = HELD_OUT[:20].copy()
+    images[7, :3, :3] = 255, 0, 255
+    candidates = make_candidates(space, images)
+    assert len(candidates) == 19
+    assert np.array_equal(candidates.coefficients, make_candidates(space, np.delete(images, 7, axis=0)).coefficients)
+    with pytest.raises(InputError, match=r"1 pictures, all of which differ .* more than 100 grey levels"):
+        make_candidates(space, images[7:8])
+
+
+def test_distances_between_details(space: Eigenlips) -> None:
+    candidates = make_candidates(space, HELD_OUT[:6])
+    details = candidates.details.astype(float)
+    for colour in range(3):
+        expected = [[np.square(a - b).sum() for b in details[..., colour]] for a in details[..., colour]]
+        assert candidates.detail_distances[colour] == pytest.approx(np.array(expected), abs=1e-1)
+
+
+def test_through_a_file(space: Eigenlips, tmp_path) -> None:
+    candidates = make_candidates(space, HELD_OUT[:20])
+    write_archive(tmp_path / "c", {}, candidates_arrays(candidates))
+    again = candidates_from_arrays(read_archive(tmp_path / "c"), space)
+    assert np.array_equal(again.coefficients, candidates.coefficients)
+    assert np.array_equal(again.details, candidates.details)
+
+
+DETAILS, COEFFICIENTS = "candidate_details", "candidate_coefficients"
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "says"),
+    [
+        (DETAILS, lambda a: a[:-1], "shape"),
+        (DETAILS, lambda a: a[:, :-1], r"required \(20, 9, 12, 3\)"),
+        (DETAILS, lambda a: a.astype(np.int64) + 1000, "required -100 to 100"),
+        (DETAILS, lambda a: a.astype(float), "whole numbers"),
+        (COEFFICIENTS, lambda a: a[:, :-1], "shape"),
+        (COEFFICIENTS, lambda a: a * np.nan, "not finite"),
+        (COEFFICIENTS, lambda a: np.full_like(a, 1e7), "required -1e"),
+        (COEFFICIENTS, lambda a: a[:0], "at least one"),
+    ],
+)
+def test_hostile_arrays_are_refused(space: Eigenlips, name: str, change, says: str) -> None:
+    arrays = candidates_arrays(make_candidates(space, HELD_OUT[:20]))
+    with pytest.raises(ModelFormatError, match=f"candidate mouths are damaged.*{says}.*; build them again"):
+        candidates_from_arrays(arrays | {name: change(arrays[name])}, space)
+
+
+def test_missing_and_unknown_arrays_are_refused(space: Eigenlips) -> None:
+    arrays = candidates_arrays(make_candidates(space, HELD_OUT[:20]))
+    with pytest.raises(ModelFormatError, match="candidate mouths are damaged"):
+        candidates_from_arrays({DETAILS: arrays[DETAILS]}, space)
+    with pytest.raises(ModelFormatError, match="undeclared"):
+        candidates_from_arrays(arrays | {"more": np.zeros(1)}, space)
+    assert isinstance(candidates_from_arrays(arrays, space), Candidates)

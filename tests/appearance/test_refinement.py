@@ -1,0 +1,189 @@
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+import pytest
+
+from appearance.test_eigenlips import pictures
+from lipmotion.appearance.candidates import choose_candidates, make_candidates
+from lipmotion.appearance.eigenlips import Eigenlips, fit_eigenlips
+from lipmotion.appearance.refinement import PAPER, RefinementOptions, Refiner, best_sequence, moving_average
+from lipmotion.corpora.store import Corpus
+from lipmotion.errors import InputError
+from lipmotion.stats.pca import fit_pca
+
+TRAINING, HELD_OUT = np.split(pictures(count=160), [120])
+
+
+@pytest.fixture
+def space() -> Eigenlips:
+    return fit_eigenlips(TRAINING, 4)
+
+
+@pytest.fixture
+def refiner(space: Eigenlips) -> Refiner:
+    return Refiner(space, make_candidates(space, TRAINING[::4]), PAPER)
+
+
+def test_the_paper_frame_by_frame(space: Eigenlips, refiner: Refiner) -> None:
+    """Eqs. 14 to 16 as printed, with coefficients of all dimensions, one colour and frame at a time."""
+    training, wanted = TRAINING, space.project(HELD_OUT[:6])
+    result = refiner.refine(wanted).astype(float)
+    for colour in range(3):
+        values = training[..., colour].reshape(120, -1)
+        basis = fit_pca(values, 108).basis
+        g = (values[::4] - space.mean[colour]) @ basis.T  # Eq. 14
+        for frame in range(6):
+            first = wanted[frame, 4 * colour : 4 * colour + 4]
+            j = np.linalg.norm(first - g[:, :4], axis=1).argmin()  # Eq. 15
+            expected = space.mean[colour] + np.concatenate([first, g[j, 4:]]) @ basis  # Eq. 16
+            assert result[frame, :, :, colour].ravel() == pytest.approx(np.clip(expected, 0, 255), abs=1.1)
+
+
+@pytest.mark.parametrize("options", [PAPER, RefinementOptions(steadiness=0.0, neighbours=1)])
+def test_a_candidate_comes_back_whole(space: Eigenlips, options: RefinementOptions) -> None:
+    images = TRAINING[::4]
+    refiner = Refiner(space, make_candidates(space, images), options)
+    coefficients = space.project(images)
+    assert np.abs(refiner.refine(coefficients).astype(int) - images).max() <= 1
+    assert np.abs(space.restore(coefficients).astype(int) - images).max() > 4  # which eigenlips alone do not give
+
+
+def test_one_candidate_for_all_colours(space: Eigenlips, refiner: Refiner) -> None:
+    wanted = space.project(HELD_OUT[:40])
+    apart, together = refiner.choose(wanted), Refiner(space, refiner.candidates).choose(wanted)
+    assert (apart != apart[:, :1]).any()
+    assert (together == together[:, :1]).all()
+    nearest = Refiner(space, refiner.candidates, RefinementOptions(steadiness=0.0)).choose(wanted)[:, 0]
+    distances = np.square(wanted[:, None] - refiner.candidates.coefficients).sum(axis=2)
+    assert np.array_equal(nearest, distances.argmin(axis=1))
+
+
+@pytest.mark.parametrize("together", [False, True])
+def test_the_search_finds_the_cheapest_of_all_sequences(space: Eigenlips, together: bool) -> None:
+    candidates = make_candidates(space, TRAINING[:5])
+    options = RefinementOptions(together, steadiness=2.0, neighbours=5)
+    wanted = space.project(HELD_OUT[:4])
+    chosen = Refiner(space, candidates, options).choose(wanted)
+    low = [
+        np.square(a[:, None] - b).sum(axis=2) for a, b in zip(np.split(wanted, 3, 1), candidates.by_colour, strict=True)
+    ]
+    for colours in ([0, 1, 2],) if together else ([0], [1], [2]):
+
+        def cost(path: tuple[int, ...], colours: list[int] = colours) -> float:
+            near = sum(low[c][t, j] for c in colours for t, j in enumerate(path))
+            change = sum(candidates.detail_distances[c][path[t - 1], path[t]] for c in colours for t in range(1, 4))
+            return float(near + 2.0 * change)
+
+        least = min(cost(path) for path in product(range(5), repeat=4))
+        assert cost(tuple(chosen[:, colours[0]])) == pytest.approx(least, rel=1e-4)
+
+
+def test_a_steadier_sequence_changes_detail_less(space: Eigenlips) -> None:
+    candidates = make_candidates(space, TRAINING[::4])
+    draw = np.random.default_rng(0)
+    wanted = space.project(HELD_OUT)[:30].repeat(2, axis=0) + draw.normal(0, 30, (60, 12))
+    changes = []
+    for steadiness in (0.0, 1.0, 10.0):
+        chosen = Refiner(space, candidates, RefinementOptions(steadiness=steadiness)).choose(wanted)[:, 0]
+        changes.append(candidates.detail_distances.sum(axis=0)[chosen[:-1], chosen[1:]].sum())
+    assert changes[0] > changes[1] > changes[2]
+
+
+def test_parts_of_a_video_are_those_of_the_whole(space: Eigenlips, refiner: Refiner) -> None:
+    wanted = space.project(HELD_OUT[:30])
+    steady = Refiner(space, refiner.candidates)
+    chosen, whole = steady.choose(wanted), steady.refine(wanted)
+    parts = [steady.pictures(wanted[part], chosen[part]) for part in (slice(0, 11), slice(11, 30))]
+    assert np.abs(np.concatenate(parts).astype(int) - whole).max() <= 1  # products of other sizes may round otherwise
+
+
+def test_blocks_of_distances_do_not_matter(space: Eigenlips, refiner: Refiner, monkeypatch: pytest.MonkeyPatch) -> None:
+    wanted = space.project(HELD_OUT[:30])
+    whole = refiner.choose(wanted)
+    monkeypatch.setattr("lipmotion.appearance.refinement.BLOCK", 7)
+    assert np.array_equal(refiner.choose(wanted), whole)
+
+
+@pytest.mark.parametrize("options", [PAPER, RefinementOptions()])
+@pytest.mark.parametrize("count", [0, 1, 2])
+def test_short_videos(space: Eigenlips, refiner: Refiner, options: RefinementOptions, count: int) -> None:
+    result = Refiner(space, refiner.candidates, options).refine(space.project(HELD_OUT[:2])[:count])
+    assert (result.shape, result.dtype) == ((count, 9, 12, 3), np.uint8)
+
+
+def test_far_coefficients_stay_within_black_and_white(refiner: Refiner) -> None:
+    result = refiner.refine(np.array([[1e5] * 12, [-1e5] * 12]))
+    assert {0, 255} <= set(np.unique(result))
+
+
+def test_a_change_is_worth_its_cost() -> None:
+    costs = np.array([[[0.0, 5.0], [3.0, 0.0], [0.0, 5.0]]], np.float32)
+    numbers = np.tile([0, 1], (1, 3, 1))
+    change = np.array([[[0.0, 1.0], [1.0, 0.0]]], np.float32)
+    assert best_sequence(costs, numbers, change).tolist() == [[0, 1, 0]]
+    assert best_sequence(costs, numbers, 2 * change).tolist() == [[0, 0, 0]]
+
+
+@pytest.mark.parametrize(
+    ("values", "says"),
+    [
+        (np.zeros((2, 11)), r"shape \(2, 11\), required finite ones of shape \(T, 12\)"),
+        (np.zeros(12), "shape"),
+        (np.full((2, 12), np.inf), "finite"),
+    ],
+)
+def test_coefficients_that_are_none(refiner: Refiner, values: np.ndarray, says: str) -> None:
+    with pytest.raises(InputError, match=says):
+        refiner.refine(values)
+
+
+def test_candidates_of_other_eigenlips(refiner: Refiner) -> None:
+    with pytest.raises(InputError, match="make them with the same eigenlips"):
+        Refiner(fit_eigenlips(pictures(), 5), refiner.candidates)
+    with pytest.raises(InputError, match="make them with the same eigenlips"):
+        Refiner(fit_eigenlips(pictures(height=8), 4), refiner.candidates)
+
+
+@pytest.mark.parametrize("options", [{"steadiness": -1.0}, {"steadiness": np.nan}, {"neighbours": 0}])
+def test_options_that_mean_nothing(options: dict[str, float]) -> None:
+    with pytest.raises(InputError, match="required"):
+        RefinementOptions(**options)  # type: ignore[arg-type]
+
+
+def test_the_moving_average_is_that_of_the_definition() -> None:
+    values = np.random.default_rng(0).normal(0, 100, (9, 2))
+    for frames in (1, 3, 5, 21):
+        averages = moving_average(values, frames)
+        for t in range(9):
+            half = min(frames // 2, t, 8 - t)
+            assert averages[t] == pytest.approx(values[t - half : t + half + 1].mean(axis=0))
+    assert moving_average(np.zeros((0, 2))).shape == (0, 2)
+    for frames in (0, 2, -1):
+        with pytest.raises(InputError, match="required an odd number"):
+            moving_average(values, frames)
+    with pytest.raises(InputError, match="curves of shape"):
+        moving_average(values[:, 0])
+
+
+def test_the_mouths_of_a_corpus_become_sharper(toy_corpus: Corpus) -> None:
+    crops = {split: mouths(toy_corpus, split) for split in ("train", "val")}
+    space = fit_eigenlips(crops["train"][::4], 2)
+    known = space.project(crops["train"])
+    refiner = Refiner(space, make_candidates(space, crops["train"][choose_candidates(known, 100)]))
+    wanted = space.project(crops["val"])
+    true, blurred, refined = map(edges, (crops["val"], space.restore(wanted), refiner.refine(wanted)))
+    assert blurred < 0.97 * true
+    assert abs(refined - true) < 0.5 * (true - blurred)
+
+
+def mouths(corpus: Corpus, split: str) -> np.ndarray:
+    """The mouth pictures of all utterances of a split."""
+    tracks = [corpus.utterance(name).track for name in corpus.names(split)]
+    return np.concatenate([track.crops for track in tracks if track.crops is not None])
+
+
+def edges(images: np.ndarray) -> float:
+    """The energy of the gradient."""
+    return float(sum(np.square(np.diff(images.astype(float), axis=axis)).mean() for axis in (1, 2)))
