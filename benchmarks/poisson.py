@@ -64,7 +64,9 @@ def figures(width: int, height: int, name: str, mask: NDArray[np.bool_], frames:
     for _ in range(rounds):
         ours.append(timed(lambda: system.clone(source, background))[1] / frames)
         opencv.append(
-            timed(lambda: [cv2.seamlessClone(source[t], framed[t], whole, centre, cv2.NORMAL_CLONE) for t in range(8)])[1]
+            timed(lambda: [cv2.seamlessClone(source[t], framed[t], whole, centre, cv2.NORMAL_CLONE) for t in range(8)])[
+                1
+            ]
             / 8
         )
         sparse.append(timed(lambda: direct.clone(source[0], background[0]))[1])

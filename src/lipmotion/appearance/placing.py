@@ -67,12 +67,8 @@ def resampling(
     x, y = to_source[:, :2] @ np.stack([columns, rows]) + to_source[:, 2:]
     offsets = np.arange(2) if kind == "linear" else np.arange(-1, 3)
     near = [np.floor(values).astype(np.intp)[:, None] + offsets for values in (y, x)]
-    weights = [
-        _weights(np.abs(values[:, None] - pixels), kind) for values, pixels in zip((y, x), near, strict=True)
-    ]
-    near_rows, near_columns = (
-        np.clip(pixels, 0, length - 1) for pixels, length in zip(near, source_size, strict=True)
-    )
+    weights = [_weights(np.abs(values[:, None] - pixels), kind) for values, pixels in zip((y, x), near, strict=True)]
+    near_rows, near_columns = (np.clip(pixels, 0, length - 1) for pixels, length in zip(near, source_size, strict=True))
     index = near_rows[:, :, None] * source_size[1] + near_columns[:, None, :]
     weight = weights[0][:, :, None] * weights[1][:, None, :]
     count = len(x)

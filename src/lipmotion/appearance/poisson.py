@@ -1,7 +1,7 @@
 """Poisson cloning: a region of one picture in another one, with the gradient of the first and the edge of the second.
 
-Inside the region the result u has the Laplacian of the source s; on the edge it is the background b. So u = s + e, and e
-is the solution of the Laplace equation whose values on the edge are b − s: a membrane. It depends only on the edge.
+Inside the region the result u has the Laplacian of the source s; on the edge it is the background b. So u = s + e, and
+e is the solution of the Laplace equation whose values on the edge are b − s: a membrane. It depends only on the edge.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Pictures = NDArray[np.uint8] | NDArray[np.floating[Any]]
 
 COLOURS = 3
 LARGEST_EDGE = 2048
-"""Largest number of pixels on the edge of a region. The matrix of a region grows with the square; here it has 100 MB."""
+"""Largest number of pixels on the edge of a region. The matrix grows with its square; with so many it has 100 MB."""
 CHUNK = 1 << 17
 """About the number of pixels that are interpolated at once: what fits into the cache of a processor."""
 BATCH = 64
@@ -70,7 +70,7 @@ class CloningSystem:
         Inside the region the gradient of the result is that of the source; outside it the result is the background.
         At the end values are rounded and cut to 0 to 255.
         Raises InputError: pictures of another shape, number or type than required, or values that are not finite.
-        Source: Pérez et al. 2003, Eqs. 7–8 (the technique of Xie & Liu 2007, §6), with the gradient of the source alone.
+        Source: Pérez et al. 2003, Eq. 7 (the technique of Xie & Liu 2007, §6), with the gradient of the source alone.
         Deviation: the membrane is solved at the nodes of nested grids and interpolated (error: docs/results/video.md).
         Cost: a product of K · B · 3 multiplications a picture, and about ten passes over the box.
         """
