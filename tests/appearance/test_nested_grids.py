@@ -24,7 +24,7 @@ def test_filling_is_the_matrix(shape: tuple[int, int], colours: int) -> None:
         filled = filler.fill(values)
         for t in range(count):
             expected = (matrix @ values[t]).reshape(*shape, colours)
-            assert filled[t][grids.region] == pytest.approx(expected[grids.region], abs=1e-5)
+            assert np.abs(filled[t] - expected)[grids.region].max() < 1e-5
 
 
 def test_each_pixel_of_the_region_is_made_of_nodes_with_weights_of_sum_one() -> None:

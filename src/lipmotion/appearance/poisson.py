@@ -75,7 +75,8 @@ class CloningSystem:
         Cost: a product of K · B · 3 multiplications a picture, and about ten passes over the box.
         """
         self._check(source, background)
-        result = background.copy() if background.dtype == np.uint8 else _grey_levels(background.astype(np.float32))
+        whole = background.dtype == np.uint8
+        result = background.astype(np.uint8) if whole else _grey_levels(background.astype(np.float32))
         new, old = (pictures[(slice(None), *self.box)] for pictures in (source, result))
         for frames, membrane in self._membranes(source, background):
             np.add(membrane, new[frames], out=membrane, casting="same_kind")
