@@ -1,0 +1,188 @@
+"""Poisson cloning: a region of one picture in another one, with the gradient of the first and the edge of the second.
+
+Inside the region the result u has the Laplacian of the source s; on the edge it is the background b. So u = s + e, and
+e is the solution of the Laplace equation whose values on the edge are b − s: a membrane. It depends only on the edge.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.appearance.nested_grids import GridFiller, NestedGrids, nested_grids
+from lipmotion.errors import InputError
+from lipmotion.kernels.threads import one_thread
+
+Mask = NDArray[np.bool_]
+Index = NDArray[np.intp]
+Pictures = NDArray[np.uint8] | NDArray[np.floating[Any]]
+
+COLOURS = 3
+LARGEST_EDGE = 2048
+"""Largest number of pixels on the edge of a region. The matrix grows with its square; with so many it has 100 MB."""
+CHUNK = 1 << 17
+"""About the number of pixels that are interpolated at once: what fits into the cache of a processor."""
+BATCH = 64
+"""Number of pictures that are solved at once."""
+
+
+@dataclass(frozen=True, eq=False)
+class CloningSystem:
+    """The Poisson equation of one region, solved for any pictures by one matrix product; made by ``cloning_system``.
+
+    mask     : bool array [shape=(h, w)], the pixels that cloning replaces
+    box      : the rows and the columns of the region and its edge
+    edge     : pixels of the box outside the region with a neighbour in it [shape=(B,)], counted row by row
+    outside  : pixels of the box outside the region [shape=(O,)], the edge among them
+    grids    : nodes at which the equation is solved, in the box
+    response : float32 array [shape=(K, B)], the membrane at every node for a difference of 1 at each pixel of the edge
+    """
+
+    mask: Mask
+    box: tuple[slice, slice]
+    edge: Index
+    outside: Index
+    grids: NestedGrids
+    response: NDArray[np.float32]
+
+    def correction(self, source: Pictures, background: Pictures) -> NDArray[np.float32]:
+        """Return what cloning adds to the source: float32 array [shape=(T, h, w, 3)], grey levels.
+
+        source, background : pictures [shape=(T, h, w, 3)], grey levels, uint8 or float
+        In the region this is the membrane; outside it, the background minus the source.
+        Raises InputError: as ``clone``.
+        """
+        self._check(source, background)
+        result = np.subtract(background, source, dtype=np.float32)
+        part = result[(slice(None), *self.box)]
+        for frames, membrane in self._membranes(source, background):
+            np.copyto(part[frames], membrane, where=self.grids.region[..., None])
+        return result
+
+    def clone(self, source: Pictures, background: Pictures) -> NDArray[np.uint8]:
+        """Return the background with the region cloned from the source: uint8 array [shape=(T, h, w, 3)].
+
+        source, background : pictures [shape=(T, h, w, 3)], grey levels (0 to 255), uint8 or float
+        Inside the region the gradient of the result is that of the source; outside it the result is the background.
+        At the end values are rounded and cut to 0 to 255.
+        Raises InputError: pictures of another shape, number or type than required, or values that are not finite.
+        Source: Pérez et al. 2003, Eq. 7 (the technique of Xie & Liu 2007, §6), with the gradient of the source alone.
+        Deviation: the membrane is solved at the nodes of nested grids and interpolated (error: docs/results/video.md).
+        Cost: a product of K · B · 3 multiplications a picture, and about ten passes over the box.
+        """
+        self._check(source, background)
+        whole = background.dtype == np.uint8
+        result = background.astype(np.uint8) if whole else _grey_levels(background.astype(np.float32))
+        new, old = (pictures[(slice(None), *self.box)] for pictures in (source, result))
+        for frames, membrane in self._membranes(source, background):
+            np.add(membrane, new[frames], out=membrane, casting="same_kind")
+            cloned = _grey_levels(membrane)
+            flat = cloned.reshape(len(cloned), -1, COLOURS)
+            flat[:, self.outside] = old[frames].reshape(flat.shape)[:, self.outside]
+            old[frames] = cloned
+        return result
+
+    def _membranes(self, source: Pictures, background: Pictures) -> Iterator[tuple[slice, NDArray[np.float32]]]:
+        """Yield slices of the pictures and their membranes in the box [shape=(t, H, W, 3)], valid in the region."""
+        height, width = self.grids.region.shape
+        step = max(1, min(CHUNK // (height * width), len(source)))
+        filler = GridFiller(self.grids, step, COLOURS)
+        for first in range(0, len(source), BATCH):
+            values = self._at_nodes(source[first : first + BATCH], background[first : first + BATCH])
+            for start in range(0, len(values), step):
+                part = values[start : start + step]
+                yield slice(first + start, first + start + len(part)), filler.fill(part)
+
+    @one_thread()
+    def _at_nodes(self, source: Pictures, background: Pictures) -> NDArray[np.float32]:
+        """Return the membranes of some pictures at the nodes [shape=(t, K, 3)]."""
+        rows, columns = self.edge // self.grids.region.shape[1], self.edge % self.grids.region.shape[1]
+        at = slice(None), rows + self.box[0].start, columns + self.box[1].start
+        difference = np.subtract(background[at], source[at], dtype=np.float32).swapaxes(0, 1)
+        product = self.response @ difference.reshape(len(self.edge), -1)
+        return np.ascontiguousarray(product.reshape(len(product), -1, COLOURS).swapaxes(0, 1))
+
+    def _check(self, source: Pictures, background: Pictures) -> None:
+        for name, pictures in (("source", source), ("background", background)):
+            if pictures.ndim != 4 or pictures.shape[1:] != (*self.mask.shape, COLOURS):
+                raise InputError(
+                    f"{name} of shape {pictures.shape}, required (T, {self.mask.shape[0]}, {self.mask.shape[1]}, "
+                    f"{COLOURS}); make a system from a mask of the pictures' size"
+                )
+            if pictures.dtype != np.uint8 and pictures.dtype.kind != "f":
+                raise InputError(f"{name} of type {pictures.dtype}, required uint8 or float, grey levels from 0 to 255")
+            if pictures.dtype != np.uint8 and not np.isfinite(pictures).all():
+                raise InputError(f"{name} with values that are not finite; required: grey levels from 0 to 255")
+        if len(source) != len(background):
+            raise InputError(f"{len(source)} source and {len(background)} background pictures; give as many of each")
+
+
+def cloning_system(mask: Mask) -> CloningSystem:
+    """Return the equation of a region, solved once for all pictures.
+
+    mask : bool array [shape=(h, w)], True in the region; any shape, in several parts, with holes
+    The outermost pixels of the picture never belong to the region: they have no neighbours that could hold it.
+    Raises InputError: not such an array, no pixel in the region, or an edge of more than ``LARGEST_EDGE`` pixels.
+    Cost: a sparse factorisation, and one solution for each pixel of the edge (seconds: docs/results/video.md).
+    """
+    if mask.ndim != 2 or mask.dtype != np.bool_:
+        raise InputError(f"mask of shape {mask.shape} and type {mask.dtype}, required (h, w) and bool")
+    inner = np.zeros_like(mask)
+    inner[1:-1, 1:-1] = mask[1:-1, 1:-1]
+    if not inner.any():
+        raise InputError(
+            f"mask of {mask.shape[0]} × {mask.shape[1]} pixels, {int(mask.sum())} of them True, none of these inside; "
+            "required: a True pixel that is not an outermost pixel of the picture"
+        )
+    rows, columns = (np.flatnonzero(inner.any(axis=axis)) for axis in (1, 0))
+    box = slice(int(rows[0]) - 1, int(rows[-1]) + 2), slice(int(columns[0]) - 1, int(columns[-1]) + 2)
+    region = inner[box]
+    edge = np.flatnonzero(_neighbours(region) & ~region)
+    if len(edge) > LARGEST_EDGE:
+        raise InputError(
+            f"region with {len(edge)} pixels on its edge, at most {LARGEST_EDGE} are possible; "
+            "use a smaller or smoother mask"
+        )
+    grids = nested_grids(region)
+    return CloningSystem(inner, box, edge, np.flatnonzero(~region), grids, _response(grids, edge))
+
+
+def _response(grids: NestedGrids, edge: Index) -> NDArray[np.float32]:
+    """Return the membrane at the nodes for a difference of 1 at each pixel of the edge [shape=(K, B)].
+
+    Of all functions that the grids can interpolate, it is the one of the least energy (Galerkin's method).
+    """
+    from scipy.sparse import eye_array
+    from scipy.sparse.linalg import splu
+
+    count, width = grids.region.size, grids.region.shape[1]
+    laplacian = sum(
+        (-eye_array(count, k=offset, format="csr") for offset in (-width, -1, 1, width)),
+        4 * eye_array(count, format="csr"),
+    )
+    interpolation = grids.matrix()
+    tested = interpolation.T @ laplacian
+    factors = splu((tested @ interpolation).tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+    right = -tested.tocsc()[:, edge]
+    response = np.empty(right.shape, np.float32)
+    for start in range(0, len(edge), BATCH):
+        response[:, start : start + BATCH] = factors.solve(right[:, start : start + BATCH].toarray())
+    return response
+
+
+def _neighbours(region: Mask) -> Mask:
+    """Return the pixels above, below and beside those of a region that is False on its outermost pixels."""
+    found = np.zeros_like(region)
+    for axis in (0, 1):
+        found |= np.roll(region, 1, axis) | np.roll(region, -1, axis)
+    return found
+
+
+def _grey_levels(pictures: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """Return pictures as grey levels, rounded and cut to 0 to 255 [same shape]; the pictures are changed."""
+    np.rint(pictures, out=pictures)
+    return np.clip(pictures, 0, 255, out=pictures).astype(np.uint8)

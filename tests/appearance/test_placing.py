@@ -1,0 +1,105 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from lipmotion.appearance.placing import Kind, feather, inverse_map, place, resampling
+from lipmotion.errors import InputError
+
+TURNED = np.array([[0.7, -0.1, 12.3], [0.12, 0.68, 8.6]])
+
+
+def noise(shape: tuple[int, ...], seed: int = 0) -> np.ndarray:
+    return np.random.default_rng(seed).integers(0, 256, shape, np.uint8)
+
+
+@pytest.mark.parametrize("kind", ["linear", "cubic"])
+def test_nothing_moves_and_whole_pixels_move_exactly(kind: Kind) -> None:
+    pictures = noise((2, 20, 30, 3))
+    still = resampling(np.eye(2, 3), (20, 30), (20, 30), kind).apply(pictures)
+    assert still == pytest.approx(pictures, abs=1e-4)
+    moved = resampling(np.array([[1.0, 0, 4], [0, 1, 7]]), (20, 30), (10, 20), kind).apply(pictures)
+    assert moved == pytest.approx(pictures[:, 7:17, 4:24], abs=1e-4)
+
+
+@pytest.mark.parametrize(("kind", "power"), [("linear", 1), ("cubic", 2)])
+def test_smooth_functions_are_exact_between_pixels(kind: Kind, power: int) -> None:
+    def function(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return (3 + x - 2 * y) ** power
+
+    y, x = np.mgrid[:60, :60] / 60
+    made = resampling(TURNED, (60, 60), (40, 40), kind).apply(function(x, y)[None, :, :, None])[0, :, :, 0]
+    row, column = np.mgrid[:40, :40]
+    at_x, at_y = (TURNED[i, 0] * column + TURNED[i, 1] * row + TURNED[i, 2] for i in range(2))
+    assert made == pytest.approx(function(at_x / 60, at_y / 60), abs=1e-4)
+
+
+def test_pixels_outside_repeat_the_outermost() -> None:
+    pictures = noise((1, 6, 6, 3))
+    made = resampling(np.array([[1.0, 0, -4], [0, 1, -4]]), (6, 6), (14, 14)).apply(pictures)
+    assert made[0, :4, :4] == pytest.approx(np.broadcast_to(pictures[0, 0, 0], (4, 4, 3)), abs=1e-3)
+    assert made[0, 11:, 11:] == pytest.approx(np.broadcast_to(pictures[0, 5, 5], (3, 3, 3)), abs=1e-3)
+
+
+def test_opencv_interpolates_the_same_positions() -> None:
+    cv2 = pytest.importorskip("cv2")
+    y, x = np.mgrid[:60, :60]
+    picture = np.rint(127 + 90 * np.sin(x / 7)[..., None] * np.cos(y / 9)[..., None] * [1, 0.5, -1]).astype(np.uint8)
+    ours = resampling(TURNED, (60, 60), (40, 40), "linear").apply(picture[None])[0]
+    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+    theirs = cv2.warpAffine(picture.astype(np.float32), TURNED, (40, 40), flags=flags)
+    assert np.abs(ours - theirs).max() < 1  # OpenCV rounds positions to 1/32 px
+
+
+def test_there_and_back() -> None:
+    back = inverse_map(TURNED)
+    point = np.array([3.0, 5.0])
+    there = TURNED[:, :2] @ point + TURNED[:, 2]
+    assert back[:, :2] @ there + back[:, 2] == pytest.approx(point)
+
+
+def test_the_weight_rises_from_the_edge() -> None:
+    weight = feather(np.ones((30, 40), bool), 6)
+    middle = weight[15, :20]
+    assert weight.dtype == np.float32
+    assert (np.diff(middle[:6]) > 0).all()
+    assert middle[5:] == pytest.approx(1)
+    assert 0 < middle[0] < 0.1
+    assert not feather(np.zeros((5, 5), bool), 3).any()
+    with pytest.raises(InputError, match="at least 1"):
+        feather(np.ones((5, 5), bool), 0.5)
+
+
+def test_a_patch_is_placed_where_the_map_says() -> None:
+    frame = noise((60, 80, 3))
+    before = frame.copy()
+    patch = noise((10, 12, 3), 1)
+    weight = np.zeros((10, 12), np.float32)
+    weight[1:-1, 1:-1] = 1
+    place(frame, patch, weight, np.array([[1.0, 0, 30], [0, 1, 20]]))
+    assert (frame[21:29, 31:41] == patch[1:-1, 1:-1]).all()
+    frame[21:29, 31:41] = before[21:29, 31:41]
+    assert (frame == before).all()
+
+
+@pytest.mark.parametrize("corner", [(-5.5, -3.0), (75.2, 50.4), (-200.0, 10.0), (10.0, 300.0)])
+def test_the_part_outside_the_frame_is_left_out(corner: tuple[float, float]) -> None:
+    """As in a larger frame, of which the frame is a part."""
+    large = noise((160, 180, 3))
+    small = large[50:110, 50:130].copy()
+    patch, weight = noise((20, 24, 3), 1), feather(np.pad(np.ones((18, 22), bool), 1), 3)
+    turn = TURNED[:, :2]
+    place(small, patch, weight, np.column_stack([turn, corner]))
+    place(large, patch, weight, np.column_stack([turn, np.add(corner, 50)]))
+    assert (small == large[50:110, 50:130]).all()
+
+
+def test_what_does_not_fit_is_refused() -> None:
+    frame, patch, weight = noise((60, 80, 3)), noise((10, 12, 3)), np.ones((10, 12), np.float32)
+    with pytest.raises(InputError, match="weight of shape"):
+        place(frame, patch, weight[1:], TURNED)
+    for affine in (np.zeros((2, 3)), np.eye(3), np.full((2, 3), np.nan)):
+        with pytest.raises(InputError, match="affine map"):
+            place(frame, patch, weight, affine)
+    with pytest.raises(InputError, match="required"):
+        resampling(TURNED, (60, 60), (10, 10)).apply(noise((1, 61, 60, 3)))

@@ -1,0 +1,222 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lipmotion.appearance import poisson
+from lipmotion.appearance.mouth_region import HEIGHT, WIDTH
+from lipmotion.appearance.poisson import cloning_system
+from lipmotion.errors import InputError
+from oracles.membranes import cloned
+
+
+def ellipse(height: int = HEIGHT, width: int = WIDTH) -> np.ndarray:
+    y, x = np.mgrid[:height, :width]
+    return ((x + 0.5) / width - 0.5) ** 2 + ((y + 0.5) / height - 0.5) ** 2 < 0.23
+
+
+def two_parts_and_a_hole() -> np.ndarray:
+    mask = np.zeros((50, 70), bool)
+    mask[4:40, 5:38] = True
+    mask[15:20, 12:30] = False
+    mask[20:46, 44:65] = True
+    mask[10, 60] = True
+    return mask
+
+
+MASKS = {
+    "ellipse": ellipse(),
+    "whole patch": np.ones((HEIGHT, WIDTH), bool),
+    "large": ellipse(80, 100),
+    "parts": two_parts_and_a_hole(),
+    "one pixel": np.pad(np.ones((1, 1), bool), 3),
+    "a line": np.pad(np.ones((1, 40), bool), 2),
+    "smallest picture": np.ones((3, 3), bool),
+    "scattered": np.random.default_rng(3).random((30, 40)) < 0.6,
+}
+
+
+def noise(shape: tuple[int, ...], seed: int = 0) -> np.ndarray:
+    return np.random.default_rng(seed).integers(0, 256, shape, np.uint8)
+
+
+@pytest.mark.parametrize("name", MASKS)
+def test_the_result_is_within_one_grey_level_of_the_printed_equation(name: str) -> None:
+    system = cloning_system(MASKS[name])
+    source, background = (noise((2, *system.mask.shape, 3), seed) for seed in (1, 2))
+    result = system.clone(source, background)
+    assert result.dtype == np.uint8
+    for t in range(2):
+        exact = np.clip(np.rint(cloned(system.mask, source[t], background[t])), 0, 255)
+        assert np.abs(result[t] - exact).max() <= 1
+        assert (result[t][~system.mask] == background[t][~system.mask]).all()
+
+
+def test_mouths_of_a_film_are_within_one_grey_level_of_the_printed_equation() -> None:
+    """Pictures as of a camera: soft, lips darker and redder than skin, other light, some noise."""
+    y, x = np.mgrid[:HEIGHT, :WIDTH]
+    draw = np.random.default_rng(4)
+    pictures = []
+    for opening, light in ((1, 1.0), (9, 0.8)):
+        lips = np.exp(-(((x - 36) / 18) ** 4) - ((y - 26) / (5 + opening)) ** 4)[..., None]
+        skin = np.array([190, 140, 110]) * (1 - 0.004 * np.abs(x - 20))[..., None]
+        pictures.append(light * (skin - lips * [40, 70, 50]) + draw.normal(0, 3, (HEIGHT, WIDTH, 3)))
+    source, background = (np.rint(np.clip(each, 0, 255)).astype(np.uint8) for each in pictures)
+    system = cloning_system(MASKS["ellipse"])
+    exact = cloned(system.mask, source, background)
+    assert np.abs(exact - source)[system.mask].max() > 20
+    assert np.abs(system.clone(source[None], background[None])[0] - np.clip(np.rint(exact), 0, 255)).max() <= 1
+    assert np.abs(source + system.correction(source[None], background[None])[0] - exact).max() < 0.25
+
+
+@pytest.mark.recordings
+def test_recorded_mouths_are_within_one_grey_level_of_the_printed_equation(recordings: Path) -> None:
+    av = pytest.importorskip("av")
+    clips = recordings / "grid-s1" / "clips"
+    if not clips.is_dir():
+        pytest.skip("no GRID recordings")
+    with av.open(str(clips / "bbaf2n.mkv")) as container:
+        frames = np.stack([frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)])
+    mouths = frames[::9, 180 : 180 + HEIGHT, 145 : 145 + WIDTH]
+    source, background = mouths[1:], mouths[:-1]
+    system = cloning_system(MASKS["ellipse"])
+    result = system.clone(source, background)
+    for t in range(len(source)):
+        exact = np.clip(np.rint(cloned(system.mask, source[t], background[t])), 0, 255)
+        assert np.abs(result[t] - exact).max() <= 1
+
+
+@pytest.mark.parametrize("name", ["ellipse", "parts", "scattered"])
+def test_constants_and_linear_functions_are_reproduced(name: str) -> None:
+    """A difference on the edge that is linear in x and y has itself as its membrane, on every grid."""
+    system = cloning_system(MASKS[name])
+    height, width = system.mask.shape
+    y, x = np.mgrid[:height, :width] / max(height, width)
+    linear = np.stack([np.full_like(x, 40), 90 * x - 30 * y, 120 * y], axis=-1)[None]
+    source = noise(linear.shape).astype(float)
+    assert system.correction(source, source + linear) == pytest.approx(linear, abs=2e-3)
+
+
+def test_the_source_on_itself_stays() -> None:
+    system = cloning_system(MASKS["ellipse"])
+    pictures = noise((3, HEIGHT, WIDTH, 3))
+    assert (system.clone(pictures, pictures) == pictures).all()
+    assert np.abs(system.correction(pictures, pictures)).max() < 1e-6
+
+
+def test_another_colour_of_the_light_vanishes() -> None:
+    """A source that differs from the background by a colour alone gives the background, on both sides of the edge."""
+    system = cloning_system(MASKS["ellipse"])
+    background = np.random.default_rng(1).uniform(60, 190, (2, HEIGHT, WIDTH, 3))
+    result = system.clone(background + np.array([25.0, -30.0, 10.0]), background)
+    assert np.abs(result - background).max() <= 0.51
+
+
+def test_floats_and_grey_levels_give_the_same() -> None:
+    system = cloning_system(MASKS["parts"])
+    source, background = (noise((2, *system.mask.shape, 3), seed) for seed in (1, 2))
+    expected = system.clone(source, background)
+    assert (system.clone(source.astype(np.float32), background.astype(np.float64)) == expected).all()
+    assert (system.clone(source.astype(np.float64), background) == expected).all()
+    between = background + 0.4
+    kept = between.copy()
+    assert (system.clone(source, between)[:, ~system.mask] == background[:, ~system.mask]).all()
+    assert (between == kept).all()
+
+
+def test_the_inputs_stay_as_they_are() -> None:
+    system = cloning_system(MASKS["ellipse"])
+    source, background = (noise((2, HEIGHT, WIDTH, 3), seed) for seed in (1, 2))
+    copies = source.copy(), background.copy()
+    system.clone(source, background)
+    assert (source == copies[0]).all()
+    assert (background == copies[1]).all()
+
+
+def test_many_pictures_give_what_each_gives_alone() -> None:
+    system = cloning_system(MASKS["ellipse"])
+    count = poisson.BATCH + 7
+    source, background = (noise((count, HEIGHT, WIDTH, 3), seed) for seed in (1, 2))
+    together = system.correction(source, background)
+    for t in (0, 31, poisson.BATCH - 1, poisson.BATCH, count - 1):
+        alone = system.correction(source[t : t + 1], background[t : t + 1])[0]
+        assert together[t] == pytest.approx(alone, abs=1e-2)
+
+
+def test_no_pictures_give_none() -> None:
+    system = cloning_system(MASKS["ellipse"])
+    none = np.empty((0, HEIGHT, WIDTH, 3), np.uint8)
+    assert system.clone(none, none).shape == none.shape
+    assert system.correction(none, none).shape == none.shape
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 10**6), height=st.integers(3, 40), width=st.integers(3, 40), share=st.floats(0.1, 1))
+def test_the_membrane_lies_between_its_edge_values(seed: int, height: int, width: int, share: float) -> None:
+    """The maximum principle, up to the error of interpolation, and the printed equation, for masks of any kind."""
+    draw = np.random.default_rng(seed)
+    mask = draw.random((height, width)) < share
+    mask[1, 1] = True
+    system = cloning_system(mask)
+    source, background = (draw.integers(0, 256, (1, height, width, 3), np.uint8) for _ in range(2))
+    correction = system.correction(source, background)[0]
+    exact = cloned(system.mask, source[0], background[0]) - source[0]
+    assert np.abs(correction - exact).max() < 1
+    outside = correction[~system.mask]
+    assert (correction[system.mask] <= outside.max(axis=0) + 1).all()
+    assert (correction[system.mask] >= outside.min(axis=0) - 1).all()
+
+
+def test_other_than_a_mask_is_refused() -> None:
+    for mask in (np.ones((5, 5)), np.ones((5, 5, 1), bool)):
+        with pytest.raises(InputError, match=r"required \(h, w\) and bool"):
+            cloning_system(mask)  # type: ignore[arg-type]
+
+
+def test_a_mask_without_an_inside_is_refused() -> None:
+    frame = np.ones((6, 9), bool)
+    frame[1:-1, 1:-1] = False
+    for mask in (np.zeros((8, 8), bool), frame, np.ones((2, 30), bool)):
+        with pytest.raises(InputError, match="none of these inside"):
+            cloning_system(mask)
+
+
+def test_too_long_an_edge_is_refused() -> None:
+    y, x = np.mgrid[:100, :100]
+    with pytest.raises(InputError, match=f"at most {poisson.LARGEST_EDGE}"):
+        cloning_system((x + y) % 2 == 0)
+
+
+def test_pictures_that_do_not_fit_are_refused() -> None:
+    system = cloning_system(MASKS["parts"])
+    good = noise((2, 50, 70, 3))
+    bad = good.astype(float)
+    bad[1, 7, 7, 2] = np.nan
+    for source, background, message in (
+        (good[0], good, "source of shape"),
+        (good, good[:, 1:], "background of shape"),
+        (good[:1], good, "as many of each"),
+        (good.astype(int), good, "source of type int64"),
+        (good, bad, "not finite"),
+    ):
+        with pytest.raises(InputError, match=message):
+            system.clone(source, background)
+
+
+def test_opencv_gives_nearly_the_same() -> None:
+    """OpenCV solves on a region that is some pixels smaller: the pictures differ near the edge by a colour alone."""
+    cv2 = pytest.importorskip("cv2")
+    y, x = np.mgrid[:HEIGHT, :WIDTH]
+    background = np.stack([100 + x / 2, 160 - y, 90 + y / 2 + x / 4], axis=-1)
+    blob = 60 * np.exp(-((x - 40) ** 2 + (y - 26) ** 2) / 60)[..., None] * [1, -0.7, 0.5]
+    source, background = (np.rint(each).astype(np.uint8) for each in (background + blob + [30, -20, 15], background))
+    ours = cloning_system(np.ones((HEIGHT, WIDTH), bool)).clone(source[None], background[None])[0].astype(int)
+    whole = np.full((HEIGHT, WIDTH), 255, np.uint8)
+    framed = np.pad(background, ((20, 20), (20, 20), (0, 0)), mode="edge")
+    theirs = cv2.seamlessClone(source, framed, whole, (WIDTH // 2 + 20, HEIGHT // 2 + 20), cv2.NORMAL_CLONE)
+    assert np.abs(ours - source).mean() > 15
+    assert np.abs(theirs[20:-20, 20:-20] - ours).mean() < 2
