@@ -17,7 +17,7 @@ import numpy as np
 
 from lipmotion.corpora.labels import labels_beside
 from lipmotion.corpora.source_recordings import AUDIO_SUFFIXES
-from lipmotion.errors import AlignmentError, CorpusError, InputError, MissingDependencyError
+from lipmotion.errors import AlignmentError, CorpusError, InputError, MissingDependencyError, shortened
 from lipmotion.pipeline.corpus.prompts import prompts
 from lipmotion.pipeline.model import load_model
 from lipmotion.pipeline.transcribe import phones_in_time
@@ -137,11 +137,21 @@ def recorded_sentences(
             words = labels_beside(path).words
             if words is not None:
                 is_any_transcribed = True
+                _check_language(words, lexicon)
                 yield SpokenSentence(name, speaker, *_aligned(path, words, phones, lexicon))
         except (AlignmentError, InputError) as error:
             monitor(Item(name, "skipped", str(error)))
     if not is_any_transcribed:
         raise CorpusError(f"{root}: no recording with a transcript; put what is said in x.wav into x.txt beside it")
+
+
+def _check_language(words: Sequence[str], lexicon: Lexicon) -> None:
+    """Raise InputError if words have accents and no pronunciation: those of other languages are no guide to English."""
+    foreign = [word for word in words if not word.isascii() and not lexicon.known(word)]
+    if foreign:
+        raise InputError(
+            f"no pronunciation of {shortened(foreign[0])!r}; required English words, or a lexicon file with the others"
+        )
 
 
 def voice_examples(sentences: Iterable[SpokenSentence]) -> Iterator[VoiceExample]:
