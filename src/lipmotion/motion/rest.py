@@ -30,6 +30,15 @@ def away_from_speech(time_s: Array, speech_s: Sequence[tuple[float, float]], mar
     return away
 
 
+def runs(mask: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Return first frame and the one after the last of each run of frames in which a mask is True [shape=(R, 2)].
+
+    mask : bool array [shape=(T,)]
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]])))
+    return edges.reshape(-1, 2)
+
+
 def speech_intervals(units: Timeline[Unit]) -> list[tuple[float, float]]:
     """Return start and end, in seconds, of every phone that is not silence."""
     return [(span.start_s, span.end_s) for span in units if not is_silent(span.label.phone)]
@@ -43,9 +52,8 @@ def unheard_frames(features: NDArray[np.floating], units: Timeline[Unit]) -> NDA
     """
     energy = features[:, ENERGY_FEATURE]
     at_floor = energy <= energy.min() + FLOOR_MARGIN
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], at_floor, [False]])))
     silent = np.zeros(len(energy), bool)
-    for first, stop in edges.reshape(-1, 2):
+    for first, stop in runs(at_floor):
         silent[first:stop] = stop - first >= LEAST_SILENCE_S * FRAME_RATE_HZ
     time_s = np.arange(len(energy)) / FRAME_RATE_HZ
     return silent & away_from_speech(time_s, speech_intervals(units), BEFORE_SPEECH_S)

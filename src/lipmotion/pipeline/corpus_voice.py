@@ -59,7 +59,8 @@ def speak_from_corpus(
             f"a model of the engine {engine.name!r} has no recordings to speak with; train one: --engine selection"
         )
     names = engine.recordings(model.learned)
-    missing = [name for name in names if name not in corpus.names(None)]
+    known = set(corpus.names())
+    missing = [name for name in names if name not in known]
     if missing:
         raise InputError(
             f"the corpus {corpus.path} lacks {len(missing)} of {len(names)} recordings of the model, {missing[0]} "

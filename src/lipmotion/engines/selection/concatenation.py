@@ -84,14 +84,14 @@ def concatenated(inventory: RecordedUnits, target: Target, pieces: list[Piece], 
     """
     time_s = np.arange(frames) / FRAME_RATE_HZ
     result, total = np.zeros((frames, inventory.values.shape[1])), np.zeros((frames, 1))
-    for number, piece in enumerate(pieces):
-        following = pieces[number + 1] if number + 1 < len(pieces) else None
+    nexts = [*pieces[1:], None]
+    clocks = [TimeMap.of(inventory, target, *pair) for pair in zip(pieces, nexts, strict=True)]
+    for number, (piece, following, clock) in enumerate(zip(pieces, nexts, clocks, strict=True)):
         begin_s = piece.start_s - piece.overlap_s if number else -np.inf
         end_s = following.start_s + following.overlap_s if following is not None else np.inf
         used = np.flatnonzero((time_s >= begin_s) & (time_s <= end_s))
         if not len(used):
             continue
-        clock = TimeMap.of(inventory, target, piece, following)
         motion = inventory.at(np.full(len(used), inventory.windows.recording[piece.unit]), clock(time_s[used]))
         weight = _rise(time_s[used], piece) if number else np.ones(len(used))
         if following is not None:
@@ -99,9 +99,9 @@ def concatenated(inventory: RecordedUnits, target: Target, pieces: list[Piece], 
         result[used] += weight[:, None] * motion
         total[used] += weight[:, None]
     result /= np.maximum(total, LEAST_WEIGHT)
-    for before, after in pairwise(pieces):
-        if after.join == HARD:
-            _smooth(inventory, target, before, after, time_s, result)
+    for sides in pairwise(zip(pieces, clocks, strict=True)):
+        if sides[1][0].join == HARD:
+            _smooth(inventory, target, sides, time_s, result)
     return result
 
 
@@ -175,19 +175,18 @@ def _rise(time_s: Array, piece: Piece) -> Array:
 
 
 def _smooth(
-    inventory: RecordedUnits, target: Target, before: Piece, after: Piece, time_s: Array, motion: Array
+    inventory: RecordedUnits, target: Target, sides: Sequence[tuple[Piece, TimeMap]], time_s: Array, motion: Array
 ) -> None:
     """Bend two abutting pieces towards one another, in place.
 
+    sides : both pieces, with their time maps
     The jump is divided between both sides; a side that is a protected phone keeps its shape and the other one takes
     all, unless both are protected. Bent are 5 % of each piece, but 20 ms at least and 150 ms at most.
     """
+    (before, _), (after, _) = sides
     join_s, times_s = after.start_s, target.windows.times_s
     recording = inventory.windows.recording
-    left, right = (
-        inventory.at(recording[[piece.unit]], TimeMap.of(inventory, target, piece, None)(np.array([join_s])))[0]
-        for piece in (before, after)
-    )
+    left, right = (inventory.at(recording[[piece.unit]], clock(np.array([join_s])))[0] for piece, clock in sides)
     jump = right - left
     kept = [is_protected(target, number) for number in (after.first - 1, after.first)]
     shares = (0.0, 1.0) if kept[0] and not kept[1] else (1.0, 0.0) if kept[1] and not kept[0] else (0.5, 0.5)

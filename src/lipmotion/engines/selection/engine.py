@@ -24,7 +24,7 @@ from lipmotion.errors import InputError
 from lipmotion.motion.generation import Statistics
 from lipmotion.motion.predictors import LEAST_NETWORK_S
 from lipmotion.motion.prior_regression import PriorRegression
-from lipmotion.motion.rest import away_from_speech, speech_intervals, unheard_frames
+from lipmotion.motion.rest import away_from_speech, runs, speech_intervals, unheard_frames
 from lipmotion.printable import printable
 from lipmotion.stats.delta_windows import with_dynamics
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
@@ -182,9 +182,8 @@ def _resting(features: NDArray[np.floating], units: Timeline[Unit], *, always: b
     if not unheard.any():
         return np.zeros(len(features))
     away = away_from_speech(np.arange(len(features)) / FRAME_RATE_HZ, speech_intervals(units), SETTLED_S)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], away, [False]])))
     resting = np.zeros(len(features))
-    for first, stop in edges.reshape(-1, 2):
+    for first, stop in runs(away):
         resting[first:stop] = float(unheard[first:stop].any())
     width = round(SETTLED_S * FRAME_RATE_HZ)
     window = np.hanning(2 * width + 1)

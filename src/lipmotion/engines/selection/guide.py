@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.selection.costs import FRACTIONS
-from lipmotion.engines.selection.windows import PhoneWindows
 from lipmotion.motion.predictors import Predictor
 from lipmotion.types import FRAME_RATE_HZ, Example, Speech
+from lipmotion.types.motion import between_frames
 
 Array = NDArray[np.float64]
 LEAST_EXPANSION, MOST_EXPANSION = 1.0, 1.6
@@ -52,12 +52,11 @@ def fit_guide(predictor: Predictor, examples: Sequence[Example], values: Sequenc
     return Guide(predictor, recorded.mean(axis=0), np.clip(ratio, LEAST_EXPANSION, MOST_EXPANSION))
 
 
-def at_points(motion: Array, windows: PhoneWindows) -> Array:
-    """Return motion of one recording [shape=(T, Q)] at the points of each of its phones [shape=(U, POINTS, Q)]."""
-    start_s, duration_s = windows.times_s[:, 0], windows.durations_s
-    position = (start_s[:, None] + FRACTIONS * duration_s[:, None]) * FRAME_RATE_HZ
-    position = np.clip(position, 0, len(motion) - 1)
-    before = np.minimum(position.astype(np.intp), max(len(motion) - 2, 0))
-    share = (position - before)[..., None]
-    result: Array = motion[before] * (1 - share) + motion[np.minimum(before + 1, len(motion) - 1)] * share
-    return result
+def at_points(motion: Array, times_s: Array) -> Array:
+    """Return motion of one recording [shape=(T, Q)] at the points of each of its phones [shape=(U, POINTS, Q)].
+
+    times_s : start and end of each phone [shape=(U, 2)]
+    """
+    start_s, end_s = times_s.T[:, :, None]
+    points_s = start_s + FRACTIONS * (end_s - start_s)
+    return between_frames(motion, FRAME_RATE_HZ, points_s.ravel()).reshape(*points_s.shape, -1)

@@ -55,14 +55,10 @@ class RecordedUnits:
         knots, order = np.unique(knots, return_index=True)
         return np.stack([np.interp(frames, knots, column) for column in values[order].T], axis=1)
 
-    def recorded(self, recording: int) -> Array:
-        """Return the motion of one recording [shape=(T, Q)]."""
-        return self.values[self.first[recording] : self.first[recording + 1]]
-
-    def poses(self, units: UnitNumbers, fraction: float | Array) -> Array:
+    def poses(self, units: UnitNumbers, fraction: float) -> Array:
         """Return the motion at a fraction of the duration of some units [shape=(N, Q)].
 
-        fraction : 0 (start) to 1 (end), one for all, or one each [shape=(N,)]
+        fraction : 0 (start) to 1 (end)
         """
         start_s, end_s = self.windows.times_s[units].T
         return self.at(self.windows.recording[units], start_s + fraction * (end_s - start_s))

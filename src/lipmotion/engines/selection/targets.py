@@ -42,8 +42,8 @@ def target_of(
     motion, distortion = guide.predict(speech)
     by_sound = bool(phone_reliability(speech, distortion, frames).mean() < LEAST_RELIABILITY)
     windows = phone_windows([_segments(duration_s) if by_sound else units])
-    predicted = at_points(motion, windows)
-    guided = guide.expanded(predicted) if guiding is None else at_points(guiding, windows)
+    predicted = at_points(motion, windows.times_s)
+    guided = guide.expanded(predicted) if guiding is None else at_points(guiding, windows.times_s)
     return costs.target(windows, guided, predicted, by_sound=by_sound)
 
 

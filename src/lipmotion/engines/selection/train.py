@@ -16,7 +16,7 @@ from lipmotion.engines.selection.inventory import RecordedUnits
 from lipmotion.engines.selection.model import SelectionModel
 from lipmotion.engines.selection.search import select
 from lipmotion.engines.selection.targets import target_of
-from lipmotion.engines.selection.windows import PhoneWindows, covering, phone_windows
+from lipmotion.engines.selection.windows import covering, phone_windows
 from lipmotion.errors import CorpusError
 from lipmotion.hmm.multistream.phone_recogniser import fit_phone_recogniser
 from lipmotion.motion.acoustic_network import fit_acoustic_network
@@ -24,9 +24,9 @@ from lipmotion.motion.closure import OPENING
 from lipmotion.motion.fit import fit_motion
 from lipmotion.motion.predictors import Predictor, stands_on_another
 from lipmotion.motion.prior_regression import fit_prior_regression
-from lipmotion.motion.rest import away_from_speech, speech_intervals
+from lipmotion.motion.rest import away_from_speech, runs, speech_intervals
 from lipmotion.motion.space import MotionSpace
-from lipmotion.motion.store import LIP_WIDTH_SHARE, MotionStore, compress
+from lipmotion.motion.store import LIP_WIDTH_SHARE, MotionStore, compress, lip_tolerance
 from lipmotion.stats.delta_windows import dynamics_known, with_dynamics
 from lipmotion.storage.checkpoint import Checkpoint
 from lipmotion.types import FRAME_RATE_HZ, Example, Monitor, Progress, sub_monitor
@@ -101,7 +101,10 @@ def inventory_of(
     predicted = None
     if guide is not None:
         predicted = np.concatenate(
-            [at_points(guide.predict(e.speech)[0], _of_recording(windows, n)) for n, e in enumerate(examples)]
+            [
+                at_points(guide.predict(example.speech)[0], windows.times_s[windows.recording == number])
+                for number, example in enumerate(examples)
+            ]
         ).astype(np.float16)
     names = tuple(example.name for example in examples)
     return RecordedUnits(names, windows, usable, first, _stored(examples, values, first, space), predicted)
@@ -136,14 +139,6 @@ def _predictor(
     return fit_prior_regression(examples, values, direct)[0]
 
 
-def _of_recording(windows: PhoneWindows, number: int) -> PhoneWindows:
-    """Return the phones of one recording."""
-    rows = windows.recording == number
-    return PhoneWindows(
-        windows.recording[rows], windows.phones[rows], windows.times_s[rows], windows.words[rows], windows.stress[rows]
-    )
-
-
 def _stored(
     examples: Sequence[Example], values: Sequence[Array], first: NDArray[np.intp], space: MotionSpace
 ) -> MotionStore:
@@ -152,17 +147,13 @@ def _stored(
     for example, begin, x in zip(examples, first[:-1].tolist(), values, strict=True):
         time_s = np.arange(len(x)) / FRAME_RATE_HZ
         near = example.valid & ~away_from_speech(time_s, speech_intervals(example.speech.units), KEPT_SILENCE_S)
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], near, [False]])))
-        ranges += [(begin + start, begin + stop) for start, stop in edges.reshape(-1, 2).tolist()]
+        ranges += (runs(near) + begin).tolist()
     everything = np.concatenate(values)
     measured = np.concatenate([everything[start:stop] for start, stop in ranges])
-    names = [channel.name for channel in space.channels]
     spread = np.ptp(np.percentile(measured, [1, 99], axis=0), axis=0)
-    tolerance = np.maximum(LIP_WIDTH_SHARE * spread, 1e-6)
-    if "width" in names and "width" in space.direct_names:
-        width = float(np.median(measured[:, space.direct_names.index("width")]))
-        tolerance = np.full(len(spread), max(LIP_WIDTH_SHARE * width, 1e-6))
-    return compress(everything, FRAME_RATE_HZ, tolerance, kept=ranges)
+    if "width" in space.direct_names:
+        spread[:] = lip_tolerance(measured, [space.channels[column] for column in space.direct]) / LIP_WIDTH_SHARE
+    return compress(everything, FRAME_RATE_HZ, np.maximum(LIP_WIDTH_SHARE * spread, 1e-6), kept=ranges)
 
 
 def _rest_pose(examples: Sequence[Example], values: Sequence[Array], space: MotionSpace) -> Array:
@@ -188,15 +179,15 @@ def _error_variances(
     values: Sequence[Array],
     recorded: Array,
 ) -> Array:
-    """Return the variances of the error of static value, Δ and Δ² in recordings without their own units
-    [shape=(3, Q)].
+    """Return the variances of the error of static value, Δ and Δ², without a recording's own units [shape=(3, Q)].
 
     recorded : all measured motion in the motion space [shape=(N, Q)]
     """
     costs = model.costs(config)
-    floor = 1e-4 * with_dynamics(recorded).var(axis=0) + 1e-12
+    spread = with_dynamics(recorded).var(axis=0)
+    floor = 1e-4 * spread + 1e-12
     if len(examples) < 2:
-        return np.maximum(with_dynamics(recorded).var(axis=0), floor)
+        return np.maximum(spread, floor)
     errors = []
     for number in np.unique(np.linspace(0, len(examples) - 1, LEFT_OUT).astype(int)):
         example = examples[number]
@@ -204,7 +195,7 @@ def _error_variances(
         if frames.any():
             generated = generated_motion(model, costs, example, model.inventory.windows.recording == number)
             errors.append(with_dynamics(values[number] - generated)[frames])
-    variances: Array = np.square(np.concatenate(errors)).mean(axis=0) if errors else with_dynamics(recorded).var(axis=0)
+    variances: Array = np.square(np.concatenate(errors)).mean(axis=0) if errors else spread
     return np.maximum(variances, floor)
 
 
