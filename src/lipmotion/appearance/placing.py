@@ -151,8 +151,3 @@ def _check_map(affine: Array) -> None:
             f"affine map of shape {affine.shape}: {np.array2string(affine, precision=3)}; required (2, 3), finite, and "
             "not flat; a frame without a face has no map"
         )
-
-
-def cut(frame: NDArray[np.uint8], to_frame: Array, size: tuple[int, int], kind: Kind = "cubic") -> Floats:
-    """Return a patch of a frame [shape=(h, w, 3)]."""
-    return resampling(to_frame, frame.shape[:2], size, kind).apply(frame[None])[0]
