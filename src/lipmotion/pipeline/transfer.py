@@ -156,7 +156,7 @@ def measured_pair(
 _Opened = Corpus | Model | FilmedFace | Path
 
 
-def _opened(onto: str | Path | Corpus | Model) -> tuple[_Opened, str]:
+def _opened(onto: str | Path | Corpus | Model | FilmedFace) -> tuple[_Opened, str]:
     """Return the corpus, the model, or the path of the video; and its name for messages."""
     if isinstance(onto, Corpus):
         return onto, str(onto.path)

@@ -1,4 +1,4 @@
-"""Steady placing: maps of a tracked face without the noise of tracking, so that a patch placed by them sits on the skin.
+"""Steady placing: maps of a face without the noise of tracking, so that a patch placed by them sits on the skin.
 
 ``benchmarks/steadying.py`` measures how far the nose and cheeks move from frame to frame after alignment.
 """
@@ -151,9 +151,14 @@ def _step(before: Sequence[Floats], after: Sequence[Floats]) -> Array:
     for reference, moved in zip(before, after, strict=True):
         step = _registered(reference, moved, step)
     reference, moved = before[-1], after[-1]
-    gain = abs(np.corrcoef(_shifted(moved, step).ravel(), reference.ravel())[0, 1])
-    plain = abs(np.corrcoef(moved.ravel(), reference.ravel())[0, 1])
-    return step if gain >= plain else np.zeros(2)
+    likeness = [_likeness(picture, reference) for picture in (_shifted(moved, step), moved)]
+    return step if likeness[0] >= likeness[1] else np.zeros(2)
+
+
+def _likeness(picture: Floats, reference: Floats) -> float:
+    """Return the absolute correlation of two pictures."""
+    one, other = (levels.ravel() - levels.mean() for levels in (picture, reference))
+    return abs(float(one @ other)) / max(float(np.linalg.norm(one) * np.linalg.norm(other)), 1e-9)
 
 
 def _registered(reference: Floats, moved: Floats, step: Array) -> Array:
@@ -167,7 +172,8 @@ def _registered(reference: Floats, moved: Floats, step: Array) -> Array:
         return step
     for _ in range(ROUNDS):
         difference = (_shifted(moved, step)[inner] - reference[inner]).ravel().astype(np.float64)
-        change = np.linalg.solve(power, terms.T @ difference)[:2]
+        solution: Array = np.linalg.solve(power, (terms.T @ difference)[:, None])
+        change = solution[:2, 0]
         step = step - change
         if np.abs(change).max() < 1e-3:
             break

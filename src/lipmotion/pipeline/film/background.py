@@ -15,6 +15,7 @@ from lipmotion.faces.filmed.renderer import Background
 from lipmotion.storage.coded_video import encode_video
 from lipmotion.vision.footage import Footage, footage_frames, track_footage
 from lipmotion.vision.frames import VideoSpan
+from lipmotion.vision.steadying import registered_maps, steady_maps
 
 MOST_BACKGROUND_S = 10.0
 """Longest background that is kept in the file of a face."""
@@ -51,7 +52,7 @@ def best_background(footages: Sequence[Footage]) -> StoredBackground:
     footage = max(footages, key=len)
     count = min(len(footage), round(MOST_BACKGROUND_S * footage.rate_hz))
     video = encode_video(_even(footage_frames(footage, 0, count), footage.size), "video")
-    return StoredBackground(video, footage.rate_hz, footage.face_to_image[:count])
+    return StoredBackground(video, footage.rate_hz, placed_maps(footage)[:count])
 
 
 def stored_sequence(background: StoredBackground) -> BackgroundSequence:
@@ -80,7 +81,12 @@ def open_background(path: Path) -> BackgroundSequence:
             if frame is not None:
                 yield frame
 
-    return BackgroundSequence(len(footage), footage.rate_hz, footage.face_to_image, read)
+    return BackgroundSequence(len(footage), footage.rate_hz, placed_maps(footage), read)
+
+
+def placed_maps(footage: Footage) -> NDArray[np.float64]:
+    """Return where the face is in every frame of some footage, without the noise of tracking [shape=(T, 2, 3)]."""
+    return steady_maps(registered_maps(footage), footage.rate_hz, footage.cuts)
 
 
 def pingpong(count: int, frames: int) -> NDArray[np.intp]:

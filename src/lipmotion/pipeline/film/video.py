@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 
 from lipmotion.appearance.eigenlips import Eigenlips
 from lipmotion.errors import InputError
+from lipmotion.faces.base import Face
 from lipmotion.faces.filmed.face import FilmedFace
 from lipmotion.faces.filmed.renderer import BATCH, STITCHING, Stitcher, StitchingOptions
 from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.film.background import open_background, stored_sequence
 from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.request import SpeechRequest
 from lipmotion.speech.pauses import STEP_S, levels_db
 from lipmotion.types import GREY, Audio, Motion
 
@@ -98,8 +100,19 @@ def mouth_and_jaw(
     return mouth, jaw
 
 
-def check_person(model: Model, face: FilmedFace, speaker: str) -> bool:
-    """Return whether a model generates the motion of the person of a face.
+def onto_face(request: SpeechRequest, model: Model, face: Face | FilmedFace) -> SpeechRequest:
+    """Return a request for the motion of the person whom a face shows.
+
+    A drawn face shows anybody; motion of another person than a filmed face's is mapped onto it (``map_onto``).
+    Raises InputError: a filmed face is of another person, and the model generates eigenlips alone.
+    """
+    if not isinstance(face, FilmedFace) or request.onto is not None or is_person_of(model, face, request.speaker):
+        return request
+    return replace(request, onto=face)
+
+
+def is_person_of(model: Model, face: FilmedFace, speaker: str = "") -> bool:
+    """Return whether a model generates the motion of the person of a face: they are of one corpus and speaker.
 
     speaker : of the people of the model whose motion is generated
     Raises InputError: it does not, and generates eigenlips alone, which cannot be mapped onto another person.
@@ -126,3 +139,25 @@ def _jaw_of(face: FilmedFace, sound: Audio | None, count: int, rate_hz: float) -
 
 def _without_jaw(stitching: StitchingOptions) -> StitchingOptions:
     return replace(stitching, jaw=False)
+
+
+def write_film(
+    path: Path,
+    face: FilmedFace,
+    motion: Motion,
+    sound: Audio,
+    *,
+    model: Model | None = None,
+    fps: float | None = None,
+    options: FilmOptions = FILM,
+) -> None:
+    """Write a video of a filmed face, with sound; whole or not at all.
+
+    model : that generated the motion; needed where the motion is eigenlips
+    Raises InputError: as ``filmed_frames``. Raises ExportError: the file cannot be written.
+    """
+    from lipmotion.export.video import write_mp4
+
+    eigenlips = model.eigenlips if model is not None else None
+    frames, rate_hz = filmed_frames(face, motion, sound=sound, eigenlips=eigenlips, fps=fps, options=options)
+    write_mp4(path, frames, fps=rate_hz, audio=sound)
