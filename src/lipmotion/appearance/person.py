@@ -113,7 +113,9 @@ class Appearance:
     @cached_property
     def jaw_candidates(self) -> Candidates:
         """The recorded lower faces as components and detail."""
-        return make_candidates(enlarged(self.jaw, self.scale), self.jaws, self.jaw_codes)
+        restored = enlarged(self.jaw, self.scale).expand(self.jaw_codes)
+        details = np.clip(np.rint(self.jaws - restored), -DEEPEST, DEEPEST)
+        return Candidates(self.jaw_codes, details.astype(np.int8))
 
     def mouth_refiner(self, options: RefinementOptions) -> Refiner:
         """Return what makes pictures of the mouth from eigenlips."""
@@ -158,7 +160,7 @@ def learn_appearance(footage: FootagePictures) -> Appearance:
     jaw = fit_eigenlips(faces[evenly_spaced(LEARNED_FROM, len(faces))], JAW_COMPONENTS)
     jaw_codes = jaw.project(faces)
     chosen = _undamaged(mouth, mouths, codes, choose_candidates(codes, CANDIDATES))
-    chosen_jaws = _undamaged(jaw, faces, jaw_codes, choose_candidates(jaw_codes, JAW_CANDIDATES))
+    chosen_jaws = choose_candidates(jaw_codes, JAW_CANDIDATES)
 
     def recorded(frames: Index) -> Pictures:
         if footage.scale == 1:

@@ -164,7 +164,7 @@ def _likeness(picture: Floats, reference: Floats) -> float:
 def _registered(reference: Floats, moved: Floats, step: Array) -> Array:
     """Return a step, improved by least squares on the gradients (Lucas & Kanade 1981)."""
     inner = (slice(MARGIN, -MARGIN), slice(MARGIN, -MARGIN))
-    down, across = np.gradient(reference.astype(np.float64))
+    down, across = (np.asarray(slope) for slope in np.gradient(reference.astype(np.float64)))
     level = reference[inner].ravel().astype(np.float64)
     terms = np.stack([across[inner].ravel(), down[inner].ravel(), level - level.mean(), np.ones(len(level))], axis=1)
     power = terms.T @ terms

@@ -37,6 +37,9 @@ BATCH = 32
 FEATHER_PX = 6.0
 """Width of the seam, px of the face."""
 
+LARGEST_DIFFERENCE = 20.0
+"""Differences on the edge of the jaw above this are no difference of light, grey levels."""
+
 
 @dataclass(frozen=True)
 class Background:
@@ -119,7 +122,7 @@ class Stitcher:
         part = (slice(None), *mouth_part(scale))
         gains = np.maximum(cheek_light(behind[part]), 1.0) / self.appearance.light
         if jaws is not None:
-            behind = self._whole.clone(relit(jaws, gains), behind)
+            behind = self._whole.clone(relit(jaws, gains), behind, LARGEST_DIFFERENCE)
         source = behind.copy()
         source[part] = relit(mouths, gains)
         patches = self._mouth_alone.clone(source, behind)
