@@ -1,4 +1,4 @@
-"""Steady placing: maps of a tracked face without the noise of tracking, so that a patch placed by them sits on the skin.
+"""Steady placing: maps of a tracked face without the noise of tracking, so that a patch placed by them sits still.
 
 ``benchmarks/steadying.py`` measures how far the nose and cheeks move from frame to frame after alignment.
 """
@@ -151,9 +151,13 @@ def _step(before: Sequence[Floats], after: Sequence[Floats]) -> Array:
     for reference, moved in zip(before, after, strict=True):
         step = _registered(reference, moved, step)
     reference, moved = before[-1], after[-1]
-    gain = abs(np.corrcoef(_shifted(moved, step).ravel(), reference.ravel())[0, 1])
-    plain = abs(np.corrcoef(moved.ravel(), reference.ravel())[0, 1])
-    return step if gain >= plain else np.zeros(2)
+    is_better = _correlation(reference, _shifted(moved, step)) >= _correlation(reference, moved)
+    return step if is_better else np.zeros(2)
+
+
+def _correlation(first: Floats, other: Floats) -> float:
+    a, b = first - first.mean(), other - other.mean()
+    return float((a * b).mean() / max(a.std() * b.std(), 1e-9))
 
 
 def _registered(reference: Floats, moved: Floats, step: Array) -> Array:
@@ -162,14 +166,14 @@ def _registered(reference: Floats, moved: Floats, step: Array) -> Array:
     down, across = np.gradient(reference.astype(np.float64))
     level = reference[inner].ravel().astype(np.float64)
     terms = np.stack([across[inner].ravel(), down[inner].ravel(), level - level.mean(), np.ones(len(level))], axis=1)
-    power = terms.T @ terms
+    power: Array = terms.T @ terms
     if np.linalg.cond(power) > 1e12:  # no texture in one direction
         return step
     for _ in range(ROUNDS):
         difference = (_shifted(moved, step)[inner] - reference[inner]).ravel().astype(np.float64)
-        change = np.linalg.solve(power, terms.T @ difference)[:2]
-        step = step - change
-        if np.abs(change).max() < 1e-3:
+        change: Array = np.linalg.solve(power, terms.T @ difference)
+        step = step - change[:2]
+        if np.abs(change[:2]).max() < 1e-3:
             break
     return step
 
