@@ -29,7 +29,7 @@ LARGEST_SCALE = 4
 TOP_PX = 50.0
 """Where the part that is replaced begins: under the nose, px below the eyes."""
 MARGIN_PX = 3.0
-"""The part that is replaced ends so far above the tip of the chin at its highest: in the face, not on neck or collar."""
+"""The part that is replaced ends so far above the tip of the chin at its highest: on skin, not on neck or collar."""
 JAW_SHARE = 1.15
 """Half of its width, as a share of half the distance between the ends of the tracked jaw line."""
 NARROWEST_PX, WIDEST_PX = 34.0, 58.0
