@@ -21,6 +21,8 @@ CANDIDATES = 500
 """Number of candidate mouths. Source: Xie & Liu 2007, §6.1."""
 ROUNDS = 8
 """Rounds in which the centres of the groups are moved: more did not lower the error on GRID."""
+PICTURES_AT_ONCE = 16
+"""Pictures that are restored at a time."""
 BLOCK = 2048
 """Pictures whose distances to all candidates are in memory at a time."""
 DEEPEST = 100
@@ -106,14 +108,32 @@ def make_candidates(eigenlips: Eigenlips, pictures: Pictures, coefficients: Valu
     """
     if coefficients is None:
         coefficients = eigenlips.project(pictures)
-    details = np.rint(pictures.astype(np.float32) - eigenlips.expand(coefficients))
-    whole = np.abs(details).max(axis=(1, 2, 3)) <= DEEPEST
+    details, deepest = recorded_details(eigenlips, pictures, coefficients)
+    whole = deepest <= DEEPEST
     if not whole.any():
         raise InputError(
             f"{len(pictures)} pictures, all of which differ from their eigenlips by more than {DEEPEST} grey levels; "
             "required at least one that does not: are they pictures of the person whom the eigenlips were trained on?"
         )
-    return Candidates(coefficients[whole], details[whole].astype(np.int8))
+    return Candidates(coefficients[whole], details[whole])
+
+
+def recorded_details(
+    eigenlips: Eigenlips, pictures: Pictures, coefficients: Values
+) -> tuple[NDArray[np.int8], NDArray[np.float32]]:
+    """Return what eigenlips leave out of pictures, and the largest value of it in each picture before it is cut off.
+
+    pictures     : [shape=(N, H, W, 3)], uint8
+    coefficients : their eigenlips [shape=(N, 3·K)]
+    Returns whole grey levels, cut off at ``DEEPEST`` [shape=(N, H, W, 3)], and [shape=(N,)].
+    """
+    details, deepest = np.empty(pictures.shape, np.int8), np.empty(len(pictures), np.float32)
+    for start in range(0, len(pictures), PICTURES_AT_ONCE):
+        part = slice(start, start + PICTURES_AT_ONCE)
+        exact = pictures[part] - eigenlips.expand(coefficients[part])
+        deepest[part] = np.abs(np.rint(exact, out=exact)).max(axis=(1, 2, 3))
+        details[part] = np.clip(exact, -DEEPEST, DEEPEST, out=exact)
+    return details, deepest
 
 
 def candidates_arrays(candidates: Candidates) -> dict[str, NDArray[Any]]:
