@@ -17,6 +17,7 @@ from lipmotion.appearance.candidates import (
     DEEPEST,
     Candidates,
     choose_candidates,
+    drawn_to_recorded,
     make_candidates,
     recorded_details,
 )
@@ -157,7 +158,8 @@ class Appearance:
         """
         values = self.from_motion.predict(motion)
         count = self.mouth_codes.shape[1]
-        return FaceCodes(values[:, :count], values[:, count:-1], values[:, -1])
+        mouth = drawn_to_recorded(values[:, :count], self.mouth_codes)
+        return FaceCodes(mouth, values[:, count:-1], values[:, -1])
 
     def of_mouths(self, mouths: Pictures) -> FaceCodes:
         """Return the lower face for pictures of the mouth [shape=(T, 56, 72, 3)], uint8, in any light."""
