@@ -22,10 +22,10 @@ from scipy.ndimage import gaussian_filter1d
 from lipmotion.vision import steadying
 from lipmotion.vision.footage import Footage, footage_frames, track_footage
 from lipmotion.vision.frames import VideoSpan
-from lipmotion.vision.steadying import REGION, registered_maps, steady_maps
+from lipmotion.vision.steadying import REGION, REGISTERED_NOISE_PX, registered_maps, steady_maps
 
 Array = NDArray[np.float64]
-LONGEST = VideoSpan(0, 12)
+LONGEST = VideoSpan(0, 5)
 MIDDLE = (-21.0, 2.0, 21.0, 44.0)
 SIDES = ((REGION[0], REGION[1], MIDDLE[0], REGION[3]), (MIDDLE[2], REGION[1], REGION[2], REGION[3]))
 
@@ -52,14 +52,15 @@ def ways(footage: Footage) -> dict[str, Array]:
     raw, rate_hz, cuts = footage.face_to_image, footage.rate_hz, footage.cuts
     with patch.object(steadying, "REGION", MIDDLE):
         registered = registered_maps(footage)
-    gaussians = {f"gaussian {sigma:g}": gaussian_filter1d(raw, sigma, axis=0, mode="nearest") for sigma in (1, 2, 4)}
+    gaussians = {f"gaussian {sigma:g}": gaussian_filter1d(raw, sigma, axis=0, mode="nearest") for sigma in (1, 2)}
     return {
         "tracked": raw,
         **gaussians,
         "fixed": np.repeat(raw.mean(axis=0)[None], len(raw), axis=0),
         "steady": steady_maps(raw, rate_hz, cuts),
         "registered": registered,
-        "registered, steady": steady_maps(registered, rate_hz, cuts),
+        "registered, smoothed": steady_maps(registered, rate_hz, cuts),
+        "registered, steady": steady_maps(registered, rate_hz, cuts, noise_px=REGISTERED_NOISE_PX),
     }
 
 
