@@ -1,6 +1,13 @@
 """Steady placing: maps of a tracked face without the noise of tracking, so that a patch placed by them sits still.
 
-``benchmarks/steadying.py`` measures how far the nose and cheeks move from frame to frame after alignment.
+``benchmarks/steadying.py`` measures how far one half of nose and cheeks moves from frame to frame after alignment, root
+mean square, px of the picture, where registration sees only the other half and so is noisier than in use:
+
+                              tracked  Gaussian of a frame  steady  registered  registered, steady
+4 clips of GRID ``val``         0.220                0.136   0.139       0.190               0.165
+a talker at 512 × 384           0.505                0.305   0.339       0.228               0.211
+a talker at 512 × 512           0.505                0.456   0.411       0.236               0.233
+one who nods quickly, 30 fps    1.676                1.885   1.675       0.621               0.620
 """
 
 from __future__ import annotations
