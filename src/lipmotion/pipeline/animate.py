@@ -115,9 +115,9 @@ def write(
     paths = [Path(output) for output in ([outputs] if isinstance(outputs, str | Path) else outputs)]
     sound = speech if isinstance(speech, Audio) else None
     recording = None if isinstance(speech, Audio) else speech
-    check_outputs(paths, recording, rate_hz=rate_hz, fps=fps, face=face, film=film, with_sound=sound is not None)
-    videos = [path for path in paths if path.suffix.lower() == VIDEO_SUFFIX]
     shown_face = opened_face(face)
+    check_outputs(paths, recording, rate_hz=rate_hz, fps=fps, face=shown_face, film=film, with_sound=sound is not None)
+    videos = [path for path in paths if path.suffix.lower() == VIDEO_SUFFIX]
     if videos and not isinstance(shown_face, FilmedFace) and "opening" not in generation.motion.names:
         raise ExportError(f"{videos[0]}: the motion has no channel 'opening' to draw a face from; write motion files")
     written = generation.selected(channels) if channels is not None else generation
