@@ -5,7 +5,7 @@ It shows nobody, it needs neither OpenCV nor MediaPipe, and where everything is 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -85,19 +85,7 @@ def toy_footage_pictures(sentences: int = 4, scale: int = 1) -> FootagePictures:
     scale : samples a pixel of the finer pictures
     Raises InputError: fewer than three sentences.
     """
-    spoken = toy_sentences(sentences)
-    motions = [toy_motion(sentence.units, CAMERA_HZ) for sentence in spoken]
-    clips = tuple(toy_lower_faces(motion, seed=number) for number, motion in enumerate(motions))
-    values = np.concatenate([motion.values for motion in motions])
-    whole = Motion(values, CAMERA_HZ, motions[0].channels)
-
-    def finer(frames: NDArray[np.intp]) -> Pictures:
-        return toy_lower_faces(Motion(values[frames], CAMERA_HZ, whole.channels), scale, seed=1000)
-
-    levels = [_levels(sentence, len(motion.values)) for sentence, motion in zip(spoken, motions, strict=True)]
-    return FootagePictures(
-        clips, values, whole.channels, np.concatenate(levels), toy_chin_px(whole), SHAPE, scale, finer
-    )
+    return _footage_pictures(toy_sentences(sentences), scale)
 
 
 def toy_places(frames: int, rate_hz: float = CAMERA_HZ) -> Array:
@@ -142,8 +130,23 @@ def toy_face(sentences: int = 4, scale: int = 1, *, corpus: str = "toy", rate_hz
     video = encode_video(toy_frames(motion, places), rate_hz)
     takes = tuple(_take(sentence) for sentence in spoken[:2])
     about = {"name": "toy", "corpus": [corpus], "speaker": "", "licence": ["synthesised by lipmotion"]}
-    appearance = learn_appearance(toy_footage_pictures(sentences, scale))
+    appearance = learn_appearance(_footage_pictures(spoken, scale))
     return FilmedFace(appearance, StoredBackground(video, places, toy_chin_px(motion)), takes, about)
+
+
+def _footage_pictures(spoken: Sequence[ToySentence], scale: int) -> FootagePictures:
+    motions = [toy_motion(sentence.units, CAMERA_HZ) for sentence in spoken]
+    clips = tuple(toy_lower_faces(motion, seed=number) for number, motion in enumerate(motions))
+    values = np.concatenate([motion.values for motion in motions])
+    whole = Motion(values, CAMERA_HZ, motions[0].channels)
+
+    def finer(frames: NDArray[np.intp]) -> Pictures:
+        return toy_lower_faces(Motion(values[frames], CAMERA_HZ, whole.channels), scale, seed=1000)
+
+    levels = [_levels(sentence, len(motion.values)) for sentence, motion in zip(spoken, motions, strict=True)]
+    return FootagePictures(
+        clips, values, whole.channels, np.concatenate(levels), toy_chin_px(whole), SHAPE, scale, finer
+    )
 
 
 def _take(sentence: ToySentence) -> SpokenTake:
