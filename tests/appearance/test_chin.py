@@ -52,9 +52,7 @@ def test_the_chin_may_be_elsewhere_in_every_frame() -> None:
 
 @pytest.mark.parametrize(("wanted", "done"), [(40.0, LARGEST_PX), (-40.0, -LARGEST_PX)])
 def test_it_does_not_move_further_than_a_neck_allows(wanted: float, done: float) -> None:
-    moved, limit = (
-        with_chin_moved(with_line(), np.array([CHIN_PX]), np.array([drop])) for drop in (wanted, done)
-    )
+    moved, limit = (with_chin_moved(with_line(), np.array([CHIN_PX]), np.array([drop])) for drop in (wanted, done))
     assert np.array_equal(moved, limit)
 
 

@@ -166,7 +166,9 @@ def test_damaged_pictures_are_no_candidates(footage: FootagePictures, monkeypatc
 @pytest.mark.parametrize("wrong", ["motion", "levels_db"])
 def test_footage_that_does_not_fit_together(footage: FootagePictures, wrong: str) -> None:
     shorter = replace(footage, **{wrong: getattr(footage, wrong)[:-1]})
-    with pytest.raises(InputError, match=r"266 pictures, 26[56] frames of motion and 26[56] of sound; required as many"):
+    with pytest.raises(
+        InputError, match=r"266 pictures, 26[56] frames of motion and 26[56] of sound; required as many"
+    ):
         learn_appearance(shorter)
     with pytest.raises(InputError, match="0 pictures"):
         learn_appearance(replace(footage, clips=()))
