@@ -4,9 +4,20 @@ from __future__ import annotations
 
 from lipmotion.errors import InputError
 from lipmotion.extensions import Registry
-from lipmotion.faces.base import Face
+from lipmotion.faces.base import Face, Stageable, Staging
+from lipmotion.types import Prosody
 
-FACES: Registry[type[Face]] = Registry("face", "lipmotion.faces", {"portrait": "lipmotion.faces.portrait:Portrait"})
+_DRAWN = "lipmotion.faces.portrait"
+FACES: Registry[type[Face]] = Registry(
+    "face",
+    "lipmotion.faces",
+    {
+        "portrait": f"{_DRAWN}:Portrait",
+        "woman": f"{_DRAWN}:Woman",
+        "man": f"{_DRAWN}:Man",
+        "cartoon": f"{_DRAWN}:Cartoon",
+    },
+)
 
 
 def face_named(name: str = "portrait") -> Face:
@@ -15,3 +26,17 @@ def face_named(name: str = "portrait") -> Face:
     if not (isinstance(chosen, type) and issubclass(chosen, Face)):
         raise InputError(f"{chosen!r} is called a face, {name!r}, by an installed package; required a class of Face")
     return chosen()
+
+
+def staged_face(name: str, staging: Staging, prosody: Prosody | None = None) -> Face:
+    """Return a face with settings.
+
+    prosody : of the speech that will be rendered; None: not known
+    Raises InputError: as ``face_named``, or the face cannot be staged and settings differ from the defaults.
+    """
+    face = face_named(name)
+    if isinstance(face, Stageable):
+        return face.staged(staging, prosody)
+    if staging != Staging():
+        raise InputError(f"the face {name!r} has no settings, as size, background and intensity; leave them out")
+    return face

@@ -1,12 +1,10 @@
 """Painting of pictures: textured bands with exact edges, smooth warps, and one layer over another.
 
-Pixels of layers are float32 [shape=(H, W, 4)]: colour 0..255, premultiplied by the cover 0..1 that comes last. Positions
-are in pixels; the centre of the first pixel is at 0.5.
+Pixels of layers are float32 [shape=(H, W, 4)]: colour 0..255, premultiplied by the cover 0..1 that comes last.
+Positions are in pixels; the centre of the first pixel is at 0.5.
 """
 
 from __future__ import annotations
-
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +12,7 @@ from numpy.typing import NDArray
 from lipmotion.kernels.choice import compiled_pays
 
 Layer = NDArray[np.float32]
+Bytes = NDArray[np.uint8]
 Floats = NDArray[np.float64]
 PIXEL_S = 6e-8
 """Time that NumPy takes for a pixel of a band; a warp takes about as long."""
@@ -40,26 +39,49 @@ def paint_band(layer: Layer, top: Floats, bottom: Floats, across: Floats, textur
         _paint_band(layer[first:last], first, top, bottom, across, texture)
 
 
-def warp(source: NDArray[Any], shift_x: Floats, shift_y: Floats, step: int, target: NDArray[Any]) -> None:
+def warp(source: Layer, shift_x: Floats, shift_y: Floats, step: int, target: Layer) -> None:
     """Fill a picture with another one that is shifted, by a different distance everywhere.
 
-    source, target   : pixels of one type, uint8 or float32 [shape=(H, W, C)]; beyond its edges the source goes on with
-                       its last pixels. A target with fewer channels gets the first ones
+    source, target   : pixels [shape=(H, W, C)]; beyond its edges the source goes on with its last pixels
     shift_x, shift_y : how far the source is from each target pixel, at every ``step``-th pixel from the first one on
-                       [shape=(ceil((H - 1) / step) + 1, ceil((W - 1) / step) + 1)]; interpolated between them
+                       [shape=(ceil(H / step) + 1, ceil(W / step) + 1)]; interpolated between them
     """
     if compiled_pays(target.shape[0] * target.shape[1] * PIXEL_S):
         from lipmotion.kernels.compiled import painting
 
-        if source.dtype == np.uint8:
-            painting.warp_bytes(source, shift_x, shift_y, step, target)
-        else:
-            painting.warp_floats(source, shift_x, shift_y, step, target)
-    else:
-        _warp(source, shift_x, shift_y, step, target)
+        painting.warp_floats(source, shift_x, shift_y, step, target)
+        return
+    y0, x0, y, x = _sources(source.shape, shift_x, shift_y, step, target.shape)
+    fx, fy = (x - x0).astype(np.float32)[..., None], (y - y0).astype(np.float32)[..., None]
+    above = source[y0, x0] + fx * (source[y0, x0 + 1] - source[y0, x0])
+    below = source[y0 + 1, x0] + fx * (source[y0 + 1, x0 + 1] - source[y0 + 1, x0])
+    target[...] = above + fy * (below - above)
 
 
-def stack(below: Layer, shade: Layer, skin: Layer, above: Layer, target: NDArray[np.uint8]) -> None:
+def warp_bytes(source: Bytes, shift_x: Floats, shift_y: Floats, step: int, target: Bytes) -> None:
+    """Fill a picture of bytes as ``warp`` does; shifts are rounded down to 1/65536, shares of pixels to 1/256.
+
+    source : [shape=(H, W, 4)]
+    target : [shape=(H, W, C)], of the first C channels, 3 or 4
+    """
+    packed = source.view(np.uint32)[..., 0]
+    if compiled_pays(target.shape[0] * target.shape[1] * PIXEL_S):
+        from lipmotion.kernels.compiled import painting
+
+        painting.warp_packed(packed, shift_x, shift_y, step, target)
+        return
+    height, width = target.shape[:2]
+    x = _whole_shifts(shift_x, step, height, width) + (np.arange(width) << 16)
+    y = _whole_shifts(shift_y, step, height, width) + (np.arange(height)[:, None] << 16)
+    x, y = (np.clip(at, 0, ((size - 1) << 16) - 1) for at, size in ((x, source.shape[1]), (y, source.shape[0])))
+    x0, y0, fx, fy = x >> 16, y >> 16, (x >> 8 & 255)[..., None], (y >> 8 & 255)[..., None]
+    pixels = source[..., : target.shape[2]].astype(np.int32)
+    above = (pixels[y0, x0] * (256 - fx) + pixels[y0, x0 + 1] * fx + 128) >> 8
+    below = (pixels[y0 + 1, x0] * (256 - fx) + pixels[y0 + 1, x0 + 1] * fx + 128) >> 8
+    target[...] = (above * (256 - fy) + below * fy + 128) >> 8
+
+
+def stack(below: Layer, shade: Layer, skin: Layer, above: Layer, target: Bytes) -> None:
     """Fill in the bytes of four layers over one another [shape=(H, W, 4)], premultiplied.
 
     below : what is behind
@@ -78,7 +100,7 @@ def stack(below: Layer, shade: Layer, skin: Layer, above: Layer, target: NDArray
 _WHOLE = np.array([1, 1, 1, 255], np.float64)
 
 
-def _stack(below: Layer, shade: Layer, skin: Layer, above: Layer, target: NDArray[np.uint8]) -> None:
+def _stack(below: Layer, shade: Layer, skin: Layer, above: Layer, target: Bytes) -> None:
     skins = skin.astype(np.float64)
     mixed = below + skins[..., 4:] * shade
     mixed = skins[..., :4] + (1 - skins[..., 3:4]) * mixed
@@ -111,23 +133,26 @@ def _paint_band(layer: Layer, first: int, top: Floats, bottom: Floats, across: F
     layer += (opacity[..., None] * (texel - layer)).astype(np.float32)
 
 
-def _warp(source: NDArray[Any], shift_x: Floats, shift_y: Floats, step: int, target: NDArray[Any]) -> None:
-    height, width, channels = target.shape
+def _sources(
+    source: tuple[int, ...], shift_x: Floats, shift_y: Floats, step: int, target: tuple[int, ...]
+) -> tuple[NDArray[np.int64], NDArray[np.int64], Floats, Floats]:
+    """Return the source pixels before each target pixel's, rows and columns, and the exact places."""
+    height, width = target[:2]
     x = np.arange(width) + _between(shift_x, step, height, width)
     y = np.arange(height)[:, None] + _between(shift_y, step, height, width)
-    x = np.minimum(np.maximum(x, 0), source.shape[1] - 1)
-    y = np.minimum(np.maximum(y, 0), source.shape[0] - 1)
-    x0, y0 = np.minimum(x.astype(np.int64), source.shape[1] - 2), np.minimum(y.astype(np.int64), source.shape[0] - 2)
-    fx, fy = (x - x0).astype(np.float32)[..., None], (y - y0).astype(np.float32)[..., None]
-    above, below = _pair(source, y0, x0, fx, channels), _pair(source, y0 + 1, x0, fx, channels)
-    values = above + fy * (below - above)
-    target[...] = values + np.float32(0.5) if target.dtype == np.uint8 else values
+    x, y = np.minimum(np.maximum(x, 0), source[1] - 1), np.minimum(np.maximum(y, 0), source[0] - 1)
+    return np.minimum(y.astype(np.int64), source[0] - 2), np.minimum(x.astype(np.int64), source[1] - 2), y, x
 
 
-def _pair(source: NDArray[Any], y: NDArray[np.int64], x: NDArray[np.int64], share: Layer, channels: int) -> Layer:
-    left, right = source[y, x, :channels].astype(np.float32), source[y, x + 1, :channels].astype(np.float32)
-    mixed: Layer = left + share * (right - left)
-    return mixed
+def _whole_shifts(grid: Floats, step: int, height: int, width: int) -> NDArray[np.int64]:
+    """Return the values of a grid at every pixel in 1/65536 [shape=(height, width)], rounded as the compiled form does."""
+    row = np.arange(height) / step
+    r = np.minimum(row.astype(int), len(grid) - 2)
+    rows = grid[r] + (row - r)[:, None] * (grid[r + 1] - grid[r])
+    start = np.floor(rows[:, :-1] * 65536).astype(np.int64)
+    more = np.floor((rows[:, 1:] - rows[:, :-1]) * 65536 / step).astype(np.int64)
+    column = np.arange(width)
+    return start[:, column // step] + column % step * more[:, column // step]
 
 
 def _between(grid: Floats, step: int, height: int, width: int) -> Floats:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,6 +10,9 @@ from lipmotion.kernels.compiled.compiler import compiled
 Layer = NDArray[np.float32]
 Floats = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
+Packed = NDArray[np.uint32]
+ONE = 1 << 16
+"""A pixel, in whole numbers."""
 
 
 @compiled
@@ -60,47 +61,77 @@ def paint_band(
 @compiled
 def warp_floats(source: Layer, shift_x: Floats, shift_y: Floats, step: int, target: Layer) -> None:
     """Fill a float32 picture with another one that is shifted, as ``kernels.painting.warp``."""
-    channels = target.shape[2]
-    for row in range(target.shape[0]):
-        for column in range(target.shape[1]):
-            y0, x0, fy, fx = _place(source.shape, shift_x, shift_y, step, row, column)
-            for channel in range(channels):
-                left, right = source[y0, x0, channel], source[y0, x0 + 1, channel]
-                above = left + fx * (right - left)
-                left, right = source[y0 + 1, x0, channel], source[y0 + 1, x0 + 1, channel]
-                below = left + fx * (right - left)
-                target[row, column, channel] = above + fy * (below - above)
+    height, width, channels = target.shape
+    last_x, last_y = source.shape[1] - 1.0, source.shape[0] - 1.0
+    row_x, row_y = np.empty(shift_x.shape[1]), np.empty(shift_x.shape[1])
+    for row in range(height):
+        _row_of_grids(shift_x, shift_y, row / step, row_x, row_y)
+        for cell in range((width + step - 1) // step):
+            cell_x, more_x = row_x[cell], row_x[cell + 1] - row_x[cell]
+            cell_y, more_y = row_y[cell], row_y[cell + 1] - row_y[cell]
+            for column in range(cell * step, min(cell * step + step, width)):
+                share = column / step - cell
+                x = min(max(column + (cell_x + share * more_x), 0.0), last_x)
+                y = min(max(row + (cell_y + share * more_y), 0.0), last_y)
+                x0, y0 = min(np.uint64(x), np.uint64(last_x - 1)), min(np.uint64(y), np.uint64(last_y - 1))
+                x1, y1 = x0 + np.uint64(1), y0 + np.uint64(1)
+                fx, fy = np.float32(x - x0), np.float32(y - y0)
+                for channel in range(channels):
+                    left, right = source[y0, x0, channel], source[y0, x1, channel]
+                    above = left + fx * (right - left)
+                    left, right = source[y1, x0, channel], source[y1, x1, channel]
+                    target[row, column, channel] = above + fy * (left + fx * (right - left) - above)
 
 
 @compiled
-def warp_bytes(source: Bytes, shift_x: Floats, shift_y: Floats, step: int, target: Bytes) -> None:
-    """Fill a picture of bytes with another one that is shifted, as ``kernels.painting.warp``."""
-    channels = target.shape[2]
-    for row in range(target.shape[0]):
-        for column in range(target.shape[1]):
-            y0, x0, fy, fx = _place(source.shape, shift_x, shift_y, step, row, column)
-            for channel in range(channels):
-                left, right = np.float32(source[y0, x0, channel]), np.float32(source[y0, x0 + 1, channel])
-                above = left + fx * (right - left)
-                left, right = np.float32(source[y0 + 1, x0, channel]), np.float32(source[y0 + 1, x0 + 1, channel])
-                below = left + fx * (right - left)
-                target[row, column, channel] = np.uint8(above + fy * (below - above) + np.float32(0.5))
+def warp_packed(source: Packed, shift_x: Floats, shift_y: Floats, step: int, target: Bytes) -> None:
+    """Fill a picture of bytes with one of packed pixels that is shifted, as ``kernels.painting.warp_bytes``.
+
+    Two channels are mixed at once, in the even and the odd bytes of a number.
+    """
+    height, width, channels = target.shape
+    end_x, end_y = (source.shape[1] - 1 << 16) - 1, (source.shape[0] - 1 << 16) - 1
+    row_x, row_y = np.empty(shift_x.shape[1]), np.empty(shift_x.shape[1])
+    lanes, half, byte, one = np.uint32(0x00FF00FF), np.uint32(0x00800080), np.uint32(8), np.uint32(256)
+    for row in range(height):
+        _row_of_grids(shift_x, shift_y, row / step, row_x, row_y)
+        for cell in range((width + step - 1) // step):
+            x, more_x = int(np.floor(row_x[cell] * ONE)), int(np.floor((row_x[cell + 1] - row_x[cell]) * ONE / step))
+            y, more_y = int(np.floor(row_y[cell] * ONE)), int(np.floor((row_y[cell + 1] - row_y[cell]) * ONE / step))
+            x, y = x + (cell * step << 16), y + (row << 16)
+            for column in range(cell * step, min(cell * step + step, width)):
+                at_x, at_y = np.uint64(min(max(x, 0), end_x)), np.uint64(min(max(y, 0), end_y))
+                x, y = x + more_x + ONE, y + more_y
+                x0, y0 = at_x >> np.uint64(16), at_y >> np.uint64(16)
+                x1, y1 = x0 + np.uint64(1), y0 + np.uint64(1)
+                fx, fy = (
+                    np.uint32(at_x >> np.uint64(8)) & np.uint32(255),
+                    np.uint32(at_y >> np.uint64(8)) & np.uint32(255),
+                )
+                gx, gy = one - fx, one - fy
+                first, second = source[y0, x0], source[y0, x1]
+                above_even = (((first & lanes) * gx + (second & lanes) * fx + half) >> byte) & lanes
+                above_odd = (((first >> byte) & lanes) * gx + ((second >> byte) & lanes) * fx + half) >> byte & lanes
+                first, second = source[y1, x0], source[y1, x1]
+                below_even = (((first & lanes) * gx + (second & lanes) * fx + half) >> byte) & lanes
+                below_odd = (((first >> byte) & lanes) * gx + ((second >> byte) & lanes) * fx + half) >> byte & lanes
+                even = (above_even * gy + below_even * fy + half) >> byte
+                odd = (above_odd * gy + below_odd * fy + half) >> byte
+                target[row, column, 0] = np.uint8(even & np.uint32(255))
+                target[row, column, 1] = np.uint8(odd & np.uint32(255))
+                target[row, column, 2] = np.uint8((even >> np.uint32(16)) & np.uint32(255))
+                if channels == 4:
+                    target[row, column, 3] = np.uint8((odd >> np.uint32(16)) & np.uint32(255))
 
 
 @compiled
-def _place(shape: Any, shift_x: Floats, shift_y: Floats, step: int, row: int, column: int) -> Any:
-    """Return the pixel of the source before a target pixel, and the share of the next one: rows, then columns."""
-    across, down = column / step, row / step
-    r, c = min(int(down), shift_x.shape[0] - 2), min(int(across), shift_x.shape[1] - 2)
-    fr, fc = down - r, across - c
-    first = shift_x[r, c] + fr * (shift_x[r + 1, c] - shift_x[r, c])
-    second = shift_x[r, c + 1] + fr * (shift_x[r + 1, c + 1] - shift_x[r, c + 1])
-    x = min(max(column + (first + fc * (second - first)), 0.0), shape[1] - 1.0)
-    first = shift_y[r, c] + fr * (shift_y[r + 1, c] - shift_y[r, c])
-    second = shift_y[r, c + 1] + fr * (shift_y[r + 1, c + 1] - shift_y[r, c + 1])
-    y = min(max(row + (first + fc * (second - first)), 0.0), shape[0] - 1.0)
-    x0, y0 = min(int(x), shape[1] - 2), min(int(y), shape[0] - 2)
-    return y0, x0, np.float32(y - y0), np.float32(x - x0)
+def _row_of_grids(shift_x: Floats, shift_y: Floats, down: float, row_x: Floats, row_y: Floats) -> None:
+    """Fill in the values of two grids in one row of pixels."""
+    r = min(int(down), shift_x.shape[0] - 2)
+    share = down - r
+    for column in range(shift_x.shape[1]):
+        row_x[column] = shift_x[r, column] + share * (shift_x[r + 1, column] - shift_x[r, column])
+        row_y[column] = shift_y[r, column] + share * (shift_y[r + 1, column] - shift_y[r, column])
 
 
 @compiled
