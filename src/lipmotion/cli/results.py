@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lipmotion.cli.paths import add_output
+from lipmotion.cli.staging import add_staging_arguments, staging_of
 
 if TYPE_CHECKING:
     from lipmotion.pipeline.model import Model
@@ -25,7 +26,9 @@ def add_result_arguments(parser: argparse.ArgumentParser, files: str, *, require
     parser.add_argument("--rate", type=float, metavar="HZ", help="frames per second of motion files (default: 100)")
     parser.add_argument("--channels", metavar="NAME,NAME", help="write only these to motion files: opening,width,...")
     parser.add_argument("--fps", type=float, default=25.0, help="frames per second of videos (default: 25)")
-    parser.add_argument("--face", default="portrait", metavar="NAME", help="face that videos show (default: portrait)")
+    articulation = "add tongue, lip_tuck, protrusion, spread, lip_press, teeth to motion files"
+    parser.add_argument("--articulation", action="store_true", help=articulation)
+    add_staging_arguments(parser)
 
 
 def check_results(options: argparse.Namespace, speech: Path | None = None) -> None:
@@ -36,7 +39,7 @@ def check_results(options: argparse.Namespace, speech: Path | None = None) -> No
     from lipmotion.pipeline.animate import check_outputs
 
     checked = {"rate_hz": options.rate, "fps": options.fps, "face": options.face}
-    check_outputs(options.output, speech, **checked, with_sound=speech is None)
+    check_outputs(options.output, speech, **checked, staging=staging_of(options), with_sound=speech is None)
 
 
 def write_results(options: argparse.Namespace, result: Generation, speech: Path | Audio, model: Model) -> None:
@@ -44,10 +47,10 @@ def write_results(options: argparse.Namespace, result: Generation, speech: Path 
 
     speech : the recording, or the sound
     """
-    from lipmotion.pipeline.animate import write
+    from lipmotion.pipeline.animate import with_articulation, write
 
     write(
-        result,
+        with_articulation(result) if options.articulation else result,
         options.output,
         speech=speech,
         model=model,
@@ -55,4 +58,5 @@ def write_results(options: argparse.Namespace, result: Generation, speech: Path 
         rate_hz=options.rate,
         fps=options.fps,
         face=options.face,
+        staging=staging_of(options),
     )

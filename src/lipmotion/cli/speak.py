@@ -27,7 +27,9 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     add_lexicon_argument(parser)
     add_model_argument(parser)
     add_speaker_argument(parser)
-    add_result_arguments(parser, "FILE.mp4 .wav .flac .ogg .json .csv .npz .TextGrid, or several", required=False)
+    add_result_arguments(
+        parser, "FILE.mp4 .webm .mov %%05d.png .wav .flac .ogg .json .csv .npz .TextGrid, or several", required=False
+    )
     add_machine_readable(parser)
     parser.set_defaults(run=run, wrong=parser.error)
 

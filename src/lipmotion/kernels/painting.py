@@ -145,7 +145,7 @@ def _sources(
 
 
 def _whole_shifts(grid: Floats, step: int, height: int, width: int) -> NDArray[np.int64]:
-    """Return the values of a grid at every pixel in 1/65536 [shape=(height, width)], rounded as the compiled form does."""
+    """Return a grid's values at every pixel in 1/65536 [shape=(height, width)], rounded as in the compiled form."""
     row = np.arange(height) / step
     r = np.minimum(row.astype(int), len(grid) - 2)
     rows = grid[r] + (row - r)[:, None] * (grid[r + 1] - grid[r])

@@ -6,13 +6,17 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export.base import check_motion, motion_suffixes, write_motion
 from lipmotion.export.sound import SOUND_CODECS, write_sound
 from lipmotion.export.textgrid import TEXTGRID_SUFFIX, write_textgrid
-from lipmotion.faces.base import Face
-from lipmotion.faces.registry import face_named
+from lipmotion.faces.base import Staging
+from lipmotion.faces.registry import staged_face
 from lipmotion.kernels.threads import one_thread
+from lipmotion.motion.gestures import GESTURES, with_gestures
+from lipmotion.pipeline.drawn_video import VIDEO_SUFFIXES, check_background, shows_face, write_drawn_face
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.outlook import outlook_of
 from lipmotion.pipeline.request import SpeechInput, request_of
@@ -24,7 +28,6 @@ from lipmotion.speech.audio_files import read_audio
 from lipmotion.storage.files import as_text, check_distinct, check_target
 from lipmotion.types import Audio, Constraints, Generation, TimedTranscript
 
-VIDEO_SUFFIX = ".mp4"
 SOUND_RATE_HZ = 48_000
 """Sampling rate of the sound track of a drawn video."""
 SLOWEST_HZ, FASTEST_HZ = 1.0, 1000.0
@@ -78,18 +81,22 @@ def write(
     rate_hz: float | None = None,
     fps: float = 25.0,
     face: str = "portrait",
+    staging: Staging | None = None,
 ) -> None:
     """Write generated motion to one or several files, each in the format of its suffix.
 
     generation : from ``animate``
-    outputs  : paths of files: ``.json``, ``.csv``, ``.npz`` (motion), ``.TextGrid`` (phones in time) or ``.mp4`` (a
-               drawn face, with sound); where ``speech`` is a sound, also ``.wav``, ``.flac``, ``.ogg``
+    outputs  : paths of files: ``.json``, ``.csv``, ``.npz`` (motion), ``.TextGrid`` (phones in time), ``.mp4``,
+               ``.webm``, ``.mov`` (a drawn face, with sound), or ``NAME%05d.png`` (its pictures, without sound); where
+               ``speech`` is a sound, also ``.wav``, ``.flac``, ``.ogg``
     speech   : the recording that was animated, or the sound, as of ``speak``; a video needs it for its sound
     model    : the model that generated the motion; motion files then name its corpus and licence
-    channels : channels of motion files, in this order; None: all
+    channels : channels of motion files, in this order, also articulatory ones as ``tongue`` (docs/articulation.md);
+               None: all of the motion
     rate_hz  : frames per second of motion files, 1 to 1000; None: the 100 of the model
     fps      : frames per second of videos, 1 to 1000
-    face     : the face of videos: ``portrait``, or the name of a face of an installed package
+    face     : the face of videos: ``portrait``, ``woman``, ``man``, ``cartoon``, or one of an installed package
+    staging  : size, background, intensity of the face, and what moves on its own (docs/faces.md); None: the defaults
     Raises ExportError: unknown suffix, no such folder, or a file that cannot be written.
     Raises InputError: a frame rate out of its range, or an unknown channel or face.
     The arguments are checked before the first file is written.
@@ -105,11 +112,12 @@ def write(
     paths = [Path(output) for output in ([outputs] if isinstance(outputs, str | Path) else outputs)]
     sound = speech if isinstance(speech, Audio) else None
     recording = None if isinstance(speech, Audio) else speech
-    check_outputs(paths, recording, rate_hz=rate_hz, fps=fps, face=face, with_sound=sound is not None)
-    videos = [path for path in paths if path.suffix.lower() == VIDEO_SUFFIX]
+    check_outputs(paths, recording, rate_hz=rate_hz, fps=fps, face=face, staging=staging, with_sound=sound is not None)
+    videos = [path for path in paths if shows_face(path)]
     if videos and "opening" not in generation.motion.names:
         raise ExportError(f"{videos[0]}: the motion has no channel 'opening' to draw a face from; write motion files")
-    drawn_face = face_named(face)
+    if {*(channels or ())} & {*GESTURES}:
+        generation = with_articulation(generation, channels or ())
     written = generation.selected(channels) if channels is not None else generation
     if rate_hz is not None:
         written = written.resampled(rate_hz)
@@ -121,9 +129,8 @@ def write(
         if path in sounds and sound is not None:
             write_sound(path, sound)
         elif path in videos:
-            _write_video(
-                generation, path, sound or read_audio(Path(str(recording)), SOUND_RATE_HZ, warn=False), fps, drawn_face
-            )
+            played = sound or read_audio(Path(str(recording)), SOUND_RATE_HZ, warn=False)
+            write_drawn_face(path, generation, played, fps, face, staging or Staging())
         elif path.suffix.lower() == TEXTGRID_SUFFIX.lower():
             write_textgrid(path, generation.units)
         else:
@@ -137,24 +144,26 @@ def check_outputs(
     rate_hz: float | None = None,
     fps: float = 25.0,
     face: str = "portrait",
+    staging: Staging | None = None,
     with_sound: bool = False,
 ) -> None:
     """Raise ExportError or InputError if an output cannot be written; called before long work begins.
 
-    outputs, speech, rate_hz, fps, face : as of ``write``
+    outputs, speech, rate_hz, fps, face, staging : as of ``write``
     with_sound : the speech is, or will be, a sound that is in no file
     """
     for hertz in (fps, rate_hz):
         if hertz is not None and not SLOWEST_HZ <= hertz <= FASTEST_HZ:
             raise InputError(f"the frame rate is {hertz}, required {SLOWEST_HZ:.0f} to {FASTEST_HZ:.0f} a second")
-    face_named(face)
-    suffixes = (*motion_suffixes(), VIDEO_SUFFIX, TEXTGRID_SUFFIX, *(SOUND_CODECS if with_sound else ()))
+    staged_face(face, staging or Staging())
+    suffixes = (*motion_suffixes(), *VIDEO_SUFFIXES, TEXTGRID_SUFFIX, *(SOUND_CODECS if with_sound else ()))
     check_distinct([Path(path) for path in outputs])
     for path in map(Path, outputs):
-        if path.suffix.lower() not in map(str.lower, suffixes):
-            raise ExportError(f"{path}: unknown format {path.suffix!r}; required one of: {' '.join(suffixes)}")
+        if path.suffix.lower() not in map(str.lower, suffixes) and not shows_face(path):
+            raise ExportError(f"{path}: unknown format {path.suffix!r}; required one of: {' '.join(suffixes)} %05d.png")
         check_target(path, speech)
-        if path.suffix.lower() == VIDEO_SUFFIX and speech is None and not with_sound:
+        check_background(path, staging or Staging())
+        if shows_face(path) and speech is None and not with_sound:
             raise ExportError(f"{path}: a video needs the recording: write(..., speech=FILE)")
 
 
@@ -169,8 +178,12 @@ def _text(value: object) -> str:
     return as_text("; ".join(map(str, value)) if isinstance(value, list) else str(value))
 
 
-def _write_video(generation: Generation, path: Path, sound: Audio, fps: float, face: Face) -> None:
-    from lipmotion.export.video import write_mp4
+def with_articulation(generation: Generation, channels: Sequence[str] = GESTURES) -> Generation:
+    """Return the generation with articulatory channels that its motion lacks, as they follow from its phones.
 
-    frames = face.render(generation.motion, generation.units, fps=fps)
-    write_mp4(path, frames, fps=fps, audio=sound)
+    channels : the articulatory ones among these are added (docs/articulation.md); their variance is 0
+    """
+    motion = with_gestures(generation.motion, generation.units, channels)
+    added = len(motion.channels) - len(generation.motion.channels)
+    variance = np.pad(generation.variance, ((0, 0), (0, added))) if added else generation.spread
+    return replace(generation, motion=motion, spread=variance)

@@ -15,8 +15,8 @@ FLOOR = 1e-9
 
 def prosody_of(audio: Audio) -> Prosody:
     """Return loudness and pitch of a sound at 16 kHz. Raises InputError: as ``speech.mfcc`` says."""
-    samples = checked_samples(audio).astype(np.float64)
-    frames = frame_count(samples)
+    checked = checked_samples(audio)
+    samples, frames = checked.astype(np.float64), frame_count(checked)
     power = np.concatenate([[0.0], np.cumsum(samples * samples)])
     centre = np.arange(frames) * HOP
     first, last = np.clip(centre - HOP, 0, len(samples)), np.clip(centre + HOP, 0, len(samples))

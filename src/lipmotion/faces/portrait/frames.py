@@ -37,9 +37,11 @@ def face_poses(
         brows=staging.brows,
         head=staging.head,
     )
-    rows = np.stack([moved.lids, moved.gaze_x, moved.gaze_y, moved.brows, moved.worry], axis=1).tolist()
-    heads = moved.head.tolist()
-    return [FacePose(mouth, *row, HeadPose(*head)) for mouth, row, head in zip(mouths, rows, heads, strict=True)]
+    curves = (curve.tolist() for curve in moved)
+    return [
+        FacePose(mouth, lids, gaze_x, gaze_y, brows, worry, HeadPose(*head))
+        for mouth, lids, gaze_x, gaze_y, brows, worry, head in zip(mouths, *curves, strict=True)
+    ]
 
 
 def pictures(rasteriser: Callable[[], Rasteriser], poses: Sequence[FacePose]) -> Iterator[NDArray[np.uint8]]:

@@ -17,8 +17,8 @@ def paint_head(window: Window, design: Design) -> Layer:
     if design.flat:
         layer.fill(skull, colours.skin)
         layer.fill(_shade_of(skull), colours.skin_shade, opacity=0.5, within=skull)
-        for side in (-1, 1):
-            layer.fill(ellipse(side * 0.46, 0.5, 0.13, 0.08), colours.blush, opacity=design.blush)
+        for cheek in (-1, 1):
+            layer.fill(ellipse(cheek * 0.46, 0.5, 0.13, 0.08), colours.blush, opacity=design.blush)
         _flat_nose(layer, design)
         layer.contour(skull, design.line, colours.line)
     else:

@@ -142,7 +142,7 @@ def _check(motion: Motion, fps: float) -> None:
 def _gestures(motion: Motion, units: Timeline[Unit], time_s: Curve, intensity: float) -> list[Curve]:
     curves = gesture_curves(units, time_s, [name for name in GESTURES if name not in motion.names])
     for name in {*GESTURES} & {*motion.names}:
-        curves[name] = np.clip(_at(motion, motion[name], time_s), 0, 1)
+        curves[name] = np.clip(_at(motion, motion[name].astype(float), time_s), 0, 1)
     for name in ("protrusion", "spread"):  # grows with the intensity, without a corner at 1
         curves[name] = 1 - (1 - curves[name]) ** np.sqrt(intensity)
     return [curves[name] for name in GESTURES]

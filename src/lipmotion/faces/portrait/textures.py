@@ -1,7 +1,7 @@
 """Textures of the mouth: small pictures that stretch with lips, teeth and tongue.
 
-A texture is colour 0..255 and opacity 0..1 [shape=(D, U, 4)]: from the top of a band to its bottom, and across it. Across
-lips, -1 and 1 are the corners; across teeth and tongue, they are ``SPAN`` eye distances from the middle.
+A texture is colour 0..255 and opacity 0..1 [shape=(D, U, 4)]: from the top of a band to its bottom, and across it.
+Across lips, -1 and 1 are the corners; across teeth and tongue, they are ``SPAN`` eye distances from the middle.
 """
 
 from __future__ import annotations
@@ -143,7 +143,7 @@ def _teeth(colour: Colour, shadow: Colour, gaps: tuple[float, ...], dark: float)
 def _tongue(colour: Colour, dark: Colour) -> Texture:
     depth, x = _grid(16, 65)
     away = x * SPAN
-    light = tuple(int(c + (255 - c) * 0.42) for c in colour)
+    light = np.array(colour) + (255 - np.array(colour)) * 0.42
     paint = _mix(colour, dark, 0.45 * depth**1.5 + 3.0 * np.abs(away) ** 1.3)
     paint = _mix(paint, light, 0.6 * np.exp(-(((depth - 0.22) / 0.2) ** 2) - ((np.abs(away) - 0.045) / 0.045) ** 2))
     paint = _mix(paint, dark, 0.25 * np.exp(-((away / 0.012) ** 2)) * (0.2 + 0.8 * depth))

@@ -1,0 +1,43 @@
+"""Options of drawn faces, as several verbs have them."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from lipmotion.faces.base import Staging
+
+MOVING = ("blinks", "gaze", "brows", "head")
+
+
+def add_staging_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the face of videos, and how it is shown (docs/faces.md)."""
+    faces = "face that videos show: woman, man, cartoon (default: portrait, the woman)"
+    parser.add_argument("--face", default="portrait", metavar="NAME", help=faces)
+    parser.add_argument("--size", type=int, default=0, metavar="PIXELS", help="height of the face's picture")
+    parser.add_argument("--background", default="scene", metavar="COLOUR", help="scene, transparent, or as #40a0ff")
+    parser.add_argument(
+        "--intensity", type=float, default=1.0, metavar="X", help="movements of the face's mouth X times"
+    )
+    still = "what does not move on its own, with commas: blinks,gaze,brows,head"
+    parser.add_argument("--still", default="", metavar="NAME,NAME", help=still)
+    parser.add_argument("--face-seed", type=int, default=0, metavar="N", help="other blinks, glances and nods")
+
+
+def staging_of(options: argparse.Namespace) -> Staging:
+    """Return how a face is shown. Raises InputError: a value out of its range, or nothing of that name moves."""
+    from lipmotion.errors import InputError
+    from lipmotion.faces.base import Staging
+
+    still = [name for name in options.still.split(",") if name]
+    unknown = [name for name in still if name not in MOVING]
+    if unknown:
+        raise InputError(f"--still names {unknown[0]!r}, required some of: {', '.join(MOVING)}")
+    return Staging(
+        size=options.size,
+        background=options.background,
+        intensity=options.intensity,
+        seed=options.face_seed,
+        **{name: name not in still for name in MOVING},
+    )
