@@ -88,7 +88,7 @@ _TARGETS: dict[str, tuple[Target, Targets]] = {
     "lip_press": (Target(0, 0, 1.0, 0.02), _steady({_CLOSED: 1.0}, 3.0, 0.02)),
     "teeth": (
         Target(0.5, 0.5, 0.5, 0.03),
-        _steady({"s z": 1.0, "iy": 0.9, "sh zh ch jh": 0.95}, 1.6, 0.03)
+        _steady({"s z": 1.0, "iy": 0.9, "sh zh ch jh": 0.95}, 2.0, 0.03)
         | _steady({"ih ix ey y": 0.75, "t d n en": 0.7, "ae eh": 0.6, "k g ng": 0.6}, 0.8, 0.03)
         | _steady({"f v th dh": 0.5}, 2.0, 0.025)
         | _steady({"uw w": 0.0, "uh": 0.15, "ao": 0.3, "aa": 0.4}, 2.0, 0.04)

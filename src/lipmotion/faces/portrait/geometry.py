@@ -68,7 +68,7 @@ def lip_outlines(lips: LipDesign, pose: MouthPose, x: Heights) -> LipOutlines:
     rise = float(upper_share(pose.gap)) * (1 + 0.5 * pose.tuck)
     rise += out * (0.45 * pose.gap - rise)
     drop = pose.gap - rise
-    middle = lips.line_y + pose.tuck * (TEETH_EDGE + 0.002 - drop) - 0.008 * out
+    middle = lips.line_y + pose.tuck * max(TEETH_EDGE + 0.002 - drop, -0.06) - 0.008 * out
     sag = (0.5 - 0.3 * wide) * drop * (1 - pose.tuck) + 0.018 * out - 0.012 * wide * (1 - pose.press)
     bend = sag * u * u
     line = middle + (1 - 0.7 * out) * _on("line", u) + lips.smile * u**3 + bend
@@ -136,7 +136,7 @@ def _arch(u: Heights, power: float) -> Heights:
 def _inner_share(gap: float, out: float, wide: float) -> float:
     """Return the share of the mouth's width along which the lips are apart; it grows with the gap."""
     share = 0.72 + 0.2 * min(gap / 0.12, 1) + 0.1 * wide * min(gap / 0.05, 1)
-    return min(share, 0.95) * (1 - out * (0.6 - 0.2 * min(gap / 0.2, 1)))
+    return min(share, 0.95) * (1 - out * (0.68 - 0.25 * min(gap / 0.2, 1)))
 
 
 def _tongue(pose: MouthPose, x: Heights, edge: float, low_lip: float) -> tuple[Heights, Heights]:
