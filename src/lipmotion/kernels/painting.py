@@ -13,6 +13,8 @@ from lipmotion.kernels.choice import compiled_pays
 
 Layer = NDArray[np.float32]
 Bytes = NDArray[np.uint8]
+Canvas = NDArray[np.uint16]
+"""Values 0..255 in 16 bits, so that pixels can be mixed as whole numbers."""
 Floats = NDArray[np.float64]
 PIXEL_S = 6e-8
 """Time that NumPy takes for a pixel of a band; a warp takes about as long."""
@@ -58,31 +60,31 @@ def warp(source: Layer, shift_x: Floats, shift_y: Floats, step: int, target: Lay
     target[...] = above + fy * (below - above)
 
 
-def warp_bytes(source: Bytes, shift_x: Floats, shift_y: Floats, step: int, target: Bytes) -> None:
+def warp_bytes(source: Canvas, shift_x: Floats, shift_y: Floats, step: int, target: Bytes) -> None:
     """Fill a picture of bytes as ``warp`` does; shifts are rounded down to 1/65536, shares of pixels to 1/256.
 
-    source : [shape=(H, W, 4)]
+    source : values 0..255 [shape=(H, W, 4)], the last two axes contiguous
     target : [shape=(H, W, C)], of the first C channels, 3 or 4
     """
-    packed = source.view(np.uint32)[..., 0]
     if compiled_pays(target.shape[0] * target.shape[1] * PIXEL_S):
         from lipmotion.kernels.compiled import painting
 
-        painting.warp_packed(packed, shift_x, shift_y, step, target)
+        painting.warp_packed(source.view(np.uint64)[..., 0], shift_x, shift_y, step, target)
         return
     height, width = target.shape[:2]
     x = _whole_shifts(shift_x, step, height, width) + (np.arange(width) << 16)
     y = _whole_shifts(shift_y, step, height, width) + (np.arange(height)[:, None] << 16)
     x, y = (np.clip(at, 0, ((size - 1) << 16) - 1) for at, size in ((x, source.shape[1]), (y, source.shape[0])))
     x0, y0, fx, fy = x >> 16, y >> 16, (x >> 8 & 255)[..., None], (y >> 8 & 255)[..., None]
+    both = fx * fy >> 8
     pixels = source[..., : target.shape[2]].astype(np.int32)
-    above = (pixels[y0, x0] * (256 - fx) + pixels[y0, x0 + 1] * fx + 128) >> 8
-    below = (pixels[y0 + 1, x0] * (256 - fx) + pixels[y0 + 1, x0 + 1] * fx + 128) >> 8
-    target[...] = (above * (256 - fy) + below * fy + 128) >> 8
+    mixed = pixels[y0, x0] * (256 - fx - fy + both) + pixels[y0, x0 + 1] * (fx - both)
+    mixed += pixels[y0 + 1, x0] * (fy - both) + pixels[y0 + 1, x0 + 1] * both + 128
+    target[...] = mixed >> 8
 
 
-def stack(below: Layer, shade: Layer, skin: Layer, above: Layer, target: Bytes) -> None:
-    """Fill in the bytes of four layers over one another [shape=(H, W, 4)], premultiplied.
+def stack(below: Layer, shade: Layer, skin: Layer, above: Layer, target: Canvas) -> None:
+    """Fill in the values 0..255 of four layers over one another [shape=(H, W, 4)], premultiplied.
 
     below : what is behind
     shade : is added to it where the shadow falls
@@ -100,12 +102,12 @@ def stack(below: Layer, shade: Layer, skin: Layer, above: Layer, target: Bytes) 
 _WHOLE = np.array([1, 1, 1, 255], np.float64)
 
 
-def _stack(below: Layer, shade: Layer, skin: Layer, above: Layer, target: Bytes) -> None:
+def _stack(below: Layer, shade: Layer, skin: Layer, above: Layer, target: Canvas) -> None:
     skins = skin.astype(np.float64)
     mixed = below + skins[..., 4:] * shade
     mixed = skins[..., :4] + (1 - skins[..., 3:4]) * mixed
     mixed = above + (1 - above[..., 3:4].astype(np.float64)) * mixed
-    target[...] = (mixed * _WHOLE + 0.5).astype(np.uint8)
+    target[...] = (mixed * _WHOLE + 0.5).astype(np.uint16)
 
 
 def _paint_band(layer: Layer, first: int, top: Floats, bottom: Floats, across: Floats, texture: Floats) -> None:

@@ -109,7 +109,7 @@ def mouth_interior(lips: LipDesign, pose: MouthPose, x: Heights, outlines: LipOu
     met = upper_edge + 0.003 + 0.08 * pose.jaw
     lower = below_lip + reveal * (min(met, below_lip) - below_lip) + (0.2 - 0.55 * reveal) * x * x
     top, bottom = _tongue(pose, x, edge, low_lip)
-    over = max(pose.tongue - 0.6, 0) / 0.4 * 0.018
+    over = max(pose.tongue - 0.6, 0) / 0.4 * 0.026
     cut = outlines.upper_inner, outlines.lower_inner
     return MouthInterior(
         np.clip(upper, cut[0], cut[1] + TUCK_OVERLAP * pose.tuck),
@@ -147,4 +147,4 @@ def _tongue(pose: MouthPose, x: Heights, edge: float, low_lip: float) -> tuple[H
     half_width = 0.2 - 0.085 * up + 0.025 * out
     across = (x / half_width) ** 2
     bulge = (1 - up) * 0.05 * (across + across**2) + up * 0.05 * across**2 * (0.5 + 0.5 * across)
-    return top + bulge, low_lip + 0.022 - 0.022 * across
+    return top + bulge, low_lip + 0.03 - 0.03 * across

@@ -53,7 +53,8 @@ class SkinField:
         side = np.abs(x)
         self._cheek = -np.sign(x) * np.exp(-(((side - 1.25 * lips.half_width) / 0.2) ** 2) - (low / 0.24) ** 2)
         self._narrow = -x * np.clip((low - 0.1) / 0.3, 0, 1) * (1 - 0.5 * np.clip(side / 0.7, 0, 1))
-        self._lift = np.exp(-(((side - 0.42) / 0.22) ** 2) - ((low + 0.3) / 0.22) ** 2)
+        self._lift = np.exp(-(((side - 0.42) / 0.22) ** 2) - ((low + 0.2) / 0.18) ** 2)
+        self._lift *= np.clip((low + 0.5) / 0.2, 0, 1)
         self._half_width = lips.half_width
 
     def shifts(self, pose: MouthPose) -> tuple[Floats, Floats]:

@@ -28,7 +28,7 @@ ROUNDED, STRETCHED = 0.27, 0.07
 """So much narrower are protruded lips, and so much wider are spread ones, beside what was measured."""
 TUCKED_GAP = (0.05, 0.07)
 """Range of the gap while the lower lip is on the teeth: enough to show them."""
-TONGUE_GAP, TEETH_GAP, ROUND_GAP = 0.08, 0.05, 0.06
+TONGUE_GAP, TEETH_GAP, ROUND_GAP = 0.095, 0.05, 0.06
 """Least gap while the tongue is between the teeth, while both rows of teeth are shown, and of protruded lips."""
 OVAL = 0.7
 """How much narrower a mouth is that opens far, relative to the rest pose and for each eye distance."""
@@ -78,7 +78,7 @@ def mouth_poses(motion: Motion, units: Timeline[Unit], fps: float, intensity: fl
     rest = _rest_frames(motion, units)
     tongue, tuck, protrusion, spread, press, teeth = _gestures(motion, units, time_s, intensity)
     gap = _gap(motion, time_s, fps, intensity)
-    free = (1 - press) * (gap > 0)
+    free = (1 - press) * np.clip(gap / FAITHFUL_ABOVE, 0, 1)
     gap += np.maximum(tuck - press, 0) * (np.clip(gap, *TUCKED_GAP) - gap)
     shown = np.maximum(2 * teeth - 1, 0)
     for weight, least in (

@@ -22,6 +22,7 @@ from lipmotion.kernels.painting import stack, warp, warp_bytes
 
 Pixels = NDArray[np.float32]
 Bytes = NDArray[np.uint8]
+Canvas = NDArray[np.uint16]
 SCENE = "scene"
 BROW_STEPS = 8
 """Positions of the brows in a pixel."""
@@ -55,7 +56,7 @@ class Rasteriser:
         whole = view.window(-9, -9, 9, 9)
         line_y = design.lips.line_y
         self._opaque = background is not None
-        self._jaw = view.window(-0.88, line_y - 0.5, 0.88, line_y + 0.95)
+        self._jaw = view.window(-0.86, line_y - 0.5, 0.86, line_y + 0.95)
         self._mouth = view.window(-0.56, line_y - 0.24, 0.56, line_y + 0.7)
         self._eyes = view.window(-0.66, -0.24, 0.66, 0.21)
         self._brow = view.window(-0.8, -0.64, 0.8, -0.06)
@@ -70,18 +71,18 @@ class Rasteriser:
         self._below, self._shade, self._front = below, shade, front
         still = _over(front, _over(skin.pixels, below + shadow[..., None] * shade))
         self._eye_painter = EyePainter(design, self._eyes)
-        self._still = (still * (1, 1, 1, 255) + 0.5).astype(np.uint8)
-        self._frame = np.ascontiguousarray(self._still[..., : 3 if self._opaque else 4])
+        self._still = (still * (1, 1, 1, 255) + 0.5).astype(np.uint16)
+        self._frame = self._still[..., : 3 if self._opaque else 4].astype(np.uint8)
         self._brows = lru_cache(maxsize=64)(self._painted_brows)
         self._skin_field, self._brow_field = SkinField(self._jaw, design.lips), BrowField(self._brow)
         self._head_field = HeadField(self._head)
         self._mouth_painter = MouthPainter(design, self._mouth)
 
-    def canvas(self) -> Bytes:
+    def canvas(self) -> Canvas:
         """Return the picture of the resting face without eyes and mouth, to draw on [shape=(size, size, 4)]."""
         return self._still.copy()
 
-    def picture(self, pose: FacePose, canvas: Bytes) -> Bytes:
+    def picture(self, pose: FacePose, canvas: Canvas) -> Bytes:
         """Return one frame [shape=(size, size, 3)], or where the background is transparent [shape=(size, size, 4)].
 
         canvas : from ``canvas``; changed
@@ -98,7 +99,7 @@ class Rasteriser:
         warp_bytes(canvas[area], *self._head_field.shifts(pose.head), STEP, frame[area])
         return frame if self._opaque else _straight(frame)
 
-    def _painted_brows(self, raised: int, worried: int) -> Bytes:
+    def _painted_brows(self, raised: int, worried: int) -> Canvas:
         steps = BROW_STEPS * self._brow.view.scale
         picture = np.empty_like(self._still[self._brow.area])
         self._lay(
@@ -112,7 +113,7 @@ class Rasteriser:
         warp(source, *shifts, STEP, skin)
         return skin
 
-    def _lay(self, skin: Pixels, window: Window, target: Bytes) -> None:
+    def _lay(self, skin: Pixels, window: Window, target: Canvas) -> None:
         area = window.area
         stack(self._below[area], self._shade[area], skin, self._front[area], target)
 
@@ -133,8 +134,8 @@ def _over(above: NDArray[np.floating], below: NDArray[np.floating]) -> Pixels:
     return np.asarray(above + (1 - above[..., 3:4]) * below, dtype=np.float32)
 
 
-def _put(above: Pixels, canvas: Bytes) -> None:
-    """Lay premultiplied pixels over bytes, in place."""
+def _put(above: Pixels, canvas: Canvas) -> None:
+    """Lay premultiplied pixels over a canvas, in place."""
     mixed = above * _WHOLE
     mixed += (1 - above[..., 3:]) * canvas
     mixed += np.float32(0.5)

@@ -10,7 +10,7 @@ from lipmotion.kernels.compiled.compiler import compiled
 Layer = NDArray[np.float32]
 Floats = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
-Packed = NDArray[np.uint32]
+Packed = NDArray[np.uint64]
 ONE = 1 << 16
 """A pixel, in whole numbers."""
 
@@ -87,12 +87,13 @@ def warp_floats(source: Layer, shift_x: Floats, shift_y: Floats, step: int, targ
 def warp_packed(source: Packed, shift_x: Floats, shift_y: Floats, step: int, target: Bytes) -> None:
     """Fill a picture of bytes with one of packed pixels that is shifted, as ``kernels.painting.warp_bytes``.
 
-    Two channels are mixed at once, in the even and the odd bytes of a number.
+    All four channels are mixed at once, in the parts of a number; no sum needs more than 16 bits.
     """
     height, width, channels = target.shape
     end_x, end_y = (source.shape[1] - 1 << 16) - 1, (source.shape[0] - 1 << 16) - 1
     row_x, row_y = np.empty(shift_x.shape[1]), np.empty(shift_x.shape[1])
-    lanes, half, byte, one = np.uint32(0x00FF00FF), np.uint32(0x00800080), np.uint32(8), np.uint32(256)
+    one, two, half = np.uint64(1), np.uint64(8), np.uint64(0x0080008000800080)
+    share, byte = np.uint64(256), np.uint64(255)
     for row in range(height):
         _row_of_grids(shift_x, shift_y, row / step, row_x, row_y)
         for cell in range((width + step - 1) // step):
@@ -103,25 +104,15 @@ def warp_packed(source: Packed, shift_x: Floats, shift_y: Floats, step: int, tar
                 at_x, at_y = np.uint64(min(max(x, 0), end_x)), np.uint64(min(max(y, 0), end_y))
                 x, y = x + more_x + ONE, y + more_y
                 x0, y0 = at_x >> np.uint64(16), at_y >> np.uint64(16)
-                x1, y1 = x0 + np.uint64(1), y0 + np.uint64(1)
-                fx, fy = (
-                    np.uint32(at_x >> np.uint64(8)) & np.uint32(255),
-                    np.uint32(at_y >> np.uint64(8)) & np.uint32(255),
-                )
-                gx, gy = one - fx, one - fy
-                first, second = source[y0, x0], source[y0, x1]
-                above_even = (((first & lanes) * gx + (second & lanes) * fx + half) >> byte) & lanes
-                above_odd = (((first >> byte) & lanes) * gx + ((second >> byte) & lanes) * fx + half) >> byte & lanes
-                first, second = source[y1, x0], source[y1, x1]
-                below_even = (((first & lanes) * gx + (second & lanes) * fx + half) >> byte) & lanes
-                below_odd = (((first >> byte) & lanes) * gx + ((second >> byte) & lanes) * fx + half) >> byte & lanes
-                even = (above_even * gy + below_even * fy + half) >> byte
-                odd = (above_odd * gy + below_odd * fy + half) >> byte
-                target[row, column, 0] = np.uint8(even & np.uint32(255))
-                target[row, column, 1] = np.uint8(odd & np.uint32(255))
-                target[row, column, 2] = np.uint8((even >> np.uint32(16)) & np.uint32(255))
+                fx, fy = at_x >> two & byte, at_y >> two & byte
+                both = fx * fy >> two
+                mixed = source[y0, x0] * (share - fx - fy + both) + source[y0, x0 + one] * (fx - both)
+                mixed += source[y0 + one, x0] * (fy - both) + source[y0 + one, x0 + one] * both + half
+                target[row, column, 0] = np.uint8(mixed >> np.uint64(8) & byte)
+                target[row, column, 1] = np.uint8(mixed >> np.uint64(24) & byte)
+                target[row, column, 2] = np.uint8(mixed >> np.uint64(40) & byte)
                 if channels == 4:
-                    target[row, column, 3] = np.uint8((odd >> np.uint32(16)) & np.uint32(255))
+                    target[row, column, 3] = np.uint8(mixed >> np.uint64(56))
 
 
 @compiled
@@ -135,7 +126,7 @@ def _row_of_grids(shift_x: Floats, shift_y: Floats, down: float, row_x: Floats, 
 
 
 @compiled
-def stack(below: Layer, shade: Layer, skin: Layer, above: Layer, target: Bytes) -> None:
+def stack(below: Layer, shade: Layer, skin: Layer, above: Layer, target: NDArray[np.uint16]) -> None:
     """Fill in the bytes of layers over one another, as ``kernels.painting.stack``."""
     for row in range(target.shape[0]):
         for column in range(target.shape[1]):
@@ -145,4 +136,4 @@ def stack(below: Layer, shade: Layer, skin: Layer, above: Layer, target: Bytes) 
                 mixed = below[row, column, channel] + shadow * shade[row, column, channel]
                 mixed = skin[row, column, channel] + behind_skin * mixed
                 mixed = above[row, column, channel] + behind_above * mixed
-                target[row, column, channel] = np.uint8(mixed * (255.0 if channel == 3 else 1.0) + 0.5)
+                target[row, column, channel] = np.uint16(mixed * (255.0 if channel == 3 else 1.0) + 0.5)
