@@ -18,7 +18,7 @@ def opening(*values: float, rate_hz: float = 25.0) -> Motion:
     return Motion(np.array(values)[:, None], rate_hz, (Channel("opening"),))
 
 
-def frames(motion: Motion, units=NOTHING_SAID, face: str = "woman", fps: float = 25.0, **staging) -> list[np.ndarray]:
+def frames(motion, units=NOTHING_SAID, face="woman", fps=25.0, **staging):
     return list(staged_face(face, Staging(**staging)).render(motion, units, fps=fps))
 
 

@@ -18,7 +18,8 @@ def middle(phones: tuple[str, ...], number: int, name: str) -> float:
 
 @pytest.mark.parametrize(
     ("name", "phone"),
-    [("lip_tuck", "f"), ("lip_tuck", "v"), ("tongue", "th"), ("tongue", "dh"), ("protrusion", "uw"), ("protrusion", "w"),
+    [("lip_tuck", "f"), ("lip_tuck", "v"), ("tongue", "th"), ("tongue", "dh"), ("protrusion", "uw"),
+     ("protrusion", "w"),
      ("spread", "iy"), ("lip_press", "p"), ("lip_press", "b"), ("lip_press", "m"), ("teeth", "s")],
 )  # fmt: skip
 def test_a_phone_reaches_its_target_whatever_is_beside_it(name, phone):

@@ -32,7 +32,7 @@ LEAST_PAUSE_S = 0.06
 """In shorter pauses the mouth goes on."""
 
 
-class Target(NamedTuple):
+class GestureTarget(NamedTuple):
     """What a phone asks of a channel.
 
     begin, end : target at the first and the last moment of the phone, 0 to 1
@@ -46,53 +46,53 @@ class Target(NamedTuple):
     width_s: float = 0.035
 
 
-Targets = Mapping[str, Target]
+Targets = Mapping[str, GestureTarget]
 
 
-def _steady(values: Mapping[str, float], dominance: float = 1.0, width_s: float = 0.035) -> dict[str, Target]:
+def _steady(values: Mapping[str, float], dominance: float = 1.0, width_s: float = 0.035) -> dict[str, GestureTarget]:
     """Return the same target from begin to end for phones: ``{"t d n": 0.6}``."""
-    return {p: Target(value, value, dominance, width_s) for phones, value in values.items() for p in phones.split()}
+    return {p: GestureTarget(value, value, dominance, width_s) for phones, value in values.items() for p in phones.split()}
 
 
 _CLOSED = " ".join(LIP_CLOSING)
-_TARGETS: dict[str, tuple[Target, Targets]] = {
+_TARGETS: dict[str, tuple[GestureTarget, Targets]] = {
     "tongue": (
-        Target(0, 0, 0.5, 0.025),
+        GestureTarget(0, 0, 0.5, 0.025),
         _steady({"th dh": TIP_OUT}, 5.0, 0.02)
         | _steady({"l el": TIP_UP, "t d n en": 0.55, "ch jh": 0.45}, 2.5, 0.022)
         | _steady({"s z": 0.3, "sh zh": 0.25, "iy ih ey y": 0.2, "r er axr": 0.2}, 0.8, 0.03),
     ),
     "lip_tuck": (
-        Target(0, 0, 1.0, 0.022),
+        GestureTarget(0, 0, 1.0, 0.022),
         _steady({"f v": 1.0}, 4.0, 0.018) | _steady({_CLOSED: 0.0}, 8.0, 0.022),
     ),
     "protrusion": (
-        Target(0, 0, 0.25, 0.03),
+        GestureTarget(0, 0, 0.25, 0.03),
         _steady({"uw w": 1.0}, 3.0, 0.05)
         | _steady({"uh": 0.65, "ao": 0.4}, 1.6, 0.05)
-        | {"ow": Target(0.55, 1.0, 2.2, 0.05), "oy": Target(0.6, 0.0, 1.6, 0.04), "aw": Target(0.0, 0.75, 1.4, 0.04)}
+        | {"ow": GestureTarget(0.55, 1.0, 2.2, 0.05), "oy": GestureTarget(0.6, 0.0, 1.6, 0.04), "aw": GestureTarget(0.0, 0.75, 1.4, 0.04)}
         | _steady({"sh zh ch jh": 0.6}, 1.4, 0.04)
         | _steady({"r": 0.55, "er axr": 0.4}, 1.2, 0.04)
         | _steady({"iy ih ey ae eh ay aa ah": 0.0}, 1.2, 0.035)
         | _steady({"f v": 0.0, "s z": 0.0, "sil sp": 0.0}, 0.7, 0.03),
     ),
     "spread": (
-        Target(0, 0, 0.25, 0.03),
+        GestureTarget(0, 0, 0.25, 0.03),
         _steady({"iy": 1.0}, 2.0, 0.04)
-        | {"ey": Target(0.5, 0.8, 1.4, 0.04), "ay": Target(0.0, 0.6, 1.0, 0.035), "oy": Target(0, 0.6, 1.0, 0.035)}
+        | {"ey": GestureTarget(0.5, 0.8, 1.4, 0.04), "ay": GestureTarget(0.0, 0.6, 1.0, 0.035), "oy": GestureTarget(0, 0.6, 1.0, 0.035)}
         | _steady({"ih ix": 0.55, "ae eh": 0.45, "y": 0.7}, 1.0, 0.035)
         | _steady({"s z": 0.6}, 0.8, 0.03)
         | _steady({"uw w uh ow ao aa r er axr sh zh ch jh": 0.0}, 1.5, 0.04)
         | _steady({"sil sp": 0.0}, 0.7, 0.03),
     ),
-    "lip_press": (Target(0, 0, 1.0, 0.02), _steady({_CLOSED: 1.0}, 3.0, 0.02)),
+    "lip_press": (GestureTarget(0, 0, 1.0, 0.02), _steady({_CLOSED: 1.0}, 3.0, 0.02)),
     "teeth": (
-        Target(0.5, 0.5, 0.5, 0.03),
+        GestureTarget(0.5, 0.5, 0.5, 0.03),
         _steady({"s z": 1.0, "iy": 0.9, "sh zh ch jh": 0.95}, 2.0, 0.03)
         | _steady({"ih ix ey y": 0.75, "t d n en": 0.7, "ae eh": 0.6, "k g ng": 0.6}, 0.8, 0.03)
         | _steady({"f v th dh": 0.5}, 2.0, 0.025)
         | _steady({"uw w": 0.0, "uh": 0.15, "ao": 0.3, "aa": 0.4}, 2.0, 0.04)
-        | {"ow": Target(0.3, 0.0, 1.6, 0.04)}
+        | {"ow": GestureTarget(0.3, 0.0, 1.6, 0.04)}
         | _steady({"sil sp": 0.0}, 2.5, 0.03),
     ),
 }
@@ -119,16 +119,29 @@ def with_gestures(motion: Motion, units: Timeline[Unit], names: Collection[str] 
     return Motion(values, motion.rate_hz, (*motion.channels, *(Channel(name, WEIGHT) for name in curves)))
 
 
-def pause_curve(units: Timeline[Unit], time_s: Curve, least_s: float = LEAST_PAUSE_S, blend_s: float = 0.06) -> Curve:
+def pause_curve(
+    units: Timeline[Unit],
+    time_s: Curve,
+    least_s: float = LEAST_PAUSE_S,
+    *,
+    blend_s: float = 0.06,
+    after_s: float = 0.0,
+    before_s: float = 0.0,
+) -> Curve:
     """Return the weight of pauses at each time, 0 to 1 [shape=(T,)]; it is 0.5 at the boundaries of a pause.
 
     least_s : shorter pauses are none
     blend_s : duration of the change
+    after_s, before_s : the pause begins so much after the last phone, and ends so much before the next one
     """
     total = np.zeros(len(time_s))
     for span in units:
         if is_silent(span.label.phone) and span.duration_s >= least_s:
-            total += _risen((time_s - span.start_s) / blend_s) - _risen((time_s - span.end_s) / blend_s)
+            start_s, end_s = span.start_s, span.end_s
+            if start_s > 0:
+                start_s += min(after_s, span.duration_s / 4)
+            end_s -= min(before_s, span.duration_s / 4)
+            total += _risen((time_s - start_s) / blend_s) - _risen((time_s - end_s) / blend_s)
     return np.clip(total, 0, 1)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,5 +17,5 @@ class Prosody:
     log_f0   : natural logarithm of F0 in Hz, NaN in unvoiced frames [shape=(T,)]
     """
 
-    level_db: NDArray[np.float64]
-    log_f0: NDArray[np.floating]
+    level_db: NDArray[np.floating[Any]]
+    log_f0: NDArray[np.floating[Any]]

@@ -42,7 +42,7 @@ class Expression(NamedTuple):
     lids           : how far the eyes are closed, 0..1
     gaze_x, gaze_y : of the irises, to the right and down, in eye distances
     brows, worry   : how far the brows are raised, and their inner ends beyond that, in eye distances
-    head           : x, y, roll, yaw, pitch as of ``HeadPose`` [shape=(N, 5)]
+    head           : x, y, roll, yaw, pitch as of ``HeadPlacement`` [shape=(N, 5)]
     """
 
     lids: Curve

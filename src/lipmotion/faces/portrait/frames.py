@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from lipmotion.faces.base import Staging
 from lipmotion.faces.portrait.expression import expression
-from lipmotion.faces.portrait.movement import HeadPose
+from lipmotion.faces.portrait.movement import HeadPlacement
 from lipmotion.faces.portrait.pose import frame_times, mouth_poses
 from lipmotion.faces.portrait.rasteriser import FacePose, Rasteriser
 from lipmotion.types import Motion, Prosody, Timeline, Unit
@@ -39,7 +39,7 @@ def face_poses(
     )
     curves = (curve.tolist() for curve in moved)
     return [
-        FacePose(mouth, lids, gaze_x, gaze_y, brows, worry, HeadPose(*head))
+        FacePose(mouth, lids, gaze_x, gaze_y, brows, worry, HeadPlacement(*head))
         for mouth, lids, gaze_x, gaze_y, brows, worry, head in zip(mouths, *curves, strict=True)
     ]
 

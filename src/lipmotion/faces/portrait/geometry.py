@@ -91,7 +91,7 @@ def lip_outlines(lips: LipDesign, pose: MouthPose, x: Heights) -> LipOutlines:
         lower_outer=np.maximum(
             line + drop * _arch(u, 0.62 - 0.15 * wide) + lower * _thickness("lower", u, out), lower_inner
         ),
-        seam=lips.seam * (1 - u**4) * (1 + 0.5 * pose.press),
+        seam=lips.seam * (1 - u**4) * (1 + 0.2 * pose.press),
     )
 
 
@@ -103,16 +103,17 @@ def mouth_interior(lips: LipDesign, pose: MouthPose, x: Heights, outlines: LipOu
     edge = lips.line_y + TEETH_EDGE
     upper_edge = edge - 0.03 * pose.protrusion - 0.05 * max(0.5 - pose.teeth, 0)
     upper = upper_edge - 0.35 * x * x
-    reveal = max(2 * pose.teeth - 1, 0)
+    reveal = min(max(2.5 * pose.teeth - 1.25, 0), 1)
     low_lip = float(outlines.lower_inner.max())
     below_lip = low_lip + 0.012 - 0.1 * pose.gap
-    met = upper_edge + 0.003 + 0.08 * pose.jaw
+    met = upper_edge + 0.002 + 0.1 * pose.jaw + 0.1 * max(1 - pose.teeth, 0)
     lower = below_lip + reveal * (min(met, below_lip) - below_lip) + (0.2 - 0.55 * reveal) * x * x
     top, bottom = _tongue(pose, x, edge, low_lip)
-    over = max(pose.tongue - 0.6, 0) / 0.4 * 0.026
+    over = max(pose.tongue - 0.6, 0) / 0.4 * 0.026 * _arch(x / min(0.14, 0.9 * outlines.inner_half_width), 0.5)
+    tucked = TUCK_OVERLAP * pose.tuck * _arch(x / outlines.inner_half_width, 0.5)
     cut = outlines.upper_inner, outlines.lower_inner
     return MouthInterior(
-        np.clip(upper, cut[0], cut[1] + TUCK_OVERLAP * pose.tuck),
+        np.clip(upper, cut[0], cut[1] + tucked),
         np.clip(np.maximum(lower, upper), *cut),
         np.clip(top, *cut),
         np.clip(np.maximum(top, bottom), cut[0], cut[1] + over),

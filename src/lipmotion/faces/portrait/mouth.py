@@ -76,12 +76,17 @@ class MouthPainter:
         across = _place(x, SPAN)
         if pose.tongue > 0.6:
             on.paint(within.tongue_top, within.tongue_bottom, across, art.tongue, (pose.tongue - 0.6) / 0.4)
-        on.paint(top, within.teeth_upper, across, art.upper_teeth, min(2.5 * pose.teeth, 1))
+        on.paint(top, within.teeth_upper, across, art.upper_teeth, min(2.5 * pose.teeth, 1) * _lit(pose))
         on.paint(top, np.minimum(top + 0.028, bottom), across, art.lip_shadow)
         if line := self._lips.outline:
             part = 0.8 * line * np.minimum((bottom - top) / 0.01, 1)
             for edge in (top, bottom):
                 on.paint(edge - part / 2, edge + part / 2, across, art.outline)
+
+
+def _lit(pose: MouthPose) -> float:
+    """Return how well the upper teeth are lit, 0..1: less behind lips that hardly part, unless the sound shows them."""
+    return float(max(min(max((pose.gap - 0.015) / 0.06, 0.15), 1), pose.tuck, 2 * pose.teeth - 1))
 
 
 class _Columns(NamedTuple):

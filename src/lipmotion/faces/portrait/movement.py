@@ -26,7 +26,7 @@ NECK_TOP, NECK_END = 1.15, 1.85
 """Between these heights the movement of the head fades."""
 
 
-class HeadPose(NamedTuple):
+class HeadPlacement(NamedTuple):
     """Where the head is: shifts in eye distances, to the right and down; angles in radians.
 
     roll  : to the speaker's left shoulder, clockwise in the picture
@@ -97,7 +97,7 @@ class HeadField:
         self._with_head = share * share * (3 - 2 * share)
         self._features = np.exp(-((x / 0.62) ** 2) - (((y - 0.35) / 0.85) ** 2)) * self._with_head
 
-    def shifts(self, pose: HeadPose) -> tuple[Floats, Floats]:
+    def shifts(self, pose: HeadPlacement) -> tuple[Floats, Floats]:
         """Return the shifts to the right and down, in pixels."""
         x = self._with_head * (pose.x - pose.roll * (self._y - PIVOT_Y)) + pose.yaw * self._features
         y = self._with_head * (pose.y + pose.roll * self._x) + pose.pitch * self._features

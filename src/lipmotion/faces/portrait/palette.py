@@ -44,7 +44,7 @@ class Palette:
     cavity: Colour = (58, 14, 22)
     tooth: Colour = (250, 246, 238)
     lower_tooth: Colour = (232, 222, 212)
-    tongue: Colour = (214, 104, 104)
+    tongue: Colour = (230, 124, 138)
     mouth_shadow: Colour = (150, 76, 58)
     beard: Colour = (150, 112, 100)
     collar: Colour = (238, 240, 240)

@@ -18,19 +18,19 @@ CLOSED_BELOW = 0.012
 """Tracked lips that touch have openings up to this; smaller openings are drawn closed."""
 FAITHFUL_ABOVE = 0.03
 """From here on the drawn gap follows the opening; between the two limits it rises linearly."""
-WIDER_FROM, WIDER = 0.05, 0.8
-"""Beyond the first, openings are drawn larger than measured, by up to this share: a drawing shows less than a face."""
+WIDER = 0.4
+"""Openings are drawn by so much larger than measured, beyond ``FAITHFUL_ABOVE``: a drawing shows less than a face."""
 WIDEST = 0.45
 """Largest drawn gap; openings of speech stay below 0.35."""
 WIDTH_GAIN, WIDTH_REACH = 2.0, 0.32
 """Changes of width are exaggerated: small ones by the factor, none beyond the reach."""
-ROUNDED, STRETCHED = 0.27, 0.07
+ROUNDED, STRETCHED = 0.23, 0.06
 """So much narrower are protruded lips, and so much wider are spread ones, beside what was measured."""
 TUCKED_GAP = (0.05, 0.07)
 """Range of the gap while the lower lip is on the teeth: enough to show them."""
-TONGUE_GAP, TEETH_GAP, ROUND_GAP = 0.095, 0.05, 0.06
+TONGUE_GAP, TEETH_GAP, ROUND_GAP = 0.085, 0.05, 0.07
 """Least gap while the tongue is between the teeth, while both rows of teeth are shown, and of protruded lips."""
-OVAL = 0.7
+OVAL = 0.4
 """How much narrower a mouth is that opens far, relative to the rest pose and for each eye distance."""
 PAUSE_S = 0.15
 """In pauses of at least this duration the mouth closes."""
@@ -87,8 +87,8 @@ def mouth_poses(motion: Motion, units: Timeline[Unit], fps: float, intensity: fl
         (protrusion**2, ROUND_GAP),
     ):
         gap += free * weight * (np.maximum(gap, least) - gap)
-    gap *= 1 - (0.3 * protrusion + 0.25 * shown) * np.clip((gap - 0.05) / 0.05, 0, 1)
-    gap *= 1 - pause_curve(units, time_s, PAUSE_S)
+    gap *= 1 - 0.12 * (protrusion + shown) * np.clip((gap - 0.05) / 0.05, 0, 1)
+    gap *= 1 - pause_curve(units, time_s, PAUSE_S, blend_s=0.1, after_s=0.08, before_s=0.14)
     width = _at(motion, _width(motion, rest, intensity), time_s)
     width += intensity * (STRETCHED * spread - ROUNDED * protrusion * np.minimum(width, 1))
     width -= OVAL * np.maximum(gap - 0.08, 0) * (1 - spread)
@@ -106,7 +106,7 @@ def drawn_gap(opening: Curve, intensity: float = 1.0) -> Curve:
     """
     rising = (opening - CLOSED_BELOW) * (FAITHFUL_ABOVE / (FAITHFUL_ABOVE - CLOSED_BELOW))
     gap = np.maximum(np.minimum(opening, rising), 0)
-    gap = gap * (1 + WIDER * (1 - np.exp(-np.maximum(gap - WIDER_FROM, 0) / 0.06))) * intensity
+    gap = (gap + WIDER * np.maximum(gap - FAITHFUL_ABOVE, 0)) * intensity
     bend = 0.6 * WIDEST
     return np.where(gap < bend, gap, bend + (WIDEST - bend) * np.tanh((gap - bend) / (WIDEST - bend)))
 

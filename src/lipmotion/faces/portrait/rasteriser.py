@@ -14,7 +14,7 @@ from lipmotion.faces.portrait.eyes import EyePainter
 from lipmotion.faces.portrait.head import paint_head
 from lipmotion.faces.portrait.layer import Layer
 from lipmotion.faces.portrait.mouth import MouthPainter
-from lipmotion.faces.portrait.movement import STEP, BrowField, HeadField, HeadPose, SkinField
+from lipmotion.faces.portrait.movement import STEP, BrowField, HeadField, HeadPlacement, SkinField
 from lipmotion.faces.portrait.palette import Colour
 from lipmotion.faces.portrait.pose import MouthPose
 from lipmotion.faces.portrait.view import View, Window
@@ -42,7 +42,7 @@ class FacePose(NamedTuple):
     gaze_y: float = 0.0
     brows: float = 0.0
     worry: float = 0.0
-    head: HeadPose = HeadPose()
+    head: HeadPlacement = HeadPlacement()
 
 
 class Rasteriser:
