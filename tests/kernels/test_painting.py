@@ -71,8 +71,11 @@ def test_both_forms_give_the_same_bits(monkeypatch, seed):
         floats, few = np.empty((16, 23, 4), np.float32), np.empty((17, 23, 3), np.uint8)
         painting.warp(layer, *shifts, 4, floats)
         painting.warp_bytes(bytes_in, *shifts, 4, few)
-        layers = [rng.uniform(0, 1, (8, 9, depth)).astype(np.float32) for depth in (4, 4, 5, 4)]
-        stacked = np.empty((8, 9, 4), np.uint16)
+        layers = [
+            (rng.uniform(0, 60, (64, 96, depth)) * [1, 1, 1, 1 / 60, 1 / 60][:depth]).astype(np.float32)
+            for depth in (4, 4, 5, 4)
+        ]
+        stacked = np.empty((64, 96, 4), np.uint16)
         painting.stack(*layers, stacked)
         results.append((layer, floats, few, stacked))
     for slow, quick in zip(*results, strict=True):

@@ -130,8 +130,8 @@ def stack(below: Layer, shade: Layer, skin: Layer, above: Layer, target: NDArray
     """Fill in the bytes of layers over one another, as ``kernels.painting.stack``."""
     for row in range(target.shape[0]):
         for column in range(target.shape[1]):
-            shadow = float(skin[row, column, 4])
-            behind_skin, behind_above = 1 - float(skin[row, column, 3]), 1 - float(above[row, column, 3])
+            shadow = np.float64(skin[row, column, 4])
+            behind_skin, behind_above = 1 - np.float64(skin[row, column, 3]), 1 - np.float64(above[row, column, 3])
             for channel in range(4):
                 mixed = below[row, column, channel] + shadow * shade[row, column, channel]
                 mixed = skin[row, column, channel] + behind_skin * mixed
