@@ -172,23 +172,32 @@ def confusion(found: list[tuple[int, str, NDArray[np.float64], NDArray[np.uint8]
 
 
 def sheet(faces: dict[str, list[Any]], path: Path) -> None:
-    from PIL import Image
+    """Write a picture with a row for each face: of every sound the mouth that is most like all of that sound."""
+    from PIL import Image, ImageDraw
 
     rows = []
     for found in faces.values():
+        row = []
         for sound in SOUNDS:
+            values = np.array([measures for _, name, measures, _ in found if name == sound])
             frames = [frame for _, name, _, frame in found if name == sound]
-            h = len(frames[0])
-            crop = slice(int(0.53 * h), int(0.86 * h)), slice(int(0.33 * h), int(0.67 * h))
-            rows.append(np.hstack([frames[k * len(frames) // 6][crop] for k in range(6)]))
-    Image.fromarray(np.vstack(rows)).save(path, optimize=True)
+            typical = frames[int(np.square(values - np.median(values, axis=0)).sum(axis=1).argmin())]
+            h = len(typical)
+            row.append(typical[int(0.545 * h) : int(0.82 * h), int(0.355 * h) : int(0.645 * h)])
+        rows.append(np.hstack(row))
+    top = np.full((22, rows[0].shape[1], 3), 255, np.uint8)
+    picture = Image.fromarray(np.vstack([top, *rows]))
+    width = rows[0].shape[1] // len(SOUNDS)
+    for n, sound in enumerate(SOUNDS):
+        ImageDraw.Draw(picture).text((n * width + width // 2, 11), sound, fill=(0, 0, 0), anchor="mm", font_size=15)
+    picture.save(path, optimize=True)
 
 
 def main() -> None:
     """Print one JSON object."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--faces", default="woman,man,cartoon")
-    parser.add_argument("--sheet", type=Path, help="pictures of six of each sound, from top to bottom as in SOUNDS")
+    parser.add_argument("--sheet", type=Path, help="a picture of each sound, a row for each face")
     parser.add_argument("--json", type=Path)
     parser.add_argument("--still", action="store_true", help="re-track faces of which only the mouth moves")
     parser.add_argument("--untracked", action="store_true", help="do not track again")
