@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from lipmotion.errors import InputError
 from lipmotion.extensions import Registry
 from lipmotion.faces.base import Face, Stageable, Staging
@@ -20,8 +22,18 @@ FACES: Registry[type[Face]] = Registry(
 )
 
 
+DRAWING_SUFFIX = ".svg"
+
+
 def face_named(name: str = "portrait") -> Face:
-    """Return a face. Raises InputError: none of that name, or what an installed package adds is no face."""
+    """Return a face; a name that ends in ``.svg`` is the path of a drawing in layers (docs/faces.md).
+
+    Raises InputError: none of that name, a drawing that cannot be used, or what an installed package adds is no face.
+    """
+    if name.lower().endswith(DRAWING_SUFFIX):
+        from lipmotion.faces.portrait.layered import LayeredFace
+
+        return LayeredFace(Path(name))
     chosen = FACES.load(name)
     if not (isinstance(chosen, type) and issubclass(chosen, Face)):
         raise InputError(f"{chosen!r} is called a face, {name!r}, by an installed package; required a class of Face")

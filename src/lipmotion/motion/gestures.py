@@ -51,7 +51,9 @@ Targets = Mapping[str, GestureTarget]
 
 def _steady(values: Mapping[str, float], dominance: float = 1.0, width_s: float = 0.035) -> dict[str, GestureTarget]:
     """Return the same target from begin to end for phones: ``{"t d n": 0.6}``."""
-    return {p: GestureTarget(value, value, dominance, width_s) for phones, value in values.items() for p in phones.split()}
+    return {
+        p: GestureTarget(value, value, dominance, width_s) for phones, value in values.items() for p in phones.split()
+    }
 
 
 _CLOSED = " ".join(LIP_CLOSING)
@@ -70,7 +72,11 @@ _TARGETS: dict[str, tuple[GestureTarget, Targets]] = {
         GestureTarget(0, 0, 0.25, 0.03),
         _steady({"uw w": 1.0}, 3.0, 0.05)
         | _steady({"uh": 0.65, "ao": 0.4}, 1.6, 0.05)
-        | {"ow": GestureTarget(0.55, 1.0, 2.2, 0.05), "oy": GestureTarget(0.6, 0.0, 1.6, 0.04), "aw": GestureTarget(0.0, 0.75, 1.4, 0.04)}
+        | {
+            "ow": GestureTarget(0.55, 1.0, 2.2, 0.05),
+            "oy": GestureTarget(0.6, 0.0, 1.6, 0.04),
+            "aw": GestureTarget(0.0, 0.75, 1.4, 0.04),
+        }
         | _steady({"sh zh ch jh": 0.6}, 1.4, 0.04)
         | _steady({"r": 0.55, "er axr": 0.4}, 1.2, 0.04)
         | _steady({"iy ih ey ae eh ay aa ah": 0.0}, 1.2, 0.035)
@@ -79,7 +85,11 @@ _TARGETS: dict[str, tuple[GestureTarget, Targets]] = {
     "spread": (
         GestureTarget(0, 0, 0.25, 0.03),
         _steady({"iy": 1.0}, 2.0, 0.04)
-        | {"ey": GestureTarget(0.5, 0.8, 1.4, 0.04), "ay": GestureTarget(0.0, 0.6, 1.0, 0.035), "oy": GestureTarget(0, 0.6, 1.0, 0.035)}
+        | {
+            "ey": GestureTarget(0.5, 0.8, 1.4, 0.04),
+            "ay": GestureTarget(0.0, 0.6, 1.0, 0.035),
+            "oy": GestureTarget(0, 0.6, 1.0, 0.035),
+        }
         | _steady({"ih ix": 0.55, "ae eh": 0.45, "y": 0.7}, 1.0, 0.035)
         | _steady({"s z": 0.6}, 0.8, 0.03)
         | _steady({"uw w uh ow ao aa r er axr sh zh ch jh": 0.0}, 1.5, 0.04)
