@@ -29,7 +29,8 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     add_model_argument(parser)
     add_speaker_argument(parser)
     add_onto_arguments(parser)
-    add_result_arguments(parser, "FILE.mp4 .wav .flac .ogg .json .csv .npz .TextGrid, or several", required=False)
+    suffixes = "FILE.mp4 .webm .mov %%05d.png .wav .flac .ogg .json .csv .npz .TextGrid, or several"
+    add_result_arguments(parser, suffixes, required=False)
     add_machine_readable(parser)
     parser.set_defaults(run=run, wrong=parser.error)
 
