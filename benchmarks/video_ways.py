@@ -1,0 +1,234 @@
+"""Recorded clips, and simple ways to give them another mouth: what ``video_face.py`` compares a renderer with."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.appearance.candidates import squared_distances
+from lipmotion.appearance.eigenlips import Eigenlips, fit_eigenlips
+from lipmotion.appearance.mouth_region import HEIGHT, WIDTH
+from lipmotion.appearance.placing import place
+from lipmotion.corpora.store import Corpus
+from lipmotion.faces.registry import face_named
+from lipmotion.pipeline.training.channels import PICTURES
+from lipmotion.stats.pca import evenly_spaced
+from lipmotion.types import Motion, Timeline, Utterance
+from lipmotion.vision.face_follower import FaceFollower
+from lipmotion.vision.frames import open_video
+from lipmotion.vision.landmarks import LIP_POINTS
+from lipmotion.vision.mouth import face_to_image, region_to_image
+from lipmotion.vision.timing import nearest_indices, resample_to_constant_rate
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Pictures = NDArray[np.uint8]
+
+LOWER_FACE = (120, 128)
+"""Height and width of the aligned part of the face in which seams are measured, px; the eyes are 90 px apart."""
+MOUTH = (slice(32, 32 + HEIGHT), slice(28, 28 + WIDTH))
+"""The mouth region in it."""
+LIP_CHANNELS = tuple(f"{axis}_{index}" for index in LIP_POINTS for axis in "xy")
+RIDGE = 1e-4
+"""Share of the mean variance of the lip points that the ridge regression of eigenlips adds to each variance."""
+
+
+@dataclass(eq=False)
+class RecordedClip:
+    """A recorded clip of a corpus with the frames of its video.
+
+    utterance : of the corpus: its sound, its track, its mouth pictures
+    path      : its video
+    frames    : uint8 array [shape=(T, H, W, 3)], frame n at n / rate of the track
+    maps      : affine maps [shape=(T, 2, 3)] from the plane of the lips to the image, as of ``face_to_image``
+    """
+
+    utterance: Utterance
+    path: Path
+    frames: Pictures
+    maps: Array
+
+    @property
+    def name(self) -> str:
+        """Name of the clip."""
+        return self.utterance.name
+
+    @property
+    def rate_hz(self) -> float:
+        """Frames a second."""
+        return self.utterance.track.motion.rate_hz
+
+    @cached_property
+    def to_frame(self) -> Array:
+        """The maps from pixels of the mouth region to their positions in the image [shape=(T, 2, 3)]."""
+        return np.stack([region_to_image(one) for one in self.maps])
+
+    @cached_property
+    def lower_face_to_frame(self) -> Array:
+        """The same of pixels of ``LOWER_FACE`` [shape=(T, 2, 3)]."""
+        first = -np.array([MOUTH[1].start, MOUTH[0].start])
+        moved: Array = self.to_frame.copy()
+        moved[:, :, 2] += self.to_frame[:, :, :2] @ first
+        return moved
+
+    @property
+    def eyes_px(self) -> float:
+        """Median distance between the outer eye corners in the image, px."""
+        return float(90 * np.median(np.sqrt(np.abs(np.linalg.det(self.maps[:, :, :2])))))
+
+
+@dataclass(frozen=True, eq=False)
+class Way:
+    """A way to make the frames of a clip.
+
+    name   : what the table says
+    motion : what drives it: ``tracked`` (the clip's own), the name of an engine, or None
+    render : function of the clip and of the motion, which returns frames of the size of the recorded ones
+    region : bool array of ``LOWER_FACE``, the region that is replaced; None: there is none
+    motion_only : whether the frames show another face, so that pictures cannot be compared
+    """
+
+    name: str
+    motion: str | None
+    render: Callable[[RecordedClip, Motion | None], Iterator[Pictures]]
+    region: Mask | None = None
+    motion_only: bool = False
+
+
+def recorded_clip(corpus: Corpus, name: str, path: Path) -> RecordedClip:
+    """Return a clip of a corpus with the frames of its video, and the pose of the head in every frame."""
+    utterance = corpus.utterance(name)
+    images, times_s, seen, points = [], [], [], []
+    with open_video(path) as video, FaceFollower() as follower:
+        for frame in video.frames:
+            found = follower.points(frame.image)
+            images.append(frame.image)
+            times_s.append(frame.time_s)
+            seen.append(found is not None)
+            if found is not None:
+                points.append(found)
+    rate_hz, count = utterance.track.motion.rate_hz, len(utterance.track.seen)
+    wanted = nearest_indices(np.array(times_s), np.arange(count) / rate_hz)
+    maps = face_to_image(np.stack(points)).reshape(len(points), 6)
+    steady = resample_to_constant_rate(np.array(times_s)[seen], maps, rate_hz, count).reshape(count, 2, 3)
+    return RecordedClip(utterance, path, np.stack([images[n] for n in wanted]), steady)
+
+
+class RecordedMouths:
+    """The mouth pictures of a training list: what the simple ways are made of.
+
+    corpus : with mouth pictures of one speaker
+    names  : the utterances
+    """
+
+    def __init__(self, corpus: Corpus, names: Sequence[str]) -> None:
+        tracks = [corpus.utterance(name).track for name in names]
+        tracks = [track for track in tracks if track.crops is not None]
+        self._pictures = [track.crops for track in tracks]
+        where = [(clip, frame) for clip, track in enumerate(tracks) for frame in np.flatnonzero(track.seen)]
+        self.where = np.array(where)
+        self.lips = np.concatenate([lips(track.motion)[track.seen] for track in tracks])
+
+    def pictures(self, numbers: NDArray[np.intp]) -> Pictures:
+        """Return some of the pictures [shape=(N, 56, 72, 3)]."""
+        return np.stack([np.asarray(self._pictures[clip])[frame] for clip, frame in self.where[numbers]])
+
+    def nearest(self, motion: Array) -> NDArray[np.intp]:
+        """Return the number of the picture whose lip points are nearest, in each frame [shape=(T,)]."""
+        found = squared_distances(motion.astype(np.float32), self.lips.astype(np.float32)).argmin(axis=1)
+        return np.asarray(found)
+
+    @cached_property
+    def chosen(self) -> Pictures:
+        """The pictures that eigenlips are made from."""
+        return self.pictures(evenly_spaced(PICTURES, len(self.where)))
+
+    @cached_property
+    def eigenlips(self) -> Eigenlips:
+        """Eigenlips of these pictures."""
+        return fit_eigenlips(self.chosen)
+
+    @cached_property
+    def map(self) -> tuple[Array, Array]:
+        """The matrix and the constant of the ridge regression from lip points to eigenlips."""
+        numbers = np.arange(0, len(self.where), 4)
+        x = self.lips[numbers]
+        y = np.concatenate([self.eigenlips.project(self.pictures(part)) for part in np.array_split(numbers, 16)])
+        centred = x - x.mean(axis=0)
+        square = centred.T @ centred
+        ridge = RIDGE * np.trace(square) / len(square)
+        matrix = np.linalg.solve(square + ridge * np.eye(len(square)), centred.T @ (y - y.mean(axis=0)))
+        return matrix, y.mean(axis=0) - x.mean(axis=0) @ matrix
+
+
+def lips(motion: Motion) -> Array:
+    """Return x and y of the lip points [shape=(T, 80)], eye distances."""
+    return np.asarray(motion.values, float)[:, [motion.column(name) for name in LIP_CHANNELS]]
+
+
+def on_frames(motion: Motion, clip: RecordedClip) -> Motion:
+    """Return motion at the frames of a clip."""
+    time_s = np.arange(len(clip.frames)) / clip.rate_hz
+    return Motion(motion.at(time_s), clip.rate_hz, motion.channels)
+
+
+def rectangle() -> Mask:
+    """Return the mouth region in ``LOWER_FACE``, without its outermost pixels, which nothing is pasted on."""
+    region = np.zeros(LOWER_FACE, bool)
+    region[MOUTH] = np.pad(np.ones((HEIGHT - 2, WIDTH - 2), bool), 1)
+    return region
+
+
+def pasted(clip: RecordedClip, pictures: Pictures) -> Iterator[Pictures]:
+    """Yield the frames of a clip with mouth pictures pasted in: hard edge, no cloning."""
+    weight = rectangle()[MOUTH].astype(np.float32)
+    for frame, picture, to_frame in zip(clip.frames, pictures, clip.to_frame, strict=True):
+        made = frame.copy()
+        place(made, picture, weight, to_frame)
+        yield made
+
+
+def simple_ways(mouths: RecordedMouths, engines: Sequence[str]) -> list[Way]:
+    """Return the simple alternatives.
+
+    engines : what else than the clip's own track drives them
+    """
+
+    def nearest(clip: RecordedClip, motion: Motion | None) -> Iterator[Pictures]:
+        assert motion is not None
+        return pasted(clip, mouths.pictures(mouths.nearest(lips(motion))))
+
+    def mapped(clip: RecordedClip, motion: Motion | None) -> Iterator[Pictures]:
+        assert motion is not None
+        matrix, constant = mouths.map
+        return pasted(clip, mouths.eigenlips.restore(lips(motion) @ matrix + constant))
+
+    def own(clip: RecordedClip, _: Motion | None) -> Iterator[Pictures]:
+        crops = clip.utterance.track.crops
+        assert crops is not None
+        return pasted(clip, mouths.eigenlips.restore(mouths.eigenlips.project(np.asarray(crops))))
+
+    def frozen(clip: RecordedClip, _: Motion | None) -> Iterator[Pictures]:
+        mean = np.rint(mouths.chosen.mean(axis=0)).astype(np.uint8)
+        return pasted(clip, np.broadcast_to(mean, (len(clip.frames), *mean.shape)))
+
+    def drawn(clip: RecordedClip, motion: Motion | None) -> Iterator[Pictures]:
+        assert motion is not None
+        return face_named("portrait").render(motion, Timeline(()), fps=clip.rate_hz)
+
+    region = rectangle()
+    ways = [
+        Way("original", None, lambda clip, _: iter(clip.frames), region),
+        Way("frozen mouth", None, frozen, region),
+        Way("eigenlips of the clip's own pictures, pasted", "tracked", own, region),
+    ]
+    for source in ("tracked", *engines):
+        ways.append(Way(f"nearest recorded mouth, {source}", source, nearest, region))
+        ways.append(Way(f"eigenlips from lip points, pasted, {source}", source, mapped, region))
+        ways.append(Way(f"drawn portrait, {source}", source, drawn, motion_only=True))
+    return ways
