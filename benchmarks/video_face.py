@@ -296,7 +296,7 @@ def phones(corpus: Corpus, names: Sequence[str], model: Model) -> list[list[tupl
 def figures(
     judged: Sequence[Judged], spoken: Sequence[Sequence[tuple[float, float, str]]], threshold: float
 ) -> dict[str, Any]:
-    """Return the figures of one way over all clips; those of ``INTERVALS`` with their intervals under ``low``, ``high``."""
+    """Return the figures of one way over all clips; the intervals of ``INTERVALS`` under ``low`` and ``high``."""
     rows: dict[str, Any] = {}
     low, high = dict[str, float](), dict[str, float]()
 
