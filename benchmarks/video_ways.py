@@ -15,15 +15,14 @@ from lipmotion.appearance.eigenlips import Eigenlips, fit_eigenlips
 from lipmotion.appearance.mouth_region import HEIGHT, WIDTH
 from lipmotion.appearance.placing import place
 from lipmotion.corpora.store import Corpus
+from lipmotion.errors import InputError
 from lipmotion.faces.registry import face_named
 from lipmotion.pipeline.training.channels import PICTURES
 from lipmotion.stats.pca import evenly_spaced
 from lipmotion.types import Motion, Timeline, Utterance
-from lipmotion.vision.face_follower import FaceFollower
-from lipmotion.vision.frames import open_video
+from lipmotion.vision.footage import footage_frames, track_footage
 from lipmotion.vision.landmarks import LIP_POINTS
-from lipmotion.vision.mouth import face_to_image, region_to_image
-from lipmotion.vision.timing import nearest_indices, resample_to_constant_rate
+from lipmotion.vision.mouth import region_to_image
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -102,21 +101,12 @@ class Way:
 
 def recorded_clip(corpus: Corpus, name: str, path: Path) -> RecordedClip:
     """Return a clip of a corpus with the frames of its video, and the pose of the head in every frame."""
+    footage = track_footage(path)
+    frames = np.stack(list(footage_frames(footage)))
     utterance = corpus.utterance(name)
-    images, times_s, seen, points = [], [], [], []
-    with open_video(path) as video, FaceFollower() as follower:
-        for frame in video.frames:
-            found = follower.points(frame.image)
-            images.append(frame.image)
-            times_s.append(frame.time_s)
-            seen.append(found is not None)
-            if found is not None:
-                points.append(found)
-    rate_hz, count = utterance.track.motion.rate_hz, len(utterance.track.seen)
-    wanted = nearest_indices(np.array(times_s), np.arange(count) / rate_hz)
-    maps = face_to_image(np.stack(points)).reshape(len(points), 6)
-    steady = resample_to_constant_rate(np.array(times_s)[seen], maps, rate_hz, count).reshape(count, 2, 3)
-    return RecordedClip(utterance, path, np.stack([images[n] for n in wanted]), steady)
+    if len(frames) != len(utterance.track.seen):
+        raise InputError(f"{path}: {len(frames)} frames, required {len(utterance.track.seen)}, as in the corpus")
+    return RecordedClip(utterance, path, frames, footage.face_to_image)
 
 
 class RecordedMouths:
