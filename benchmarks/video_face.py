@@ -5,8 +5,9 @@
 
 CORPUS is a prepared corpus of one speaker with mouth pictures, FOLDER has its videos. Each *way* makes the frames of a
 clip again, with another mouth: simple ways (``video_ways.py``) learned on ``train``, and the original itself as the
-ceiling. They are driven by the clip's own track, or by what an engine generates from its sound alone. Printed is a
-table in Markdown, with 95 % bootstrap intervals over clips in the JSON:
+ceiling. They are driven by the clip's own track, by what an engine generates from its sound alone, or by the track of
+another clip (``crossed``: nothing of the recorded mouth may shine through; PSNR and SSIM then say nothing). Printed is
+a table in Markdown, with 95 % bootstrap intervals over clips in the JSON:
 
 psnr_db, ssim, sharpness, colour_edges, flicker : of the mouth region, in the pose of the recorded head
 seam, seam_ratio, colour_offset, colour_drift   : at the outline of what was put in (``lipmotion.measures.pictures``)
@@ -37,6 +38,7 @@ import numpy as np
 from numpy.typing import NDArray
 from video_sheets import Sheets, face_crop, write_sheets
 from video_ways import (
+    CROSSED,
     LOWER_FACE,
     MOUTH,
     Pictures,
@@ -47,6 +49,7 @@ from video_ways import (
     on_frames,
     recorded_clip,
     simple_ways,
+    video_of,
 )
 
 from lipmotion import Corpus, animate, load_model
@@ -89,11 +92,13 @@ class Setting:
 class Job:
     """One clip.
 
+    other : the clip whose motion is ``crossed``
     sheet : how many of its frames, evenly spaced, are wanted for the sheets
     """
 
     setting: Setting
     name: str
+    other: str
     sheet: int
 
 
@@ -122,7 +127,10 @@ def main() -> None:
     names = corpus.names(options.split)[: options.count]
     setting = Setting(options.corpus, options.clips, tuple(options.engine), tuple(options.only), options.mp4)
     with_sheets = set(np.linspace(0, len(names) - 1, 3).astype(int)) if options.sheets else set()
-    jobs = [Job(setting, name, options.frames if number in with_sheets else 0) for number, name in enumerate(names)]
+    jobs = [
+        Job(setting, name, names[number - 1], options.frames if number in with_sheets else 0)
+        for number, name in enumerate(names)
+    ]
     with worker_pool(options.processes) as workers:
         judged = dict(zip(names, workers.ordered_map(judge, jobs), strict=True))
     ways = list(judged[names[0]])
@@ -164,7 +172,9 @@ def parsed() -> argparse.Namespace:
 def all_ways(setting: Setting) -> tuple[Way, ...]:
     """Return the ways that are compared."""
     corpus = Corpus.open(setting.corpus)
-    ways = simple_ways(RecordedMouths(corpus, corpus.names("train")), [path.stem for path in setting.engines])
+    ways = simple_ways(
+        RecordedMouths(corpus, corpus.names("train"), setting.clips), [path.stem for path in setting.engines]
+    )
     return tuple(way for way in ways if not setting.only or way.name.startswith(setting.only))
 
 
@@ -178,9 +188,8 @@ def judge(job: Job) -> dict[str, Judged]:
     """Return what was measured of one clip, by way."""
     setting = job.setting
     corpus = Corpus.open(setting.corpus)
-    path = next(p for p in sorted(setting.clips.iterdir()) if p.stem == job.name)
-    clip = recorded_clip(corpus, job.name, path)
-    motions = {"tracked": clip.utterance.track.motion}
+    clip = recorded_clip(corpus, job.name, video_of(setting.clips, job.name))
+    motions = {"tracked": clip.utterance.track.motion, CROSSED: corpus.utterance(job.other).track.motion}
     ways = all_ways(setting)
     for file in setting.engines:
         if any(way.motion == file.stem for way in ways):

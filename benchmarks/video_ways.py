@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from lipmotion.appearance.candidates import squared_distances
 from lipmotion.appearance.eigenlips import Eigenlips, fit_eigenlips
 from lipmotion.appearance.mouth_region import HEIGHT, WIDTH
-from lipmotion.appearance.placing import place
+from lipmotion.appearance.placing import inverse_map, place
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import InputError
 from lipmotion.faces.registry import face_named
@@ -32,6 +32,8 @@ LOWER_FACE = (120, 128)
 """Height and width of the aligned part of the face in which seams are measured, px; the eyes are 90 px apart."""
 MOUTH = (slice(32, 32 + HEIGHT), slice(28, 28 + WIDTH))
 """The mouth region in it."""
+CROSSED = "crossed"
+"""What drives a way: the track of another clip."""
 LIP_CHANNELS = tuple(f"{axis}_{index}" for index in LIP_POINTS for axis in "xy")
 RIDGE = 1e-4
 """Share of the mean variance of the lip points that the ridge regression of eigenlips adds to each variance."""
@@ -86,7 +88,7 @@ class Way:
     """A way to make the frames of a clip.
 
     name   : what the table says
-    motion : what drives it: ``tracked`` (the clip's own), the name of an engine, or None
+    motion : what drives it: ``tracked`` (the clip's own track), the name of an engine, ``CROSSED``, or None
     render : function of the clip and of the motion, which returns frames of the size of the recorded ones
     region : bool array of ``LOWER_FACE``, the region that is replaced; None: there is none
     motion_only : whether the frames show another face, so that pictures cannot be compared
@@ -109,16 +111,30 @@ def recorded_clip(corpus: Corpus, name: str, path: Path) -> RecordedClip:
     return RecordedClip(utterance, path, frames, footage.face_to_image)
 
 
+def video_of(clips: Path, name: str) -> Path:
+    """Return the video of an utterance in a folder."""
+    return next(path for path in sorted(clips.glob(f"{name}.*")) if path.is_file())
+
+
+@lru_cache(maxsize=48)
+def training_video(path: Path) -> tuple[Pictures, Array]:
+    """Return the frames of a video, and the maps from the mouth region to them."""
+    footage = track_footage(path)
+    maps = np.stack([region_to_image(one) for one in footage.face_to_image])
+    return np.stack(list(footage_frames(footage))), maps
+
+
 class RecordedMouths:
     """The mouth pictures of a training list: what the simple ways are made of.
 
-    corpus : with mouth pictures of one speaker
+    corpus : of one speaker; all utterances have mouth pictures
     names  : the utterances
+    clips  : the folder of their videos
     """
 
-    def __init__(self, corpus: Corpus, names: Sequence[str]) -> None:
+    def __init__(self, corpus: Corpus, names: Sequence[str], clips: Path) -> None:
         tracks = [corpus.utterance(name).track for name in names]
-        tracks = [track for track in tracks if track.crops is not None]
+        self._names, self._clips = names, clips
         self._pictures = [track.crops for track in tracks]
         where = [(clip, frame) for clip, track in enumerate(tracks) for frame in np.flatnonzero(track.seen)]
         self.where = np.array(where)
@@ -132,6 +148,12 @@ class RecordedMouths:
         """Return the number of the picture whose lip points are nearest, in each frame [shape=(T,)]."""
         found = squared_distances(motion.astype(np.float32), self.lips.astype(np.float32)).argmin(axis=1)
         return np.asarray(found)
+
+    def frame(self, number: int) -> tuple[Pictures, Array]:
+        """Return the frame of the video that a picture is from, and the map from the mouth region to it."""
+        clip, frame = self.where[number]
+        frames, to_frame = training_video(video_of(self._clips, self._names[clip]))
+        return frames[frame], to_frame[frame]
 
     @cached_property
     def chosen(self) -> Pictures:
@@ -183,6 +205,20 @@ def pasted(clip: RecordedClip, pictures: Pictures) -> Iterator[Pictures]:
         yield made
 
 
+def mouth_in_frame(frame: Pictures, to_frame: Array) -> NDArray[np.float32]:
+    """Return where the mouth region lies in a frame: 1 inside, 0 outside [shape=(H, W)]."""
+    rows, columns = np.mgrid[: frame.shape[0], : frame.shape[1]]
+    back = inverse_map(to_frame)
+    x, y = np.einsum("ij,jhw->ihw", back[:, :2], np.stack([columns, rows])) + back[:, 2, None, None]
+    inside = (x > 0.5) & (x < WIDTH - 1.5) & (y > 0.5) & (y < HEIGHT - 1.5)
+    return inside.astype(np.float32)
+
+
+def composed(outer: Array, inner: Array) -> Array:
+    """Return the affine map that applies ``inner``, then ``outer`` [shape=(2, 3)]."""
+    return np.concatenate([outer[:, :2] @ inner[:, :2], outer[:, :2] @ inner[:, 2:] + outer[:, 2:]], axis=1)
+
+
 def simple_ways(mouths: RecordedMouths, engines: Sequence[str]) -> list[Way]:
     """Return the simple alternatives.
 
@@ -192,6 +228,14 @@ def simple_ways(mouths: RecordedMouths, engines: Sequence[str]) -> list[Way]:
     def nearest(clip: RecordedClip, motion: Motion | None) -> Iterator[Pictures]:
         assert motion is not None
         return pasted(clip, mouths.pictures(mouths.nearest(lips(motion))))
+
+    def from_video(clip: RecordedClip, motion: Motion | None) -> Iterator[Pictures]:
+        assert motion is not None
+        for number, frame, to_frame in zip(mouths.nearest(lips(motion)), clip.frames, clip.to_frame, strict=True):
+            source, to_source = mouths.frame(int(number))
+            made = frame.copy()
+            place(made, source, mouth_in_frame(source, to_source), composed(to_frame, inverse_map(to_source)))
+            yield made
 
     def mapped(clip: RecordedClip, motion: Motion | None) -> Iterator[Pictures]:
         assert motion is not None
@@ -217,8 +261,10 @@ def simple_ways(mouths: RecordedMouths, engines: Sequence[str]) -> list[Way]:
         Way("frozen mouth", None, frozen, region),
         Way("eigenlips of the clip's own pictures, pasted", "tracked", own, region),
     ]
-    for source in ("tracked", *engines):
+    for source in ("tracked", *engines, CROSSED):
         ways.append(Way(f"nearest recorded mouth, {source}", source, nearest, region))
+        if source in ("tracked", *engines[:1]):  # slow: the clips that it chooses from are tracked again
+            ways.append(Way(f"nearest recorded mouth, from its video, {source}", source, from_video, region))
         ways.append(Way(f"eigenlips from lip points, pasted, {source}", source, mapped, region))
         ways.append(Way(f"drawn portrait, {source}", source, drawn, motion_only=True))
     return ways
