@@ -9,7 +9,8 @@ ceiling. They are driven by the clip's own track, by what an engine generates fr
 another clip (``crossed``: nothing of the recorded mouth may shine through; PSNR and SSIM then say nothing). Printed is
 a table in Markdown, with 95 % bootstrap intervals over clips in the JSON:
 
-psnr_db, ssim, sharpness, colour_edges, flicker : of the mouth region, in the pose of the recorded head
+psnr_db, ssim, sharpness, colour_edges, flicker : of the mouth region, in the pose of the recorded head; ``lips_`` of
+                   the middle of it, where lips and teeth are
 seam, seam_ratio, colour_offset, colour_drift   : at the outline of what was put in (``lipmotion.measures.pictures``)
 acc_*, driver_*  : correlation of opening, width and outer lips, when the result is tracked again, with those of the
                    recording, and with those of the motion that drove it; pooled over all frames
@@ -45,6 +46,7 @@ from video_ways import (
     RecordedClip,
     RecordedMouths,
     Way,
+    filmed_ways,
     lips,
     on_frames,
     recorded_clip,
@@ -53,9 +55,10 @@ from video_ways import (
 )
 
 from lipmotion import Corpus, animate, load_model
-from lipmotion.appearance.placing import resampling
+from lipmotion.appearance.placing import cut
 from lipmotion.errors import InputError
 from lipmotion.export.video import write_mp4
+from lipmotion.faces.filmed.face import load_face
 from lipmotion.measures.bootstrap import bootstrap_interval
 from lipmotion.measures.closures import closed_threshold, phone_closures
 from lipmotion.measures.curves import pooled_correlation
@@ -73,6 +76,8 @@ from lipmotion.vision.track import track
 
 Array = NDArray[np.float64]
 Span = tuple[float, float]
+LIPS = (slice(None), slice(16, 40), slice(16, 56))
+"""The part of the mouth region in which lips and teeth are."""
 DISTANCES = ("opening", "width", "outer")
 INTERVALS = ("psnr_db", "ssim", "sharpness", "flicker", "seam_ratio", "acc_opening", "driver_opening", "landmarks")
 
@@ -84,6 +89,7 @@ class Setting:
     corpus: Path
     clips: Path
     engines: tuple[Path, ...]
+    face: Path | None
     only: tuple[str, ...]
     mp4: bool
 
@@ -125,7 +131,9 @@ def main() -> None:
     options = parsed()
     corpus = Corpus.open(options.corpus)
     names = corpus.names(options.split)[: options.count]
-    setting = Setting(options.corpus, options.clips, tuple(options.engine), tuple(options.only), options.mp4)
+    setting = Setting(
+        options.corpus, options.clips, tuple(options.engine), options.face, tuple(options.only), options.mp4
+    )
     with_sheets = set(np.linspace(0, len(names) - 1, 3).astype(int)) if options.sheets else set()
     jobs = [
         Job(setting, name, names[number - 1], options.frames if number in with_sheets else 0)
@@ -158,6 +166,7 @@ def parsed() -> argparse.Namespace:
     parser.add_argument("--split", default="val")
     parser.add_argument("--count", type=int, help="the first clips of the split only")
     parser.add_argument("--engine", type=Path, action="append", default=[], help="a model file; repeatable")
+    parser.add_argument("--face", type=Path, help="a file of ``lipmotion face build``, of the same speaker")
     parser.add_argument("--only", action="append", default=[], help="ways whose name begins so; repeatable")
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--mp4", action="store_true")
@@ -172,9 +181,10 @@ def parsed() -> argparse.Namespace:
 def all_ways(setting: Setting) -> tuple[Way, ...]:
     """Return the ways that are compared."""
     corpus = Corpus.open(setting.corpus)
-    ways = simple_ways(
-        RecordedMouths(corpus, corpus.names("train"), setting.clips), [path.stem for path in setting.engines]
-    )
+    engines = [path.stem for path in setting.engines]
+    ways = simple_ways(RecordedMouths(corpus, corpus.names("train"), setting.clips), engines)
+    if setting.face:
+        ways += filmed_ways(load_face(setting.face).appearance, engines)
     return tuple(way for way in ways if not setting.only or way.name.startswith(setting.only))
 
 
@@ -220,6 +230,8 @@ def judged_way(clip: RecordedClip, way: Way, driver: Motion | None, true: Pictur
     made = lower_face(clip, frames)
     inner = (slice(None), *MOUTH)
     row = picture_figures(made[inner], true[inner])
+    inside = picture_figures(made[inner][LIPS], true[inner][LIPS])
+    row |= {f"lips_{name}": inside[name] for name in ("sharpness", "contrast")}
     if way.region is not None:
         edge = picture_figures(made, true, way.region)
         row |= {name: edge[name] for name in ("seam", "seam_ratio", "colour_offset", "colour_drift")}
@@ -266,10 +278,9 @@ def write_lossless(path: Path, frames: Iterable[Pictures], rate_hz: float) -> No
 
 
 def lower_face(clip: RecordedClip, frames: Pictures) -> Pictures:
-    """Return the aligned lower face of frames, in the pose of the recorded head [shape=(T, 120, 128, 3)]."""
-    size = frames.shape[1:3]
+    """Return the aligned lower face of frames, in the pose of the recorded head [shape=(T, 152, 152, 3)]."""
     pairs = zip(frames, clip.lower_face_to_frame, strict=True)
-    parts = [resampling(to_frame, size, LOWER_FACE).apply(frame[None])[0] for frame, to_frame in pairs]
+    parts = [cut(frame, to_frame, LOWER_FACE) for frame, to_frame in pairs]
     rounded: Pictures = np.clip(np.rint(np.stack(parts)), 0, 255).astype(np.uint8)
     return rounded
 
@@ -365,6 +376,8 @@ COLUMNS = {
     "psnr_db": ("PSNR, dB", ".1f"),
     "ssim": ("SSIM", ".3f"),
     "sharpness": ("sharpness", ".2f"),
+    "lips_sharpness": ("of the lips", ".2f"),
+    "lips_contrast": ("contrast", ".2f"),
     "flicker": ("flicker", ".2f"),
     "colour_edges": ("colour edges", ".2f"),
     "seam": ("seam", ".2f"),
@@ -389,7 +402,7 @@ COLUMNS = {
 def as_table(results: dict[str, dict[str, Any]]) -> str:
     """Return the figures as two tables in Markdown: of pictures, and of motion."""
     parts = []
-    for names in (list(COLUMNS)[:9], list(COLUMNS)[9:]):
+    for names in (list(COLUMNS)[:11], list(COLUMNS)[11:]):
         lines = ["| way | " + " | ".join(COLUMNS[name][0] for name in names) + " |", "|---" * (len(names) + 1) + "|"]
         for way, rows in results.items():
             if any(name in rows for name in names):

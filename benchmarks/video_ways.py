@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.appearance import lower_face
 from lipmotion.appearance.candidates import squared_distances
 from lipmotion.appearance.eigenlips import Eigenlips, fit_eigenlips
 from lipmotion.appearance.mouth_region import HEIGHT, WIDTH
-from lipmotion.appearance.placing import inverse_map, place
+from lipmotion.appearance.person import Appearance
+from lipmotion.appearance.placing import cut, inverse_map, place
+from lipmotion.appearance.refinement import PAPER
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import InputError
+from lipmotion.faces.filmed.renderer import Background, Stitcher, StitchingOptions
 from lipmotion.faces.registry import face_named
 from lipmotion.pipeline.training.channels import PICTURES
+from lipmotion.speech.pauses import STEP_S, levels_db
 from lipmotion.stats.pca import evenly_spaced
 from lipmotion.types import Motion, Timeline, Utterance
 from lipmotion.vision.footage import footage_frames, track_footage
@@ -25,12 +30,15 @@ from lipmotion.vision.landmarks import LIP_POINTS
 from lipmotion.vision.mouth import region_to_image
 
 Array = NDArray[np.float64]
+Floats = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 Pictures = NDArray[np.uint8]
 
-LOWER_FACE = (120, 128)
+AROUND_PX = 12
+"""What is seen around the lower face, so that skin beside what replaces it can be measured."""
+LOWER_FACE = (lower_face.HEIGHT + 2 * AROUND_PX, lower_face.WIDTH + 2 * AROUND_PX)
 """Height and width of the aligned part of the face in which seams are measured, px; the eyes are 90 px apart."""
-MOUTH = (slice(32, 32 + HEIGHT), slice(28, 28 + WIDTH))
+MOUTH = (slice(28, 28 + HEIGHT), slice(40, 40 + WIDTH))
 """The mouth region in it."""
 CROSSED = "crossed"
 """What drives a way: the track of another clip."""
@@ -122,6 +130,10 @@ def training_video(path: Path) -> tuple[Pictures, Array]:
     footage = track_footage(path)
     maps = np.stack([region_to_image(one) for one in footage.face_to_image])
     return np.stack(list(footage_frames(footage))), maps
+
+
+Codes = Callable[[RecordedClip, Motion | None], tuple[Floats, Floats]]
+"""A function that returns eigenlips and components of the jaw for a clip and the motion that drives it."""
 
 
 class RecordedMouths:
@@ -268,3 +280,55 @@ def simple_ways(mouths: RecordedMouths, engines: Sequence[str]) -> list[Way]:
         ways.append(Way(f"eigenlips from lip points, pasted, {source}", source, mapped, region))
         ways.append(Way(f"drawn portrait, {source}", source, drawn, motion_only=True))
     return ways
+
+
+def filmed_ways(appearance: Appearance, engines: Sequence[str]) -> list[Way]:
+    """Return the ways of the renderer, each on the clip's own frames as background.
+
+    engines : what else than the clip's own track drives them; all options are tried with the track and the first
+    """
+
+    def way(name: str, source: str, codes: Codes, options: StitchingOptions) -> Way:
+        stitcher = Stitcher(appearance, options)
+
+        def render(clip: RecordedClip, motion: Motion | None) -> Iterator[Pictures]:
+            mouth, jaw = codes(clip, motion)
+            frames = zip(clip.frames, clip.maps, strict=True)
+            return stitcher.stitch(mouth, jaw, (Background(frame, to_frame) for frame, to_frame in frames))
+
+        region = lower_face.replaced_part(appearance.shape, 1) if options.jaw else lower_face.mouth_ellipse(1)
+        return Way(f"filmed, {name}", source, render, np.pad(region, AROUND_PX))
+
+    def of_motion(_: RecordedClip, motion: Motion | None) -> tuple[Floats, Floats]:
+        assert motion is not None
+        return appearance.of_motion(motion)
+
+    def of_mouths(clip: RecordedClip, _: Motion | None) -> tuple[Floats, Floats]:
+        size = (lower_face.HEIGHT, lower_face.WIDTH)
+        maps = lower_face.region_map(clip.maps, 1)
+        pictures = np.stack([cut(frame, to, size) for frame, to in zip(clip.frames, maps, strict=True)])
+        whole = np.clip(np.rint(pictures), 0, 255).astype(np.uint8)
+        return appearance.of_mouths(whole[(slice(None), *lower_face.mouth_part(1))])
+
+    def by_sound(clip: RecordedClip, motion: Motion | None) -> tuple[Floats, Floats]:
+        levels = levels_db(clip.utterance.audio)
+        times_s = np.arange(len(clip.frames)) / clip.rate_hz
+        heard = np.interp(times_s, (np.arange(len(levels)) + 0.5) * STEP_S, levels)
+        return of_motion(clip, motion)[0], appearance.jaw_of_sound(heard)
+
+    usual = StitchingOptions()
+    ways = [way("own eigenlips", "tracked", of_mouths, usual)]
+    ways += [way(source, source, of_motion, usual) for source in ("tracked", *engines, CROSSED)]
+    options = {
+        "no jaw": replace(usual, jaw=False),
+        "no refinement": replace(usual, mouth=None),
+        "refinement of the paper": replace(usual, mouth=PAPER),
+        "noise": replace(usual, noise=True),
+    }
+    ways += [
+        way(f"{source}, {name}", source, of_motion, option)
+        for source in ("tracked", *engines[:1])
+        for name, option in options.items()
+    ]
+    ways += [way(f"{source}, jaw by sound", source, by_sound, usual) for source in ("tracked", *engines[:1])]
+    return [*ways, way(f"{CROSSED}, no jaw", CROSSED, of_motion, options["no jaw"])]

@@ -8,6 +8,7 @@ from lipmotion.errors import InputError
 from lipmotion.measures.pictures import (
     colour_change,
     colour_edges,
+    contrast,
     flicker,
     outline_slopes,
     picture_figures,
@@ -80,6 +81,14 @@ def test_a_blurred_picture_is_less_similar_and_less_sharp():
 def test_sharpness_of_a_ramp_is_the_square_of_its_slope():
     assert sharpness(ramp(3.0)) == pytest.approx([9] * 4)
     assert sharpness(ramp(3.0).swapaxes(1, 2)) == pytest.approx([9] * 4)
+
+
+def test_contrast_is_the_deviation_of_the_brightness():
+    halves = np.zeros((3, HEIGHT, WIDTH, 3))
+    halves[:, :, WIDTH // 2 :] = (60, 90, 120)
+    assert contrast(halves) == pytest.approx([45] * 3)
+    assert contrast(halves[:, :, ::-1] + 50) == pytest.approx([45] * 3)
+    assert picture_figures(halves / 2, halves)["contrast"] == pytest.approx(0.5)
 
 
 def test_grey_pictures_have_no_colour_edges_and_red_ones_half():
@@ -170,8 +179,8 @@ def test_equal_pictures_have_the_best_figures():
     assert 0.7 < figures.pop("seam") < 1.4
     assert figures.pop("colour_offset") == pytest.approx(0)
     assert figures.pop("colour_drift") == pytest.approx(0)
-    assert list(figures) == ["ssim", "sharpness", "colour_edges", "flicker", "seam_ratio"]
-    assert list(figures.values()) == pytest.approx([1] * 5)
+    assert list(figures) == ["ssim", "sharpness", "contrast", "colour_edges", "flicker", "seam_ratio"]
+    assert list(figures.values()) == pytest.approx([1] * 6)
 
 
 def test_a_still_original_has_no_ratio_of_flicker():

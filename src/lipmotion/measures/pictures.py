@@ -66,8 +66,8 @@ def picture_figures(made: Pictures, true: Pictures, outline: Mask | None = None)
     """Return all measures of made pictures, by name.
 
     outline : bool array [shape=(H, W)], the region that was put into the pictures; None: no figures of its edge
-    ``psnr_db`` and ``ssim`` are means over frames. ``sharpness``, ``colour_edges`` and ``flicker`` are ratios to the
-    true pictures, where 1 is right. ``seam`` is that of ``OutlineSlopes``, ``seam_ratio`` the slope on the outline over
+    ``psnr_db`` and ``ssim`` are means over frames. ``sharpness``, ``contrast``, ``colour_edges`` and ``flicker`` are
+    ratios to the true pictures, where 1 is right. ``seam`` is that of ``OutlineSlopes``, ``seam_ratio`` the slope on the outline over
     that of the true pictures at the same place; ``colour_offset`` and ``colour_drift`` compare the skin inside the
     outline with that outside (``ColourChange``). A ratio to pictures without any is NaN.
     Raises InputError: pictures of different shapes, fewer than three, or a region that has no inside or no outside.
@@ -76,6 +76,7 @@ def picture_figures(made: Pictures, true: Pictures, outline: Mask | None = None)
         "psnr_db": float(psnr_db(made, true).mean()),
         "ssim": float(structural_similarity(made, true).mean()),
         "sharpness": _ratio(sharpness(made), sharpness(true)),
+        "contrast": _ratio(contrast(made), contrast(true)),
         "colour_edges": _ratio(colour_edges(made), colour_edges(true)),
         "flicker": _ratio(flicker(made), flicker(true)),
     }
@@ -133,6 +134,17 @@ def sharpness(pictures: Pictures) -> Curve:
     """
     _check(pictures)
     return _energy(_levels(pictures))
+
+
+def contrast(pictures: Pictures) -> Curve:
+    """Return the standard deviation of the brightness over the pixels of every frame, grey levels [shape=(T,)].
+
+    Brightness is the mean of the three colours. A mouth whose dark inside and bright teeth are averaged has too little.
+    Raises InputError: not pictures.
+    """
+    _check(pictures)
+    deviation: Curve = _levels(pictures).mean(axis=3).std(axis=(1, 2), dtype=float)
+    return deviation
 
 
 def colour_edges(pictures: Pictures) -> Curve:
