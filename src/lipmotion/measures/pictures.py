@@ -67,9 +67,9 @@ def picture_figures(made: Pictures, true: Pictures, outline: Mask | None = None)
 
     outline : bool array [shape=(H, W)], the region that was put into the pictures; None: no figures of its edge
     ``psnr_db`` and ``ssim`` are means over frames. ``sharpness``, ``contrast``, ``colour_edges`` and ``flicker`` are
-    ratios to the true pictures, where 1 is right. ``seam`` is that of ``OutlineSlopes``, ``seam_ratio`` the slope on the outline over
-    that of the true pictures at the same place; ``colour_offset`` and ``colour_drift`` compare the skin inside the
-    outline with that outside (``ColourChange``). A ratio to pictures without any is NaN.
+    ratios to the true pictures, where 1 is right. ``seam`` is that of ``OutlineSlopes``, ``seam_ratio`` the slope on
+    the outline over that of the true pictures at the same place; ``colour_offset`` and ``colour_drift`` compare the
+    skin inside the outline with that outside (``ColourChange``). A ratio to pictures without any is NaN.
     Raises InputError: pictures of different shapes, fewer than three, or a region that has no inside or no outside.
     """
     figures = {
