@@ -25,12 +25,14 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 def run(options: argparse.Namespace) -> None:
     """Call ``lipmotion.animate`` and ``lipmotion.write``; print the paths that were written."""
     from lipmotion.pipeline.animate import animate
+    from lipmotion.pipeline.film.video import onto_face
     from lipmotion.pipeline.posteriors import animate_with_posteriors, check_picture, write_posteriors
 
     check_results(options, options.speech)
     if options.posteriors:
         check_picture(options.posteriors, options.speech)
     request, model = request_and_model(options)
+    request = onto_face(request, model, options.face)
     if options.posteriors:
         result, posteriors = animate_with_posteriors(request, model=model)
         write_posteriors(options.posteriors, result, posteriors)

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lipmotion.cli.paths import add_output
+from lipmotion.cli.paths import add_input, add_output
 
 if TYPE_CHECKING:
     from lipmotion.pipeline.model import Model
@@ -24,17 +24,25 @@ def add_result_arguments(parser: argparse.ArgumentParser, files: str, *, require
     add_output(parser, "-o", "--output", force=True, help=files, **outputs)
     parser.add_argument("--rate", type=float, metavar="HZ", help="frames per second of motion files (default: 100)")
     parser.add_argument("--channels", metavar="NAME,NAME", help="write only these to motion files: opening,width,...")
-    parser.add_argument("--fps", type=float, default=25.0, help="frames per second of videos (default: 25)")
-    parser.add_argument("--face", default="portrait", metavar="NAME", help="face that videos show (default: portrait)")
+    rate = "frames per second of videos (default: 25; of filmed faces, those of the footage)"
+    parser.add_argument("--fps", type=float, help=rate)
+    face = "face that videos show: portrait, or a filmed face (default: portrait)"
+    drawn: dict[str, Any] = {"type": str, "default": "portrait", "metavar": "NAME|FILE.face", "help": face}
+    add_input(parser, "--face", what="face", replaceable=True, **drawn)
+    footage = "footage of the same person into which a filmed face is stitched (default: the one in its file)"
+    add_input(parser, "--background", what="background", metavar="VIDEO", help=footage)
+    follows = "what the jaw of a filmed face follows: motion, energy or none (default: motion)"
+    parser.add_argument("--jaw", choices=["motion", "energy", "none"], default="motion", help=follows)
 
 
 def check_results(options: argparse.Namespace, speech: Path | None = None) -> None:
-    """Raise ExportError or InputError if an output cannot be written.
+    """Raise ExportError or InputError if an output cannot be written; replace the name of a face by the face.
 
     speech : the recording (None: there will be a sound that is in no file)
     """
-    from lipmotion.pipeline.animate import check_outputs
+    from lipmotion.pipeline.animate import check_outputs, opened_face
 
+    options.face = opened_face(options.face)
     checked = {"rate_hz": options.rate, "fps": options.fps, "face": options.face}
     check_outputs(options.output, speech, **checked, with_sound=speech is None)
 
@@ -45,6 +53,7 @@ def write_results(options: argparse.Namespace, result: Generation, speech: Path 
     speech : the recording, or the sound
     """
     from lipmotion.pipeline.animate import write
+    from lipmotion.pipeline.film.video import FilmOptions
 
     write(
         result,
@@ -55,4 +64,5 @@ def write_results(options: argparse.Namespace, result: Generation, speech: Path 
         rate_hz=options.rate,
         fps=options.fps,
         face=options.face,
+        film=FilmOptions(background=options.background, jaw=options.jaw),
     )

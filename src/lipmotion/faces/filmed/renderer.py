@@ -68,6 +68,9 @@ class StitchingOptions:
     seed: int = 0
 
 
+STITCHING = StitchingOptions()
+
+
 @dataclass(frozen=True, eq=False)
 class Stitcher:
     """Stitches the mouth and the jaw of a person into frames of footage.
@@ -77,7 +80,7 @@ class Stitcher:
     """
 
     appearance: Appearance
-    options: StitchingOptions = StitchingOptions()
+    options: StitchingOptions = STITCHING
 
     def stitch(self, mouth: Floats, jaw: Floats, backgrounds: Iterable[Background]) -> Iterator[Picture]:
         """Yield frames, one for each frame of motion.
