@@ -46,6 +46,8 @@ from lipmotion.vision.frames import open_video
 COMMAND = [sys.executable, "-m", "lipmotion.cli.main"]
 Pictures = NDArray[np.uint8]
 RATE_HZ = 25
+STITCHED = 9
+"""Rounds of stitching."""
 BATCH = 25
 """Frames that are stitched at once."""
 SHAPE = FaceShape(half_width_px=48.0, bottom_px=142.0)
@@ -61,7 +63,7 @@ def main() -> None:
     parser.add_argument("--clips", type=int, default=20)
     parser.add_argument("--seconds", default="12,60")
     parser.add_argument("--sizes", default="360x288,1280x720")
-    parser.add_argument("--rounds", type=int, default=9)
+    parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--only", action="append", choices=("build", "animate", "stitch"))
     options = parser.parse_args()
     clips = sorted(path for path in options.folder.iterdir() if path.is_file())[: options.clips]
@@ -80,7 +82,7 @@ def main() -> None:
             if "animate" in only:
                 animate(size, speech, lengths, options.model, face, enlarged[0], options.rounds)
             if "stitch" in only:
-                stitch(size, enlarged[0], options.rounds)
+                stitch(size, enlarged[0])
 
 
 def show(figure: str, **values: Any) -> None:
@@ -135,7 +137,7 @@ def animate(
         show(f"animate {size}, frames after the first {lengths[0]} s", **rates)
 
 
-def stitch(size: str, path: Path, rounds: int) -> None:
+def stitch(size: str, path: Path) -> None:
     """Time the stitching of one clip: its own patches put back, and OpenCV's way to do the same."""
     cv2.setNumThreads(1)
     footage = track_footage(path)
@@ -146,7 +148,7 @@ def stitch(size: str, path: Path, rounds: int) -> None:
     shape = mask.shape
     system, weight = cloning_system(mask), feather(mask, 6.0 * scale)
     ours, opencv, cloned = [], [], []
-    for _ in range(rounds):
+    for _ in range(STITCHED):
         starts = range(0, len(frames), BATCH)
         parts = [stitched(frames[n : n + BATCH], to_frame[n : n + BATCH], system, weight) for n in starts]
         cut, clone, placed, theirs = 1e3 * np.sum(parts, axis=0) / len(frames)

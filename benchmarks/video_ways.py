@@ -21,6 +21,7 @@ from lipmotion.corpora.store import Corpus
 from lipmotion.errors import InputError
 from lipmotion.faces.filmed.renderer import Background, Stitcher, StitchingOptions
 from lipmotion.faces.registry import face_named
+from lipmotion.pipeline.film.background import placed_maps
 from lipmotion.pipeline.training.channels import PICTURES
 from lipmotion.speech.pauses import STEP_S, levels_db
 from lipmotion.stats.pca import evenly_spaced
@@ -55,12 +56,14 @@ class RecordedClip:
     path      : its video
     frames    : uint8 array [shape=(T, H, W, 3)], frame n at n / rate of the track
     maps      : affine maps [shape=(T, 2, 3)] from the plane of the lips to the image, as of ``face_to_image``
+    placed    : the same without the noise of tracking, where a renderer puts pictures
     """
 
     utterance: Utterance
     path: Path
     frames: Pictures
     maps: Array
+    placed: Array
 
     @property
     def name(self) -> str:
@@ -116,7 +119,7 @@ def recorded_clip(corpus: Corpus, name: str, path: Path) -> RecordedClip:
     utterance = corpus.utterance(name)
     if len(frames) != len(utterance.track.seen):
         raise InputError(f"{path}: {len(frames)} frames, required {len(utterance.track.seen)}, as in the corpus")
-    return RecordedClip(utterance, path, frames, footage.face_to_image)
+    return RecordedClip(utterance, path, frames, footage.face_to_image, placed_maps(footage))
 
 
 def video_of(clips: Path, name: str) -> Path:
@@ -293,7 +296,7 @@ def filmed_ways(appearance: Appearance, engines: Sequence[str]) -> list[Way]:
 
         def render(clip: RecordedClip, motion: Motion | None) -> Iterator[Pictures]:
             mouth, jaw = codes(clip, motion)
-            frames = zip(clip.frames, clip.maps, strict=True)
+            frames = zip(clip.frames, clip.placed, strict=True)
             return stitcher.stitch(mouth, jaw, (Background(frame, to_frame) for frame, to_frame in frames))
 
         region = lower_face.replaced_part(appearance.shape, 1) if options.jaw else lower_face.mouth_ellipse(1)
@@ -305,7 +308,7 @@ def filmed_ways(appearance: Appearance, engines: Sequence[str]) -> list[Way]:
 
     def of_mouths(clip: RecordedClip, _: Motion | None) -> tuple[Floats, Floats]:
         size = (lower_face.HEIGHT, lower_face.WIDTH)
-        maps = lower_face.region_map(clip.maps, 1)
+        maps = lower_face.region_map(clip.placed, 1)
         pictures = np.stack([cut(frame, to, size) for frame, to in zip(clip.frames, maps, strict=True)])
         whole = np.clip(np.rint(pictures), 0, 255).astype(np.uint8)
         return appearance.of_mouths(whole[(slice(None), *lower_face.mouth_part(1))])
