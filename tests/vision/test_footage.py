@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.vision.footage import footage_frames, track_footage
+from lipmotion.vision.footage import footage_frames, footage_groups, track_footage
 from lipmotion.vision.frames import VideoSpan, open_video
 from lipmotion.vision.track import track
 from vision.scripted import face, script
@@ -102,6 +102,18 @@ def test_frames_of_a_span(write_video, scripted):
     footage = track_footage(write_video(ticks=range(20)), VideoSpan(0.2, 0.6))
     assert levels(footage_frames(footage)) == list(range(5, 15))
     assert levels(footage_frames(footage, 4, 8)) == list(range(9, 13))
+
+
+@pytest.mark.parametrize("most_bytes", [0, 20 * 48 * 64 * 3, 10**9])
+def test_frames_in_any_order(write_video, scripted, most_bytes):
+    ticks = [n for n in range(20) if n not in (5, 12, 13)]
+    scripted([FACES[n] for n in ticks])
+    footage = track_footage(write_video(ticks=ticks))
+    order = [*range(20), *range(18, -1, -1), 3, 17]
+    groups = footage_groups(footage, most_bytes)
+    shown = levels(footage_frames(footage))
+    assert levels(groups.frame(n) for n in order) == [shown[n] for n in order]
+    assert groups.nbytes <= max(most_bytes, 2 * 48 * 64 * 3)
 
 
 @pytest.mark.parametrize(("start", "stop"), [(-1, 5), (6, 5), (0, 21), (21, None)])

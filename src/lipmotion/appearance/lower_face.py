@@ -28,12 +28,14 @@ LARGEST_SCALE = 4
 """Most samples a pixel: an eye distance of 360 px. More would make the edge of the region too long to clone."""
 TOP_PX = 50.0
 """Where the part that is replaced begins: under the nose, px below the eyes."""
-MARGIN_PX = 12.0
-"""How far it reaches below the chin at its lowest."""
+MARGIN_PX = 3.0
+"""The part that is replaced ends so far above the tip of the chin at its highest: on skin, not on neck or collar."""
 JAW_SHARE = 1.15
 """Half of its width, as a share of half the distance between the ends of the tracked jaw line."""
 NARROWEST_PX, WIDEST_PX = 34.0, 58.0
 """Limits of half its width: the mouth must fit in, and it must fit into the picture."""
+LEAST_BOTTOM_PX = 106.0
+"""The part that is replaced holds the mouth, whatever the chin."""
 MOUTH_AXES_PX = 34.0, 26.0
 """Half width and half height of the ellipse in which the mouth is replaced, about the middle of the mouth region."""
 CHEEK_PX = 12, 10
@@ -52,15 +54,15 @@ class FaceShape:
     bottom_px: float
 
 
-def face_shape(jaw_half_width: float, chin: float) -> FaceShape:
+def face_shape(jaw_half_width: float, chin_px: Array) -> FaceShape:
     """Return the shape of the part that is replaced.
 
     jaw_half_width : half the distance between the ends of the jaw line, eye distances
-    chin           : how far the tip of the chin is below the eyes at most, eye distances
+    chin_px        : how far the tip of the chin is below the eyes in all frames [shape=(T,)]
     """
     half = float(np.clip(JAW_SHARE * jaw_half_width * EYE_DISTANCE_PX, NARROWEST_PX, WIDEST_PX))
-    lowest = CORNER[1] + HEIGHT - 4.0
-    return FaceShape(half, float(np.clip(chin * EYE_DISTANCE_PX + MARGIN_PX, TOP_PX + 60.0, lowest)))
+    highest = float(np.percentile(chin_px, 1))
+    return FaceShape(half, float(np.clip(highest - MARGIN_PX, LEAST_BOTTOM_PX, CORNER[1] + HEIGHT - 4.0)))
 
 
 def region_map(face_to_frame: Array, scale: int) -> Array:

@@ -55,6 +55,7 @@ class FootagePictures:
     clips     : pictures of consecutive frames, clip by clip [each shape=(T, 128, 128, 3)], uint8
     motion    : of all these frames in turn, in ``channels`` [shape=(N, C)]
     levels_db : of the sound in these frames [shape=(N,)]
+    chin_px   : how far the tip of the chin is below the eyes in these frames, px of the face [shape=(N,)]
     shape     : of the lower face
     scale     : samples a pixel with which the footage loses nothing
     finer     : returns the pictures of some frames with ``scale`` samples a pixel
@@ -65,9 +66,27 @@ class FootagePictures:
     motion: Array
     channels: tuple[Channel, ...]
     levels_db: Array
+    chin_px: Array
     shape: FaceShape
     scale: int
     finer: Callable[[Index], Pictures]
+
+
+@dataclass(frozen=True, eq=False)
+class FaceCodes:
+    """What the lower face is like in every frame.
+
+    mouth   : eigenlips [shape=(T, 90)]
+    jaw     : components of the jaw [shape=(T, 3·K)]
+    chin_px : how far the tip of the chin is below the eyes, px of the face [shape=(T,)]
+    """
+
+    mouth: Floats
+    jaw: Floats
+    chin_px: Floats
+
+    def __len__(self) -> int:
+        return len(self.mouth)
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,9 +102,9 @@ class Appearance:
     jaw         : principal components of the lower face, 128 × 128 px, whose mouth is always the mean one
     jaws        : recorded lower faces, the candidates of the jaw [shape=(M, 128 · scale, 128 · scale, 3)], uint8
     jaw_codes   : their components [shape=(M, 3·K)]
-    from_motion : regression of eigenlips and components of the jaw on motion of tracked points
-    from_mouth  : regression of the components of the jaw on 1 and the eigenlips [shape=(1 + 90, 3·K)]
-    from_sound  : regression of the components of the jaw on 1 and the level of the sound, dB [shape=(2, 3·K)]
+    from_motion : regression of eigenlips, components of the jaw and place of the chin on motion of tracked points
+    from_mouth  : regression of jaw and chin on 1 and the eigenlips [shape=(1 + 90, 3·K + 1)]
+    from_sound  : regression of jaw and chin on 1 and the level of the sound, dB [shape=(2, 3·K + 1)]
     noise       : of the camera
     Source: Xie & Liu 2007, §5 (eigenlips), §6.1 (candidates, noise), §6.2 (jaw). Deviation: the jaw has components,
     too, so that it moves smoothly; the paper shows recorded ones.
@@ -113,7 +132,9 @@ class Appearance:
     @cached_property
     def jaw_candidates(self) -> Candidates:
         """The recorded lower faces as components and detail."""
-        return make_candidates(enlarged(self.jaw, self.scale), self.jaws, self.jaw_codes)
+        restored = enlarged(self.jaw, self.scale).expand(self.jaw_codes)
+        details = np.clip(np.rint(self.jaws - restored), -DEEPEST, DEEPEST)
+        return Candidates(self.jaw_codes, details.astype(np.int8))
 
     def mouth_refiner(self, options: RefinementOptions) -> Refiner:
         """Return what makes pictures of the mouth from eigenlips."""
@@ -123,25 +144,28 @@ class Appearance:
         """Return what makes pictures of the lower face from components of the jaw."""
         return Refiner(enlarged(self.jaw, self.scale), self.jaw_candidates, options)
 
-    def of_motion(self, motion: Motion) -> tuple[Floats, Floats]:
-        """Return eigenlips [shape=(T, 90)] and components of the jaw [shape=(T, 3·K)] for motion of tracked points.
+    def of_motion(self, motion: Motion) -> FaceCodes:
+        """Return the lower face for motion of tracked points.
 
         Raises InputError: the motion has not the channels of ``from_motion``, or values that are not finite.
         """
-        both = self.from_motion.predict(motion)
-        return both[:, : self.mouth_codes.shape[1]], both[:, self.mouth_codes.shape[1] :]
+        values = self.from_motion.predict(motion)
+        count = self.mouth_codes.shape[1]
+        return FaceCodes(values[:, :count], values[:, count:-1], values[:, -1])
 
-    def of_mouths(self, mouths: Pictures) -> tuple[Floats, Floats]:
-        """Return the same for pictures of the mouth [shape=(T, 56, 72, 3)], uint8, in any light."""
-        codes = self.mouth.project(relit(mouths, self.light / cheek_light(mouths)))
-        return codes, codes @ self.from_mouth[1:] + self.from_mouth[0]
+    def of_mouths(self, mouths: Pictures) -> FaceCodes:
+        """Return the lower face for pictures of the mouth [shape=(T, 56, 72, 3)], uint8, in any light."""
+        codes = self.mouth.project(relit(mouths, self.light / np.maximum(cheek_light(mouths), 1.0)))
+        values = codes @ self.from_mouth[1:] + self.from_mouth[0]
+        return FaceCodes(codes, values[:, :-1], values[:, -1])
 
-    def jaw_of_sound(self, levels_db: Array) -> Floats:
-        """Return components of the jaw [shape=(T, 3·K)] for the level of the sound in each frame [shape=(T,)].
+    def with_jaw_of_sound(self, codes: FaceCodes, levels_db: Array) -> FaceCodes:
+        """Return the lower face with another jaw, for the level of the sound in each frame [shape=(T,)].
 
         Source: Xie & Liu 2007, §6.2: the jaw goes down about in proportion to the energy of the sound.
         """
-        return (levels_db[:, None] * self.from_sound[1] + self.from_sound[0]).astype(np.float32)
+        values = (levels_db[:, None] * self.from_sound[1] + self.from_sound[0]).astype(np.float32)
+        return FaceCodes(codes.mouth, values[:, :-1], values[:, -1])
 
 
 def learn_appearance(footage: FootagePictures) -> Appearance:
@@ -158,13 +182,14 @@ def learn_appearance(footage: FootagePictures) -> Appearance:
     jaw = fit_eigenlips(faces[evenly_spaced(LEARNED_FROM, len(faces))], JAW_COMPONENTS)
     jaw_codes = jaw.project(faces)
     chosen = _undamaged(mouth, mouths, codes, choose_candidates(codes, CANDIDATES))
-    chosen_jaws = _undamaged(jaw, faces, jaw_codes, choose_candidates(jaw_codes, JAW_CANDIDATES))
+    chosen_jaws = choose_candidates(jaw_codes, JAW_CANDIDATES)
 
     def recorded(frames: Index) -> Pictures:
         if footage.scale == 1:
             return pictures[frames]
         return relit(footage.finer(frames), reference / light[frames])
 
+    jaw_and_chin = np.concatenate([jaw_codes, footage.chin_px[:, None]], axis=1)
     ends = np.cumsum([len(clip) for clip in footage.clips])[:-1]
     return Appearance(
         footage.shape,
@@ -176,9 +201,9 @@ def learn_appearance(footage: FootagePictures) -> Appearance:
         jaw,
         _jaw_alone(recorded(chosen_jaws), footage.shape),
         jaw_codes[chosen_jaws],
-        fit_motion_map(footage.motion, footage.channels, np.concatenate([codes, jaw_codes], axis=1)),
-        _regression(codes, jaw_codes),
-        _regression(footage.levels_db[:, None], jaw_codes),
+        fit_motion_map(footage.motion, footage.channels, np.concatenate([codes, jaw_and_chin], axis=1)),
+        _regression(codes, jaw_and_chin),
+        _regression(footage.levels_db[:, None], jaw_and_chin),
         estimate_noise(np.split(mouths, ends)),
     )
 

@@ -15,11 +15,13 @@ from lipmotion.appearance.motion_map import motion_map_arrays, motion_map_from_a
 from lipmotion.appearance.mouth_region import HEIGHT as MOUTH_HEIGHT
 from lipmotion.appearance.mouth_region import WIDTH as MOUTH_WIDTH
 from lipmotion.appearance.person import Appearance
-from lipmotion.storage.coded_video import MOST_PICTURES, CodedVideo, encode_video
+from lipmotion.storage.coded_video import decode_pictures, encode_pictures
 from lipmotion.storage.schema import Arrays, ArraySpec, arrays_under, checked_arrays, format_errors, refuse_undeclared
 
 Pictures = NDArray[np.uint8]
 
+CRF = 6.0
+"""Quality of the pictures: detail is what they are kept for."""
 PARTS = ("mouth", "jaw", "from_motion", "noise")
 """Prefixes of the names of the arrays of parts."""
 
@@ -41,9 +43,9 @@ def appearance_arrays(appearance: Appearance) -> dict[str, NDArray[Any]]:
         "shape": np.array([shape.half_width_px, shape.bottom_px]),
         "scale": np.array(appearance.scale),
         "light": appearance.light,
-        "mouths": encode_video(appearance.mouths, "stills").data,
+        "mouths": encode_pictures(appearance.mouths, CRF),
         "mouth_codes": appearance.mouth_codes,
-        "jaws": encode_video(appearance.jaws, "stills").data,
+        "jaws": encode_pictures(appearance.jaws, CRF),
         "jaw_codes": appearance.jaw_codes,
         "from_mouth": appearance.from_mouth,
         "from_sound": appearance.from_sound,
@@ -63,7 +65,7 @@ def appearance_from_arrays(arrays: Arrays) -> Appearance:
         _check_size("mouth", mouth, (MOUTH_HEIGHT, MOUTH_WIDTH))
         _check_size("jaw", jaw, (HEIGHT, WIDTH))
         codes, jaw_codes = len(mouth.channels), len(jaw.channels)
-        stored = checked_arrays(own, APPEARANCE, C=codes, K=jaw_codes, F=codes + 1)
+        stored = checked_arrays(own, APPEARANCE, C=codes, K=jaw_codes, F=codes + 1, J=jaw_codes + 1)
         scale = int(stored["scale"])
         half_width_px, bottom_px = stored["shape"].tolist()
         if not NARROWEST_PX <= half_width_px <= WIDEST_PX or not CORNER[1] < bottom_px < CORNER[1] + HEIGHT:
@@ -78,7 +80,7 @@ def appearance_from_arrays(arrays: Arrays) -> Appearance:
             jaw,
             _decoded(stored["jaws"], len(stored["jaw_codes"]), HEIGHT * scale, WIDTH * scale),
             stored["jaw_codes"],
-            motion_map_from_arrays(inner["from_motion"], codes + jaw_codes),
+            motion_map_from_arrays(inner["from_motion"], codes + jaw_codes + 1),
             stored["from_mouth"],
             stored["from_sound"],
             camera_noise_from_arrays(inner["noise"]),
@@ -93,8 +95,8 @@ APPEARANCE = {
     "mouth_codes": ArraySpec(np.float32, "N C", -LARGEST_COEFFICIENT, LARGEST_COEFFICIENT),
     "jaws": ArraySpec(np.uint8, "B", 0, 255),
     "jaw_codes": ArraySpec(np.float32, "M K", -LARGEST_COEFFICIENT, LARGEST_COEFFICIENT),
-    "from_mouth": ArraySpec(np.float32, "F K", -LARGEST_COEFFICIENT, LARGEST_COEFFICIENT),
-    "from_sound": ArraySpec(np.float32, "2 K", -LARGEST_COEFFICIENT, LARGEST_COEFFICIENT),
+    "from_mouth": ArraySpec(np.float32, "F J", -LARGEST_COEFFICIENT, LARGEST_COEFFICIENT),
+    "from_sound": ArraySpec(np.float32, "2 J", -LARGEST_COEFFICIENT, LARGEST_COEFFICIENT),
 }
 """The arrays of an appearance, beside those of its parts."""
 
@@ -105,6 +107,7 @@ def _check_size(name: str, space: Eigenlips, size: tuple[int, int]) -> None:
 
 
 def _decoded(data: Pictures, count: int, height: int, width: int) -> Pictures:
-    if count > MOST_PICTURES:
-        raise ValueError(f"{count} pictures, required at most {MOST_PICTURES}")
-    return CodedVideo(data, count, (height, width)).pictures()
+    pictures = decode_pictures(data)
+    if pictures.shape != (count, height, width, 3):
+        raise ValueError(f"pictures of shape {pictures.shape}, required ({count}, {height}, {width}, 3)")
+    return pictures

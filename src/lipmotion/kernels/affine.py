@@ -63,7 +63,7 @@ def blend(
     if patch.dtype != np.uint8:
         patch = patch.astype(np.float32, copy=False)
     weight = _plain(weight, np.float32)
-    if frame.flags.c_contiguous and _is_compiled(size[0] * size[1], patch.shape[2], kind):
+    if _is_compiled(size[0] * size[1], patch.shape[2], kind):
         from lipmotion.kernels.compiled import affine
 
         affine.blend(frame, *corner, size, _plain(patch), weight, _plain(to_patch, np.float64))

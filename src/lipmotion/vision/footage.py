@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import islice, pairwise
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
+from lipmotion.storage.frame_groups import MOST_DECODED, FrameGroups
 from lipmotion.types import Track
 from lipmotion.vision.frames import WHOLE, VideoSpan, open_video
 from lipmotion.vision.mouth import face_to_image
@@ -22,6 +23,9 @@ Array = NDArray[np.float64]
 
 SAME_TIME_S = 1e-4
 """Times of pictures that differ by less are those of one picture: containers count in whole ticks."""
+
+GROUP = 32
+"""Most frames of a video file that are decoded together."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +94,36 @@ def footage_frames(footage: Footage, start: int = 0, stop: int | None = None) ->
     if not 0 <= start <= stop <= len(footage):
         raise InputError(f"frames {start} to {stop} of {footage.path}, required within 0 to {len(footage)}")
     return _frames_between(footage, start, stop)
+
+
+def footage_groups(footage: Footage, most_bytes: int = MOST_DECODED) -> FrameGroups:
+    """Return access to the frames of a tracked video in any order, also backwards, in bounded memory.
+
+    most_bytes : decoded frames that are kept
+    Reading a frame raises InputError: the video cannot be read, or has changed since it was tracked.
+    Cost: forwards each picture is decoded once; backwards, those between the video's own key frame and a group of up to
+    ``GROUP`` frames are decoded again for every group. A video that is played backwards often is better copied into a
+    ``storage.coded_video.StoredVideo``.
+    """
+    frame_bytes = footage.size[0] * footage.size[1] * 3
+    length = min(GROUP, max(1, most_bytes // (3 * frame_bytes)))
+    starts = [*range(0, len(footage), length), len(footage)]
+    return FrameGroups(_SequentialReader(footage), starts, most_bytes)
+
+
+class _SequentialReader:
+    """Reads groups of frames; a group that follows the one before is read on, without seeking."""
+
+    def __init__(self, footage: Footage) -> None:
+        self._footage = footage
+        self._frames: Iterator[NDArray[np.uint8]] = iter(())
+        self._next = -1
+
+    def __call__(self, start: int, stop: int) -> list[NDArray[np.uint8]]:
+        if start != self._next:
+            self._frames = footage_frames(self._footage, start)
+        self._next = stop
+        return list(islice(self._frames, stop - start))
 
 
 def _frames_between(footage: Footage, start: int, stop: int) -> Iterator[NDArray[np.uint8]]:

@@ -1,4 +1,4 @@
-"""Steady placing: maps of a face without the noise of tracking, so that a patch placed by them sits on the skin.
+"""Steady placing: maps of a tracked face without the noise of tracking, so that a patch placed by them sits still.
 
 ``benchmarks/steadying.py`` measures how far the nose and cheeks move from frame to frame after alignment.
 """
@@ -151,31 +151,29 @@ def _step(before: Sequence[Floats], after: Sequence[Floats]) -> Array:
     for reference, moved in zip(before, after, strict=True):
         step = _registered(reference, moved, step)
     reference, moved = before[-1], after[-1]
-    likeness = [_likeness(picture, reference) for picture in (_shifted(moved, step), moved)]
-    return step if likeness[0] >= likeness[1] else np.zeros(2)
+    is_better = _correlation(reference, _shifted(moved, step)) >= _correlation(reference, moved)
+    return step if is_better else np.zeros(2)
 
 
-def _likeness(picture: Floats, reference: Floats) -> float:
-    """Return the absolute correlation of two pictures."""
-    one, other = (levels.ravel() - levels.mean() for levels in (picture, reference))
-    return abs(float(one @ other)) / max(float(np.linalg.norm(one) * np.linalg.norm(other)), 1e-9)
+def _correlation(first: Floats, other: Floats) -> float:
+    a, b = first - first.mean(), other - other.mean()
+    return float((a * b).mean() / max(a.std() * b.std(), 1e-9))
 
 
 def _registered(reference: Floats, moved: Floats, step: Array) -> Array:
     """Return a step, improved by least squares on the gradients (Lucas & Kanade 1981)."""
     inner = (slice(MARGIN, -MARGIN), slice(MARGIN, -MARGIN))
-    down, across = np.gradient(reference.astype(np.float64))
+    down, across = (np.asarray(slope, np.float64) for slope in np.gradient(reference.astype(np.float64)))
     level = reference[inner].ravel().astype(np.float64)
     terms = np.stack([across[inner].ravel(), down[inner].ravel(), level - level.mean(), np.ones(len(level))], axis=1)
-    power = terms.T @ terms
+    power: Array = np.asarray(terms.T @ terms, np.float64)
     if np.linalg.cond(power) > 1e12:  # no texture in one direction
         return step
     for _ in range(ROUNDS):
         difference = (_shifted(moved, step)[inner] - reference[inner]).ravel().astype(np.float64)
-        solution: Array = np.linalg.solve(power, (terms.T @ difference)[:, None])
-        change = solution[:2, 0]
-        step = step - change
-        if np.abs(change).max() < 1e-3:
+        change: Array = np.linalg.solve(power, terms.T @ difference).astype(np.float64)
+        step = step - change[:2]
+        if np.abs(change[:2]).max() < 1e-3:
             break
     return step
 

@@ -14,7 +14,7 @@ from lipmotion.appearance.person import Appearance
 from lipmotion.appearance.person_arrays import appearance_arrays, appearance_from_arrays
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.storage.archive import UNREADABLE, read_archive, read_archive_header, write_archive
-from lipmotion.storage.coded_video import MOST_PICTURES, CodedVideo
+from lipmotion.storage.coded_video import STORED_VIDEO, StoredVideo, stored_video_arrays, stored_video_from_arrays
 from lipmotion.storage.files import check_source
 from lipmotion.storage.schema import (
     POSITIVE,
@@ -39,14 +39,14 @@ SAMPLE = 32767
 class StoredBackground:
     """A background sequence: footage of the person, with the place of the face in every frame.
 
-    video         : the frames
-    rate_hz       : frames a second
+    video         : T frames, of even height and width
     face_to_frame : affine maps from px of the face to px of the frame [shape=(T, 2, 3)]
+    chin_px       : how far the tip of the chin is below the eyes in each frame, px of the face [shape=(T,)]
     """
 
-    video: CodedVideo
-    rate_hz: float
+    video: StoredVideo
     face_to_frame: Array
+    chin_px: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +83,7 @@ class FilmedFace:
         """A description of the face for users, by keyword."""
         appearance, video = self.appearance, self.background.video
         height, width = video.size
-        seconds = len(video) / self.background.rate_hz
+        seconds = len(video) / video.rate_hz
         explained = [f"{100 * float(space.explained.mean()):.1f} %" for space in (appearance.mouth, appearance.jaw)]
         described = {key: _text(value) for key, value in self.about.items()}
         return described | {
@@ -91,7 +91,7 @@ class FilmedFace:
             "jaw": f"{len(appearance.jaw.channels)} components, {explained[1]} of the variance; "
             f"{len(appearance.jaws)} candidates",
             "resolution": f"{appearance.scale} samples a pixel, 90 px between the eyes",
-            "background": f"{seconds:.1f} s of {width} × {height} px at {self.background.rate_hz:g} frames a second",
+            "background": f"{seconds:.1f} s of {width} × {height} px at {video.rate_hz:g} frames a second",
             "needs": f"{len(appearance.from_motion.names)} channels of tracked points, or eigenlips",
         }
 
@@ -104,13 +104,8 @@ def save_face(face: FilmedFace, path: str | Path) -> None:
     background, takes = face.background, face.takes
     channels = takes[0].motion.channels if takes else ()
     arrays = {f"appearance/{name}": array for name, array in appearance_arrays(face.appearance).items()}
-    arrays |= {
-        "background/data": background.video.data,
-        "background/count": np.array(len(background.video)),
-        "background/size": np.array(background.video.size),
-        "background/rate_hz": np.array(background.rate_hz),
-        "background/face_to_frame": background.face_to_frame,
-    }
+    arrays |= {f"background/{name}": array for name, array in stored_video_arrays(background.video).items()}
+    arrays |= {"background/face_to_frame": background.face_to_frame, "background/chin_px": background.chin_px}
     for number, take in enumerate(takes):
         arrays |= {
             f"take{number}/sound": np.rint(np.clip(take.sound.samples, -1, 1) * SAMPLE).astype(np.int16),
@@ -175,13 +170,10 @@ def read_face_header(path: Path) -> dict[str, Any]:
 
 MOST_TAKES = 1000
 BACKGROUND = {
-    "data": ArraySpec(np.uint8, "A", 0, 255),
-    "count": ArraySpec(np.intp, "", 1, MOST_PICTURES),
-    "size": ArraySpec(np.intp, "2", 16, 8192),
-    "rate_hz": ArraySpec(np.float64, "", 1, 1000),
     "face_to_frame": ArraySpec(np.float64, "T 2 3", -1e5, 1e5),
+    "chin_px": ArraySpec(np.float64, "T", 0, 1000),
 }
-"""The arrays of a background."""
+"""The arrays of a background, beside those of its video."""
 TAKE = {
     "sound": ArraySpec(np.int16, "S", -SAMPLE - 1, SAMPLE),
     "sound_rate_hz": ArraySpec(np.intp, "", 8000, 48_000),
@@ -193,14 +185,13 @@ TAKE = {
 
 
 def _background(arrays: Arrays) -> StoredBackground:
-    refuse_undeclared(arrays, BACKGROUND)
-    stored = checked_arrays(arrays, BACKGROUND)
-    height, width = stored["size"].tolist()
+    refuse_undeclared(arrays, BACKGROUND, STORED_VIDEO)
+    video = stored_video_from_arrays({name: array for name, array in arrays.items() if name not in BACKGROUND})
+    stored = checked_arrays(arrays, BACKGROUND, T=len(video))
     maps = stored["face_to_frame"]
-    if len(maps) != int(stored["count"]) or (np.abs(np.linalg.det(maps[:, :, :2])) < FLAT).any():
-        raise ValueError(f"{len(maps)} places of the face for {int(stored['count'])} frames, or flat ones")
-    video = CodedVideo(stored["data"], int(stored["count"]), (height, width))
-    return StoredBackground(video, float(stored["rate_hz"]), maps)
+    if (np.abs(np.linalg.det(maps[:, :, :2])) < FLAT).any() or any(length % 2 for length in video.size):
+        raise ValueError("flat places of the face, or frames of odd sizes")
+    return StoredBackground(video, maps, stored["chin_px"])
 
 
 FLAT = 1e-6

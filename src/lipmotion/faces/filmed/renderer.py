@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.appearance.camera_noise import NoiseSource
+from lipmotion.appearance.chin import moved_part, with_chin_moved
 from lipmotion.appearance.lower_face import (
     HEIGHT,
     WIDTH,
@@ -21,7 +22,7 @@ from lipmotion.appearance.lower_face import (
     relit,
     replaced_part,
 )
-from lipmotion.appearance.person import JAW_OPTIONS, Appearance
+from lipmotion.appearance.person import JAW_OPTIONS, Appearance, FaceCodes
 from lipmotion.appearance.placing import cut, feather, place
 from lipmotion.appearance.poisson import CloningSystem, cloning_system
 from lipmotion.appearance.refinement import STEADY, RefinementOptions, Refiner
@@ -37,6 +38,9 @@ BATCH = 32
 FEATHER_PX = 6.0
 """Width of the seam, px of the face."""
 
+LARGEST_DIFFERENCE = 20.0
+"""Differences on the edge of the jaw above this are no difference of light, grey levels."""
+
 
 @dataclass(frozen=True)
 class Background:
@@ -44,10 +48,12 @@ class Background:
 
     frame         : uint8 array [shape=(H, W, 3)], RGB
     face_to_frame : affine map from px of the face to px of the frame [shape=(2, 3)]
+    chin_px       : how far the tip of the chin is below the eyes, px of the face
     """
 
     frame: Picture
     face_to_frame: Array
+    chin_px: float
 
 
 @dataclass(frozen=True)
@@ -82,27 +88,32 @@ class Stitcher:
     appearance: Appearance
     options: StitchingOptions = STITCHING
 
-    def stitch(self, mouth: Floats, jaw: Floats, backgrounds: Iterable[Background]) -> Iterator[Picture]:
+    def stitch(self, codes: FaceCodes, backgrounds: Iterable[Background]) -> Iterator[Picture]:
         """Yield frames, one for each frame of motion.
 
-        mouth       : eigenlips [shape=(T, 90)], one row a frame of the video
-        jaw         : components of the jaw [shape=(T, 3·K)]
-        backgrounds : at least T; taken a few at a time, so memory does not grow with the length
-        Raises InputError: too few backgrounds, or frames of several sizes.
+        codes       : what the lower face is like, one row a frame of the video
+        backgrounds : at least as many; taken a few at a time, so memory does not grow with the length
+        Raises InputError: too few backgrounds.
         """
-        mouth_chosen = self._mouths.choose(mouth)
-        jaw_chosen = self._jaws.choose(jaw)
+        mouth_chosen = self._mouths.choose(codes.mouth)
+        jaw_chosen = self._jaws.choose(codes.jaw)
         iterator = iter(backgrounds)
-        for first in range(0, len(mouth), BATCH):
+        for first in range(0, len(codes), BATCH):
             part = slice(first, first + BATCH)
-            batch = list(islice(iterator, len(mouth[part])))
-            if len(batch) < len(mouth[part]):
+            batch = list(islice(iterator, len(codes.mouth[part])))
+            if len(batch) < len(codes.mouth[part]):
                 raise InputError(
-                    f"{first + len(batch)} frames of background, required {len(mouth)}; give longer footage"
+                    f"{first + len(batch)} frames of background, required {len(codes)}; give longer footage"
                 )
-            mouths = self._pictures_of_mouth(mouth[part], mouth_chosen[part], first)
-            jaws = self._jaws.pictures(jaw[part], jaw_chosen[part]) if self.options.jaw else None
-            yield from self._stitched(mouths, jaws, batch)
+            mouths = self._pictures_of_mouth(codes.mouth[part], mouth_chosen[part], first)
+            if not self.options.jaw:
+                yield from self._stitched(mouths, self._behind(batch), batch)
+                continue
+            jaws = self._jaws.pictures(codes.jaw[part], jaw_chosen[part])
+            chins = np.array([each.chin_px for each in batch])
+            behind = with_chin_moved(self._behind(batch), chins, codes.chin_px[part] - chins)
+            gains = self._gains(behind)
+            yield from self._stitched(mouths, self._whole.clone(relit(jaws, gains), behind, LARGEST_DIFFERENCE), batch)
 
     def _pictures_of_mouth(self, codes: Floats, chosen: NDArray[np.intp], first: int) -> Pictures:
         if self.options.mouth is None:
@@ -111,19 +122,27 @@ class Stitcher:
             pictures = self._mouths.pictures(codes, chosen)
         return self._noise.add(pictures, first) if self.options.noise else pictures
 
-    def _stitched(self, mouths: Pictures, jaws: Pictures | None, batch: Sequence[Background]) -> Iterator[Picture]:
-        scale = self.appearance.scale
-        size = HEIGHT * scale, WIDTH * scale
-        maps = region_map(np.stack([each.face_to_frame for each in batch]), scale)
-        behind = np.stack([_grey_levels(cut(each.frame, to, size)) for each, to in zip(batch, maps, strict=True)])
-        part = (slice(None), *mouth_part(scale))
-        gains = np.maximum(cheek_light(behind[part]), 1.0) / self.appearance.light
-        if jaws is not None:
-            behind = self._whole.clone(relit(jaws, gains), behind)
+    def _behind(self, batch: Sequence[Background]) -> Pictures:
+        """Return the lower face of the footage, aligned [shape=(T, H, W, 3)]."""
+        size = HEIGHT * self.appearance.scale, WIDTH * self.appearance.scale
+        return np.stack(
+            [_grey_levels(cut(each.frame, to, size)) for each, to in zip(batch, self._maps(batch), strict=True)]
+        )
+
+    def _maps(self, batch: Sequence[Background]) -> Array:
+        return region_map(np.stack([each.face_to_frame for each in batch]), self.appearance.scale)
+
+    def _gains(self, behind: Pictures) -> Array:
+        """Return how much lighter the footage is than the pictures of the person, in each colour [shape=(T, 3)]."""
+        part = (slice(None), *mouth_part(self.appearance.scale))
+        return np.maximum(cheek_light(behind[part]), 1.0) / self.appearance.light
+
+    def _stitched(self, mouths: Pictures, behind: Pictures, batch: Sequence[Background]) -> Iterator[Picture]:
+        """Yield the frames of a batch with mouths in lower faces, and these in the frames."""
         source = behind.copy()
-        source[part] = relit(mouths, gains)
+        source[(slice(None), *mouth_part(self.appearance.scale))] = relit(mouths, self._gains(behind))
         patches = self._mouth_alone.clone(source, behind)
-        for each, patch, to in zip(batch, patches, maps, strict=True):
+        for each, patch, to in zip(batch, patches, self._maps(batch), strict=True):
             frame = each.frame.copy()
             place(frame, patch, self._weight, to)
             yield frame
@@ -151,7 +170,7 @@ class Stitcher:
     @cached_property
     def _weight(self) -> Floats:
         scale = self.appearance.scale
-        mask = replaced_part(self.appearance.shape, scale) if self.options.jaw else mouth_ellipse(scale)
+        mask = moved_part(scale) if self.options.jaw else mouth_ellipse(scale)
         return feather(mask, FEATHER_PX * scale)
 
 

@@ -12,13 +12,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.appearance.lower_face import HEIGHT, WIDTH, FaceShape, best_scale, face_shape, region_map
+from lipmotion.appearance.lower_face import HEIGHT, WIDTH, best_scale, face_shape, region_map
 from lipmotion.appearance.person import FootagePictures, learn_appearance
 from lipmotion.appearance.placing import cut
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.faces.filmed.face import FilmedFace, SpokenTake
 from lipmotion.kernels.threads import one_thread
-from lipmotion.pipeline.film.background import best_background
+from lipmotion.pipeline.film.background import best_background, chin_px
 from lipmotion.pipeline.film.takes import Take, takes_of
 from lipmotion.pipeline.workers import worker_pool
 from lipmotion.speech.audio_files import read_audio
@@ -38,6 +38,8 @@ SPOKEN_TAKES_S = 20.0
 """Seconds of speech that are kept, for motion of other people's models."""
 SILENT_DB = -100.0
 """Level of video without sound."""
+JAW_ENDS = ("x_150", "x_379")
+"""The ends of the tracked jaw line, right and left."""
 UNUSED_AXIS = "z_"
 """Channels of depth are not used: they are guesses of the tracker, and differ most between people."""
 
@@ -188,6 +190,9 @@ def _pictures(filmed: Sequence[_Filmed]) -> FootagePictures:
     motion = np.concatenate(values)
     channels = filmed[0].footage.track.motion.channels
     used = [n for n, channel in enumerate(channels) if not channel.name.startswith(UNUSED_AXIS)]
+    names = [channel.name for channel in channels]
+    right, left = (motion[:, names.index(name)] for name in JAW_ENDS)
+    chin = np.concatenate([chin_px(take.footage)[take.used] for take in filmed])
     maps = np.concatenate([take.footage.face_to_image[take.used] for take in filmed])
     scale = best_scale(maps)
     starts = np.cumsum([0, *(len(take.used) for take in filmed)])
@@ -196,7 +201,8 @@ def _pictures(filmed: Sequence[_Filmed]) -> FootagePictures:
         motion[:, used],
         tuple(channels[n] for n in used),
         np.concatenate([_levels(take) for take in filmed]),
-        _shape(motion, [channel.name for channel in channels]),
+        chin,
+        face_shape(float(np.median(left - right)) / 2, chin),
         scale,
         partial(_finer, filmed, starts, scale),
     )
@@ -221,12 +227,6 @@ def _levels(take: _Filmed) -> NDArray[np.float64]:
     levels = levels_db(take.sound)
     times_s = take.used / take.footage.rate_hz
     return np.interp(times_s, (np.arange(len(levels)) + 0.5) * STEP_S, levels)
-
-
-def _shape(motion: NDArray[np.float64], names: list[str]) -> FaceShape:
-    """Return the shape of the lower face, from the ends of the jaw line and the tip of the chin."""
-    right, left, chin = (motion[:, names.index(name)] for name in ("x_150", "x_379", "y_152"))
-    return face_shape(float(np.median(left - right)) / 2, -float(np.percentile(chin, 1)))
 
 
 def _spoken(filmed: Sequence[_Filmed]) -> tuple[SpokenTake, ...]:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.appearance.eigenlips import Eigenlips
+from lipmotion.appearance.person import FaceCodes
 from lipmotion.errors import InputError
 from lipmotion.faces.base import Face
 from lipmotion.faces.filmed.face import FilmedFace
@@ -72,19 +73,19 @@ def filmed_frames(
     if not 0 < rate_hz < float("inf"):
         raise InputError(f"the frame rate is {rate_hz}, required more than 0")
     count = int(np.floor((len(motion.values) - 1) / motion.rate_hz * rate_hz + 1e-9)) + 1
-    mouth, jaw = mouth_and_jaw(face, motion, count, rate_hz, eigenlips)
+    codes = face_codes(face, motion, count, rate_hz, eigenlips)
     if options.jaw == "energy":
-        jaw = _jaw_of(face, sound, count, rate_hz)
+        codes = face.appearance.with_jaw_of_sound(codes, _levels(sound, count, rate_hz))
     stitcher = Stitcher(
         face.appearance, options.stitching if options.jaw != "none" else _without_jaw(options.stitching)
     )
-    return stitcher.stitch(mouth, jaw, background.frames(count, rate_hz)), rate_hz
+    return stitcher.stitch(codes, background.frames(count, rate_hz)), rate_hz
 
 
-def mouth_and_jaw(
-    face: FilmedFace, motion: Motion, count: int, rate_hz: float, eigenlips: Eigenlips | None
-) -> tuple[Floats, Floats]:
-    """Return eigenlips [shape=(count, 90)] and components of the jaw [shape=(count, 3·K)] at the rate of a video.
+def face_codes(
+    face: FilmedFace, motion: Motion, count: int, rate_hz: float, eigenlips: Eigenlips | None = None
+) -> FaceCodes:
+    """Return what the lower face is like in ``count`` frames at the rate of a video.
 
     Raises InputError: motion without the channels that the face needs.
     """
@@ -94,10 +95,14 @@ def mouth_and_jaw(
     values = shown.values[:, [shown.column(channel.name) for channel in eigenlips.channels]]
     starts = range(0, count, BATCH)
     parts = [face.appearance.of_mouths(eigenlips.restore(values[start : start + BATCH])) for start in starts]
-    mouth, jaw = (np.concatenate([part[n] for part in parts]) for n in (0, 1))
-    if any(channel.unit != GREY for channel in shown.channels):  # points as well: they tell the jaw better
-        jaw = face.appearance.of_motion(shown)[1]
-    return mouth, jaw
+    mouth, jaw, chin_px = (np.concatenate(values) for values in zip(*map(_fields, parts), strict=True))
+    if all(channel.unit == GREY for channel in shown.channels):
+        return FaceCodes(mouth, jaw, chin_px)
+    return replace(face.appearance.of_motion(shown), mouth=mouth)  # points tell the jaw better
+
+
+def _fields(codes: FaceCodes) -> tuple[Floats, Floats, Floats]:
+    return codes.mouth, codes.jaw, codes.chin_px
 
 
 def onto_face(request: SpeechRequest, model: Model, face: Face | FilmedFace) -> SpeechRequest:
@@ -129,12 +134,13 @@ def is_person_of(model: Model, face: FilmedFace, speaker: str = "") -> bool:
     return same
 
 
-def _jaw_of(face: FilmedFace, sound: Audio | None, count: int, rate_hz: float) -> Floats:
+def _levels(sound: Audio | None, count: int, rate_hz: float) -> NDArray[np.float64]:
+    """Return the level of the sound in every frame of a video, dB [shape=(count,)]."""
     if sound is None:
         raise InputError("a jaw that follows the energy needs the sound; give the recording")
     levels = levels_db(sound)
     centres_s = (np.arange(len(levels)) + 0.5) * STEP_S
-    return face.appearance.jaw_of_sound(np.interp(np.arange(count) / rate_hz, centres_s, levels))
+    return np.interp(np.arange(count) / rate_hz, centres_s, levels)
 
 
 def _without_jaw(stitching: StitchingOptions) -> StitchingOptions:
