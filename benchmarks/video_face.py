@@ -62,7 +62,7 @@ from lipmotion.faces.filmed.face import load_face
 from lipmotion.measures.bootstrap import bootstrap_interval
 from lipmotion.measures.closures import closed_threshold, phone_closures
 from lipmotion.measures.curves import pooled_correlation
-from lipmotion.measures.pictures import picture_figures, psnr_db
+from lipmotion.measures.pictures import outline_figures, picture_figures, psnr_db
 from lipmotion.pipeline.evaluation.figures import BILABIAL
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import SpeechRequest
@@ -182,9 +182,10 @@ def all_ways(setting: Setting) -> tuple[Way, ...]:
     """Return the ways that are compared."""
     corpus = Corpus.open(setting.corpus)
     engines = [path.stem for path in setting.engines]
-    ways = simple_ways(RecordedMouths(corpus, corpus.names("train"), setting.clips), engines)
+    mouths = RecordedMouths(corpus, corpus.names("train"), setting.clips)
+    ways = simple_ways(mouths, engines)
     if setting.face:
-        ways += filmed_ways(load_face(setting.face).appearance, engines)
+        ways += filmed_ways(load_face(setting.face), mouths, engines)
     return tuple(way for way in ways if not setting.only or way.name.startswith(setting.only))
 
 
@@ -233,8 +234,7 @@ def judged_way(clip: RecordedClip, way: Way, driver: Motion | None, true: Pictur
     inside = picture_figures(made[inner][LIPS], true[inner][LIPS])
     row |= {f"lips_{name}": inside[name] for name in ("sharpness", "contrast")}
     if way.region is not None:
-        edge = picture_figures(made, true, way.region)
-        row |= {name: edge[name] for name in ("seam", "seam_ratio", "colour_offset", "colour_drift")}
+        row |= outline_figures(made, true, way.region)
     sheets = sheets_of(clip, frames, job.sheet, {"psnr": -psnr_db(made[inner], true[inner]), "landmarks": landmarks})
     return Judged(row, curves, landmarks, seen, clip.eyes_px, sheets)
 
@@ -385,6 +385,7 @@ COLUMNS = {
     "colour_offset": ("colour offset", ".1f"),
     "colour_drift": ("colour drift", ".1f"),
     "engine_opening": ("ACC opening, driver", ".3f"),
+    "engine_width": ("width", ".3f"),
     "acc_opening": ("ACC opening", ".3f"),
     "acc_width": ("width", ".3f"),
     "acc_outer": ("outer", ".3f"),

@@ -14,16 +14,16 @@ from lipmotion.appearance import lower_face
 from lipmotion.appearance.candidates import squared_distances
 from lipmotion.appearance.eigenlips import Eigenlips, fit_eigenlips
 from lipmotion.appearance.mouth_region import HEIGHT, WIDTH
-from lipmotion.appearance.person import Appearance
-from lipmotion.appearance.placing import cut, inverse_map, place
+from lipmotion.appearance.placing import inverse_map, place
 from lipmotion.appearance.refinement import PAPER
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import InputError
-from lipmotion.faces.filmed.renderer import Background, Stitcher, StitchingOptions
+from lipmotion.faces.filmed.face import FilmedFace
+from lipmotion.faces.filmed.renderer import STITCHING
 from lipmotion.faces.registry import face_named
 from lipmotion.pipeline.film.background import placed_maps
+from lipmotion.pipeline.film.video import FILM, FilmOptions, filmed_frames
 from lipmotion.pipeline.training.channels import PICTURES
-from lipmotion.speech.pauses import STEP_S, levels_db
 from lipmotion.stats.pca import evenly_spaced
 from lipmotion.types import Motion, Timeline, Utterance
 from lipmotion.vision.footage import footage_frames, track_footage
@@ -31,7 +31,6 @@ from lipmotion.vision.landmarks import LIP_POINTS
 from lipmotion.vision.mouth import region_to_image
 
 Array = NDArray[np.float64]
-Floats = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 Pictures = NDArray[np.uint8]
 
@@ -55,15 +54,13 @@ class RecordedClip:
     utterance : of the corpus: its sound, its track, its mouth pictures
     path      : its video
     frames    : uint8 array [shape=(T, H, W, 3)], frame n at n / rate of the track
-    maps      : affine maps [shape=(T, 2, 3)] from the plane of the lips to the image, as of ``face_to_image``
-    placed    : the same without the noise of tracking, where a renderer puts pictures
+    maps      : affine maps [shape=(T, 2, 3)] from the plane of the lips to the image, without the noise of tracking
     """
 
     utterance: Utterance
     path: Path
     frames: Pictures
     maps: Array
-    placed: Array
 
     @property
     def name(self) -> str:
@@ -119,7 +116,7 @@ def recorded_clip(corpus: Corpus, name: str, path: Path) -> RecordedClip:
     utterance = corpus.utterance(name)
     if len(frames) != len(utterance.track.seen):
         raise InputError(f"{path}: {len(frames)} frames, required {len(utterance.track.seen)}, as in the corpus")
-    return RecordedClip(utterance, path, frames, footage.face_to_image, placed_maps(footage))
+    return RecordedClip(utterance, path, frames, placed_maps(footage))
 
 
 def video_of(clips: Path, name: str) -> Path:
@@ -133,10 +130,6 @@ def training_video(path: Path) -> tuple[Pictures, Array]:
     footage = track_footage(path)
     maps = np.stack([region_to_image(one) for one in footage.face_to_image])
     return np.stack(list(footage_frames(footage))), maps
-
-
-Codes = Callable[[RecordedClip, Motion | None], tuple[Floats, Floats]]
-"""A function that returns eigenlips and components of the jaw for a clip and the motion that drives it."""
 
 
 class RecordedMouths:
@@ -237,7 +230,7 @@ def composed(outer: Array, inner: Array) -> Array:
 def simple_ways(mouths: RecordedMouths, engines: Sequence[str]) -> list[Way]:
     """Return the simple alternatives.
 
-    engines : what else than the clip's own track drives them
+    engines : what else than the clip's own track drives them; the first is used
     """
 
     def nearest(clip: RecordedClip, motion: Motion | None) -> Iterator[Pictures]:
@@ -276,62 +269,52 @@ def simple_ways(mouths: RecordedMouths, engines: Sequence[str]) -> list[Way]:
         Way("frozen mouth", None, frozen, region),
         Way("eigenlips of the clip's own pictures, pasted", "tracked", own, region),
     ]
-    for source in ("tracked", *engines, CROSSED):
+    for source in ("tracked", *engines[:1], CROSSED):
         ways.append(Way(f"nearest recorded mouth, {source}", source, nearest, region))
-        if source in ("tracked", *engines[:1]):  # slow: the clips that it chooses from are tracked again
+        if source != CROSSED:  # slow: the clips that it chooses from are tracked again
             ways.append(Way(f"nearest recorded mouth, from its video, {source}", source, from_video, region))
         ways.append(Way(f"eigenlips from lip points, pasted, {source}", source, mapped, region))
         ways.append(Way(f"drawn portrait, {source}", source, drawn, motion_only=True))
     return ways
 
 
-def filmed_ways(appearance: Appearance, engines: Sequence[str]) -> list[Way]:
-    """Return the ways of the renderer, each on the clip's own frames as background.
+def filmed_ways(face: FilmedFace, mouths: RecordedMouths, engines: Sequence[str]) -> list[Way]:
+    """Return the ways of the renderer, each with the clip itself as background.
 
     engines : what else than the clip's own track drives them; all options are tried with the track and the first
     """
 
-    def way(name: str, source: str, codes: Codes, options: StitchingOptions) -> Way:
-        stitcher = Stitcher(appearance, options)
-
+    def way(name: str, source: str, options: FilmOptions, eigenlips: Eigenlips | None = None) -> Way:
         def render(clip: RecordedClip, motion: Motion | None) -> Iterator[Pictures]:
-            mouth, jaw = codes(clip, motion)
-            frames = zip(clip.frames, clip.placed, strict=True)
-            return stitcher.stitch(mouth, jaw, (Background(frame, to_frame) for frame, to_frame in frames))
+            shown = motion
+            if eigenlips is not None:
+                crops = np.asarray(clip.utterance.track.crops)
+                shown = Motion(eigenlips.project(crops), clip.rate_hz, eigenlips.channels)
+            assert shown is not None
+            with_clip = replace(options, background=clip.path)
+            sound = clip.utterance.audio
+            return filmed_frames(face, shown, sound=sound, eigenlips=eigenlips, options=with_clip)[0]
 
-        region = lower_face.replaced_part(appearance.shape, 1) if options.jaw else lower_face.mouth_ellipse(1)
-        return Way(f"filmed, {name}", source, render, np.pad(region, AROUND_PX))
+        mask = lower_face.mouth_ellipse(1) if options.jaw == "none" else _replaced(face)
+        return Way(f"filmed, {name}", source, render, np.pad(mask, AROUND_PX))
 
-    def of_motion(_: RecordedClip, motion: Motion | None) -> tuple[Floats, Floats]:
-        assert motion is not None
-        return appearance.of_motion(motion)
-
-    def of_mouths(clip: RecordedClip, _: Motion | None) -> tuple[Floats, Floats]:
-        size = (lower_face.HEIGHT, lower_face.WIDTH)
-        maps = lower_face.region_map(clip.placed, 1)
-        pictures = np.stack([cut(frame, to, size) for frame, to in zip(clip.frames, maps, strict=True)])
-        whole = np.clip(np.rint(pictures), 0, 255).astype(np.uint8)
-        return appearance.of_mouths(whole[(slice(None), *lower_face.mouth_part(1))])
-
-    def by_sound(clip: RecordedClip, motion: Motion | None) -> tuple[Floats, Floats]:
-        levels = levels_db(clip.utterance.audio)
-        times_s = np.arange(len(clip.frames)) / clip.rate_hz
-        heard = np.interp(times_s, (np.arange(len(levels)) + 0.5) * STEP_S, levels)
-        return of_motion(clip, motion)[0], appearance.jaw_of_sound(heard)
-
-    usual = StitchingOptions()
-    ways = [way("own eigenlips", "tracked", of_mouths, usual)]
-    ways += [way(source, source, of_motion, usual) for source in ("tracked", *engines, CROSSED)]
+    ways = [way("own eigenlips", "tracked", FILM, mouths.eigenlips)]
+    ways += [way(source, source, FILM) for source in ("tracked", *engines, CROSSED)]
     options = {
-        "no jaw": replace(usual, jaw=False),
-        "no refinement": replace(usual, mouth=None),
-        "refinement of the paper": replace(usual, mouth=PAPER),
-        "noise": replace(usual, noise=True),
+        "no jaw": FilmOptions(jaw="none"),
+        "jaw by energy": FilmOptions(jaw="energy"),
+        "no refinement": FilmOptions(stitching=replace(STITCHING, mouth=None)),
+        "refinement of the paper": FilmOptions(stitching=replace(STITCHING, mouth=PAPER)),
+        "noise": FilmOptions(stitching=replace(STITCHING, noise=True)),
     }
     ways += [
-        way(f"{source}, {name}", source, of_motion, option)
+        way(f"{source}, {name}", source, option)
         for source in ("tracked", *engines[:1])
         for name, option in options.items()
     ]
-    ways += [way(f"{source}, jaw by sound", source, by_sound, usual) for source in ("tracked", *engines[:1])]
-    return [*ways, way(f"{CROSSED}, no jaw", CROSSED, of_motion, options["no jaw"])]
+    return [*ways, way(f"{CROSSED}, no jaw", CROSSED, options["no jaw"])]
+
+
+def _replaced(face: FilmedFace) -> Mask:
+    """Return the part of the lower face that is replaced."""
+    return lower_face.replaced_part(face.appearance.shape, 1)

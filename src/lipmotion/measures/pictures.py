@@ -62,17 +62,14 @@ class ColourChange:
     drift: float
 
 
-def picture_figures(made: Pictures, true: Pictures, outline: Mask | None = None) -> dict[str, float]:
-    """Return all measures of made pictures, by name.
+def picture_figures(made: Pictures, true: Pictures) -> dict[str, float]:
+    """Return the measures of made pictures beside true ones, by name.
 
-    outline : bool array [shape=(H, W)], the region that was put into the pictures; None: no figures of its edge
     ``psnr_db`` and ``ssim`` are means over frames. ``sharpness``, ``contrast``, ``colour_edges`` and ``flicker`` are
-    ratios to the true pictures, where 1 is right. ``seam`` is that of ``OutlineSlopes``, ``seam_ratio`` the slope on
-    the outline over that of the true pictures at the same place; ``colour_offset`` and ``colour_drift`` compare the
-    skin inside the outline with that outside (``ColourChange``). A ratio to pictures without any is NaN.
-    Raises InputError: pictures of different shapes, fewer than three, or a region that has no inside or no outside.
+    ratios to the true pictures, where 1 is right; NaN where these have none.
+    Raises InputError: pictures of different shapes, or fewer than three.
     """
-    figures = {
+    return {
         "psnr_db": float(psnr_db(made, true).mean()),
         "ssim": float(structural_similarity(made, true).mean()),
         "sharpness": _ratio(sharpness(made), sharpness(true)),
@@ -80,14 +77,23 @@ def picture_figures(made: Pictures, true: Pictures, outline: Mask | None = None)
         "colour_edges": _ratio(colour_edges(made), colour_edges(true)),
         "flicker": _ratio(flicker(made), flicker(true)),
     }
-    if outline is None:
-        return figures
-    slopes = outline_slopes(made, outline)
-    inside, outside = skin_beside(outline)
-    change = colour_change(made, true, inside, outside)
-    return figures | {
+
+
+def outline_figures(made: Pictures, true: Pictures, region: Mask) -> dict[str, float]:
+    """Return the measures of the edge of what was put into made pictures, beside true ones, by name.
+
+    region : bool array [shape=(H, W)], what was put in
+    ``seam`` is that of ``OutlineSlopes``; ``seam_ratio`` is the slope on the outline over that of the true pictures at
+    the same place, NaN where these have none. ``colour_offset`` and ``colour_drift`` compare the skin inside the
+    outline with that outside (``ColourChange``).
+    Raises InputError: pictures of different shapes, or a region without an inside or an outside.
+    """
+    _check(made, true)
+    slopes, true_slopes = outline_slopes(made, region), outline_slopes(true, region)
+    change = colour_change(made, true, *skin_beside(region))
+    return {
         "seam": slopes.seam,
-        "seam_ratio": _ratio(slopes.at, outline_slopes(true, outline).at),
+        "seam_ratio": _ratio(slopes.at, true_slopes.at),
         "colour_offset": change.offset,
         "colour_drift": change.drift,
     }
