@@ -6,7 +6,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lipmotion.cli.paths import add_input, add_output
+from lipmotion.cli.faces import add_face_arguments, film_options
+from lipmotion.cli.paths import add_output
 
 if TYPE_CHECKING:
     from lipmotion.pipeline.model import Model
@@ -25,14 +26,9 @@ def add_result_arguments(parser: argparse.ArgumentParser, files: str, *, require
     parser.add_argument("--rate", type=float, metavar="HZ", help="frames per second of motion files (default: 100)")
     parser.add_argument("--channels", metavar="NAME,NAME", help="write only these to motion files: opening,width,...")
     rate = "frames per second of videos (default: 25; of filmed faces, those of the footage)"
+    rate = "frames per second of videos (default: 25; of filmed faces, those of the footage)"
     parser.add_argument("--fps", type=float, help=rate)
-    face = "face that videos show: portrait, or a filmed face (default: portrait)"
-    drawn: dict[str, Any] = {"type": str, "default": "portrait", "metavar": "NAME|FILE.face", "help": face}
-    add_input(parser, "--face", what="face", replaceable=True, **drawn)
-    footage = "footage of the same person into which a filmed face is stitched (default: the one in its file)"
-    add_input(parser, "--background", what="background", metavar="VIDEO", help=footage)
-    follows = "what the jaw of a filmed face follows: motion, energy or none (default: motion)"
-    parser.add_argument("--jaw", choices=["motion", "energy", "none"], default="motion", help=follows)
+    add_face_arguments(parser)
 
 
 def check_results(options: argparse.Namespace, speech: Path | None = None) -> None:
@@ -53,7 +49,6 @@ def write_results(options: argparse.Namespace, result: Generation, speech: Path 
     speech : the recording, or the sound
     """
     from lipmotion.pipeline.animate import write
-    from lipmotion.pipeline.film.video import FilmOptions
 
     write(
         result,
@@ -64,5 +59,5 @@ def write_results(options: argparse.Namespace, result: Generation, speech: Path 
         rate_hz=options.rate,
         fps=options.fps,
         face=options.face,
-        film=FilmOptions(background=options.background, jaw=options.jaw),
+        film=film_options(options),
     )

@@ -53,8 +53,7 @@ def run(options: argparse.Namespace) -> None:
 
 def _speak(options: argparse.Namespace, report: Report) -> None:
     from lipmotion.corpora.store import Corpus
-    from lipmotion.faces.filmed.face import FilmedFace
-    from lipmotion.pipeline.film.video import is_person_of
+    from lipmotion.pipeline.film.video import person_shown
     from lipmotion.pipeline.model import load_model
     from lipmotion.pipeline.speak import read_text, speak
     from lipmotion.units import Lexicon
@@ -64,16 +63,8 @@ def _speak(options: argparse.Namespace, report: Report) -> None:
     lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
     model = load_model(options.model)
     corpus = Corpus.open(options.corpus) if options.corpus else None
-    needs_map = isinstance(options.face, FilmedFace) and not is_person_of(model, options.face, options.speaker)
-    sound, result = speak(
-        text,
-        voice=options.voice,
-        corpus=corpus,
-        model=model,
-        lexicon=lexicon,
-        speaker=options.speaker,
-        onto=options.onto or (options.face if needs_map else None),
-        onto_speaker=options.onto_speaker,
-    )
+    how = {"voice": options.voice, "corpus": corpus, "model": model, "lexicon": lexicon, "speaker": options.speaker}
+    onto = options.onto or person_shown(model, options.face, options.speaker)
+    sound, result = speak(text, **how, onto=onto, onto_speaker=options.onto_speaker)
     write_results(options, result, sound, model)
     report.finish("\n".join(options.output), files=options.output, seconds=round(sound.duration_s, 3))

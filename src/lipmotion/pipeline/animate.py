@@ -130,7 +130,10 @@ def write(
         elif path in videos:
             heard = sound or read_audio(Path(str(recording)), SOUND_RATE_HZ, warn=False)
             if isinstance(shown_face, FilmedFace):
-                write_film(path, shown_face, generation.motion, heard, model=model, fps=fps, options=film)
+                filmed = None if recording is None else Path(recording)
+                write_film(
+                    path, shown_face, generation.motion, heard, speech=filmed, model=model, fps=fps, options=film
+                )
             else:
                 _write_video(generation, path, heard, DRAWN_HZ if fps is None else fps, shown_face)
         elif path.suffix.lower() == TEXTGRID_SUFFIX.lower():

@@ -169,3 +169,30 @@ def _maps(frames: TrackedFrames) -> Array:
             scene_s = times_s[inside] - start / rate_hz
             result[start:stop] = resample_to_constant_rate(scene_s, maps[inside], rate_hz, stop - start)
     return result.reshape(-1, 2, 3)
+
+
+def untracked_frames(path: Path) -> tuple[Iterator[NDArray[np.uint8]], float]:
+    """Return the frames of a video in constant order, and their rate; no face is looked for.
+
+    Each is a uint8 array [shape=(H, W, 3)], RGB: the last picture that begins at or before the time of the frame. The
+    video must be read to its end, or the iterator be closed.
+    Raises InputError: no such video, or one that states no frame rate.
+    """
+    with open_video(path) as video:
+        rates = [rate for rate in video.stated_rates_hz if rate > 0]
+    if not rates:
+        raise InputError(f"{path}: states no frame rate; convert it to a constant one")
+    return _held_frames(path, rates[0]), rates[0]
+
+
+def _held_frames(path: Path, rate_hz: float) -> Iterator[NDArray[np.uint8]]:
+    shown: NDArray[np.uint8] | None = None
+    n = 0
+    with open_video(path) as video:
+        for picture in video.frames:
+            while shown is not None and n / rate_hz < picture.time_s - SAME_TIME_S:
+                yield shown
+                n += 1
+            shown = picture.image
+    if shown is not None:
+        yield shown

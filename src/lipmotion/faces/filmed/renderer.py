@@ -115,6 +115,13 @@ class Stitcher:
             gains = self._gains(behind)
             yield from self._stitched(mouths, self._whole.clone(relit(jaws, gains), behind, LARGEST_DIFFERENCE), batch)
 
+    def mouths(self, codes: FaceCodes) -> Iterator[Picture]:
+        """Yield pictures of the mouth alone [shape=(56 · scale, 72 · scale, 3)], one for each frame of motion."""
+        chosen = self._mouths.choose(codes.mouth)
+        for first in range(0, len(codes), BATCH):
+            part = slice(first, first + BATCH)
+            yield from self._pictures_of_mouth(codes.mouth[part], chosen[part], first)
+
     def _pictures_of_mouth(self, codes: Floats, chosen: NDArray[np.intp], first: int) -> Pictures:
         if self.options.mouth is None:
             pictures = self._mouths.eigenlips.restore(codes)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
-from lipmotion.appearance.mouth_region import EYE_DISTANCE_PX
+from lipmotion.appearance.mouth_region import CORNER, EYE_DISTANCE_PX, HEIGHT
 from lipmotion.faces.filmed.face import StoredBackground
 from lipmotion.faces.filmed.renderer import Background
 from lipmotion.storage.coded_video import encode_video
@@ -22,6 +22,8 @@ from lipmotion.vision.steadying import registered_maps, steady_maps
 
 MOST_BACKGROUND_S = 10.0
 """Longest background that is kept in the file of a face."""
+HEAD_PX = -75.0, -80.0, 75.0, 150.0
+"""Left, top, right and bottom of a head, px of the face, from the point between the eyes."""
 CHIN = "y_152"
 """The tip of the chin."""
 SMOOTHING_FRAMES = 0.7
@@ -44,6 +46,22 @@ class BackgroundSequence:
     rate_hz: float
     face_to_frame: NDArray[np.float64]
     chin_px: NDArray[np.float64]
+
+    @property
+    def face_box(self) -> tuple[float, float, float, float]:
+        """The part of the frames in which the face is at any time: left, top, right and bottom, px."""
+        corners = np.array([[x, y, 1.0] for x in HEAD_PX[::2] for y in HEAD_PX[1::2]])
+        places = (self.face_to_frame @ corners.T).swapaxes(1, 2).reshape(-1, 2)
+        least, most = places.min(axis=0), places.max(axis=0)
+        return float(least[0]), float(least[1]), float(most[0]), float(most[1])
+
+    def enlarged(self, zoom: float) -> BackgroundSequence:
+        """Return the same background, on which a mouth is ``zoom`` times as large, in the same place."""
+        middle = np.array([0.0, CORNER[1] + HEIGHT / 2])
+        maps = self.face_to_frame.copy()
+        maps[:, :, 2] += maps[:, :, :2] @ middle * (1 - zoom)
+        maps[:, :, :2] *= zoom
+        return replace(self, face_to_frame=maps)
 
     def frames(self, count: int, rate_hz: float) -> Iterator[Background]:
         """Yield ``count`` frames at a rate: forwards, backwards, and so on."""

@@ -13,20 +13,26 @@ from numpy.typing import NDArray
 from lipmotion.appearance.eigenlips import Eigenlips
 from lipmotion.appearance.person import FaceCodes
 from lipmotion.errors import InputError
+from lipmotion.export.inset import with_inset
+from lipmotion.export.synthetic_mark import mark_frames, mark_metadata
+from lipmotion.export.video import write_mp4
 from lipmotion.faces.base import Face
 from lipmotion.faces.filmed.face import FilmedFace
 from lipmotion.faces.filmed.renderer import BATCH, STITCHING, Stitcher, StitchingOptions
 from lipmotion.kernels.threads import one_thread
-from lipmotion.pipeline.film.background import open_background, stored_sequence
+from lipmotion.pipeline.film.background import BackgroundSequence, open_background, stored_sequence
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.request import SpeechRequest
 from lipmotion.speech.pauses import STEP_S, levels_db
 from lipmotion.types import GREY, Audio, Motion
+from lipmotion.vision.footage import untracked_frames
 
 Floats = NDArray[np.float32]
 Frames = Iterator[NDArray[np.uint8]]
 Jaw = Literal["motion", "energy", "none"]
-JAWS: tuple[Jaw, ...] = ("motion", "energy", "none")
+Overlay = Literal["inset", "mouth"]
+Mark = Literal["metadata", "visible", "none"]
+ZOOM = 1.3
+"""How much larger than the speaker's own the mouth over it is."""
 
 
 @dataclass(frozen=True)
@@ -36,50 +42,98 @@ class FilmOptions:
     background : footage of the same person into which mouth and jaw are stitched; None: the one in the face's file
     jaw        : what the jaw follows: the motion, the energy of the sound (Xie & Liu 2007, §6.2), or the background's
                  own motion (``none``)
+    overlay    : the aid to lip-reading: on the speech's own video, a large mouth in a corner (``inset``) or over the
+                 speaker's own (``mouth``); None: no such video is needed
+    mark       : how the video says that it is synthetic: in its metadata, there and in a corner of the picture
+                 (``visible``), or not at all (docs/consent.md)
     stitching  : how pictures are made
     """
 
     background: Path | None = None
     jaw: Jaw = "motion"
+    overlay: Overlay | None = None
+    mark: Mark = "metadata"
     stitching: StitchingOptions = STITCHING
 
 
 FILM = FilmOptions()
 
 
+@dataclass(frozen=True, eq=False)
+class Film:
+    """A video that is made while it is read.
+
+    frames  : each uint8 RGB [shape=(H, W, 3)], of even sizes
+    rate_hz : frames a second
+    covered : the part of the frames in which the face, or the inset, is at any time: left, top, right, bottom, px; None
+              where it is not known
+    """
+
+    frames: Frames
+    rate_hz: float
+    covered: tuple[float, float, float, float] | None
+
+
 @one_thread()
-def filmed_frames(
+def film_of(
     face: FilmedFace,
     motion: Motion,
     *,
+    speech: Path | None = None,
     sound: Audio | None = None,
     eigenlips: Eigenlips | None = None,
     fps: float | None = None,
     options: FilmOptions = FILM,
-) -> tuple[Frames, float]:
-    """Return the frames of a video [each shape=(H, W, 3)], of even sizes, and their rate.
+) -> Film:
+    """Return the video of a filmed face.
 
     face      : of the person
     motion    : of tracked points of the same person, or eigenlips
+    speech    : the video of the speech, for an overlay
     sound     : for a jaw that follows the energy
     eigenlips : of the model that generated ``motion``, if it has any
-    fps       : frames a second; None: those of the footage
+    fps       : frames a second; None, and with an overlay: those of the footage
     Frame n shows the time n / fps; the last one is at or before the end of the motion. Frames are made a few at a time.
     Raises InputError: motion without the channels that the face needs, no sound for ``energy``, a background in which
-    there is no face, or a rate that is not positive.
+    there is no face, a rate that is not positive, or an overlay of a sound without video.
     """
-    background = stored_sequence(face.background) if options.background is None else open_background(options.background)
-    rate_hz = background.rate_hz if fps is None else fps
+    if options.overlay is not None and (speech is None or options.background is not None):
+        raise InputError("an overlay shows the video of the speech: give a video as speech, and no background")
+    if options.overlay == "inset" and speech is not None:
+        frames, rate_hz = untracked_frames(speech)
+        codes = _codes(face, motion, sound, rate_hz, eigenlips, options)
+        mouths = Stitcher(face.appearance, options.stitching).mouths(codes)
+        return Film(with_inset(_even(frames), mouths), rate_hz, None)
+    background = _background(face, options, speech)
+    rate_hz = background.rate_hz if fps is None or options.overlay is not None else fps
+    codes = _codes(face, motion, sound, rate_hz, eigenlips, options)
+    has_jaw = options.jaw != "none" and options.overlay is None
+    stitcher = Stitcher(face.appearance, options.stitching if has_jaw else replace(options.stitching, jaw=False))
+    return Film(stitcher.stitch(codes, background.frames(len(codes), rate_hz)), rate_hz, background.face_box)
+
+
+def _codes(
+    face: FilmedFace,
+    motion: Motion,
+    sound: Audio | None,
+    rate_hz: float,
+    eigenlips: Eigenlips | None,
+    options: FilmOptions,
+) -> FaceCodes:
+    """Return what the lower face is like in every frame of a video."""
     if not 0 < rate_hz < float("inf"):
         raise InputError(f"the frame rate is {rate_hz}, required more than 0")
     count = int(np.floor((len(motion.values) - 1) / motion.rate_hz * rate_hz + 1e-9)) + 1
     codes = face_codes(face, motion, count, rate_hz, eigenlips)
     if options.jaw == "energy":
         codes = face.appearance.with_jaw_of_sound(codes, _levels(sound, count, rate_hz))
-    stitcher = Stitcher(
-        face.appearance, options.stitching if options.jaw != "none" else _without_jaw(options.stitching)
-    )
-    return stitcher.stitch(codes, background.frames(count, rate_hz)), rate_hz
+    return codes
+
+
+def _background(face: FilmedFace, options: FilmOptions, speech: Path | None) -> BackgroundSequence:
+    if options.overlay is not None and speech is not None:
+        return open_background(speech).enlarged(ZOOM)
+    return stored_sequence(face.background) if options.background is None else open_background(options.background)
 
 
 def face_codes(
@@ -105,15 +159,13 @@ def _fields(codes: FaceCodes) -> tuple[Floats, Floats, Floats]:
     return codes.mouth, codes.jaw, codes.chin_px
 
 
-def onto_face(request: SpeechRequest, model: Model, face: Face | FilmedFace) -> SpeechRequest:
-    """Return a request for the motion of the person whom a face shows.
+def person_shown(model: Model, face: Face | FilmedFace, speaker: str = "") -> FilmedFace | None:
+    """Return a filmed face if it is of another person than the motion of a model, so that it must be mapped onto it.
 
-    A drawn face shows anybody; motion of another person than a filmed face's is mapped onto it (``map_onto``).
-    Raises InputError: a filmed face is of another person, and the model generates eigenlips alone.
+    speaker : of the people of the model whose motion is generated
+    A drawn face shows anybody. Raises InputError: as ``is_person_of``.
     """
-    if not isinstance(face, FilmedFace) or request.onto is not None or is_person_of(model, face, request.speaker):
-        return request
-    return replace(request, onto=face)
+    return face if isinstance(face, FilmedFace) and not is_person_of(model, face, speaker) else None
 
 
 def is_person_of(model: Model, face: FilmedFace, speaker: str = "") -> bool:
@@ -143,8 +195,11 @@ def _levels(sound: Audio | None, count: int, rate_hz: float) -> NDArray[np.float
     return np.interp(np.arange(count) / rate_hz, centres_s, levels)
 
 
-def _without_jaw(stitching: StitchingOptions) -> StitchingOptions:
-    return replace(stitching, jaw=False)
+def _even(frames: Frames) -> Frames:
+    """Yield frames without a last row or column that makes their sizes odd."""
+    for frame in frames:
+        height, width = (length // 2 * 2 for length in frame.shape[:2])
+        yield frame[:height, :width]
 
 
 def write_film(
@@ -153,6 +208,7 @@ def write_film(
     motion: Motion,
     sound: Audio,
     *,
+    speech: Path | None = None,
     model: Model | None = None,
     fps: float | None = None,
     options: FilmOptions = FILM,
@@ -160,10 +216,12 @@ def write_film(
     """Write a video of a filmed face, with sound; whole or not at all.
 
     model : that generated the motion; needed where the motion is eigenlips
-    Raises InputError: as ``filmed_frames``. Raises ExportError: the file cannot be written.
+    The other arguments are those of ``film_of``. Raises InputError: as ``film_of``. Raises ExportError: the file cannot
+    be written.
     """
-    from lipmotion.export.video import write_mp4
-
     eigenlips = model.eigenlips if model is not None else None
-    frames, rate_hz = filmed_frames(face, motion, sound=sound, eigenlips=eigenlips, fps=fps, options=options)
-    write_mp4(path, frames, fps=rate_hz, audio=sound)
+    film = film_of(face, motion, speech=speech, sound=sound, eigenlips=eigenlips, fps=fps, options=options)
+    frames = mark_frames(film.frames, film.covered) if options.mark == "visible" else film.frames
+    metadata = mark_metadata() if options.mark != "none" else None
+    tags, xmp = (metadata.tags, metadata.xmp) if metadata is not None else (None, None)
+    write_mp4(path, frames, fps=film.rate_hz, audio=sound, tags=tags, xmp=xmp)
