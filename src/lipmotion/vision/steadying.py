@@ -163,17 +163,18 @@ def _correlation(first: Floats, other: Floats) -> float:
 def _registered(reference: Floats, moved: Floats, step: Array) -> Array:
     """Return a step, improved by least squares on the gradients (Lucas & Kanade 1981)."""
     inner = (slice(MARGIN, -MARGIN), slice(MARGIN, -MARGIN))
-    down, across = (np.asarray(slope, np.float64) for slope in np.gradient(reference.astype(np.float64)))
+    slopes: list[Array] = list(np.gradient(reference.astype(np.float64)))
+    down, across = slopes
     level = reference[inner].ravel().astype(np.float64)
     terms = np.stack([across[inner].ravel(), down[inner].ravel(), level - level.mean(), np.ones(len(level))], axis=1)
-    power: Array = np.asarray(terms.T @ terms, np.float64)
+    power: Array = terms.T @ terms
     if np.linalg.cond(power) > 1e12:  # no texture in one direction
         return step
     for _ in range(ROUNDS):
         difference = (_shifted(moved, step)[inner] - reference[inner]).ravel().astype(np.float64)
-        change: Array = np.linalg.solve(power, terms.T @ difference).astype(np.float64)
-        step = step - change[:2]
-        if np.abs(change[:2]).max() < 1e-3:
+        change = [float(value) for value in np.linalg.solve(power, terms.T @ difference)[:2]]
+        step = step - np.array(change)
+        if max(map(abs, change)) < 1e-3:
             break
     return step
 
