@@ -22,7 +22,7 @@ from lipmotion.faces.filmed.face import FilmedFace
 from lipmotion.faces.filmed.renderer import STITCHING
 from lipmotion.faces.registry import face_named
 from lipmotion.pipeline.film.background import placed_maps
-from lipmotion.pipeline.film.video import FILM, FilmOptions, filmed_frames
+from lipmotion.pipeline.film.video import FILM, FilmOptions, film_of
 from lipmotion.pipeline.training.channels import PICTURES
 from lipmotion.stats.pca import evenly_spaced
 from lipmotion.types import Motion, Timeline, Utterance
@@ -293,7 +293,7 @@ def filmed_ways(face: FilmedFace, mouths: RecordedMouths, engines: Sequence[str]
             assert shown is not None
             with_clip = replace(options, background=clip.path)
             sound = clip.utterance.audio
-            return filmed_frames(face, shown, sound=sound, eigenlips=eigenlips, options=with_clip)[0]
+            return film_of(face, shown, sound=sound, eigenlips=eigenlips, options=with_clip).frames
 
         mask = lower_face.mouth_ellipse(1) if options.jaw == "none" else _replaced(face)
         return Way(f"filmed, {name}", source, render, np.pad(mask, AROUND_PX))
