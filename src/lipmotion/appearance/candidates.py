@@ -21,6 +21,10 @@ CANDIDATES = 500
 """Number of candidate mouths. Source: Xie & Liu 2007, §6.1."""
 ROUNDS = 8
 """Rounds in which the centres of the groups are moved: more did not lower the error on GRID."""
+MIXED, DRAWN = 20, 0.75
+"""Recorded mouths of which a predicted one is mixed, and the share of the mixture."""
+PICTURES_AT_ONCE = 16
+"""Pictures that are restored at a time."""
 BLOCK = 2048
 """Pictures whose distances to all candidates are in memory at a time."""
 DEEPEST = 100
@@ -106,14 +110,61 @@ def make_candidates(eigenlips: Eigenlips, pictures: Pictures, coefficients: Valu
     """
     if coefficients is None:
         coefficients = eigenlips.project(pictures)
-    details = np.rint(pictures.astype(np.float32) - eigenlips.expand(coefficients))
-    whole = np.abs(details).max(axis=(1, 2, 3)) <= DEEPEST
+    details, deepest = recorded_details(eigenlips, pictures, coefficients)
+    whole = deepest <= DEEPEST
     if not whole.any():
         raise InputError(
             f"{len(pictures)} pictures, all of which differ from their eigenlips by more than {DEEPEST} grey levels; "
             "required at least one that does not: are they pictures of the person whom the eigenlips were trained on?"
         )
-    return Candidates(coefficients[whole], details[whole].astype(np.int8))
+    return Candidates(coefficients[whole], details[whole])
+
+
+def recorded_details(
+    eigenlips: Eigenlips, pictures: Pictures, coefficients: Values
+) -> tuple[NDArray[np.int8], NDArray[np.float32]]:
+    """Return what eigenlips leave out of pictures, and the largest value of it in each picture before it is cut off.
+
+    pictures     : [shape=(N, H, W, 3)], uint8
+    coefficients : their eigenlips [shape=(N, 3·K)]
+    Returns whole grey levels, cut off at ``DEEPEST`` [shape=(N, H, W, 3)], and [shape=(N,)].
+    """
+    details, deepest = np.empty(pictures.shape, np.int8), np.empty(len(pictures), np.float32)
+    for start in range(0, len(pictures), PICTURES_AT_ONCE):
+        part = slice(start, start + PICTURES_AT_ONCE)
+        exact = pictures[part] - eigenlips.expand(coefficients[part])
+        deepest[part] = np.abs(np.rint(exact, out=exact)).max(axis=(1, 2, 3))
+        details[part] = np.clip(exact, -DEEPEST, DEEPEST, out=exact)
+    return details, deepest
+
+
+def drawn_to_recorded(wanted: Values, recorded: Values) -> Values:
+    """Return coefficients [shape=(T, D)] that are drawn towards recorded ones: no mouth is an impossible one.
+
+    wanted   : coefficients that a regression predicts [shape=(T, D)]
+    recorded : of recorded mouths [shape=(N, D)]
+    Each is replaced by ``DRAWN`` of the nearest mixture of its ``MIXED`` nearest recorded ones, and the rest of itself.
+    Mixtures have weights ≥ 0 whose sum is 1, and prefer what is near, so they change smoothly over time.
+    Source: Wang et al. 2010, "Locality-constrained linear coding", Eq. 7 (here with squared distances as penalty);
+    what it gains: docs/results/video.md.
+    Cost: O(T·N·D) for distances, O(T·MIXED³).
+    """
+    count = min(MIXED, len(recorded))
+    result = np.empty(wanted.shape, np.float32)
+    for start in range(0, len(wanted), BLOCK):
+        some = wanted[start : start + BLOCK]
+        distances = squared_distances(some, recorded)
+        near = np.argpartition(distances, count - 1, axis=1)[:, :count]
+        steps = recorded[near] - some[:, None]
+        products = (steps @ steps.swapaxes(1, 2)).astype(np.float64)
+        penalty = np.take_along_axis(distances, near, axis=1).astype(np.float64)
+        least = NO_DISTANCE * np.trace(products, axis1=1, axis2=2)[:, None] + np.finfo(float).tiny
+        products[:, np.arange(count), np.arange(count)] += penalty + least
+        weights = np.maximum(np.linalg.solve(products, np.ones((len(some), count, 1)))[:, :, 0], 0)
+        weights /= weights.sum(axis=1, keepdims=True)
+        mixtures = np.einsum("tn,tnd->td", weights.astype(np.float32), recorded[near])
+        result[start : start + BLOCK] = DRAWN * mixtures + (1 - DRAWN) * some
+    return result
 
 
 def candidates_arrays(candidates: Candidates) -> dict[str, NDArray[Any]]:

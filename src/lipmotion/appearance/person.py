@@ -12,7 +12,15 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 
 from lipmotion.appearance.camera_noise import CameraNoise, estimate_noise
-from lipmotion.appearance.candidates import CANDIDATES, DEEPEST, Candidates, choose_candidates, make_candidates
+from lipmotion.appearance.candidates import (
+    CANDIDATES,
+    DEEPEST,
+    Candidates,
+    choose_candidates,
+    drawn_to_recorded,
+    make_candidates,
+    recorded_details,
+)
 from lipmotion.appearance.eigenlips import COMPONENTS, Eigenlips, enlarged, fit_eigenlips
 from lipmotion.appearance.lower_face import (
     HEIGHT,
@@ -132,9 +140,8 @@ class Appearance:
     @cached_property
     def jaw_candidates(self) -> Candidates:
         """The recorded lower faces as components and detail."""
-        restored = enlarged(self.jaw, self.scale).expand(self.jaw_codes)
-        details = np.clip(np.rint(self.jaws - restored), -DEEPEST, DEEPEST)
-        return Candidates(self.jaw_codes, details.astype(np.int8))
+        details, _ = recorded_details(enlarged(self.jaw, self.scale), self.jaws, self.jaw_codes)
+        return Candidates(self.jaw_codes, details)
 
     def mouth_refiner(self, options: RefinementOptions) -> Refiner:
         """Return what makes pictures of the mouth from eigenlips."""
@@ -151,7 +158,8 @@ class Appearance:
         """
         values = self.from_motion.predict(motion)
         count = self.mouth_codes.shape[1]
-        return FaceCodes(values[:, :count], values[:, count:-1], values[:, -1])
+        mouth = drawn_to_recorded(values[:, :count], self.mouth_codes)
+        return FaceCodes(mouth, values[:, count:-1], values[:, -1])
 
     def of_mouths(self, mouths: Pictures) -> FaceCodes:
         """Return the lower face for pictures of the mouth [shape=(T, 56, 72, 3)], uint8, in any light."""
@@ -233,8 +241,8 @@ def _jaw_alone(pictures: Pictures, shape: FaceShape) -> Pictures:
 
 def _undamaged(space: Eigenlips, pictures: Pictures, codes: Floats, chosen: Index) -> Index:
     """Return those of the chosen pictures that are like what their components restore: damaged video is not."""
-    detail = np.abs(pictures[chosen] - space.expand(codes[chosen])).max(axis=(1, 2, 3))
-    return chosen[detail <= DEEPEST] if (detail <= DEEPEST).any() else chosen
+    whole = recorded_details(space, pictures[chosen], codes[chosen])[1] <= DEEPEST
+    return chosen[whole] if whole.any() else chosen
 
 
 def _regression(inputs: Values, targets: Values) -> Floats:

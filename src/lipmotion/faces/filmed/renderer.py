@@ -33,7 +33,7 @@ Floats = NDArray[np.float32]
 Picture = NDArray[np.uint8]
 Pictures = NDArray[np.uint8]
 
-BATCH = 32
+BATCH = 16
 """Frames in memory at a time."""
 FEATHER_PX = 6.0
 """Width of the seam, px of the face."""

@@ -5,15 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
+from lipmotion.appearance.frame_descriptors import describe_frames
+from lipmotion.appearance.looping import LoopOrder, loop_order
 from lipmotion.appearance.mouth_region import CORNER, EYE_DISTANCE_PX, HEIGHT
 from lipmotion.faces.filmed.face import StoredBackground
 from lipmotion.faces.filmed.renderer import Background
+from lipmotion.stats.pca import evenly_spaced
 from lipmotion.storage.coded_video import encode_video
 from lipmotion.storage.frame_groups import FrameGroups
 from lipmotion.vision.footage import Footage, footage_frames, footage_groups, track_footage
@@ -28,6 +32,12 @@ CHIN = "y_152"
 """The tip of the chin."""
 SMOOTHING_FRAMES = 0.7
 """Standard deviation of the smoothing of its place, frames: the tracker trembles."""
+MOST_TRIED = 12
+"""Parts of the footage that are tried as backgrounds."""
+SHOWN_S = 60.0
+"""How long they are shown then."""
+SHORT_S, SHORT_COST = 3.0, 2.0
+"""A part that is shorter costs so much more, in proportion to what is missing: it would repeat too soon."""
 MOST_TRACKED_S = 120.0
 """Seconds of a video that are used as a background."""
 
@@ -40,12 +50,16 @@ class BackgroundSequence:
     rate_hz       : frames a second
     face_to_frame : affine maps from px of the face to px of the frame [shape=(T, 2, 3)]
     chin_px       : how far the tip of the chin is below the eyes, px of the face [shape=(T,)]
+    usable        : frames in which the face is seen [shape=(T,)]
+    cuts          : frames before which the camera changes
     """
 
     groups: Callable[[], FrameGroups]
     rate_hz: float
     face_to_frame: NDArray[np.float64]
     chin_px: NDArray[np.float64]
+    usable: NDArray[np.bool_]
+    cuts: tuple[int, ...] = ()
 
     @property
     def face_box(self) -> tuple[float, float, float, float]:
@@ -64,31 +78,74 @@ class BackgroundSequence:
         return replace(self, face_to_frame=maps)
 
     def frames(self, count: int, rate_hz: float) -> Iterator[Background]:
-        """Yield ``count`` frames at a rate: forwards, backwards, and so on."""
-        seconds = count / rate_hz
-        order = pingpong(len(self.chin_px), int(np.ceil(seconds * self.rate_hz)) + 1)
+        """Yield ``count`` frames at a rate: from the first one, or, if they are too few, in ``loop_order``."""
         groups = self.groups()
-        for number in order[np.floor(np.arange(count) * (self.rate_hz / rate_hz) + 0.5).astype(int)].tolist():
-            frame = groups.frame(number)
-            height, width = (length // 2 * 2 for length in frame.shape[:2])
-            yield Background(frame[:height, :width], self.face_to_frame[number], float(self.chin_px[number]))
+        shown = np.floor(np.arange(count) * (self.rate_hz / rate_hz) + 0.5).astype(int)
+        order = self.order(groups, int(shown[-1]) + 1)
+        for first, second, weight in zip(order.first[shown], order.second[shown], order.weight[shown], strict=True):
+            one, other = (self._frame(groups, int(number)) for number in (first, second))
+            yield one if weight == 0 else _mixed(one, other, float(weight))
+
+    def order(self, groups: FrameGroups, count: int) -> LoopOrder:
+        """Return which frames are shown, at the background's own rate."""
+        total = len(self.chin_px)
+        if count <= total:
+            return LoopOrder(np.arange(count), np.arange(count), np.zeros(count), ())
+        descriptors = describe_frames((groups.frame(number) for number in range(total)), self.face_to_frame)
+        return loop_order(descriptors, count, self.rate_hz, usable=self.usable, cuts=self.cuts)
+
+    def _frame(self, groups: FrameGroups, number: int) -> Background:
+        frame = groups.frame(number)
+        height, width = (length // 2 * 2 for length in frame.shape[:2])
+        return Background(frame[:height, :width], self.face_to_frame[number], float(self.chin_px[number]))
 
 
 def best_background(footages: Sequence[Footage]) -> StoredBackground:
-    """Return the best part of some footage."""
-    footage = max(footages, key=len)
-    count = min(len(footage), round(MOST_BACKGROUND_S * footage.rate_hz))
+    """Return the part of some footage that can be shown for a minute with the least visible join.
+
+    Of ``MOST_TRIED`` parts, spread evenly, of at most ``MOST_BACKGROUND_S``, without cuts; others only if there are no
+    such parts.
+    """
+    parts = [part for footage in footages for part in _parts(footage)]
+    tried = [parts[number] for number in evenly_spaced(MOST_TRIED, len(parts))]
+    footage, start, stop = min(tried, key=_blemish)
     height, width = (length // 2 * 2 for length in footage.size)
-    frames = (frame[:height, :width] for frame in footage_frames(footage, 0, count))
-    return StoredBackground(
-        encode_video(frames, footage.rate_hz), placed_maps(footage)[:count], chin_px(footage)[:count]
-    )
+    frames = (frame[:height, :width] for frame in footage_frames(footage, start, stop))
+    video = encode_video(frames, footage.rate_hz)
+    return StoredBackground(video, placed_maps(footage)[start:stop], chin_px(footage)[start:stop])
+
+
+_Part = tuple[Footage, int, int]
+
+
+def _parts(footage: Footage) -> list[_Part]:
+    """Return parts of some footage: first frame, and the one after the last."""
+    longest = round(MOST_BACKGROUND_S * footage.rate_hz)
+    seen = np.asarray(footage.track.seen)
+    ends = [0, *footage.cuts, len(footage)]
+    parts = []
+    for first, last in pairwise(ends):
+        count = max(1, -(-(last - first) // longest))
+        for start, stop in pairwise(np.linspace(first, last, count + 1).astype(int).tolist()):
+            if stop > start and seen[start:stop].all():
+                parts.append((footage, start, stop))
+    return parts or [(footage, 0, min(len(footage), longest))]
+
+
+def _blemish(part: _Part) -> float:
+    """Return how visible the worst join is if a part is shown for a minute; short ones are worse."""
+    footage, start, stop = part
+    descriptors = describe_frames(footage_frames(footage, start, stop), footage.face_to_image[start:stop])
+    order = loop_order(descriptors, round(SHOWN_S * footage.rate_hz), footage.rate_hz)
+    worst = max((join.cost for join in order.joins), default=0.0)
+    return worst + SHORT_COST * max(0.0, 1 - (stop - start) / footage.rate_hz / SHORT_S)
 
 
 def stored_sequence(background: StoredBackground) -> BackgroundSequence:
     """Return the background in the file of a face."""
     video = background.video
-    return BackgroundSequence(video.groups, video.rate_hz, background.face_to_frame, background.chin_px)
+    usable = np.ones(len(video), bool)
+    return BackgroundSequence(video.groups, video.rate_hz, background.face_to_frame, background.chin_px, usable)
 
 
 def open_background(path: Path) -> BackgroundSequence:
@@ -97,7 +154,9 @@ def open_background(path: Path) -> BackgroundSequence:
     Raises InputError: no video, or no face in it.
     """
     footage = track_footage(path, VideoSpan(0.0, MOST_TRACKED_S))
-    return BackgroundSequence(partial(footage_groups, footage), footage.rate_hz, placed_maps(footage), chin_px(footage))
+    usable = np.asarray(footage.track.seen)
+    groups = partial(footage_groups, footage)
+    return BackgroundSequence(groups, footage.rate_hz, placed_maps(footage), chin_px(footage), usable, footage.cuts)
 
 
 def chin_px(footage: Footage) -> NDArray[np.float64]:
@@ -110,7 +169,8 @@ def placed_maps(footage: Footage) -> NDArray[np.float64]:
     return steady_maps(registered_maps(footage), footage.rate_hz, footage.cuts)
 
 
-def pingpong(count: int, frames: int) -> NDArray[np.intp]:
-    """Return the numbers of frames, forwards and backwards in turn [shape=(frames,)]."""
-    place = np.arange(frames) % max(1, 2 * (count - 1))
-    return np.where(place < count, place, 2 * (count - 1) - place)
+def _mixed(one: Background, other: Background, weight: float) -> Background:
+    """Return a frame between two, of which the second has some weight."""
+    frame = np.rint((1 - weight) * one.frame + weight * other.frame).astype(np.uint8)
+    place = (1 - weight) * one.face_to_frame + weight * other.face_to_frame
+    return Background(frame, place, (1 - weight) * one.chin_px + weight * other.chin_px)
