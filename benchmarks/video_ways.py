@@ -21,7 +21,8 @@ from lipmotion.errors import InputError
 from lipmotion.faces.filmed.face import FilmedFace
 from lipmotion.faces.filmed.renderer import STITCHING
 from lipmotion.faces.registry import face_named
-from lipmotion.pipeline.film.background import placed_maps
+from lipmotion.pipeline.film import video
+from lipmotion.pipeline.film.background import open_background, placed_maps
 from lipmotion.pipeline.film.video import FILM, FilmOptions, film_of
 from lipmotion.pipeline.training.channels import PICTURES
 from lipmotion.stats.pca import evenly_spaced
@@ -283,6 +284,7 @@ def filmed_ways(face: FilmedFace, mouths: RecordedMouths, engines: Sequence[str]
 
     engines : what else than the clip's own track drives them; all options are tried with the track and the first
     """
+    video.open_background = lru_cache(maxsize=1)(open_background)  # every clip is tracked once, not once a way
 
     def way(name: str, source: str, options: FilmOptions, eigenlips: Eigenlips | None = None) -> Way:
         def render(clip: RecordedClip, motion: Motion | None) -> Iterator[Pictures]:
