@@ -33,7 +33,7 @@ BUSY, BUSY_S = 2.5, 0.12
 """Eyes that change by more than this many times the median change blink or look elsewhere: no join so near, s."""
 BUSY_COST = 10.0
 """What a join there costs: more than any other."""
-MOST_COMPARED = 3000
+MOST_COMPARED = 1500
 """In longer backgrounds no jumps are searched, as every pair of frames would be compared."""
 TRIES = 8
 """Orders that are drawn; the one with the least cost of its worst join and of its last frame is returned."""
@@ -136,7 +136,7 @@ class _Plan:
         self.restless = _restlessness(descriptors.standardised(self.scenes), self.scenes) + BUSY_COST * self.busy
         self._least = max(1, round(LEAST_RUN_S * rate_hz))
         self._usual = USUAL_RUN_S * rate_hz
-        self._jumps = {way: self._best_jumps(descriptors, way) for way in (1, -1)}
+        self._jumps = self._best_jumps(descriptors)
 
     def order(self, count: int, longest: tuple[int, int], draws: np.random.Generator) -> LoopOrder:
         """Return one order of frames, drawn by chance."""
@@ -187,15 +187,19 @@ class _Plan:
         start, stop = self.scenes[int(self._scene_of[at])]
         return stop - 1 - at if way > 0 else at - start
 
-    def _best_jumps(self, descriptors: FrameDescriptors, way: int) -> tuple[Numbers, Array]:
-        """Return the frame to which each frame is best followed by a jump, -1 for none, and the cost [shape=(T,)]."""
-        count = len(self._scene_of)
-        target, cost = np.full(count, -1), np.full(count, np.inf)
+    def _best_jumps(self, descriptors: FrameDescriptors) -> dict[int, tuple[Numbers, Array]]:
+        """Return the frame to which each frame is best followed by a jump, -1 for none, and the cost, both ways."""
+        count = len(descriptors)
         if count > MOST_COMPARED:
-            return target, cost
+            return {way: (np.full(count, -1), np.full(count, np.inf)) for way in (1, -1)}
         distance = descriptors.distances(self.scenes)
-        power = np.full((count, count), 0.0)
+        return {way: self._best_jumps_on(distance, way) for way in (1, -1)}
+
+    def _best_jumps_on(self, distance: Array, way: int) -> tuple[Numbers, Array]:
+        """Return the same for one direction [shape=(T,)], from the distances of frames [shape=(T, T)]."""
+        count = len(distance)
         frames = np.arange(count)
+        power = np.zeros((count, count))
         for shift, weight in _DYNAMICS:
             old, new = (np.clip(frames + way * (k + shift), 0, count - 1) for k in (1, 0))
             power += weight * np.square(distance[old][:, new])

@@ -22,7 +22,7 @@ from lipmotion.storage.coded_video import encode_video
 from lipmotion.storage.frame_groups import FrameGroups
 from lipmotion.vision.footage import Footage, footage_frames, footage_groups, track_footage
 from lipmotion.vision.frames import VideoSpan
-from lipmotion.vision.steadying import registered_maps, steady_maps
+from lipmotion.vision.steadying import REGISTERED_NOISE_PX, registered_maps, steady_maps
 
 MOST_BACKGROUND_S = 10.0
 """Longest background that is kept in the file of a face."""
@@ -166,7 +166,7 @@ def chin_px(footage: Footage) -> NDArray[np.float64]:
 
 def placed_maps(footage: Footage) -> NDArray[np.float64]:
     """Return where the face is in every frame of some footage, without the noise of tracking [shape=(T, 2, 3)]."""
-    return steady_maps(registered_maps(footage), footage.rate_hz, footage.cuts)
+    return steady_maps(registered_maps(footage), footage.rate_hz, footage.cuts, noise_px=REGISTERED_NOISE_PX)
 
 
 def _mixed(one: Background, other: Background, weight: float) -> Background:

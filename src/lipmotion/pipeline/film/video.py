@@ -47,6 +47,10 @@ class FilmOptions:
     mark       : how the video says that it is synthetic: in its metadata, there and in a corner of the picture
                  (``visible``), or not at all (docs/consent.md)
     stitching  : how pictures are made
+
+    >>> import lipmotion
+    >>> lipmotion.FilmOptions(jaw="none").mark
+    'metadata'
     """
 
     background: Path | None = None
