@@ -1,7 +1,8 @@
 """Synthetic video beside the recorded video: does it look like it, and does its mouth move as it was told.
 
     python benchmarks/video_face.py CORPUS --clips FOLDER [--split val] [--engine FILE.lipmotion ...] [--only NAME ...]
-        [-o FILE.json] [--table FILE.md] [--sheets FOLDER] [--mp4] [--count N] [--processes 2]
+        [--face FILE.face] [--work FOLDER] [-o FILE.json] [--table FILE.md] [--sheets FOLDER] [--mp4] [--count N]
+        [--processes 2]
 
 CORPUS is a prepared corpus of one speaker with mouth pictures, FOLDER has its videos. Each *way* makes the frames of a
 clip again, with another mouth: simple ways (``video_ways.py``) learned on ``train``, and the original itself as the
@@ -27,6 +28,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 import tempfile
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -37,6 +39,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from video_results import Judged, load_judged, save_judged
 from video_sheets import Sheets, face_crop, write_sheets
 from video_ways import (
     CROSSED,
@@ -94,6 +97,7 @@ class Setting:
     face: Path | None
     only: tuple[str, ...]
     mp4: bool
+    work: Path
 
 
 @dataclass(frozen=True)
@@ -110,39 +114,31 @@ class Job:
     sheet: int
 
 
-@dataclass(eq=False)
-class Judged:
-    """What was measured of one clip, made one way.
-
-    figures : of its pictures
-    curves  : opening, width and outer lips [each shape=(T, 3)]: ``made`` (tracked again), ``true``, ``driver``
-    landmarks : mean distance of the lip points in every frame [shape=(T,)], eye distances
-    seen    : frames in which both videos show a face [shape=(T,)]
-    """
-
-    figures: dict[str, float]
-    curves: dict[str, Array]
-    landmarks: Array
-    seen: NDArray[np.bool_]
-    eyes_px: float
-    sheets: Sheets
-
-
 def main() -> None:
     """Measure every clip of a split, and print the table."""
     options = parsed()
     corpus = Corpus.open(options.corpus)
     names = corpus.names(options.split)[: options.count]
-    setting = Setting(
-        options.corpus, options.clips, tuple(options.engine), options.face, tuple(options.only), options.mp4
-    )
+    with tempfile.TemporaryDirectory() as temporary:
+        work = options.work or Path(temporary)
+        work.mkdir(parents=True, exist_ok=True)
+        engines = tuple(options.engine)
+        only = tuple(options.only)
+        setting = Setting(options.corpus, options.clips, engines, options.face, only, options.mp4, work)
+        report(options, corpus, names, setting)
+
+
+def report(options: argparse.Namespace, corpus: Corpus, names: Sequence[str], setting: Setting) -> None:
+    """Measure the clips; print the table, and write what is wanted."""
     with_sheets = set(np.linspace(0, len(names) - 1, 3).astype(int)) if options.sheets else set()
     jobs = [
         Job(setting, name, names[number - 1], options.frames if number in with_sheets else 0)
         for number, name in enumerate(names)
     ]
     with worker_pool(options.processes) as workers:
-        judged = dict(zip(names, workers.ordered_map(judge, jobs), strict=True))
+        judged = {
+            name: load_judged(path) for name, path in zip(names, workers.ordered_map(stored_judge, jobs), strict=True)
+        }
     ways = list(judged[names[0]])
     spoken = phones(corpus, names, load_model(options.engine[0] if options.engine else None))
     openings = [np.asarray(corpus.utterance(name).track.motion["opening"], float) for name in corpus.names("train")]
@@ -170,6 +166,7 @@ def parsed() -> argparse.Namespace:
     parser.add_argument("--engine", type=Path, action="append", default=[], help="a model file; repeatable")
     parser.add_argument("--face", type=Path, help="a file of ``lipmotion face build``, of the same speaker")
     parser.add_argument("--only", action="append", default=[], help="ways whose name begins so; repeatable")
+    parser.add_argument("--work", type=Path, help="where what was measured is kept: a run can be stopped and continued")
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--mp4", action="store_true")
     parser.add_argument("-o", "--output", type=Path)
@@ -195,6 +192,15 @@ def all_ways(setting: Setting) -> tuple[Way, ...]:
 def engine(path: Path) -> Model:
     """Return a model of motion."""
     return load_model(path)
+
+
+def stored_judge(job: Job) -> Path:
+    """Return the file with what was measured of one clip; it is measured if there is none."""
+    path = job.setting.work / f"{job.name}.npz"
+    if not path.exists():
+        save_judged(path, judge(job))
+        print(job.name, file=sys.stderr, flush=True)
+    return path
 
 
 def judge(job: Job) -> dict[str, Judged]:
