@@ -8,9 +8,10 @@ face is built from the first --clips of them, and their sound, one after the oth
 JSON objects:
 
 build   : wall and processor seconds, peak memory of the process, bytes of the face
-animate : whole processes, for every length: wall seconds, peak memory. ``frames_per_s`` is of the additional frames of
-          the longest over the shortest: without start-up; ``rendering_per_s`` leaves out the time that the same speech
-          takes to a .json, so it is that of the pictures alone. Medians of the rounds, ways taken in turn
+animate : whole processes, for every length: wall and processor seconds, peak memory; medians of the rounds, ways taken
+          in turn. Then frames a second, and a processor second, of the additional frames of the longest over the
+          shortest: without start-up. ``pictures`` leaves out the time that the same speech takes to a .json. On a
+          machine with other work the processor seconds are what counts
 stitch  : milliseconds a frame, one thread, the least of the rounds (kernels are compiled during the first ones): cut a
           patch, clone it, place it; cloning alone; and ``cv2.seamlessClone`` of the same patch
 """
@@ -132,9 +133,12 @@ def animate(
         show(f"animate {size}, {length} s", **values, motion_alone_s=round(middle[length, "json"][0], 2))
     if len(lengths) > 1:
         frames = (lengths[-1] - lengths[0]) * RATE_HZ
-        whole_s, motion_s = (middle[lengths[-1], kind][0] - middle[lengths[0], kind][0] for kind in ("mp4", "json"))
-        rates = {"frames_per_s": round(frames / whole_s, 1), "rendering_per_s": round(frames / (whole_s - motion_s), 1)}
-        show(f"animate {size}, frames after the first {lengths[0]} s", **rates)
+        for clock, column in (("second", 0), ("CPU second", 1)):
+            whole_s, motion_s = (
+                middle[lengths[-1], kind][column] - middle[lengths[0], kind][column] for kind in ("mp4", "json")
+            )
+            rates = {"all": round(frames / whole_s, 1), "pictures": round(frames / (whole_s - motion_s), 1)}
+            show(f"animate {size}, frames a {clock} after the first {lengths[0]} s", **rates)
 
 
 def stitch(size: str, path: Path) -> None:
