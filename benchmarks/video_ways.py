@@ -24,6 +24,7 @@ from lipmotion.faces.registry import face_named
 from lipmotion.pipeline.film import video
 from lipmotion.pipeline.film.background import open_background, placed_maps
 from lipmotion.pipeline.film.video import FILM, FilmOptions, film_of
+from lipmotion.pipeline.model import load_model
 from lipmotion.pipeline.training.channels import PICTURES
 from lipmotion.stats.pca import evenly_spaced
 from lipmotion.types import Motion, Timeline, Utterance
@@ -295,7 +296,8 @@ def filmed_ways(face: FilmedFace, mouths: RecordedMouths, engines: Sequence[str]
             assert shown is not None
             with_clip = replace(options, background=clip.path)
             sound = clip.utterance.audio
-            return film_of(face, shown, sound=sound, eigenlips=eigenlips, options=with_clip).frames
+            model = None if eigenlips is None else replace(load_model(), eigenlips=eigenlips)
+            return film_of(face, shown, sound=sound, model=model, options=with_clip).frames
 
         mask = lower_face.mouth_ellipse(1) if options.jaw == "none" else _replaced(face)
         return Way(f"filmed, {name}", source, render, np.pad(mask, AROUND_PX))
@@ -307,7 +309,7 @@ def filmed_ways(face: FilmedFace, mouths: RecordedMouths, engines: Sequence[str]
         "jaw by energy": FilmOptions(jaw="energy"),
         "no refinement": FilmOptions(stitching=replace(STITCHING, mouth=None)),
         "refinement of the paper": FilmOptions(stitching=replace(STITCHING, mouth=PAPER)),
-        "noise": FilmOptions(stitching=replace(STITCHING, noise=True)),
+        "no noise": FilmOptions(stitching=replace(STITCHING, noise=False)),
     }
     ways += [
         way(f"{source}, {name}", source, option)
