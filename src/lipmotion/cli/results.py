@@ -36,8 +36,10 @@ def check_results(options: argparse.Namespace, speech: Path | None = None) -> No
     speech : the recording (None: there will be a sound that is in no file)
     """
     from lipmotion.pipeline.animate import check_outputs, opened_face
+    from lipmotion.pipeline.film.video import check_film
 
     options.face = opened_face(options.face)
+    check_film(options.face, film_options(options), has_recording=speech is not None)
     checked = {"rate_hz": options.rate, "fps": options.fps, "face": options.face}
     check_outputs(options.output, speech, **checked, with_sound=speech is None)
 

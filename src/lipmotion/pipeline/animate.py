@@ -14,7 +14,7 @@ from lipmotion.faces.base import Face
 from lipmotion.faces.filmed.face import SUFFIX, FilmedFace, load_face
 from lipmotion.faces.registry import face_named
 from lipmotion.kernels.threads import one_thread
-from lipmotion.pipeline.film.video import FILM, FilmOptions, write_film
+from lipmotion.pipeline.film.video import FILM, FilmOptions, check_film, write_film
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.outlook import outlook_of
 from lipmotion.pipeline.request import SpeechInput, request_of
@@ -98,7 +98,8 @@ def write(
                or a ``.face`` file)
     film     : how a filmed face is shown
     Raises ExportError: unknown suffix, no such folder, or a file that cannot be written.
-    Raises InputError: a frame rate out of its range, or an unknown channel or face.
+    Raises InputError: a frame rate out of its range, an unknown channel or face, or an option of a filmed face without
+    one.
     The arguments are checked before the first file is written.
 
     >>> import lipmotion, tempfile
@@ -113,6 +114,7 @@ def write(
     sound = speech if isinstance(speech, Audio) else None
     recording = None if isinstance(speech, Audio) else speech
     shown_face = opened_face(face)
+    check_film(shown_face, film, has_recording=recording is not None)
     check_outputs(paths, recording, rate_hz=rate_hz, fps=fps, face=shown_face, with_sound=sound is not None)
     videos = [path for path in paths if path.suffix.lower() == VIDEO_SUFFIX]
     if videos and not isinstance(shown_face, FilmedFace) and "opening" not in generation.motion.names:

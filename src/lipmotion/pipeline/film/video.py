@@ -103,8 +103,7 @@ def film_of(
     Raises InputError: motion without the channels that the face needs, no sound for ``energy``, a background in which
     there is no face, a rate that is not positive, or an overlay of a sound without video.
     """
-    if options.overlay is not None and (speech is None or options.background is not None):
-        raise InputError("an overlay shows the video of the speech: give a video as speech, and no background")
+    check_film(face, options, has_recording=speech is not None)
     if options.overlay == "inset" and speech is not None:
         frames, rate_hz = untracked_frames(speech)
         codes = _codes(face, motion, sound, rate_hz, eigenlips, options)
@@ -118,6 +117,19 @@ def film_of(
     has_jaw = options.jaw != "none" and options.overlay is None
     stitcher = Stitcher(face.appearance, options.stitching if has_jaw else replace(options.stitching, jaw=False))
     return Film(stitcher.stitch(codes, background.frames(len(codes), rate_hz)), rate_hz, background.face_box)
+
+
+def check_film(face: Face | FilmedFace, options: FilmOptions, *, has_recording: bool) -> None:
+    """Raise InputError if a face cannot be shown so; called before long work begins.
+
+    has_recording : whether the speech is a file, which may be a video, and not only a sound
+    """
+    if not isinstance(face, FilmedFace) and (options.overlay or options.background or options.mark == "visible"):
+        raise InputError(
+            "an overlay, a background and a visible mark are those of a filmed face; give one: --face FILE.face"
+        )
+    if options.overlay is not None and (not has_recording or options.background is not None):
+        raise InputError("an overlay shows the video of the speech: give a video as speech, and no background")
 
 
 def _codes(
