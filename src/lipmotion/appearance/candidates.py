@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from lipmotion.appearance.eigenlips import COLOURS, Eigenlips
 from lipmotion.errors import InputError
-from lipmotion.storage.schema import Arrays, ArraySpec, checked_arrays, format_errors, refuse_undeclared
 
 Values = NDArray[np.float32]
 Pictures = NDArray[np.uint8]
@@ -170,23 +169,6 @@ def drawn_to_recorded(wanted: Values, recorded: Values) -> Values:
     return result
 
 
-def candidates_arrays(candidates: Candidates) -> dict[str, NDArray[Any]]:
-    """Return candidates serialised as arrays (``CANDIDATE_ARRAYS``)."""
-    return {"candidate_coefficients": candidates.coefficients, "candidate_details": candidates.details}
-
-
-def candidates_from_arrays(arrays: Arrays, eigenlips: Eigenlips) -> Candidates:
-    """Deserialise candidates, for pictures restored with the same eigenlips.
-
-    Raises ModelFormatError: an array is missing, unknown, out of range, or not of these eigenlips' size.
-    """
-    with format_errors("the candidate mouths", "build them again from the corpus", verb="are"):
-        refuse_undeclared(arrays, CANDIDATE_ARRAYS)
-        height, width = eigenlips.size
-        stored = checked_arrays(arrays, CANDIDATE_ARRAYS, C=len(eigenlips.channels), H=height, W=width)
-        return Candidates(stored["candidate_coefficients"], stored["candidate_details"])
-
-
 def squared_distances(some: Values, others: Values) -> Values:
     """Return the squared distances between rows of two tables [shape=(M, D) and (N, D)]: float32 [shape=(M, N)]."""
     products = some @ others.T
@@ -197,11 +179,6 @@ def squared_distances(some: Values, others: Values) -> Values:
 
 LARGEST_COEFFICIENT = 1e6
 """No coefficient of a picture is larger: 255 · √D of D pixels, and pictures have at most 10⁷."""
-CANDIDATE_ARRAYS = {
-    "candidate_coefficients": ArraySpec(np.float32, "N C", -LARGEST_COEFFICIENT, LARGEST_COEFFICIENT),
-    "candidate_details": ArraySpec(np.int8, f"N H W {len(COLOURS)}", -DEEPEST, DEEPEST),
-}
-"""The arrays of candidates."""
 
 
 def _furthest(values: Values, count: int) -> Index:

@@ -10,6 +10,7 @@ from lipmotion.cli.faces import add_face_arguments, film_options
 from lipmotion.cli.paths import add_output
 
 if TYPE_CHECKING:
+    from lipmotion.cli.progress import Report
     from lipmotion.pipeline.model import Model
     from lipmotion.types import Audio, Generation
 
@@ -36,18 +37,19 @@ def check_results(options: argparse.Namespace, speech: Path | None = None) -> No
     speech : the recording (None: there will be a sound that is in no file)
     """
     from lipmotion.pipeline.animate import check_outputs, opened_face
-    from lipmotion.pipeline.film.video import check_film
 
     options.face = opened_face(options.face)
-    check_film(options.face, film_options(options), has_recording=speech is not None)
-    checked = {"rate_hz": options.rate, "fps": options.fps, "face": options.face}
+    checked = {"rate_hz": options.rate, "fps": options.fps, "face": options.face, "film": film_options(options)}
     check_outputs(options.output, speech, **checked, with_sound=speech is None)
 
 
-def write_results(options: argparse.Namespace, result: Generation, speech: Path | Audio, model: Model) -> None:
+def write_results(
+    options: argparse.Namespace, result: Generation, speech: Path | Audio, model: Model, report: Report
+) -> None:
     """Write generated motion to the outputs.
 
     speech : the recording, or the sound
+    report : receives the progress of videos
     """
     from lipmotion.pipeline.animate import write
 
@@ -61,4 +63,5 @@ def write_results(options: argparse.Namespace, result: Generation, speech: Path 
         fps=options.fps,
         face=options.face,
         film=film_options(options),
+        monitor=report.receive,
     )

@@ -10,6 +10,7 @@ from lipmotion.cli.options import add_machine_readable
 from lipmotion.cli.paths import add_input
 from lipmotion.cli.results import add_result_arguments, check_results, write_results
 from lipmotion.cli.speech import add_lexicon_argument, add_model_argument, add_onto_arguments, add_speaker_argument
+from lipmotion.printable import printable
 
 if TYPE_CHECKING:
     from lipmotion.cli.progress import Report
@@ -66,5 +67,5 @@ def _speak(options: argparse.Namespace, report: Report) -> None:
     how = {"voice": options.voice, "corpus": corpus, "model": model, "lexicon": lexicon, "speaker": options.speaker}
     onto = options.onto or person_shown(model, options.face, options.speaker)
     sound, result = speak(text, **how, onto=onto, onto_speaker=options.onto_speaker)
-    write_results(options, result, sound, model)
-    report.finish("\n".join(options.output), files=options.output, seconds=round(sound.duration_s, 3))
+    write_results(options, result, sound, model, report)
+    report.finish("\n".join(map(printable, options.output)), files=options.output, seconds=round(sound.duration_s, 3))

@@ -14,7 +14,7 @@ from lipmotion.faces.base import Face
 from lipmotion.faces.filmed.face import SUFFIX, FilmedFace, load_face
 from lipmotion.faces.registry import face_named
 from lipmotion.kernels.threads import one_thread
-from lipmotion.pipeline.film.video import FILM, FilmOptions, check_film, write_film
+from lipmotion.pipeline.film.video import FILM, RENDERING, FilmOptions, check_film, film_of, write_film
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.outlook import outlook_of
 from lipmotion.pipeline.request import SpeechInput, request_of
@@ -24,7 +24,8 @@ from lipmotion.pipeline.understand import understood_speech
 from lipmotion.pipeline.workers import map_in_processes
 from lipmotion.speech.audio_files import read_audio
 from lipmotion.storage.files import as_text, check_distinct, check_target
-from lipmotion.types import Audio, Constraints, Generation, TimedTranscript
+from lipmotion.types import Audio, Constraints, Generation, Monitor, TimedTranscript, silent_monitor
+from lipmotion.types.progress import with_reports
 
 VIDEO_SUFFIX = ".mp4"
 SOUND_RATE_HZ = 48_000
@@ -83,6 +84,7 @@ def write(
     fps: float | None = None,
     face: str | Path | Face | FilmedFace = "portrait",
     film: FilmOptions = FILM,
+    monitor: Monitor = silent_monitor,
 ) -> None:
     """Write generated motion to one or several files, each in the format of its suffix.
 
@@ -97,9 +99,9 @@ def write(
     face     : the face of videos: ``portrait``, the name of a face of an installed package, or a filmed face (a value
                or a ``.face`` file)
     film     : how a filmed face is shown
+    monitor  : receives reports of the progress of videos
     Raises ExportError: unknown suffix, no such folder, or a file that cannot be written.
-    Raises InputError: a frame rate out of its range, an unknown channel or face, or an option of a filmed face without
-    one.
+    Raises InputError: a frame rate out of its range, or an unknown channel or face.
     The arguments are checked before the first file is written.
 
     >>> import lipmotion, tempfile
@@ -114,8 +116,7 @@ def write(
     sound = speech if isinstance(speech, Audio) else None
     recording = None if isinstance(speech, Audio) else speech
     shown_face = opened_face(face)
-    check_film(shown_face, film, has_recording=recording is not None)
-    check_outputs(paths, recording, rate_hz=rate_hz, fps=fps, face=shown_face, with_sound=sound is not None)
+    check_outputs(paths, recording, rate_hz=rate_hz, fps=fps, face=shown_face, film=film, with_sound=sound is not None)
     videos = [path for path in paths if path.suffix.lower() == VIDEO_SUFFIX]
     if videos and not isinstance(shown_face, FilmedFace) and "opening" not in generation.motion.names:
         raise ExportError(f"{videos[0]}: the motion has no channel 'opening' to draw a face from; write motion files")
@@ -133,11 +134,12 @@ def write(
             heard = sound or read_audio(Path(str(recording)), SOUND_RATE_HZ, warn=False)
             if isinstance(shown_face, FilmedFace):
                 filmed = None if recording is None else Path(recording)
-                write_film(
-                    path, shown_face, generation.motion, heard, speech=filmed, model=model, fps=fps, options=film
+                film_frames = film_of(
+                    shown_face, generation.motion, speech=filmed, sound=heard, model=model, fps=fps, options=film
                 )
+                write_film(path, film_frames, heard, mark=film.mark, monitor=monitor)
             else:
-                _write_video(generation, path, heard, DRAWN_HZ if fps is None else fps, shown_face)
+                _write_video(generation, path, heard, DRAWN_HZ if fps is None else fps, shown_face, monitor)
         elif path.suffix.lower() == TEXTGRID_SUFFIX.lower():
             write_textgrid(path, generation.units)
         else:
@@ -151,17 +153,18 @@ def check_outputs(
     rate_hz: float | None = None,
     fps: float | None = None,
     face: str | Path | Face | FilmedFace = "portrait",
+    film: FilmOptions = FILM,
     with_sound: bool = False,
 ) -> None:
     """Raise ExportError or InputError if an output cannot be written; called before long work begins.
 
-    outputs, speech, rate_hz, fps, face : as of ``write``
+    outputs, speech, rate_hz, fps, face, film : as of ``write``
     with_sound : the speech is, or will be, a sound that is in no file
     """
     for hertz in (fps, rate_hz):
         if hertz is not None and not SLOWEST_HZ <= hertz <= FASTEST_HZ:
             raise InputError(f"the frame rate is {hertz}, required {SLOWEST_HZ:.0f} to {FASTEST_HZ:.0f} a second")
-    opened_face(face)
+    check_film(opened_face(face), film, speech)
     suffixes = (*motion_suffixes(), VIDEO_SUFFIX, TEXTGRID_SUFFIX, *(SOUND_CODECS if with_sound else ()))
     check_distinct([Path(path) for path in outputs])
     for path in map(Path, outputs):
@@ -195,8 +198,9 @@ def _text(value: object) -> str:
     return as_text("; ".join(map(str, value)) if isinstance(value, list) else str(value))
 
 
-def _write_video(generation: Generation, path: Path, sound: Audio, fps: float, face: Face) -> None:
+def _write_video(generation: Generation, path: Path, sound: Audio, fps: float, face: Face, monitor: Monitor) -> None:
     from lipmotion.export.video import write_mp4
 
     frames = face.render(generation.motion, generation.units, fps=fps)
-    write_mp4(path, frames, fps=fps, audio=sound)
+    count = int(generation.motion.time_s[-1] * fps + 1e-9) + 1
+    write_mp4(path, with_reports(frames, count, RENDERING, monitor), fps=fps, audio=sound)

@@ -72,7 +72,7 @@ class StitchingOptions:
     jaw: bool = True
     mouth: RefinementOptions | None = STEADY
     jaw_detail: RefinementOptions = JAW_OPTIONS
-    noise: bool = False
+    noise: bool = True
     seed: int = 0
 
 

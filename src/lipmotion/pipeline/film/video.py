@@ -25,7 +25,10 @@ from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.film.background import BackgroundSequence, open_background, stored_sequence
 from lipmotion.pipeline.model import Model
 from lipmotion.speech.pauses import levels_db_at
-from lipmotion.types import GREY, Audio, Motion
+from lipmotion.storage.files import check_source
+from lipmotion.storage.media import has_video
+from lipmotion.types import GREY, Audio, Monitor, Motion, silent_monitor
+from lipmotion.types.progress import with_reports
 from lipmotion.vision.footage import untracked_frames
 
 Floats = NDArray[np.float32]
@@ -33,6 +36,8 @@ Frames = Iterator[NDArray[np.uint8]]
 Jaw = Literal["motion", "energy", "none"]
 Overlay = Literal["inset", "mouth"]
 Mark = Literal["metadata", "visible", "none"]
+RENDERING = "rendering the video"
+"""Name of the stage in reports of progress."""
 LOG = logging.getLogger("lipmotion")
 ZOOM = 1.3
 """How much larger than the speaker's own the mouth over it is."""
@@ -71,11 +76,13 @@ class Film:
     """A video that is made while it is read.
 
     frames  : each uint8 RGB [shape=(H, W, 3)], of even sizes
+    count   : number of the frames
     rate_hz : frames a second
     covered : the part of the frames in which the face, or the inset, is at any time: left, top, right, bottom, px
     """
 
     frames: Frames
+    count: int
     rate_hz: float
     covered: tuple[float, float, float, float]
 
@@ -87,7 +94,7 @@ def film_of(
     *,
     speech: Path | None = None,
     sound: Audio | None = None,
-    eigenlips: Eigenlips | None = None,
+    model: Model | None = None,
     fps: float | None = None,
     options: FilmOptions = FILM,
 ) -> Film:
@@ -97,39 +104,28 @@ def film_of(
     motion    : of tracked points of the same person, or eigenlips
     speech    : the video of the speech, for an overlay
     sound     : for a jaw that follows the energy
-    eigenlips : of the model that generated ``motion``, if it has any
+    model     : that generated the motion; needed where the motion is eigenlips
     fps       : frames a second; None, and with an overlay: those of the footage
     Frame n shows the time n / fps; the last one is at or before the end of the motion. Frames are made a few at a time.
     Raises InputError: motion without the channels that the face needs, no sound for ``energy``, a background in which
     there is no face, a rate that is not positive, or an overlay of a sound without video.
     """
-    check_film(face, options, has_recording=speech is not None)
+    check_film(face, options, speech)
+    eigenlips = model.eigenlips if model is not None else None
     if options.overlay == "inset" and speech is not None:
         frames, rate_hz = untracked_frames(speech)
         codes = _codes(face, motion, sound, rate_hz, eigenlips, options)
         mouths = Stitcher(face.appearance, options.stitching).mouths(codes)
         first, frames = _first_of(_even(frames), speech)
         covered = inset_box((first.shape[0], first.shape[1]), face.appearance.mouths.shape[1:3])
-        return Film(with_inset(frames, mouths), rate_hz, covered)
+        return Film(with_inset(frames, mouths), len(codes), rate_hz, covered)
     background = _background(face, options, speech)
     rate_hz = background.rate_hz if fps is None or options.overlay is not None else fps
     codes = _codes(face, motion, sound, rate_hz, eigenlips, options)
     has_jaw = options.jaw != "none" and options.overlay is None
     stitcher = Stitcher(face.appearance, options.stitching if has_jaw else replace(options.stitching, jaw=False))
-    return Film(stitcher.stitch(codes, background.frames(len(codes), rate_hz)), rate_hz, background.face_box)
-
-
-def check_film(face: Face | FilmedFace, options: FilmOptions, *, has_recording: bool) -> None:
-    """Raise InputError if a face cannot be shown so; called before long work begins.
-
-    has_recording : whether the speech is a file, which may be a video, and not only a sound
-    """
-    if not isinstance(face, FilmedFace) and (options.overlay or options.background or options.mark == "visible"):
-        raise InputError(
-            "an overlay, a background and a visible mark are those of a filmed face; give one: --face FILE.face"
-        )
-    if options.overlay is not None and (not has_recording or options.background is not None):
-        raise InputError("an overlay shows the video of the speech: give a video as speech, and no background")
+    frames = stitcher.stitch(codes, background.frames(len(codes), rate_hz))
+    return Film(frames, len(codes), rate_hz, background.face_box)
 
 
 def _codes(
@@ -241,25 +237,35 @@ def _even(frames: Frames) -> Frames:
 
 @one_thread()
 def write_film(
-    path: Path,
-    face: FilmedFace,
-    motion: Motion,
-    sound: Audio,
-    *,
-    speech: Path | None = None,
-    model: Model | None = None,
-    fps: float | None = None,
-    options: FilmOptions = FILM,
+    path: Path, film: Film, sound: Audio, *, mark: Mark = "metadata", monitor: Monitor = silent_monitor
 ) -> None:
     """Write a video of a filmed face, with sound; whole or not at all.
 
-    model : that generated the motion; needed where the motion is eigenlips
-    The other arguments are those of ``film_of``. Raises InputError: as ``film_of``. Raises ExportError: the file cannot
-    be written.
+    film, mark : of ``film_of``, which is read to its end; how the video says that it is synthetic
+    monitor    : receives reports of the progress
+    Raises InputError: the background cannot be read to its end. Raises ExportError: the file cannot be written, or the
+    face leaves no corner for a visible mark.
     """
-    eigenlips = model.eigenlips if model is not None else None
-    film = film_of(face, motion, speech=speech, sound=sound, eigenlips=eigenlips, fps=fps, options=options)
-    frames = mark_frames(film.frames, film.covered) if options.mark == "visible" else film.frames
-    metadata = mark_metadata() if options.mark != "none" else None
+    frames = with_reports(film.frames, film.count, RENDERING, monitor)
+    if mark == "visible":
+        frames = mark_frames(frames, film.covered)
+    metadata = mark_metadata() if mark != "none" else None
     tags, xmp = (metadata.tags, metadata.xmp) if metadata is not None else (None, None)
     write_mp4(path, frames, fps=film.rate_hz, audio=sound, tags=tags, xmp=xmp)
+
+
+def check_film(face: Face | FilmedFace, options: FilmOptions, speech: str | Path | None = None) -> None:
+    """Raise InputError if options do not go with a face, or with the speech; called before long work begins.
+
+    speech : the recording; None: it is a sound that is in no file
+    """
+    filmed = {"a background": options.background, "an overlay": options.overlay}
+    given = next((name for name, value in filmed.items() if value is not None), None)
+    if given is not None and not isinstance(face, FilmedFace):
+        raise InputError(f"{given} is for filmed faces; give one: --face FILE.face (docs/filmed-face.md)")
+    if options.background is not None:
+        check_source(Path(options.background), "video")
+    if options.overlay is not None and (speech is None or options.background is not None):
+        raise InputError("an overlay shows the video of the speech: give a video as speech, and no background")
+    if options.overlay is not None and not has_video(Path(str(speech))):
+        raise InputError(f"{speech}: has no pictures, and an overlay shows them; give a video as speech")
