@@ -243,7 +243,7 @@ def test_a_face_of_another_person(
     """The motion is mapped onto that person by the speech in the file."""
     from dataclasses import replace
 
-    about = filmed_face.about | {"corpus": ["someone/else"]}
+    about = dict(filmed_face.about) | {"corpus": ["someone/else"]}
     save_face(replace(filmed_face, about=about), here / "else.face")
     assert run(*basics[:-1], "else.face", "-o", "a.mp4") == (0, ["a.mp4"], [])
     save_face(replace(filmed_face, about=about, takes=()), here / "mute.face")
