@@ -157,7 +157,7 @@ def test_recordings_that_cannot_be_used_are_left_out(videos: Videos, monkeypatch
             raise InputError(f"{path}: no face in 60 of 60 frames")
         return whole(path, *more)  # type: ignore[arg-type]
 
-    whole = build.track_footage
+    whole = vars(build)["track_footage"]
     monkeypatch.setattr(build, "track_footage", film)
     monkeypatch.setattr(build, "LEAST_FOOTAGE_S", 5.0)
     events: list[Event] = []
