@@ -64,8 +64,11 @@ class Candidates:
     @cached_property
     def detail_distances(self) -> Values:
         """Squared distances between the details of any two candidates, in each colour [shape=(3, N, N)], grey²."""
-        flat = np.moveaxis(self.details, -1, 0).reshape(len(COLOURS), len(self), -1).astype(np.float32)
-        return np.stack([squared_distances(colour, colour) for colour in flat])
+        distances = []
+        for number in range(len(COLOURS)):  # of a large face one colour of 500 details has 130 MB
+            colour = self.details[..., number].reshape(len(self), -1).astype(np.float32)
+            distances.append(squared_distances(colour, colour))
+        return np.stack(distances)
 
 
 def choose_candidates(coefficients: NDArray[np.floating[Any]], count: int = CANDIDATES) -> Index:

@@ -128,7 +128,7 @@ class _Plan:
     def __init__(
         self, descriptors: FrameDescriptors, rate_hz: float, allowed: NDArray[np.bool_], cuts: Sequence[int]
     ) -> None:
-        self.scenes = _scenes(allowed, cuts)
+        self.scenes = scenes_of(allowed, cuts)
         self._scene_of = np.full(len(allowed), -1)
         for index, (start, stop) in enumerate(self.scenes):
             self._scene_of[start:stop] = index
@@ -218,8 +218,13 @@ class _Plan:
         return np.where(np.isfinite(least), best, -1), least
 
 
-def _scenes(allowed: NDArray[np.bool_], cuts: Sequence[int]) -> list[tuple[int, int]]:
-    """Return the parts of a background between frames that may not be shown and cuts."""
+def scenes_of(allowed: NDArray[np.bool_], cuts: Sequence[int]) -> list[tuple[int, int]]:
+    """Return the parts of a background between cuts and frames that may not be shown.
+
+    allowed : the frames that may be shown [shape=(T,)]
+    cuts    : frames before which the camera changes
+    Each part is its first frame and the one after its last.
+    """
     change = np.flatnonzero(np.diff(allowed.astype(int))) + 1
     ends = sorted({0, len(allowed), *change.tolist(), *(cut for cut in cuts if 0 < cut < len(allowed))})
     return [(start, stop) for start, stop in pairwise(ends) if allowed[start]]

@@ -22,7 +22,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb to the parser of the command line."""
     parser = verbs.add_parser("animate", help="turn speech into lip motion or an animated face")
     add_speech_arguments(parser)
-    add_result_arguments(parser, "FILE.mp4 .json .csv .npz .TextGrid, or several")
+    add_result_arguments(parser, "FILE.mp4 .webm .mov %%05d.png .json .csv .npz .TextGrid, or several")
     posteriors = "draw the posterior probabilities of the chains' units over time (coupled models)"
     add_output(parser, "--posteriors", metavar="FILE.png", help=posteriors)
     add_execution(parser)

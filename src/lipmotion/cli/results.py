@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from lipmotion.cli.faces import add_face_arguments, film_options
 from lipmotion.cli.paths import add_output
+from lipmotion.cli.staging import add_staging_arguments, staging_of
 
 if TYPE_CHECKING:
     from lipmotion.cli.progress import Report
@@ -27,9 +28,11 @@ def add_result_arguments(parser: argparse.ArgumentParser, files: str, *, require
     parser.add_argument("--rate", type=float, metavar="HZ", help="frames per second of motion files (default: 100)")
     parser.add_argument("--channels", metavar="NAME,NAME", help="write only these to motion files: opening,width,...")
     rate = "frames per second of videos (default: 25; of filmed faces, those of the footage)"
-    rate = "frames per second of videos (default: 25; of filmed faces, those of the footage)"
     parser.add_argument("--fps", type=float, help=rate)
+    articulation = "add tongue, lip_tuck, protrusion, spread, lip_press, teeth to motion files"
+    parser.add_argument("--articulation", action="store_true", help=articulation)
     add_face_arguments(parser)
+    add_staging_arguments(parser)
 
 
 def check_results(options: argparse.Namespace, speech: Path | None = None) -> None:
@@ -41,7 +44,7 @@ def check_results(options: argparse.Namespace, speech: Path | None = None) -> No
 
     options.face = opened_face(options.face)
     checked = {"rate_hz": options.rate, "fps": options.fps, "face": options.face, "film": film_options(options)}
-    check_outputs(options.output, speech, **checked, with_sound=speech is None)
+    check_outputs(options.output, speech, **checked, staging=staging_of(options), with_sound=speech is None)
 
 
 def write_results(
@@ -52,10 +55,10 @@ def write_results(
     speech : the recording, or the sound
     report : receives the progress of videos
     """
-    from lipmotion.pipeline.animate import write
+    from lipmotion.pipeline.animate import with_articulation, write
 
     write(
-        result,
+        with_articulation(result) if options.articulation else result,
         options.output,
         speech=speech,
         model=model,
@@ -64,5 +67,6 @@ def write_results(
         fps=options.fps,
         face=options.face,
         film=film_options(options),
+        staging=staging_of(options),
         monitor=report.receive,
     )

@@ -25,11 +25,10 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser.add_argument("--voice", metavar="NAME", help=named)
     add_input(parser, "--corpus", what="corpus", metavar="FOLDER", help="whose recordings speak, for --voice corpus")
     parser.add_argument("--voices", action="store_true", help="list the installed voices")
-    add_lexicon_argument(parser)
-    add_model_argument(parser)
-    add_speaker_argument(parser)
-    add_onto_arguments(parser)
-    add_result_arguments(parser, "FILE.mp4 .wav .flac .ogg .json .csv .npz .TextGrid, or several", required=False)
+    for add_argument in (add_lexicon_argument, add_model_argument, add_speaker_argument, add_onto_arguments):
+        add_argument(parser)
+    suffixes = "FILE.mp4 .webm .mov %%05d.png .wav .flac .ogg .json .csv .npz .TextGrid, or several"
+    add_result_arguments(parser, suffixes, required=False)
     add_machine_readable(parser)
     parser.set_defaults(run=run, wrong=parser.error)
 

@@ -49,11 +49,13 @@ class Background:
     frame         : uint8 array [shape=(H, W, 3)], RGB
     face_to_frame : affine map from px of the face to px of the frame [shape=(2, 3)]
     chin_px       : how far the tip of the chin is below the eyes, px of the face
+    has_face      : whether the person is seen; False: the frame stays as it is
     """
 
     frame: Picture
     face_to_frame: Array
     chin_px: float
+    has_face: bool = True
 
 
 @dataclass(frozen=True)
@@ -151,7 +153,8 @@ class Stitcher:
         patches = self._mouth_alone.clone(source, behind)
         for each, patch, to in zip(batch, patches, self._maps(batch), strict=True):
             frame = each.frame.copy()
-            place(frame, patch, self._weight, to)
+            if each.has_face:
+                place(frame, patch, self._weight, to)
             yield frame
 
     @cached_property

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 from typing import Literal
 
@@ -13,7 +15,7 @@ from numpy.typing import NDArray
 from lipmotion.appearance.eigenlips import Eigenlips
 from lipmotion.appearance.person import FaceCodes
 from lipmotion.errors import InputError
-from lipmotion.export.inset import with_inset
+from lipmotion.export.inset import inset_box, with_inset
 from lipmotion.export.synthetic_mark import mark_frames, mark_metadata
 from lipmotion.export.video import write_mp4
 from lipmotion.faces.base import Face
@@ -22,7 +24,7 @@ from lipmotion.faces.filmed.renderer import BATCH, STITCHING, Stitcher, Stitchin
 from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.film.background import BackgroundSequence, open_background, stored_sequence
 from lipmotion.pipeline.model import Model
-from lipmotion.speech.pauses import STEP_S, levels_db
+from lipmotion.speech.pauses import levels_db_at
 from lipmotion.storage.files import check_source
 from lipmotion.storage.media import has_video
 from lipmotion.types import GREY, Audio, Monitor, Motion, silent_monitor
@@ -36,6 +38,7 @@ Overlay = Literal["inset", "mouth"]
 Mark = Literal["metadata", "visible", "none"]
 RENDERING = "rendering the video"
 """Name of the stage in reports of progress."""
+LOG = logging.getLogger("lipmotion")
 ZOOM = 1.3
 """How much larger than the speaker's own the mouth over it is."""
 
@@ -75,14 +78,13 @@ class Film:
     frames  : each uint8 RGB [shape=(H, W, 3)], of even sizes
     count   : number of the frames
     rate_hz : frames a second
-    covered : the part of the frames in which the face, or the inset, is at any time: left, top, right, bottom, px; None
-              where it is not known
+    covered : the part of the frames in which the face, or the inset, is at any time: left, top, right, bottom, px
     """
 
     frames: Frames
     count: int
     rate_hz: float
-    covered: tuple[float, float, float, float] | None
+    covered: tuple[float, float, float, float]
 
 
 @one_thread()
@@ -114,7 +116,9 @@ def film_of(
         frames, rate_hz = untracked_frames(speech)
         codes = _codes(face, motion, sound, rate_hz, eigenlips, options)
         mouths = Stitcher(face.appearance, options.stitching).mouths(codes)
-        return Film(with_inset(_even(frames), mouths), len(codes), rate_hz, None)
+        first, frames = _first_of(_even(frames), speech)
+        covered = inset_box((first.shape[0], first.shape[1]), face.appearance.mouths.shape[1:3])
+        return Film(with_inset(frames, mouths), len(codes), rate_hz, covered)
     background = _background(face, options, speech)
     rate_hz = background.rate_hz if fps is None or options.overlay is not None else fps
     codes = _codes(face, motion, sound, rate_hz, eigenlips, options)
@@ -144,7 +148,7 @@ def _codes(
 
 def _background(face: FilmedFace, options: FilmOptions, speech: Path | None) -> BackgroundSequence:
     if options.overlay is not None and speech is not None:
-        return open_background(speech).enlarged(ZOOM)
+        return open_background(speech, in_time=True).enlarged(ZOOM)
     return stored_sequence(face.background) if options.background is None else open_background(options.background)
 
 
@@ -175,20 +179,31 @@ def person_shown(model: Model, face: Face | FilmedFace, speaker: str = "") -> Fi
     """Return a filmed face if it is of another person than the motion of a model, so that it must be mapped onto it.
 
     speaker : of the people of the model whose motion is generated
-    A drawn face shows anybody. Raises InputError: as ``is_person_of``.
+    A drawn face shows anybody. A filmed face without speech (its footage has no sound) cannot be mapped onto: that is
+    logged as a warning, and the motion stays as it is. Raises InputError: as ``is_person_of``.
     """
-    return face if isinstance(face, FilmedFace) and not is_person_of(model, face, speaker) else None
+    if not isinstance(face, FilmedFace) or is_person_of(model, face, speaker):
+        return None
+    if not face.takes:
+        LOG.warning(
+            "the face was built from footage without sound, so the motion, which is another person's, is not fitted to "
+            "it; build it from footage with sound"
+        )
+        return None
+    return face
 
 
 def is_person_of(model: Model, face: FilmedFace, speaker: str = "") -> bool:
     """Return whether a model generates the motion of the person of a face: they are of one corpus and speaker.
 
     speaker : of the people of the model whose motion is generated
+    The only person of a model is that of a face of the same corpus unless both have names, and these differ.
     Raises InputError: it does not, and generates eigenlips alone, which cannot be mapped onto another person.
     """
     people = model.about.get("speakers") or [""]
     same = bool(set(model.about.get("corpus", ())) & set(face.about.get("corpus", ())))
-    same = same and (len(people) < 2 or speaker == face.about.get("speaker"))
+    filmed = face.about.get("speaker", "")
+    same = same and (speaker == filmed if len(people) > 1 else people[0] == filmed or not (people[0] and filmed))
     if not same and model.visual == "eigenlips":
         raise InputError(
             "the model generates mouth pictures of the person of "
@@ -202,9 +217,15 @@ def _levels(sound: Audio | None, count: int, rate_hz: float) -> NDArray[np.float
     """Return the level of the sound in every frame of a video, dB [shape=(count,)]."""
     if sound is None:
         raise InputError("a jaw that follows the energy needs the sound; give the recording")
-    levels = levels_db(sound)
-    centres_s = (np.arange(len(levels)) + 0.5) * STEP_S
-    return np.interp(np.arange(count) / rate_hz, centres_s, levels)
+    return levels_db_at(sound, np.arange(count) / rate_hz)
+
+
+def _first_of(frames: Frames, speech: Path) -> tuple[NDArray[np.uint8], Frames]:
+    """Return the first frame, and all of them. Raises InputError: there are none."""
+    first = next(frames, None)
+    if first is None:
+        raise InputError(f"{speech}: holds no pictures; give a video as speech")
+    return first, chain([first], frames)
 
 
 def _even(frames: Frames) -> Frames:
@@ -214,6 +235,7 @@ def _even(frames: Frames) -> Frames:
         yield frame[:height, :width]
 
 
+@one_thread()
 def write_film(
     path: Path, film: Film, sound: Audio, *, mark: Mark = "metadata", monitor: Monitor = silent_monitor
 ) -> None:
