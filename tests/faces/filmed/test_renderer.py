@@ -20,7 +20,7 @@ from lipmotion.testing.toy import toy_motion, toy_sentences
 from lipmotion.testing.toy_face import FRAME_HEIGHT, FRAME_WIDTH, toy_chin_px, toy_frames, toy_places
 from lipmotion.types import Motion
 
-FRAMES = BATCH + 8
+FRAMES = 40
 """More than one batch."""
 MOUTH_ALONE = StitchingOptions(jaw=False)
 

@@ -98,7 +98,7 @@ def test_a_larger_mouth_in_the_same_place(sequence: BackgroundSequence) -> None:
 def test_the_chin_is_where_the_tracker_sees_it(video: ToyVideo) -> None:
     found, drawn = chin_px(footage_of(video)), toy_chin_px(video.motion)
     assert np.abs(found - drawn).max() < 4  # it is smoothed over about a frame
-    assert np.corrcoef(found, drawn)[0, 1] > 0.98
+    assert np.corrcoef(found, drawn)[0, 1] > 0.95
 
 
 def test_a_video_as_a_background(video: ToyVideo, monkeypatch: pytest.MonkeyPatch) -> None:
