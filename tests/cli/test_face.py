@@ -209,7 +209,7 @@ def test_options_of_filmed_faces_alone(
     for option in (["--overlay", "inset"], ["--background", toy_speech], ["--jaw", "none"], ["--mark", "visible"]):
         done = run(*basics[:-2], "-o", "a.mp4", *option)
         assert is_one_error(done, 3), done
-        assert "is for filmed faces; give one: --face FILE.face" in done.err[0]
+        assert "for filmed faces; give one: --face FILE.face" in done.err[0]
     assert list(here.iterdir()) == []
 
 
