@@ -81,7 +81,7 @@ def write_ways(folder: Path, sheets: Mapping[str, Mapping[str, Sheets]]) -> None
         for way, clips in sheets.items():
             pictures = np.concatenate([clips[name].spaced[n][1] for n in numbers], axis=1)
             rows += [text(way, pictures.shape[1]), pictures]
-        Image.fromarray(np.concatenate(rows)).save(folder / f"ways-{name}.png")
+        save(folder / f"ways-{name}.png", rows)
 
 
 def write(path: Path, pairs: Sequence[tuple[str, Pair]]) -> None:
@@ -94,7 +94,12 @@ def write(path: Path, pairs: Sequence[tuple[str, Pair]]) -> None:
         rows += [np.concatenate([text(label, SHOWN[0]) for label, _ in part], axis=1)]
         rows += [np.concatenate([pair[side] for _, pair in part], axis=1) for side in (0, 1)]
     if rows:
-        Image.fromarray(np.concatenate(rows)).save(path)
+        save(path, rows)
+
+
+def save(path: Path, rows: Sequence[Pictures]) -> None:
+    """Write rows of pictures as a PNG, quickly: there are hundreds of sheets."""
+    Image.fromarray(np.concatenate(rows)).save(path, compress_level=1)
 
 
 def text(label: str, width: int) -> Pictures:
