@@ -208,3 +208,13 @@ def test_no_frames(appearance: Appearance) -> None:
     codes = FaceCodes(np.zeros((0, 90), np.float32), np.zeros((0, 36), np.float32), np.zeros(0, np.float32))
     assert list(Stitcher(appearance).stitch(codes, [])) == []
     assert list(Stitcher(appearance).mouths(codes)) == []
+
+
+def test_a_frame_without_a_face_stays_as_it_is(
+    appearance: Appearance, backgrounds: list[Background], spoken: Motion
+) -> None:
+    hidden = [replace(each, has_face=n not in (3, BATCH + 1)) for n, each in enumerate(backgrounds)]
+    codes = appearance.of_motion(Motion(spoken.values[::-1], 25.0, spoken.channels))
+    made, all_made = (stitched(appearance, codes, given) for given in (hidden, backgrounds))
+    for n, each in enumerate(hidden):
+        assert np.array_equal(made[n], all_made[n] if each.has_face else each.frame)
