@@ -14,7 +14,7 @@ from lipmotion.export.sound import SOUND_CODECS, write_sound
 from lipmotion.export.textgrid import TEXTGRID_SUFFIX, write_textgrid
 from lipmotion.faces.base import Face, Staging
 from lipmotion.faces.filmed.face import SUFFIX, FilmedFace, load_face
-from lipmotion.faces.registry import face_named
+from lipmotion.faces.registry import FACES, face_named
 from lipmotion.kernels.threads import one_thread
 from lipmotion.motion.gestures import GESTURES, with_gestures
 from lipmotion.pipeline.drawn_video import (
@@ -216,6 +216,9 @@ def opened_face(face: str | Path | Face | FilmedFace) -> Face | FilmedFace:
         return face
     if Path(face).suffix.lower() == SUFFIX:
         return load_face(face)
+    beside = Path(f"{face}{SUFFIX}")
+    if str(face) not in FACES.names and beside.is_file():
+        raise InputError(f"no drawn face {str(face)!r}; for the filmed face give its file: {beside}")
     return face_named(str(face))
 
 

@@ -193,7 +193,8 @@ def test_an_inset_on_the_video_of_the_speech(filmed_face: FilmedFace, motion: Mo
     assert frames.shape == (25, 48, 64, 3)
     assert film.rate_hz == pytest.approx(25.0)
     left, top, right, bottom = film.covered
-    assert 0 < left < right <= 64 and 0 < top < bottom <= 48  # the inset
+    assert 0 < left < right <= 64  # the inset
+    assert 0 < top < bottom <= 48
     assert np.ptp(frames[:, :20, :30]) == 0  # the video itself, flat and grey
     assert np.ptp(frames[0, -19:, -24:]) > 60
 

@@ -34,7 +34,7 @@ Picture = NDArray[np.uint8]
 Pictures = NDArray[np.uint8]
 
 BATCH = 16
-"""Frames in memory at a time."""
+"""Frames in memory at a time, at one sample a pixel; fewer of larger faces."""
 FEATHER_PX = 6.0
 """Width of the seam, px of the face."""
 
@@ -100,8 +100,9 @@ class Stitcher:
         mouth_chosen = self._mouths.choose(codes.mouth)
         jaw_chosen = self._jaws.choose(codes.jaw)
         iterator = iter(backgrounds)
-        for first in range(0, len(codes), BATCH):
-            part = slice(first, first + BATCH)
+        size = max(1, BATCH // self.appearance.scale)
+        for first in range(0, len(codes), size):
+            part = slice(first, first + size)
             batch = list(islice(iterator, len(codes.mouth[part])))
             if len(batch) < len(codes.mouth[part]):
                 raise InputError(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -13,8 +14,14 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
 from lipmotion.appearance.frame_descriptors import describe_frames
+from lipmotion.appearance.identity import SAME_PERSON, face_signature, likeness
 from lipmotion.appearance.looping import LoopOrder, loop_order, scenes_of
+from lipmotion.appearance.lower_face import HEIGHT as REGION_HEIGHT
+from lipmotion.appearance.lower_face import WIDTH as REGION_WIDTH
+from lipmotion.appearance.lower_face import region_map
 from lipmotion.appearance.mouth_region import CORNER, EYE_DISTANCE_PX, HEIGHT
+from lipmotion.appearance.person import Appearance
+from lipmotion.appearance.placing import cut
 from lipmotion.faces.filmed.face import StoredBackground
 from lipmotion.faces.filmed.renderer import Background
 from lipmotion.stats.pca import evenly_spaced
@@ -23,6 +30,8 @@ from lipmotion.storage.frame_groups import FrameGroups
 from lipmotion.vision.footage import Footage, footage_frames, footage_groups, track_footage
 from lipmotion.vision.frames import WHOLE, VideoSpan
 from lipmotion.vision.steadying import REGISTERED_NOISE_PX, registered_maps, steady_maps
+
+LOG = logging.getLogger("lipmotion")
 
 MOST_BACKGROUND_S = 10.0
 """Longest background that is kept in the file of a face."""
@@ -175,15 +184,34 @@ def stored_sequence(background: StoredBackground) -> BackgroundSequence:
     return BackgroundSequence(video.groups, video.rate_hz, background.face_to_frame, background.chin_px, usable)
 
 
-def open_background(path: Path, *, in_time: bool = False) -> BackgroundSequence:
+def open_background(path: Path, appearance: Appearance | None = None, *, in_time: bool = False) -> BackgroundSequence:
     """Return a video as a background.
 
+    appearance : of the person who should be in it: somebody else is warned about; None: it may be anybody
     in_time : as of ``BackgroundSequence``: all of the video is used; False: at most ``MOST_TRACKED_S`` of it
     Raises InputError: no video, or no face in it.
     """
     footage = track_footage(path, WHOLE if in_time else VideoSpan(0.0, MOST_TRACKED_S))
+    if appearance is not None:
+        _warn_of_somebody_else(footage, appearance)
     groups, maps = partial(footage_groups, footage), placed_maps(footage)
     return BackgroundSequence(groups, footage.rate_hz, maps, chin_px(footage), _usable(footage), footage.cuts, in_time)
+
+
+def _warn_of_somebody_else(footage: Footage, appearance: Appearance) -> None:
+    frame = int(np.flatnonzero(footage.track.seen)[0])
+    shown = next(footage_frames(footage, frame, frame + 1))
+    picture = cut(shown, region_map(footage.face_to_image[frame], 1), (REGION_HEIGHT, REGION_WIDTH))
+    recorded = appearance.jaw.mean.T.reshape(REGION_HEIGHT, REGION_WIDTH, 3)
+    found = likeness(face_signature(picture), face_signature(recorded))
+    if found < SAME_PERSON:
+        LOG.warning(
+            "%s: seems to show somebody else than the face (likeness %.2f, of one person at least %.2f); give "
+            "footage of the same person",
+            footage.path,
+            found,
+            SAME_PERSON,
+        )
 
 
 def chin_px(footage: Footage) -> NDArray[np.float64]:

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.appearance.identity import SAME_PERSON, face_signature
 from lipmotion.appearance.lower_face import HEIGHT, WIDTH, best_scale, face_shape, region_map
 from lipmotion.appearance.person import FootagePictures, learn_appearance
 from lipmotion.appearance.placing import cut
@@ -135,10 +136,26 @@ def _filmed(takes: Sequence[Take], workers: int, monitor: Monitor) -> list[_Film
                 found.append(result)
     if not found:
         raise InputError(f"none of {len(takes)} recordings can be used; the first: {problems[0]}")
+    found = _of_one_person(found, monitor)
     sizes = sorted({take.footage.size for take in found})
     if len(sizes) > 1:
         LOG.warning("the recordings have pictures of %d sizes; the background is one of them", len(sizes))
     return found
+
+
+def _of_one_person(filmed: Sequence[_Filmed], monitor: Monitor) -> list[_Filmed]:
+    """Return the takes that show the person whom most takes show; the others are reported, and left out."""
+    signatures = np.stack([face_signature(take.pictures) for take in filmed])
+    alike = signatures @ signatures.T
+    person = int((alike >= SAME_PERSON).sum(axis=1).argmax())
+    kept = []
+    for take, value in zip(filmed, alike[person].tolist(), strict=True):
+        if value >= SAME_PERSON:
+            kept.append(take)
+            continue
+        reason = f"shows another face than most recordings (likeness {value:.2f}, required {SAME_PERSON})"
+        monitor(Item(take.footage.path.name, "skipped", reason))
+    return kept
 
 
 def _film(take: Take) -> _Filmed | str:

@@ -57,6 +57,8 @@ def takes_of(source: Path, recordings: Path | None = None, speaker: str = "") ->
     speaker    : whose, where there are several people
     Raises InputError: no such file, several people, no such person, no videos, or a corpus without ``recordings``.
     """
+    if not source.exists():
+        raise InputError(f"{source}: no such file or folder; give a video of the person, or a folder of videos")
     if source.is_file():
         check_source(source, "video")
         whole = SourceRecording(source.stem, source, None, speaker=speaker)

@@ -149,7 +149,9 @@ def _codes(
 def _background(face: FilmedFace, options: FilmOptions, speech: Path | None) -> BackgroundSequence:
     if options.overlay is not None and speech is not None:
         return open_background(speech, in_time=True).enlarged(ZOOM)
-    return stored_sequence(face.background) if options.background is None else open_background(options.background)
+    if options.background is None:
+        return stored_sequence(face.background)
+    return open_background(options.background, face.appearance)
 
 
 def face_codes(
