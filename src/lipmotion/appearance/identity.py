@@ -12,8 +12,8 @@ from lipmotion.appearance.lower_face import HEIGHT, WIDTH
 Floats = NDArray[np.float32]
 
 SAME_PERSON = 0.78
-"""Least likeness of two recordings of one person. Between clips of one person it was 0.83 to 0.99 (five people), between
-those of different people up to 0.76, and 0.83 twice in 228 pairs: GRID, and three open talkers."""
+"""Least likeness of two recordings of one person. Between clips of one person it was 0.83 to 0.99 (four people),
+between those of different people up to 0.76, and 0.83 twice in 228 pairs: GRID, and three open talkers."""
 _ROWS, _COLUMNS, _STEP = 110, slice(20, 108), 3
 """Nose, cheeks and mouth, without neck and background; every third sample."""
 
