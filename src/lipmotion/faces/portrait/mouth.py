@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.faces.portrait.design import Design
-from lipmotion.faces.portrait.geometry import Heights, LipOutlines, lip_outlines, mouth_interior
+from lipmotion.faces.portrait.geometry import Heights, LipOutlines, MouthInterior, lip_outlines, mouth_interior
 from lipmotion.faces.portrait.pose import MouthPose
 from lipmotion.faces.portrait.textures import SPAN, Texture, mouth_textures
 from lipmotion.faces.portrait.view import Window
@@ -30,18 +30,19 @@ class MouthPainter:
 
     def paint(self, layer: NDArray[np.float32], pose: MouthPose) -> None:
         """Paint the mouth of a pose on the window's pixels [shape=(h, w, 4)], in place."""
-        shape = lip_outlines(self._lips, pose, self._x)
-        within = np.abs(self._x).max(axis=0) < shape.half_width * CORNER_REACH
-        columns = np.flatnonzero(within)
+        half_width = self._lips.half_width * pose.width
+        columns = np.flatnonzero(np.abs(self._x).max(axis=0) < half_width * CORNER_REACH)
         on = _Columns(layer, columns[0], columns[-1] + 1, self._scale, self._first_row)
         x = self._x[:, on.first : on.last]
-        on_lips = _place(x, shape.half_width)
+        on_lips = _place(x, half_width)
         shape = lip_outlines(self._lips, pose, x)
         self._skin_shadows(on, shape, pose, x, on_lips)
-        self._inside(on, shape, pose, x, on_lips)
+        within = mouth_interior(self._lips, pose, x, shape) if pose.gap > 0 else None
+        if within is not None:
+            self._inside(on, shape, within, pose, x, on_lips)
         self._lips_around(on, shape, on_lips)
-        if pose.gap > 0:
-            self._in_front(on, shape, pose, x)
+        if within is not None:
+            self._in_front(on, shape, within, pose, x)
 
     def _skin_shadows(self, on: _Columns, shape: LipOutlines, pose: MouthPose, x: Heights, on_lips: Heights) -> None:
         art = self._textures
@@ -59,19 +60,19 @@ class MouthPainter:
         thick = np.where(closed, shape.seam, 0)
         on.paint(middle - thick, middle + thick, on_lips, art.seam)
 
-    def _inside(self, on: _Columns, shape: LipOutlines, pose: MouthPose, x: Heights, on_lips: Heights) -> None:
-        if pose.gap <= 0:
-            return
-        art, within = self._textures, mouth_interior(self._lips, pose, x, shape)
+    def _inside(
+        self, on: _Columns, shape: LipOutlines, within: MouthInterior, pose: MouthPose, x: Heights, on_lips: Heights
+    ) -> None:
+        art = self._textures
         top, bottom = shape.upper_inner, shape.lower_inner
         across = _place(x, SPAN)
         on.paint(top, bottom, on_lips, art.cavity)
         on.paint(within.tongue_top, np.minimum(within.tongue_bottom, bottom), across, art.tongue)
         on.paint(within.teeth_lower, bottom, across, art.lower_teeth, min(2.5 * pose.teeth, 1))
 
-    def _in_front(self, on: _Columns, shape: LipOutlines, pose: MouthPose, x: Heights) -> None:
+    def _in_front(self, on: _Columns, shape: LipOutlines, within: MouthInterior, pose: MouthPose, x: Heights) -> None:
         """Paint the upper teeth, and what of the tongue is in front of the lower lip."""
-        art, within = self._textures, mouth_interior(self._lips, pose, x, shape)
+        art = self._textures
         top, bottom = shape.upper_inner, shape.lower_inner
         across = _place(x, SPAN)
         if pose.tongue > 0.6:
