@@ -21,6 +21,7 @@ from lipmotion.rig.limits import (
     check_count,
 )
 from lipmotion.rig.mesh import Blendshape, Material, Mesh, MeshPart
+from lipmotion.rig.gltf_textures import gltf_material, texture_colours
 from lipmotion.rig.vrm import expression_shapes, looks_backwards
 
 Matrix = NDArray[np.float64]
@@ -39,10 +40,12 @@ class _Surface:
     vertices: list[Matrix] = field(default_factory=list)
     triangles: list[NDArray[np.int64]] = field(default_factory=list)
     uv: list[Matrix | None] = field(default_factory=list)
+    colours: list[Matrix] = field(default_factory=list)
     parts: list[tuple[str, Material]] = field(default_factory=list)
     moved: dict[str, list[tuple[NDArray[np.int64], Matrix]]] = field(default_factory=dict)
     targets: dict[tuple[int, int], str] = field(default_factory=dict)
     first: dict[Any, int] = field(default_factory=dict)
+    blocks: dict[Any, int] = field(default_factory=dict)
     count: int = 0
     displacements: int = 0
 
@@ -90,6 +93,7 @@ def _mesh(document: GltfDocument, arrays: GltfArrays) -> Mesh:
         parts,
         tuple(shapes),
         np.concatenate(uv) if len(uv) == len(surface.uv) else None,
+        np.concatenate(surface.colours),
     )
 
 
@@ -127,7 +131,7 @@ def _add_primitive(
         raise InputError("morph targets that are no list of objects; export it again")
     shared = (id(node), attributes.get("POSITION"), tuple(target.get("POSITION") for target in targets))
     if shared not in surface.first:
-        surface.first[shared] = surface.count
+        surface.first[shared], surface.blocks[shared] = surface.count, len(surface.vertices)
         _add_vertices(surface, document, arrays, node, primitive, owner[0], matrix, places)
     first = surface.first[shared]
     count = len(arrays.floats(attributes.get("POSITION"), 3))
@@ -137,16 +141,22 @@ def _add_primitive(
         corners = np.arange(count)
     if corners.size % 3 or (corners.size and not 0 <= corners.min() <= corners.max() < count):
         raise InputError(f"triangles of vertices up to {corners.max(initial=0)} of {count}; export it again")
-    material = _material(document, primitive.get("material"))
+    material = gltf_material(document, primitive.get("material"))
     surface.triangles.append(corners.reshape(-1, 3) + first)
     check_count("triangles", sum(map(len, surface.triangles)), MOST_TRIANGLES)
     surface.parts.append((_unused(owner[1], material.name, surface), material))
     mapped = None
     if "TEXCOORD_0" in attributes:
-        places_in_texture = arrays.floats(attributes["TEXCOORD_0"], 2)
-        if len(places_in_texture) != count:
+        in_texture = arrays.floats(attributes["TEXCOORD_0"], 2)
+        if len(in_texture) != count:
             raise InputError("texture coordinates of another number of vertices; export it again")
-        mapped = (places_in_texture * (1.0, -1.0) + (0.0, 1.0))[corners].reshape(-1, 3, 2)
+        seen = texture_colours(document, arrays, primitive.get("material"), in_texture)
+        if seen is not None:
+            used = np.unique(corners)
+            surface.colours[surface.blocks[shared]][used] = seen[used]
+        mapped = (in_texture * (1.0, -1.0) + (0.0, 1.0))[corners].reshape(-1, 3, 2)
+    else:
+        surface.colours[surface.blocks[shared]][np.unique(corners)] = material.colour
     surface.uv.append(mapped)
 
 
@@ -182,6 +192,7 @@ def _add_vertices(
         moved = np.einsum("nij,nj->ni", linear, moved)
         rows = np.flatnonzero(np.abs(moved).max(axis=1, initial=0.0) > LEAST)
         surface.moved.setdefault(name, []).append((rows + surface.count, moved[rows]))
+    surface.colours.append(np.tile(gltf_material(document, primitive.get("material")).colour, (len(vertices), 1)))
     surface.count += len(vertices)
 
 
@@ -284,19 +295,6 @@ def _target_names(mesh: dict[str, Any], primitive: dict[str, Any], count: int) -
         if isinstance(names, list) and len(names) >= count and len({_text(each) for each in names}) == len(names):
             return [_text(name) or f"target {number}" for number, name in enumerate(names[:count])]
     return [f"target {number}" for number in range(count)]
-
-
-def _material(document: GltfDocument, number: Any) -> Material:
-    """Return a material: its base colour as sRGB, its gloss from its roughness."""
-    if number is None:
-        return Material()
-    found = document.item("materials", number)
-    look = found.get("pbrMetallicRoughness")
-    look = look if isinstance(look, dict) else {}
-    linear = np.clip(_vector(look.get("baseColorFactor", [1, 1, 1, 1]), 4)[:3], 0, 1)
-    red, green, blue = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055).tolist()
-    roughness = float(np.clip(_vector([look.get("roughnessFactor", 1.0)], 1)[0], 0, 1))
-    return Material(_text(found.get("name")), (red, green, blue), 1 - roughness)
 
 
 def _unused(owner: str, material: str, surface: _Surface) -> str:

@@ -74,6 +74,7 @@ class Mesh:
                 part without a name
     shapes    : blendshapes, in the order of their weights
     uv        : the place of each triangle's corners in a texture, 0 to 1, v upwards [shape=(F, 3, 2)], or None
+    colours   : of every vertex, sRGB, 0 to 1, in place of the materials' [shape=(V, 3)], or None
     Raises InputError: shapes of arrays that do not fit, values that are not finite, a triangle or a blendshape of a
     vertex that does not exist, parts that do not follow one another, or two blendshapes of one name.
     """
@@ -83,6 +84,7 @@ class Mesh:
     parts: tuple[MeshPart, ...] = ()
     shapes: tuple[Blendshape, ...] = ()
     uv: NDArray[np.float64] | None = None
+    colours: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
         _check_places("vertices", self.vertices)
@@ -91,6 +93,8 @@ class Mesh:
             raise InputError(f"triangles have shape {self.triangles.shape}, required (F, 3)")
         if self.uv is not None and self.uv.shape != (*self.triangles.shape, 2):
             raise InputError(f"uv has shape {self.uv.shape}, required {(*self.triangles.shape, 2)}")
+        if self.colours is not None and self.colours.shape != self.vertices.shape:
+            raise InputError(f"colours have shape {self.colours.shape}, required {self.vertices.shape}")
         if not self.parts:
             object.__setattr__(self, "parts", (MeshPart("", 0, len(self.triangles)),))
         self._check_parts()
@@ -156,7 +160,7 @@ class Mesh:
 def joined(meshes: Mapping[str, Mesh]) -> Mesh:
     """Return one mesh of several ones; each gives one part of its name, of the material of its first part.
 
-    Blendshapes of one name become one. The texture coordinates remain where all of them have some.
+    Blendshapes of one name become one. Texture coordinates and colours remain where all of them have some.
     """
     offsets = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes.values())])
     triangles = [mesh.triangles + offset for mesh, offset in zip(meshes.values(), offsets, strict=False)]
@@ -170,6 +174,7 @@ def joined(meshes: Mapping[str, Mesh]) -> Mesh:
         for shape in mesh.shapes:
             shapes.setdefault(shape.name, []).append((shape.rows + offset, shape.displacements))
     uv = [mesh.uv for mesh in meshes.values() if mesh.uv is not None]
+    colours = [mesh.colours for mesh in meshes.values() if mesh.colours is not None]
     return Mesh(
         np.concatenate([mesh.vertices for mesh in meshes.values()]),
         np.concatenate(triangles).astype(np.int32),
@@ -179,6 +184,7 @@ def joined(meshes: Mapping[str, Mesh]) -> Mesh:
             for name, moved in shapes.items()
         ),
         np.concatenate(uv) if len(uv) == len(meshes) else None,
+        np.concatenate(colours) if len(colours) == len(meshes) else None,
     )
 
 
