@@ -13,6 +13,8 @@ Array = NDArray[np.float64]
 
 FADE_S = 0.06
 """Longest half of a cross-fade between two phones, in seconds; of short phones, half of the phone."""
+LEAST_FADE_S = 0.025
+"""Shortest half of a cross-fade: no curve jumps, and a phone under 50 ms is not wholly said."""
 GESTURES: Mapping[str, tuple[tuple[str, ...], float]] = {
     "mouthPressLeft": (("p", "b", "m", "em"), 0.35),
     "mouthPressRight": (("p", "b", "m", "em"), 0.35),
@@ -27,14 +29,17 @@ def phone_weights(units: Timeline[Unit], time_s: Array, kind: Callable[[str], st
     """Return how far each kind of phone is being said, 0 to 1 [each shape=(T,)]; at every time they add up to 1.
 
     kind : the kind of each phone; before the first and after the last unit, and in gaps, it is that of an empty phone
-    Neighbours are cross-faded by half a cosine around the border between them. The middle of a phone is wholly its own.
+    Neighbours are cross-faded by half a cosine around the border between them. The middle of a phone of 50 ms or more is
+    wholly its own.
     """
     names, borders, halves = _segments(units, kind)
     weights: dict[str, Array] = {name: np.zeros(len(time_s)) for name in names}
     rising = [np.ones(len(time_s)), *(_step((time_s - at) / half) for at, half in zip(borders, halves, strict=True))]
+    reached = rising[0]
     for number, name in enumerate(names):
-        after = rising[number + 1] if number + 1 < len(rising) else 0.0
-        weights[name] += rising[number] - after
+        after = np.minimum(rising[number + 1], reached) if number + 1 < len(rising) else np.zeros(len(time_s))
+        weights[name] += reached - after
+        reached = after
     return weights
 
 
@@ -68,7 +73,7 @@ def _segments(units: Timeline[Unit], kind: Callable[[str], str]) -> tuple[list[s
         starts.append(ends[-1])
         ends.append(float("inf"))
     lengths = [end - start for start, end in zip(starts, ends, strict=True)]
-    halves = [max(min(FADE_S, left / 2, right / 2), 1e-3) for left, right in zip(lengths, lengths[1:], strict=False)]
+    halves = [max(min(FADE_S, left / 2, right / 2), LEAST_FADE_S) for left, right in zip(lengths, lengths[1:], strict=False)]
     return names, starts[1:], halves
 
 
