@@ -42,7 +42,8 @@ class ControlBinding:
 
     placement : the control points: lip and jaw points of motion, each at a vertex
     rows      : the vertices that follow any of them, ascending [shape=(N,)]
-    controls  : which control points a vertex follows, as rows of the placement; unused ones have weight 0 [shape=(N, K)]
+    controls  : which control points a vertex follows, as rows of the placement; unused ones have weight 0
+                [shape=(N, K)]
     weights   : how much, 0 to 1; what they leave of 1 is fixed to the head [shape=(N, K)]
     """
 
@@ -83,7 +84,8 @@ def bind(mesh: Mesh, surface: MeshSurface, placement: LipPlacement) -> ControlBi
     """Return the weights of the control points on a mesh, by distance along its surface.
 
     A control point acts within its reach: wᵢ ∝ ((Rᵢ − dᵢ) / (Rᵢ (dᵢ + s)))², normalised over the control points; all of
-    them together fade out as the nearest one gets out of reach. Distances are measured along the surface, so the upper lip
+    them together fade out as the nearest one gets out of reach. Distances are measured along the surface, so the
+    upper lip
     does not drag the lower, however near it is. Pieces inside the mouth below the lips follow the jaw as one.
     Source: Hofer 2008, Eq. 12, which gives no form of the weights; Franke & Nielson 1980 (modified Shepard weights).
     """
@@ -100,7 +102,8 @@ def bind(mesh: Mesh, surface: MeshSurface, placement: LipPlacement) -> ControlBi
     weights[near] = (pulls / np.maximum(pulls.sum(axis=0), 1e-12) * held).T
     inside = _inside(mesh, surface, placement)
     weights[inside] = 0.0
-    weights[np.ix_(inside, [placement.row(point) for point in JAW_FOLLOWERS])] = 1 / len(JAW_FOLLOWERS)
+    followers = np.array([placement.row(point) for point in JAW_FOLLOWERS])
+    weights[np.ix_(np.flatnonzero(inside), followers)] = 1 / len(JAW_FOLLOWERS)
     return _strongest(placement, weights)
 
 
@@ -140,7 +143,8 @@ def _strongest(placement: LipPlacement, weights: Array) -> ControlBinding:
 
 
 def _inside(mesh: Mesh, surface: MeshSurface, placement: LipPlacement) -> NDArray[np.bool_]:
-    """Return the vertices of pieces that lie inside the mouth, below where the lips meet: lower teeth, tongue [shape=(V,)]."""
+    """Return the vertices of pieces that lie inside the mouth, below where the lips meet: lower teeth, tongue
+    [shape=(V,)]."""
     template = mouth_template()
     places = mesh.vertices @ placement.axes / placement.scale
     lips = places[placement.vertices[~template.jaw]]
@@ -148,7 +152,9 @@ def _inside(mesh: Mesh, surface: MeshSurface, placement: LipPlacement) -> NDArra
     half = float(np.ptp(lips[:, 0])) / 2
     result = np.zeros(len(places), bool)
     touched = set(surface.pieces[placement.vertices].tolist())
-    within = (np.abs(places[:, 0] - centre[0]) < 1.2 * half) & (places[:, 2] < front) & (places[:, 2] > front - 2 * _CAVITY)
+    within = (
+        (np.abs(places[:, 0] - centre[0]) < 1.2 * half) & (places[:, 2] < front) & (places[:, 2] > front - 2 * _CAVITY)
+    )
     within &= np.abs(places[:, 1] - centre[1]) < _CAVITY
     count = int(surface.pieces.max(initial=-1)) + 1
     sizes = np.bincount(surface.pieces, minlength=count)

@@ -56,7 +56,8 @@ def save_binding(path: Path, binding: ControlBinding, mesh: Mesh) -> None:
 def load_binding(path: Path, mesh: Mesh) -> ControlBinding:
     """Return the binding of a file, for the mesh that it was made for.
 
-    Raises InputError: no such file, or it was made for a mesh of another number of vertices. Raises ModelFormatError: it
+    Raises InputError: no such file, or it was made for a mesh of another number of vertices. Raises
+    ModelFormatError: it
     is no binding, damaged, or of another version.
     """
     check_source(path, "binding")
@@ -108,22 +109,26 @@ def read_weights(path: Path) -> dict[int, dict[int, float]]:
     Raises InputError: no such file, other columns, a row that is damaged, or a vertex and point that occur twice.
     """
     paint: dict[int, dict[int, float]] = {}
-    for number, (vertex, point, weight) in _rows(path, WEIGHT_COLUMNS, "table of weights"):
+    for number, row in _rows(path, WEIGHT_COLUMNS, "table of weights"):
+        vertex, point = (_whole(path, number, text) for text in row[:2])
+        given = paint.setdefault(vertex, {})
+        if point in given:
+            raise InputError(f"{path}: line {number}: vertex {vertex} and point {point} occur twice; remove one")
         try:
-            given = paint.setdefault(int(vertex), {})
-            if int(point) in given:
-                raise InputError(f"{path}: line {number}: vertex {vertex} and point {point} occur twice; remove one")
-            given[int(point)] = float(weight)
+            given[point] = float(row[2])
         except ValueError as error:
-            raise InputError(f"{path}: line {number}: {shortened(str(error))}; required vertex,point,weight") from error
+            raise InputError(f"{path}: line {number}: {shortened(row[2])!r} is no number") from error
     return paint
 
 
 def write_points(path: Path, placement: LipPlacement) -> None:
-    """Write the vertex of each lip and jaw point as a table: ``point,vertex``. Raises ExportError: it cannot be written."""
+    """Write the vertex of each lip and jaw point as a table: ``point,vertex``. Raises ExportError: it cannot be
+    written."""
     with whole_file(path) as unfinished, unfinished.open("w", encoding="ascii", newline="\n") as file:
         file.write(",".join(POINT_COLUMNS) + "\n")
-        file.writelines(f"{point},{vertex}\n" for point, vertex in zip(placement.points, placement.vertices, strict=True))
+        file.writelines(
+            f"{point},{vertex}\n" for point, vertex in zip(placement.points, placement.vertices, strict=True)
+        )
 
 
 def read_points(path: Path) -> dict[int, int]:
@@ -132,14 +137,19 @@ def read_points(path: Path) -> dict[int, int]:
     Raises InputError: no such file, other columns, a row that is damaged, or a point that occurs twice.
     """
     named: dict[int, int] = {}
-    for number, (point, vertex) in _rows(path, POINT_COLUMNS, "table of lip points"):
-        try:
-            if int(point) in named:
-                raise InputError(f"{path}: line {number}: the point {point} occurs twice; remove one")
-            named[int(point)] = int(vertex)
-        except ValueError as error:
-            raise InputError(f"{path}: line {number}: {shortened(str(error))}; required point,vertex") from error
+    for number, row in _rows(path, POINT_COLUMNS, "table of lip points"):
+        point, vertex = (_whole(path, number, text) for text in row)
+        if point in named:
+            raise InputError(f"{path}: line {number}: the point {point} occurs twice; remove one")
+        named[point] = vertex
     return named
+
+
+def _whole(path: Path, line: int, text: str) -> int:
+    try:
+        return int(text)
+    except ValueError as error:
+        raise InputError(f"{path}: line {line}: {shortened(text)!r} is no whole number") from error
 
 
 def _rows(path: Path, columns: tuple[str, ...], kind: str) -> Iterator[tuple[int, list[str]]]:

@@ -69,7 +69,7 @@ def face_shapes(mesh: Mesh, placement: LipPlacement, only: Collection[str] = ())
     moved = placement.to_motion(mesh.displacements(placement.vertices))
     strong = np.abs(moved).max(axis=(1, 2), initial=0.0) > LEAST_MOVED
     arkit = [arkit_name(name) or "" for name in mesh.shape_names]
-    mouths = {name: number for number, name in enumerate(arkit) if name in ARKIT_MOUTH and (strong[number] or name == "tongueOut")}
+    mouths = {name: n for n, name in enumerate(arkit) if name in ARKIT_MOUTH and len(mesh.shapes[n].rows)}
     if only:
         unknown = [name for name in only if name not in mesh.shape_names]
         if unknown:
@@ -77,7 +77,7 @@ def face_shapes(mesh: Mesh, placement: LipPlacement, only: Collection[str] = ())
         chosen, style = [mesh.shape_names.index(name) for name in only], "own"
         known = [arkit[number] for number in chosen]
         style = "arkit" if "jawOpen" in known else style
-    elif "jawOpen" in mouths and len(mouths) > 5:
+    elif "jawOpen" in mouths and strong[mouths["jawOpen"]] and len(mouths) > 5:
         chosen, known, style = list(mouths.values()), list(mouths), "arkit"
     else:
         chosen, known, style = _spoken(mesh, strong)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +30,8 @@ def phone_weights(units: Timeline[Unit], time_s: Array, kind: Callable[[str], st
     """Return how far each kind of phone is being said, 0 to 1 [each shape=(T,)]; at every time they add up to 1.
 
     kind : the kind of each phone; before the first and after the last unit, and in gaps, it is that of an empty phone
-    Neighbours are cross-faded by half a cosine around the border between them. The middle of a phone of 50 ms or more is
+    Neighbours are cross-faded by half a cosine around the border between them. The middle of a phone of 50 ms or
+    more is
     wholly its own.
     """
     names, borders, halves = _segments(units, kind)
@@ -73,7 +75,7 @@ def _segments(units: Timeline[Unit], kind: Callable[[str], str]) -> tuple[list[s
         starts.append(ends[-1])
         ends.append(float("inf"))
     lengths = [end - start for start, end in zip(starts, ends, strict=True)]
-    halves = [max(min(FADE_S, left / 2, right / 2), LEAST_FADE_S) for left, right in zip(lengths, lengths[1:], strict=False)]
+    halves = [max(min(FADE_S, left / 2, right / 2), LEAST_FADE_S) for left, right in pairwise(lengths)]
     return names, starts[1:], halves
 
 

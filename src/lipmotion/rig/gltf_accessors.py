@@ -122,7 +122,12 @@ class GltfArrays:
 
 
 def _decoded(data: bytes, packed: dict[str, Any]) -> bytes:
-    count, stride, mode, kind = _size(packed, "count"), _size(packed, "byteStride"), packed.get("mode"), packed.get("filter")
+    count, stride, mode, kind = (
+        _size(packed, "count"),
+        _size(packed, "byteStride"),
+        packed.get("mode"),
+        packed.get("filter"),
+    )
     if count > MOST_ELEMENTS or count * stride > 16 * MOST_ELEMENTS:
         raise InputError(f"a compressed array of {count} elements, required at most {MOST_ELEMENTS}; reduce the mesh")
     if kind not in {None, "NONE", "EXPONENTIAL"}:

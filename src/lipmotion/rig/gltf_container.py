@@ -72,7 +72,7 @@ def read_gltf_document(path: Path) -> GltfDocument:
     if not isinstance(json, dict) or not isinstance(json.get("asset"), dict):
         raise InputError("no glTF document: it names no asset; give a .glb, .gltf or .vrm file")
     version = str(json["asset"].get("version", ""))
-    if version.split(".")[0] != str(VERSION):
+    if version.split(".", maxsplit=1)[0] != str(VERSION):
         raise InputError(f"glTF version {shortened(version)!r}, required 2.0; export it again")
     _check_extensions(json.get("extensionsRequired", []))
     document = GltfDocument(json)
@@ -106,7 +106,9 @@ def _check_extensions(required: Any) -> None:
         if name == "KHR_draco_mesh_compression":
             raise InputError("it is compressed by Draco, which is not read; export it without, or with meshopt")
         if name not in READABLE and not str(name).startswith("KHR_materials_"):
-            raise InputError(f"it requires the extension {shortened(str(name))!r}, which is not read; export without it")
+            raise InputError(
+                f"it requires the extension {shortened(str(name))!r}, which is not read; export without it"
+            )
 
 
 def _buffers(document: GltfDocument, folder: Path, binary: bytes | None) -> dict[int, bytes]:

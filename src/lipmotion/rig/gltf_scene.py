@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError, shortened
 from lipmotion.rig.gltf_accessors import GltfArrays
 from lipmotion.rig.gltf_container import GltfDocument, read_gltf_document
+from lipmotion.rig.gltf_textures import gltf_material, texture_colours
 from lipmotion.rig.limits import (
     MOST_DISPLACEMENTS,
     MOST_SHAPES,
@@ -21,7 +22,6 @@ from lipmotion.rig.limits import (
     check_count,
 )
 from lipmotion.rig.mesh import Blendshape, Material, Mesh, MeshPart
-from lipmotion.rig.gltf_textures import gltf_material, texture_colours
 from lipmotion.rig.vrm import expression_shapes, looks_backwards
 
 Matrix = NDArray[np.float64]
@@ -51,7 +51,8 @@ class _Surface:
 
 
 def read_gltf(path: Path) -> Mesh:
-    """Return all meshes of a ``.glb``, ``.gltf`` or ``.vrm`` file as one, in the place where its scene has them at rest.
+    """Return all meshes of a ``.glb``, ``.gltf`` or ``.vrm`` file as one, in the place where its scene has them at
+    rest.
 
     Every primitive becomes a part. Morph targets become blendshapes; those of one name in several primitives become
     one. Expressions of a VRM become blendshapes as well (``aa``, ``ih``, ...), after the targets.
@@ -80,7 +81,7 @@ def _mesh(document: GltfDocument, arrays: GltfArrays) -> Mesh:
         Blendshape(name, np.concatenate([rows for rows, _ in moved]), np.concatenate([way for _, way in moved]) * turn)
         for name, moved in surface.moved.items()
     ]
-    shapes += expression_shapes(document, {key: name for key, name in surface.targets.items()}, shapes)
+    shapes += expression_shapes(document, surface.targets, shapes)
     stops = np.cumsum([0, *(len(rows) for rows in surface.triangles)])
     parts = tuple(
         MeshPart(name, int(first), int(stop), material)
@@ -135,10 +136,7 @@ def _add_primitive(
         _add_vertices(surface, document, arrays, node, primitive, owner[0], matrix, places)
     first = surface.first[shared]
     count = len(arrays.floats(attributes.get("POSITION"), 3))
-    if "indices" in primitive:
-        corners = arrays.whole(primitive["indices"])[:, 0]
-    else:
-        corners = np.arange(count)
+    corners = arrays.whole(primitive["indices"])[:, 0] if "indices" in primitive else np.arange(count)
     if corners.size % 3 or (corners.size and not 0 <= corners.min() <= corners.max() < count):
         raise InputError(f"triangles of vertices up to {corners.max(initial=0)} of {count}; export it again")
     material = gltf_material(document, primitive.get("material"))
@@ -239,8 +237,10 @@ def _global_matrices(document: GltfDocument) -> Iterator[tuple[int, Matrix]]:
     scene = document.json.get("scene", 0)
     scenes = document.items("scenes")
     children = {child for node in nodes for child in _numbers(node.get("children", []))}
-    roots = _numbers(document.item("scenes", scene).get("nodes", [])) if scenes else sorted(
-        set(range(len(nodes))) - children
+    roots = (
+        _numbers(document.item("scenes", scene).get("nodes", []))
+        if scenes
+        else sorted(set(range(len(nodes))) - children)
     )
     stack = [(root, np.eye(4), 0) for root in reversed(roots)]
     seen: set[int] = set()

@@ -52,7 +52,8 @@ class _Buffer:
         return len(self.accessors) - 1
 
     def add_few(self, values: NDArray[np.float64]) -> int:
-        """Add displacements [shape=(N, 3)] of which most are 0, as a sparse array; return the number of its accessor."""
+        """Add displacements [shape=(N, 3)] of which most are 0, as a sparse array; return the number of its
+        accessor."""
         rows = np.flatnonzero(values.any(axis=1))
         if 2 * len(rows) > len(values):
             return self.add(values, "VEC3", target=VERTICES, limits=True)
@@ -94,7 +95,10 @@ def write_glb(path: Path, mesh: Mesh, weights: Motion | None = None) -> None:
         "materials": materials,
     }
     if mesh.shapes:
-        document["meshes"][0] |= {"weights": [0.0] * len(mesh.shapes), "extras": {"targetNames": list(mesh.shape_names)}}
+        document["meshes"][0] |= {
+            "weights": [0.0] * len(mesh.shapes),
+            "extras": {"targetNames": list(mesh.shape_names)},
+        }
     if weights is not None and mesh.shapes and len(weights.values):
         document["animations"] = [_animation(buffer, mesh, weights)]
     document |= {

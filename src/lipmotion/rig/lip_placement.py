@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,21 +20,29 @@ from lipmotion.rig.mouth_template import (
     mouth_template,
 )
 from lipmotion.rig.shape_names import arkit_name, viseme_name, vowel_name
-from lipmotion.rig.surface import MeshSurface
+from lipmotion.rig.surface import MeshSurface, mesh_surface
 
 Rows = NDArray[np.int64]
 Places = NDArray[np.float64]
 
 SLIT_REACH = 0.06
 """The lips meet where vertices closer than this share of the width of the jaw go different ways as the mouth opens."""
-SLIT_STEP = 0.35
+SLIT_STEP = 0.3
 """How different: this share of how far the jaw goes."""
+DETOUR = 2.0
+"""They are on two lips if the way along the surface is this many times as long as the straight one, and more than the
+distance between neighbours."""
+LIP_LINE = 0.1
+"""Vertices this close to the line between the corners, in widths of the mouth, are not joined with others at their
+place
+where no blendshape tells the lips apart."""
 FRONT = 0.04
 """Behind the foremost of such pairs by more than this share are the insides of the mouth."""
 DEPTH_WEIGHT = 0.35
 """Distances in depth count so much where a point is looked for, for lips protrude differently."""
 EYE_CORNERS = (33, 263)
 """The outer corners of the eyes, right and left; in a list of named points they give the upright direction."""
+_AT_ONCE = 64
 NEEDED = (RIGHT_CORNER, LEFT_CORNER, UPPER_MIDDLE, LOWER_MIDDLE)
 """The points that a list must name, where nothing is found by blendshapes."""
 
@@ -70,7 +78,8 @@ class LipPlacement:
 def placed_by_shape(mesh: Mesh, surface: MeshSurface) -> LipPlacement:
     """Return where the lip points are, from the blendshape that opens the mouth.
 
-    The lips meet where neighbours go apart as the mouth opens; the ends of that line are the corners. The character must
+    The lips meet where neighbours go apart as the mouth opens; the ends of that line are the corners. The character
+    must
     stand upright and look along +z, as files of OBJ and glTF have it.
     Raises InputError: no blendshape opens the mouth, or the lips are not found.
     """
@@ -79,7 +88,7 @@ def placed_by_shape(mesh: Mesh, surface: MeshSurface) -> LipPlacement:
     drop[shape.rows] = -shape.displacements[:, 1]
     skin = _skin(surface, drop)
     drop = np.where(skin, drop, 0.0) / max(float(drop[skin].max(initial=0.0)), 1e-12)
-    middle = _slit(mesh.vertices, drop, skin)
+    middle = _slit(mesh.vertices, surface, drop, skin)
     if len(middle) < 3:
         raise InputError(
             f"the blendshape {shortened(shape.name)!r} parts no lips; name the lip points by their vertices "
@@ -98,7 +107,8 @@ def placed_by_shape(mesh: Mesh, surface: MeshSurface) -> LipPlacement:
 def placed_by_points(mesh: Mesh, surface: MeshSurface, named: Mapping[int, int]) -> LipPlacement:
     """Return where the lip points are, from some that are named; the others are the nearest to the template.
 
-    named : vertex of each point; the corners (61, 291) and the middles of the inner lips (13, 14) are required. With the
+    named : vertex of each point; the corners (61, 291) and the middles of the inner lips (13, 14) are required.
+            With the
             eye corners (33, 263) the head may be turned any way; without them it must stand upright and look along +z
     Raises InputError: a required point is missing, a vertex does not exist, or the lips are one surface without a slit.
     """
@@ -128,12 +138,33 @@ def placed_by_points(mesh: Mesh, surface: MeshSurface, named: Mapping[int, int])
     return LipPlacement(template.points, vertices, scale, axes)
 
 
+def surface_of_named(mesh: Mesh, named: Mapping[int, int]) -> MeshSurface:
+    """Return how a mesh hangs together whose lip points are named: its lips are apart, also where they touch.
+
+    Raises InputError: as ``placed_by_points``.
+    """
+    _check_named(named, len(mesh.vertices), mouth_template())
+    surface = mesh_surface(mesh)
+    if surface.places[named[UPPER_MIDDLE]] != surface.places[named[LOWER_MIDDLE]]:
+        return surface
+    right, left = mesh.vertices[named[RIGHT_CORNER]], mesh.vertices[named[LEFT_CORNER]]
+    width = float(np.linalg.norm(left - right))
+    along = (left - right) / max(width, 1e-12)
+    from_middle = mesh.vertices - (left + right) / 2
+    across = from_middle @ along
+    lips = mesh.vertices[named[UPPER_MIDDLE]] - (left + right) / 2
+    off = from_middle - across[:, None] * along
+    bend = (1 - np.square(np.clip(2 * across / max(width, 1e-12), -1, 1)))[:, None] * (lips - (lips @ along) * along)
+    split = (np.abs(across) < 0.499 * width) & (np.linalg.norm(off - bend, axis=1) < LIP_LINE * width)
+    return mesh_surface(mesh, split)
+
+
 def opening_shape(mesh: Mesh) -> Blendshape:
     """Return the blendshape that opens the mouth most plainly. Raises InputError: there is none.
 
     ARKit's ``jawOpen``, else the vowel or viseme ``aa``, else another whose name says so.
     """
-    tests = (
+    tests: tuple[Callable[[str], bool], ...] = (
         lambda name: arkit_name(name) == "jawOpen",
         lambda name: viseme_name(name) == "aa",
         lambda name: vowel_name(name) == "aa",
@@ -154,11 +185,11 @@ def _skin(surface: MeshSurface, drop: Places) -> NDArray[np.bool_]:
     """Return the vertices of the face: the piece of the surface with both moved and still vertices, most of them."""
     still, moved = drop < 0.1 * drop.max(initial=0.0), drop > 0.5 * drop.max(initial=0.0)
     count = int(surface.pieces.max(initial=-1)) + 1
-    both = np.minimum(np.bincount(surface.pieces[still], minlength=count), np.bincount(surface.pieces[moved], minlength=count))
-    return surface.pieces == int(both.argmax())
+    counts = [np.bincount(surface.pieces[chosen], minlength=count) for chosen in (still, moved)]
+    return surface.pieces == int(np.minimum(*counts).argmax())
 
 
-def _slit(vertices: Places, drop: Places, skin: NDArray[np.bool_]) -> Places:
+def _slit(vertices: Places, surface: MeshSurface, drop: Places, skin: NDArray[np.bool_]) -> Places:
     """Return points along the line where the lips meet: middles of pairs that go apart [shape=(N, 3)]."""
     moved = vertices[skin & (drop > 0.5)]
     reach = SLIT_REACH * float(np.ptp(moved[:, 0])) if len(moved) else 0.0
@@ -166,8 +197,10 @@ def _slit(vertices: Places, drop: Places, skin: NDArray[np.bool_]) -> Places:
     if not reach or not len(low) or not len(high):
         return np.zeros((0, 3))
     nearest = cKDTree(vertices[high]).query_ball_point(vertices[low], reach)
-    pairs = np.array([(a, high[b]) for a, found in zip(low, nearest, strict=True) for b in found], np.int64).reshape(-1, 2)
+    listed = [(a, high[b]) for a, found in zip(low, nearest, strict=True) for b in found]
+    pairs = np.array(listed, np.int64).reshape(-1, 2)
     pairs = pairs[drop[pairs[:, 0]] - drop[pairs[:, 1]] > SLIT_STEP]
+    pairs = pairs[_apart(vertices, surface, pairs, reach)]
     middle = (vertices[pairs[:, 0]] + vertices[pairs[:, 1]]) / 2
     if not len(middle):
         return middle
@@ -176,6 +209,19 @@ def _slit(vertices: Places, drop: Places, skin: NDArray[np.bool_]) -> Places:
     for number, around in enumerate(tree.query_ball_point(middle[:, :1], reach)):
         front[number] = middle[number, 2] > middle[around, 2].max() - FRONT * reach / SLIT_REACH
     return middle[front]
+
+
+def _apart(vertices: Places, surface: MeshSurface, pairs: Rows, reach: float) -> NDArray[np.bool_]:
+    """Return which pairs are far from one another along the surface [shape=(N,)]."""
+    far = np.zeros(len(pairs), bool)
+    straight = np.linalg.norm(vertices[pairs[:, 0]] - vertices[pairs[:, 1]], axis=1)
+    longest = np.maximum(DETOUR * straight, reach / 2)
+    sources, number = np.unique(pairs[:, 0], return_inverse=True)
+    for first in range(0, len(sources), _AT_ONCE):
+        along = surface.distances(sources[first : first + _AT_ONCE], float(longest.max(initial=0.0)) + reach)
+        here = (number >= first) & (number < first + _AT_ONCE)
+        far[here] = along[number[here] - first, pairs[here, 1]] > longest[here]
+    return far
 
 
 def _share_at_slit(vertices: Places, drop: Places, skin: NDArray[np.bool_], middle: Places) -> Places:
@@ -187,7 +233,8 @@ def _share_at_slit(vertices: Places, drop: Places, skin: NDArray[np.bool_], midd
 
 
 def _targets(template: MouthTemplate, scale: float, centre: Places, middle: Places) -> Places:
-    """Return where the points should be on a mouth whose lips meet along ``middle``, from right to left [shape=(52, 3)]."""
+    """Return where the points should be on a mouth whose lips meet along ``middle``, from right to left [shape=(52,
+    3)]."""
     targets = centre + scale * (template.places - template.centre)
     seam = np.interp(targets[:, 0], middle[:, 0], middle[:, 1])
     depth = np.interp(targets[:, 0], middle[:, 0], middle[:, 2])

@@ -228,5 +228,6 @@ def _check_header(data: bytes, kind: int, versions: tuple[int, ...]) -> None:
         raise InputError(_DAMAGED)
     if data[0] & 15 not in versions:
         raise InputError(
-            f"version {data[0] & 15} of meshopt compression, required version {versions[-1]}; export without compression"
+            f"version {data[0] & 15} of meshopt compression, required version {versions[-1]}; export it without "
+            "compression"
         )

@@ -60,9 +60,10 @@ def read_obj(path: Path) -> Mesh:
     content = file_bytes(path, "mesh")
     places: list[list[bytes]] = []
     textures: list[list[bytes]] = []
-    faces, library = _Faces(), ""
+    faces, library, number = _Faces(), "", 0
     try:
-        for number, line in enumerate(_lines(content), 1):
+        for line in _lines(content):
+            number += 1
             words = line.split()
             if not words:
                 continue

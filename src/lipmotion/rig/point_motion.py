@@ -59,7 +59,9 @@ def point_motion(motion: Motion, units: Timeline[Unit]) -> PointMotion:
     template = mouth_template()
     names = [[f"{axis}_{point}" for axis in "xyz"] for point in template.points]
     if all(name in motion.names for row in names for name in row):
-        places = np.stack([np.stack([motion[name] for name in row], axis=1) for row in names], axis=1).astype(np.float64)
+        places = np.stack([np.stack([motion[name] for name in row], axis=1) for row in names], axis=1).astype(
+            np.float64
+        )
         displacements = places - np.median(places[rest], axis=0)
     else:
         displacements = _made_up(motion, rest, gap)

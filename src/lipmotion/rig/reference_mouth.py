@@ -1,6 +1,7 @@
 """A mouth that has ARKit's blendshapes and nothing else: motion becomes ARKit's weights without any mesh.
 
-The places are those of the template, the shapes are formulas on them: what ARKit's documentation shows of each shape, in
+The places are those of the template, the shapes are formulas on them: what ARKit's documentation shows of each
+shape, in
 eye distances. docs/results/rig.md compares them with a scanned head's.
 """
 
@@ -8,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +19,7 @@ from lipmotion.rig.mouth_template import FACING, mouth_template
 from lipmotion.rig.shape_names import ARKIT_MOUTH
 
 Array = NDArray[np.float64]
+Real = NDArray[np.floating[Any]] | float
 
 HINGE = (-0.45, -0.75)
 """The axis of the jaw: height and depth behind the eyes, in eye distances."""
@@ -64,8 +67,8 @@ def _displacement(name: str) -> Array:
         return _jaw_open(regions)
     if base == "mouthClose":
         return _lips_together(regions)
-    if base == "jaw" or base == "mouthLeft" or base == "mouthRight":
-        way = 0.15 if name.endswith("Left") else -0.09
+    if base in {"jaw", "mouthLeft", "mouthRight"}:
+        way = 0.15 if name.endswith("Left") else -0.15
         return np.outer((regions.jaw + 0.6 * regions.lower) if base == "jaw" else regions.lips, [way, 0, 0])
     moved = _FORMS[base](regions) if base in _FORMS else np.zeros_like(regions.places)
     sided = name != base
@@ -73,7 +76,8 @@ def _displacement(name: str) -> Array:
 
 
 def _jaw_open(regions: _Regions) -> Array:
-    """Return the jaw turned about its hinge; the lower lip follows it wholly, the corners by 0.45, the upper lip hardly."""
+    """Return the jaw turned about its hinge; the lower lip follows it wholly, the corners by 0.45, the upper lip
+    hardly."""
     share = regions.jaw + regions.lips * (0.45 + 0.55 * regions.lower - 0.45 * regions.upper)
     arm = regions.places[:, 1:] - HINGE
     turned = arm @ np.array(
@@ -115,7 +119,7 @@ def _gap_across(jaw: Array, regions: _Regions) -> tuple[Array, Array]:
     return np.array(where)[order], np.array(gaps)[order]
 
 
-def _form(x: Array | float, y: Array | float, z: Array | float, regions: _Regions) -> Array:
+def _form(x: Real, y: Real, z: Real, regions: _Regions) -> Array:
     return np.stack([value * regions.lips for value in (x, y, z)], axis=1)
 
 

@@ -1,4 +1,5 @@
-"""Names of blendshapes: ARKit's 52, the 15 visemes of Oculus and OpenXR, the vowels of VRM, and how files spell them."""
+"""Names of blendshapes: ARKit's 52, the 15 visemes of Oculus and OpenXR, the vowels of VRM, and how files spell
+them."""
 
 from __future__ import annotations
 

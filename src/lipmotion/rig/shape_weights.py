@@ -2,27 +2,31 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.rig.bounded_curves import CurveCosts, bounded_curves
 from lipmotion.rig.face_shapes import NOT_FROM_POINTS, FaceShapes
-from lipmotion.rig.gestures import gesture_curves
+from lipmotion.rig.gestures import gesture_curves, phone_weights
 from lipmotion.rig.mouth_template import FACING, mouth_template
 from lipmotion.rig.point_motion import PointMotion, point_motion
 from lipmotion.rig.visemes import NEAREST_VOWEL, viseme_curves
 from lipmotion.types import WEIGHT, Channel, Motion, Timeline, Unit
+from lipmotion.units import LIP_CLOSING
 
 Array = NDArray[np.float64]
 
 DEPTH, JAW, CORNERS, LIPS_APART = 0.4, 0.5, 2.0, 2.0
-"""Weights of distances in depth, of the jaw, of the corners across, and of the gap between the lips, beside 1 for lips."""
+"""Weights of distances in depth, of the jaw, of the corners across, and of the gap between the lips, beside 1 for
+lips."""
 TIE = 0.15
 """Weight of the difference between the left and the right of a pair."""
 PHONES_SAY = 0.2
 """Weight of the visemes that the phones say, beside what the points say."""
+PRESSED = 0.01
+"""In p, b and m the lips are closed this much further than to touch, in eye distances: no light between them."""
 LEAST_PARTING = 0.004
 """Shapes that part the lips by less than this, in eye distances, are not used to part or to close them."""
 BISECTIONS = 60
@@ -36,7 +40,7 @@ class SolverOptions:
     gestures : whether phones add what points do not show (pressed lips, a tucked lip, the tongue)
     """
 
-    costs: CurveCosts = CurveCosts()
+    costs: CurveCosts = field(default_factory=CurveCosts)
     gestures: bool = True
 
 
@@ -47,7 +51,8 @@ def shape_weights(
 
     motion : of lip and jaw points, or of ``opening`` and ``width``; its rest pose is the mesh as it is
     units  : phones in time
-    The lips are together where the motion has them together, as in p, b and m, and in silence: with ``mouthClose``, where
+    The lips are together where the motion has them together, as in p, b and m, and in silence: with ``mouthClose``,
+    where
     the mesh has it, the jaw may stay open behind closed lips. ``mouthClose`` is never more than ``jawOpen``.
     Raises InputError: as ``point_motion``.
     """
@@ -57,7 +62,7 @@ def shape_weights(
         weights = _spoken_weights(points, motion, units, shapes, options)
     else:
         weights = _free_weights(points, motion, units, shapes, options)
-    weights = with_gap(weights, shapes, points.gap)
+    weights = with_gap(weights, shapes, points.gap - PRESSED * _closing(units, motion.time_s))
     return Motion(weights, motion.rate_hz, tuple(Channel(name, WEIGHT) for name in shapes.names))
 
 
@@ -67,7 +72,8 @@ def with_gap(weights: Array, shapes: FaceShapes, gap: Array) -> Array:
     weights : 0 to 1, ``mouthClose`` at most ``jawOpen`` [shape=(T, S)]
     gap     : eye distances; where it is 0 the lips meet [shape=(T,)]
     The projection onto the weights with that gap: as smooth as the weights and the gap are. Shapes that hardly part the
-    lips remain. ``mouthClose`` takes its part by closing the lips in front of an open jaw. Where no weights between 0 and 1
+    lips remain. ``mouthClose`` takes its part by closing the lips in front of an open jaw. Where no weights between
+    0 and 1
     have the gap, those that come nearest.
     """
     jaw, close = shapes.row("jawOpen"), shapes.row("mouthClose")
@@ -86,6 +92,12 @@ def with_gap(weights: Array, shapes: FaceShapes, gap: Array) -> Array:
     if jaw is not None and close is not None:
         weights[:, jaw] += weights[:, close]
     return np.clip(weights, 0.0, 1.0)
+
+
+def _closing(units: Timeline[Unit], time_s: Array) -> Array:
+    """Return how far phones that close the lips are being said, 0 to 1 [shape=(T,)]."""
+    said = phone_weights(units, time_s, lambda phone: "closing" if phone in LIP_CLOSING else "")
+    return said.get("closing", np.zeros(len(time_s)))
 
 
 def _free_weights(

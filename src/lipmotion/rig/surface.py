@@ -14,7 +14,8 @@ from lipmotion.rig.mesh import Mesh
 Rows = NDArray[np.int64]
 
 SAME_PLACE = 1e-5
-"""Vertices closer than this share of the size of the mesh are one place: files split vertices along seams of textures."""
+"""Vertices closer than this share of the size of the mesh are one place: files split vertices along seams of
+textures."""
 SAME_WAY = 1e-3
 """They must be moved alike by all blendshapes, to this share of the largest displacement: lips that touch are not."""
 SAME_SIDE = -0.2
@@ -46,12 +47,20 @@ class MeshSurface:
         return np.asarray(found)[:, self.places]
 
 
-def mesh_surface(mesh: Mesh) -> MeshSurface:
-    """Return how the vertices of a mesh hang together."""
+def mesh_surface(mesh: Mesh, split: NDArray[np.bool_] | None = None) -> MeshSurface:
+    """Return how the vertices of a mesh hang together.
+
+    split : vertices that are places of their own, even where others are at the same place, as along closed lips that no
+            blendshape opens [shape=(V,)]; None: none
+    """
     normals = vertex_normals(mesh.vertices, mesh.triangles)
     places = _places(mesh, normals)
+    if split is not None:
+        places = np.unique(np.where(split, len(places) + np.arange(len(places)), places), return_inverse=True)[1]
+        places = places.reshape(-1).astype(np.int64)
     triangles = places[mesh.triangles]
-    pairs = np.unique(np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1), axis=0)
+    sides = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    pairs = np.unique(np.sort(sides, axis=1), axis=0)
     pairs = pairs[pairs[:, 0] != pairs[:, 1]]
     first = np.zeros(int(places.max(initial=-1)) + 1, np.int64)
     first[places[::-1]] = np.arange(len(places))[::-1]

@@ -44,7 +44,8 @@ def viseme_motion(units: Timeline[Unit], frames: int, rate_hz: float) -> Motion:
     """Return the weights of the 15 visemes over time, channels ``viseme_sil``, ``viseme_PP``, ...; 0 to 1.
 
     units : phones in time
-    At every time the weights add up to 1. In silence ``viseme_sil`` is 1 and all others are 0; in the middle of p, b and
+    At every time the weights add up to 1. In silence ``viseme_sil`` is 1 and all others are 0; in the middle of p,
+    b and
     m ``viseme_PP`` is 1.
     """
     said = viseme_curves(units, np.arange(frames) / rate_hz)

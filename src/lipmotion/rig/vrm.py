@@ -56,7 +56,10 @@ def _of_version_0(document: GltfDocument) -> dict[str, list[Bind]]:
     for group in groups:
         preset = str(group.get("presetName") or "").lower()
         name = PRESETS.get(preset, preset) if preset not in {"", "unknown"} else str(group.get("name") or "")
-        binds = [_bind(each.get("mesh"), each.get("index"), each.get("weight"), FULL) for each in _objects(group.get("binds"))]
+        binds = [
+            _bind(each.get("mesh"), each.get("index"), each.get("weight"), FULL)
+            for each in _objects(group.get("binds"))
+        ]
         found[name] = [bind for bind in binds if bind is not None]
     return found
 
