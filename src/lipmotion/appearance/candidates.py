@@ -95,15 +95,17 @@ def choose_candidates(coefficients: NDArray[np.floating[Any]], count: int = CAND
     return np.unique(_nearest(centres, values))
 
 
-def make_candidates(eigenlips: Eigenlips, pictures: Pictures) -> Candidates:
+def make_candidates(eigenlips: Eigenlips, pictures: Pictures, coefficients: Values | None = None) -> Candidates:
     """Return recorded mouth pictures as candidates, without those that are damaged.
 
-    eigenlips : of the same person
-    pictures  : those chosen [shape=(N, H, W, 3)], uint8
+    eigenlips    : of the same person
+    pictures     : those chosen [shape=(N, H, W, 3)], uint8
+    coefficients : of the same pictures [shape=(N, 3·K)], for eigenlips that are ``enlarged``; None: their projections
     A picture that differs from what its eigenlips restore by more than ``DEEPEST`` grey levels somewhere is left out.
     Raises InputError: no pictures, none that is whole, or of another size than those of the eigenlips.
     """
-    coefficients = eigenlips.project(pictures)
+    if coefficients is None:
+        coefficients = eigenlips.project(pictures)
     details = np.rint(pictures.astype(np.float32) - eigenlips.expand(coefficients))
     whole = np.abs(details).max(axis=(1, 2, 3)) <= DEEPEST
     if not whole.any():

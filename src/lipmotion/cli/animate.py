@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 
 from lipmotion.cli.options import add_workers, worker_count
 from lipmotion.cli.output import print_line, print_note
@@ -25,12 +26,15 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 def run(options: argparse.Namespace) -> None:
     """Call ``lipmotion.animate`` and ``lipmotion.write``; print the paths that were written."""
     from lipmotion.pipeline.animate import animate
+    from lipmotion.pipeline.film.video import person_shown
     from lipmotion.pipeline.posteriors import animate_with_posteriors, check_picture, write_posteriors
 
     check_results(options, options.speech)
     if options.posteriors:
         check_picture(options.posteriors, options.speech)
     request, model = request_and_model(options)
+    if request.onto is None:
+        request = replace(request, onto=person_shown(model, options.face, options.speaker))
     if options.posteriors:
         result, posteriors = animate_with_posteriors(request, model=model)
         write_posteriors(options.posteriors, result, posteriors)

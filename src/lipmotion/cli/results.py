@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from lipmotion.cli.faces import add_face_arguments, film_options
 from lipmotion.cli.paths import add_output
 
 if TYPE_CHECKING:
@@ -24,17 +25,20 @@ def add_result_arguments(parser: argparse.ArgumentParser, files: str, *, require
     add_output(parser, "-o", "--output", force=True, help=files, **outputs)
     parser.add_argument("--rate", type=float, metavar="HZ", help="frames per second of motion files (default: 100)")
     parser.add_argument("--channels", metavar="NAME,NAME", help="write only these to motion files: opening,width,...")
-    parser.add_argument("--fps", type=float, default=25.0, help="frames per second of videos (default: 25)")
-    parser.add_argument("--face", default="portrait", metavar="NAME", help="face that videos show (default: portrait)")
+    rate = "frames per second of videos (default: 25; of filmed faces, those of the footage)"
+    rate = "frames per second of videos (default: 25; of filmed faces, those of the footage)"
+    parser.add_argument("--fps", type=float, help=rate)
+    add_face_arguments(parser)
 
 
 def check_results(options: argparse.Namespace, speech: Path | None = None) -> None:
-    """Raise ExportError or InputError if an output cannot be written.
+    """Raise ExportError or InputError if an output cannot be written; replace the name of a face by the face.
 
     speech : the recording (None: there will be a sound that is in no file)
     """
-    from lipmotion.pipeline.animate import check_outputs
+    from lipmotion.pipeline.animate import check_outputs, opened_face
 
+    options.face = opened_face(options.face)
     checked = {"rate_hz": options.rate, "fps": options.fps, "face": options.face}
     check_outputs(options.output, speech, **checked, with_sound=speech is None)
 
@@ -55,4 +59,5 @@ def write_results(options: argparse.Namespace, result: Generation, speech: Path 
         rate_hz=options.rate,
         fps=options.fps,
         face=options.face,
+        film=film_options(options),
     )

@@ -11,8 +11,10 @@ from lipmotion.export.base import check_motion, motion_suffixes, write_motion
 from lipmotion.export.sound import SOUND_CODECS, write_sound
 from lipmotion.export.textgrid import TEXTGRID_SUFFIX, write_textgrid
 from lipmotion.faces.base import Face
+from lipmotion.faces.filmed.face import SUFFIX, FilmedFace, load_face
 from lipmotion.faces.registry import face_named
 from lipmotion.kernels.threads import one_thread
+from lipmotion.pipeline.film.video import FILM, FilmOptions, write_film
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.outlook import outlook_of
 from lipmotion.pipeline.request import SpeechInput, request_of
@@ -27,6 +29,8 @@ from lipmotion.types import Audio, Constraints, Generation, TimedTranscript
 VIDEO_SUFFIX = ".mp4"
 SOUND_RATE_HZ = 48_000
 """Sampling rate of the sound track of a drawn video."""
+DRAWN_HZ = 25.0
+"""Frame rate of videos of drawn faces."""
 SLOWEST_HZ, FASTEST_HZ = 1.0, 1000.0
 """Smallest and largest frame rate of a file; a mistyped rate must not fill the memory."""
 
@@ -76,8 +80,9 @@ def write(
     model: Model | None = None,
     channels: Sequence[str] | None = None,
     rate_hz: float | None = None,
-    fps: float = 25.0,
-    face: str = "portrait",
+    fps: float | None = None,
+    face: str | Path | Face | FilmedFace = "portrait",
+    film: FilmOptions = FILM,
 ) -> None:
     """Write generated motion to one or several files, each in the format of its suffix.
 
@@ -88,8 +93,10 @@ def write(
     model    : the model that generated the motion; motion files then name its corpus and licence
     channels : channels of motion files, in this order; None: all
     rate_hz  : frames per second of motion files, 1 to 1000; None: the 100 of the model
-    fps      : frames per second of videos, 1 to 1000
-    face     : the face of videos: ``portrait``, or the name of a face of an installed package
+    fps      : frames per second of videos, 1 to 1000; None: 25 for drawn faces, those of the footage for filmed ones
+    face     : the face of videos: ``portrait``, the name of a face of an installed package, or a filmed face (a value
+               or a ``.face`` file)
+    film     : how a filmed face is shown
     Raises ExportError: unknown suffix, no such folder, or a file that cannot be written.
     Raises InputError: a frame rate out of its range, or an unknown channel or face.
     The arguments are checked before the first file is written.
@@ -107,9 +114,9 @@ def write(
     recording = None if isinstance(speech, Audio) else speech
     check_outputs(paths, recording, rate_hz=rate_hz, fps=fps, face=face, with_sound=sound is not None)
     videos = [path for path in paths if path.suffix.lower() == VIDEO_SUFFIX]
-    if videos and "opening" not in generation.motion.names:
+    shown_face = opened_face(face)
+    if videos and not isinstance(shown_face, FilmedFace) and "opening" not in generation.motion.names:
         raise ExportError(f"{videos[0]}: the motion has no channel 'opening' to draw a face from; write motion files")
-    drawn_face = face_named(face)
     written = generation.selected(channels) if channels is not None else generation
     if rate_hz is not None:
         written = written.resampled(rate_hz)
@@ -121,9 +128,14 @@ def write(
         if path in sounds and sound is not None:
             write_sound(path, sound)
         elif path in videos:
-            _write_video(
-                generation, path, sound or read_audio(Path(str(recording)), SOUND_RATE_HZ, warn=False), fps, drawn_face
-            )
+            heard = sound or read_audio(Path(str(recording)), SOUND_RATE_HZ, warn=False)
+            if isinstance(shown_face, FilmedFace):
+                filmed = None if recording is None else Path(recording)
+                write_film(
+                    path, shown_face, generation.motion, heard, speech=filmed, model=model, fps=fps, options=film
+                )
+            else:
+                _write_video(generation, path, heard, DRAWN_HZ if fps is None else fps, shown_face)
         elif path.suffix.lower() == TEXTGRID_SUFFIX.lower():
             write_textgrid(path, generation.units)
         else:
@@ -135,8 +147,8 @@ def check_outputs(
     speech: str | Path | None = None,
     *,
     rate_hz: float | None = None,
-    fps: float = 25.0,
-    face: str = "portrait",
+    fps: float | None = None,
+    face: str | Path | Face | FilmedFace = "portrait",
     with_sound: bool = False,
 ) -> None:
     """Raise ExportError or InputError if an output cannot be written; called before long work begins.
@@ -147,7 +159,7 @@ def check_outputs(
     for hertz in (fps, rate_hz):
         if hertz is not None and not SLOWEST_HZ <= hertz <= FASTEST_HZ:
             raise InputError(f"the frame rate is {hertz}, required {SLOWEST_HZ:.0f} to {FASTEST_HZ:.0f} a second")
-    face_named(face)
+    opened_face(face)
     suffixes = (*motion_suffixes(), VIDEO_SUFFIX, TEXTGRID_SUFFIX, *(SOUND_CODECS if with_sound else ()))
     check_distinct([Path(path) for path in outputs])
     for path in map(Path, outputs):
@@ -156,6 +168,18 @@ def check_outputs(
         check_target(path, speech)
         if path.suffix.lower() == VIDEO_SUFFIX and speech is None and not with_sound:
             raise ExportError(f"{path}: a video needs the recording: write(..., speech=FILE)")
+
+
+def opened_face(face: str | Path | Face | FilmedFace) -> Face | FilmedFace:
+    """Return a face by its name, the one in a ``.face`` file, or the same face.
+
+    Raises InputError: no such face or file. Raises ModelFormatError: the file is damaged, or of another version.
+    """
+    if isinstance(face, Face | FilmedFace):
+        return face
+    if Path(face).suffix.lower() == SUFFIX:
+        return load_face(face)
+    return face_named(str(face))
 
 
 def _write_motion(generation: Generation, path: Path, speech: str | Path | None, model: Model | None) -> None:

@@ -36,7 +36,7 @@ def open_media(path: Path) -> Any:
     """
     import av
 
-    _bound_allocations()
+    bound_allocations()
     options = {
         "protocol_whitelist": "file",
         "format_whitelist": ",".join(MEDIA_FORMATS),
@@ -52,7 +52,7 @@ def open_media(path: Path) -> Any:
 
 
 @cache
-def _bound_allocations() -> None:
+def bound_allocations() -> None:
     """Limit FFmpeg's allocations to ``LARGEST_BLOCK``, in the whole process: it trusts the sizes in file headers."""
     import av._core
 
