@@ -54,7 +54,7 @@ def _shade(
     grazing2 = grazing * grazing
     open_sky, direct = reaches[:, 0], reaches[:, 1]
     up = 0.5 + 0.5 * normals[:, 1]
-    diffuse = [open_sky * (up * lamps[4, c] + (1.0 - up) * lamps[5, c]) for c in range(3)]
+    diffuse = [_bounced(open_sky, colours[:, c]) * (up * lamps[4, c] + (1.0 - up) * lamps[5, c]) for c in range(3)]
     edge = finish[:, 5] * grazing2 * grazing2 * open_sky
     shine = [edge * lamps[4, c] for c in range(3)]
     for n in range(2):
@@ -71,8 +71,10 @@ def _shade(
         glint = finish[:, 3] * across * np.minimum(np.maximum(4.0 * facing + 0.3, 0.0), 1.0) * arrives
         for c in range(3):
             soft = np.maximum(facing + finish[:, c], 0.0) / (1.0 + finish[:, c])
-            diffuse[c] = diffuse[c] + soft * np.sqrt(soft) * arrives * lamps[n, 3 + c]
-            shine[c] = shine[c] + np.where(finish[:, 3] > 0, glint * lamps[n, 3 + c], 0.0)
+            diffuse[c] = diffuse[c] + soft * np.sqrt(soft) * _bounced(arrives, colours[:, c]) * lamps[n, 3 + c]
+            glare = glint * lamps[n, 3 + c]
+            glare = np.where(finish[:, 6] > 0, glare * (4.0 * colours[:, c]), glare)
+            shine[c] = shine[c] + np.where(finish[:, 3] > 0, glare, 0.0)
     for n in range(2, 4):
         rim = np.maximum(_dot(normals, lamps[n, None, :3]), 0.0) * grazing2 * open_sky
         for c in range(3):
@@ -80,6 +82,11 @@ def _shade(
             shine[c] = shine[c] + 0.12 * rim * lamps[n, 3 + c]
     light = np.stack([colours[:, c] * diffuse[c] + shine[c] for c in range(3)], axis=1)
     return light.astype(np.float32)
+
+
+def _bounced(arrives: Real, colour: Real) -> Real:
+    """Return the light that arrives together with what the surface near by sends on, in its own colour."""
+    return arrives * (1.0 + colour * (1.0 - arrives))
 
 
 def _dot(a: Real, b: Real) -> Real:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,7 +54,7 @@ class Figure:
             Part("skin", self.skin.rest, self.skin.triangles, skin_colours(self.skin), palette.SKIN_FINISH, self.skin.normals),
             part("tongue", tongue_at_rest, tongue_triangles(), palette.TONGUE, palette.TONGUE_FINISH),
             lower_teeth(), upper_teeth(),
-            self._eye, self._eye.mirrored("right eye"), self._light, self._light.mirrored("right light"),
+            self._eye, self._eye.mirrored("right eye"), self._light, replace(self._light, name="right light"),
             part("lashes", lash, lash_triangles(), palette.LASH, palette.BROW_FINISH),
             part("right lashes", lash, lash_triangles(), palette.LASH, palette.BROW_FINISH),
             left_brow, left_brow.mirrored("right brow"),
@@ -64,7 +64,7 @@ class Figure:
         self.parts = tuple(parts)
         stops = np.cumsum([0, *(len(each.places) for each in parts)]).tolist()
         self.rows = {each.name: slice(a, b) for each, a, b in zip(parts, stops, stops[1:], strict=False)}
-        self.head = slice(0, self.rows["neck"].start)
+        self.head = slice(0, self.rows["clothing"].start)
         self.triangles = np.concatenate(
             [each.triangles + first for each, first in zip(parts, stops, strict=False)]
         ).astype(np.int32)
@@ -81,10 +81,14 @@ class Figure:
         self._kinds[lips[VISIBLE + 2 :].ravel()] = palette.FINISHES.index(palette.MOUTH_FINISH)
         self._lighting = Lighting(palette.FINISHES)
         self._reaches = self._baked()
+        self._held = np.zeros((stops[-1], 1))
+        share = np.clip((-1.0 - self._places[self.rows["neck"], 1]) / 0.6, 0, 1)
+        self._held[self.rows["neck"], 0] = share * share * (3 - 2 * share)
 
     def frame(self, pose: HeadPose, viewer: Real) -> Drawn:
         """Return places and light of all vertices in a pose, seen from a place [shape=(3,)]."""
         places, normals, colours = self._places.copy(), self._normals.copy(), self._colours.copy()
+        reaches_ = self._reaches.copy()
         skin, skin_normals = self.skin.posed(pose)
         places[self.rows["skin"]], normals[self.rows["skin"]] = skin, skin_normals
         licked = tongue(pose)
@@ -97,14 +101,15 @@ class Figure:
             places[self.rows[name], 1] += pose.brows
         inside = self._lit_inside(pose, skin)
         for rows in (self.rows["tongue"], lower, self.rows["upper teeth"], self._wall):
-            colours[rows] *= inside(places[rows])[:, None]
+            reaches_[rows] = inside(places[rows])[:, None]
         turn = turned(*pose.turn)
         strands = self._strands.copy()
-        places[self.head] = (places[self.head] - PIVOT) @ turn.T + PIVOT
-        normals[self.head] = normals[self.head] @ turn.T
+        held = self._held[self.head]
+        places[self.head] = held * places[self.head] + (1 - held) * ((places[self.head] - PIVOT) @ turn.T + PIVOT)
+        normals[self.head] = held * normals[self.head] + (1 - held) * (normals[self.head] @ turn.T)
         strands[self.head] = strands[self.head] @ turn.T
         light = self._lighting.light(
-            places, normals, colours, self._kinds, viewer, reaches=self._reaches, strands=strands
+            places, normals, colours, self._kinds, viewer, reaches=reaches_, strands=strands
         )
         return Drawn(places, light)
 
@@ -136,7 +141,7 @@ class Figure:
             depth = np.clip((front - places[:, 2] - 0.10) / (0.22 + 0.8 * span), 0, 1)
             under = np.clip((top - places[:, 1] + 0.01) / 0.05, 0, 1)
             aside = np.clip(1.35 - (places[:, 0] / half) ** 2, 0, 1)
-            return (1 - 0.93 * depth) ** 1.5 * (0.45 + 0.55 * under) * (0.35 + 0.65 * aside)
+            return (1 - 0.55 * pose.roundness) * (1 - 0.93 * depth) ** 1.5 * (0.45 + 0.55 * under) * (0.35 + 0.65 * aside)
 
         return inside
 

@@ -18,7 +18,7 @@ EYE = np.array([0.315, 0.0, -0.215])
 """Centre of the left eyeball; the right one is its mirror image."""
 EYEBALL, LID = 0.225, 0.243
 """Radii of the eyeball and of the skin upon it."""
-MOUTH_Y = -0.755
+MOUTH_Y = -0.70
 """Height of the line between the lips."""
 MIDDLE = np.array([0.0, -0.3, -0.75])
 """A place inside the head from which every place of the skin can be seen."""
@@ -51,15 +51,15 @@ def cut(a: Real, b: Real, blend: float) -> Real:
 
 
 def head(p: Real) -> Real:
-    """Return the distance from the skin of the head with its neck, without lips, eyes open or shut, and ears."""
+    """Return the distance from the skin of the head without neck, lips, eyes open or shut, and ears."""
     q = p.copy()
     q[:, 0] = np.abs(q[:, 0])
     d = ellipsoid(q, (0, 0.34, -0.80), (0.83, 0.92, 0.93))
     d = union(d, ellipsoid(q, (0, -0.30, -0.60), (0.72, 0.78, 0.60)), 0.35)
     d = union(d, ellipsoid(q, (0.34, -0.35, -0.33), (0.30, 0.27, 0.32)), 0.3)
-    d = union(d, cone(q, (0.0, -1.00, -0.27), (0.33, -0.62, -0.62), 0.16, 0.22), 0.35)
-    d = union(d, ellipsoid(q, (0, -1.03, -0.19), (0.19, 0.14, 0.16)), 0.22)
-    d = union(d, ellipsoid(q, (0, -0.76, -0.18), (0.36, 0.27, 0.22)), 0.25)
+    d = union(d, cone(q, (0.0, -0.95, -0.27), (0.33, -0.60, -0.62), 0.16, 0.22), 0.35)
+    d = union(d, ellipsoid(q, (0, -0.98, -0.185), (0.19, 0.14, 0.16)), 0.22)
+    d = union(d, ellipsoid(q, (0, -0.71, -0.17), (0.36, 0.27, 0.22)), 0.25)
     d = cut(d, ellipsoid(q, (0.33, 0.0, 0.10), (0.27, 0.2, 0.14)), 0.16)
     d = union(d, np.linalg.norm(q - EYE, axis=1) - LID, 0.05)
     d = union(d, cone(q, (0, 0.10, -0.07), (0, -0.35, 0.10), 0.052, 0.078), 0.14)
@@ -67,7 +67,7 @@ def head(p: Real) -> Real:
     d = union(d, ellipsoid(q, (0.094, -0.43, 0.045), (0.06, 0.055, 0.075)), 0.06)
     d = cut(d, ellipsoid(q, (0.052, -0.495, 0.105), (0.034, 0.026, 0.05)), 0.025)
     d = cut(d, ellipsoid(q, (0, -0.575, 0.065), (0.03, 0.07, 0.03)), 0.05)
-    return union(d, cone(q, (0, -0.9, -0.92), (0, -2.2, -1.02), 0.36, 0.38), 0.12)
+    return d
 
 
 def along_rays(form: Form, start: Real, direction: Real, *, steps: int = 70) -> Real:

@@ -74,7 +74,7 @@ def _hairline() -> Real:
 
 
 def _bun() -> Part:
-    down, around = np.meshgrid(np.linspace(0.02, np.pi - 0.02, 40), 2 * np.pi * np.arange(96) / 96, indexing="ij")
+    down, around = np.meshgrid(np.linspace(0.02, np.pi - 0.02, 48), 2 * np.pi * np.arange(160) / 160, indexing="ij")
     twist = around + 1.5 * down
     height = 1 - 2 * np.abs(np.sin(4 * twist + 0.7 * np.sin(2 * down))) ** 0.9
     radius = 1 + 0.055 * height
@@ -84,7 +84,7 @@ def _bun() -> Part:
     )
     strands = np.stack([-np.sin(around), 0.6 * np.ones_like(around), np.cos(around)], axis=-1).reshape(-1, 3)
     strands /= np.linalg.norm(strands, axis=1, keepdims=True)
-    triangles = grid_triangles(40, 96, closed=True)[:, ::-1]
+    triangles = grid_triangles(48, 160, closed=True)[:, ::-1]
     return part("bun", places.reshape(-1, 3) + BUN, triangles, _streaks(height.ravel()), palette.HAIR_FINISH, strands)
 
 
@@ -114,7 +114,7 @@ def _fringe() -> list[Part]:
     for n, (x, y, z, wide) in enumerate(_FRINGE):
         start = 0.24 + 0.015 * n
         points = [
-            (start, 1.0, -0.15, 0.02), (start + 0.12 * x, 0.90, -0.02, 0.10), (0.5 * (start + x), 0.74 - 0.06 * abs(x), -0.03, 0.115),
+            (start, 0.97, -0.2, -0.03), (start + 0.12 * x, 0.90, -0.02, 0.10), (0.5 * (start + x), 0.74 - 0.06 * abs(x), -0.03, 0.115),
             (0.97 * x, y + 0.20, z + 0.08, 0.08), (1.02 * x, y - 0.06, z - 0.06, 0.035),
         ]  # fmt: skip
         locks.append(_lock(points, wide, 0.05, 0.22 * (-1) ** n))

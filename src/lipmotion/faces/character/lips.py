@@ -116,7 +116,7 @@ def _opening(pose: HeadPose) -> tuple[Real, Real]:
 
     A round mouth has an elliptic hole that ends before the corners; a spread one is a slot with a flat edge.
     """
-    reach = 1 - 0.16 * pose.roundness
+    reach = 1 - 0.40 * pose.roundness
     power = 2 + 1.2 * pose.spread
     inside = np.maximum(1 - np.abs(ACROSS / reach) ** power, 0)
     hole = inside ** (0.92 - 0.40 * pose.roundness - 0.2 * pose.spread)

@@ -6,7 +6,7 @@ from lipmotion.rig.lighting import Finish
 
 Triple = tuple[float, float, float]
 
-SKIN = (0.945, 0.745, 0.645)
+SKIN = (0.95, 0.765, 0.675)
 SKIN_LIGHT = (0.975, 0.80, 0.70)
 BLUSH = (0.93, 0.50, 0.45)
 SKIN_DEEP = (0.72, 0.40, 0.34)
@@ -24,7 +24,7 @@ IRIS_DARK = (0.16, 0.30, 0.27)
 IRIS_RIM = (0.09, 0.15, 0.15)
 PUPIL = (0.03, 0.03, 0.035)
 LASH = (0.14, 0.08, 0.07)
-BROW = (0.34, 0.19, 0.13)
+BROW = (0.40, 0.235, 0.16)
 HAIR = (0.43, 0.235, 0.145)
 HAIR_LIGHT = (0.60, 0.35, 0.21)
 HAIR_DEEP = (0.25, 0.125, 0.085)
@@ -34,7 +34,7 @@ EARRING = (0.95, 0.80, 0.50)
 
 SKIN_FINISH = Finish((0.48, 0.28, 0.20), gloss=0.13, focus=4, edge=0.22)
 LIP_FINISH = Finish((0.40, 0.24, 0.20), gloss=0.34, focus=5, edge=0.12)
-MOUTH_FINISH = Finish((0.3, 0.2, 0.2), gloss=0.15, focus=5)
+MOUTH_FINISH = Finish((0.3, 0.2, 0.2))
 TOOTH_FINISH = Finish((0.5, 0.45, 0.4), gloss=0.22, focus=6, edge=0.05)
 TONGUE_FINISH = Finish((0.5, 0.3, 0.3), gloss=0.22, focus=5)
 EYE_FINISH = Finish((0.5, 0.42, 0.38), gloss=0.1, focus=6, edge=0.05)

@@ -112,7 +112,7 @@ class Skin:
 
 def jaw_weight(places: Real) -> Real:
     """Return how far places at rest belong to the jaw, 0 to 1 [shape=(N,)]."""
-    down = _step((-0.50 - places[:, 1]) / 0.42)
+    down = _step((-0.47 - places[:, 1]) / 0.40)
     front = _step((places[:, 2] + 0.98) / 0.45)
     return down * front
 

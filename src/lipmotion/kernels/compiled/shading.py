@@ -28,18 +28,19 @@ def shade(
         open_sky, direct = reaches[v]
         finish = finishes[kinds[v]]
         up = 0.5 + 0.5 * ny
-        red = open_sky * (up * lamps[4, 0] + (1.0 - up) * lamps[5, 0])
-        green = open_sky * (up * lamps[4, 1] + (1.0 - up) * lamps[5, 1])
-        blue = open_sky * (up * lamps[4, 2] + (1.0 - up) * lamps[5, 2])
+        cr, cg, cb = colours[v]
+        red = _bounced(open_sky, cr) * (up * lamps[4, 0] + (1.0 - up) * lamps[5, 0])
+        green = _bounced(open_sky, cg) * (up * lamps[4, 1] + (1.0 - up) * lamps[5, 1])
+        blue = _bounced(open_sky, cb) * (up * lamps[4, 2] + (1.0 - up) * lamps[5, 2])
         edge = finish[5] * grazing2 * grazing2 * open_sky
         shine_r, shine_g, shine_b = edge * lamps[4, 0], edge * lamps[4, 1], edge * lamps[4, 2]
         for n in range(2):
             lx, ly, lz = lamps[n, 0], lamps[n, 1], lamps[n, 2]
             arrives = direct if n == 0 else open_sky
             facing = nx * lx + ny * ly + nz * lz
-            red += _wrapped(facing, finish[0]) * arrives * lamps[n, 3]
-            green += _wrapped(facing, finish[1]) * arrives * lamps[n, 4]
-            blue += _wrapped(facing, finish[2]) * arrives * lamps[n, 5]
+            red += _wrapped(facing, finish[0]) * _bounced(arrives, cr) * lamps[n, 3]
+            green += _wrapped(facing, finish[1]) * _bounced(arrives, cg) * lamps[n, 4]
+            blue += _wrapped(facing, finish[2]) * _bounced(arrives, cb) * lamps[n, 5]
             if finish[3] > 0.0:
                 hx, hy, hz = ex + lx, ey + ly, ez + lz
                 length = np.sqrt(hx * hx + hy * hy + hz * hz)
@@ -51,9 +52,14 @@ def shade(
                 for _ in range(int(finish[4])):
                     across = across * across
                 glint = finish[3] * across * min(max(4.0 * facing + 0.3, 0.0), 1.0) * arrives
-                shine_r += glint * lamps[n, 3]
-                shine_g += glint * lamps[n, 4]
-                shine_b += glint * lamps[n, 5]
+                if finish[6] > 0.0:
+                    shine_r += glint * lamps[n, 3] * (4.0 * cr)
+                    shine_g += glint * lamps[n, 4] * (4.0 * cg)
+                    shine_b += glint * lamps[n, 5] * (4.0 * cb)
+                else:
+                    shine_r += glint * lamps[n, 3]
+                    shine_g += glint * lamps[n, 4]
+                    shine_b += glint * lamps[n, 5]
         for n in range(2, 4):
             facing = max(nx * lamps[n, 0] + ny * lamps[n, 1] + nz * lamps[n, 2], 0.0)
             rim = facing * grazing2 * open_sky
@@ -63,9 +69,14 @@ def shade(
             shine_r += 0.12 * rim * lamps[n, 3]
             shine_g += 0.12 * rim * lamps[n, 4]
             shine_b += 0.12 * rim * lamps[n, 5]
-        light[v, 0] = colours[v, 0] * red + shine_r
-        light[v, 1] = colours[v, 1] * green + shine_g
-        light[v, 2] = colours[v, 2] * blue + shine_b
+        light[v, 0] = cr * red + shine_r
+        light[v, 1] = cg * green + shine_g
+        light[v, 2] = cb * blue + shine_b
+
+
+@compiled
+def _bounced(arrives: float, colour: float) -> float:
+    return arrives * (1.0 + colour * (1.0 - arrives))
 
 
 @compiled
