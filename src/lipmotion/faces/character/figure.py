@@ -62,9 +62,11 @@ class Figure:
             neck(), clothing(), collar(),
         ]  # fmt: skip
         self.parts = tuple(parts)
+        names = [each.name for each in parts]
         stops = np.cumsum([0, *(len(each.places) for each in parts)]).tolist()
         self.rows = {each.name: slice(a, b) for each, a, b in zip(parts, stops, stops[1:], strict=False)}
         self.head = slice(0, self.rows["clothing"].start)
+        self.first_still_triangle = sum(len(each.triangles) for each in parts[: names.index("clothing")])
         self.triangles = np.concatenate(
             [each.triangles + first for each, first in zip(parts, stops, strict=False)]
         ).astype(np.int32)
