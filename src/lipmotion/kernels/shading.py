@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 from lipmotion.kernels.choice import compiled_pays
 
 Real = NDArray[np.float64]
+AWAY = -0.35
+"""Vertices that face further away than this (the cosine) are not seen, and stay dark."""
 VERTEX_S = 1.2e-6
 """Time that NumPy takes for a vertex."""
 
@@ -50,7 +52,8 @@ def _shade(
 ) -> NDArray[np.float32]:
     eye = viewer - places
     eye = eye / np.sqrt(_dot(eye, eye))[:, None]
-    grazing = np.minimum(np.maximum(1.0 - _dot(normals, eye), 0.0), 1.0)
+    faces = _dot(normals, eye)
+    grazing = np.minimum(np.maximum(1.0 - faces, 0.0), 1.0)
     grazing2 = grazing * grazing
     open_sky, direct = reaches[:, 0], reaches[:, 1]
     up = 0.5 + 0.5 * normals[:, 1]
@@ -81,6 +84,7 @@ def _shade(
             diffuse[c] = diffuse[c] + 0.9 * rim * lamps[n, 3 + c]
             shine[c] = shine[c] + 0.12 * rim * lamps[n, 3 + c]
     light = np.stack([colours[:, c] * diffuse[c] + shine[c] for c in range(3)], axis=1)
+    light[faces < AWAY] = 0
     return light.astype(np.float32)
 
 

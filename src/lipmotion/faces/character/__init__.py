@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from lipmotion.faces.base import Face
 from lipmotion.faces.character.liveliness import SEED
 from lipmotion.faces.character.performance import head_poses
-from lipmotion.faces.character.pose import HeadPose
+from lipmotion.faces.character.pose import FacePose
 from lipmotion.types import Motion, Timeline, Unit
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ def render(
     return _frames(poses, camera)
 
 
-def _frames(poses: list[HeadPose], camera: object) -> Iterator[NDArray[np.uint8]]:
+def _frames(poses: list[FacePose], camera: object) -> Iterator[NDArray[np.uint8]]:
     from lipmotion.faces.character.stage import Stage
 
     stage = Stage(camera)

@@ -15,7 +15,7 @@ from lipmotion.faces.character.hair import hair
 from lipmotion.faces.character.inside import lower_teeth, tongue, tongue_triangles, upper_teeth
 from lipmotion.faces.character.lips import RINGS, VISIBLE
 from lipmotion.faces.character.part import Part, part
-from lipmotion.faces.character.pose import HeadPose
+from lipmotion.faces.character.pose import FacePose
 from lipmotion.faces.character.skin import REST, Skin, jaw_moved
 from lipmotion.faces.character.tint import skin_colours
 from lipmotion.rig.lighting import Lighting
@@ -87,7 +87,7 @@ class Figure:
         share = np.clip((-1.0 - self._places[self.rows["neck"], 1]) / 0.6, 0, 1)
         self._held[self.rows["neck"], 0] = share * share * (3 - 2 * share)
 
-    def frame(self, pose: HeadPose, viewer: Real) -> Drawn:
+    def frame(self, pose: FacePose, viewer: Real) -> Drawn:
         """Return places and light of all vertices in a pose, seen from a place [shape=(3,)]."""
         places, normals, colours = self._places.copy(), self._normals.copy(), self._colours.copy()
         reaches_ = self._reaches.copy()
@@ -115,7 +115,7 @@ class Figure:
         )
         return Drawn(places, light)
 
-    def _look(self, pose: HeadPose, places: Real, normals: Real, colours: Real) -> None:
+    def _look(self, pose: FacePose, places: Real, normals: Real, colours: Real) -> None:
         """Place eyeballs, reflections and lashes, and shade the eyes under their upper lids."""
         look, half = turned(*pose.gaze), turned(0.35 * pose.gaze[0], 0.35 * pose.gaze[1])
         x, y = self.skin.lids_of_eye.opening(pose)
@@ -133,7 +133,7 @@ class Figure:
             places[self.rows[name + "lashes"]] = lashes(lid, pose.shut) * flip
             normals[self.rows[name + "lashes"]] = [0.0, 0.0, 1.0]
 
-    def _lit_inside(self, pose: HeadPose, skin: Real):  # noqa: ANN202
+    def _lit_inside(self, pose: FacePose, skin: Real):  # noqa: ANN202
         """Return the function from places in the mouth to the part of the light that arrives there."""
         ring = skin[self.skin.lip_rows()[VISIBLE - 1]]
         top, low, front = ring[_MIDDLE, 1], ring[_LAST, 1], 0.5 * (ring[_MIDDLE, 2] + ring[_LAST, 2])

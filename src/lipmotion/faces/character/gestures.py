@@ -63,6 +63,7 @@ SPREAD = Gesture(
     },
     0.10,
 )  # fmt: skip
+TEETH_TOGETHER = Gesture(dict.fromkeys(("s", "z", "sh", "zh", "ch", "jh"), 1.0), 0.08)
 SILENT = Gesture(dict.fromkeys((SILENCE, PAUSE), 1.0), 0.10)
 LEAST_PAUSE_S = 0.15
 """In shorter pauses between words the mouth goes on."""

@@ -21,7 +21,7 @@ _LINE = (
     (0.42, -0.70, -1.26), (0.0, -0.74, -1.28),
 )  # fmt: skip
 """About where the hair begins, from the middle of the forehead round the left ear to the nape."""
-_COLUMNS, _ROWS = 300, 40
+_COLUMNS, _ROWS = 270, 30
 
 
 def hair() -> Part:
@@ -74,7 +74,7 @@ def _hairline() -> Real:
 
 
 def _bun() -> Part:
-    down, around = np.meshgrid(np.linspace(0.02, np.pi - 0.02, 48), 2 * np.pi * np.arange(160) / 160, indexing="ij")
+    down, around = np.meshgrid(np.linspace(0.02, np.pi - 0.02, 36), 2 * np.pi * np.arange(128) / 128, indexing="ij")
     twist = around + 1.5 * down
     height = 1 - 2 * np.abs(np.sin(4 * twist + 0.7 * np.sin(2 * down))) ** 0.9
     radius = 1 + 0.055 * height
@@ -84,7 +84,7 @@ def _bun() -> Part:
     )
     strands = np.stack([-np.sin(around), 0.6 * np.ones_like(around), np.cos(around)], axis=-1).reshape(-1, 3)
     strands /= np.linalg.norm(strands, axis=1, keepdims=True)
-    triangles = grid_triangles(48, 160, closed=True)[:, ::-1]
+    triangles = grid_triangles(36, 128, closed=True)[:, ::-1]
     return part("bun", places.reshape(-1, 3) + BUN, triangles, _streaks(height.ravel()), palette.HAIR_FINISH, strands)
 
 

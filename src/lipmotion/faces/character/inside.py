@@ -9,7 +9,7 @@ from lipmotion.faces.character import palette
 from lipmotion.faces.character.forms import MOUTH_Y
 from lipmotion.faces.character.lips import ARCH, TEETH_EDGE, TEETH_Z
 from lipmotion.faces.character.part import Part, grid_triangles, joined_parts, part
-from lipmotion.faces.character.pose import HeadPose
+from lipmotion.faces.character.pose import FacePose
 from lipmotion.faces.character.skin import jaw_moved
 
 Real = NDArray[np.float64]
@@ -17,7 +17,7 @@ Real = NDArray[np.float64]
 _UPPER_EDGES = (0.0, 0.062, 0.112, 0.155, 0.192, 0.222, 0.247)
 _LOWER_EDGES = (0.0, 0.040, 0.082, 0.125, 0.165, 0.2, 0.23)
 """Where teeth touch their neighbours: distances from the middle, seen from the front."""
-LOWER_EDGE = TEETH_EDGE + 0.004
+LOWER_EDGE = TEETH_EDGE - 0.024
 """Height of the edge of the lower incisors, behind the upper ones, when the jaw is closed."""
 _TONGUE_RINGS, _TONGUE_SIDES = 22, 20
 
@@ -78,7 +78,7 @@ def tongue_triangles() -> NDArray[np.int32]:
     return grid_triangles(_TONGUE_RINGS, _TONGUE_SIDES, closed=True)[:, ::-1]
 
 
-def tongue(pose: HeadPose) -> Real:
+def tongue(pose: FacePose) -> Real:
     """Return the places of the tongue from root to tip [shape=(V, 3)], the head not turned."""
     floor = LOWER_EDGE - 0.075
     root, body = np.array([0, floor - 0.05, -0.46]), np.array([0, floor + 0.075, -0.36])

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError
 from lipmotion.faces.character import gestures
 from lipmotion.faces.character.liveliness import SEED, liveliness
-from lipmotion.faces.character.pose import HeadPose
+from lipmotion.faces.character.pose import FacePose
 from lipmotion.types import Motion, Timeline, Unit
 from lipmotion.units import LIP_CLOSING, is_silent
 
@@ -16,8 +16,9 @@ Curve = NDArray[np.float64]
 
 CLOSED_BELOW = 0.012
 """Tracked lips that touch have openings up to this; smaller openings are drawn closed."""
-FAITHFUL_ABOVE = 0.03
-"""From here on the drawn gap equals the opening; between the two limits it rises linearly."""
+OPEN_FROM, PARTED, GROWTH = 0.03, 0.022, 0.86
+"""From this opening on the gap is the opening times the growth, plus the length: trackers read less of small openings and
+more of wide ones (docs/results/head.md). Below it rises from 0, where the lips touch."""
 WIDEST = 0.4
 """Largest drawn gap; openings of speech stay below 0.35."""
 WIDTH_GAIN, WIDTH_REACH = 1.5, 0.34
@@ -26,13 +27,15 @@ TUCKED_GAP = (0.022, 0.05)
 """Range of the gap while the lower lip is on the teeth."""
 TONGUE_GAP = 0.045
 """Least gap while the tongue is between the teeth."""
+ROUND_GAP = 0.022
+"""Added to the gap of round lips, whose hole is narrow."""
 PAUSED_GAP = 0.03
 """Largest gap in pauses, in which people breathe with lips that hardly part."""
 DRAWN = ("opening", "width", "outer", "y_152")
 """The channels that are drawn."""
 
 
-def head_poses(motion: Motion, units: Timeline[Unit], fps: float, *, seed: int = SEED) -> list[HeadPose]:
+def head_poses(motion: Motion, units: Timeline[Unit], fps: float, *, seed: int = SEED) -> list[FacePose]:
     """Return the pose of every video frame, frame n at ``n / fps`` seconds, to the end of the motion.
 
     seed : of blinks, glances and the movement of the head
@@ -48,22 +51,23 @@ def head_poses(motion: Motion, units: Timeline[Unit], fps: float, *, seed: int =
     tuck = gestures.TUCK.weight(units, time_s) * (1 - press)
     out = gestures.TONGUE_OUT.weight(units, time_s) * (1 - press)
     gap = _gap(motion, time_s, fps)
+    rounding = gestures.ROUND.weight(units, time_s) * (1 - pause)
+    gap += ROUND_GAP * rounding * np.clip(gap / 0.03, 0, 1)
     gap += tuck * (np.clip(gap, *TUCKED_GAP) - gap)
     gap += out * (np.maximum(gap, TONGUE_GAP) - gap)
     gap += pause * (np.minimum(gap, PAUSED_GAP) - gap)
     gap = _closed(gap * (1 - press), units, time_s)
     change = _at(motion, _width(motion, rest), time_s)
-    rounding = gestures.ROUND.weight(units, time_s) * (1 - pause)
     spread = gestures.SPREAD.weight(units, time_s) * (1 - pause)
     narrow = np.clip(-change / 0.16, 0, 1) * (1 - spread)
-    roundness = np.maximum(rounding, 0.6 * narrow)
+    roundness = np.maximum(rounding, 0.4 * narrow)
     wide = np.clip(np.maximum(spread, np.clip(change / 0.12, 0, 1)) - roundness, 0, 1)
     rise = upper_share(gap) + tuck * np.maximum(0.02 - upper_share(gap), 0)
     alive = liveliness(gap, pause, fps, seed=seed)
     curves = {
         "gap": gap,
         "upper_rise": np.minimum(rise, gap),
-        "jaw": _jaw(motion, rest, gap, time_s) + 0.012 * (1 - pause) * (1 - press),
+        "jaw": _jaw(motion, rest, gap, time_s) * (1 - 0.7 * gestures.TEETH_TOGETHER.weight(units, time_s)),
         "width": 1 + change - 0.13 * rounding + 0.045 * spread,
         "fullness": _at(motion, _fullness(motion, rest), time_s) * (1 + 0.08 * roundness),
         "roundness": roundness,
@@ -79,15 +83,16 @@ def head_poses(motion: Motion, units: Timeline[Unit], fps: float, *, seed: int =
     }
     rows = np.stack(list(curves.values()), axis=1).tolist()
     return [
-        HeadPose(**dict(zip(curves, row, strict=True)), gaze=(gaze[0], gaze[1]), turn=(turn[0], turn[1], turn[2]))
+        FacePose(**dict(zip(curves, row, strict=True)), gaze=(gaze[0], gaze[1]), turn=(turn[0], turn[1], turn[2]))
         for row, gaze, turn in zip(rows, alive.gaze.tolist(), alive.turn.tolist(), strict=True)
     ]
 
 
 def drawn_gap(opening: Curve) -> Curve:
     """Return the gap to draw for a measured opening [shape=(T,)]; exactly 0 where the lips touch."""
-    rising = (opening - CLOSED_BELOW) * (FAITHFUL_ABOVE / (FAITHFUL_ABOVE - CLOSED_BELOW))
-    return np.clip(np.minimum(opening, rising), 0, WIDEST)
+    parted = GROWTH * opening + PARTED
+    risen = np.clip((opening - CLOSED_BELOW) / (OPEN_FROM - CLOSED_BELOW), 0, 1)
+    return np.clip(parted * risen, 0, WIDEST)
 
 
 def upper_share(gap: Curve) -> Curve:

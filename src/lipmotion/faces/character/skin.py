@@ -9,7 +9,7 @@ from scipy.spatial import Delaunay, cKDTree
 from lipmotion.faces.character.eyelids import LID_COLUMNS, LID_RINGS, Eyelids
 from lipmotion.faces.character.forms import MIDDLE, MOUTH_Y, head, outward, seen_from_front, seen_from_middle
 from lipmotion.faces.character.lips import ACROSS, COLUMNS, RINGS, SIDE, lip_surface, section_points
-from lipmotion.faces.character.pose import HeadPose
+from lipmotion.faces.character.pose import FacePose
 from lipmotion.rig.rasteriser import normals_of
 
 Real = NDArray[np.float64]
@@ -19,7 +19,7 @@ SPACING = 0.030
 """Distance of the vertices in the middle of the face, in radians about ``MIDDLE``."""
 HINGE = np.array([0.0, -0.32, -0.82])
 """The axis of the jaw goes through here, from ear to ear."""
-REST = HeadPose()
+REST = FacePose()
 
 
 class Skin:
@@ -61,7 +61,7 @@ class Skin:
         """Return the vertices of the lids of the left (0) or right (1) eye [shape=(LID_RINGS + 1, LID_COLUMNS)]."""
         return self._lid_rows(eye)
 
-    def posed(self, pose: HeadPose) -> tuple[Real, Real]:
+    def posed(self, pose: FacePose) -> tuple[Real, Real]:
         """Return places and normals of all vertices [shape=(V, 3), both], the head not turned."""
         places = self._places(pose)
         change = normals_of(places, self.triangles) - self._meshed_rest
@@ -96,7 +96,7 @@ class Skin:
         shares *= np.exp(-across[self._bound] / 0.5)
         self._shares = shares / shares.sum(axis=1, keepdims=True) * self.lip_weight[self._bound, None]
 
-    def _places(self, pose: HeadPose) -> Real:
+    def _places(self, pose: FacePose) -> Real:
         points = section_points(pose, self.base_z)
         lips = lip_surface(points)
         moved = lips[0] - self._contour
@@ -179,7 +179,7 @@ def _triangles(face: Real, contour: int, edge: int) -> NDArray[np.int32]:
     flat = _on_map(face)
     found = Delaunay(flat).simplices
     middle = flat[found].mean(axis=1)
-    hole = _within(middle, flat[:contour])
+    hole = _within(middle, flat[:contour]) | _under_hair(face[found].mean(axis=1))
     for eye in range(2):
         hole |= _within(middle, flat[contour + eye * edge : contour + (eye + 1) * edge])
     found = found[~hole]
@@ -187,6 +187,12 @@ def _triangles(face: Real, contour: int, edge: int) -> NDArray[np.int32]:
     turned = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0] < 0
     found[turned] = found[turned][:, ::-1]
     return found.astype(np.int32)
+
+
+def _under_hair(places: Real) -> NDArray[np.bool_]:
+    """Return which places of the head the hair always hides [shape=(N,)]."""
+    x, y, z = np.abs(places[:, 0]), places[:, 1], places[:, 2]
+    return (y > 1.0 - 0.6 * np.maximum(x - 0.2, 0)) | ((y > 0.1) & (z < -0.75)) | (z < -1.2)
 
 
 def _within(points: Real, polygon: Real) -> NDArray[np.bool_]:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.faces.character.figure import Figure
-from lipmotion.faces.character.pose import HeadPose
+from lipmotion.faces.character.pose import FacePose
 from lipmotion.rig.rasteriser import Camera, Canvas
 
 CENTRE = (0.0, -0.03)
@@ -33,11 +33,11 @@ class Stage:
     def __init__(self, camera: Camera) -> None:
         self.figure = figure()
         self.canvas = Canvas(camera)
-        still = self.figure.frame(HeadPose(), camera.place)
+        still = self.figure.frame(FacePose(), camera.place)
         first = self.figure.first_still_triangle
         self._still = self.canvas.picture(still.places, still.light, self.figure.triangles[first:])
 
-    def picture(self, pose: HeadPose) -> NDArray[np.uint8]:
+    def picture(self, pose: FacePose) -> NDArray[np.uint8]:
         """Return the picture of a pose [shape=(H, W, 3)]; only the box around head and neck is drawn anew."""
         drawn = self.figure.frame(pose, self.canvas.camera.place)
         head = drawn.places[self.figure.head]

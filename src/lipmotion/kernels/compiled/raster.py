@@ -23,27 +23,47 @@ def draw(
 ) -> None:  # fmt: skip
     """Draw triangles over the background into an area of a picture, in place; arguments as of ``kernels.raster``."""
     left, top, right, bottom = area
-    faces = np.empty(len(triangles), np.intp)
-    rows = np.empty((len(triangles), 2), np.int32)
-    count = 0
-    for f in range(len(triangles)):
-        a, b, c = triangles[f]
-        if (x[b] - x[a]) * (y[c] - y[a]) - (x[c] - x[a]) * (y[b] - y[a]) < 0:
-            rows[count, 0] = np.int32(np.floor(min(y[a], y[b], y[c])))
-            rows[count, 1] = np.int32(np.ceil(max(y[a], y[b], y[c])))
-            faces[count] = f
-            count += 1
+    bands = (bottom - top + BAND - 1) // BAND
+    faces, starts = _by_band(x, y, triangles, 2 * left, 2 * right, 2 * top, bands)
     width = right - left
     depth = np.empty((2 * BAND, 2 * width), np.float32)
     colour = np.empty((2 * BAND, 2 * width, 3), np.float32)
-    for first in range(top, bottom, BAND):
+    for band in range(bands):
+        first = top + band * BAND
         last = min(first + BAND, bottom)
         depth[:] = FAR
-        for n in range(count):
-            if rows[n, 0] < 2 * last and rows[n, 1] > 2 * first:
-                a, b, c = triangles[faces[n]]
-                _triangle(x, y, z, colours, a, b, c, 2 * left, 2 * right, 2 * first, 2 * last, depth, colour)
+        for n in range(starts[band], starts[band + 1]):
+            a, b, c = triangles[faces[n]]
+            _triangle(x, y, z, colours, a, b, c, 2 * left, 2 * right, 2 * first, 2 * last, depth, colour)
         _resolve(depth, colour, background, tone, picture, left, right, first, last)
+
+
+@compiled
+def _by_band(
+    x: Real, y: Real, triangles: NDArray[np.int32], left: int, right: int, top: int, bands: int
+) -> tuple[NDArray[np.int32], NDArray[np.intp]]:
+    """Return the triangles that face the viewer, band after band, and where the triangles of each band begin."""
+    spans = np.empty((len(triangles), 2), np.int32)
+    starts = np.zeros(bands + 1, np.intp)
+    for f in range(len(triangles)):
+        a, b, c = triangles[f]
+        spans[f, 0], spans[f, 1] = 1, 0
+        faces_viewer = (x[b] - x[a]) * (y[c] - y[a]) - (x[c] - x[a]) * (y[b] - y[a]) < 0
+        if faces_viewer and min(x[a], x[b], x[c]) < right and max(x[a], x[b], x[c]) > left:
+            low, high = min(y[a], y[b], y[c]), max(y[a], y[b], y[c])
+            spans[f, 0] = max(int(np.floor((low - top) / (2 * BAND))), 0)
+            spans[f, 1] = min(int(np.floor((high - top) / (2 * BAND))), bands - 1)
+            for band in range(spans[f, 0], spans[f, 1] + 1):
+                starts[band + 1] += 1
+    for band in range(bands):
+        starts[band + 1] += starts[band]
+    faces = np.empty(starts[bands], np.int32)
+    filled = starts.copy()
+    for f in range(len(triangles)):
+        for band in range(spans[f, 0], spans[f, 1] + 1):
+            faces[filled[band]] = f
+            filled[band] += 1
+    return faces, starts
 
 
 @compiled
@@ -62,14 +82,16 @@ def _triangle(
     red, green, blue = colours[a]
     red_b, green_b, blue_b = colours[b, 0] - red, colours[b, 1] - green, colours[b, 2] - blue
     red_c, green_c, blue_c = colours[c, 0] - red, colours[c, 1] - green, colours[c, 2] - blue
+    step_a, step_b, step_c = yc - yb, ya - yc, yb - ya
     for row in range(y0, y1):
-        py = row + 0.5
+        px, py = x0 + 0.5, row + 0.5
+        of_a = (xc - xb) * (py - yb) - step_a * (px - xb)
+        of_b = (xa - xc) * (py - yc) - step_b * (px - xc)
+        of_c = (xb - xa) * (py - ya) - step_c * (px - xa)
+        within = False
         for column in range(x0, x1):
-            px = column + 0.5
-            of_a = (xc - xb) * (py - yb) - (yc - yb) * (px - xb)
-            of_b = (xa - xc) * (py - yc) - (ya - yc) * (px - xc)
-            of_c = (xb - xa) * (py - ya) - (yb - ya) * (px - xa)
             if of_a >= bias_a and of_b >= bias_b and of_c >= bias_c:
+                within = True
                 share_b, share_c = np.float32(of_b * inverse), np.float32(of_c * inverse)
                 away = za + (share_b * zb + share_c * zc)
                 if away < depth[row - top, column - left]:
@@ -78,6 +100,11 @@ def _triangle(
                     sample[0] = red + (share_b * red_b + share_c * red_c)
                     sample[1] = green + (share_b * green_b + share_c * green_c)
                     sample[2] = blue + (share_b * blue_b + share_c * blue_c)
+            elif within:
+                break
+            of_a -= step_a  # exact, as the corners are
+            of_b -= step_b
+            of_c -= step_c
 
 
 @compiled
@@ -92,17 +119,19 @@ def _resolve(
     depth: Colours, colour: Colours, background: Colours, tone: NDArray[np.uint8], picture: NDArray[np.uint8],
     left: int, right: int, first: int, last: int,
 ) -> None:  # fmt: skip
-    most = np.float32(len(tone) - 1)
-    quarter, zero = np.float32(0.25), np.float32(0)
+    most, quarter = np.float32(len(tone) - 1), np.float32(0.25)
+    zero, one = np.float32(0), np.float32(1)
     for row in range(first, last):
+        i = 2 * (row - first)
         for column in range(left, right):
-            i, j = 2 * (row - first), 2 * (column - left)
+            j = 2 * (column - left)
+            empty_a, empty_b = depth[i, j] == FAR, depth[i, j + 1] == FAR
+            empty_c, empty_d = depth[i + 1, j] == FAR, depth[i + 1, j + 1] == FAR
             for k in range(3):
                 behind = background[row, column, k]
-                total = zero
-                for di in range(2):
-                    for dj in range(2):
-                        empty = depth[i + di, j + dj] == FAR
-                        total += behind if empty else colour[i + di, j + dj, k]
-                level = min(max(quarter * total, zero), np.float32(1)) * most
+                total = behind if empty_a else colour[i, j, k]
+                total += behind if empty_b else colour[i, j + 1, k]
+                total += behind if empty_c else colour[i + 1, j, k]
+                total += behind if empty_d else colour[i + 1, j + 1, k]
+                level = min(max(quarter * total, zero), one) * most
                 picture[row, column, k] = tone[int(level)]

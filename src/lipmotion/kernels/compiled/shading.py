@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from lipmotion.kernels.compiled.compiler import compiled
 
 Real = NDArray[np.float64]
+AWAY = -0.35
+"""Vertices that face further away than this (the cosine) are not seen, and stay dark."""
 
 
 @compiled
@@ -23,7 +25,11 @@ def shade(
         ex, ey, ez = viewer[0] - places[v, 0], viewer[1] - places[v, 1], viewer[2] - places[v, 2]
         far = np.sqrt(ex * ex + ey * ey + ez * ez)
         ex, ey, ez = ex / far, ey / far, ez / far
-        grazing = min(max(1.0 - (nx * ex + ny * ey + nz * ez), 0.0), 1.0)
+        faces = nx * ex + ny * ey + nz * ez
+        if faces < AWAY:
+            light[v] = 0.0
+            continue
+        grazing = min(max(1.0 - faces, 0.0), 1.0)
         grazing2 = grazing * grazing
         open_sky, direct = reaches[v]
         finish = finishes[kinds[v]]
