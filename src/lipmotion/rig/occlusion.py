@@ -16,11 +16,18 @@ BIAS, SOFT = 0.05, 0.10
 
 
 def reaches(
-    places: Real, normals: Real, hiding: NDArray[np.bool_], *, directions: int = 72, lamps: int = 20
+    places: Real,
+    normals: Real,
+    triangles: NDArray[np.int32],
+    hiding: NDArray[np.bool_],
+    *,
+    directions: int = 72,
+    lamps: int = 20,
 ) -> Real:
     """Return the parts of the sky and of the key light that reach the vertices, 0 to 1 [shape=(V, 2)].
 
     places, normals : of the vertices, which must be dense: no further apart than ``CELL`` [shape=(V, 3)]
+    triangles  : along which the result is smoothed [shape=(F, 3)]
     hiding     : which of them hide others [shape=(V,)]
     directions : number of directions of the sky;  lamps : number of places on the key light, which is large and soft
     Cost: O(V · directions).
@@ -39,7 +46,23 @@ def reaches(
     for n in range(lamps):
         radius, angle = 0.22 * np.sqrt((n + 0.5) / lamps), 2.39996 * n
         direct += _visible(places, hiding, unit(key + radius * (np.cos(angle) * around + np.sin(angle) * above)))
-    return np.stack([sky, direct / lamps], axis=1)
+    return _smoothed(np.stack([sky, direct / lamps], axis=1), triangles)
+
+
+def _smoothed(values: Real, triangles: NDArray[np.int32], times: int = 4) -> Real:
+    """Return values of vertices as means over the triangles around them [shape=(V, 2)]."""
+    count = np.maximum(np.bincount(triangles.ravel(), minlength=len(values)), 1)[:, None]
+    for _ in range(times):
+        mean = values[triangles].mean(axis=1)
+        total = np.stack(
+            [
+                sum(np.bincount(triangles[:, corner], mean[:, k], minlength=len(values)) for corner in range(3))
+                for k in range(values.shape[1])
+            ],
+            axis=1,
+        )
+        values = total / count
+    return values
 
 
 def _sphere(count: int) -> Real:

@@ -90,6 +90,6 @@ def collar() -> Part:
     around = 2 * np.pi * np.arange(161) / 160
     path = np.stack([0.475 * np.cos(around), -1.60 - 0.09 * np.sin(around), -0.98 + 0.44 * np.sin(around)], axis=1)
     upward = np.stack([np.cos(around), np.full(161, 0.35), np.sin(around)], axis=1)
-    rib = 1 + 0.07 * np.cos(40 * around)
+    rib = 1 + 0.04 * np.cos(40 * around)
     places, triangles, _ = tube(path, 0.075 * np.ones(161), 0.05 * rib, upward, sides=14)
     return part("collar", places, triangles, palette.CLOTH_RIB, palette.CLOTH_FINISH)

@@ -12,7 +12,7 @@ from lipmotion.faces.character.body import clothing, collar, ear, earring, neck
 from lipmotion.faces.character.eyes import LASHES, brow, catchlights, eyeball, lash_triangles, lashes
 from lipmotion.faces.character.forms import EYE
 from lipmotion.faces.character.hair import hair
-from lipmotion.faces.character.inside import lower_teeth, tongue, tongue_triangles, upper_teeth
+from lipmotion.faces.character.inside import lower_drop, lower_teeth, tongue, tongue_triangles, upper_teeth
 from lipmotion.faces.character.lips import RINGS, VISIBLE
 from lipmotion.faces.character.part import Part, part
 from lipmotion.faces.character.pose import FacePose
@@ -97,13 +97,14 @@ class Figure:
         places[self.rows["tongue"]] = licked
         normals[self.rows["tongue"]] = normals_of(licked, tongue_triangles())
         lower = self.rows["teeth"]
-        places[lower] = jaw_moved(places[lower], pose.jaw)
+        places[lower] = jaw_moved(places[lower], lower_drop(pose))
         self._look(pose, places, normals, colours)
         for name in ("brow", "right brow"):
             places[self.rows[name], 1] += pose.brows
         inside = self._lit_inside(pose, skin)
         for rows in (self.rows["tongue"], lower, self.rows["upper teeth"], self._wall):
             reaches_[rows] = inside(places[rows])[:, None]
+        reaches_[self.rows["tongue"]] = np.minimum(1.0, 1.7 * reaches_[self.rows["tongue"]])
         turn = turned(*pose.turn)
         strands = self._strands.copy()
         held = self._held[self.head]
@@ -158,7 +159,7 @@ class Figure:
         for name in inner:
             hiding[self.rows[name]] = False
         hiding[self._wall] = False
-        lit = reaches(places, self._normals, hiding)
+        lit = reaches(places, self._normals, self.triangles, hiding)
         for name in inner - set(eyes):
             lit[self.rows[name]] = 1
         lit[self._wall] = 1

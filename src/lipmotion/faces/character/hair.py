@@ -76,8 +76,8 @@ def _hairline() -> Real:
 def _bun() -> Part:
     down, around = np.meshgrid(np.linspace(0.02, np.pi - 0.02, 36), 2 * np.pi * np.arange(128) / 128, indexing="ij")
     twist = around + 1.5 * down
-    height = 1 - 2 * np.abs(np.sin(4 * twist + 0.7 * np.sin(2 * down))) ** 0.9
-    radius = 1 + 0.055 * height
+    height = np.cos(8 * twist + 1.4 * np.sin(2 * down))
+    radius = 1 + 0.04 * height * np.sin(down)
     places = np.stack(
         [0.40 * radius * np.sin(down) * np.cos(around), 0.33 * radius * np.cos(down), 0.38 * radius * np.sin(down) * np.sin(around)],
         axis=-1,

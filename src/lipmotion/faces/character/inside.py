@@ -17,8 +17,10 @@ Real = NDArray[np.float64]
 _UPPER_EDGES = (0.0, 0.062, 0.112, 0.155, 0.192, 0.222, 0.247)
 _LOWER_EDGES = (0.0, 0.040, 0.082, 0.125, 0.165, 0.2, 0.23)
 """Where teeth touch their neighbours: distances from the middle, seen from the front."""
-LOWER_EDGE = TEETH_EDGE - 0.024
+LOWER_EDGE = TEETH_EDGE + 0.006
 """Height of the edge of the lower incisors, behind the upper ones, when the jaw is closed."""
+PARTED_TEETH = 0.035
+"""Distance of the teeth behind closed lips."""
 _TONGUE_RINGS, _TONGUE_SIDES = 22, 20
 
 
@@ -73,6 +75,11 @@ def _tooth(a: float, b: float, number: int, edge_y: float, height: float, up: fl
     return part("tooth", places, triangles if up > 0 else triangles[:, ::-1], colours.reshape(-1, 3), palette.TOOTH_FINISH)
 
 
+def lower_drop(pose: FacePose) -> float:
+    """Return how far the lower teeth drop with the jaw, a length; they touch the upper ones only when bitten together."""
+    return pose.jaw + PARTED_TEETH * (1 - pose.bite)
+
+
 def tongue_triangles() -> NDArray[np.int32]:
     """Return the triangles of the tongue [shape=(F, 3)]."""
     return grid_triangles(_TONGUE_RINGS, _TONGUE_SIDES, closed=True)[:, ::-1]
@@ -83,7 +90,7 @@ def tongue(pose: FacePose) -> Real:
     floor = LOWER_EDGE - 0.075
     root, body = np.array([0, floor - 0.05, -0.46]), np.array([0, floor + 0.075, -0.36])
     blade, tip = np.array([0, floor + 0.02, -0.22]), np.array([0, floor - 0.012, TEETH_Z - 0.085])
-    points = jaw_moved(np.stack([root, body, blade, tip]), pose.jaw)
+    points = jaw_moved(np.stack([root, body, blade, tip]), lower_drop(pose))
     tooth = np.array([0, TEETH_EDGE - 0.020, TEETH_Z + 0.075])
     ridge = np.array([0, TEETH_EDGE + 0.035, TEETH_Z - 0.075])
     for weight, to_tip, lift in ((pose.tongue_up, ridge, 0.01), (pose.tongue_out, tooth, -0.008)):

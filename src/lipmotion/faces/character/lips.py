@@ -74,7 +74,7 @@ def section_points(pose: FacePose, base_z: Real) -> Real:
     inner_y = middle + np.where(upper, rise, -drop) * hole
     full = _FULL + 0.7 * pose.roundness * np.where(upper, _ENVELOPE - _FULL, 0)
     thick = np.where(upper, _UPPER_LIP, _LOWER_LIP) * full
-    thick = thick * pose.fullness * (1 - 0.35 * pose.press) * np.where(upper, 1.0, 1 - 0.5 * pose.tuck)
+    thick = thick * pose.fullness * (1 - 0.35 * pose.press) * np.where(upper, 1.0, 1 - 0.45 * pose.tuck)
     outer_y = middle + np.where(upper, rise, -drop) * contour + SIDE * thick * _rounded(pose)
     forward = pose.protrusion * (1 - 0.45 * ACROSS**2)
     arch = -ARCH * (x**2 - (REST_HALF_WIDTH * ACROSS) ** 2)
@@ -89,7 +89,7 @@ def section_points(pose: FacePose, base_z: Real) -> Real:
     tuck = pose.tuck * np.where(upper, 0.0, 1.0) * _ENVELOPE
     contact_z = meet - 0.002 + 0.35 * bulge * pose.roundness
     contact_z = contact_z + tuck * (teeth + 0.02 - contact_z)
-    inner_y = np.where(upper, inner_y, inner_y + tuck * (np.minimum(TEETH_EDGE + 0.014, inner_y + 0.07) - inner_y))
+    inner_y = np.where(upper, inner_y, inner_y + tuck * (np.minimum(TEETH_EDGE + 0.004, inner_y + 0.07) - inner_y))
     crest = meet + bulge * (1 - 0.25 * tuck) - 0.03 * tuck
     behind = np.maximum(teeth + 0.022, contact_z - 0.10)
     y, z = outer_y, outer_z

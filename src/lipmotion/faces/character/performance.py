@@ -23,11 +23,11 @@ WIDEST = 0.4
 """Largest drawn gap; openings of speech stay below 0.35."""
 WIDTH_GAIN, WIDTH_REACH = 1.5, 0.34
 """Changes of width are exaggerated: small ones by the factor, none beyond the reach."""
-TUCKED_GAP = (0.022, 0.05)
+TUCKED_GAP = (0.03, 0.05)
 """Range of the gap while the lower lip is on the teeth."""
 TONGUE_GAP = 0.045
 """Least gap while the tongue is between the teeth."""
-ROUND_GAP = 0.022
+ROUND_GAP = 0.008
 """Added to the gap of round lips, whose hole is narrow."""
 PAUSED_GAP = 0.03
 """Largest gap in pauses, in which people breathe with lips that hardly part."""
@@ -62,12 +62,15 @@ def head_poses(motion: Motion, units: Timeline[Unit], fps: float, *, seed: int =
     narrow = np.clip(-change / 0.16, 0, 1) * (1 - spread)
     roundness = np.maximum(rounding, 0.4 * narrow)
     wide = np.clip(np.maximum(spread, np.clip(change / 0.12, 0, 1)) - roundness, 0, 1)
-    rise = upper_share(gap) + tuck * np.maximum(0.02 - upper_share(gap), 0)
+    rise = upper_share(gap) + roundness * np.maximum(0.42 * gap - upper_share(gap), 0)
+    rise += tuck * np.maximum(0.028 - rise, 0)
+    bite = gestures.TEETH_TOGETHER.weight(units, time_s) * (1 - pause)
     alive = liveliness(gap, pause, fps, seed=seed)
     curves = {
         "gap": gap,
         "upper_rise": np.minimum(rise, gap),
-        "jaw": _jaw(motion, rest, gap, time_s) * (1 - 0.7 * gestures.TEETH_TOGETHER.weight(units, time_s)),
+        "jaw": _jaw(motion, rest, gap, time_s) * (1 - 0.7 * bite),
+        "bite": np.maximum(bite, press),
         "width": 1 + change - 0.13 * rounding + 0.045 * spread,
         "fullness": _at(motion, _fullness(motion, rest), time_s) * (1 + 0.08 * roundness),
         "roundness": roundness,

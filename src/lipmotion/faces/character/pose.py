@@ -18,6 +18,7 @@ class FacePose(NamedTuple):
     protrusion : how far the lips are pushed forward, a length
     press      : 1: lips pressed together, as in P B M
     tuck       : 1: lower lip against the upper teeth, as in F V
+    bite       : 1: teeth together, as in S
     tongue_out : 1: tip of the tongue between the teeth, as in TH
     tongue_up  : 1: tip of the tongue behind the upper teeth, as in L N T D
     smile      : how far the corners rise, a length
@@ -37,6 +38,7 @@ class FacePose(NamedTuple):
     protrusion: float = 0.0
     press: float = 0.0
     tuck: float = 0.0
+    bite: float = 0.0
     tongue_out: float = 0.0
     tongue_up: float = 0.0
     smile: float = 0.0
