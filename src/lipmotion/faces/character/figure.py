@@ -128,7 +128,7 @@ class Figure:
             normals[eye] = normals[eye] @ look.T
             upper = np.interp(side * places[eye, 0], x[:LASHES], y[:LASHES])
             under = np.clip((upper - places[eye, 1] + 0.01) / 0.085, 0, 1)
-            colours[eye] *= (0.45 + 0.55 * under)[:, None]
+            colours[eye] *= (0.6 + 0.4 * under)[:, None]
             places[light] = self._light.places @ half.T + EYE * flip
             colours[light] *= 2.2
             places[self.rows[name + "lashes"]] = lashes(lid, pose.shut) * flip
@@ -144,7 +144,7 @@ class Figure:
             depth = np.clip((front - places[:, 2] - 0.10) / (0.22 + 0.8 * span), 0, 1)
             under = np.clip((top - places[:, 1] + 0.01) / 0.05, 0, 1)
             aside = np.clip(1.35 - (places[:, 0] / half) ** 2, 0, 1)
-            return (1 - 0.55 * pose.roundness) * (1 - 0.93 * depth) ** 1.5 * (0.45 + 0.55 * under) * (0.35 + 0.65 * aside)
+            return (1 - 0.55 * pose.roundness) * (1 - 0.93 * depth) ** 1.5 * (0.6 + 0.4 * under) * (0.35 + 0.65 * aside)
 
         return inside
 

@@ -46,6 +46,7 @@ class Gesture:
         return np.asarray(share * share * (3 - 2 * share))
 
 
+CLOSE = Gesture(dict.fromkeys(LIP_CLOSING, 1.0), 0.03)
 PRESS = Gesture(dict.fromkeys(LIP_CLOSING, 1.0), 0.05)
 TUCK = Gesture({"f": 1.0, "v": 1.0}, 0.06)
 TONGUE_OUT = Gesture({"th": 1.0, "dh": 0.9}, 0.06)

@@ -27,8 +27,8 @@ TUCKED_GAP = (0.03, 0.05)
 """Range of the gap while the lower lip is on the teeth."""
 TONGUE_GAP = 0.045
 """Least gap while the tongue is between the teeth."""
-ROUND_GAP = 0.008
-"""Added to the gap of round lips, whose hole is narrow."""
+ROUND_GAP, TONGUE_UP_GAP = -0.012, 0.012
+"""Added to the gap of round lips, of which trackers read more, and where the tongue fills it, of which they read less."""
 PAUSED_GAP = 0.03
 """Largest gap in pauses, in which people breathe with lips that hardly part."""
 DRAWN = ("opening", "width", "outer", "y_152")
@@ -53,10 +53,12 @@ def head_poses(motion: Motion, units: Timeline[Unit], fps: float, *, seed: int =
     gap = _gap(motion, time_s, fps)
     rounding = gestures.ROUND.weight(units, time_s) * (1 - pause)
     gap += ROUND_GAP * rounding * np.clip(gap / 0.03, 0, 1)
+    up = gestures.TONGUE_UP.weight(units, time_s)
+    gap += TONGUE_UP_GAP * up * np.clip(gap / 0.05, 0, 1)
     gap += tuck * (np.clip(gap, *TUCKED_GAP) - gap)
     gap += out * (np.maximum(gap, TONGUE_GAP) - gap)
     gap += pause * (np.minimum(gap, PAUSED_GAP) - gap)
-    gap = _closed(gap * (1 - press), units, time_s)
+    gap = _closed(gap * (1 - gestures.CLOSE.weight(units, time_s)), units, time_s)
     change = _at(motion, _width(motion, rest), time_s)
     spread = gestures.SPREAD.weight(units, time_s) * (1 - pause)
     narrow = np.clip(-change / 0.16, 0, 1) * (1 - spread)
@@ -79,7 +81,7 @@ def head_poses(motion: Motion, units: Timeline[Unit], fps: float, *, seed: int =
         "press": press,
         "tuck": tuck,
         "tongue_out": out,
-        "tongue_up": gestures.TONGUE_UP.weight(units, time_s) * (1 - out),
+        "tongue_up": up * (1 - out),
         "smile": 0.008 * wide,
         "shut": alive.shut,
         "brows": alive.brows,
