@@ -96,6 +96,19 @@ class Canvas:
             draw(screen, colours, triangles, area, self.background, self._tone, picture)
         return picture
 
+    def shown(self, places: Real, marked: NDArray[np.bool_], triangles: NDArray[np.int32]) -> NDArray[np.bool_]:
+        """Return the pixels of which at least half shows marked vertices [shape=(H, W)].
+
+        places : of the vertices in space [shape=(V, 3)];  marked : which of them [shape=(V,)]
+        triangles : those that are not marked hide what is behind them [shape=(F, 3)]
+        """
+        size = self.camera.height, self.camera.width, 3
+        light = np.repeat(marked[:, None], 3, axis=1).astype(np.float32)
+        picture, area = np.zeros(size, np.uint8), (0, 0, size[1], size[0])
+        tone = np.arange(256).astype(np.uint8)
+        draw(self.camera.on_screen(places), light, triangles, area, np.zeros(size, np.float32), tone, picture)
+        return np.asarray(picture[..., 0] >= 128)
+
 
 def gradient(
     camera: Camera,

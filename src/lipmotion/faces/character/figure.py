@@ -116,6 +116,12 @@ class Figure:
         )
         return Drawn(places, light)
 
+    def mouth_rows(self) -> dict[str, NDArray[np.intp]]:
+        """Return the vertices of the parts of the mouth: lips, wall, tongue, teeth (the lower ones), upper teeth."""
+        rows = {name: np.arange(*self.rows[name].indices(len(self._places))) for name in ("tongue", "teeth", "upper teeth")}
+        lips = self.skin.lip_rows()
+        return {"lips": lips[1 : VISIBLE + 1].ravel(), "wall": self._wall, **rows}
+
     def _look(self, pose: FacePose, places: Real, normals: Real, colours: Real) -> None:
         """Place eyeballs, reflections and lashes, and shade the eyes under their upper lids."""
         look, half = turned(*pose.gaze), turned(0.35 * pose.gaze[0], 0.35 * pose.gaze[1])

@@ -42,3 +42,16 @@ class Stage:
         drawn = self.figure.frame(pose, self.canvas.camera.place)
         head = drawn.places[self.figure.head]
         return self.canvas.picture(drawn.places, drawn.light, self.figure.triangles, onto=self._still, moving=head)
+
+    def parts_seen(self, pose: FacePose) -> dict[str, NDArray[np.bool_]]:
+        """Return which pixels show each part of the mouth: lips, wall, tongue, teeth (lower), upper teeth.
+
+        Every mask has the size of the picture [shape=(H, W)].
+        """
+        drawn = self.figure.frame(pose, self.canvas.camera.place)
+        seen = {}
+        for name, rows in self.figure.mouth_rows().items():
+            marked = np.zeros(len(drawn.places), bool)
+            marked[rows] = True
+            seen[name] = self.canvas.shown(drawn.places, marked, self.figure.triangles)
+        return seen
