@@ -6,7 +6,11 @@ from lipmotion.errors import InputError
 from lipmotion.extensions import Registry
 from lipmotion.faces.base import Face
 
-FACES: Registry[type[Face]] = Registry("face", "lipmotion.faces", {"portrait": "lipmotion.faces.portrait:Portrait"})
+FACES: Registry[type[Face]] = Registry(
+    "face",
+    "lipmotion.faces",
+    {"portrait": "lipmotion.faces.portrait:Portrait", "head": "lipmotion.faces.character:Head"},
+)
 
 
 def face_named(name: str = "portrait") -> Face:
