@@ -6,10 +6,9 @@ Source: ISO/IEC 14496-2:2004, Annex C (facial animation parameters and their uni
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lipmotion.rig.mouth_template import mouth_template
-from lipmotion.rig.point_motion import PointMotion, point_motion
+from lipmotion.rig.point_motion import closed_displacements, point_motion
 from lipmotion.types import Channel, Motion, Timeline, Unit
 
 FAP = "fap"
@@ -57,7 +56,7 @@ def fap_motion(motion: Motion, units: Timeline[Unit]) -> Motion:
     Raises InputError: as ``point_motion``.
     """
     points = point_motion(motion, units)
-    moved = closed(points)
+    moved = closed_displacements(points)
     template = mouth_template()
     lengths = {"N": MOUTH_TO_NOSE, "W": template.width}
     columns = [
@@ -66,21 +65,3 @@ def fap_motion(motion: Motion, units: Timeline[Unit]) -> Motion:
     ]
     channels = tuple(Channel(f"fap{number}_{name}", FAP) for number, name, *_ in PARAMETERS)
     return Motion(np.stack(columns, axis=1), motion.rate_hz, channels)
-
-
-def closed(points: PointMotion) -> NDArray[np.float64]:
-    """Return the displacements with the inner lips apart by the gap of the motion [shape=(T, 52, 3)].
-
-    The middle of the lips of a person at rest is not wholly closed; both lips share the correction.
-    """
-    template = mouth_template()
-    moved = points.displacements.copy()
-    upper, lower = (np.flatnonzero(side & template.inner) for side in (template.upper, template.lower))
-    middle = (template.row(13), template.row(14))
-    correction = points.gap - (moved[:, middle[0], 1] - moved[:, middle[1], 1])
-    across = 1 - np.abs(template.places[:, 0]) / (template.width / 2)
-    moved[:, upper, 1] += np.outer(correction / 2, across[upper])
-    moved[:, lower, 1] -= np.outer(correction / 2, across[lower])
-    moved[:, middle[0], 1] += correction / 2 * (1 - across[middle[0]])
-    moved[:, middle[1], 1] -= correction / 2 * (1 - across[middle[1]])
-    return moved

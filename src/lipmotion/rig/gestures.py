@@ -17,9 +17,9 @@ FADE_S = 0.06
 LEAST_FADE_S = 0.025
 """Shortest half of a cross-fade: no curve jumps, and a phone under 50 ms is not wholly said."""
 GESTURES: Mapping[str, tuple[tuple[str, ...], float]] = {
-    "mouthPressLeft": (("p", "b", "m", "em"), 0.35),
-    "mouthPressRight": (("p", "b", "m", "em"), 0.35),
-    "mouthRollUpper": (("p", "b", "m", "em"), 0.15),
+    "mouthPressLeft": (("p", "b", "m", "em"), 0.2),
+    "mouthPressRight": (("p", "b", "m", "em"), 0.2),
+    "mouthRollUpper": (("p", "b", "m", "em"), 0.1),
     "mouthRollLower": (("f", "v"), 0.55),
     "tongueOut": (("th", "dh"), 0.3),
 }

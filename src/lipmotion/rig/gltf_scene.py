@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,8 @@ from lipmotion.rig.vrm import expression_shapes, looks_backwards
 Matrix = NDArray[np.float64]
 TRIANGLES = 4
 """The mode of primitives that are lists of triangles; strips, fans, lines and points are not read."""
+HALF_CLEAR = 0.5
+"""A triangle is clear where the texture in its middle is clearer than this."""
 DEEPEST = 256
 """Most levels of nodes."""
 LEAST = 1e-9
@@ -140,22 +142,28 @@ def _add_primitive(
     if corners.size % 3 or (corners.size and not 0 <= corners.min() <= corners.max() < count):
         raise InputError(f"triangles of vertices up to {corners.max(initial=0)} of {count}; export it again")
     material = gltf_material(document, primitive.get("material"))
-    surface.triangles.append(corners.reshape(-1, 3) + first)
-    check_count("triangles", sum(map(len, surface.triangles)), MOST_TRIANGLES)
-    surface.parts.append((_unused(owner[1], material.name, surface), material))
-    mapped = None
+    check_count("triangles", sum(map(len, surface.triangles)) + corners.size // 3, MOST_TRIANGLES)
+    triangles, clear, mapped = corners.reshape(-1, 3), np.zeros(corners.size // 3, bool), None
+    block = surface.colours[surface.blocks[shared]]
     if "TEXCOORD_0" in attributes:
         in_texture = arrays.floats(attributes["TEXCOORD_0"], 2)
         if len(in_texture) != count:
             raise InputError("texture coordinates of another number of vertices; export it again")
+        mapped = (in_texture * (1.0, -1.0) + (0.0, 1.0))[corners].reshape(-1, 3, 2)
         seen = texture_colours(document, arrays, primitive.get("material"), in_texture)
         if seen is not None:
-            used = np.unique(corners)
-            surface.colours[surface.blocks[shared]][used] = seen[used]
-        mapped = (in_texture * (1.0, -1.0) + (0.0, 1.0))[corners].reshape(-1, 3, 2)
+            block[np.unique(corners)] = seen[np.unique(corners), :3]
+            middles = texture_colours(document, arrays, primitive.get("material"), in_texture[triangles].mean(axis=1))
+            clear = middles[:, 3] < HALF_CLEAR if middles is not None else clear
     else:
-        surface.colours[surface.blocks[shared]][np.unique(corners)] = material.colour
-    surface.uv.append(mapped)
+        block[np.unique(corners)] = material.colour
+    for hidden in (False, True):  # what a texture leaves out becomes a part of its own
+        chosen = clear == hidden
+        if chosen.any():
+            look = replace(material, opacity=0.0) if hidden else material
+            surface.triangles.append(triangles[chosen] + first)
+            surface.parts.append((_unused(owner[1], look.name, surface), look))
+            surface.uv.append(None if mapped is None else mapped[chosen])
 
 
 def _add_vertices(

@@ -21,6 +21,7 @@ LARGEST_TEXTURE = 1 << 26
 PICTURES = ("PNG", "JPEG", "WEBP")
 SMOOTHED = 512
 """Textures are reduced to this many pixels across: a vertex then has the mean colour around it."""
+OPAQUE = "OPAQUE"
 _EXTENSIONS = ("EXT_texture_webp",)
 
 
@@ -30,19 +31,21 @@ def gltf_material(document: GltfDocument, number: Any) -> Material:
         return Material()
     found = document.item("materials", number)
     look = _object(found.get("pbrMetallicRoughness"))
-    factor = _numbers(look.get("baseColorFactor"), 4, 1.0)[:3]
-    linear = np.clip(factor, 0, 1)
+    factor = np.clip(_numbers(look.get("baseColorFactor"), 4, 1.0), 0, 1)
+    linear = factor[:3]
     coded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
     red, green, blue = np.clip(coded, 0, 1).tolist()
     roughness = float(np.clip(_numbers([look.get("roughnessFactor", 1.0)], 1, 1.0)[0], 0, 1))
+    opacity = 1.0 if found.get("alphaMode", OPAQUE) == OPAQUE else float(factor[3])
     name = found.get("name")
-    return Material(" ".join(name.split()) if isinstance(name, str) else "", (red, green, blue), 1 - roughness)
+    return Material(" ".join(name.split()) if isinstance(name, str) else "", (red, green, blue), 1 - roughness, opacity)
 
 
 def texture_colours(document: GltfDocument, arrays: GltfArrays, material: Any, uv: Colours) -> Colours | None:
-    """Return the colour of a material's base texture at some vertices, times its base colour [shape=(N, 3)], sRGB.
+    """Return what a material's base texture shows at some places, times its base colour [shape=(N, 4)].
 
     uv : places in the texture, v downwards, repeated beyond 0 to 1 [shape=(N, 2)]
+    Red, green and blue as sRGB; the last is the opacity, 1 in materials that are opaque whatever their texture says.
     None: there is no texture, or none that can be read (PNG, JPEG and WebP can).
     """
     picture = _picture(document, arrays, material)
@@ -52,7 +55,10 @@ def texture_colours(document: GltfDocument, arrays: GltfArrays, material: Any, u
     at = uv % 1.0 * (width, height)
     column = np.minimum(at[:, 0].astype(int), width - 1)
     row = np.minimum(at[:, 1].astype(int), height - 1)
-    colours: Colours = picture[row, column] / 255.0 * gltf_material(document, material).colour
+    look = gltf_material(document, material)
+    colours: Colours = picture[row, column] / 255.0 * (*look.colour, look.opacity)
+    if document.item("materials", material).get("alphaMode", OPAQUE) == OPAQUE:
+        colours[:, 3] = 1.0
     return colours
 
 
@@ -74,7 +80,7 @@ def _picture(document: GltfDocument, arrays: GltfArrays, material: Any) -> NDArr
 
 
 def _decoded(content: bytes) -> NDArray[np.uint8] | None:
-    """Return a picture, reduced [shape=(H, W, 3)]; None if it is damaged, too large or of another format."""
+    """Return a picture, reduced [shape=(H, W, 4)]; None if it is damaged, too large or of another format."""
     from PIL import Image
 
     try:
@@ -84,7 +90,7 @@ def _decoded(content: bytes) -> NDArray[np.uint8] | None:
                 if picture.width * picture.height > LARGEST_TEXTURE:
                     return None
                 picture.draft("RGB", (SMOOTHED, SMOOTHED))
-                small = picture.convert("RGB")
+                small = picture.convert("RGBA")
                 small.thumbnail((SMOOTHED, SMOOTHED))
                 return np.asarray(small)
     except (OSError, ValueError, SyntaxError, MemoryError, Image.DecompressionBombError):

@@ -18,11 +18,13 @@ class Material:
     name     : any text, for people
     colour   : red, green and blue of the diffuse reflection, sRGB, 0 to 1
     gloss    : 0 is dull as cloth, 1 shines as a wet eye
+    opacity  : 0 is clear as air, 1 hides what is behind
     """
 
     name: str = ""
     colour: tuple[float, float, float] = (0.8, 0.8, 0.8)
     gloss: float = 0.2
+    opacity: float = 1.0
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -212,10 +212,12 @@ def _materials(folder: Path, library: str) -> dict[str, Material]:
             found[name] = Material(name)
         elif name and len(words) == 4 and words[0] == b"Kd":
             red, green, blue = (min(max(_number(word), 0.0), 1.0) for word in words[1:])
-            found[name] = Material(name, (red, green, blue), found[name].gloss)
+            found[name] = replace(found[name], colour=(red, green, blue))
         elif name and len(words) == 2 and words[0] == b"Ns":
             shininess = max(_number(words[1]), 0.0)
-            found[name] = Material(name, found[name].colour, shininess / (shininess + _SHININESS))
+            found[name] = replace(found[name], gloss=shininess / (shininess + _SHININESS))
+        elif name and len(words) > 1 and words[0] in {b"d", b"Tf"}:  # Maya writes Tf as 1 less the transparency
+            found[name] = replace(found[name], opacity=min(max(_number(words[-1]), 0.0), 1.0))
     return found
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.rig.mouth_template import CHIN, mouth_template
+from lipmotion.rig.mouth_template import CHIN, LOWER_MIDDLE, UPPER_MIDDLE, mouth_template
 from lipmotion.types import Motion, Timeline, Unit
 from lipmotion.units import is_silent
 
@@ -66,6 +66,24 @@ def point_motion(motion: Motion, units: Timeline[Unit]) -> PointMotion:
     else:
         displacements = _made_up(motion, rest, gap)
     return PointMotion(displacements, gap, motion.rate_hz)
+
+
+def closed_displacements(points: PointMotion) -> Array:
+    """Return the displacements with the inner lips apart by the gap of the motion [shape=(T, 52, 3)].
+
+    The middle of the lips of a person at rest is not wholly closed; both lips share the correction.
+    """
+    template = mouth_template()
+    moved = points.displacements.copy()
+    upper, lower = (np.flatnonzero(side & template.inner) for side in (template.upper, template.lower))
+    middle = (template.row(UPPER_MIDDLE), template.row(LOWER_MIDDLE))
+    correction = points.gap - (moved[:, middle[0], 1] - moved[:, middle[1], 1])
+    across = 1 - np.abs(template.places[:, 0]) / (template.width / 2)
+    moved[:, upper, 1] += np.outer(correction / 2, across[upper])
+    moved[:, lower, 1] -= np.outer(correction / 2, across[lower])
+    moved[:, middle[0], 1] += correction / 2 * (1 - across[middle[0]])
+    moved[:, middle[1], 1] -= correction / 2 * (1 - across[middle[1]])
+    return moved
 
 
 def rest_frames(motion: Motion, units: Timeline[Unit]) -> NDArray[np.bool_]:
