@@ -6,6 +6,13 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from lipmotion.cli.characters import (
+    add_character_arguments,
+    chosen_curves,
+    open_character,
+    other_outputs,
+    write_animated_outputs,
+)
 from lipmotion.cli.faces import add_face_arguments, film_options
 from lipmotion.cli.paths import add_output
 
@@ -29,6 +36,7 @@ def add_result_arguments(parser: argparse.ArgumentParser, files: str, *, require
     rate = "frames per second of videos (default: 25; of filmed faces, those of the footage)"
     parser.add_argument("--fps", type=float, help=rate)
     add_face_arguments(parser)
+    add_character_arguments(parser)
 
 
 def check_results(options: argparse.Namespace, speech: Path | None = None) -> None:
@@ -38,9 +46,10 @@ def check_results(options: argparse.Namespace, speech: Path | None = None) -> No
     """
     from lipmotion.pipeline.animate import check_outputs, opened_face
 
+    open_character(options)
     options.face = opened_face(options.face)
     checked = {"rate_hz": options.rate, "fps": options.fps, "face": options.face}
-    check_outputs(options.output, speech, **checked, with_sound=speech is None)
+    check_outputs(other_outputs(options), speech, **checked, with_sound=speech is None)
 
 
 def write_results(options: argparse.Namespace, result: Generation, speech: Path | Audio, model: Model) -> None:
@@ -50,14 +59,16 @@ def write_results(options: argparse.Namespace, result: Generation, speech: Path 
     """
     from lipmotion.pipeline.animate import write
 
+    drawn, channels = chosen_curves(options, result)
     write(
-        result,
-        options.output,
+        drawn,
+        other_outputs(options),
         speech=speech,
         model=model,
-        channels=options.channels.split(",") if options.channels is not None else None,
+        channels=channels,
         rate_hz=options.rate,
         fps=options.fps,
         face=options.face,
         film=film_options(options),
     )
+    write_animated_outputs(options, result)

@@ -153,7 +153,7 @@ def blink_curve(time_s: Array, seed: int = SEED) -> Array:
 
 def _drawn_triangles(mesh: Mesh, near: NDArray[np.bool_]) -> NDArray[np.int32]:
     """Return the triangles near the mouth, without those that are clear as glass [shape=(F', 3)]."""
-    shown = near[mesh.triangles].any(axis=1)
+    shown = np.asarray(near[mesh.triangles].any(axis=1))
     for part in mesh.parts:
         if part.material.opacity < LEAST_OPACITY:
             shown[part.first : part.stop] = False
@@ -170,6 +170,7 @@ def _look(mesh: Mesh) -> tuple[Rows, Array, Lighting]:
     if mesh.colours is not None:
         colours = linear(mesh.colours)
     finishes = [
-        Finish(SCATTER, gloss=0.5 * part.material.gloss, focus=4 + round(2 * part.material.gloss)) for part in mesh.parts
+        Finish(SCATTER, gloss=0.5 * part.material.gloss, focus=4 + round(2 * part.material.gloss))
+        for part in mesh.parts
     ]
     return kinds, colours, Lighting(finishes)

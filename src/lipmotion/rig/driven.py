@@ -49,7 +49,8 @@ class DrivenCharacter:
         """
         if self.shapes is None:
             raise InputError(
-                "the character is moved by control points and has no weights of blendshapes; write a video, or its motion"
+                "the character is moved by control points and has no weights of blendshapes; write a video, or the "
+                "motion without --character"
             )
         return shape_weights(motion, units, self.shapes)
 
@@ -64,7 +65,7 @@ class DrivenCharacter:
         """
         points = point_motion(motion, units)
         if self.shapes is not None:
-            rows = at_times(self.weights(motion, units).values, points.gap, motion.rate_hz, time_s)
+            rows = at_times(self.weights(motion, units).values.astype(np.float64), points.gap, motion.rate_hz, time_s)
             shut = np.zeros(len(time_s)) if blinks is None or self._eyelids is None else blinks
             for row, closed in zip(rows, shut, strict=True):
                 yield self._shaped(row, float(closed))
@@ -123,8 +124,8 @@ def driven_character(
     binding   : a binding file, or a table of painted weights (``.csv``); both mean control points
     by_points : move it by control points, though it has blendshapes
     only      : the names of the blendshapes to use; empty: those that are understood
-    Raises InputError: a file is damaged, or what moves the mouth is not found in it. Raises ModelFormatError: the binding
-    is damaged.
+    Raises InputError: a file is damaged, or what moves the mouth is not found in it.
+    Raises ModelFormatError: the binding is damaged.
     """
     mesh = read_character(path)
     is_stored = binding is not None and binding.suffix.lower() == BINDING_SUFFIX
