@@ -38,8 +38,11 @@ def add_character_arguments(parser: argparse.ArgumentParser) -> None:
 def open_character(options: argparse.Namespace) -> None:
     """Read the character that was asked for, as the face of videos; check what is written of it."""
     from lipmotion.errors import ExportError, InputError
+    from lipmotion.pipeline.characters import check_curve_set
     from lipmotion.storage.files import check_target
 
+    if options.curves:
+        check_curve_set(options.curves)
     options.driven = None
     for path in animated_outputs(options):
         if options.character is None:

@@ -24,6 +24,14 @@ SHAPE_SETS = ("arkit", "visemes", "fap")
 facial animation parameters of lips and jaw."""
 
 
+def check_curve_set(curves: str | Path) -> None:
+    """Raise InputError unless there is such a set of curves, or such a table of a rig, for ``curves_of``."""
+    if Path(curves).suffix.lower() == ".csv":
+        read_rig_table(Path(curves))
+    elif curves not in SHAPE_SETS:
+        raise InputError(f"no set of curves {str(curves)!r}, required one of {', '.join(SHAPE_SETS)}, or a FILE.csv")
+
+
 def curves_of(motion: Motion, units: Timeline[Unit], curves: str | Path | DrivenCharacter) -> Motion:
     """Return motion as curves that drive a character.
 
@@ -32,18 +40,17 @@ def curves_of(motion: Motion, units: Timeline[Unit], curves: str | Path | Driven
     """
     if isinstance(curves, DrivenCharacter):
         return curves.weights(motion, units)
+    check_curve_set(curves)
     if curves == "arkit":
         return shape_weights(motion, units, arkit_mouth())
     if curves == "visemes":
         return viseme_motion(units, len(motion.values), motion.rate_hz)
     if curves == "fap":
         return fap_motion(motion, units)
-    if Path(curves).suffix.lower() == ".csv":
-        rows = read_rig_table(Path(curves))
-        sets = (motion, curves_of(motion, units, "arkit"), curves_of(motion, units, "visemes"))
-        sources = {name: each[name].astype(np.float64) for each in sets for name in each.names}
-        return rig_motion(rows, sources, motion.rate_hz)
-    raise InputError(f"no set of curves {str(curves)!r}, required one of {', '.join(SHAPE_SETS)}, or a FILE.csv")
+    rows = read_rig_table(Path(curves))
+    sets = (motion, curves_of(motion, units, "arkit"), curves_of(motion, units, "visemes"))
+    sources = {name: each[name].astype(np.float64) for each in sets for name in each.names}
+    return rig_motion(rows, sources, motion.rate_hz)
 
 
 def with_curves(generation: Generation, curves: str | Path | DrivenCharacter) -> tuple[Generation, tuple[str, ...]]:
