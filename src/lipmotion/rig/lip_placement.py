@@ -27,7 +27,7 @@ Places = NDArray[np.float64]
 
 SLIT_REACH = 0.06
 """The lips meet where vertices closer than this share of the width of the jaw go different ways as the mouth opens."""
-SLIT_STEP = 0.3
+SLIT_STEP = 0.2
 """How different: this share of how far the jaw goes."""
 DETOUR = 2.0
 """They are on two lips if the way along the surface is this many times as long as the straight one, and more than the
@@ -78,7 +78,7 @@ class LipPlacement:
 def placed_by_shape(mesh: Mesh, surface: MeshSurface) -> LipPlacement:
     """Return where the lip points are, from the blendshape that opens the mouth.
 
-    The lips meet where neighbours go apart as the mouth opens; the ends of that line are the corners. The character
+    The lips meet where neighbours go apart as the mouth opens; the ends of that line are the inner corners. The character
     must
     stand upright and look along +z, as files of OBJ and glTF have it.
     Raises InputError: no blendshape opens the mouth, or the lips are not found.
@@ -96,7 +96,7 @@ def placed_by_shape(mesh: Mesh, surface: MeshSurface) -> LipPlacement:
         )
     template = mouth_template()
     right, left = middle[middle[:, 0].argmin()], middle[middle[:, 0].argmax()]
-    scale = float(left[0] - right[0]) / template.width
+    scale = float(left[0] - right[0]) / template.inner_width
     order = np.argsort(middle[:, 0], kind="stable")
     targets = _targets(template, scale, (right + left) / 2, middle[order])
     upper = drop < _share_at_slit(mesh.vertices, drop, skin, middle)
@@ -206,7 +206,7 @@ def _slit(vertices: Places, surface: MeshSurface, drop: Places, skin: NDArray[np
         return middle
     front = np.zeros(len(middle), bool)
     tree = cKDTree(middle[:, :1])
-    for number, around in enumerate(tree.query_ball_point(middle[:, :1], reach)):
+    for number, around in enumerate(tree.query_ball_point(middle[:, :1], reach / 4)):
         front[number] = middle[number, 2] > middle[around, 2].max() - FRONT * reach / SLIT_REACH
     return middle[front]
 

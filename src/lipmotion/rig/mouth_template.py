@@ -19,6 +19,8 @@ UPPER_MIDDLE, LOWER_MIDDLE = 13, 14
 """The middles of the inner lips; the channel ``opening`` is their distance."""
 RIGHT_CORNER, LEFT_CORNER = 61, 291
 """The lip corners; the channel ``width`` is their distance."""
+INNER_CORNERS = (78, 308)
+"""Where the lips part, right and left."""
 UPPER_EDGE, LOWER_EDGE = 0, 17
 """The middles of the outer lips; the channel ``outer`` is their distance."""
 CHIN = 152
@@ -58,6 +60,12 @@ class MouthTemplate:
     def width(self) -> float:
         """The distance of the lip corners, eye distances."""
         return float(np.linalg.norm(self.places[self.row(RIGHT_CORNER)] - self.places[self.row(LEFT_CORNER)]))
+
+    @property
+    def inner_width(self) -> float:
+        """The distance of the inner lip corners (78, 308), where the lips part, eye distances."""
+        right, left = (self.places[self.row(point)] for point in INNER_CORNERS)
+        return float(np.linalg.norm(left - right))
 
     def seam(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the height at which the closed lips meet, at some places from right to left [shape=(len(x),)]."""
