@@ -18,7 +18,7 @@ from lipmotion.units import LIP_CLOSING
 
 Array = NDArray[np.float64]
 
-DEPTH, JAW, CORNERS, LIPS_APART = 0.4, 0.5, 2.0, 2.0
+DEPTH, JAW, CORNERS, LIPS_APART = 0.4, 0.5, 4.0, 2.0
 """Weights of distances in depth, of the jaw, of the corners across, and of the gap between the lips, beside 1 for
 lips."""
 TIE = 0.15
