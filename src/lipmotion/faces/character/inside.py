@@ -91,7 +91,7 @@ def tongue(pose: FacePose) -> Real:
     root, body = np.array([0, floor - 0.05, -0.46]), np.array([0, floor + 0.075, -0.36])
     blade, tip = np.array([0, floor + 0.02, -0.22]), np.array([0, floor - 0.012, TEETH_Z - 0.085])
     points = jaw_moved(np.stack([root, body, blade, tip]), lower_drop(pose))
-    tooth = np.array([0, TEETH_EDGE - 0.020, TEETH_Z + 0.075])
+    tooth = np.array([0, TEETH_EDGE - 0.014, TEETH_Z + 0.080])
     ridge = np.array([0, TEETH_EDGE + 0.035, TEETH_Z - 0.075])
     for weight, to_tip, lift in ((pose.tongue_up, ridge, 0.01), (pose.tongue_out, tooth, -0.008)):
         points[3] += weight * (to_tip - points[3])

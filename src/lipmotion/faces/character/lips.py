@@ -116,10 +116,10 @@ def _opening(pose: FacePose) -> tuple[Real, Real]:
 
     A round mouth has an elliptic hole that ends before the corners; a spread one is a slot with a flat edge.
     """
-    reach = 1 - 0.40 * pose.roundness
+    reach = 1 - 0.47 * pose.roundness - 0.10 * pose.oval
     power = 2 + 1.2 * pose.spread
     inside = np.maximum(1 - np.abs(ACROSS / reach) ** power, 0)
-    oval = 0.3 * np.clip(pose.gap / 0.2, 0, 1) * (1 - pose.spread) * (1 - pose.roundness)
+    oval = (0.25 * np.clip(pose.gap / 0.2, 0, 1) + 0.2 * pose.oval) * (1 - pose.spread) * (1 - pose.roundness)
     hole = inside ** (0.92 - 0.40 * pose.roundness - 0.2 * pose.spread - oval)
     contour = np.maximum(1 - ACROSS**2, 0) ** (0.85 - 0.25 * pose.roundness)
     return hole, contour

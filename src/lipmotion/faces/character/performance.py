@@ -23,11 +23,13 @@ WIDEST = 0.4
 """Largest drawn gap; openings of speech stay below 0.35."""
 WIDTH_GAIN, WIDTH_REACH = 1.5, 0.34
 """Changes of width are exaggerated: small ones by the factor, none beyond the reach."""
-TUCKED_GAP = (0.03, 0.05)
+TUCKED_GAP = (0.045, 0.06)
 """Range of the gap while the lower lip is on the teeth."""
 TONGUE_GAP = 0.045
 """Least gap while the tongue is between the teeth."""
-ROUND_GAP, TONGUE_UP_GAP = -0.012, 0.012
+OVAL_GROWTH = 0.12
+"""How much further the mouth opens in AA and the like."""
+ROUND_GAP, TONGUE_UP_GAP = -0.006, 0.012
 """Added to the gap of round lips, of which trackers read more, and where the tongue fills it, of which they read less."""
 PAUSED_GAP = 0.03
 """Largest gap in pauses, in which people breathe with lips that hardly part."""
@@ -52,6 +54,8 @@ def head_poses(motion: Motion, units: Timeline[Unit], fps: float, *, seed: int =
     out = gestures.TONGUE_OUT.weight(units, time_s) * (1 - press)
     gap = _gap(motion, time_s, fps)
     rounding = gestures.ROUND.weight(units, time_s) * (1 - pause)
+    oval = gestures.OVAL.weight(units, time_s) * (1 - pause)
+    gap *= 1 + OVAL_GROWTH * oval
     gap += ROUND_GAP * rounding * np.clip(gap / 0.03, 0, 1)
     up = gestures.TONGUE_UP.weight(units, time_s)
     gap += TONGUE_UP_GAP * up * np.clip(gap / 0.05, 0, 1)
@@ -65,23 +69,24 @@ def head_poses(motion: Motion, units: Timeline[Unit], fps: float, *, seed: int =
     roundness = np.maximum(rounding, 0.4 * narrow)
     wide = np.clip(np.maximum(spread, np.clip(change / 0.12, 0, 1)) - roundness, 0, 1)
     rise = upper_share(gap) + roundness * np.maximum(0.42 * gap - upper_share(gap), 0)
-    rise += tuck * np.maximum(0.028 - rise, 0)
+    rise += tuck * np.maximum(0.036 - rise, 0)
     bite = gestures.TEETH_TOGETHER.weight(units, time_s) * (1 - pause)
     alive = liveliness(gap, pause, fps, seed=seed)
     curves = {
         "gap": gap,
         "upper_rise": np.minimum(rise, gap),
-        "jaw": _jaw(motion, rest, gap, time_s) * (1 - 0.7 * bite),
+        "jaw": _jaw(motion, rest, gap, time_s) * (1 - 0.85 * bite),
         "bite": np.maximum(bite, press),
-        "width": 1 + change - 0.13 * rounding + 0.045 * spread,
+        "width": 1 + change - 0.14 * rounding + 0.05 * spread - 0.05 * oval,
         "fullness": _at(motion, _fullness(motion, rest), time_s) * (1 + 0.08 * roundness),
         "roundness": roundness,
         "spread": wide,
+        "oval": oval,
         "protrusion": 0.085 * roundness,
         "press": press,
         "tuck": tuck,
         "tongue_out": out,
-        "tongue_up": up * (1 - out),
+        "tongue_up": up * (1 - out) * (1 - bite),
         "smile": 0.008 * wide,
         "shut": alive.shut,
         "brows": alive.brows,
