@@ -2,12 +2,13 @@
 
     python benchmarks/head.py --retrack --apart --speed [--face portrait] [--sheet docs/images/head.png]
 
-One JSON object a line. ``retrack``: each sentence is spoken by the default synthetic voice, animated and rendered to mp4,
-and tracked with the project's own tracker; correlation of opening and width with the motion given, all frames of all
-sentences pooled (ACC) and the mean of the sentences. ``closed``: p, b and m in which the lips touch in a frame of the poses. ``apart``: the
-sounds of all sentences by leave-one-sentence-out, nearest mean of the sound in units of the standard deviation, from
-what the picture shows of lips, hole, teeth and tongue at the sound's middle frame. ``speed``: frames a second of
-rendering to mp4 at 1280 x 720, two threads, median of five runs, and the time of the whole process for 60 s of speech.
+One JSON object a line. ``retrack``: each sentence is spoken by the default synthetic voice, animated and rendered to
+mp4, and tracked with the project's own tracker; correlation of opening and width with the motion given, all frames of
+all sentences pooled (ACC), and the mean of the sentences. ``closed``: p, b and m in which the lips touch in a frame of
+the poses. ``apart``: the sounds of all sentences by leave-one-sentence-out, nearest mean of the sound in units of the
+standard deviation, from what the picture shows of lips, hole, teeth and tongue at the sound's middle. ``speed``: frames
+a second of rendering to mp4 at 1280 x 720, two threads, median of five runs, and the time of the whole process for 60 s
+of speech.
 """
 
 from __future__ import annotations
@@ -134,7 +135,7 @@ def apart(spoken: list[SpokenText]) -> dict[str, object]:
         poses = head_poses(each.generation.motion, each.generation.units, 100.0)
         for span in each.generation.units:
             if span.label.phone in SOUNDS:
-                middle = int(round(50 * (span.start_s + span.end_s)))
+                middle = round(50 * (span.start_s + span.end_s))
                 rows.append(mouth_seen(poses[min(middle, len(poses) - 1)]))
                 labels.append(names.index(SOUNDS[span.label.phone]))
                 sentences.append(number)
@@ -155,7 +156,7 @@ def apart(spoken: list[SpokenText]) -> dict[str, object]:
 def mouth_seen(pose: FacePose) -> list[float]:
     """Return what the picture shows of the mouth, head straight: widths, heights and areas, in eye distances.
 
-    Width and height of the lips and of what is between them, and the areas of lips, upper teeth, lower teeth and tongue.
+    Width and height of the lips and of what is between them; areas of lips, upper teeth, lower teeth and tongue.
     """
     stage = _front()
     masks = stage.parts_seen(pose._replace(turn=(0.0, 0.0, 0.0), shut=0.0))

@@ -20,7 +20,24 @@ LASHES = 33
 
 def eyeball() -> Part:
     """Return the left eyeball, its middle at (0, 0, 0), looking along +z."""
-    radii = np.array([0, 0.022, PUPIL - 0.004, PUPIL, 0.068, 0.083, 0.098, IRIS - 0.006, IRIS, IRIS + 0.006, 0.138, 0.162, 0.19, 0.215])
+    radii = np.array(
+        [
+            0,
+            0.022,
+            PUPIL - 0.004,
+            PUPIL,
+            0.068,
+            0.083,
+            0.098,
+            IRIS - 0.006,
+            IRIS,
+            IRIS + 0.006,
+            0.138,
+            0.162,
+            0.19,
+            0.215,
+        ]
+    )
     angle = np.arcsin(np.clip(radii / EYEBALL, 0, 0.999))
     angle = np.concatenate([angle, np.linspace(angle[-1] + 0.15, 2.0, 5)])
     around = 2 * np.pi * np.arange(_SIDES) / _SIDES
@@ -51,7 +68,9 @@ def eyeball() -> Part:
             colours[n] = palette.IRIS_RIM
         else:
             colours[n] = palette.EYE_WHITE
-    return part("eye", places, grid_triangles(len(angle), _SIDES, closed=True), colours.reshape(-1, 3), palette.EYE_FINISH)
+    return part(
+        "eye", places, grid_triangles(len(angle), _SIDES, closed=True), colours.reshape(-1, 3), palette.EYE_FINISH
+    )
 
 
 def catchlights() -> Part:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,7 +15,7 @@ from lipmotion.faces.character.forms import EYE
 from lipmotion.faces.character.hair import hair
 from lipmotion.faces.character.inside import lower_drop, lower_teeth, tongue, tongue_triangles, upper_teeth
 from lipmotion.faces.character.lips import RINGS, VISIBLE
-from lipmotion.faces.character.part import Part, part
+from lipmotion.faces.character.part import part
 from lipmotion.faces.character.pose import FacePose
 from lipmotion.faces.character.skin import REST, Skin, jaw_moved
 from lipmotion.faces.character.tint import skin_colours
@@ -51,7 +52,7 @@ class Figure:
         left_brow, left_ear, ring, tongue_at_rest = brow(), ear(), earring(), tongue(REST)
         lash = np.zeros((3 * LASHES, 3))
         parts = [
-            Part("skin", self.skin.rest, self.skin.triangles, skin_colours(self.skin), palette.SKIN_FINISH, self.skin.normals),
+            self.skin.as_part(skin_colours(self.skin)),
             part("tongue", tongue_at_rest, tongue_triangles(), palette.TONGUE, palette.TONGUE_FINISH),
             lower_teeth(), upper_teeth(),
             self._eye, self._eye.mirrored("right eye"), self._light, replace(self._light, name="right light"),
@@ -111,14 +112,14 @@ class Figure:
         places[self.head] = held * places[self.head] + (1 - held) * ((places[self.head] - PIVOT) @ turn.T + PIVOT)
         normals[self.head] = held * normals[self.head] + (1 - held) * (normals[self.head] @ turn.T)
         strands[self.head] = strands[self.head] @ turn.T
-        light = self._lighting.light(
-            places, normals, colours, self._kinds, viewer, reaches=reaches_, strands=strands
-        )
+        light = self._lighting.light(places, normals, colours, self._kinds, viewer, reaches=reaches_, strands=strands)
         return Drawn(places, light)
 
     def mouth_rows(self) -> dict[str, NDArray[np.intp]]:
         """Return the vertices of the parts of the mouth: lips, wall, tongue, teeth (the lower ones), upper teeth."""
-        rows = {name: np.arange(*self.rows[name].indices(len(self._places))) for name in ("tongue", "teeth", "upper teeth")}
+        rows = {
+            name: np.arange(*self.rows[name].indices(len(self._places))) for name in ("tongue", "teeth", "upper teeth")
+        }
         lips = self.skin.lip_rows()
         return {"lips": lips[1 : VISIBLE + 1].ravel(), "wall": self._wall, **rows}
 
@@ -140,7 +141,7 @@ class Figure:
             places[self.rows[name + "lashes"]] = lashes(lid, pose.shut) * flip
             normals[self.rows[name + "lashes"]] = [0.0, 0.0, 1.0]
 
-    def _lit_inside(self, pose: FacePose, skin: Real):  # noqa: ANN202
+    def _lit_inside(self, pose: FacePose, skin: Real) -> Callable[[Real], Real]:
         """Return the function from places in the mouth to the part of the light that arrives there."""
         ring = skin[self.skin.lip_rows()[VISIBLE - 1]]
         top, low, front = ring[_MIDDLE, 1], ring[_LAST, 1], 0.5 * (ring[_MIDDLE, 2] + ring[_LAST, 2])

@@ -1,4 +1,4 @@
-"""What the phones say of the mouth beside the motion: lips pressed, round, spread or tucked, and where the tongue is."""
+"""What phones say of the mouth beside the motion: lips pressed, round, spread or tucked, and where the tongue is."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ OVAL = Gesture({"aa": 1.0, "ao": 0.8, "aw": 0.7, "ay": 0.4, "ah": 0.4, "ax": 0.2
 TEETH_TOGETHER = Gesture(dict.fromkeys(("s", "z", "sh", "zh", "ch", "jh"), 1.0), 0.08)
 SILENT = Gesture(dict.fromkeys((SILENCE, PAUSE), 1.0), 0.10)
 LEAST_PAUSE_S, AFTER_S, BEFORE_S = 0.25, 0.06, 0.12
-"""In shorter pauses between words the mouth goes on; a pause begins later and ends earlier for the lips than for the ear."""
+"""In shorter pauses the mouth goes on; a pause begins later and ends earlier for the lips than for the ear."""
 
 
 def pause_weight(units: Timeline[Unit], time_s: Curve) -> Curve:

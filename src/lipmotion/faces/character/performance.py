@@ -17,8 +17,8 @@ Curve = NDArray[np.float64]
 CLOSED_BELOW = 0.012
 """Tracked lips that touch have openings up to this; smaller openings are drawn closed."""
 OPEN_FROM, PARTED, GROWTH = 0.03, 0.022, 0.86
-"""From this opening on the gap is the opening times the growth, plus the length: trackers read less of small openings and
-more of wide ones (docs/results/head.md). Below it rises from 0, where the lips touch."""
+"""From this opening on the gap is the opening times the growth, plus the length: trackers read less of small openings
+and more of wide ones (docs/results/head.md). Below it rises from 0, where the lips touch."""
 WIDEST = 0.4
 """Largest drawn gap; openings of speech stay below 0.35."""
 WIDTH_GAIN, WIDTH_REACH = 1.5, 0.34
@@ -30,7 +30,7 @@ TONGUE_GAP = 0.045
 OVAL_GROWTH = 0.12
 """How much further the mouth opens in AA and the like."""
 ROUND_GAP, TONGUE_UP_GAP = -0.006, 0.012
-"""Added to the gap of round lips, of which trackers read more, and where the tongue fills it, of which they read less."""
+"""Added to the gap of round lips, of which trackers read more, and where the tongue fills it: they read less."""
 PAUSED_GAP = 0.03
 """Largest gap in pauses, in which people breathe with lips that hardly part."""
 DRAWN = ("opening", "width", "outer", "y_152")
