@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,6 +15,8 @@ Real = NDArray[np.float64]
 
 IRIS, PUPIL = 0.115, 0.055
 """Radii of iris and pupil, as lengths on the eyeball."""
+CATCHLIGHT = 2.2
+"""Reflections of lamps are brighter than white paint."""
 _SIDES = 64
 LASHES = 33
 """Columns of the lashes: those of the upper lid."""
@@ -83,7 +87,8 @@ def catchlights() -> Part:
         z = np.sqrt(away**2 - (flat**2).sum(axis=1))
         fan = np.stack([np.zeros(16, int), 1 + np.arange(16), 1 + (np.arange(16) + 1) % 16], axis=1).astype(np.int32)
         discs.append(part("light", np.column_stack([flat, z]), fan, (white, white, white), palette.GLOWING))
-    return joined_parts("catchlights", discs)
+    lights = joined_parts("catchlights", discs)
+    return replace(lights, colours=CATCHLIGHT * lights.colours)
 
 
 def lash_triangles() -> NDArray[np.int32]:
