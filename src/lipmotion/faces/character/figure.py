@@ -47,6 +47,8 @@ class Figure:
 
     triangles : of all parts [shape=(F, 3)]
     head      : the rows of the vertices that move; those of the body, behind them, never do
+    colours   : diffuse reflection of the vertices, linear [shape=(V, 3)]
+    parts, rows : the parts, and the rows of the vertices of each by its name
     """
 
     def __init__(self) -> None:
@@ -76,7 +78,7 @@ class Figure:
         ).astype(np.int32)
         self._places = np.concatenate([each.places for each in parts])
         self._normals = np.concatenate([each.normals for each in parts])
-        self._colours = np.concatenate([each.colours for each in parts])
+        self.colours = np.concatenate([each.colours for each in parts])
         none = [np.zeros_like(each.places) if each.strands is None else each.strands for each in parts]
         self._strands = np.concatenate(none)
         kinds = [np.full(len(each.places), palette.FINISHES.index(each.finish)) for each in parts]
@@ -138,7 +140,7 @@ class Figure:
 
     def _shaded(self, pose: FacePose, places: Real) -> tuple[Real, Real]:
         """Return colours and arriving light: eyes are darker under their lids, the mouth is darker inside."""
-        colours, arrives = self._colours.copy(), self._reaches.copy()
+        colours, arrives = self.colours.copy(), self._reaches.copy()
         x, y = self.skin.lids_of_eye.opening(pose)
         for side, name in _EYES:
             eye = self.rows[name + "eye"]

@@ -87,7 +87,7 @@ def section_points(pose: FacePose, base_z: Real) -> Real:
     teeth = TEETH_Z - ARCH * x**2
     up = SIDE * 1.0
     tuck = pose.tuck * np.where(upper, 0.0, 1.0) * _ENVELOPE
-    contact_z = meet - 0.002 + 0.35 * bulge * pose.roundness
+    contact_z = meet - 0.002 + 0.02 * _ENVELOPE * pose.roundness
     contact_z = contact_z + tuck * (teeth + 0.02 - contact_z)
     inner_y = np.where(upper, inner_y, inner_y + tuck * (np.minimum(TEETH_EDGE + 0.004, inner_y + 0.07) - inner_y))
     crest = meet + bulge * (1 - 0.25 * tuck) - 0.03 * tuck

@@ -61,12 +61,15 @@ def head_mesh(figure: Figure) -> Mesh:
 
 
 def _parts(figure: Figure) -> tuple[MeshPart, ...]:
+    pieces = [(name, count, figure.parts[0]) for name, count in figure.skin.pieces.items()]
+    pieces += [(each.name, len(each.triangles), each) for each in figure.parts[1:]]
     parts, first = [], 0
-    for each in figure.parts:
-        red, green, blue = (float(value) for value in _encoded(each.colours.mean(axis=0)))
-        material = Material(each.name, (red, green, blue), min(2 * each.finish.gloss, 1.0))
-        parts.append(MeshPart(each.name, first, first + len(each.triangles), material))
-        first += len(each.triangles)
+    for name, count, each in pieces:
+        seen = np.unique(figure.triangles[first : first + count])
+        red, green, blue = (float(value) for value in _encoded(figure.colours[seen].mean(axis=0)))
+        material = Material(name, (red, green, blue), min(2 * each.finish.gloss, 1.0))
+        parts.append(MeshPart(name, first, first + count, material))
+        first += count
     return tuple(parts)
 
 

@@ -9,7 +9,7 @@ from scipy.spatial import Delaunay, cKDTree
 from lipmotion.faces.character import palette
 from lipmotion.faces.character.eyelids import LID_COLUMNS, LID_RINGS, Eyelids
 from lipmotion.faces.character.forms import MIDDLE, MOUTH_Y, head, outward, seen_from_front, seen_from_middle
-from lipmotion.faces.character.lips import ACROSS, COLUMNS, RINGS, SIDE, lip_surface, section_points
+from lipmotion.faces.character.lips import ACROSS, COLUMNS, RINGS, SIDE, VISIBLE, lip_surface, section_points
 from lipmotion.faces.character.part import Part
 from lipmotion.faces.character.pose import FacePose
 from lipmotion.rig.rasteriser import normals_of
@@ -28,7 +28,7 @@ class Skin:
     """The skin: vertices of face, lips, wall of the mouth and lids, in this order.
 
     triangles : [shape=(F, 3)];  rest : places at rest [shape=(V, 3)];  normals : at rest [shape=(V, 3)]
-    lips, wall, lids : the rows of their vertices
+    pieces    : the number of triangles of the face, the lips, the wall of the mouth and the lids, in this order
     """
 
     def __init__(self) -> None:
@@ -48,6 +48,13 @@ class Skin:
             rows = self.lid_rows(eye)
             grids.append(_closed_grid(rows[::-1]) if eye == 0 else _closed_grid(rows))
         self.triangles = np.concatenate([triangles, *grids]).astype(np.int32)
+        front = 2 * VISIBLE * COLUMNS
+        self.pieces = {
+            "skin": len(triangles),
+            "lips": front,
+            "wall": len(grids[0]) - front,
+            "lids": len(grids[1]) + len(grids[2]),
+        }
         self._bind(contour)
         self.rest = self._places(REST)
         meshed = normals_of(self.rest, self.triangles)
