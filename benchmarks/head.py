@@ -4,8 +4,8 @@
 
 One JSON object a line. ``retrack``: each sentence is spoken by the default synthetic voice, animated and rendered to
 mp4, and tracked with the project's own tracker; correlation of opening and width with the motion given, all frames of
-all sentences pooled (ACC), and the mean of the sentences. ``closed``: p, b and m in which the lips touch in a frame of
-the poses. ``apart``: the sounds of all sentences by leave-one-sentence-out, nearest mean of the sound in units of the
+all sentences pooled (ACC), and the mean of the sentences. The same again without the phones.
+``closed``: p, b and m in which the lips touch in a frame of the poses. ``apart``: the sounds of all sentences by leave-one-sentence-out, nearest mean of the sound in units of the
 standard deviation, from what the picture shows of lips, hole, teeth and tongue at the sound's middle. ``speed``: frames
 a second of rendering to mp4 at 1280 x 720, two threads, median of five runs, and the time of the whole process for 60 s
 of speech.
@@ -74,6 +74,7 @@ def main() -> None:
     spoken = [lipmotion.speak(text) for text in SENTENCES] if options.retrack or options.apart else []
     if options.retrack:
         print(json.dumps({"retrack": retrack(spoken, options.face)}), flush=True)
+        print(json.dumps({"without_phones": retrack(spoken, options.face, phones=False)}), flush=True)
         print(json.dumps({"closed": closed(spoken)}), flush=True)
     if options.apart:
         print(json.dumps({"apart": apart(spoken)}), flush=True)
@@ -83,15 +84,18 @@ def main() -> None:
         sheet(options.sheet)
 
 
-def retrack(spoken: list[SpokenText], face: str) -> dict[str, object]:
-    """Return correlations of the motion that is tracked in the rendered videos with the motion given."""
+def retrack(spoken: list[SpokenText], face: str, *, phones: bool = True) -> dict[str, object]:
+    """Return correlations of the motion that is tracked in the rendered videos with the motion given.
+
+    phones : whether the face is told the phones; without them it draws the motion alone
+    """
     given, tracked = [], []
     with tempfile.TemporaryDirectory() as folder:
         for each in spoken:
             path = Path(folder) / "sentence.mp4"
             motion = each.generation.motion
-            frames = face_named(face).render(motion, each.generation.units, fps=25.0)
-            write_mp4(path, frames, fps=25.0, audio=each.sound)
+            units = each.generation.units if phones else Timeline[Unit](())
+            write_mp4(path, face_named(face).render(motion, units, fps=25.0), fps=25.0, audio=each.sound)
             seen = track(path, crops=False).motion.resampled(25.0)
             count = min(len(seen.values), int(motion.time_s[-1] * 25))
             time_s = np.arange(count) / 25

@@ -120,7 +120,7 @@ def _opening(pose: FacePose) -> tuple[Real, Real]:
     power = 2 + 1.2 * pose.spread
     inside = np.maximum(1 - np.abs(ACROSS / reach) ** power, 0)
     oval = (0.25 * np.clip(pose.gap / 0.2, 0, 1) + 0.2 * pose.oval) * (1 - pose.spread) * (1 - pose.roundness)
-    hole = inside ** (0.92 - 0.40 * pose.roundness - 0.2 * pose.spread - oval)
+    hole = inside ** (0.92 - 0.40 * pose.roundness - 0.36 * pose.spread - oval)
     contour = np.maximum(1 - ACROSS**2, 0) ** (0.85 - 0.25 * pose.roundness)
     return hole, contour
 
