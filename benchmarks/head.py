@@ -4,11 +4,11 @@
 
 One JSON object a line. ``retrack``: each sentence is spoken by the default synthetic voice, animated and rendered to
 mp4, and tracked with the project's own tracker; correlation of opening and width with the motion given, all frames of
-all sentences pooled (ACC), and the mean of the sentences. The same again without the phones.
-``closed``: p, b and m in which the lips touch in a frame of the poses. ``apart``: the sounds of all sentences by leave-one-sentence-out, nearest mean of the sound in units of the
-standard deviation, from what the picture shows of lips, hole, teeth and tongue at the sound's middle. ``speed``: frames
-a second of rendering to mp4 at 1280 x 720, two threads, median of five runs, and the time of the whole process for 60 s
-of speech.
+all sentences pooled (ACC), and the mean of the sentences. The same again without the phones. ``closed``: p, b and m in
+which the lips touch in a frame of the poses. ``apart``: the sounds of all sentences by leave-one-sentence-out, nearest
+mean of the sound in units of the standard deviation, from what the picture shows of lips, hole, teeth and tongue at the
+sound's middle. ``speed``: frames a second of rendering to mp4 at 1280 x 720, two threads, median of five runs, and the
+time of the whole process for 60 s of speech; processor time, which other work on the machine lengthens less.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ from lipmotion.faces.character.part import Part, grid_triangles, part, tube
 
 Real = NDArray[np.float64]
 
-_SIDES = 96
+_SIDES = 64
 
 
 def ear() -> Part:
@@ -101,11 +101,11 @@ def clothing() -> Part:
         (-1.92, 1.28, 0.60, -1.02, 2.1), (-2.08, 1.58, 0.62, -1.03, 2.15), (-2.35, 1.74, 0.66, -1.03, 2.2),
         (-2.8, 1.80, 0.72, -1.03, 2.2), (-3.4, 1.80, 0.75, -1.03, 2.2),
     ]  # fmt: skip
-    rings = _rings(_between(table, 48))
+    rings = _rings(_between(table, 28))
     return part(
         "clothing",
         rings.reshape(-1, 3),
-        grid_triangles(48, _SIDES, closed=True)[:, ::-1],
+        grid_triangles(28, _SIDES, closed=True)[:, ::-1],
         palette.CLOTH,
         palette.CLOTH_FINISH,
     )
@@ -113,9 +113,9 @@ def clothing() -> Part:
 
 def collar() -> Part:
     """Return the ribbed collar."""
-    around = 2 * np.pi * np.arange(161) / 160
+    around = 2 * np.pi * np.arange(121) / 120
     path = np.stack([0.475 * np.cos(around), -1.60 - 0.09 * np.sin(around), -0.98 + 0.44 * np.sin(around)], axis=1)
-    upward = np.stack([np.cos(around), np.full(161, 0.35), np.sin(around)], axis=1)
-    rib = 1 + 0.04 * np.cos(40 * around)
-    places, triangles, _ = tube(path, 0.075 * np.ones(161), 0.05 * rib, upward, sides=14)
+    upward = np.stack([np.cos(around), np.full(121, 0.35), np.sin(around)], axis=1)
+    rib = 1 + 0.04 * np.cos(30 * around)
+    places, triangles, _ = tube(path, 0.075 * np.ones(121), 0.05 * rib, upward, sides=10)
     return part("collar", places, triangles, palette.CLOTH_RIB, palette.CLOTH_FINISH)

@@ -17,7 +17,7 @@ IRIS, PUPIL = 0.115, 0.055
 """Radii of iris and pupil, as lengths on the eyeball."""
 CATCHLIGHT = 2.2
 """Reflections of lamps are brighter than white paint."""
-_SIDES = 64
+_SIDES = 48
 LASHES = 33
 """Columns of the lashes: those of the upper lid."""
 

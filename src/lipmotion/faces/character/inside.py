@@ -51,7 +51,7 @@ def _row(name: str, edges: tuple[float, ...], edge_y: float, height: float, up: 
 
 def _tooth(a: float, b: float, number: int, edge_y: float, height: float, up: float, front: float) -> Part:
     """Return one tooth between two columns: a rounded plate that is bent over its edge."""
-    across, down = np.meshgrid(np.linspace(-1, 1, 11), np.linspace(0, 1, 12))
+    across, down = np.meshgrid(np.linspace(-1, 1, 9), np.linspace(0, 1, 9))
     half, middle = abs(b - a) / 2, (a + b) / 2
     x = middle + half * 0.985 * across
     shorter = (0.0, 0.007, 0.002, 0.008, 0.014, 0.02)[number] if up > 0 else 0.004 * number
@@ -68,7 +68,7 @@ def _tooth(a: float, b: float, number: int, edge_y: float, height: float, up: fl
     root = (0.25 * level**3)[..., None]
     colours = (1 - shade) * colour + shade * np.array(palette.TOOTH_GAP)
     colours = (1 - root) * colours + root * np.array(palette.TOOTH_GAP)
-    triangles = grid_triangles(12, 11)
+    triangles = grid_triangles(9, 9)
     return part(
         "tooth", places, triangles if up > 0 else triangles[:, ::-1], colours.reshape(-1, 3), palette.TOOTH_FINISH
     )

@@ -17,7 +17,7 @@ from lipmotion.rig.rasteriser import normals_of
 Real = NDArray[np.float64]
 Index = NDArray[np.intp]
 
-SPACING = 0.030
+SPACING = 0.033
 """Distance of the vertices in the middle of the face, in radians about ``MIDDLE``."""
 HINGE = np.array([0.0, -0.32, -0.82])
 """The axis of the jaw goes through here, from ear to ear."""
