@@ -16,12 +16,15 @@ if TYPE_CHECKING:
     from lipmotion.engines import engine_named
     from lipmotion.export.base import read_motion
     from lipmotion.export.cues.sheet import CueSheet
+    from lipmotion.faces.filmed.face import FilmedFace, load_face, save_face
     from lipmotion.pipeline.adapt import adapt
     from lipmotion.pipeline.animate import animate, write
     from lipmotion.pipeline.corpus.prepare import prepare
     from lipmotion.pipeline.cues import cues, write_cues
     from lipmotion.pipeline.evaluation.evaluate import evaluate
     from lipmotion.pipeline.explain import explain
+    from lipmotion.pipeline.film.build import build_face
+    from lipmotion.pipeline.film.video import FilmOptions
     from lipmotion.pipeline.model import Model, load_model, save_model
     from lipmotion.pipeline.request import SpeechRequest
     from lipmotion.pipeline.speak import speak
@@ -48,6 +51,8 @@ __all__ = [
     "Corpus",
     "CueSheet",
     "Explanation",
+    "FilmOptions",
+    "FilmedFace",
     "Generation",
     "Lexicon",
     "Model",
@@ -62,14 +67,17 @@ __all__ = [
     "Unit",
     "adapt",
     "animate",
+    "build_face",
     "cues",
     "engine_named",
     "evaluate",
     "explain",
+    "load_face",
     "load_model",
     "map_onto",
     "prepare",
     "read_motion",
+    "save_face",
     "save_model",
     "speak",
     "state_runs",
@@ -88,15 +96,20 @@ _HOMES = {
     "Lexicon": "lipmotion.units",
     "Model": "lipmotion.pipeline.model",
     "adapt": "lipmotion.pipeline.adapt",
+    "FilmOptions": "lipmotion.pipeline.film.video",
+    "FilmedFace": "lipmotion.faces.filmed.face",
     "animate": "lipmotion.pipeline.animate",
+    "build_face": "lipmotion.pipeline.film.build",
     "cues": "lipmotion.pipeline.cues",
     "engine_named": "lipmotion.engines",
     "evaluate": "lipmotion.pipeline.evaluation.evaluate",
     "explain": "lipmotion.pipeline.explain",
+    "load_face": "lipmotion.faces.filmed.face",
     "load_model": "lipmotion.pipeline.model",
     "map_onto": "lipmotion.pipeline.transfer",
     "prepare": "lipmotion.pipeline.corpus.prepare",
     "read_motion": "lipmotion.export.base",
+    "save_face": "lipmotion.faces.filmed.face",
     "save_model": "lipmotion.pipeline.model",
     "SpokenText": "lipmotion.types",
     "speak": "lipmotion.pipeline.speak",

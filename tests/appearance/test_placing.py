@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lipmotion.appearance.placing import Kind, feather, inverse_map, place, resampling
+from lipmotion.appearance.placing import Kind, cut, feather, inverse_map, place, resampling
 from lipmotion.errors import InputError
 
 TURNED = np.array([[0.7, -0.1, 12.3], [0.12, 0.68, 8.6]])
@@ -103,3 +103,51 @@ def test_what_does_not_fit_is_refused() -> None:
             place(frame, patch, weight, affine)
     with pytest.raises(InputError, match="required"):
         resampling(TURNED, (60, 60), (10, 10)).apply(noise((1, 61, 60, 3)))
+
+
+def test_a_patch_of_pixels_as_large_as_the_frames_is_resampled() -> None:
+    frame = noise((60, 60, 3))
+    assert (cut(frame, TURNED, (20, 24)) == resampling(TURNED, (60, 60), (20, 24)).apply(frame[None])[0]).all()
+    assert cut(frame, TURNED, (20, 24)).dtype == np.float32
+
+
+@pytest.mark.parametrize("samples", [2, 3, 5])
+def test_pixels_of_a_large_frame_are_averaged(samples: int) -> None:
+    """A patch whose pixels are blocks of the frame's holds the means of these blocks."""
+    frame = noise((60, 90, 3))
+    middle = (samples - 1) / 2
+    patch = cut(frame, np.array([[samples, 0, middle], [0, samples, middle]], float), (60 // samples, 90 // samples))
+    blocks = frame.reshape(60 // samples, samples, 90 // samples, samples, 3).mean((1, 3))
+    assert patch == pytest.approx(blocks, abs=1e-3)
+
+
+@pytest.mark.parametrize("scale", [1.6, 1.9, 2.7, 3.4])
+def test_no_pixel_of_a_large_frame_is_skipped(scale: float) -> None:
+    """Every pixel of the frame counts about as much in the patch as every other."""
+    turned = np.column_stack([scale * np.array([[0.95, -0.3], [0.3, 0.95]]), [9.3, 4.1]])
+    frame = np.zeros((60, 60, 3), np.uint8)
+    seen = np.zeros((12, 12))
+    for row in range(12):
+        for column in range(12):
+            frame[24 + row, 24 + column] = 200
+            seen[row, column] = cut(frame, turned, (36, 36)).sum()
+            frame[24 + row, 24 + column] = 0
+    assert (0.9 * seen.mean() < seen).all()
+    assert (seen < 1.1 * seen.mean()).all()
+
+
+def test_what_was_cut_is_placed_where_it_was() -> None:
+    y, x = np.mgrid[:80, :90]
+    frame = np.rint(127 + 90 * np.sin(x / 7)[..., None] * np.cos(y / 9)[..., None] * [1, 0.5, -1]).astype(np.uint8)
+    placed = frame.copy()
+    weight = feather(np.pad(np.ones((58, 68), bool), 1), 5)
+    place(placed, cut(frame, TURNED, (60, 70)), weight, TURNED)
+    assert (np.abs(placed.astype(int) - frame) <= 1).all()
+
+
+@pytest.mark.parametrize("frame", [np.zeros((60, 80)), np.zeros((60, 80, 3)), np.zeros((60, 80, 4), np.uint8)])
+def test_a_frame_of_another_kind_is_refused(frame: np.ndarray) -> None:
+    with pytest.raises(InputError, match="frame of shape"):
+        cut(frame, TURNED, (10, 12))
+    with pytest.raises(InputError, match="frame of shape"):
+        place(frame, noise((10, 12, 3), 1), np.ones((10, 12), np.float32), TURNED)

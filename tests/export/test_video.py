@@ -7,7 +7,8 @@ import pytest
 
 from lipmotion.errors import ExportError
 from lipmotion.export import write_mp4
-from lipmotion.export.video import frame_rate
+from lipmotion.export.video import TAGS, frame_rate
+from lipmotion.export.xmp import LARGEST_PACKET
 from lipmotion.types import Audio
 
 RATES = [24, 25, 29.97, 30, 60]
@@ -174,3 +175,67 @@ def test_an_error_while_drawing_passes_through_and_leaves_no_file(tmp_path):
     with pytest.raises(ZeroDivisionError):
         write_mp4(tmp_path / "a.mp4", frames(), fps=25, audio=silence(0.1))
     assert not list(tmp_path.iterdir())
+
+
+def moving(count: int, height: int = 96, width: int = 128) -> list[np.ndarray]:
+    """Return frames of noise that moves, and changes a little from frame to frame."""
+    draw = np.random.default_rng(0)
+    large = draw.integers(60, 196, (height, width + count, 3))
+    return [(large[:, n : n + width] + draw.integers(-4, 5, (height, width, 3))).astype(np.uint8) for n in range(count)]
+
+
+def test_the_same_frames_give_the_same_bytes(tmp_path):
+    for name in ("a.mp4", "b.mp4"):
+        write_mp4(tmp_path / name, moving(40), fps=25, audio=silence(1.6), tags={"comment": "c"}, xmp="<x/>")
+    assert (tmp_path / "a.mp4").read_bytes() == (tmp_path / "b.mp4").read_bytes()
+
+
+def test_the_bytes_do_not_depend_on_the_number_of_processors(tmp_path):
+    """The encoder writes its settings into the video; where the number of threads is its own choice, it varies."""
+    write_mp4(tmp_path / "a.mp4", moving(3, 720, 1280), fps=25, audio=silence(0.2))
+    content = (tmp_path / "a.mp4").read_bytes()
+    assert b" threads=4 " in content
+    assert b" bframes=0 " in content
+
+
+def test_tags_come_back(tmp_path):
+    tags = {name: f"{name}: größe\nline" for name in TAGS}
+    write_mp4(tmp_path / "a.mp4", black(2), fps=25, audio=silence(0.1), tags=tags)
+    with av.open(str(tmp_path / "a.mp4")) as container:
+        assert {name: container.metadata.get(name) for name in TAGS} == tags
+    content = (tmp_path / "a.mp4").read_bytes()
+    assert content.index(b"moov") < content.index("\xa9cmt".encode("latin-1")) < content.index(b"mdat")
+
+
+def test_a_tag_that_would_be_lost_is_refused(tmp_path):
+    with pytest.raises(ExportError, match="unknown tags colour, encoder; known: album"):
+        write_mp4(
+            tmp_path / "a.mp4", black(1), fps=25, audio=silence(0.1), tags={"encoder": "x", "colour": "y", "title": "z"}
+        )
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_name_that_is_no_unicode_can_be_a_tag(tmp_path):
+    write_mp4(tmp_path / "a.mp4", black(1), fps=25, audio=silence(0.1), tags={"title": "a\udcffb"})
+    with av.open(str(tmp_path / "a.mp4")) as container:
+        assert container.metadata["title"] == r"a\udcffb"
+
+
+def test_an_unusable_packet_leaves_no_file(tmp_path):
+    with pytest.raises(ExportError, match="XMP metadata"):
+        write_mp4(tmp_path / "a.mp4", black(1), fps=25, audio=silence(0.1), xmp="x" * (LARGEST_PACKET + 1))
+    assert not list(tmp_path.iterdir())
+
+
+def test_change_from_frame_to_frame_is_kept(tmp_path):
+    """An encoder that predicts frames from both sides smooths what changes, and skin looks like wax."""
+    y, x = np.mgrid[:96, :128]
+    still = np.stack([127 + 60 * np.sin(x / 9), 127 + 60 * np.cos(y / 7), 100 + 0.5 * x], axis=2)
+    draw = np.random.default_rng(0)
+    frames = [np.rint(still + draw.normal(0, 3, (96, 128, 1))).astype(np.uint8) for _ in range(40)]
+    write_mp4(tmp_path / "a.mp4", frames, fps=25, audio=silence(1.6))
+    with av.open(str(tmp_path / "a.mp4")) as container:
+        shown = [frame.to_ndarray()[:96] for frame in container.decode(video=0)]
+    given = [av.VideoFrame.from_ndarray(frame).reformat(format="yuv420p").to_ndarray()[:96] for frame in frames]
+    flicker = [np.abs(np.diff(np.array(pictures, float), 2, axis=0)).mean() for pictures in (shown, given)]
+    assert 0.4 < flicker[0] / flicker[1] < 1.2

@@ -3,36 +3,37 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
+from lipmotion.kernels import affine
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
 Pictures = NDArray[np.uint8] | NDArray[np.floating[Any]]
-Kind = Literal["linear", "cubic"]
+Kind = affine.Kind
 """Interpolation between pixels: bilinear from 2 × 2, or bicubic from 4 × 4 of them."""
-SHARPNESS = -0.5
-"""The parameter a of cubic convolution (Keys 1981); with -½ second-degree polynomials are reproduced."""
+MOST_SAMPLES = 16
+"""Most samples along each side of a pixel that are averaged where the frame is larger than the patch."""
 
 
 @dataclass(frozen=True, eq=False)
 class Resampling:
-    """Where the pixels of a new picture lie in a given one, ready for any picture of that size.
+    """Where the pixels of a new picture lie in a given one; made by ``resampling``, for any picture of that size.
 
+    to_source   : affine map from a new pixel to its position in the given picture [shape=(2, 3)]
     source_size : height and width of the given picture, px
     size        : height and width of the new picture, px
-    index       : pixels of the given picture, counted row by row, that each new pixel is made of [shape=(h · w, n)]
-    weight      : their weights, whose sum is 1 [shape=(h · w, n)]
+    kind        : how to interpolate
     """
 
+    to_source: Array
     source_size: tuple[int, int]
     size: tuple[int, int]
-    index: NDArray[np.intp]
-    weight: Floats
+    kind: Kind
 
     def apply(self, pictures: Pictures) -> Floats:
         """Return the new pictures [shape=(T, h, w, C)]. ``pictures`` : [shape=(T, H, W, C)].
@@ -42,11 +43,7 @@ class Resampling:
         if pictures.ndim != 4 or pictures.shape[1:3] != self.source_size:
             height, width = self.source_size
             raise InputError(f"pictures of shape {pictures.shape}, required (T, {height}, {width}, C)")
-        flat = pictures.reshape(len(pictures), -1, pictures.shape[3])
-        result = np.zeros((len(pictures), len(self.index), pictures.shape[3]), np.float32)
-        for index, weight in zip(self.index.T, self.weight.T, strict=True):
-            result += flat[:, index] * weight[:, None]
-        return result.reshape(len(pictures), *self.size, -1)
+        return affine.resample(pictures, self.to_source, self.size, self.kind)
 
 
 def resampling(
@@ -60,19 +57,37 @@ def resampling(
     size        : height and width of the new pictures
     kind        : how to interpolate. Pixels outside the given picture repeat its outermost ones.
     Raises InputError: not such a map.
-    Source: Keys 1981 (cubic). A new picture that is much smaller than the given one would skip pixels: not for that.
+    Source: Keys 1981 (cubic). A new picture that is much smaller than the given one would skip pixels: use ``cut``.
     """
     _check_map(to_source)
-    rows, columns = np.mgrid[: size[0], : size[1]].reshape(2, -1)
-    x, y = to_source[:, :2] @ np.stack([columns, rows]) + to_source[:, 2:]
-    offsets = np.arange(2) if kind == "linear" else np.arange(-1, 3)
-    near = [np.floor(values).astype(np.intp)[:, None] + offsets for values in (y, x)]
-    weights = [_weights(np.abs(values[:, None] - pixels), kind) for values, pixels in zip((y, x), near, strict=True)]
-    near_rows, near_columns = (np.clip(pixels, 0, length - 1) for pixels, length in zip(near, source_size, strict=True))
-    index = near_rows[:, :, None] * source_size[1] + near_columns[:, None, :]
-    weight = weights[0][:, :, None] * weights[1][:, None, :]
-    count = len(x)
-    return Resampling(source_size, size, index.reshape(count, -1), weight.reshape(count, -1).astype(np.float32))
+    return Resampling(to_source, source_size, size, kind)
+
+
+def cut(frame: NDArray[np.uint8], to_frame: Array, size: tuple[int, int], kind: Kind = "cubic") -> Floats:
+    """Return an aligned patch of a frame: float32 array [shape=(h, w, 3)], grey levels; cubic ones may leave 0 to 255.
+
+    frame    : uint8 array [shape=(H, W, 3)]; pixels outside it repeat its outermost ones
+    to_frame : affine map [shape=(2, 3)] from the centre of a pixel of the patch to its position in the frame
+    size     : height and width of the patch
+    Where a pixel of the patch covers 1.5 × 1.5 or more pixels of the frame, so many samples of it are averaged that no
+    pixel of the frame is skipped.
+    Raises InputError: not such a frame or map.
+    """
+    _check_frame(frame)
+    _check_map(to_frame)
+    turn = to_frame[:, :2]
+    samples = min(MOST_SAMPLES, max(1, round(np.sqrt(abs(np.linalg.det(turn))))))
+    if samples == 1:
+        return affine.resample(frame[None], to_frame, size, kind)[0]
+    first = to_frame[:, 2] + turn.sum(axis=1) * (0.5 / samples - 0.5)
+    finer = np.column_stack([turn / samples, first])
+    fine = affine.resample(frame[None], finer, (size[0] * samples, size[1] * samples), kind)[0]
+    patch = np.zeros((*size, frame.shape[2]), np.float32)
+    for row in range(samples):
+        for column in range(samples):
+            patch += fine[row::samples, column::samples]
+    patch /= samples * samples
+    return patch
 
 
 def inverse_map(to_source: Array) -> Array:
@@ -107,9 +122,10 @@ def place(frame: NDArray[np.uint8], patch: Pictures, weight: Floats, to_frame: A
     weight   : [shape=(h, w)], of ``feather``; 0 on the outermost pixels, or they are seen as an edge
     to_frame : affine map [shape=(2, 3)] from the centre of a pixel of the patch to its position in the frame
     The part of the patch that lies outside the frame is left out. Pixels with weight 0 stay as they are, to the bit.
-    Raises InputError: a weight of another size than the patch, or a map that cannot be inverted.
+    Raises InputError: no such frame, a weight of another size than the patch, or a map that cannot be inverted.
     """
-    if patch.ndim != 3 or weight.shape != patch.shape[:2]:
+    _check_frame(frame)
+    if patch.ndim != 3 or patch.shape[2] != 3 or weight.shape != patch.shape[:2]:
         raise InputError(f"weight of shape {weight.shape} for a patch of {patch.shape}; required (h, w) and (h, w, 3)")
     to_patch = inverse_map(to_frame)
     height, width = weight.shape
@@ -121,20 +137,12 @@ def place(frame: NDArray[np.uint8], patch: Pictures, weight: Floats, to_frame: A
     if left >= right or top >= bottom:
         return
     shifted = np.concatenate([to_patch[:, :2], to_patch[:, 2:] + to_patch[:, :2] @ [[left], [top]]], axis=1)
-    size = (bottom - top, right - left)
-    new = resampling(shifted, (height, width), size, kind).apply(patch[None])[0]
-    share = resampling(shifted, (height, width), size, "linear").apply(weight[None, :, :, None])[0]
-    box = frame[top:bottom, left:right]
-    box[...] = np.clip(np.rint(box + share * (new - box)), 0, 255)
+    affine.blend(frame, (top, left), (bottom - top, right - left), patch, weight, shifted, kind)
 
 
-def _weights(distance: Array, kind: Kind) -> Array:
-    if kind == "linear":
-        return 1 - distance
-    a = SHARPNESS
-    near = ((a + 2) * distance - (a + 3)) * distance**2 + 1
-    far = a * (((distance - 5) * distance + 8) * distance - 4)
-    return np.where(distance <= 1, near, far)
+def _check_frame(frame: NDArray[np.uint8]) -> None:
+    if frame.ndim != 3 or frame.shape[2] != 3 or not frame.size or frame.dtype != np.uint8:
+        raise InputError(f"frame of shape {frame.shape} and type {frame.dtype}, required (H, W, 3) and uint8")
 
 
 def _check_map(affine: Array) -> None:

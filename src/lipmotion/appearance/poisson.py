@@ -63,10 +63,13 @@ class CloningSystem:
             np.copyto(part[frames], membrane, where=self.grids.region[..., None])
         return result
 
-    def clone(self, source: Pictures, background: Pictures) -> NDArray[np.uint8]:
+    def clone(self, source: Pictures, background: Pictures, largest_difference: float = np.inf) -> NDArray[np.uint8]:
         """Return the background with the region cloned from the source: uint8 array [shape=(T, h, w, 3)].
 
         source, background : pictures [shape=(T, h, w, 3)], grey levels (0 to 255), uint8 or float
+        largest_difference : differences on the edge of the region are cut off at this, grey levels: those of light are
+                             smaller, and where pictures show other things there (skin and a collar), the membrane would
+                             carry the difference far into the region
         Inside the region the gradient of the result is that of the source; outside it the result is the background.
         At the end values are rounded and cut to 0 to 255.
         Raises InputError: pictures of another shape, number or type than required, or values that are not finite.
@@ -78,7 +81,7 @@ class CloningSystem:
         whole = background.dtype == np.uint8
         result = background.astype(np.uint8) if whole else _grey_levels(background.astype(np.float32))
         new, old = (pictures[(slice(None), *self.box)] for pictures in (source, result))
-        for frames, membrane in self._membranes(source, background):
+        for frames, membrane in self._membranes(source, background, largest_difference):
             np.add(membrane, new[frames], out=membrane, casting="same_kind")
             cloned = _grey_levels(membrane)
             flat = cloned.reshape(len(cloned), -1, COLOURS)
@@ -86,23 +89,27 @@ class CloningSystem:
             old[frames] = cloned
         return result
 
-    def _membranes(self, source: Pictures, background: Pictures) -> Iterator[tuple[slice, NDArray[np.float32]]]:
+    def _membranes(
+        self, source: Pictures, background: Pictures, limit: float = np.inf
+    ) -> Iterator[tuple[slice, NDArray[np.float32]]]:
         """Yield slices of the pictures and their membranes in the box [shape=(t, H, W, 3)], valid in the region."""
         height, width = self.grids.region.shape
         step = max(1, min(CHUNK // (height * width), len(source)))
         filler = GridFiller(self.grids, step, COLOURS)
         for first in range(0, len(source), BATCH):
-            values = self._at_nodes(source[first : first + BATCH], background[first : first + BATCH])
+            values = self._at_nodes(source[first : first + BATCH], background[first : first + BATCH], limit)
             for start in range(0, len(values), step):
                 part = values[start : start + step]
                 yield slice(first + start, first + start + len(part)), filler.fill(part)
 
     @one_thread()
-    def _at_nodes(self, source: Pictures, background: Pictures) -> NDArray[np.float32]:
+    def _at_nodes(self, source: Pictures, background: Pictures, limit: float) -> NDArray[np.float32]:
         """Return the membranes of some pictures at the nodes [shape=(t, K, 3)]."""
         rows, columns = self.edge // self.grids.region.shape[1], self.edge % self.grids.region.shape[1]
         at = slice(None), rows + self.box[0].start, columns + self.box[1].start
         difference = np.subtract(background[at], source[at], dtype=np.float32).swapaxes(0, 1)
+        if np.isfinite(limit):
+            difference = np.clip(difference, -limit, limit)
         product = self.response @ difference.reshape(len(self.edge), -1)
         return np.ascontiguousarray(product.reshape(len(product), -1, COLOURS).swapaxes(0, 1))
 

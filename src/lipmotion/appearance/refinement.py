@@ -42,6 +42,8 @@ class RefinementOptions:
             raise InputError(f"{self.neighbours} neighbours, required at least 1")
 
 
+STEADY = RefinementOptions()
+"""The default: one candidate for all colours, and steady detail."""
 PAPER = RefinementOptions(together=False, steadiness=0.0, neighbours=1)
 """The refinement of the paper: the nearest candidate of every colour and frame."""
 
@@ -58,7 +60,7 @@ class Refiner:
 
     eigenlips: Eigenlips
     candidates: Candidates
-    options: RefinementOptions = RefinementOptions()
+    options: RefinementOptions = STEADY
 
     def __post_init__(self) -> None:
         wanted, found = (len(self.eigenlips.channels), self.eigenlips.size), self.candidates

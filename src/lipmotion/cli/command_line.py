@@ -11,14 +11,28 @@ import warnings
 from collections.abc import Sequence
 from typing import NoReturn
 
-from lipmotion.cli import adapt, animate, cite, corpus, cues, evaluate, experiment, explain, info, speak, train, words
+from lipmotion.cli import (
+    adapt,
+    animate,
+    cite,
+    corpus,
+    cues,
+    evaluate,
+    experiment,
+    explain,
+    face,
+    info,
+    speak,
+    train,
+    words,
+)
 from lipmotion.cli.events import Events
 from lipmotion.cli.output import flush_output, output_error, print_line, with_program_name
 from lipmotion.cli.paths import check_paths
 from lipmotion.cli.stop import Stopper
 from lipmotion.printable import printable
 
-VERBS = (animate, speak, explain, cues, words, corpus, train, adapt, evaluate, experiment, info, cite)
+VERBS = (animate, speak, explain, cues, words, corpus, train, adapt, face, evaluate, experiment, info, cite)
 EXIT_CODES = """exit codes: 0 done, 1 a bug, 2 wrong command line, 3 unusable input, 4 corpus, 5 alignment,
 6 model file, 7 output, 8 missing package, 130 interrupted, 143 terminated"""
 

@@ -6,9 +6,12 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from lipmotion.cli.faces import add_face_arguments, film_options
 from lipmotion.cli.paths import add_output
+from lipmotion.cli.staging import add_staging_arguments, staging_of
 
 if TYPE_CHECKING:
+    from lipmotion.cli.progress import Report
     from lipmotion.pipeline.model import Model
     from lipmotion.types import Audio, Generation
 
@@ -24,30 +27,38 @@ def add_result_arguments(parser: argparse.ArgumentParser, files: str, *, require
     add_output(parser, "-o", "--output", force=True, help=files, **outputs)
     parser.add_argument("--rate", type=float, metavar="HZ", help="frames per second of motion files (default: 100)")
     parser.add_argument("--channels", metavar="NAME,NAME", help="write only these to motion files: opening,width,...")
-    parser.add_argument("--fps", type=float, default=25.0, help="frames per second of videos (default: 25)")
-    parser.add_argument("--face", default="portrait", metavar="NAME", help="face that videos show (default: portrait)")
+    rate = "frames per second of videos (default: 25; of filmed faces, those of the footage)"
+    parser.add_argument("--fps", type=float, help=rate)
+    articulation = "add tongue, lip_tuck, protrusion, spread, lip_press, teeth to motion files"
+    parser.add_argument("--articulation", action="store_true", help=articulation)
+    add_face_arguments(parser)
+    add_staging_arguments(parser)
 
 
 def check_results(options: argparse.Namespace, speech: Path | None = None) -> None:
-    """Raise ExportError or InputError if an output cannot be written.
+    """Raise ExportError or InputError if an output cannot be written; replace the name of a face by the face.
 
     speech : the recording (None: there will be a sound that is in no file)
     """
-    from lipmotion.pipeline.animate import check_outputs
+    from lipmotion.pipeline.animate import check_outputs, opened_face
 
-    checked = {"rate_hz": options.rate, "fps": options.fps, "face": options.face}
-    check_outputs(options.output, speech, **checked, with_sound=speech is None)
+    options.face = opened_face(options.face)
+    checked = {"rate_hz": options.rate, "fps": options.fps, "face": options.face, "film": film_options(options)}
+    check_outputs(options.output, speech, **checked, staging=staging_of(options), with_sound=speech is None)
 
 
-def write_results(options: argparse.Namespace, result: Generation, speech: Path | Audio, model: Model) -> None:
+def write_results(
+    options: argparse.Namespace, result: Generation, speech: Path | Audio, model: Model, report: Report
+) -> None:
     """Write generated motion to the outputs.
 
     speech : the recording, or the sound
+    report : receives the progress of videos
     """
-    from lipmotion.pipeline.animate import write
+    from lipmotion.pipeline.animate import with_articulation, write
 
     write(
-        result,
+        with_articulation(result) if options.articulation else result,
         options.output,
         speech=speech,
         model=model,
@@ -55,4 +66,7 @@ def write_results(options: argparse.Namespace, result: Generation, speech: Path 
         rate_hz=options.rate,
         fps=options.fps,
         face=options.face,
+        film=film_options(options),
+        staging=staging_of(options),
+        monitor=report.receive,
     )

@@ -20,6 +20,11 @@ def add_speech_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the recording, its transcript, lexicon, units, recogniser and speaker, the model, and another person."""
     add_recording_arguments(parser)
     add_model_argument(parser)
+    add_onto_arguments(parser)
+
+
+def add_onto_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add ``--onto`` and ``--onto-speaker``: another person, onto whose face the motion is mapped."""
     face = "another person, onto whose face the motion is mapped: a video of them, a prepared corpus or a model"
     add_input(parser, "--onto", what="footage of the other person", metavar="VIDEO|CORPUS|MODEL", help=face)
     which = "which person, if the corpus or the model of --onto has several"

@@ -7,13 +7,15 @@ from pathlib import Path
 
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import InputError
+from lipmotion.faces.filmed.face import FilmedFace
 from lipmotion.motion.speakers import SpeakerMap
 from lipmotion.pipeline.model import Model
 from lipmotion.types import Audio, TimedTranscript, Timeline, Unit
 from lipmotion.units import Lexicon
 
-Onto = str | Path | Corpus | Model | SpeakerMap
-"""Another person: a video, the folder of a corpus or a model file, or the value of one of them, or a finished map."""
+Onto = str | Path | Corpus | Model | FilmedFace | SpeakerMap
+"""Another person: a video, the folder of a corpus, a model file or a face file, or the value of one of them, or a
+finished map."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,7 @@ from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.animate import animate
 from lipmotion.pipeline.corpus_voice import speak_from_corpus
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.pipeline.request import SpeechRequest
+from lipmotion.pipeline.request import Onto, SpeechRequest
 from lipmotion.pipeline.speakers import speaker_map
 from lipmotion.speech.audio_files import SPEECH_RATE_HZ
 from lipmotion.speech.recogniser import SHORT_PAUSE_S
@@ -52,6 +52,8 @@ def speak(
     constraints: Constraints | None = None,
     lexicon: Lexicon | None = None,
     speaker: str = "",
+    onto: Onto | None = None,
+    onto_speaker: str = "",
 ) -> SpokenText:
     """Return a text as sound of a synthetic voice, and the lip motion for it, with 0.25 s of rest at both ends.
 
@@ -63,6 +65,7 @@ def speak(
     constraints : values that the motion must take exactly, in the units of the speaker
     lexicon     : pronunciations of English words; they tell which vowels are reduced, not how the voice says the words
     speaker     : whose motion is generated, of the people whom the model was trained on; empty: the mean person
+    onto, onto_speaker : another person, onto whose face the motion is mapped (``SpeechRequest``)
     The phones and their times are the synthesiser's, so nothing is recognised.
     Raises MissingDependencyError: no synthesiser is installed, or not the one that was asked for.
     Raises InputError: no such voice or speaker, or a text that is too long, has no word, or cannot be spoken.
@@ -74,6 +77,8 @@ def speak(
     if voice == CORPUS_VOICE or corpus is not None:
         if voice != CORPUS_VOICE or corpus is None:
             raise InputError("a corpus that speaks needs both: the voice 'corpus', and the corpus (--corpus FOLDER)")
+        if onto is not None:
+            raise InputError("a corpus speaks with the motion that was recorded; it is not mapped onto another person")
         loaded = model if isinstance(model, Model) else load_model(model)
         return speak_from_corpus(text, corpus, loaded, constraints=constraints, lexicon=lexicon, speaker=speaker)
     sentences = sentences_of(text)
@@ -81,7 +86,9 @@ def speak(
     loaded = model if isinstance(model, Model) else load_model(model)
     speaker_map(loaded.speakers, speaker)  # an unknown one is reported before anything is spoken
     sound, speech, units = _said(sentences, chosen, lexicon)
-    request = SpeechRequest(_with_floor(speech, units), units=units, speaker=speaker)
+    request = SpeechRequest(
+        _with_floor(speech, units), units=units, speaker=speaker, onto=onto, onto_speaker=onto_speaker
+    )
     return SpokenText(sound, animate(request, model=loaded, constraints=constraints))
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import AlignmentError, InputError
+from lipmotion.faces.filmed.face import SUFFIX, FilmedFace, load_face
 from lipmotion.kernels.threads import one_thread
 from lipmotion.motion.speakers import SpeakerMap, SpeakerMaps
 from lipmotion.motion.transfer import composed, measured_speech_s, transfer_map, with_channels
@@ -47,7 +48,7 @@ def map_onto(
     """Return the map from the motion that a model generates to that of another person; ``SpeechRequest.onto`` takes it.
 
     model        : whose motion is mapped
-    onto         : the person: a video, a prepared corpus, or another model
+    onto         : the person: a video, a prepared corpus, another model, or a filmed face
     speaker      : whose motion is mapped, of the people whom ``model`` was trained on; empty: the mean person
     onto_speaker : onto whose motion, where a corpus or another model has several people
     recogniser   : how the person's recordings without a transcript are recognised, as of ``SpeechRequest``; best the
@@ -152,19 +153,23 @@ def measured_pair(
     return Example(name, speech, generated, valid), Example(name, speech, motion, valid)
 
 
-_Opened = Corpus | Model | Path
+_Opened = Corpus | Model | FilmedFace | Path
 
 
-def _opened(onto: str | Path | Corpus | Model) -> tuple[_Opened, str]:
+def _opened(onto: str | Path | Corpus | Model | FilmedFace) -> tuple[_Opened, str]:
     """Return the corpus, the model, or the path of the video; and its name for messages."""
     if isinstance(onto, Corpus):
         return onto, str(onto.path)
     if isinstance(onto, Model):
         return onto, "the model"
+    if isinstance(onto, FilmedFace):
+        return onto, "the face"
     path = Path(onto)
     if path.is_dir():
         return Corpus.open(path), str(path)
     check_source(path, "video")
+    if path.suffix.lower() == SUFFIX:
+        return load_face(path), str(path)
     return (load_model(path) if is_zipfile(path) else path), str(path)
 
 
@@ -179,6 +184,9 @@ def _takes(
         if speech is None:
             raise InputError("the person of a model is measured in some speech; give a request (speech=...)")
         yield where, replace(speech, speaker="", onto=None), opened
+    elif isinstance(opened, FilmedFace):
+        for number, take in enumerate(opened.takes):
+            yield f"take {number + 1}", SpeechRequest(take.sound), Track(take.motion, take.seen)
     elif isinstance(opened, Corpus):
         names = _names(opened, where, speaker)
         mean_s = sum(seconds for _, seconds in opened.speakers.values()) / max(len(opened), 1)

@@ -36,7 +36,7 @@ def open_media(path: Path) -> Any:
     """
     import av
 
-    _bound_allocations()
+    bound_allocations()
     options = {
         "protocol_whitelist": "file",
         "format_whitelist": ",".join(MEDIA_FORMATS),
@@ -52,7 +52,7 @@ def open_media(path: Path) -> Any:
 
 
 @cache
-def _bound_allocations() -> None:
+def bound_allocations() -> None:
     """Limit FFmpeg's allocations to ``LARGEST_BLOCK``, in the whole process: it trusts the sizes in file headers."""
     import av._core
 
@@ -66,6 +66,17 @@ def video_streams(container: Any) -> list[Any]:
 
     cover = av.stream.Disposition.attached_pic
     return [stream for stream in container.streams.video if not stream.disposition & cover]
+
+
+def has_video(path: Path) -> bool:
+    """Return whether a file can be opened and has a video stream."""
+    import av
+
+    try:
+        with open_media(path) as container:
+            return bool(video_streams(container))
+    except (av.FFmpegError, ValueError, OSError):
+        return False
 
 
 def stated_duration_s(container: Any, stream: Any) -> float:

@@ -1,0 +1,150 @@
+"""The mark of synthetic video: metadata that people and programs can read, and a label in a corner of the picture.
+
+Only for videos that look recorded: a drawn face needs none. What a mark does and does not do: docs/consent.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from importlib.metadata import version
+from typing import Any
+from xml.sax.saxutils import escape
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import ExportError, InputError
+from lipmotion.printable import printable
+
+Frame = NDArray[np.uint8]
+Box = tuple[float, float, float, float]
+"""Left, top, right and bottom, px from the upper left corner of the frame."""
+
+SOURCE_TYPE = "http://cv.iptc.org/newscodes/digitalsourcetype/compositeWithTrainedAlgorithmicMedia"
+"""IPTC's digital source type for recorded pictures into which parts were set that a model learned from recordings."""
+STATEMENT = (
+    "synthetic: the movements of the mouth and the jaw in this video were generated from speech by a computer "
+    "(lipmotion); they were not recorded"
+)
+"""What the metadata says. It begins with the word to search for."""
+LABEL = "synthetic"
+LETTER_SHARE, SMALLEST_LETTERS = 0.035, 9
+"""Height of the label's letters, as a share of the frame's shorter side, and the least that can be read, px."""
+SPACE = 0.8
+"""Distance of the label from the edges of the frame, relative to the height of its letters."""
+DARKNESS, BRIGHTNESS = 0.45, 0.9
+"""Opacity of the label's black ground, and of its white letters."""
+
+
+@dataclass(frozen=True)
+class MarkMetadata:
+    """The mark as arguments of ``write_mp4``.
+
+    tags : what players show; the keywords hold ``SOURCE_TYPE`` too, as programs that copy a video often drop the packet
+    xmp  : packet for programs, in which ``SOURCE_TYPE`` is the property DigitalSourceType of the IPTC
+    """
+
+    tags: dict[str, str]
+    xmp: str
+
+
+def mark_metadata(statement: str = STATEMENT) -> MarkMetadata:
+    """Return the metadata that say that a video is synthetic.
+
+    statement : what the comment says, for people; in the packet without line ends and control characters
+    Source: IPTC Digital Source Type NewsCodes; IPTC Video Metadata Hub; Adobe, XMP Specification Part 1.
+    """
+    text = escape(printable(statement))
+    xmp = _PACKET.format(statement=text, source_type=SOURCE_TYPE, tool=f"lipmotion {version('lipmotion')}")
+    return MarkMetadata({"comment": statement, "keywords": f"{LABEL}, {SOURCE_TYPE}"}, xmp)
+
+
+def mark_frames(frames: Iterable[Frame], face: Box | None = None, label: str = LABEL) -> Iterator[Frame]:
+    """Yield the frames with a small label in a corner, in the same place in all of them; the frames are not changed.
+
+    frames : uint8 RGB [shape=(H, W, 3)], all of one size; taken one at a time
+    face   : the part of the frames in which the face is at any time, which the label leaves free. Of the corners that
+             are free, the first in this order is taken: lower right, lower left, upper right, upper left.
+    Raises ExportError: the face leaves no corner for letters of ``SMALLEST_LETTERS`` px.
+    Raises InputError: the face is no such box.
+    """
+    if face is not None and not (face[0] <= face[2] and face[1] <= face[3]):
+        raise InputError(
+            f"face {face}, required: left, top, right and bottom in px, left before right, top over bottom"
+        )
+    drawn: _DrawnLabel | None = None
+    for frame in frames:
+        drawn = drawn or _placed(frame.shape[0], frame.shape[1], face, label)
+        height, width = drawn.ground.shape
+        marked = frame.copy()
+        part = marked[drawn.top : drawn.top + height, drawn.left : drawn.left + width]
+        part[...] = np.rint(part * (1 - drawn.ground[..., None]) + drawn.letters[..., None])
+        yield marked
+
+
+@dataclass(frozen=True, eq=False)
+class _DrawnLabel:
+    """A label and its place: the frame becomes frame · (1 − ground) + letters [shapes=(h, w)]."""
+
+    top: int
+    left: int
+    ground: NDArray[np.float32]
+    letters: NDArray[np.float32]
+
+
+def _placed(height: int, width: int, face: Box | None, label: str) -> _DrawnLabel:
+    """Return the label in the first free corner, as large as possible. Raises ExportError: no corner is free."""
+    largest = max(SMALLEST_LETTERS, round(LETTER_SHARE * min(height, width)))
+    for size in range(largest, SMALLEST_LETTERS - 1, -1):
+        ground, letters = _drawn(label, size)
+        rows, columns = ground.shape
+        space = round(SPACE * size)
+        for top in (height - space - rows, space):
+            for left in (width - space - columns, space):
+                inside = 0 <= top <= height - rows and 0 <= left <= width - columns
+                if inside and (face is None or _apart((left, top, left + columns, top + rows), face)):
+                    return _DrawnLabel(top, left, ground, letters)
+    raise ExportError(
+        f"no corner of the {width} × {height} px frame has room for the label {label!r} beside the face {face}; "
+        "use a video with more space around the face, or the mark in the metadata alone"
+    )
+
+
+def _apart(one: Box, other: Box) -> bool:
+    return one[2] <= other[0] or other[2] <= one[0] or one[3] <= other[1] or other[3] <= one[1]
+
+
+def _drawn(label: str, size: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return opacity and grey levels of a label: white letters of ``size`` px on a dark ground with round corners."""
+    from PIL import Image, ImageDraw, ImageFont
+
+    font: Any = ImageFont.load_default(size)
+    left, top, right, bottom = font.getbbox(label)
+    across, down = round(0.45 * size), round(0.3 * size)
+    room = (int(np.ceil(right - left)) + 2 * across, int(np.ceil(bottom - top)) + 2 * down)
+    finer = Image.new("L", (room[0] * 4, room[1] * 4))
+    ImageDraw.Draw(finer).rounded_rectangle((0, 0, room[0] * 4 - 1, room[1] * 4 - 1), 4 * down, fill=255)
+    shape = np.asarray(finer.resize(room, Image.Resampling.BOX), np.float32) / 255
+    text = Image.new("L", room)
+    ImageDraw.Draw(text).text((across - left, down - top), label, fill=255, font=font)
+    letters = (BRIGHTNESS / 255) * np.asarray(text, np.float32)
+    ground = letters + (1 - letters) * DARKNESS * shape
+    return ground.astype(np.float32), (255 * letters).astype(np.float32)
+
+
+_PACKET = """<?xpacket begin="\ufeff" id="W5M0MpCehiHzreSzNTczkc9d"?>
+<x:xmpmeta xmlns:x="adobe:ns:meta/">
+ <rdf:RDF xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#">
+  <rdf:Description rdf:about=""
+    xmlns:dc="http://purl.org/dc/elements/1.1/"
+    xmlns:xmp="http://ns.adobe.com/xap/1.0/"
+    xmlns:Iptc4xmpExt="http://iptc.org/std/Iptc4xmpExt/2008-02-29/">
+   <Iptc4xmpExt:DigitalSourceType>{source_type}</Iptc4xmpExt:DigitalSourceType>
+   <xmp:CreatorTool>{tool}</xmp:CreatorTool>
+   <dc:description><rdf:Alt><rdf:li xml:lang="x-default">{statement}</rdf:li></rdf:Alt></dc:description>
+  </rdf:Description>
+ </rdf:RDF>
+</x:xmpmeta>
+<?xpacket end="r"?>
+"""

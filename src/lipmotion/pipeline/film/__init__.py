@@ -1,0 +1,1 @@
+"""Filmed faces: built from footage of a person, and animated over it."""

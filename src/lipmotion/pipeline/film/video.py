@@ -1,0 +1,271 @@
+"""Video of a filmed face: generated motion, stitched into footage of the person."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import chain
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.appearance.eigenlips import Eigenlips
+from lipmotion.appearance.person import FaceCodes
+from lipmotion.errors import InputError
+from lipmotion.export.inset import inset_box, with_inset
+from lipmotion.export.synthetic_mark import mark_frames, mark_metadata
+from lipmotion.export.video import write_mp4
+from lipmotion.faces.base import Face
+from lipmotion.faces.filmed.face import FilmedFace
+from lipmotion.faces.filmed.renderer import BATCH, STITCHING, Stitcher, StitchingOptions
+from lipmotion.kernels.threads import one_thread
+from lipmotion.pipeline.film.background import BackgroundSequence, open_background, stored_sequence
+from lipmotion.pipeline.model import Model
+from lipmotion.speech.pauses import levels_db_at
+from lipmotion.storage.files import check_source
+from lipmotion.storage.media import has_video
+from lipmotion.types import GREY, Audio, Monitor, Motion, silent_monitor
+from lipmotion.types.progress import with_reports
+from lipmotion.vision.footage import untracked_frames
+
+Floats = NDArray[np.float32]
+Frames = Iterator[NDArray[np.uint8]]
+Jaw = Literal["motion", "energy", "none"]
+Overlay = Literal["inset", "mouth"]
+Mark = Literal["metadata", "visible", "none"]
+RENDERING = "rendering the video"
+"""Name of the stage in reports of progress."""
+LOG = logging.getLogger("lipmotion")
+ZOOM = 1.3
+"""How much larger than the speaker's own the mouth over it is."""
+
+
+@dataclass(frozen=True)
+class FilmOptions:
+    """How a filmed face is shown.
+
+    background : footage of the same person into which mouth and jaw are stitched; None: the one in the face's file
+    jaw        : what the jaw follows: the motion, the energy of the sound (Xie & Liu 2007, §6.2), or the background's
+                 own motion (``none``)
+    overlay    : the aid to lip-reading: on the speech's own video, a large mouth in a corner (``inset``) or over the
+                 speaker's own (``mouth``); None: no such video is needed
+    mark       : how the video says that it is synthetic: in its metadata, there and in a corner of the picture
+                 (``visible``), or not at all (docs/consent.md)
+    stitching  : how pictures are made
+
+    >>> import lipmotion
+    >>> lipmotion.FilmOptions(jaw="none").mark
+    'metadata'
+    """
+
+    background: Path | None = None
+    jaw: Jaw = "motion"
+    overlay: Overlay | None = None
+    mark: Mark = "metadata"
+    stitching: StitchingOptions = STITCHING
+
+
+FILM = FilmOptions()
+
+
+@dataclass(frozen=True, eq=False)
+class Film:
+    """A video that is made while it is read.
+
+    frames  : each uint8 RGB [shape=(H, W, 3)], of even sizes
+    count   : number of the frames
+    rate_hz : frames a second
+    covered : the part of the frames in which the face, or the inset, is at any time: left, top, right, bottom, px
+    """
+
+    frames: Frames
+    count: int
+    rate_hz: float
+    covered: tuple[float, float, float, float]
+
+
+@one_thread()
+def film_of(
+    face: FilmedFace,
+    motion: Motion,
+    *,
+    speech: Path | None = None,
+    sound: Audio | None = None,
+    model: Model | None = None,
+    fps: float | None = None,
+    options: FilmOptions = FILM,
+) -> Film:
+    """Return the video of a filmed face.
+
+    face      : of the person
+    motion    : of tracked points of the same person, or eigenlips
+    speech    : the video of the speech, for an overlay
+    sound     : for a jaw that follows the energy
+    model     : that generated the motion; needed where the motion is eigenlips
+    fps       : frames a second; None, and with an overlay: those of the footage
+    Frame n shows the time n / fps; the last one is at or before the end of the motion. Frames are made a few at a time.
+    Raises InputError: motion without the channels that the face needs, no sound for ``energy``, a background in which
+    there is no face, a rate that is not positive, or an overlay of a sound without video.
+    """
+    check_film(face, options, speech)
+    eigenlips = model.eigenlips if model is not None else None
+    if options.overlay == "inset" and speech is not None:
+        frames, rate_hz = untracked_frames(speech)
+        codes = _codes(face, motion, sound, rate_hz, eigenlips, options)
+        mouths = Stitcher(face.appearance, options.stitching).mouths(codes)
+        first, frames = _first_of(_even(frames), speech)
+        covered = inset_box((first.shape[0], first.shape[1]), face.appearance.mouths.shape[1:3])
+        return Film(with_inset(frames, mouths), len(codes), rate_hz, covered)
+    background = _background(face, options, speech)
+    rate_hz = background.rate_hz if fps is None or options.overlay is not None else fps
+    codes = _codes(face, motion, sound, rate_hz, eigenlips, options)
+    has_jaw = options.jaw != "none" and options.overlay is None
+    stitcher = Stitcher(face.appearance, options.stitching if has_jaw else replace(options.stitching, jaw=False))
+    frames = stitcher.stitch(codes, background.frames(len(codes), rate_hz))
+    return Film(frames, len(codes), rate_hz, background.face_box)
+
+
+def _codes(
+    face: FilmedFace,
+    motion: Motion,
+    sound: Audio | None,
+    rate_hz: float,
+    eigenlips: Eigenlips | None,
+    options: FilmOptions,
+) -> FaceCodes:
+    """Return what the lower face is like in every frame of a video."""
+    if not 0 < rate_hz < float("inf"):
+        raise InputError(f"the frame rate is {rate_hz}, required more than 0")
+    count = int(np.floor((len(motion.values) - 1) / motion.rate_hz * rate_hz + 1e-9)) + 1
+    codes = face_codes(face, motion, count, rate_hz, eigenlips)
+    if options.jaw == "energy":
+        codes = face.appearance.with_jaw_of_sound(codes, _levels(sound, count, rate_hz))
+    return codes
+
+
+def _background(face: FilmedFace, options: FilmOptions, speech: Path | None) -> BackgroundSequence:
+    if options.overlay is not None and speech is not None:
+        return open_background(speech, in_time=True).enlarged(ZOOM)
+    return stored_sequence(face.background) if options.background is None else open_background(options.background)
+
+
+def face_codes(
+    face: FilmedFace, motion: Motion, count: int, rate_hz: float, eigenlips: Eigenlips | None = None
+) -> FaceCodes:
+    """Return what the lower face is like in ``count`` frames at the rate of a video.
+
+    Raises InputError: motion without the channels that the face needs.
+    """
+    shown = Motion(motion.at(np.arange(count) / rate_hz), rate_hz, motion.channels)
+    if eigenlips is None or not all(channel in shown.channels for channel in eigenlips.channels):
+        return face.appearance.of_motion(shown)
+    values = shown.values[:, [shown.column(channel.name) for channel in eigenlips.channels]]
+    starts = range(0, count, BATCH)
+    parts = [face.appearance.of_mouths(eigenlips.restore(values[start : start + BATCH])) for start in starts]
+    mouth, jaw, chin_px = (np.concatenate(values) for values in zip(*map(_fields, parts), strict=True))
+    if all(channel.unit == GREY for channel in shown.channels):
+        return FaceCodes(mouth, jaw, chin_px)
+    return replace(face.appearance.of_motion(shown), mouth=mouth)  # points tell the jaw better
+
+
+def _fields(codes: FaceCodes) -> tuple[Floats, Floats, Floats]:
+    return codes.mouth, codes.jaw, codes.chin_px
+
+
+def person_shown(model: Model, face: Face | FilmedFace, speaker: str = "") -> FilmedFace | None:
+    """Return a filmed face if it is of another person than the motion of a model, so that it must be mapped onto it.
+
+    speaker : of the people of the model whose motion is generated
+    A drawn face shows anybody. A filmed face without speech (its footage has no sound) cannot be mapped onto: that is
+    logged as a warning, and the motion stays as it is. Raises InputError: as ``is_person_of``.
+    """
+    if not isinstance(face, FilmedFace) or is_person_of(model, face, speaker):
+        return None
+    if not face.takes:
+        LOG.warning(
+            "the face was built from footage without sound, so the motion, which is another person's, is not fitted to "
+            "it; build it from footage with sound"
+        )
+        return None
+    return face
+
+
+def is_person_of(model: Model, face: FilmedFace, speaker: str = "") -> bool:
+    """Return whether a model generates the motion of the person of a face: they are of one corpus and speaker.
+
+    speaker : of the people of the model whose motion is generated
+    The only person of a model is that of a face of the same corpus unless both have names, and these differ.
+    Raises InputError: it does not, and generates eigenlips alone, which cannot be mapped onto another person.
+    """
+    people = model.about.get("speakers") or [""]
+    same = bool(set(model.about.get("corpus", ())) & set(face.about.get("corpus", ())))
+    filmed = face.about.get("speaker", "")
+    same = same and (speaker == filmed if len(people) > 1 else people[0] == filmed or not (people[0] and filmed))
+    if not same and model.visual == "eigenlips":
+        raise InputError(
+            "the model generates mouth pictures of the person of "
+            f"{'; '.join(map(str, model.about.get('corpus', ['another corpus'])))}, the face is that of another; use a "
+            "model of tracked points, or train one of eigenlips on this person"
+        )
+    return same
+
+
+def _levels(sound: Audio | None, count: int, rate_hz: float) -> NDArray[np.float64]:
+    """Return the level of the sound in every frame of a video, dB [shape=(count,)]."""
+    if sound is None:
+        raise InputError("a jaw that follows the energy needs the sound; give the recording")
+    return levels_db_at(sound, np.arange(count) / rate_hz)
+
+
+def _first_of(frames: Frames, speech: Path) -> tuple[NDArray[np.uint8], Frames]:
+    """Return the first frame, and all of them. Raises InputError: there are none."""
+    first = next(frames, None)
+    if first is None:
+        raise InputError(f"{speech}: holds no pictures; give a video as speech")
+    return first, chain([first], frames)
+
+
+def _even(frames: Frames) -> Frames:
+    """Yield frames without a last row or column that makes their sizes odd."""
+    for frame in frames:
+        height, width = (length // 2 * 2 for length in frame.shape[:2])
+        yield frame[:height, :width]
+
+
+@one_thread()
+def write_film(
+    path: Path, film: Film, sound: Audio, *, mark: Mark = "metadata", monitor: Monitor = silent_monitor
+) -> None:
+    """Write a video of a filmed face, with sound; whole or not at all.
+
+    film, mark : of ``film_of``, which is read to its end; how the video says that it is synthetic
+    monitor    : receives reports of the progress
+    Raises InputError: the background cannot be read to its end. Raises ExportError: the file cannot be written, or the
+    face leaves no corner for a visible mark.
+    """
+    frames = with_reports(film.frames, film.count, RENDERING, monitor)
+    if mark == "visible":
+        frames = mark_frames(frames, film.covered)
+    metadata = mark_metadata() if mark != "none" else None
+    tags, xmp = (metadata.tags, metadata.xmp) if metadata is not None else (None, None)
+    write_mp4(path, frames, fps=film.rate_hz, audio=sound, tags=tags, xmp=xmp)
+
+
+def check_film(face: Face | FilmedFace, options: FilmOptions, speech: str | Path | None = None) -> None:
+    """Raise InputError if options do not go with a face, or with the speech; called before long work begins.
+
+    speech : the recording; None: it is a sound that is in no file
+    """
+    filmed = {"a background": options.background, "an overlay": options.overlay}
+    given = next((name for name, value in filmed.items() if value is not None), None)
+    if given is not None and not isinstance(face, FilmedFace):
+        raise InputError(f"{given} is for filmed faces; give one: --face FILE.face (docs/filmed-face.md)")
+    if options.background is not None:
+        check_source(Path(options.background), "video")
+    if options.overlay is not None and (speech is None or options.background is not None):
+        raise InputError("an overlay shows the video of the speech: give a video as speech, and no background")
+    if options.overlay is not None and not has_video(Path(str(speech))):
+        raise InputError(f"{speech}: has no pictures, and an overlay shows them; give a video as speech")

@@ -1,0 +1,291 @@
+"""Pictures in an array of an archive: H.264 without a container, of which any group can be decoded alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from itertools import chain, pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import InputError, ModelFormatError
+from lipmotion.storage.frame_groups import FrameGroups
+from lipmotion.storage.media import MOST_PIXELS, bound_allocations
+from lipmotion.storage.schema import Arrays, ArraySpec, checked_arrays, format_errors, refuse_undeclared
+
+Pictures = NDArray[np.uint8]
+Stream = NDArray[np.uint8]
+
+VIDEO_CRF = 18.0
+"""Quality of a stored background: x264's constant rate factor, 0 (lossless) to 51; smaller is better."""
+PICTURES_CRF = 12.0
+"""Quality of stored pictures of mouths."""
+GROUP = 8
+"""Frames of a stored video that are decoded together."""
+PICTURE_GROUP = 250
+"""Pictures of a stack, all of which are decoded at once, that are coded together at most."""
+MOST_FRAMES = 100_000
+"""Most frames of a stored video: an hour."""
+MOST_PICTURE_BYTES = 1 << 29
+"""Most bytes of a stack of decoded pictures."""
+_BT601, _LIMITED = 5, 1
+_START = np.array([0, 0, 1], np.uint8)
+_DELIMITER, _PARAMETERS = 9, 7
+"""Types of the unit that begins every frame, and of the one that begins every group."""
+
+
+@dataclass(frozen=True, eq=False)
+class StoredVideo:
+    """A video in an array, frame n at n / rate_hz seconds.
+
+    data    : a stream of H.264 in bytes (ITU-T H.264, annex B); every frame begins with a delimiter, every group with
+              parameters, and frames are coded in the order in which they are shown [shape=(bytes,)]
+    rate_hz : frame rate
+    size    : height and width, px
+    count   : number of frames
+    Raises ModelFormatError: not such a stream, or of another number of frames.
+    """
+
+    data: Stream
+    rate_hz: float
+    size: tuple[int, int]
+    count: int
+
+    def __post_init__(self) -> None:
+        with format_errors("the stored video", _REMEDY):
+            found = len(self._layout[0]) - 1
+            if found != self.count or not 1 <= self.count <= MOST_FRAMES:
+                raise ValueError(f"{found} frames, required {self.count}, at least 1 and at most {MOST_FRAMES}")
+
+    def __len__(self) -> int:
+        return self.count
+
+    @cached_property
+    def _layout(self) -> tuple[list[int], list[int]]:
+        return _layout(self.data)
+
+    def groups(self) -> FrameGroups:
+        """Return access to any frame, each uint8 RGB [shape=(H, W, 3)]; memory does not grow with the video's length.
+
+        Reading a frame raises ModelFormatError: it is damaged.
+        """
+        return FrameGroups(self._decoded, self._layout[1])
+
+    def frames(self, order: Iterable[int]) -> Iterator[Pictures]:
+        """Yield frames by their numbers, in any order; as ``groups``."""
+        groups = self.groups()
+        return (groups.frame(index) for index in order)
+
+    def _decoded(self, start: int, stop: int) -> list[Pictures]:
+        begins = self._layout[0]
+        pictures = list(_decode(self.data, begins[start : stop + 1], self.size))
+        if len(pictures) != stop - start:
+            raise ModelFormatError(
+                f"the stored video is damaged ({len(pictures)} of {stop - start} frames from {start} on can be "
+                f"decoded); {_REMEDY}"
+            )
+        return pictures
+
+
+def encode_video(
+    frames: Iterable[Pictures], rate_hz: float, *, crf: float = VIDEO_CRF, group: int = GROUP
+) -> StoredVideo:
+    """Return a video whose frames can be read in any order.
+
+    frames  : uint8 RGB [shape=(H, W, 3)], all of one size, at least one; taken one at a time
+    rate_hz : frame rate
+    crf     : quality, 0 (best) to 51
+    group   : frames that are decoded together; fewer take more bytes and less time to reach one of them
+    Colours are stored at half the resolution (4:2:0), as in almost every video that a camera wrote.
+    Raises InputError: no frames, frames of several sizes, no such quality.
+    """
+    if not 0 < rate_hz < float("inf"):
+        raise InputError(f"a video of {rate_hz} frames a second, required more than 0")
+    iterator = iter(frames)
+    first = next(iterator, None)
+    if first is None:
+        raise InputError("a video of no frames, required at least one")
+    parts = list(_encode(chain([first], iterator), crf, group, "yuv420p"))
+    data = np.frombuffer(b"".join(parts), np.uint8)
+    return StoredVideo(data, float(rate_hz), (first.shape[0], first.shape[1]), len(parts))
+
+
+def encode_pictures(pictures: Pictures, crf: float = PICTURES_CRF) -> Stream:
+    """Return a stack of pictures in few bytes [shape=(bytes,)].
+
+    pictures : uint8 RGB [shape=(N, H, W, 3)], at least one; each is smaller where it resembles the one before
+    crf      : quality, 0 (best) to 51
+    Colours are stored at full resolution (4:4:4).
+    Raises InputError: not pictures, or no such quality.
+    """
+    if pictures.ndim != 4 or not len(pictures):
+        raise InputError(f"pictures of shape {pictures.shape}, required (N, H, W, 3), at least one")
+    if pictures.nbytes > MOST_PICTURE_BYTES:
+        raise InputError(f"pictures of {pictures.nbytes} bytes, required at most {MOST_PICTURE_BYTES}; give fewer")
+    return np.frombuffer(b"".join(_encode(pictures, crf, PICTURE_GROUP, "yuv444p")), np.uint8)
+
+
+def decode_pictures(data: Stream) -> Pictures:
+    """Return the pictures of ``encode_pictures`` [shape=(N, H, W, 3)]. Raises ModelFormatError: they are damaged."""
+    with format_errors("the stored pictures", _REMEDY, verb="are"):
+        begins, _ = _layout(data)
+        decoded = _decode(data, begins, None)
+        first = next(decoded, None)
+        count = len(begins) - 1
+        if first is None or count * first.nbytes > MOST_PICTURE_BYTES:
+            raise ValueError(f"{count} pictures of {first.nbytes if first is not None else 0} bytes")
+        pictures = np.empty((count, *first.shape), np.uint8)
+        found = 0
+        for picture in chain([first], decoded):
+            if found == count or picture.shape != first.shape:
+                raise ValueError("pictures of several sizes, or more of them than begin")
+            pictures[found] = picture
+            found += 1
+        if found != count:
+            raise ValueError(f"{found} of {count} pictures can be decoded")
+        return pictures
+
+
+def stored_video_arrays(video: StoredVideo) -> dict[str, NDArray[Any]]:
+    """Serialise a video."""
+    return {
+        "data": video.data,
+        "rate_hz": np.array(video.rate_hz),
+        "size": np.array(video.size),
+        "count": np.array(video.count),
+    }
+
+
+def stored_video_from_arrays(arrays: Arrays) -> StoredVideo:
+    """Deserialise a video. Raises ModelFormatError: an array is missing, unknown, or has a wrong shape or range."""
+    with format_errors("the stored video", _REMEDY):
+        refuse_undeclared(arrays, STORED_VIDEO)
+        stored = checked_arrays(arrays, STORED_VIDEO)
+        height, width = stored["size"].tolist()
+        if height * width > MOST_PIXELS:
+            raise ValueError(f"frames of {width} × {height} pixels, required at most {MOST_PIXELS} in all")
+        return StoredVideo(stored["data"], float(stored["rate_hz"]), (height, width), int(stored["count"]))
+
+
+STORED_VIDEO = {
+    "data": ArraySpec(np.uint8, "B", 0, 255),
+    "rate_hz": ArraySpec(np.float64, "", 1, 1000),
+    "size": ArraySpec(np.intp, "2", 1, 10_000),
+    "count": ArraySpec(np.intp, "", 1, MOST_FRAMES),
+}
+"""The arrays of a stored video."""
+
+_REMEDY = "build the file again, or download it again"
+
+
+def _encode(frames: Iterable[Pictures], crf: float, group: int, pixel_format: str) -> Iterator[bytes]:
+    """Yield the bytes of every frame."""
+    import av
+
+    if not 0 <= crf <= 51 or group < 1:
+        raise InputError(f"quality {crf:g} and groups of {group}, required 0 to 51, and at least 1")
+    context: Any = None
+    shape: tuple[int, ...] = ()
+    for n, frame in enumerate(frames):
+        if context is None:
+            shape = frame.shape
+            _check_picture(frame)
+            context = _encoder(shape, crf, group, pixel_format)
+        if frame.shape != shape or frame.dtype != np.uint8:
+            raise InputError(f"frame {n} is {frame.dtype} {frame.shape}, required uint8 {shape} as the first")
+        picture = av.VideoFrame.from_ndarray(_padded(frame, context.height, context.width), format="rgb24")
+        picture = picture.reformat(format=pixel_format, dst_colorspace=_BT601, dst_color_range=_LIMITED)
+        picture.pts = n
+        yield from map(bytes, context.encode(picture))
+    yield from map(bytes, context.encode(None))
+
+
+def _check_picture(frame: Pictures) -> None:
+    if frame.ndim != 3 or frame.shape[2] != 3 or not frame.size:
+        raise InputError(f"a picture of shape {frame.shape}, required (H, W, 3)")
+    if frame.shape[0] * frame.shape[1] > MOST_PIXELS:
+        raise InputError(f"a picture of shape {frame.shape}, required at most {MOST_PIXELS} pixels; scale the video")
+
+
+def _encoder(shape: tuple[int, ...], crf: float, group: int, pixel_format: str) -> Any:
+    import av
+
+    context: Any = av.CodecContext.create("libx264", "w")
+    step = 2 if pixel_format == "yuv420p" else 1
+    context.height, context.width = (-(-side // step) * step for side in shape[:2])
+    context.pix_fmt = pixel_format
+    context.time_base = Fraction(1, 25)
+    context.colorspace, context.color_range = _BT601, _LIMITED
+    context.options = {
+        "crf": f"{crf:g}",
+        "preset": "medium",
+        "x264-params": f"keyint={group}:min-keyint={group}:scenecut=0:bframes=0:aud=1:repeat-headers=1:threads=1",
+    }
+    return context
+
+
+def _padded(frame: Pictures, height: int, width: int) -> Pictures:
+    """Return a picture of some size; its outermost row and column are repeated."""
+    rest = (height - frame.shape[0], width - frame.shape[1])
+    if any(rest):
+        frame = np.pad(frame, ((0, rest[0]), (0, rest[1]), (0, 0)), mode="edge")
+    return np.ascontiguousarray(frame)
+
+
+def _layout(data: Stream) -> tuple[list[int], list[int]]:
+    """Return where each frame begins, and the end; and the first frame of each group, and the number of frames.
+
+    Raises ValueError: not a stream of such frames.
+    """
+    if data.ndim != 1 or data.dtype != np.uint8 or len(data) < 8:
+        raise ValueError(f"a stream of shape {data.shape} and type {data.dtype}, required bytes")
+    starts = np.flatnonzero((data[:-3] == 0) & (data[1:-2] == 0) & (data[2:-1] == 1))
+    types = data[starts + 3] & 31
+    frames = starts[types == _DELIMITER]
+    parameters = starts[types == _PARAMETERS]
+    if not len(frames) or not len(parameters) or starts[0] > 1 or types[0] != _DELIMITER or parameters[0] > 64:
+        raise ValueError("no stream of H.264 with delimiters and parameters")
+    begins = np.maximum(frames - 1, 0)  # a start code may have a zero before it
+    groups = np.unique(np.searchsorted(frames, parameters, side="right") - 1)
+    return [*begins.tolist(), len(data)], [*groups.tolist(), len(frames)]
+
+
+def _decode(data: Stream, begins: Sequence[int], size: tuple[int, int] | None) -> Iterator[Pictures]:
+    """Yield the frames of some groups. ``size`` : the size required. Raises ModelFormatError: they are damaged."""
+    import av
+
+    bound_allocations()
+    context: Any = av.CodecContext.create("h264", "r")
+    context.options = {"max_pixels": str(MOST_PIXELS), "err_detect": "explode"}
+    context.thread_count = 1
+    with _decoding_errors():
+        for start, stop in pairwise(begins):
+            for picture in context.decode(av.Packet(data[start:stop].tobytes())):
+                yield _as_rgb(picture, size)
+        for picture in context.decode(None):
+            yield _as_rgb(picture, size)
+
+
+@contextmanager
+def _decoding_errors() -> Iterator[None]:
+    import av
+
+    try:
+        yield
+    except (av.FFmpegError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise ModelFormatError(f"the stored pictures are damaged ({reason}); {_REMEDY}") from error
+
+
+def _as_rgb(picture: Any, size: tuple[int, int] | None) -> Pictures:
+    height, width = size or (picture.height, picture.width)
+    if picture.is_corrupt or not (0 <= picture.height - height <= 1 and 0 <= picture.width - width <= 1):
+        raise ValueError(f"a picture of {picture.width} × {picture.height} pixels, required {width} × {height}")
+    picture = picture.reformat(format="rgb24", src_colorspace=_BT601, src_color_range=_LIMITED)
+    rgb: Pictures = picture.to_ndarray()
+    return rgb[:height, :width]

@@ -1,0 +1,96 @@
+import struct
+
+import av
+import numpy as np
+import pytest
+
+from lipmotion.errors import ExportError, InputError
+from lipmotion.export import write_mp4
+from lipmotion.export.xmp import LARGEST_PACKET, XMP_UUID, append_xmp, read_xmp
+from lipmotion.types import Audio
+
+
+@pytest.fixture
+def video(tmp_path):
+    """A video without XMP."""
+    path = tmp_path / "a.mp4"
+    frames = [np.full((32, 48, 3), 9 * n, np.uint8) for n in range(10)]
+    write_mp4(path, frames, fps=25, audio=Audio(np.zeros(6400, np.float32), 16_000))
+    return path
+
+
+def brightness(path):
+    with av.open(str(path)) as container:
+        return [int(frame.to_ndarray(format="gray").mean()) for frame in container.decode(video=0)]
+
+
+def test_what_is_appended_is_read_and_the_video_stays(video):
+    before, shown = video.read_bytes(), brightness(video)
+    assert read_xmp(video) is None
+    append_xmp(video, "<größe/>")
+    assert read_xmp(video) == "<größe/>"
+    assert video.read_bytes().startswith(before)
+    assert brightness(video) == shown
+
+
+def test_ffmpeg_reads_the_packet(video):
+    append_xmp(video, "<x>y</x>")
+    with av.open(str(video), options={"export_xmp": "1"}) as container:
+        assert container.metadata["xmp"] == "<x>y</x>"
+
+
+def test_the_first_of_several_packets_counts(video):
+    append_xmp(video, "one")
+    append_xmp(video, "two")
+    assert read_xmp(video) == "one"
+
+
+def test_long_boxes_and_other_uuids_are_passed_over(tmp_path):
+    path = tmp_path / "a.mp4"
+    path.write_bytes(
+        struct.pack(">I4sQ", 1, b"mdat", 20) + b"abcd" + struct.pack(">I4s", 26, b"uuid") + bytes(16) + b"no"
+    )
+    assert read_xmp(path) is None
+    append_xmp(path, "yes")
+    assert read_xmp(path) == "yes"
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"text",
+        struct.pack(">I4s", 0, b"mdat") + b"until the end",
+        struct.pack(">I4s", 99, b"mdat") + b"cut short",
+        struct.pack(">I4s", 4, b"mdat"),
+        struct.pack(">I4s", 8, b"free") + b"abc",
+    ],
+)
+def test_what_does_not_end_with_a_whole_box_is_left_alone(content, tmp_path):
+    path = tmp_path / "a.mp4"
+    path.write_bytes(content)
+    with pytest.raises(ExportError, match="not whole boxes"):
+        append_xmp(path, "x")
+    assert path.read_bytes() == content
+    if content:
+        assert read_xmp(path) is None
+
+
+def test_a_file_that_is_not_there_is_refused(tmp_path):
+    with pytest.raises(InputError, match="no such file"):
+        read_xmp(tmp_path / "a.mp4")
+    (tmp_path / "a.mp4").touch()
+    with pytest.raises(InputError, match="empty"):
+        read_xmp(tmp_path / "a.mp4")
+
+
+def test_packets_that_cannot_be_are_refused(video):
+    with pytest.raises(ExportError, match="at most"):
+        append_xmp(video, "x" * (LARGEST_PACKET + 1))
+    whole = video.read_bytes()
+    video.write_bytes(whole + struct.pack(">I4s", 26, b"uuid") + XMP_UUID + b"\xff\xfe")
+    with pytest.raises(InputError, match="not UTF-8"):
+        read_xmp(video)
+    video.write_bytes(whole + struct.pack(">I4s", 1 << 31, b"uuid") + XMP_UUID)
+    with pytest.raises(InputError, match="at most"):
+        read_xmp(video)

@@ -1,0 +1,61 @@
+"""A face mesh that answers as a test tells it to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from lipmotion.vision import face_follower as follow
+from lipmotion.vision.face_finder import FaceBox
+from lipmotion.vision.landmarks import TRACKED_POINTS
+
+COLUMN = {index: n for n, index in enumerate(TRACKED_POINTS)}
+
+
+def face(opening: float) -> NDArray[np.float64]:
+    """A face of 60 px between the eyes, as the face mesh gives it [shape=(N, 3)]."""
+    points = np.random.default_rng(11).uniform(0, 48, (len(TRACKED_POINTS), 3))
+    points[[COLUMN[33], COLUMN[263], COLUMN[10], COLUMN[168]]] = [[2, 20, 0], [62, 20, 0], [32, 2, 5], [32, 20, 0]]
+    points[[COLUMN[13], COLUMN[14]], :2] = [[32.0, 40.0], [32.0, 40 + 60 * opening]]
+    return points
+
+
+class ScriptedMesh:
+    """Stands for the face mesh: one answer a frame, None for no face."""
+
+    last: NDArray[np.float64] | None = None
+
+    def __init__(self, answers: Iterator[NDArray[np.float64] | None], most: int) -> None:
+        self.answers, self.most = answers, most
+
+    def __enter__(self) -> ScriptedMesh:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def faces(self, _image: NDArray[np.uint8]) -> list[NDArray[np.float64]]:
+        if self.most == 1:
+            ScriptedMesh.last = next(self.answers)
+        return [] if self.last is None else [self.last]
+
+
+class NoFinder:
+    """Stands for the detector, which finds no more than the mesh."""
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def boxes(self, _image: NDArray[np.uint8], *, thorough: bool) -> list[FaceBox]:
+        del thorough
+        return []
+
+
+def script(monkeypatch: pytest.MonkeyPatch, answers: Sequence[NDArray[np.float64] | None]) -> None:
+    """Let the faces of the next video be these, one answer a frame."""
+    answered = iter(answers)
+    monkeypatch.setattr(follow, "FaceFinder", NoFinder)
+    monkeypatch.setattr(follow, "FaceMesh", lambda most=1: ScriptedMesh(answered, most))

@@ -1,0 +1,175 @@
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lipmotion.errors import InputError
+from lipmotion.vision.footage import footage_frames, footage_groups, track_footage, untracked_frames
+from lipmotion.vision.frames import VideoSpan, open_video
+from lipmotion.vision.track import track
+from vision.scripted import face, script
+
+OPENINGS = 0.1 + 0.05 * np.sin(np.arange(20) / 3)
+MOVES = np.stack([0.5 * np.arange(20), np.sin(np.arange(20) / 4), np.zeros(20)], axis=1)
+FACES = [face(opening) + move for opening, move in zip(OPENINGS, MOVES, strict=True)]
+JUMP_PX = 90
+"""More than a face of 60 px between the eyes moves from frame to frame."""
+
+
+@pytest.fixture
+def scripted(monkeypatch):
+    pytest.importorskip("cv2")
+    return partial(script, monkeypatch)
+
+
+def levels(frames) -> list[int]:
+    """Which picture of the file each frame is: picture n of ``write_video`` is a flat grey of 10 n."""
+    return [round(float(frame.mean()) / 10) for frame in frames]
+
+
+def eyes_in_frames(footage) -> np.ndarray:
+    """Where the maps put the middle between the eyes [shape=(T, 2)]."""
+    return footage.face_to_image[:, :, 2]
+
+
+def test_it_tracks_as_track_does(write_video, scripted):
+    path = write_video(ticks=range(20))
+    scripted(FACES)
+    footage = track_footage(path, crops=True)
+    scripted(FACES)
+    expected = track(path)
+    np.testing.assert_array_equal(footage.track.motion.values, expected.motion.values)
+    np.testing.assert_array_equal(footage.track.crops, expected.crops)
+    assert footage.track.notes == expected.notes
+    assert (footage.size, footage.rate_hz, len(footage), footage.cuts) == ((48, 64), 25.0, 20, ())
+
+
+def test_maps_follow_the_face(write_video, scripted):
+    scripted(FACES)
+    eyes = eyes_in_frames(track_footage(write_video(ticks=range(20))))
+    np.testing.assert_allclose(eyes - eyes[0], (MOVES - MOVES[0])[:, :2], atol=1e-6)
+
+
+def test_maps_of_frames_without_a_face_are_interpolated(write_video, scripted):
+    scripted([None if n in (0, 8, 19) else one for n, one in enumerate(FACES)])
+    footage = track_footage(write_video(ticks=range(20)))
+    eyes = eyes_in_frames(footage)
+    assert np.flatnonzero(~footage.track.seen).tolist() == [0, 8, 19]
+    np.testing.assert_allclose(eyes[8] - eyes[1], (MOVES[8] - MOVES[1])[:2], atol=0.02)
+    np.testing.assert_array_equal(footage.face_to_image[[0, 19]], footage.face_to_image[[1, 18]])
+
+
+def test_maps_do_not_run_over_a_cut(write_video, scripted):
+    rows = np.linspace(0, 255, 96).astype(np.uint8)
+    picture = np.tile(rows[:, None, None], (1, 320, 3))  # the face looks the same after the jump: the same person
+    ticks = [n for n in range(20) if n not in (9, 14)]
+    moved = [one + (n >= 10) * np.array([JUMP_PX, 0, 0]) for n, one in enumerate(FACES)]
+    asked = sorted([*ticks, 10])  # the mesh that has lost the face, and the next one
+    scripted([moved[n] + (60, 30, 0) for n in asked])
+    footage = track_footage(write_video(ticks=ticks, size=(320, 96), picture=picture))
+    assert footage.cuts == (10,)
+    eyes = eyes_in_frames(footage)[:, 0]
+    np.testing.assert_allclose(eyes[9], eyes[8], atol=1e-9)
+    np.testing.assert_allclose(eyes[10:] - eyes[8], JUMP_PX + MOVES[10:, 0] - MOVES[8, 0], atol=1e-6)
+
+
+@pytest.mark.parametrize("dropped", [(), (6, 13), (7, 8, 9)])
+def test_frames_come_in_their_constant_order(write_video, scripted, dropped):
+    ticks = [n for n in range(20) if n not in dropped]
+    scripted([FACES[n] for n in ticks])
+    footage = track_footage(write_video(ticks=ticks))
+    shown = [ticks[index] for index in levels(footage_frames(footage))]
+    assert len(shown) == len(footage) == 20
+    assert [shown[n] for n in ticks] == ticks
+    distance = np.abs(np.array(shown) - np.arange(20))
+    assert distance.max() == {(): 0, (6, 13): 1, (7, 8, 9): 2}[dropped]
+
+
+@pytest.mark.parametrize(("start", "stop"), [(0, 20), (0, 1), (7, 7), (12, 17), (19, None), (3, None)])
+def test_a_part_is_the_same_as_in_the_whole(write_video, scripted, start, stop):
+    ticks = [n for n in range(20) if n not in (5, 12, 13)]
+    scripted([FACES[n] for n in ticks])
+    footage = track_footage(write_video(ticks=ticks))
+    assert levels(footage_frames(footage, start, stop)) == levels(footage_frames(footage))[start:stop]
+
+
+def test_frames_of_a_span(write_video, scripted):
+    scripted(FACES[5:15])
+    footage = track_footage(write_video(ticks=range(20)), VideoSpan(0.2, 0.6))
+    assert levels(footage_frames(footage)) == list(range(5, 15))
+    assert levels(footage_frames(footage, 4, 8)) == list(range(9, 13))
+
+
+@pytest.mark.parametrize("most_bytes", [0, 20 * 48 * 64 * 3, 10**9])
+def test_frames_in_any_order(write_video, scripted, most_bytes):
+    ticks = [n for n in range(20) if n not in (5, 12, 13)]
+    scripted([FACES[n] for n in ticks])
+    footage = track_footage(write_video(ticks=ticks))
+    order = [*range(20), *range(18, -1, -1), 3, 17]
+    groups = footage_groups(footage, most_bytes)
+    shown = levels(footage_frames(footage))
+    assert levels(groups.frame(n) for n in order) == [shown[n] for n in order]
+    assert groups.nbytes <= max(most_bytes, 2 * 48 * 64 * 3)
+
+
+@pytest.mark.parametrize(("start", "stop"), [(-1, 5), (6, 5), (0, 21), (21, None)])
+def test_frames_that_are_not_there_are_refused(write_video, scripted, start, stop):
+    scripted(FACES)
+    footage = track_footage(write_video(ticks=range(20)))
+    with pytest.raises(InputError, match=rf"frames {start} to {stop or 20} of .*, required within 0 to 20"):
+        footage_frames(footage, start, stop)
+
+
+def test_a_video_that_was_exchanged_is_noticed(write_video, scripted):
+    scripted(FACES)
+    footage = track_footage(write_video(ticks=range(20)))
+    other = write_video("other.mp4", ticks=range(20), size=(32, 32))
+    with pytest.raises(InputError, match="a picture is not 64 × 48 as when it was tracked"):
+        list(footage_frames(replace(footage, path=other)))
+
+
+def test_a_video_that_became_shorter_shows_its_last_picture(write_video, scripted):
+    scripted(FACES)
+    footage = track_footage(write_video(ticks=range(20)))
+    shorter = replace(footage, path=write_video("shorter.mp4", ticks=range(15)))
+    assert levels(footage_frames(shorter)) == [*range(15), *([14] * 5)]
+    with pytest.raises(InputError, match=r"no picture from 0\.72 s on"):
+        list(footage_frames(shorter, 18))
+
+
+@pytest.mark.video
+@pytest.mark.recordings
+def test_a_recording_is_read_picture_by_picture(recordings: Path):
+    pytest.importorskip("mediapipe")
+    path = recordings / "grid-s1" / "clips" / "bbizzn.mkv"  # its first 12 pictures are grey
+    footage = track_footage(path)
+    assert footage.size == (288, 360)
+    np.testing.assert_array_equal(footage.face_to_image[:12], np.tile(footage.face_to_image[12], (12, 1, 1)))
+    with open_video(path) as video:
+        pictures = [picture.image for picture in video.frames]
+    assert len(pictures) == len(footage)
+    for frame, picture in zip(footage_frames(footage, 5, 20), pictures[5:20], strict=True):
+        np.testing.assert_array_equal(frame, picture)
+
+
+@pytest.mark.parametrize("dropped", [(), (3,), (7, 8, 9), (19,)])
+def test_untracked_frames_hold_the_last_picture(write_video, dropped):
+    """At a constant rate; where pictures were dropped, the one before is shown again."""
+    ticks = [n for n in range(20) if n not in dropped]
+    frames, rate_hz = untracked_frames(write_video(ticks=ticks))
+    assert rate_hz == 25.0
+    wanted = [sum(tick <= n for tick in ticks) - 1 for n in range(ticks[-1] + 1)]
+    assert levels(frames) == wanted
+
+
+def test_untracked_frames_of_a_file_that_is_no_video(tmp_path):
+    path = tmp_path / "a.mp4"
+    path.write_text("no video")
+    with pytest.raises(InputError, match=r"a\.mp4"):
+        untracked_frames(path)
+    with pytest.raises(InputError, match="no such"):
+        untracked_frames(tmp_path / "missing.mp4")
