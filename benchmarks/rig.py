@@ -1,13 +1,14 @@
 """Measures of characters: skinning, blendshapes of meshes that nobody here made, control points, rendering.
 
     python benchmarks/rig.py --skinning
-    python benchmarks/rig.py CHARACTER... [--control-points] [--lip-points FILE.csv] [--speech FILE] [--retrack] [--speed]
+    python benchmarks/rig.py CHARACTER... [--control-points] [--lip-points FILE.csv] [--speech FILE] [--transcript FILE]
+        [--retrack] [--speed]
 
-One JSON object a line. For each character: seconds to read and to find the mouth; of the motion that the shipped model generates
-for the speech (default: the example), the correlation of opening and width of the mesh's own lip points with the motion,
-the largest gap in p, b, m and in silence, the largest step of a weight in 10 ms. ``retrack``: the same correlations, as
-the project's tracker finds them in the rendered video. ``speed``: frames of the picture at
-720p in a second of one core. Seconds are those of the processor, whatever else the machine does.
+One JSON object a line. For each character: seconds to read it and to find its mouth. Of the motion that the shipped
+model generates for the speech (default: the example): the correlation of opening and width of the mesh's own lip points
+with the motion, the gap in p, b, m and in silence, the largest step of a weight in 10 ms. ``retrack``: the same
+correlations, as the project's tracker finds them in the rendered video. ``speed``: pictures at 720p in a second of one
+core. Seconds are those of the processor, whatever else the machine does.
 """
 
 from __future__ import annotations
@@ -141,9 +142,8 @@ def retracked(character: DrivenCharacter, spoken: lipmotion.Generation) -> dict[
     times = found.time_s[found.time_s <= spoken.motion.time_s[-1]]
     given = spoken.motion.at(times)
     columns = {name: spoken.motion.column(name) for name in ("opening", "width")}
-    return {
-        f"retracked_{name}": correlation(found[name][: len(times)], given[:, column]) for name, column in columns.items()
-    }
+    seen = {name: found[name][: len(times)] for name in columns}
+    return {f"retracked_{name}": correlation(seen[name], given[:, column]) for name, column in columns.items()}
 
 
 def correlation(one: np.ndarray, other: np.ndarray) -> float:

@@ -10,10 +10,12 @@ import pytest
 
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import engine_named
+from lipmotion.faces.filmed.face import FilmedFace, save_face
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.pipeline.model import Model, save_model
 from lipmotion.pipeline.training.train import train
 from lipmotion.testing.toy import ToySentence, toy_sentences, toy_utterances
+from lipmotion.testing.toy_face import toy_face
 
 SENTENCES = 12
 
@@ -108,4 +110,18 @@ def pictured_model_file(pictured_model: Model, tmp_path_factory: pytest.TempPath
     """The model of lip distances and eigenlips as it is saved."""
     path = tmp_path_factory.mktemp("pictured") / "pictured.lipmotion"
     save_model(pictured_model, path)
+    return path
+
+
+@pytest.fixture(scope="session")
+def filmed_face() -> FilmedFace:
+    """The face of the drawn person, learned in two seconds; the toy model is of the same person."""
+    return toy_face()
+
+
+@pytest.fixture(scope="session")
+def filmed_face_file(filmed_face: FilmedFace, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The face of the drawn person as it is saved."""
+    path = tmp_path_factory.mktemp("face") / "toy.face"
+    save_face(filmed_face, path)
     return path

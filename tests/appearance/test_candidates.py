@@ -5,16 +5,15 @@ import pytest
 
 from appearance.test_eigenlips import pictures
 from lipmotion.appearance.candidates import (
-    Candidates,
-    candidates_arrays,
-    candidates_from_arrays,
+    DRAWN,
     choose_candidates,
+    drawn_to_recorded,
     make_candidates,
+    recorded_details,
     squared_distances,
 )
 from lipmotion.appearance.eigenlips import Eigenlips, fit_eigenlips
-from lipmotion.errors import InputError, ModelFormatError
-from lipmotion.storage.archive import read_archive, write_archive
+from lipmotion.errors import InputError
 
 HELD_OUT = pictures(count=160)[120:]
 
@@ -116,40 +115,37 @@ def test_distances_between_details(space: Eigenlips) -> None:
         assert candidates.detail_distances[colour] == pytest.approx(np.array(expected), abs=1e-1)
 
 
-def test_through_a_file(space: Eigenlips, tmp_path) -> None:
-    candidates = make_candidates(space, HELD_OUT[:20])
-    write_archive(tmp_path / "c", {}, candidates_arrays(candidates))
-    again = candidates_from_arrays(read_archive(tmp_path / "c"), space)
-    assert np.array_equal(again.coefficients, candidates.coefficients)
-    assert np.array_equal(again.details, candidates.details)
+def test_details_are_what_the_eigenlips_leave_out(space: Eigenlips) -> None:
+    images = HELD_OUT[:20].copy()
+    images[3, :2] = 255 - images[3, :2]
+    codes = space.project(images)
+    details, deepest = recorded_details(space, images, codes)
+    exact = np.rint(images - space.expand(codes))
+    assert np.array_equal(details, np.clip(exact, -100, 100).astype(np.int8))
+    assert deepest == pytest.approx(np.abs(exact).max(axis=(1, 2, 3)))
 
 
-DETAILS, COEFFICIENTS = "candidate_details", "candidate_coefficients"
+def test_recorded_mouths_stay_where_they_are() -> None:
+    values = mouths()[::5]
+    assert drawn_to_recorded(values, values) == pytest.approx(values, abs=0.2)  # they are up to 147 from 0
 
 
-@pytest.mark.parametrize(
-    ("name", "change", "says"),
-    [
-        (DETAILS, lambda a: a[:-1], "shape"),
-        (DETAILS, lambda a: a[:, :-1], r"required \(20, 9, 12, 3\)"),
-        (DETAILS, lambda a: a.astype(np.int64) + 1000, "required -100 to 100"),
-        (DETAILS, lambda a: a.astype(float), "whole numbers"),
-        (COEFFICIENTS, lambda a: a[:, :-1], "shape"),
-        (COEFFICIENTS, lambda a: a * np.nan, "not finite"),
-        (COEFFICIENTS, lambda a: np.full_like(a, 1e7), "required -1e"),
-        (COEFFICIENTS, lambda a: a[:0], "at least one"),
-    ],
-)
-def test_hostile_arrays_are_refused(space: Eigenlips, name: str, change, says: str) -> None:
-    arrays = candidates_arrays(make_candidates(space, HELD_OUT[:20]))
-    with pytest.raises(ModelFormatError, match=f"candidate mouths are damaged.*{says}.*; build them again"):
-        candidates_from_arrays(arrays | {name: change(arrays[name])}, space)
+def test_a_mouth_between_recorded_ones_stays_and_one_far_away_comes_nearer() -> None:
+    grid = np.stack(np.meshgrid(np.arange(8.0), np.arange(8.0)), axis=-1).reshape(-1, 2).astype(np.float32)
+    wanted = np.array([[3.4, 2.7], [3.5, 20.0]], np.float32)
+    drawn = drawn_to_recorded(wanted, grid)
+    assert drawn[0] == pytest.approx(wanted[0], abs=0.1)
+    assert drawn[1] == pytest.approx([3.5, (1 - DRAWN) * 20 + DRAWN * 7], abs=0.5)  # 7 is the end of what was recorded
 
 
-def test_missing_and_unknown_arrays_are_refused(space: Eigenlips) -> None:
-    arrays = candidates_arrays(make_candidates(space, HELD_OUT[:20]))
-    with pytest.raises(ModelFormatError, match="candidate mouths are damaged"):
-        candidates_from_arrays({DETAILS: arrays[DETAILS]}, space)
-    with pytest.raises(ModelFormatError, match="undeclared"):
-        candidates_from_arrays(arrays | {"more": np.zeros(1)}, space)
-    assert isinstance(candidates_from_arrays(arrays, space), Candidates)
+def test_mouths_are_drawn_smoothly_over_time() -> None:
+    recorded = mouths(1)[::3]
+    path = np.linspace(recorded[0], recorded[50], 400)
+    steps = np.linalg.norm(np.diff(drawn_to_recorded(path.astype(np.float32), recorded), axis=0), axis=1)
+    assert steps.max() < 0.05 * np.linalg.norm(path[-1] - path[0])  # where the nearest ones change
+
+
+def test_few_recorded_mouths_are_enough() -> None:
+    one = mouths()[:1]
+    drawn = drawn_to_recorded(one + 4, one)
+    assert drawn == pytest.approx(one + 4 * (1 - DRAWN), abs=1e-3)

@@ -57,9 +57,10 @@ def test_a_transcript(run: RunCommand, basics: tuple[object, ...], here: Path, a
     assert " ".join(unit["phone"] for unit in units) == "sil s iy b aa b p aa p ax m aa m ax sil"
 
 
-def test_an_unknown_word_is_a_warning(run: RunCommand, basics: tuple[object, ...], here: Path, caplog) -> None:
-    assert run(*basics, "-o", "a.json", "--transcript", "see bimab papa mama").code == 0
-    assert "'bimab' is not in the dictionary; read as 'b ih m ae b'" in caplog.text
+def test_an_unknown_word_is_a_warning(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:
+    done = run(*basics, "-o", "a.json", "--transcript", "see bimab papa mama")
+    assert done.code == 0
+    assert "'bimab' is not in the dictionary; read as 'b ih m ae b'" in "".join(done.err)
     assert (here / "a.json").exists()
 
 
@@ -270,3 +271,31 @@ def test_the_other_person_is_not_replaced(
     done = run("animate", toy_speech, "--model", toy_model_file, "--onto", toy_corpus.path, "-o", inside)
     assert done.code != 0
     assert not inside.exists()
+
+
+def test_a_staged_face(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:
+    staging = "--face cartoon --size 64 --background #102030 --intensity 1.5 --still gaze,head --face-seed 3 --fps 5"
+    assert run(*basics, "-o", "a%02d.png", *staging.split()) == (0, ["a%02d.png"], [])
+    picture = Image.open(here / "a00.png")
+    assert picture.size == (64, 64)
+    assert picture.getpixel((0, 0)) == (16, 32, 48)
+
+
+@pytest.mark.usefixtures("here")
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [("--still nose", "blinks, gaze, brows, head"), ("--size 63", "even number"), ("--intensity 7", "0 to 3"),
+     ("--background pink", "#40a0ff"), ("--background transparent", "cannot be transparent")],
+)  # fmt: skip
+def test_a_face_that_cannot_be_staged_so(
+    run: RunCommand, basics: tuple[object, ...], options: str, message: str
+) -> None:
+    done = run(*basics, "-o", "a.mp4", *options.split())
+    assert is_one_error(done, 7 if "transparent" in options else 3)
+    assert message in done[2][0]
+
+
+def test_articulation_in_motion_files(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:
+    assert run(*basics, "-o", "a.csv", "--articulation")[0] == 0
+    header = (here / "a.csv").read_text().splitlines()[0].split(",")
+    assert header[-6:] == ["tongue", "lip_tuck", "protrusion", "spread", "lip_press", "teeth"]

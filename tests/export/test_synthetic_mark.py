@@ -67,6 +67,8 @@ def test_the_tags_outlive_a_copy_of_the_streams(tmp_path):
 def test_any_statement_is_valid_xml():
     packet = ET.fromstring(mark_metadata('<"&größe{}>').xmp.encode())  # noqa: S314
     assert packet.findtext(".//dc:description/rdf:Alt/rdf:li", None, NAMES) == '<"&größe{}>'
+    odd = ET.fromstring(mark_metadata("a\x00b\udcff\nc").xmp.encode())  # noqa: S314
+    assert odd.findtext(".//dc:description/rdf:Alt/rdf:li", None, NAMES) == r"a\x00b\udcff\nc"
 
 
 def test_every_frame_has_the_same_label_and_nothing_else_changes():

@@ -72,7 +72,16 @@ def test_what_does_not_end_with_a_whole_box_is_left_alone(content, tmp_path):
     with pytest.raises(ExportError, match="not whole boxes"):
         append_xmp(path, "x")
     assert path.read_bytes() == content
-    assert read_xmp(path) is None
+    if content:
+        assert read_xmp(path) is None
+
+
+def test_a_file_that_is_not_there_is_refused(tmp_path):
+    with pytest.raises(InputError, match="no such file"):
+        read_xmp(tmp_path / "a.mp4")
+    (tmp_path / "a.mp4").touch()
+    with pytest.raises(InputError, match="empty"):
+        read_xmp(tmp_path / "a.mp4")
 
 
 def test_packets_that_cannot_be_are_refused(video):

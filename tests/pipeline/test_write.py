@@ -14,9 +14,11 @@ import pytest
 
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export.base import read_motion
-from lipmotion.pipeline.animate import animate, write
+from lipmotion.faces import Staging
+from lipmotion.motion.gestures import GESTURES
+from lipmotion.pipeline.animate import animate, with_articulation, write
 from lipmotion.pipeline.model import Model
-from lipmotion.types import Generation
+from lipmotion.types import Audio, Generation
 
 
 @pytest.fixture(scope="module")
@@ -56,8 +58,9 @@ def test_the_sound_of_a_video_is_read_without_a_second_warning(
 ) -> None:
     warns = []
 
-    def read(*_: object, warn: bool = True) -> None:
+    def read(*_: object, warn: bool = True) -> Audio:
         warns.append(warn)
+        return Audio(np.zeros(16_000, np.float32), 16_000)
 
     monkeypatch.setattr("lipmotion.pipeline.animate.read_audio", read)
     monkeypatch.setattr("lipmotion.export.video.write_mp4", lambda *_, **__: None)
@@ -160,3 +163,44 @@ def test_a_name_for_no_table_is_refused_before_the_first_file(result: Generation
     with pytest.raises(ExportError, match="'a,b' does not fit in a table"):
         write(odd, [tmp_path / "a.json", tmp_path / "a.csv"])
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", ["a.webm", "a.mov", "a%03d.png"])
+def test_a_face_may_be_transparent_where_the_file_can_be(
+    result: Generation, toy_model: Model, toy_speech: Path, tmp_path: Path, name: str
+) -> None:
+    staging = Staging(size=64, background="transparent")
+    write(result, tmp_path / name, speech=toy_speech, model=toy_model, fps=5, face="man", staging=staging)
+    first = min(tmp_path.iterdir())
+    assert first.name == name.replace("%03d", "000")
+    with av.open(str(first)) as container:
+        stream = container.streams.video[0]
+        assert (stream.height, stream.width) == (64, 64)
+        assert stream.metadata.get("alpha_mode") == "1" or "a" in stream.codec_context.pix_fmt
+
+
+def test_what_cannot_be_transparent_or_staged_is_refused_before_anything_is_written(
+    result: Generation, toy_speech: Path, tmp_path: Path
+) -> None:
+    with pytest.raises(ExportError, match="cannot be transparent"):
+        write(result, [tmp_path / "a.json", tmp_path / "a.mp4"], speech=toy_speech, staging=CLEAR)
+    with pytest.raises(InputError, match="face"):
+        write(result, [tmp_path / "a.json"], speech=toy_speech, face="nobody")
+    assert not list(tmp_path.iterdir())
+
+
+CLEAR = Staging(background="transparent")
+
+
+def test_articulatory_channels_are_written_where_they_are_asked_for(
+    result: Generation, toy_speech: Path, tmp_path: Path
+) -> None:
+    write(result, tmp_path / "a.json", speech=toy_speech, channels=["opening", "tongue", "teeth"])
+    motion, _ = read_motion(tmp_path / "a.json")
+    assert motion.names == ("opening", "tongue", "teeth")
+    assert [channel.unit for channel in motion.channels] == ["eye_distance", "weight", "weight"]
+    assert 0 <= motion["teeth"].min() < motion["teeth"].max() <= 1
+    more = with_articulation(result)
+    assert more.motion.names == (*result.motion.names, *GESTURES)
+    assert more.variance.shape == more.motion.values.shape
+    assert not more.variance[:, -1].any()

@@ -42,7 +42,7 @@ def test_frames_come_back_in_order(stored):
     frames = np.stack(list(stored.frames(range(21))))
     assert len(stored) == stored.count == 21
     assert frames.dtype == np.uint8
-    assert min(psnr_db(a, b) for a, b in zip(film(), frames, strict=True)) > 38
+    assert min(psnr_db(a, b) for a, b in zip(film(), frames, strict=True)) > 36
     neighbours = [psnr_db(a, b) for a, b in zip(film()[1:], frames, strict=False)]
     assert max(neighbours) < 32  # so each is the right one
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.vision.footage import footage_frames, footage_groups, track_footage
+from lipmotion.vision.footage import footage_frames, footage_groups, track_footage, untracked_frames
 from lipmotion.vision.frames import VideoSpan, open_video
 from lipmotion.vision.track import track
 from vision.scripted import face, script
@@ -154,3 +154,22 @@ def test_a_recording_is_read_picture_by_picture(recordings: Path):
     assert len(pictures) == len(footage)
     for frame, picture in zip(footage_frames(footage, 5, 20), pictures[5:20], strict=True):
         np.testing.assert_array_equal(frame, picture)
+
+
+@pytest.mark.parametrize("dropped", [(), (3,), (7, 8, 9), (19,)])
+def test_untracked_frames_hold_the_last_picture(write_video, dropped):
+    """At a constant rate; where pictures were dropped, the one before is shown again."""
+    ticks = [n for n in range(20) if n not in dropped]
+    frames, rate_hz = untracked_frames(write_video(ticks=ticks))
+    assert rate_hz == 25.0
+    wanted = [sum(tick <= n for tick in ticks) - 1 for n in range(ticks[-1] + 1)]
+    assert levels(frames) == wanted
+
+
+def test_untracked_frames_of_a_file_that_is_no_video(tmp_path):
+    path = tmp_path / "a.mp4"
+    path.write_text("no video")
+    with pytest.raises(InputError, match=r"a\.mp4"):
+        untracked_frames(path)
+    with pytest.raises(InputError, match="no such"):
+        untracked_frames(tmp_path / "missing.mp4")

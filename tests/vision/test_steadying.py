@@ -10,7 +10,7 @@ from lipmotion.types import Motion, Track
 from lipmotion.vision import steadying
 from lipmotion.vision.footage import Footage
 from lipmotion.vision.frames import WHOLE
-from lipmotion.vision.steadying import registered_maps, steady_maps
+from lipmotion.vision.steadying import REGISTERED_NOISE_PX, registered_maps, steady_maps
 
 STILL = np.array([[0.8, 0, 100], [0, 0.8, 60]])
 MOUTH = np.array([0.0, 76.0, 1.0])
@@ -45,6 +45,12 @@ def test_a_quick_nod_stays():
     true = (at(nod) @ MOUTH)[:, 1]
     assert np.abs(moved - true).max() < 0.25
     assert np.abs(moved[[20, 45]] - true[[20, 45]]).max() < 0.01
+
+
+def test_less_is_taken_away_where_less_is_noise():
+    maps = at(trembling(0.3))
+    tracked, registered = steady_maps(maps, RATE_HZ), steady_maps(maps, RATE_HZ, noise_px=REGISTERED_NOISE_PX)
+    assert spread(tracked) < 0.8 * spread(registered) < 0.95 * spread(maps)
 
 
 def test_a_face_that_moves_evenly_is_not_held_back():

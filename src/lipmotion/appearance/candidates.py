@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from lipmotion.appearance.eigenlips import COLOURS, Eigenlips
 from lipmotion.errors import InputError
-from lipmotion.storage.schema import Arrays, ArraySpec, checked_arrays, format_errors, refuse_undeclared
 
 Values = NDArray[np.float32]
 Pictures = NDArray[np.uint8]
@@ -21,6 +20,10 @@ CANDIDATES = 500
 """Number of candidate mouths. Source: Xie & Liu 2007, §6.1."""
 ROUNDS = 8
 """Rounds in which the centres of the groups are moved: more did not lower the error on GRID."""
+MIXED, DRAWN = 20, 0.75
+"""Recorded mouths of which a predicted one is mixed, and the share of the mixture."""
+PICTURES_AT_ONCE = 16
+"""Pictures that are restored at a time."""
 BLOCK = 2048
 """Pictures whose distances to all candidates are in memory at a time."""
 DEEPEST = 100
@@ -61,8 +64,11 @@ class Candidates:
     @cached_property
     def detail_distances(self) -> Values:
         """Squared distances between the details of any two candidates, in each colour [shape=(3, N, N)], grey²."""
-        flat = np.moveaxis(self.details, -1, 0).reshape(len(COLOURS), len(self), -1).astype(np.float32)
-        return np.stack([squared_distances(colour, colour) for colour in flat])
+        distances = []
+        for number in range(len(COLOURS)):  # of a large face one colour of 500 details has 130 MB
+            colour = self.details[..., number].reshape(len(self), -1).astype(np.float32)
+            distances.append(squared_distances(colour, colour))
+        return np.stack(distances)
 
 
 def choose_candidates(coefficients: NDArray[np.floating[Any]], count: int = CANDIDATES) -> Index:
@@ -106,31 +112,61 @@ def make_candidates(eigenlips: Eigenlips, pictures: Pictures, coefficients: Valu
     """
     if coefficients is None:
         coefficients = eigenlips.project(pictures)
-    details = np.rint(pictures.astype(np.float32) - eigenlips.expand(coefficients))
-    whole = np.abs(details).max(axis=(1, 2, 3)) <= DEEPEST
+    details, deepest = recorded_details(eigenlips, pictures, coefficients)
+    whole = deepest <= DEEPEST
     if not whole.any():
         raise InputError(
             f"{len(pictures)} pictures, all of which differ from their eigenlips by more than {DEEPEST} grey levels; "
             "required at least one that does not: are they pictures of the person whom the eigenlips were trained on?"
         )
-    return Candidates(coefficients[whole], details[whole].astype(np.int8))
+    return Candidates(coefficients[whole], details[whole])
 
 
-def candidates_arrays(candidates: Candidates) -> dict[str, NDArray[Any]]:
-    """Return candidates serialised as arrays (``CANDIDATE_ARRAYS``)."""
-    return {"candidate_coefficients": candidates.coefficients, "candidate_details": candidates.details}
+def recorded_details(
+    eigenlips: Eigenlips, pictures: Pictures, coefficients: Values
+) -> tuple[NDArray[np.int8], NDArray[np.float32]]:
+    """Return what eigenlips leave out of pictures, and the largest value of it in each picture before it is cut off.
 
-
-def candidates_from_arrays(arrays: Arrays, eigenlips: Eigenlips) -> Candidates:
-    """Deserialise candidates, for pictures restored with the same eigenlips.
-
-    Raises ModelFormatError: an array is missing, unknown, out of range, or not of these eigenlips' size.
+    pictures     : [shape=(N, H, W, 3)], uint8
+    coefficients : their eigenlips [shape=(N, 3·K)]
+    Returns whole grey levels, cut off at ``DEEPEST`` [shape=(N, H, W, 3)], and [shape=(N,)].
     """
-    with format_errors("the candidate mouths", "build them again from the corpus", verb="are"):
-        refuse_undeclared(arrays, CANDIDATE_ARRAYS)
-        height, width = eigenlips.size
-        stored = checked_arrays(arrays, CANDIDATE_ARRAYS, C=len(eigenlips.channels), H=height, W=width)
-        return Candidates(stored["candidate_coefficients"], stored["candidate_details"])
+    details, deepest = np.empty(pictures.shape, np.int8), np.empty(len(pictures), np.float32)
+    for start in range(0, len(pictures), PICTURES_AT_ONCE):
+        part = slice(start, start + PICTURES_AT_ONCE)
+        exact = pictures[part] - eigenlips.expand(coefficients[part])
+        deepest[part] = np.abs(np.rint(exact, out=exact)).max(axis=(1, 2, 3))
+        details[part] = np.clip(exact, -DEEPEST, DEEPEST, out=exact)
+    return details, deepest
+
+
+def drawn_to_recorded(wanted: Values, recorded: Values) -> Values:
+    """Return coefficients [shape=(T, D)] that are drawn towards recorded ones: no mouth is an impossible one.
+
+    wanted   : coefficients that a regression predicts [shape=(T, D)]
+    recorded : of recorded mouths [shape=(N, D)]
+    Each is replaced by ``DRAWN`` of the nearest mixture of its ``MIXED`` nearest recorded ones, and the rest of itself.
+    Mixtures have weights ≥ 0 whose sum is 1, and prefer what is near, so they change smoothly over time.
+    Source: Wang et al. 2010, "Locality-constrained linear coding", Eq. 7 (here with squared distances as penalty);
+    what it gains: docs/results/video.md.
+    Cost: O(T·N·D) for distances, O(T·MIXED³).
+    """
+    count = min(MIXED, len(recorded))
+    result = np.empty(wanted.shape, np.float32)
+    for start in range(0, len(wanted), BLOCK):
+        some = wanted[start : start + BLOCK]
+        distances = squared_distances(some, recorded)
+        near = np.argpartition(distances, count - 1, axis=1)[:, :count]
+        steps = recorded[near] - some[:, None]
+        products = (steps @ steps.swapaxes(1, 2)).astype(np.float64)
+        penalty = np.take_along_axis(distances, near, axis=1).astype(np.float64)
+        least = NO_DISTANCE * np.trace(products, axis1=1, axis2=2)[:, None] + np.finfo(float).tiny
+        products[:, np.arange(count), np.arange(count)] += penalty + least
+        weights = np.maximum(np.linalg.solve(products, np.ones((len(some), count, 1)))[:, :, 0], 0)
+        weights /= weights.sum(axis=1, keepdims=True)
+        mixtures = np.einsum("tn,tnd->td", weights.astype(np.float32), recorded[near])
+        result[start : start + BLOCK] = DRAWN * mixtures + (1 - DRAWN) * some
+    return result
 
 
 def squared_distances(some: Values, others: Values) -> Values:
@@ -143,11 +179,6 @@ def squared_distances(some: Values, others: Values) -> Values:
 
 LARGEST_COEFFICIENT = 1e6
 """No coefficient of a picture is larger: 255 · √D of D pixels, and pictures have at most 10⁷."""
-CANDIDATE_ARRAYS = {
-    "candidate_coefficients": ArraySpec(np.float32, "N C", -LARGEST_COEFFICIENT, LARGEST_COEFFICIENT),
-    "candidate_details": ArraySpec(np.int8, f"N H W {len(COLOURS)}", -DEEPEST, DEEPEST),
-}
-"""The arrays of candidates."""
 
 
 def _furthest(values: Values, count: int) -> Index:

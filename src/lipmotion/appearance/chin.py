@@ -27,6 +27,8 @@ SIDE_PX = 46.0, 60.0
 """Between these distances from the middle the movement ends: beyond is what is behind the head."""
 LARGEST_PX = 14.0
 """The chin is not moved further: more would fold the neck."""
+LARGEST_UP, LARGEST_DOWN = 0.6, 1.2
+"""Nor further than these shares of its distance to what is not moved: more would fold or tear a short chin."""
 LEAST_PX = 0.05
 """A smaller movement is none."""
 A = -0.5
@@ -48,12 +50,13 @@ def with_chin_moved(pictures: Pictures, chin_px: Array, drops_px: Array) -> Pict
 
     pictures : [shape=(T, 128 · scale, 128 · scale, 3)], uint8
     chin_px  : how far the tip of the chin is below the eyes in them, px of the face [shape=(T,)]
-    drops_px : how far it is moved down [shape=(T,)], at most ``LARGEST_PX``
+    drops_px : how far it is moved down [shape=(T,)]; at most ``LARGEST_PX`` are done, less where the chin is short
     Columns are resampled by cubic convolution.
     """
     scale = pictures.shape[1] // HEIGHT
     result = pictures.copy()
-    drops = np.clip(drops_px, -LARGEST_PX, LARGEST_PX)
+    room = np.maximum(chin_px - ABOVE_PX - STILL_PX, 0)
+    drops = np.clip(drops_px, -np.minimum(LARGEST_PX, LARGEST_UP * room), np.minimum(LARGEST_PX, LARGEST_DOWN * room))
     across = (np.arange(WIDTH * scale) + 0.5) / scale + CORNER[0]
     share = np.maximum(1 - (across / HINGE_PX) ** 2, 0) * (1 - _rise(np.abs(across), *SIDE_PX))
     columns = np.flatnonzero(share > 0)

@@ -12,7 +12,15 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 
 from lipmotion.appearance.camera_noise import CameraNoise, estimate_noise
-from lipmotion.appearance.candidates import CANDIDATES, DEEPEST, Candidates, choose_candidates, make_candidates
+from lipmotion.appearance.candidates import (
+    CANDIDATES,
+    DEEPEST,
+    Candidates,
+    choose_candidates,
+    drawn_to_recorded,
+    make_candidates,
+    recorded_details,
+)
 from lipmotion.appearance.eigenlips import COMPONENTS, Eigenlips, enlarged, fit_eigenlips
 from lipmotion.appearance.lower_face import (
     HEIGHT,
@@ -42,6 +50,8 @@ JAW_COMPONENTS = 12
 JAW_CANDIDATES = 120
 """Recorded lower faces whose detail the jaw has."""
 JAW_OPTIONS = RefinementOptions(steadiness=0.3)
+AT_ONCE = 256
+"""Pictures that are projected at a time."""
 EDGE_PX = 3
 """The jaw's pictures are its own so far beyond the part that is replaced: cloning reads its edge."""
 MOUTH_RIDGE = 1e-3
@@ -132,9 +142,8 @@ class Appearance:
     @cached_property
     def jaw_candidates(self) -> Candidates:
         """The recorded lower faces as components and detail."""
-        restored = enlarged(self.jaw, self.scale).expand(self.jaw_codes)
-        details = np.clip(np.rint(self.jaws - restored), -DEEPEST, DEEPEST)
-        return Candidates(self.jaw_codes, details.astype(np.int8))
+        details, _ = recorded_details(enlarged(self.jaw, self.scale), self.jaws, self.jaw_codes)
+        return Candidates(self.jaw_codes, details)
 
     def mouth_refiner(self, options: RefinementOptions) -> Refiner:
         """Return what makes pictures of the mouth from eigenlips."""
@@ -151,7 +160,8 @@ class Appearance:
         """
         values = self.from_motion.predict(motion)
         count = self.mouth_codes.shape[1]
-        return FaceCodes(values[:, :count], values[:, count:-1], values[:, -1])
+        mouth = drawn_to_recorded(values[:, :count], self.mouth_codes)
+        return FaceCodes(mouth, values[:, count:-1], values[:, -1])
 
     def of_mouths(self, mouths: Pictures) -> FaceCodes:
         """Return the lower face for pictures of the mouth [shape=(T, 56, 72, 3)], uint8, in any light."""
@@ -172,15 +182,21 @@ def learn_appearance(footage: FootagePictures) -> Appearance:
     """Return the appearance of a person.
 
     Raises InputError: no pictures, or motion of another number of frames.
-    Cost: about 10 s for four minutes of footage; 50 kB a frame.
+    Cost: about 10 s for four minutes of footage; 100 kB a frame.
     """
     pictures, light, reference = _in_one_light(footage)
     mouths = pictures[(slice(None), *mouth_part(1))]
     mouth = fit_eigenlips(mouths[evenly_spaced(LEARNED_FROM, len(mouths))], COMPONENTS)
     codes = mouth.project(mouths)
-    faces = _jaw_alone(pictures, footage.shape)
-    jaw = fit_eigenlips(faces[evenly_spaced(LEARNED_FROM, len(faces))], JAW_COMPONENTS)
-    jaw_codes = jaw.project(faces)
+    around = pictures[evenly_spaced(LEARNED_FROM, len(pictures))].mean(axis=0, dtype=np.float32)
+    faces = _jaw_alone(pictures[evenly_spaced(LEARNED_FROM, len(pictures))], around, footage.shape)
+    jaw = fit_eigenlips(faces, JAW_COMPONENTS)
+    jaw_codes = np.concatenate(
+        [
+            jaw.project(_jaw_alone(pictures[start : start + AT_ONCE], around, footage.shape))
+            for start in range(0, len(pictures), AT_ONCE)
+        ]
+    )
     chosen = _undamaged(mouth, mouths, codes, choose_candidates(codes, CANDIDATES))
     chosen_jaws = choose_candidates(jaw_codes, JAW_CANDIDATES)
 
@@ -189,6 +205,7 @@ def learn_appearance(footage: FootagePictures) -> Appearance:
             return pictures[frames]
         return relit(footage.finer(frames), reference / light[frames])
 
+    chosen_faces = recorded(chosen_jaws)
     jaw_and_chin = np.concatenate([jaw_codes, footage.chin_px[:, None]], axis=1)
     ends = np.cumsum([len(clip) for clip in footage.clips])[:-1]
     return Appearance(
@@ -199,7 +216,7 @@ def learn_appearance(footage: FootagePictures) -> Appearance:
         np.ascontiguousarray(recorded(chosen)[(slice(None), *mouth_part(footage.scale))]),
         codes[chosen],
         jaw,
-        _jaw_alone(recorded(chosen_jaws), footage.shape),
+        _jaw_alone(chosen_faces, chosen_faces.mean(axis=0, dtype=np.float32), footage.shape),
         jaw_codes[chosen_jaws],
         fit_motion_map(footage.motion, footage.channels, np.concatenate([codes, jaw_and_chin], axis=1)),
         _regression(codes, jaw_and_chin),
@@ -216,25 +233,31 @@ def _in_one_light(footage: FootagePictures) -> tuple[Pictures, Array, Array]:
             f"{count} pictures, {len(footage.motion)} frames of motion and {len(footage.levels_db)} of sound; required "
             "as many of each"
         )
-    pictures = np.concatenate(footage.clips)
-    light = np.maximum(cheek_light(pictures[(slice(None), *mouth_part(1))]), 1.0)
+    part = (slice(None), *mouth_part(1))
+    light = np.maximum(np.concatenate([cheek_light(clip[part]) for clip in footage.clips]), 1.0)
     reference = np.median(light, axis=0)
-    return relit(pictures, reference / light), light, reference
+    pictures = np.empty((count, *footage.clips[0].shape[1:]), np.uint8)
+    start = 0
+    for clip in footage.clips:
+        inside = slice(start, start + len(clip))
+        pictures[inside] = relit(clip, reference / light[inside])
+        start += len(clip)
+    return pictures, light, reference
 
 
-def _jaw_alone(pictures: Pictures, shape: FaceShape) -> Pictures:
-    """Return lower faces that differ in the jaw alone: their mouth and their surroundings are the mean ones."""
+def _jaw_alone(pictures: Pictures, mean: Floats, shape: FaceShape) -> Pictures:
+    """Return lower faces that differ in the jaw alone: mouth and surroundings are the mean ones [shape=(H, W, 3)]."""
     scale = pictures.shape[1] // HEIGHT
     other = mouth_ellipse(scale) | ~binary_dilation(replaced_part(shape, scale), iterations=EDGE_PX * scale)
     result = pictures.copy()
-    result[:, other] = np.rint(pictures[:, other].mean(axis=0, dtype=np.float32)).astype(np.uint8)
+    result[:, other] = np.rint(mean[other]).astype(np.uint8)
     return result
 
 
 def _undamaged(space: Eigenlips, pictures: Pictures, codes: Floats, chosen: Index) -> Index:
     """Return those of the chosen pictures that are like what their components restore: damaged video is not."""
-    detail = np.abs(pictures[chosen] - space.expand(codes[chosen])).max(axis=(1, 2, 3))
-    return chosen[detail <= DEEPEST] if (detail <= DEEPEST).any() else chosen
+    whole = recorded_details(space, pictures[chosen], codes[chosen])[1] <= DEEPEST
+    return chosen[whole] if whole.any() else chosen
 
 
 def _regression(inputs: Values, targets: Values) -> Floats:

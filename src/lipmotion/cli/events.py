@@ -14,7 +14,10 @@ if TYPE_CHECKING:
     from typing import Any
 
 OPTIONS = ("--machine-readable", "--machineReadable")
-STATUS_VERBS, LINES_VERBS = ("cues",), ("speak", "words", "corpus", "train", "evaluate", "experiment")
+STATUS_VERBS, LINES_VERBS = (
+    ("cues",),
+    ("animate", "face", "speak", "words", "corpus", "train", "evaluate", "experiment"),
+)
 
 
 class Events:

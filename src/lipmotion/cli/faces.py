@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lipmotion.cli.paths import add_input
@@ -13,11 +14,12 @@ if TYPE_CHECKING:
 
 def add_face_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the face of videos, and how a filmed face is shown."""
-    face = "face that videos show: portrait, or a filmed face (default: portrait)"
+    face = "face that videos show: woman, man, cartoon, or a filmed face (default: portrait, the woman)"
     drawn: dict[str, Any] = {"type": str, "default": "portrait", "metavar": "NAME|FILE.face", "help": face}
     add_input(parser, "--face", what="face", replaceable=True, **drawn)
-    footage = "footage of the same person into which a filmed face is stitched (default: the one in its file)"
-    add_input(parser, "--background", what="background", metavar="VIDEO", help=footage)
+    shown = "footage of the same person (default: that in its file); of a drawn face: transparent, or as #40a0ff"
+    behind: dict[str, Any] = {"type": str, "metavar": "VIDEO|COLOUR", "help": shown}
+    add_input(parser, "--background", what="background", **behind)
     follows = "what the jaw of a filmed face follows: motion, energy or none (default: motion)"
     parser.add_argument("--jaw", choices=["motion", "energy", "none"], default="motion", help=follows)
     aid = "show the video of the speech with a large mouth of the filmed face, in a corner or over the speaker's own"
@@ -30,4 +32,12 @@ def film_options(options: argparse.Namespace) -> FilmOptions:
     """Return how a filmed face is shown."""
     from lipmotion.pipeline.film.video import FilmOptions
 
-    return FilmOptions(options.background, options.jaw, options.overlay, options.mark)
+    footage = Path(options.background) if options.background and is_filmed(options) else None
+    return FilmOptions(footage, options.jaw, options.overlay, options.mark)
+
+
+def is_filmed(options: argparse.Namespace) -> bool:
+    """Return whether the face is a filmed one."""
+    from lipmotion.faces.filmed.face import FilmedFace
+
+    return isinstance(options.face, FilmedFace)

@@ -15,8 +15,10 @@ from lipmotion.cli.characters import (
 )
 from lipmotion.cli.faces import add_face_arguments, film_options
 from lipmotion.cli.paths import add_output
+from lipmotion.cli.staging import add_staging_arguments, staging_of
 
 if TYPE_CHECKING:
+    from lipmotion.cli.progress import Report
     from lipmotion.pipeline.model import Model
     from lipmotion.types import Audio, Generation
 
@@ -33,10 +35,12 @@ def add_result_arguments(parser: argparse.ArgumentParser, files: str, *, require
     parser.add_argument("--rate", type=float, metavar="HZ", help="frames per second of motion files (default: 100)")
     parser.add_argument("--channels", metavar="NAME,NAME", help="write only these to motion files: opening,width,...")
     rate = "frames per second of videos (default: 25; of filmed faces, those of the footage)"
-    rate = "frames per second of videos (default: 25; of filmed faces, those of the footage)"
     parser.add_argument("--fps", type=float, help=rate)
+    articulation = "add tongue, lip_tuck, protrusion, spread, lip_press, teeth to motion files"
+    parser.add_argument("--articulation", action="store_true", help=articulation)
     add_face_arguments(parser)
     add_character_arguments(parser)
+    add_staging_arguments(parser)
 
 
 def check_results(options: argparse.Namespace, speech: Path | None = None) -> None:
@@ -48,20 +52,23 @@ def check_results(options: argparse.Namespace, speech: Path | None = None) -> No
 
     open_character(options)
     options.face = opened_face(options.face)
-    checked = {"rate_hz": options.rate, "fps": options.fps, "face": options.face}
-    check_outputs(other_outputs(options), speech, **checked, with_sound=speech is None)
+    checked = {"rate_hz": options.rate, "fps": options.fps, "face": options.face, "film": film_options(options)}
+    check_outputs(other_outputs(options), speech, **checked, staging=staging_of(options), with_sound=speech is None)
 
 
-def write_results(options: argparse.Namespace, result: Generation, speech: Path | Audio, model: Model) -> None:
+def write_results(
+    options: argparse.Namespace, result: Generation, speech: Path | Audio, model: Model, report: Report
+) -> None:
     """Write generated motion to the outputs.
 
     speech : the recording, or the sound
+    report : receives the progress of videos
     """
-    from lipmotion.pipeline.animate import write
+    from lipmotion.pipeline.animate import with_articulation, write
 
     drawn, channels = chosen_curves(options, result)
     write(
-        drawn,
+        with_articulation(drawn) if options.articulation else drawn,
         other_outputs(options),
         speech=speech,
         model=model,
@@ -70,5 +77,7 @@ def write_results(options: argparse.Namespace, result: Generation, speech: Path 
         fps=options.fps,
         face=options.face,
         film=film_options(options),
+        staging=staging_of(options),
+        monitor=report.receive,
     )
     write_animated_outputs(options, result)

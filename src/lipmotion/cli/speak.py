@@ -10,6 +10,7 @@ from lipmotion.cli.options import add_machine_readable
 from lipmotion.cli.paths import add_input
 from lipmotion.cli.results import add_result_arguments, check_results, write_results
 from lipmotion.cli.speech import add_lexicon_argument, add_model_argument, add_onto_arguments, add_speaker_argument
+from lipmotion.printable import printable
 
 if TYPE_CHECKING:
     from lipmotion.cli.progress import Report
@@ -24,11 +25,10 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser.add_argument("--voice", metavar="NAME", help=named)
     add_input(parser, "--corpus", what="corpus", metavar="FOLDER", help="whose recordings speak, for --voice corpus")
     parser.add_argument("--voices", action="store_true", help="list the installed voices")
-    add_lexicon_argument(parser)
-    add_model_argument(parser)
-    add_speaker_argument(parser)
-    add_onto_arguments(parser)
-    add_result_arguments(parser, "FILE.mp4 .wav .flac .ogg .json .csv .npz .TextGrid, or several", required=False)
+    for add_argument in (add_lexicon_argument, add_model_argument, add_speaker_argument, add_onto_arguments):
+        add_argument(parser)
+    suffixes = "FILE.mp4 .webm .mov %%05d.png .wav .flac .ogg .json .csv .npz .TextGrid, or several"
+    add_result_arguments(parser, suffixes, required=False)
     add_machine_readable(parser)
     parser.set_defaults(run=run, wrong=parser.error)
 
@@ -66,5 +66,5 @@ def _speak(options: argparse.Namespace, report: Report) -> None:
     how = {"voice": options.voice, "corpus": corpus, "model": model, "lexicon": lexicon, "speaker": options.speaker}
     onto = options.onto or person_shown(model, options.face, options.speaker)
     sound, result = speak(text, **how, onto=onto, onto_speaker=options.onto_speaker)
-    write_results(options, result, sound, model)
-    report.finish("\n".join(options.output), files=options.output, seconds=round(sound.duration_s, 3))
+    write_results(options, result, sound, model, report)
+    report.finish("\n".join(map(printable, options.output)), files=options.output, seconds=round(sound.duration_s, 3))

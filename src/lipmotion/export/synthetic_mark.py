@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import ExportError, InputError
+from lipmotion.printable import printable
 
 Frame = NDArray[np.uint8]
 Box = tuple[float, float, float, float]
@@ -51,10 +52,11 @@ class MarkMetadata:
 def mark_metadata(statement: str = STATEMENT) -> MarkMetadata:
     """Return the metadata that say that a video is synthetic.
 
-    statement : what the comment says, for people
+    statement : what the comment says, for people; in the packet without line ends and control characters
     Source: IPTC Digital Source Type NewsCodes; IPTC Video Metadata Hub; Adobe, XMP Specification Part 1.
     """
-    xmp = _PACKET.format(statement=escape(statement), source_type=SOURCE_TYPE, tool=f"lipmotion {version('lipmotion')}")
+    text = escape(printable(statement))
+    xmp = _PACKET.format(statement=text, source_type=SOURCE_TYPE, tool=f"lipmotion {version('lipmotion')}")
     return MarkMetadata({"comment": statement, "keywords": f"{LABEL}, {SOURCE_TYPE}"}, xmp)
 
 

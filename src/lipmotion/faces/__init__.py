@@ -1,6 +1,6 @@
 """Faces: from motion to pictures."""
 
-from lipmotion.faces.base import Face
-from lipmotion.faces.registry import FACES, face_named
+from lipmotion.faces.base import Face, Stageable, Staging
+from lipmotion.faces.registry import FACES, face_named, staged_face
 
-__all__ = ["FACES", "Face", "face_named"]
+__all__ = ["FACES", "Face", "Stageable", "Staging", "face_named", "staged_face"]

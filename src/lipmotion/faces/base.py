@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.types import Motion, Timeline, Unit
+from lipmotion.errors import InputError, shortened
+from lipmotion.types import Configuration, Motion, Prosody, Rule, Timeline, Unit, option
+
+SCENE, TRANSPARENT = "scene", "transparent"
+SMALLEST, LARGEST = 64, 4096
+"""Range of the height of pictures, in pixels."""
 
 
 class Face(ABC):
@@ -22,7 +30,59 @@ class Face(ABC):
     def render(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> Iterator[NDArray[np.uint8]]:
         """Return RGB frames [shape=(H, W, 3)] of even height and width; frame n shows the time ``n / fps`` seconds.
 
+        A face that is staged with a transparent background returns RGBA frames [shape=(H, W, 4)], with straight alpha.
         The last frame is at or before the last frame of the motion. The same input gives the same pixels.
         units : phones in time; may be empty
         Raises InputError: a channel that the face needs is missing, values are not finite, or fps is not positive.
+        """
+
+
+@dataclass(frozen=True)
+class Staging(Configuration):
+    """How a face is shown, beside what it says.
+
+    size       : height of the picture in pixels, an even number; 0: the face's own
+    background : ``scene`` (the face's own), ``transparent``, or a colour as ``#40a0ff``
+    intensity  : 1: movements of the mouth as spoken; more, up to 3: larger. Closed lips stay closed at any intensity
+    blinks, gaze, brows, head : whether these move on their own
+    seed       : of the movements that depend on chance
+    Raises InputError: a value out of its range, or no such background.
+    """
+
+    size: int = option(0, Rule(least=0))
+    background: str = SCENE
+    intensity: float = option(1.0, Rule(least=0))
+    blinks: bool = True
+    gaze: bool = True
+    brows: bool = True
+    head: bool = True
+    seed: int = option(0, Rule(least=0))
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.size and not (SMALLEST <= self.size <= LARGEST and self.size % 2 == 0):
+            raise InputError(f"the size is {self.size} pixels, required an even number from {SMALLEST} to {LARGEST}")
+        if self.intensity > 3:
+            raise InputError(f"the intensity is {self.intensity:g}, required 0 to 3")
+        if self.background not in (SCENE, TRANSPARENT) and not re.fullmatch("#[0-9a-fA-F]{6}", self.background):
+            raise InputError(
+                f"the background is {shortened(self.background)!r}, required scene, transparent, or a colour as #40a0ff"
+            )
+
+    @property
+    def colour(self) -> tuple[int, int, int] | None:
+        """Red, green and blue of the background, 0..255; None: it has no single colour."""
+        if not self.background.startswith("#"):
+            return None
+        return int(self.background[1:3], 16), int(self.background[3:5], 16), int(self.background[5:7], 16)
+
+
+@runtime_checkable
+class Stageable(Protocol):
+    """A face that can be staged; a face has this ability if it has the method."""
+
+    def staged(self, staging: Staging, prosody: Prosody | None = None) -> Face:
+        """Return the same face with other settings.
+
+        prosody : of the speech that will be rendered, for movements of brows and head; None: not known
         """

@@ -2,20 +2,56 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from lipmotion.errors import InputError
 from lipmotion.extensions import Registry
-from lipmotion.faces.base import Face
+from lipmotion.faces.base import Face, Stageable, Staging
+from lipmotion.types import Prosody
 
+_DRAWN = "lipmotion.faces.portrait"
 FACES: Registry[type[Face]] = Registry(
     "face",
     "lipmotion.faces",
-    {"portrait": "lipmotion.faces.portrait:Portrait", "head": "lipmotion.faces.character:Head"},
+    {
+        "portrait": f"{_DRAWN}:Portrait",
+        "woman": f"{_DRAWN}:Woman",
+        "man": f"{_DRAWN}:Man",
+        "cartoon": f"{_DRAWN}:Cartoon",
+        "head": "lipmotion.faces.character:Head",
+    },
 )
 
 
+DRAWING_SUFFIX = ".svg"
+
+
 def face_named(name: str = "portrait") -> Face:
-    """Return a face. Raises InputError: none of that name, or what an installed package adds is no face."""
+    """Return a face; a name that ends in ``.svg`` is the path of a drawing in layers (docs/faces.md).
+
+    Raises InputError: none of that name, a drawing that cannot be used, or what an installed package adds is no face.
+    """
+    if name.lower().endswith(DRAWING_SUFFIX):
+        from lipmotion.faces.portrait.layered import LayeredFace
+
+        return LayeredFace(Path(name))
     chosen = FACES.load(name)
     if not (isinstance(chosen, type) and issubclass(chosen, Face)):
         raise InputError(f"{chosen!r} is called a face, {name!r}, by an installed package; required a class of Face")
     return chosen()
+
+
+def staged_face(face: str | Face, staging: Staging, prosody: Prosody | None = None) -> Face:
+    """Return a face, or the one of a name, with settings.
+
+    prosody : of the speech that will be rendered; None: not known
+    Raises InputError: as ``face_named``, or the face cannot be staged and settings differ from the defaults.
+    """
+    if isinstance(face, str):
+        face = face_named(face)
+    if isinstance(face, Stageable):
+        return face.staged(staging, prosody)
+    if staging != Staging():
+        kind = type(face).__name__
+        raise InputError(f"the face {kind!r} has no settings, as size, background and intensity; leave them out")
+    return face

@@ -6,15 +6,26 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export.base import check_motion, motion_suffixes, write_motion
 from lipmotion.export.sound import SOUND_CODECS, write_sound
 from lipmotion.export.textgrid import TEXTGRID_SUFFIX, write_textgrid
-from lipmotion.faces.base import Face
+from lipmotion.faces.base import Face, Staging
 from lipmotion.faces.filmed.face import SUFFIX, FilmedFace, load_face
 from lipmotion.faces.registry import face_named
 from lipmotion.kernels.threads import one_thread
-from lipmotion.pipeline.film.video import FILM, FilmOptions, write_film
+from lipmotion.motion.gestures import GESTURES, with_gestures
+from lipmotion.pipeline.drawn_video import (
+    OPAQUE_SUFFIX,
+    VIDEO_SUFFIXES,
+    check_background,
+    check_staging,
+    shows_face,
+    write_drawn_face,
+)
+from lipmotion.pipeline.film.video import FILM, FilmOptions, check_film, film_of, write_film
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.outlook import outlook_of
 from lipmotion.pipeline.request import SpeechInput, request_of
@@ -24,9 +35,8 @@ from lipmotion.pipeline.understand import understood_speech
 from lipmotion.pipeline.workers import map_in_processes
 from lipmotion.speech.audio_files import read_audio
 from lipmotion.storage.files import as_text, check_distinct, check_target
-from lipmotion.types import Audio, Constraints, Generation, TimedTranscript
+from lipmotion.types import Audio, Constraints, Generation, Monitor, TimedTranscript, silent_monitor
 
-VIDEO_SUFFIX = ".mp4"
 SOUND_RATE_HZ = 48_000
 """Sampling rate of the sound track of a drawn video."""
 DRAWN_HZ = 25.0
@@ -83,20 +93,27 @@ def write(
     fps: float | None = None,
     face: str | Path | Face | FilmedFace = "portrait",
     film: FilmOptions = FILM,
+    staging: Staging | None = None,
+    monitor: Monitor = silent_monitor,
 ) -> None:
     """Write generated motion to one or several files, each in the format of its suffix.
 
     generation : from ``animate``
-    outputs  : paths of files: ``.json``, ``.csv``, ``.npz`` (motion), ``.TextGrid`` (phones in time) or ``.mp4`` (a
-               drawn face, with sound); where ``speech`` is a sound, also ``.wav``, ``.flac``, ``.ogg``
+    outputs  : paths of files: ``.json``, ``.csv``, ``.npz`` (motion), ``.TextGrid`` (phones in time), ``.mp4``,
+               ``.webm``, ``.mov`` (a drawn face, with sound), or ``NAME%05d.png`` (its pictures, without sound); where
+               ``speech`` is a sound, also ``.wav``, ``.flac``, ``.ogg``
     speech   : the recording that was animated, or the sound, as of ``speak``; a video needs it for its sound
     model    : the model that generated the motion; motion files then name its corpus and licence
-    channels : channels of motion files, in this order; None: all
+    channels : channels of motion files, in this order, also articulatory ones as ``tongue`` (docs/articulation.md);
+               None: all of the motion
     rate_hz  : frames per second of motion files, 1 to 1000; None: the 100 of the model
     fps      : frames per second of videos, 1 to 1000; None: 25 for drawn faces, those of the footage for filmed ones
-    face     : the face of videos: ``portrait``, the name of a face of an installed package, or a filmed face (a value
-               or a ``.face`` file)
+    face     : the face of videos: ``portrait``, ``woman``, ``man``, ``cartoon``, one of an installed package, or a
+               filmed face (a value or a ``.face`` file), which is written as ``.mp4``
     film     : how a filmed face is shown
+    staging  : size, background, intensity of a drawn face, and what moves on its own (docs/faces.md); None: the
+               defaults
+    monitor  : receives reports of the progress of videos
     Raises ExportError: unknown suffix, no such folder, or a file that cannot be written.
     Raises InputError: a frame rate out of its range, or an unknown channel or face.
     The arguments are checked before the first file is written.
@@ -112,11 +129,22 @@ def write(
     paths = [Path(output) for output in ([outputs] if isinstance(outputs, str | Path) else outputs)]
     sound = speech if isinstance(speech, Audio) else None
     recording = None if isinstance(speech, Audio) else speech
-    check_outputs(paths, recording, rate_hz=rate_hz, fps=fps, face=face, with_sound=sound is not None)
-    videos = [path for path in paths if path.suffix.lower() == VIDEO_SUFFIX]
     shown_face = opened_face(face)
+    check_outputs(
+        paths,
+        recording,
+        rate_hz=rate_hz,
+        fps=fps,
+        face=shown_face,
+        film=film,
+        staging=staging,
+        with_sound=sound is not None,
+    )
+    videos = [path for path in paths if shows_face(path)]
     if videos and not isinstance(shown_face, FilmedFace) and "opening" not in generation.motion.names:
         raise ExportError(f"{videos[0]}: the motion has no channel 'opening' to draw a face from; write motion files")
+    if {*(channels or ())} & {*GESTURES}:
+        generation = with_articulation(generation, channels or ())
     written = generation.selected(channels) if channels is not None else generation
     if rate_hz is not None:
         written = written.resampled(rate_hz)
@@ -128,14 +156,16 @@ def write(
         if path in sounds and sound is not None:
             write_sound(path, sound)
         elif path in videos:
-            heard = sound or read_audio(Path(str(recording)), SOUND_RATE_HZ, warn=False)
+            played = sound or read_audio(Path(str(recording)), SOUND_RATE_HZ, warn=False)
             if isinstance(shown_face, FilmedFace):
                 filmed = None if recording is None else Path(recording)
-                write_film(
-                    path, shown_face, generation.motion, heard, speech=filmed, model=model, fps=fps, options=film
+                frames = film_of(
+                    shown_face, generation.motion, speech=filmed, sound=played, model=model, fps=fps, options=film
                 )
+                write_film(path, frames, played, mark=film.mark, monitor=monitor)
             else:
-                _write_video(generation, path, heard, DRAWN_HZ if fps is None else fps, shown_face)
+                hertz = DRAWN_HZ if fps is None else fps
+                write_drawn_face(path, generation, played, hertz, shown_face, staging or Staging(), monitor)
         elif path.suffix.lower() == TEXTGRID_SUFFIX.lower():
             write_textgrid(path, generation.units)
         else:
@@ -149,24 +179,31 @@ def check_outputs(
     rate_hz: float | None = None,
     fps: float | None = None,
     face: str | Path | Face | FilmedFace = "portrait",
+    film: FilmOptions = FILM,
+    staging: Staging | None = None,
     with_sound: bool = False,
 ) -> None:
     """Raise ExportError or InputError if an output cannot be written; called before long work begins.
 
-    outputs, speech, rate_hz, fps, face : as of ``write``
+    outputs, speech, rate_hz, fps, face, film, staging : as of ``write``
     with_sound : the speech is, or will be, a sound that is in no file
     """
     for hertz in (fps, rate_hz):
         if hertz is not None and not SLOWEST_HZ <= hertz <= FASTEST_HZ:
             raise InputError(f"the frame rate is {hertz}, required {SLOWEST_HZ:.0f} to {FASTEST_HZ:.0f} a second")
-    opened_face(face)
-    suffixes = (*motion_suffixes(), VIDEO_SUFFIX, TEXTGRID_SUFFIX, *(SOUND_CODECS if with_sound else ()))
+    shown_face = opened_face(face)
+    check_film(shown_face, film, speech)
+    check_staging(shown_face, staging or Staging())
+    suffixes = (*motion_suffixes(), *VIDEO_SUFFIXES, TEXTGRID_SUFFIX, *(SOUND_CODECS if with_sound else ()))
     check_distinct([Path(path) for path in outputs])
     for path in map(Path, outputs):
-        if path.suffix.lower() not in map(str.lower, suffixes):
-            raise ExportError(f"{path}: unknown format {path.suffix!r}; required one of: {' '.join(suffixes)}")
+        if path.suffix.lower() not in map(str.lower, suffixes) and not shows_face(path):
+            raise ExportError(f"{path}: unknown format {path.suffix!r}; required one of: {' '.join(suffixes)} %05d.png")
         check_target(path, speech)
-        if path.suffix.lower() == VIDEO_SUFFIX and speech is None and not with_sound:
+        check_background(path, staging or Staging())
+        if isinstance(shown_face, FilmedFace) and shows_face(path) and path.suffix.lower() != OPAQUE_SUFFIX:
+            raise ExportError(f"{path}: filmed faces are written as {OPAQUE_SUFFIX}; name the output so")
+        if shows_face(path) and speech is None and not with_sound:
             raise ExportError(f"{path}: a video needs the recording: write(..., speech=FILE)")
 
 
@@ -193,8 +230,12 @@ def _text(value: object) -> str:
     return as_text("; ".join(map(str, value)) if isinstance(value, list) else str(value))
 
 
-def _write_video(generation: Generation, path: Path, sound: Audio, fps: float, face: Face) -> None:
-    from lipmotion.export.video import write_mp4
+def with_articulation(generation: Generation, channels: Sequence[str] = GESTURES) -> Generation:
+    """Return the generation with articulatory channels that its motion lacks, as they follow from its phones.
 
-    frames = face.render(generation.motion, generation.units, fps=fps)
-    write_mp4(path, frames, fps=fps, audio=sound)
+    channels : the articulatory ones among these are added (docs/articulation.md); their variance is 0
+    """
+    motion = with_gestures(generation.motion, generation.units, channels)
+    added = len(motion.channels) - len(generation.motion.channels)
+    variance = np.pad(generation.variance, ((0, 0), (0, added))) if added else generation.spread
+    return replace(generation, motion=motion, spread=variance)

@@ -78,9 +78,8 @@ class LipPlacement:
 def placed_by_shape(mesh: Mesh, surface: MeshSurface) -> LipPlacement:
     """Return where the lip points are, from the blendshape that opens the mouth.
 
-    The lips meet where neighbours go apart as the mouth opens; the ends of that line are the inner corners. The character
-    must
-    stand upright and look along +z, as files of OBJ and glTF have it.
+    The lips meet where neighbours go apart as the mouth opens; the ends of that line are the inner corners. The
+    character must stand upright and look along +z, as files of OBJ and glTF have it.
     Raises InputError: no blendshape opens the mouth, or the lips are not found.
     """
     shape = opening_shape(mesh)

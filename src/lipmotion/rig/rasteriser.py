@@ -80,7 +80,7 @@ class Canvas:
 
         places    : of the vertices in space [shape=(V, 3)]
         colours   : of the vertices, as ``Lighting`` gives them [shape=(V, 3)]
-        triangles : counterclockwise where they are seen from outside; seen from behind they are not drawn [shape=(F, 3)]
+        triangles : counterclockwise from outside; those that are seen from behind are not drawn [shape=(F, 3)]
         onto      : a picture to which the new one is equal outside the box of ``moving``
         moving    : places of vertices; only the smallest box of pixels around them is drawn
         """

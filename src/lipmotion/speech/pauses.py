@@ -37,6 +37,18 @@ def levels_db(audio: Audio) -> Array:
     return uniform_filter1d(levels, SMOOTHING_FRAMES, mode="nearest") if len(levels) else levels
 
 
+def levels_db_at(audio: Audio, times_s: Array) -> Array:
+    """Return the smoothed level of a sound at some times, dB of full scale [same shape].
+
+    times_s : rising, s [shape=(T,)]; before the first and after the last level that one is returned
+    A sound of less than 10 ms has the level ``QUIETEST_DB``.
+    """
+    levels = levels_db(audio)
+    if not len(levels):
+        return np.full(len(times_s), QUIETEST_DB)
+    return np.interp(times_s, (np.arange(len(levels)) + 0.5) * STEP_S, levels)
+
+
 def spoken_spans(levels: Array) -> list[tuple[float, float]]:
     """Return start and end of every stretch between two pauses, s.
 

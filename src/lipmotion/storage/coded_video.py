@@ -21,7 +21,7 @@ from lipmotion.storage.schema import Arrays, ArraySpec, checked_arrays, format_e
 Pictures = NDArray[np.uint8]
 Stream = NDArray[np.uint8]
 
-VIDEO_CRF = 16.0
+VIDEO_CRF = 18.0
 """Quality of a stored background: x264's constant rate factor, 0 (lossless) to 51; smaller is better."""
 PICTURES_CRF = 12.0
 """Quality of stored pictures of mouths."""

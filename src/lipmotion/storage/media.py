@@ -68,6 +68,17 @@ def video_streams(container: Any) -> list[Any]:
     return [stream for stream in container.streams.video if not stream.disposition & cover]
 
 
+def has_video(path: Path) -> bool:
+    """Return whether a file can be opened and has a video stream."""
+    import av
+
+    try:
+        with open_media(path) as container:
+            return bool(video_streams(container))
+    except (av.FFmpegError, ValueError, OSError):
+        return False
+
+
 def stated_duration_s(container: Any, stream: Any) -> float:
     """Return the duration of a stream that an open container states, in seconds; 0 if it states none.
 

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import islice
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.faces.base import Face
+from lipmotion.faces.base import TRANSPARENT, Face, Stageable, Staging
 from lipmotion.testing.contract import require, require_error
 from lipmotion.testing.examples import example
 from lipmotion.types import Timeline, Unit
 
 
 def check_face(face: Face) -> None:
-    """Check that a face draws motion as ``Face.render`` says.
+    """Check that a face draws motion as ``Face.render`` says, and is staged as ``Stageable`` says if it can be.
 
     Raises ContractError: what was found.
 
@@ -39,3 +41,19 @@ def check_face(face: Face) -> None:
     broken = replace(motion, values=np.full_like(motion.values, np.nan))
     require_error(InputError, lambda: list(face.render(broken, units, fps=10.0)), "values that are not finite")
     require_error(InputError, lambda: list(face.render(motion, units, fps=0.0)), "fps of 0")
+    if isinstance(face, Stageable):
+        _check_staged(face)
+
+
+def _check_staged(face: Stageable) -> None:
+    one = example(("m", "aa"))
+
+    def first(**settings: Any) -> NDArray[np.uint8]:
+        return next(iter(face.staged(Staging(**settings)).render(one.motion, one.speech.units, fps=10.0)))
+
+    small = first(size=64)
+    require(small.shape[0] == 64, f"a picture {small.shape[0]} pixels high, required the 64 that were asked for")
+    clear = first(size=64, background=TRANSPARENT)
+    require(clear.shape == (*small.shape[:2], 4), f"transparent frames of shape {clear.shape}, required RGBA")
+    require(bool(np.any(clear[..., 3] == 0)), "no pixel is transparent")
+    require(isinstance(face.staged(Staging()), Face), "a staged face is no face")

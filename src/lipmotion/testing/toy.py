@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export.video import write_mp4
-from lipmotion.faces.portrait import render
+from lipmotion.faces import Staging
+from lipmotion.faces.portrait import Woman
 from lipmotion.speech.formant_synthesiser import synthesise
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.storage.files import whole_file
@@ -161,9 +162,10 @@ def write_toy_recordings(directory: Path, *, sentences: int = 12, seed: int = 0,
     spoken = toy_sentences(sentences, seed)
     _make_folder(directory)
     videos = [directory / f"{sentence.name}.mp4" for sentence in spoken]
+    face = Woman(Staging(size=FACE_HEIGHT, blinks=False, gaze=False, brows=False, head=False))
     for sentence, video in zip(spoken, videos, strict=True):
         motion = toy_motion(sentence.units, _MOTION_HZ)
-        write_mp4(video, render(motion, sentence.units, fps=fps, height=FACE_HEIGHT), fps=fps, audio=sentence.audio)
+        write_mp4(video, face.render(motion, sentence.units, fps=fps), fps=fps, audio=sentence.audio)
         _write_lines(video.with_suffix(".txt"), [" ".join(sentence.words)])
     for split in ("train", "val", "test"):
         _write_lines(directory / f"{split}.txt", [sentence.name for sentence in spoken if sentence.split == split])

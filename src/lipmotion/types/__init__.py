@@ -28,6 +28,7 @@ from lipmotion.types.generation import (
 from lipmotion.types.motion import EYE_DISTANCE, GREY, WEIGHT, Channel, Motion, check_curves, check_magnitude
 from lipmotion.types.parallel_map import ParallelMap
 from lipmotion.types.progress import Item, Monitor, Progress, silent_monitor, sub_monitor, with_progress
+from lipmotion.types.prosody import Prosody
 from lipmotion.types.timeline import Span, Timeline, Unit
 from lipmotion.types.transcript import TimedTranscript, TimedWord, TranscriptLine, in_order
 from lipmotion.types.utterance import Track, Utterance
@@ -61,6 +62,7 @@ __all__ = [
     "Pin",
     "PriorOutput",
     "Progress",
+    "Prosody",
     "ReducedVariance",
     "RegressedMean",
     "Rule",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
@@ -62,6 +62,19 @@ def sub_monitor(monitor: Monitor, start: float, stop: float, prefix: str = "") -
         monitor(event)
 
     return report
+
+
+def with_reports(items: Iterable[ItemT], count: int, stage: str, monitor: Monitor) -> Iterator[ItemT]:
+    """Yield the items one by one, about ``count`` of them, and report now and then how many are done."""
+    for number, item in enumerate(items):
+        if number % REPORTED == 0:
+            monitor(Progress(stage, number, count, min(number / max(count, 1), 1.0)))
+        yield item
+    monitor(Progress(stage, count, count, 1.0))
+
+
+REPORTED = 10
+"""Every so many items are reported."""
 
 
 def with_progress(items: Sequence[ItemT], stage: str, monitor: Monitor) -> Iterator[ItemT]:

@@ -22,7 +22,7 @@ from lipmotion.faces.character.pose import FacePose
 from lipmotion.types import Motion, Timeline, Unit
 
 if TYPE_CHECKING:
-    from lipmotion.faces.character.stage import Stage
+    from lipmotion.rig.rasteriser import Camera
 
 __all__ = ["Head", "render"]
 
@@ -65,7 +65,7 @@ def render(
     return _frames(poses, camera)
 
 
-def _frames(poses: list[FacePose], camera: object) -> Iterator[NDArray[np.uint8]]:
+def _frames(poses: list[FacePose], camera: Camera) -> Iterator[NDArray[np.uint8]]:
     from lipmotion.faces.character.stage import Stage
 
     stage = Stage(camera)

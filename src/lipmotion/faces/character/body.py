@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,7 +12,7 @@ from lipmotion.faces.character.part import Part, grid_triangles, part, tube
 
 Real = NDArray[np.float64]
 
-_SIDES = 96
+_SIDES = 64
 
 
 def ear() -> Part:
@@ -30,7 +32,7 @@ def ear() -> Part:
     up = np.array([0.14, 1.0, -0.10])
     places = np.array([0.80, -0.20, -0.80]) + u[..., None] * back + v[..., None] * up + w[..., None] * out
     colours = np.broadcast_to(np.array(palette.SKIN), places.shape).copy()
-    warm = np.exp(-((ring - 0.4) / 0.3) ** 2)[:, None, None] * 0.35 + 0.15
+    warm = np.exp(-(((ring - 0.4) / 0.3) ** 2))[:, None, None] * 0.35 + 0.15
     colours = (1 - warm) * colours + warm * np.array(palette.BLUSH)
     triangles = grid_triangles(len(ring), 48, closed=True)
     return part("ear", places.reshape(-1, 3), triangles, colours.reshape(-1, 3), palette.SKIN_FINISH)
@@ -53,13 +55,18 @@ def _rings(table: Real) -> Real:
         c, s = np.cos(around), np.sin(around)
         rows.append(
             np.stack(
-                [wide * np.sign(c) * np.abs(c) ** power, np.full(_SIDES, y), z + deep * np.sign(s) * np.abs(s) ** power], axis=1
+                [
+                    wide * np.sign(c) * np.abs(c) ** power,
+                    np.full(_SIDES, y),
+                    z + deep * np.sign(s) * np.abs(s) ** power,
+                ],
+                axis=1,
             )
         )
     return np.stack(rows)
 
 
-def _between(table: list[tuple[float, ...]], count: int) -> Real:
+def _between(table: Sequence[tuple[float, ...]], count: int) -> Real:
     from scipy.interpolate import PchipInterpolator
 
     knots = np.array(table)
@@ -69,9 +76,22 @@ def _between(table: list[tuple[float, ...]], count: int) -> Real:
 
 def neck() -> Part:
     """Return the neck, from under the hair to under the collar."""
-    rings = _rings(_between([(-0.55, 0.33, 0.30, -0.98, 2), (-1.0, 0.355, 0.34, -0.96, 2), (-1.45, 0.375, 0.36, -0.98, 2), (-1.75, 0.47, 0.40, -1.0, 2), (-1.95, 0.75, 0.45, -1.0, 2)], 26))
+    rings = _rings(
+        _between(
+            [
+                (-0.55, 0.33, 0.30, -0.98, 2),
+                (-1.0, 0.355, 0.34, -0.96, 2),
+                (-1.45, 0.375, 0.36, -0.98, 2),
+                (-1.75, 0.47, 0.40, -1.0, 2),
+                (-1.95, 0.75, 0.45, -1.0, 2),
+            ],
+            26,
+        )
+    )
     colours = np.broadcast_to(np.array(palette.SKIN), (rings.size // 3, 3)).copy()
-    return part("neck", rings.reshape(-1, 3), grid_triangles(26, _SIDES, closed=True)[:, ::-1], colours, palette.SKIN_FINISH)
+    return part(
+        "neck", rings.reshape(-1, 3), grid_triangles(26, _SIDES, closed=True)[:, ::-1], colours, palette.SKIN_FINISH
+    )
 
 
 def clothing() -> Part:
@@ -81,15 +101,21 @@ def clothing() -> Part:
         (-1.92, 1.28, 0.60, -1.02, 2.1), (-2.08, 1.58, 0.62, -1.03, 2.15), (-2.35, 1.74, 0.66, -1.03, 2.2),
         (-2.8, 1.80, 0.72, -1.03, 2.2), (-3.4, 1.80, 0.75, -1.03, 2.2),
     ]  # fmt: skip
-    rings = _rings(_between(table, 48))
-    return part("clothing", rings.reshape(-1, 3), grid_triangles(48, _SIDES, closed=True)[:, ::-1], palette.CLOTH, palette.CLOTH_FINISH)
+    rings = _rings(_between(table, 28))
+    return part(
+        "clothing",
+        rings.reshape(-1, 3),
+        grid_triangles(28, _SIDES, closed=True)[:, ::-1],
+        palette.CLOTH,
+        palette.CLOTH_FINISH,
+    )
 
 
 def collar() -> Part:
     """Return the ribbed collar."""
-    around = 2 * np.pi * np.arange(161) / 160
+    around = 2 * np.pi * np.arange(121) / 120
     path = np.stack([0.475 * np.cos(around), -1.60 - 0.09 * np.sin(around), -0.98 + 0.44 * np.sin(around)], axis=1)
-    upward = np.stack([np.cos(around), np.full(161, 0.35), np.sin(around)], axis=1)
-    rib = 1 + 0.04 * np.cos(40 * around)
-    places, triangles, _ = tube(path, 0.075 * np.ones(161), 0.05 * rib, upward, sides=14)
+    upward = np.stack([np.cos(around), np.full(121, 0.35), np.sin(around)], axis=1)
+    rib = 1 + 0.04 * np.cos(30 * around)
+    places, triangles, _ = tube(path, 0.075 * np.ones(121), 0.05 * rib, upward, sides=10)
     return part("collar", places, triangles, palette.CLOTH_RIB, palette.CLOTH_FINISH)

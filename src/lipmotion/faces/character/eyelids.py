@@ -31,8 +31,12 @@ def _curve(knots: list[tuple[float, float]]) -> Real:
     return np.asarray(CubicSpline(x, y)(LID_ACROSS))
 
 
-UPPER_LID = _curve([(-1, -0.028), (-0.75, 0.040), (-0.35, 0.086), (0.1, 0.098), (0.55, 0.080), (0.85, 0.043), (1, 0.012)])
-LOWER_LID = _curve([(-1, -0.028), (-0.75, -0.062), (-0.3, -0.082), (0.15, -0.086), (0.6, -0.063), (0.85, -0.026), (1, 0.012)])
+UPPER_LID = _curve(
+    [(-1, -0.028), (-0.75, 0.040), (-0.35, 0.086), (0.1, 0.098), (0.55, 0.080), (0.85, 0.043), (1, 0.012)]
+)
+LOWER_LID = _curve(
+    [(-1, -0.028), (-0.75, -0.062), (-0.3, -0.082), (0.15, -0.086), (0.6, -0.063), (0.85, -0.026), (1, 0.012)]
+)
 _SHUT = LOWER_LID + 0.016 * (1 - LID_ACROSS**2)
 
 
@@ -63,7 +67,7 @@ class Eyelids:
         return EYE[0] + HALF_WIDTH * LID_ACROSS, np.where(LID_SIDE > 0, upper, lower)
 
     def rings(self, pose: FacePose) -> Real:
-        """Return the places of all rings but the outermost, from the eyeball outwards [shape=(LID_RINGS, LID_COLUMNS, 3)]."""
+        """Return all rings but the outermost, from the eyeball outwards [shape=(LID_RINGS, LID_COLUMNS, 3)]."""
         x, y = self.opening(pose)
         edge = self.edge()
         share = (np.arange(LID_RINGS - 1) / (LID_RINGS - 1))[:, None] ** 1.25

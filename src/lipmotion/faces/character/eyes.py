@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,14 +15,33 @@ Real = NDArray[np.float64]
 
 IRIS, PUPIL = 0.115, 0.055
 """Radii of iris and pupil, as lengths on the eyeball."""
-_SIDES = 64
+CATCHLIGHT = 2.2
+"""Reflections of lamps are brighter than white paint."""
+_SIDES = 48
 LASHES = 33
 """Columns of the lashes: those of the upper lid."""
 
 
 def eyeball() -> Part:
     """Return the left eyeball, its middle at (0, 0, 0), looking along +z."""
-    radii = np.array([0, 0.022, PUPIL - 0.004, PUPIL, 0.068, 0.083, 0.098, IRIS - 0.006, IRIS, IRIS + 0.006, 0.138, 0.162, 0.19, 0.215])
+    radii = np.array(
+        [
+            0,
+            0.022,
+            PUPIL - 0.004,
+            PUPIL,
+            0.068,
+            0.083,
+            0.098,
+            IRIS - 0.006,
+            IRIS,
+            IRIS + 0.006,
+            0.138,
+            0.162,
+            0.19,
+            0.215,
+        ]
+    )
     angle = np.arcsin(np.clip(radii / EYEBALL, 0, 0.999))
     angle = np.concatenate([angle, np.linspace(angle[-1] + 0.15, 2.0, 5)])
     around = 2 * np.pi * np.arange(_SIDES) / _SIDES
@@ -51,7 +72,9 @@ def eyeball() -> Part:
             colours[n] = palette.IRIS_RIM
         else:
             colours[n] = palette.EYE_WHITE
-    return part("eye", places, grid_triangles(len(angle), _SIDES, closed=True), colours.reshape(-1, 3), palette.EYE_FINISH)
+    return part(
+        "eye", places, grid_triangles(len(angle), _SIDES, closed=True), colours.reshape(-1, 3), palette.EYE_FINISH
+    )
 
 
 def catchlights() -> Part:
@@ -64,7 +87,8 @@ def catchlights() -> Part:
         z = np.sqrt(away**2 - (flat**2).sum(axis=1))
         fan = np.stack([np.zeros(16, int), 1 + np.arange(16), 1 + (np.arange(16) + 1) % 16], axis=1).astype(np.int32)
         discs.append(part("light", np.column_stack([flat, z]), fan, (white, white, white), palette.GLOWING))
-    return joined_parts("catchlights", discs)
+    lights = joined_parts("catchlights", discs)
+    return replace(lights, colours=CATCHLIGHT * lights.colours)
 
 
 def lash_triangles() -> NDArray[np.int32]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,7 +15,7 @@ from lipmotion.faces.character.forms import EYE
 from lipmotion.faces.character.hair import hair
 from lipmotion.faces.character.inside import lower_drop, lower_teeth, tongue, tongue_triangles, upper_teeth
 from lipmotion.faces.character.lips import RINGS, VISIBLE
-from lipmotion.faces.character.part import Part, part
+from lipmotion.faces.character.part import part
 from lipmotion.faces.character.pose import FacePose
 from lipmotion.faces.character.skin import REST, Skin, jaw_moved
 from lipmotion.faces.character.tint import skin_colours
@@ -26,6 +27,9 @@ Real = NDArray[np.float64]
 
 PIVOT = np.array([0.0, -0.75, -0.9])
 """The head turns about this place, the top of the neck."""
+TONGUE_LIGHT = 1.7
+"""The tongue is wet, and drawn brighter than the rest of the mouth."""
+_EYES = ((1.0, ""), (-1.0, "right "))
 _MIDDLE, _LAST = 20, 60
 """Columns of the lips in the middle of the upper and of the lower lip."""
 
@@ -43,6 +47,8 @@ class Figure:
 
     triangles : of all parts [shape=(F, 3)]
     head      : the rows of the vertices that move; those of the body, behind them, never do
+    colours   : diffuse reflection of the vertices, linear [shape=(V, 3)]
+    parts, rows : the parts, and the rows of the vertices of each by its name
     """
 
     def __init__(self) -> None:
@@ -51,10 +57,10 @@ class Figure:
         left_brow, left_ear, ring, tongue_at_rest = brow(), ear(), earring(), tongue(REST)
         lash = np.zeros((3 * LASHES, 3))
         parts = [
-            Part("skin", self.skin.rest, self.skin.triangles, skin_colours(self.skin), palette.SKIN_FINISH, self.skin.normals),
+            self.skin.as_part(skin_colours(self.skin)),
             part("tongue", tongue_at_rest, tongue_triangles(), palette.TONGUE, palette.TONGUE_FINISH),
             lower_teeth(), upper_teeth(),
-            self._eye, self._eye.mirrored("right eye"), self._light, replace(self._light, name="right light"),
+            self._eye, self._eye.mirrored("right eye"), self._light, replace(self._light, name="right catchlights"),
             part("lashes", lash, lash_triangles(), palette.LASH, palette.BROW_FINISH),
             part("right lashes", lash, lash_triangles(), palette.LASH, palette.BROW_FINISH),
             left_brow, left_brow.mirrored("right brow"),
@@ -72,7 +78,7 @@ class Figure:
         ).astype(np.int32)
         self._places = np.concatenate([each.places for each in parts])
         self._normals = np.concatenate([each.normals for each in parts])
-        self._colours = np.concatenate([each.colours for each in parts])
+        self.colours = np.concatenate([each.colours for each in parts])
         none = [np.zeros_like(each.places) if each.strands is None else each.strands for each in parts]
         self._strands = np.concatenate(none)
         kinds = [np.full(len(each.places), palette.FINISHES.index(each.finish)) for each in parts]
@@ -87,60 +93,67 @@ class Figure:
         share = np.clip((-1.0 - self._places[self.rows["neck"], 1]) / 0.6, 0, 1)
         self._held[self.rows["neck"], 0] = share * share * (3 - 2 * share)
 
-    def frame(self, pose: FacePose, viewer: Real) -> Drawn:
-        """Return places and light of all vertices in a pose, seen from a place [shape=(3,)]."""
-        places, normals, colours = self._places.copy(), self._normals.copy(), self._colours.copy()
-        reaches_ = self._reaches.copy()
-        skin, skin_normals = self.skin.posed(pose)
-        places[self.rows["skin"]], normals[self.rows["skin"]] = skin, skin_normals
+    def placed(self, pose: FacePose) -> tuple[Real, Real]:
+        """Return places and normals of all vertices in a pose, the head not turned [shape=(V, 3), both]."""
+        places, normals = self._places.copy(), self._normals.copy()
+        places[self.rows["skin"]], normals[self.rows["skin"]] = self.skin.posed(pose)
         licked = tongue(pose)
-        places[self.rows["tongue"]] = licked
-        normals[self.rows["tongue"]] = normals_of(licked, tongue_triangles())
-        lower = self.rows["teeth"]
-        places[lower] = jaw_moved(places[lower], lower_drop(pose))
-        self._look(pose, places, normals, colours)
+        places[self.rows["tongue"]], normals[self.rows["tongue"]] = licked, normals_of(licked, tongue_triangles())
+        places[self.rows["teeth"]] = jaw_moved(places[self.rows["teeth"]], lower_drop(pose))
         for name in ("brow", "right brow"):
             places[self.rows[name], 1] += pose.brows
-        inside = self._lit_inside(pose, skin)
-        for rows in (self.rows["tongue"], lower, self.rows["upper teeth"], self._wall):
-            reaches_[rows] = inside(places[rows])[:, None]
-        reaches_[self.rows["tongue"]] = np.minimum(1.0, 1.7 * reaches_[self.rows["tongue"]])
-        turn = turned(*pose.turn)
+        self._look(pose, places, normals)
+        return places, normals
+
+    def frame(self, pose: FacePose, viewer: Real) -> Drawn:
+        """Return places and light of all vertices in a pose, seen from a place [shape=(3,)]."""
+        places, normals = self.placed(pose)
+        colours, arrives = self._shaded(pose, places)
+        turn, held, moving = turned(*pose.turn), self._held[self.head], self.head
         strands = self._strands.copy()
-        held = self._held[self.head]
-        places[self.head] = held * places[self.head] + (1 - held) * ((places[self.head] - PIVOT) @ turn.T + PIVOT)
-        normals[self.head] = held * normals[self.head] + (1 - held) * (normals[self.head] @ turn.T)
-        strands[self.head] = strands[self.head] @ turn.T
-        light = self._lighting.light(
-            places, normals, colours, self._kinds, viewer, reaches=reaches_, strands=strands
-        )
+        places[moving] = held * places[moving] + (1 - held) * ((places[moving] - PIVOT) @ turn.T + PIVOT)
+        normals[moving] = held * normals[moving] + (1 - held) * (normals[moving] @ turn.T)
+        strands[moving] = strands[moving] @ turn.T
+        light = self._lighting.light(places, normals, colours, self._kinds, viewer, reaches=arrives, strands=strands)
         return Drawn(places, light)
 
     def mouth_rows(self) -> dict[str, NDArray[np.intp]]:
         """Return the vertices of the parts of the mouth: lips, wall, tongue, teeth (the lower ones), upper teeth."""
-        rows = {name: np.arange(*self.rows[name].indices(len(self._places))) for name in ("tongue", "teeth", "upper teeth")}
+        rows = {
+            name: np.arange(*self.rows[name].indices(len(self._places))) for name in ("tongue", "teeth", "upper teeth")
+        }
         lips = self.skin.lip_rows()
         return {"lips": lips[1 : VISIBLE + 1].ravel(), "wall": self._wall, **rows}
 
-    def _look(self, pose: FacePose, places: Real, normals: Real, colours: Real) -> None:
-        """Place eyeballs, reflections and lashes, and shade the eyes under their upper lids."""
+    def _look(self, pose: FacePose, places: Real, normals: Real) -> None:
+        """Place eyeballs, reflections and lashes."""
         look, half = turned(*pose.gaze), turned(0.35 * pose.gaze[0], 0.35 * pose.gaze[1])
-        x, y = self.skin.lids_of_eye.opening(pose)
         lid = places[self.skin.lid_rows(0)[1][:LASHES]]
-        for side, name in ((1.0, ""), (-1.0, "right ")):
+        for side, name in _EYES:
             flip = np.array([side, 1.0, 1.0])
-            eye, light = self.rows[name + "eye"], self.rows[name + ("light" if name else "catchlights")]
+            eye = self.rows[name + "eye"]
             places[eye] = places[eye] @ look.T + EYE * flip
             normals[eye] = normals[eye] @ look.T
-            upper = np.interp(side * places[eye, 0], x[:LASHES], y[:LASHES])
-            under = np.clip((upper - places[eye, 1] + 0.01) / 0.085, 0, 1)
-            colours[eye] *= (0.6 + 0.4 * under)[:, None]
-            places[light] = self._light.places @ half.T + EYE * flip
-            colours[light] *= 2.2
+            places[self.rows[name + "catchlights"]] = self._light.places @ half.T + EYE * flip
             places[self.rows[name + "lashes"]] = lashes(lid, pose.shut) * flip
             normals[self.rows[name + "lashes"]] = [0.0, 0.0, 1.0]
 
-    def _lit_inside(self, pose: FacePose, skin: Real):  # noqa: ANN202
+    def _shaded(self, pose: FacePose, places: Real) -> tuple[Real, Real]:
+        """Return colours and arriving light: eyes are darker under their lids, the mouth is darker inside."""
+        colours, arrives = self.colours.copy(), self._reaches.copy()
+        x, y = self.skin.lids_of_eye.opening(pose)
+        for side, name in _EYES:
+            eye = self.rows[name + "eye"]
+            upper = np.interp(side * places[eye, 0], x[:LASHES], y[:LASHES])
+            under = np.clip((upper - places[eye, 1] + 0.01) / 0.085, 0, 1)
+            colours[eye] *= (0.6 + 0.4 * under)[:, None]
+        inside = self._lit_inside(pose, places[self.rows["skin"]])
+        for rows in (self.rows["tongue"], self.rows["teeth"], self.rows["upper teeth"], self._wall):
+            arrives[rows] = inside(places[rows])[:, None]
+        arrives[self.rows["tongue"]] = np.minimum(1.0, TONGUE_LIGHT * arrives[self.rows["tongue"]])
+        return colours, arrives
+
+    def _lit_inside(self, pose: FacePose, skin: Real) -> Callable[[Real], Real]:
         """Return the function from places in the mouth to the part of the light that arrives there."""
         ring = skin[self.skin.lip_rows()[VISIBLE - 1]]
         top, low, front = ring[_MIDDLE, 1], ring[_LAST, 1], 0.5 * (ring[_MIDDLE, 2] + ring[_LAST, 2])
@@ -157,16 +170,14 @@ class Figure:
     def _baked(self) -> Real:
         """Return the parts of sky and key light that reach the vertices at rest [shape=(V, 2)]."""
         eyes = ("eye", "right eye")
-        places = self._places.copy()
-        for name, side in zip(eyes, (1.0, -1.0), strict=True):
-            places[self.rows[name]] += EYE * [side, 1, 1]
-        inner = {"tongue", "teeth", "upper teeth", *eyes, "catchlights", "right light", "lashes", "right lashes"}
+        places, normals = self.placed(REST)
+        inner = {"tongue", "teeth", "upper teeth", *eyes, "catchlights", "right catchlights", "lashes", "right lashes"}
         hiding = np.ones(len(places), bool)
-        for name in inner:
+        for name in sorted(inner):
             hiding[self.rows[name]] = False
         hiding[self._wall] = False
-        lit = reaches(places, self._normals, self.triangles, hiding)
-        for name in inner - set(eyes):
+        lit = reaches(places, normals, self.triangles, hiding)
+        for name in sorted(inner - set(eyes)):
             lit[self.rows[name]] = 1
         lit[self._wall] = 1
         lit[:, 0] = np.clip(1.08 * lit[:, 0], 0.12, 1) ** 1.15

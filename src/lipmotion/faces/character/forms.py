@@ -66,8 +66,7 @@ def head(p: Real) -> Real:
     d = union(d, ellipsoid(q, (0, -0.40, 0.135), (0.092, 0.082, 0.095)), 0.1)
     d = union(d, ellipsoid(q, (0.094, -0.43, 0.045), (0.06, 0.055, 0.075)), 0.06)
     d = cut(d, ellipsoid(q, (0.052, -0.495, 0.105), (0.034, 0.026, 0.05)), 0.025)
-    d = cut(d, ellipsoid(q, (0, -0.575, 0.065), (0.03, 0.07, 0.03)), 0.05)
-    return d
+    return cut(d, ellipsoid(q, (0, -0.565, 0.075), (0.03, 0.06, 0.03)), 0.05)
 
 
 def along_rays(form: Form, start: Real, direction: Real, *, steps: int = 70) -> Real:

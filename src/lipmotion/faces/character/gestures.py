@@ -1,9 +1,9 @@
-"""What the phones say of the mouth beside the motion: lips pressed, round, spread or tucked, and where the tongue is."""
+"""What phones say of the mouth beside the motion: lips pressed, round, spread or tucked, and where the tongue is."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,31 +46,39 @@ class Gesture:
         return np.asarray(share * share * (3 - 2 * share))
 
 
-CLOSE = Gesture(dict.fromkeys(LIP_CLOSING, 1.0), 0.03)
-PRESS = Gesture(dict.fromkeys(LIP_CLOSING, 1.0), 0.05)
-TUCK = Gesture({"f": 1.0, "v": 1.0}, 0.06)
-TONGUE_OUT = Gesture({"th": 1.0, "dh": 0.9}, 0.06)
-TONGUE_UP = Gesture({"l": 1.0, "el": 1.0, "t": 0.75, "d": 0.75, "n": 0.85, "en": 0.85, "s": 0.3, "z": 0.3}, 0.06)
-ROUND = Gesture(
-    {
-        "uw": 1.0, "w": 1.0, "ow": 0.8, "uh": 0.6, "ao": 0.45, "oy": 0.6, "r": 0.4, "er": 0.4, "axr": 0.3,
-        "sh": 0.5, "zh": 0.5, "ch": 0.5, "jh": 0.5, "aw": 0.35,
-    },
-    0.11, 0.03,
-)  # fmt: skip
-SPREAD = Gesture(
-    {
-        "iy": 1.0, "ey": 0.7, "ih": 0.5, "ix": 0.4, "y": 0.6, "s": 0.4, "z": 0.4, "ae": 0.35, "ay": 0.3, "eh": 0.3,
-    },
-    0.10,
-)  # fmt: skip
-TEETH_TOGETHER = Gesture(dict.fromkeys(("s", "z", "sh", "zh", "ch", "jh"), 1.0), 0.08)
+GESTURES = {
+    "close": Gesture(dict.fromkeys(LIP_CLOSING, 1.0), 0.03),
+    "press": Gesture(dict.fromkeys(LIP_CLOSING, 1.0), 0.05),
+    "tuck": Gesture({"f": 1.0, "v": 1.0}, 0.06),
+    "tongue_out": Gesture({"th": 1.0, "dh": 0.9}, 0.06),
+    "tongue_up": Gesture({"l": 1.0, "el": 1.0, "t": 0.75, "d": 0.75, "n": 0.85, "en": 0.85}, 0.06),
+    "round": Gesture(
+        {
+            "uw": 1.0, "w": 1.0, "ow": 0.8, "uh": 0.6, "ao": 0.45, "oy": 0.6, "r": 0.4, "er": 0.4, "axr": 0.3,
+            "sh": 0.5, "zh": 0.5, "ch": 0.5, "jh": 0.5, "aw": 0.35,
+        },
+        0.11, 0.03,
+    ),
+    "spread": Gesture(
+        {
+            "iy": 1.0, "ey": 0.7, "ih": 0.5, "ix": 0.4, "y": 0.6, "s": 0.4, "z": 0.4, "ae": 0.35, "ay": 0.3, "eh": 0.3,
+        },
+        0.10,
+    ),
+    "oval": Gesture({"aa": 1.0, "ao": 0.8, "aw": 0.7, "ay": 0.4, "ah": 0.4, "ax": 0.2}, 0.12),
+    "bite": Gesture(dict.fromkeys(("s", "z", "sh", "zh", "ch", "jh"), 1.0), 0.08),
+}  # fmt: skip
+"""The gestures by name. ``close`` brings the lips together; ``press`` rolls them in while they are."""
 SILENT = Gesture(dict.fromkeys((SILENCE, PAUSE), 1.0), 0.10)
-LEAST_PAUSE_S = 0.15
-"""In shorter pauses between words the mouth goes on."""
+LEAST_PAUSE_S, AFTER_S, BEFORE_S = 0.25, 0.06, 0.12
+"""In shorter pauses the mouth goes on; a pause begins later and ends earlier for the lips than for the ear."""
 
 
 def pause_weight(units: Timeline[Unit], time_s: Curve) -> Curve:
     """Return the weight of pauses of ``LEAST_PAUSE_S`` or more at each time, 0 to 1 [shape=(T,)]."""
-    long = tuple(span for span in units if span.duration_s >= LEAST_PAUSE_S)
+    long = tuple(
+        replace(span, start_s=span.start_s + AFTER_S * (span.start_s > 0), end_s=span.end_s - BEFORE_S)
+        for span in units
+        if span.duration_s >= LEAST_PAUSE_S
+    )
     return SILENT.weight(Timeline(long), time_s)

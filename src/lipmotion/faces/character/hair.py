@@ -8,8 +8,8 @@ from scipy.interpolate import CubicSpline
 
 from lipmotion.faces.character import palette
 from lipmotion.faces.character.forms import MIDDLE, head, seen_from_middle
-from lipmotion.rig.lighting import unit
 from lipmotion.faces.character.part import Part, grid_triangles, joined_parts, part, tube
+from lipmotion.rig.lighting import unit
 
 Real = NDArray[np.float64]
 
@@ -61,7 +61,9 @@ def _ridges(phase: Real) -> Real:
 def _streaks(height: Real) -> Real:
     light = np.clip(0.5 + 0.5 * height, 0, 1)[:, None]
     deep, middle, bright = (np.array(c) for c in (palette.HAIR_DEEP, palette.HAIR, palette.HAIR_LIGHT))
-    return np.where(light < 0.5, deep + 2 * light * (middle - deep), middle + (2 * light - 1) * 0.55 * (bright - middle))
+    return np.where(
+        light < 0.5, deep + 2 * light * (middle - deep), middle + (2 * light - 1) * 0.55 * (bright - middle)
+    )
 
 
 def _hairline() -> Real:
@@ -79,7 +81,11 @@ def _bun() -> Part:
     height = np.cos(8 * twist + 1.4 * np.sin(2 * down))
     radius = 1 + 0.04 * height * np.sin(down)
     places = np.stack(
-        [0.40 * radius * np.sin(down) * np.cos(around), 0.33 * radius * np.cos(down), 0.38 * radius * np.sin(down) * np.sin(around)],
+        [
+            0.40 * radius * np.sin(down) * np.cos(around),
+            0.33 * radius * np.cos(down),
+            0.38 * radius * np.sin(down) * np.sin(around),
+        ],
         axis=-1,
     )
     strands = np.stack([-np.sin(around), 0.6 * np.ones_like(around), np.cos(around)], axis=-1).reshape(-1, 3)
@@ -114,14 +120,23 @@ def _fringe() -> list[Part]:
     for n, (x, y, z, wide) in enumerate(_FRINGE):
         start = 0.24 + 0.015 * n
         points = [
-            (start, 0.97, -0.2, -0.03), (start + 0.12 * x, 0.90, -0.02, 0.10), (0.5 * (start + x), 0.74 - 0.06 * abs(x), -0.03, 0.115),
-            (0.97 * x, y + 0.20, z + 0.08, 0.08), (1.02 * x, y - 0.06, z - 0.06, 0.035),
-        ]  # fmt: skip
+            (start, 0.97, -0.2, -0.03),
+            (start + 0.12 * x, 0.90, -0.02, 0.10),
+            (0.5 * (start + x), 0.74 - 0.06 * abs(x), -0.03, 0.115),
+            (0.97 * x, y + 0.20, z + 0.08, 0.08),
+            (1.02 * x, y - 0.06, z - 0.06, 0.035),
+        ]
         locks.append(_lock(points, wide, 0.05, 0.22 * (-1) ** n))
     return locks
 
 
 def _strands() -> list[Part]:
-    left = [(0.77, 0.16, -0.46, 0.02), (0.80, -0.08, -0.42, 0.05), (0.74, -0.36, -0.36, 0.07), (0.66, -0.62, -0.40, 0.11), (0.66, -0.84, -0.40, 0.20)]
+    left = [
+        (0.77, 0.16, -0.46, 0.02),
+        (0.80, -0.08, -0.42, 0.05),
+        (0.74, -0.36, -0.36, 0.07),
+        (0.66, -0.62, -0.40, 0.11),
+        (0.66, -0.84, -0.40, 0.20),
+    ]
     right = [(-x, y, z, away) for x, y, z, away in left]
     return [_lock(left, 0.034, 0.02, 0.1), _lock(right, 0.034, 0.02, 0.1)]

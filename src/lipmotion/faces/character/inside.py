@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.faces.character import palette
-from lipmotion.faces.character.forms import MOUTH_Y
 from lipmotion.faces.character.lips import ARCH, TEETH_EDGE, TEETH_Z
 from lipmotion.faces.character.part import Part, grid_triangles, joined_parts, part
 from lipmotion.faces.character.pose import FacePose
@@ -36,15 +37,13 @@ def lower_teeth() -> Part:
 
 def _row(name: str, edges: tuple[float, ...], edge_y: float, height: float, up: float, front: float) -> Part:
     teeth = []
-    for number, (near, far) in enumerate(zip(edges, edges[1:], strict=False)):
+    for number, (near, far) in enumerate(pairwise(edges)):
         for side in (1, -1):
             teeth.append(_tooth(side * near, side * far, number, edge_y, height, up, front))
     x = np.linspace(-0.26, 0.26, 41)
     y = edge_y + up * height * np.array([0.72, 0.86, 1.3, 1.9])
     depth = np.array([-0.02, 0.004, 0.008, 0.0])
-    grid = np.stack(
-        [np.tile(x, 4), np.repeat(y, 41), np.concatenate([front - ARCH * x**2 + d for d in depth])], axis=1
-    )
+    grid = np.stack([np.tile(x, 4), np.repeat(y, 41), np.concatenate([front - ARCH * x**2 + d for d in depth])], axis=1)
     triangles = grid_triangles(4, 41)
     gum = part("gum", grid, triangles[:, ::-1] if up > 0 else triangles, palette.GUM, palette.TOOTH_FINISH)
     return joined_parts(name, [*teeth, gum])
@@ -52,7 +51,7 @@ def _row(name: str, edges: tuple[float, ...], edge_y: float, height: float, up: 
 
 def _tooth(a: float, b: float, number: int, edge_y: float, height: float, up: float, front: float) -> Part:
     """Return one tooth between two columns: a rounded plate that is bent over its edge."""
-    across, down = np.meshgrid(np.linspace(-1, 1, 11), np.linspace(0, 1, 12))
+    across, down = np.meshgrid(np.linspace(-1, 1, 9), np.linspace(0, 1, 9))
     half, middle = abs(b - a) / 2, (a + b) / 2
     x = middle + half * 0.985 * across
     shorter = (0.0, 0.007, 0.002, 0.008, 0.014, 0.02)[number] if up > 0 else 0.004 * number
@@ -64,19 +63,19 @@ def _tooth(a: float, b: float, number: int, edge_y: float, height: float, up: fl
     tip = 0.012 * np.clip((down - 0.62) / 0.2, 0, 1) ** 2
     z = front - ARCH * x**2 - 0.012 + bulge - inward - tip
     places = np.stack([x, y, z], axis=-1).reshape(-1, 3)
-    order = np.argsort(np.linspace(-1, 1, 11) * (1 if b > a else 1))
-    places = places.reshape(12, 11, 3)[:, order].reshape(-1, 3)
     colour = np.array(palette.TOOTH) * (1 - 0.025 * number)
     shade = np.clip(np.abs(across) - 0.8, 0, 1)[..., None] / 0.2 * 0.4
     root = (0.25 * level**3)[..., None]
     colours = (1 - shade) * colour + shade * np.array(palette.TOOTH_GAP)
     colours = (1 - root) * colours + root * np.array(palette.TOOTH_GAP)
-    triangles = grid_triangles(12, 11)
-    return part("tooth", places, triangles if up > 0 else triangles[:, ::-1], colours.reshape(-1, 3), palette.TOOTH_FINISH)
+    triangles = grid_triangles(9, 9)
+    return part(
+        "tooth", places, triangles if up > 0 else triangles[:, ::-1], colours.reshape(-1, 3), palette.TOOTH_FINISH
+    )
 
 
 def lower_drop(pose: FacePose) -> float:
-    """Return how far the lower teeth drop with the jaw, a length; they touch the upper ones only when bitten together."""
+    """Return how far the lower teeth drop with the jaw, a length; bitten together they touch the upper ones."""
     return pose.jaw + PARTED_TEETH * (1 - pose.bite)
 
 
@@ -91,7 +90,7 @@ def tongue(pose: FacePose) -> Real:
     root, body = np.array([0, floor - 0.05, -0.46]), np.array([0, floor + 0.075, -0.36])
     blade, tip = np.array([0, floor + 0.02, -0.22]), np.array([0, floor - 0.012, TEETH_Z - 0.085])
     points = jaw_moved(np.stack([root, body, blade, tip]), lower_drop(pose))
-    tooth = np.array([0, TEETH_EDGE - 0.020, TEETH_Z + 0.075])
+    tooth = np.array([0, TEETH_EDGE - 0.014, TEETH_Z + 0.080])
     ridge = np.array([0, TEETH_EDGE + 0.035, TEETH_Z - 0.075])
     for weight, to_tip, lift in ((pose.tongue_up, ridge, 0.01), (pose.tongue_out, tooth, -0.008)):
         points[3] += weight * (to_tip - points[3])

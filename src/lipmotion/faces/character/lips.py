@@ -1,7 +1,7 @@
 """The lips of one pose: contours from the motion, a rounded cross-section at every column of them.
 
-The lips are a closed loop of ``COLUMNS`` columns: the upper lip from the right corner to the left one, then the lower lip
-back. Every column runs through ``RINGS`` rings: from the skin over the lip into the mouth, and on along the wall of
+The lips are a closed loop of ``COLUMNS`` columns: the upper lip from the right corner to the left one, then the lower
+lip back. Every column runs through ``RINGS`` rings: from the skin over the lip into the mouth, and on along the wall of
 the mouth to the throat.
 """
 
@@ -80,14 +80,14 @@ def section_points(pose: FacePose, base_z: Real) -> Real:
     arch = -ARCH * (x**2 - (REST_HALF_WIDTH * ACROSS) ** 2)
     back = np.where(upper, 0.0, 0.22 * drop + 0.05 * pose.tuck * _ENVELOPE)
     outer_z = base_z + 0.85 * forward + arch - back
-    meet = np.interp(ACROSS, ACROSS[: _UPPER], 0.5 * (base_z[: _UPPER] + _opposite(base_z))) + forward + arch
+    meet = np.interp(ACROSS, ACROSS[:_UPPER], 0.5 * (base_z[:_UPPER] + _opposite(base_z))) + forward + arch
     meet = meet - np.where(upper, 0.0, 0.25 * drop) * contour
     bulge = np.where(upper, 0.05, 0.062) * _ENVELOPE * pose.fullness * (1 - 0.3 * pose.press)
     inner_x = x * (1 - 0.12 * pose.roundness * _ENVELOPE)
     teeth = TEETH_Z - ARCH * x**2
     up = SIDE * 1.0
     tuck = pose.tuck * np.where(upper, 0.0, 1.0) * _ENVELOPE
-    contact_z = meet - 0.002 + 0.35 * bulge * pose.roundness
+    contact_z = meet - 0.002 + 0.02 * _ENVELOPE * pose.roundness
     contact_z = contact_z + tuck * (teeth + 0.02 - contact_z)
     inner_y = np.where(upper, inner_y, inner_y + tuck * (np.minimum(TEETH_EDGE + 0.004, inner_y + 0.07) - inner_y))
     crest = meet + bulge * (1 - 0.25 * tuck) - 0.03 * tuck
@@ -108,19 +108,19 @@ def section_points(pose: FacePose, base_z: Real) -> Real:
 
 def _opposite(base_z: Real) -> Real:
     """Return the values of the lower lip at the columns of the upper one [shape=(41,)]."""
-    return np.concatenate([base_z[:1], base_z[:_UPPER - 1:-1], base_z[_UPPER - 1 : _UPPER]])
+    return np.concatenate([base_z[:1], base_z[: _UPPER - 1 : -1], base_z[_UPPER - 1 : _UPPER]])
 
 
 def _opening(pose: FacePose) -> tuple[Real, Real]:
-    """Return the shape of the hole and of the outer contour, 1 in the middle, 0 at the corners [shape=(COLUMNS,), both].
+    """Return the shapes of hole and outer contour, 1 in the middle, 0 at the corners [shape=(COLUMNS,), both].
 
     A round mouth has an elliptic hole that ends before the corners; a spread one is a slot with a flat edge.
     """
-    reach = 1 - 0.40 * pose.roundness
+    reach = 1 - 0.47 * pose.roundness - 0.10 * pose.oval
     power = 2 + 1.2 * pose.spread
     inside = np.maximum(1 - np.abs(ACROSS / reach) ** power, 0)
-    oval = 0.3 * np.clip(pose.gap / 0.2, 0, 1) * (1 - pose.spread) * (1 - pose.roundness)
-    hole = inside ** (0.92 - 0.40 * pose.roundness - 0.2 * pose.spread - oval)
+    oval = (0.25 * np.clip(pose.gap / 0.2, 0, 1) + 0.2 * pose.oval) * (1 - pose.spread) * (1 - pose.roundness)
+    hole = inside ** (0.92 - 0.40 * pose.roundness - 0.36 * pose.spread - oval)
     contour = np.maximum(1 - ACROSS**2, 0) ** (0.85 - 0.25 * pose.roundness)
     return hole, contour
 

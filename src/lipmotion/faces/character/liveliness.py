@@ -1,8 +1,8 @@
 """What moves in a face beside the mouth: blinks, glances, brows, and the head. All of it follows from a seed.
 
-Blinks last 0.15 to 0.2 s, close faster than they open, and come every 2 to 5 s, mostly at pauses and large glances. The eyes
-jump from place to place (saccades), mostly back to the viewer, and hold their target while the head turns. The head drifts
-and nods a little with the loud syllables.
+Blinks last about 0.2 s, close faster than they open, and come every 2 to 5 s, mostly at pauses and large glances. The
+eyes jump from place to place (saccades), mostly back to the viewer, and hold their target while the head turns. The
+head drifts, and nods a little with the wide syllables.
 """
 
 from __future__ import annotations

@@ -48,7 +48,7 @@ class Part:
 def part(
     name: str, places: Real, triangles: Triangles, colour: Triple | Real, finish: Finish, strands: Real | None = None
 ) -> Part:
-    """Return a part of one sRGB colour, or of one for every vertex [shape=(V, 3)]; normals are those of its triangles."""
+    """Return a part of one sRGB colour, or of one a vertex [shape=(V, 3)]; normals are those of its triangles."""
     colours = np.broadcast_to(linear(colour), places.shape).copy()
     return Part(name, places, triangles, colours, finish, normals_of(places, triangles), strands)
 

@@ -17,18 +17,20 @@ Curve = NDArray[np.float64]
 CLOSED_BELOW = 0.012
 """Tracked lips that touch have openings up to this; smaller openings are drawn closed."""
 OPEN_FROM, PARTED, GROWTH = 0.03, 0.022, 0.86
-"""From this opening on the gap is the opening times the growth, plus the length: trackers read less of small openings and
-more of wide ones (docs/results/head.md). Below it rises from 0, where the lips touch."""
+"""From this opening on the gap is the opening times the growth, plus the length: trackers read less of small openings
+and more of wide ones (docs/results/head.md). Below it rises from 0, where the lips touch."""
 WIDEST = 0.4
 """Largest drawn gap; openings of speech stay below 0.35."""
 WIDTH_GAIN, WIDTH_REACH = 1.5, 0.34
 """Changes of width are exaggerated: small ones by the factor, none beyond the reach."""
-TUCKED_GAP = (0.03, 0.05)
+TUCKED_GAP = (0.045, 0.06)
 """Range of the gap while the lower lip is on the teeth."""
 TONGUE_GAP = 0.045
 """Least gap while the tongue is between the teeth."""
+OVAL_GROWTH = 0.04
+"""How much further the mouth opens in AA and the like."""
 ROUND_GAP, TONGUE_UP_GAP = -0.012, 0.012
-"""Added to the gap of round lips, of which trackers read more, and where the tongue fills it, of which they read less."""
+"""Added to the gap of round lips, of which trackers read more, and where the tongue fills it: they read less."""
 PAUSED_GAP = 0.03
 """Largest gap in pauses, in which people breathe with lips that hardly part."""
 DRAWN = ("opening", "width", "outer", "y_152")
@@ -46,43 +48,34 @@ def head_poses(motion: Motion, units: Timeline[Unit], fps: float, *, seed: int =
     _check(motion, fps)
     time_s = np.arange(int(np.floor((len(motion.values) - 1) / motion.rate_hz * fps + 1e-9)) + 1) / fps
     rest = _rest_frames(motion, units)
+    said = {name: gesture.weight(units, time_s) for name, gesture in gestures.GESTURES.items()}
     pause = gestures.pause_weight(units, time_s)
-    press = gestures.PRESS.weight(units, time_s)
-    tuck = gestures.TUCK.weight(units, time_s) * (1 - press)
-    out = gestures.TONGUE_OUT.weight(units, time_s) * (1 - press)
-    gap = _gap(motion, time_s, fps)
-    rounding = gestures.ROUND.weight(units, time_s) * (1 - pause)
-    gap += ROUND_GAP * rounding * np.clip(gap / 0.03, 0, 1)
-    up = gestures.TONGUE_UP.weight(units, time_s)
-    gap += TONGUE_UP_GAP * up * np.clip(gap / 0.05, 0, 1)
-    gap += tuck * (np.clip(gap, *TUCKED_GAP) - gap)
-    gap += out * (np.maximum(gap, TONGUE_GAP) - gap)
-    gap += pause * (np.minimum(gap, PAUSED_GAP) - gap)
-    gap = _closed(gap * (1 - gestures.CLOSE.weight(units, time_s)), units, time_s)
+    for name in ("round", "spread", "oval", "bite"):
+        said[name] *= 1 - pause
+    for name in ("tuck", "tongue_out"):
+        said[name] *= 1 - said["press"]
     change = _at(motion, _width(motion, rest), time_s)
-    spread = gestures.SPREAD.weight(units, time_s) * (1 - pause)
-    narrow = np.clip(-change / 0.16, 0, 1) * (1 - spread)
-    roundness = np.maximum(rounding, 0.4 * narrow)
-    wide = np.clip(np.maximum(spread, np.clip(change / 0.12, 0, 1)) - roundness, 0, 1)
-    rise = upper_share(gap) + roundness * np.maximum(0.42 * gap - upper_share(gap), 0)
-    rise += tuck * np.maximum(0.028 - rise, 0)
-    bite = gestures.TEETH_TOGETHER.weight(units, time_s) * (1 - pause)
+    narrow = np.clip(-change / 0.16, 0, 1) * (1 - said["spread"])
+    roundness = np.maximum(said["round"], 0.4 * narrow)
+    wide = np.clip(np.maximum(said["spread"], np.clip(change / 0.12, 0, 1)) - roundness, 0, 1)
+    gap = _closed(_articulated(_gap(motion, time_s, fps), said, roundness, pause), units, time_s)
     alive = liveliness(gap, pause, fps, seed=seed)
     curves = {
         "gap": gap,
-        "upper_rise": np.minimum(rise, gap),
-        "jaw": _jaw(motion, rest, gap, time_s) * (1 - 0.7 * bite),
-        "bite": np.maximum(bite, press),
-        "width": 1 + change - 0.13 * rounding + 0.045 * spread,
+        "upper_rise": _rise(gap, roundness, said["tuck"]),
+        "jaw": _jaw(motion, rest, gap, time_s) * (1 - 0.85 * said["bite"]),
+        "bite": np.maximum(np.maximum(said["bite"], 0.6 * said["spread"]), said["press"]),
+        "width": 1 + change - 0.14 * said["round"] + 0.05 * said["spread"] - 0.05 * said["oval"],
         "fullness": _at(motion, _fullness(motion, rest), time_s) * (1 + 0.08 * roundness),
         "roundness": roundness,
         "spread": wide,
+        "oval": said["oval"],
         "protrusion": 0.085 * roundness,
-        "press": press,
-        "tuck": tuck,
-        "tongue_out": out,
-        "tongue_up": up * (1 - out),
-        "smile": 0.008 * wide,
+        "press": said["press"],
+        "tuck": said["tuck"],
+        "tongue_out": said["tongue_out"],
+        "tongue_up": said["tongue_up"] * (1 - said["tongue_out"]) * (1 - said["bite"]),
+        "smile": 0.012 * wide,
         "shut": alive.shut,
         "brows": alive.brows,
     }
@@ -91,6 +84,23 @@ def head_poses(motion: Motion, units: Timeline[Unit], fps: float, *, seed: int =
         FacePose(**dict(zip(curves, row, strict=True)), gaze=(gaze[0], gaze[1]), turn=(turn[0], turn[1], turn[2]))
         for row, gaze, turn in zip(rows, alive.gaze.tolist(), alive.turn.tolist(), strict=True)
     ]
+
+
+def _articulated(gap: Curve, said: dict[str, Curve], roundness: Curve, pause: Curve) -> Curve:
+    """Return the gap that suits what is said: teeth on the lip, tongue between the teeth, lips at rest in pauses."""
+    gap = gap * (1 + OVAL_GROWTH * said["oval"])
+    gap = gap + ROUND_GAP * roundness * np.clip(gap / 0.03, 0, 1)
+    gap = gap + TONGUE_UP_GAP * said["tongue_up"] * np.clip(gap / 0.05, 0, 1)
+    gap = gap + said["tuck"] * (np.clip(gap, *TUCKED_GAP) - gap)
+    gap = gap + said["tongue_out"] * (np.maximum(gap, TONGUE_GAP) - gap)
+    gap = gap + pause * (np.minimum(gap, PAUSED_GAP) - gap)
+    return np.maximum(gap * (1 - said["close"]), 0)
+
+
+def _rise(gap: Curve, roundness: Curve, tuck: Curve) -> Curve:
+    """Return how far the upper lip rises [shape=(T,)]: round lips part evenly, and F bares the upper teeth."""
+    rise = upper_share(gap) + roundness * np.maximum(0.42 * gap - upper_share(gap), 0)
+    return np.minimum(rise + tuck * np.maximum(0.036 - rise, 0), gap)
 
 
 def drawn_gap(opening: Curve) -> Curve:

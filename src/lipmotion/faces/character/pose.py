@@ -15,6 +15,7 @@ class FacePose(NamedTuple):
     fullness   : thickness of the lips, relative to the rest pose
     roundness  : 1 is a round hole, as in OO
     spread     : 1 is a wide flat slot, as in EE
+    oval       : 1 is a tall oval hole, as in AA
     protrusion : how far the lips are pushed forward, a length
     press      : 1: lips pressed together, as in P B M
     tuck       : 1: lower lip against the upper teeth, as in F V
@@ -35,6 +36,7 @@ class FacePose(NamedTuple):
     fullness: float = 1.0
     roundness: float = 0.0
     spread: float = 0.0
+    oval: float = 0.0
     protrusion: float = 0.0
     press: float = 0.0
     tuck: float = 0.0

@@ -6,16 +6,18 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay, cKDTree
 
+from lipmotion.faces.character import palette
 from lipmotion.faces.character.eyelids import LID_COLUMNS, LID_RINGS, Eyelids
 from lipmotion.faces.character.forms import MIDDLE, MOUTH_Y, head, outward, seen_from_front, seen_from_middle
-from lipmotion.faces.character.lips import ACROSS, COLUMNS, RINGS, SIDE, lip_surface, section_points
+from lipmotion.faces.character.lips import ACROSS, COLUMNS, RINGS, SIDE, VISIBLE, lip_surface, section_points
+from lipmotion.faces.character.part import Part
 from lipmotion.faces.character.pose import FacePose
 from lipmotion.rig.rasteriser import normals_of
 
 Real = NDArray[np.float64]
 Index = NDArray[np.intp]
 
-SPACING = 0.030
+SPACING = 0.033
 """Distance of the vertices in the middle of the face, in radians about ``MIDDLE``."""
 HINGE = np.array([0.0, -0.32, -0.82])
 """The axis of the jaw goes through here, from ear to ear."""
@@ -26,7 +28,7 @@ class Skin:
     """The skin: vertices of face, lips, wall of the mouth and lids, in this order.
 
     triangles : [shape=(F, 3)];  rest : places at rest [shape=(V, 3)];  normals : at rest [shape=(V, 3)]
-    lips, wall, lids : the rows of their vertices
+    pieces    : the number of triangles of the face, the lips, the wall of the mouth and the lids, in this order
     """
 
     def __init__(self) -> None:
@@ -41,11 +43,18 @@ class Skin:
         triangles = _triangles(self.face, len(contour), len(edges) // 2)
         self._first_lip = len(self.face)
         self._first_lid = self._first_lip + (RINGS - 1) * COLUMNS
-        grids = [_closed_grid(self._lip_rows())]
+        grids = [_closed_grid(self.lip_rows())]
         for eye in range(2):
-            rows = self._lid_rows(eye)
+            rows = self.lid_rows(eye)
             grids.append(_closed_grid(rows[::-1]) if eye == 0 else _closed_grid(rows))
         self.triangles = np.concatenate([triangles, *grids]).astype(np.int32)
+        front = 2 * VISIBLE * COLUMNS
+        self.pieces = {
+            "skin": len(triangles),
+            "lips": front,
+            "wall": len(grids[0]) - front,
+            "lids": len(grids[1]) + len(grids[2]),
+        }
         self._bind(contour)
         self.rest = self._places(REST)
         meshed = normals_of(self.rest, self.triangles)
@@ -55,11 +64,19 @@ class Skin:
 
     def lip_rows(self) -> Index:
         """Return the vertices of the lips, ring by ring from the skin inwards [shape=(RINGS, COLUMNS)]."""
-        return self._lip_rows()
+        inner = self._first_lip + np.arange((RINGS - 1) * COLUMNS).reshape(RINGS - 1, COLUMNS)
+        return np.concatenate([np.arange(COLUMNS)[None], inner])
 
     def lid_rows(self, eye: int) -> Index:
         """Return the vertices of the lids of the left (0) or right (1) eye [shape=(LID_RINGS + 1, LID_COLUMNS)]."""
-        return self._lid_rows(eye)
+        outer = COLUMNS + eye * LID_COLUMNS + np.arange(LID_COLUMNS)
+        first = self._first_lid + eye * LID_RINGS * LID_COLUMNS
+        inner = first + np.arange(LID_RINGS * LID_COLUMNS).reshape(LID_RINGS, LID_COLUMNS)
+        return np.concatenate([inner, outer[None]])
+
+    def as_part(self, colours: Real) -> Part:
+        """Return the skin at rest with the diffuse reflection of its vertices, linear [shape=(V, 3)]."""
+        return Part("skin", self.rest, self.triangles, colours, palette.SKIN_FINISH, self.normals)
 
     def posed(self, pose: FacePose) -> tuple[Real, Real]:
         """Return places and normals of all vertices [shape=(V, 3), both], the head not turned."""
@@ -67,16 +84,6 @@ class Skin:
         change = normals_of(places, self.triangles) - self._meshed_rest
         normals = self.normals + change
         return places, normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
-
-    def _lip_rows(self) -> Index:
-        inner = self._first_lip + np.arange((RINGS - 1) * COLUMNS).reshape(RINGS - 1, COLUMNS)
-        return np.concatenate([np.arange(COLUMNS)[None], inner])
-
-    def _lid_rows(self, eye: int) -> Index:
-        outer = COLUMNS + eye * LID_COLUMNS + np.arange(LID_COLUMNS)
-        first = self._first_lid + eye * LID_RINGS * LID_COLUMNS
-        inner = first + np.arange(LID_RINGS * LID_COLUMNS).reshape(LID_RINGS, LID_COLUMNS)
-        return np.concatenate([inner, outer[None]])
 
     def _bind(self, contour: Real) -> None:
         """Bind every vertex of the face to two columns of the lips, and to the jaw."""

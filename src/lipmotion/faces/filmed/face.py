@@ -71,6 +71,11 @@ class FilmedFace:
     background : the footage into which they are stitched if there is no other
     takes      : speech with motion
     about      : information for users: ``name``, ``corpus``, ``speaker``, ``licence``, ``attribution``, ``footage_s``
+    Make one with ``build_face``, or read one with ``load_face``.
+
+    >>> import lipmotion
+    >>> lipmotion.load_face("anna.face").summary["resolution"]  # doctest: +SKIP
+    '2 samples a pixel, 90 px between the eyes'
     """
 
     appearance: Appearance
@@ -100,6 +105,9 @@ def save_face(face: FilmedFace, path: str | Path) -> None:
     """Write a face to a file: a zip of plain arrays and a JSON header, whole or not at all, never pickle.
 
     Raises ExportError: the file cannot be written.
+
+    >>> import lipmotion
+    >>> lipmotion.save_face(lipmotion.build_face("anna.mp4"), "anna.face")  # doctest: +SKIP
     """
     background, takes = face.background, face.takes
     channels = takes[0].motion.channels if takes else ()
@@ -123,6 +131,9 @@ def load_face(path: str | Path) -> FilmedFace:
     """Return the face in a file.
 
     Raises InputError: no such file. Raises ModelFormatError: not a face, damaged, or of another version.
+
+    >>> import lipmotion
+    >>> face = lipmotion.load_face("anna.face")  # doctest: +SKIP
     """
     path = Path(path)
     check_source(path, "face")

@@ -33,7 +33,7 @@ Floats = NDArray[np.float32]
 Picture = NDArray[np.uint8]
 Pictures = NDArray[np.uint8]
 
-BATCH = 32
+BATCH = 16
 """Frames in memory at a time."""
 FEATHER_PX = 6.0
 """Width of the seam, px of the face."""
@@ -49,11 +49,13 @@ class Background:
     frame         : uint8 array [shape=(H, W, 3)], RGB
     face_to_frame : affine map from px of the face to px of the frame [shape=(2, 3)]
     chin_px       : how far the tip of the chin is below the eyes, px of the face
+    has_face      : whether the person is seen; False: the frame stays as it is
     """
 
     frame: Picture
     face_to_frame: Array
     chin_px: float
+    has_face: bool = True
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,7 @@ class StitchingOptions:
     jaw: bool = True
     mouth: RefinementOptions | None = STEADY
     jaw_detail: RefinementOptions = JAW_OPTIONS
-    noise: bool = False
+    noise: bool = True
     seed: int = 0
 
 
@@ -151,7 +153,8 @@ class Stitcher:
         patches = self._mouth_alone.clone(source, behind)
         for each, patch, to in zip(batch, patches, self._maps(batch), strict=True):
             frame = each.frame.copy()
-            place(frame, patch, self._weight, to)
+            if each.has_face:
+                place(frame, patch, self._weight, to)
             yield frame
 
     @cached_property

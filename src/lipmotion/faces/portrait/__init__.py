@@ -1,57 +1,112 @@
-"""A drawn face: a flat portrait whose mouth is drawn from the motion. It needs numpy and Pillow only.
+"""Drawn characters: flat portraits whose mouths are drawn from the motion. They need numpy and Pillow only.
 
-The stages of a frame: ``pose`` (motion and phones → numbers) → ``geometry`` (numbers → outlines) → ``mouth``
-(outlines → pixels, with ``bands``) → ``rasteriser`` (pixels → picture). The still parts are painted once, by
-``surroundings``, ``head`` and ``eyes`` on a ``layer``.
+The stages of a frame: ``pose`` (motion and phones → numbers) and ``expression`` (voice → blinks, glances, head) →
+``geometry`` (numbers → outlines) → ``mouth`` (outlines → pixels, with ``textures``) → ``rasteriser`` (pixels →
+picture, moved by ``movement``). The still parts are painted once, by ``surroundings``, ``head`` and ``eyes`` on a
+``layer``. A character is a ``design``: ``woman``, ``man``, ``cartoon``.
 """
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Iterator
 from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError
-from lipmotion.faces.base import Face
-from lipmotion.faces.portrait.eyes import lid_closure
-from lipmotion.faces.portrait.pose import MouthPose, mouth_poses
-from lipmotion.types import Motion, Timeline, Unit
+from lipmotion.faces.base import TRANSPARENT, Face, Staging
+from lipmotion.faces.portrait.design import Design
+from lipmotion.types import Motion, Prosody, Timeline, Unit
 
-__all__ = ["Portrait", "render"]
+__all__ = ["Cartoon", "DrawnFace", "Man", "Portrait", "Woman", "render"]
+
+OWN_SIZE = 640
+"""Height of pictures whose size is not given."""
+
+
+class DrawnFace(Face):
+    """A drawn character; ``design`` says which."""
+
+    def __init__(self, staging: Staging | None = None, prosody: Prosody | None = None) -> None:
+        self.staging, self.prosody = staging or Staging(), prosody
+
+    @property
+    @abstractmethod
+    def design(self) -> Design:
+        """The character."""
+
+    def staged(self, staging: Staging, prosody: Prosody | None = None) -> DrawnFace:
+        """Return the same character with other settings.
+
+        prosody : of the speech that will be rendered, for brows and head; None: not known
+        """
+        return type(self)(staging, prosody)
+
+    def render(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> Iterator[NDArray[np.uint8]]:  # noqa: D102
+        return render(self.design, motion, units, fps=fps, staging=self.staging, prosody=self.prosody)
 
 
 @final
-class Portrait(Face):
-    """The drawn portrait, 640 × 640 pixels, as ``render`` draws it."""
+class Woman(DrawnFace):
+    """A woman with long hair."""
 
-    def render(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> Iterator[NDArray[np.uint8]]:  # noqa: D102
-        return render(motion, units, fps=fps)
+    @property
+    def design(self) -> Design:  # noqa: D102
+        from lipmotion.faces.portrait.woman import WOMAN
+
+        return WOMAN
+
+
+Portrait = Woman
+"""The best of the characters: what is shown where none is asked for."""
+
+
+@final
+class Man(DrawnFace):
+    """A man with short hair."""
+
+    @property
+    def design(self) -> Design:  # noqa: D102
+        from lipmotion.faces.portrait.man import MAN
+
+        return MAN
+
+
+@final
+class Cartoon(DrawnFace):
+    """A flat cartoon with lines around its surfaces."""
+
+    @property
+    def design(self) -> Design:  # noqa: D102
+        from lipmotion.faces.portrait.cartoon import CARTOON
+
+        return CARTOON
 
 
 def render(
-    motion: Motion, units: Timeline[Unit], *, fps: float = 25.0, height: int = 640
+    design: Design,
+    motion: Motion,
+    units: Timeline[Unit],
+    *,
+    fps: float = 25.0,
+    staging: Staging | None = None,
+    prosody: Prosody | None = None,
 ) -> Iterator[NDArray[np.uint8]]:
-    """Yield RGB frames [shape=(height, height, 3)] of a motion to its end, frame n at ``n / fps`` seconds.
+    """Yield frames of a motion to its end, frame n at ``n / fps`` seconds.
 
-    motion : needs ``opening``; ``width``, ``outer`` and the chin ``y_152`` are used where they exist.
-             ``width`` and ``outer`` are taken relative to the rest pose in silence, so they suit any speaker.
-    units  : the phones, for the lip on the teeth (f v) and the tongue (th dh l t d n); may be empty
-    height : even number of pixels
-    Raises InputError: no ``opening``, no frames, values that are not finite, a size that is odd or under 64,
-    or fps not positive.
-    The same input gives the same pixels, blinks included.
+    motion : needs ``opening``; ``width``, ``outer``, the chin ``y_152`` and the articulatory channels are used where
+             they exist. ``width`` and ``outer`` are taken relative to the rest pose in silence, so they suit any
+             speaker
+    units  : the phones, from which the articulatory channels follow that the motion lacks; may be empty
+    Returns RGB [shape=(size, size, 3)], or RGBA with straight alpha where the background is transparent.
+    Raises InputError: no ``opening``, no frames, values that are not finite, or fps not positive.
+    The same input gives the same pixels.
     """
-    if height < 64 or height % 2:
-        raise InputError(f"the height is {height} pixels, required an even number of at least 64")
-    poses = mouth_poses(motion, units, fps)
-    return _frames(poses, lid_closure(np.arange(len(poses)) / fps), height)
-
-
-def _frames(poses: list[MouthPose], shut: NDArray[np.float64], height: int) -> Iterator[NDArray[np.uint8]]:
+    from lipmotion.faces.portrait.frames import face_poses, pictures
     from lipmotion.faces.portrait.rasteriser import Rasteriser
 
-    rasteriser = Rasteriser(height)
-    for pose, lids in zip(poses, shut.tolist(), strict=True):
-        yield rasteriser.picture(pose, lids)
+    chosen = staging or Staging()
+    poses = face_poses(motion, units, fps, chosen, prosody)
+    background = None if chosen.background == TRANSPARENT else chosen.colour or chosen.background
+    return pictures(lambda: Rasteriser(design, chosen.size or OWN_SIZE, background), poses)

@@ -1,84 +1,127 @@
-"""The eyes, and the times at which they blink."""
+"""The eyes: lids, lashes, and an iris that moves."""
 
 from __future__ import annotations
+
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.faces.portrait import palette
+from lipmotion.faces.portrait.design import Design
 from lipmotion.faces.portrait.layer import Glow, Layer, Rim
 from lipmotion.faces.portrait.outlines import Points, ellipse, mirrored, open_curve, stroke
-from lipmotion.faces.portrait.view import Window
+from lipmotion.faces.portrait.palette import WHITE
+from lipmotion.faces.portrait.view import Pixels, Window
+from lipmotion.kernels.painting import warp
 
-BLINK_S = 0.2
-"""Duration of a blink."""
-CENTRE_X, CENTRE_Y = 0.345, -0.014
-LOWER_LID = ((0.175, 0.035), (0.26, 0.075), (0.37, 0.088), (0.465, 0.05), (0.51, -0.01))
-UPPER_LID = ((0.175, 0.035), (0.245, -0.062), (0.35, -0.106), (0.455, -0.082), (0.51, -0.01))
-
-
-def lid_closure(time_s: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return how far the eyes are closed at each time, 0..1 [shape=(T,)].
-
-    Blinks are always at the same times, about 2.9 to 4.5 s apart; the lids fall faster than they rise.
-    """
-    number = np.arange(1, int(np.max(time_s, initial=0) / 2.8) + 3)
-    blink_s = 3.7 * number - 1.6 + 0.45 * np.sin(2.4 * number)
-    share = (time_s[:, None] - blink_s) / BLINK_S
-    shut = np.where(share < 0.4, share / 0.4, (1 - share) / 0.6)
-    return np.asarray(np.sin(np.clip(shut, 0, 1).max(axis=1) * np.pi / 2))
+LID_POSITIONS = 16
+GAZE_STEPS = 8
+"""Positions of the gaze in a pixel."""
 
 
-def paint_eyes(window: Window, shut: float) -> Layer:
-    """Return a layer with both eyes.
+class EyePainter:
+    """Paints both eyes of a character, with the lids."""
 
-    shut : how far they are closed, 0..1
-    """
-    layer = Layer(window)
-    for side in (1, -1):
-        _lids(layer, shut, side)
-        _lashes(layer, shut, side)
-    return layer
+    def __init__(self, design: Design, window: Window) -> None:
+        self._design, self._window = design, window
+        self._iris = _iris(window, design).pixels
+        self._lids = lru_cache(maxsize=LID_POSITIONS + 1)(self._painted_lids)
+        self._cached = lru_cache(maxsize=128)(self._painted)
+
+    def painted(self, shut: float, gaze_x: float, gaze_y: float) -> Pixels:
+        """Return the eyes, premultiplied colour and cover [shape=(h, w, 4)]; not to be changed.
+
+        shut           : how far they are closed, 0..1
+        gaze_x, gaze_y : how far the irises are to the right and down, in eye distances
+        """
+        step = self._window.view.scale * GAZE_STEPS
+        return self._cached(round(shut * LID_POSITIONS), round(gaze_x * step), round(gaze_y * step))
+
+    def _painted(self, lids: int, gaze_x: int, gaze_y: int) -> Pixels:
+        under, almond, over = self._lids(lids)
+        iris = np.empty_like(self._iris)
+        grid = np.ones((2, 2))
+        step = max(iris.shape[:2])
+        warp(self._iris, -gaze_x / GAZE_STEPS * grid, -gaze_y / GAZE_STEPS * grid, step, iris)
+        iris *= almond[..., None]
+        picture = iris + (1 - iris[..., 3:]) * under
+        return over + (1 - over[..., 3:]) * picture
+
+    def _painted_lids(self, position: int) -> tuple[Pixels, NDArray[np.float32], Pixels]:
+        """Return what is under the irises, the openings between the lids, and what is over the irises."""
+        shut, design, colours = position / LID_POSITIONS, self._design, self._design.palette
+        under, almond, over = Layer(self._window), Layer(self._window), Layer(self._window)
+        for side in (1, -1):
+            whole, opening, bottom = _almonds(design, shut, side)
+            light = Glow(side * design.eyes.x, 0.0, 0.1, 0.05, colours.skin_light, 0.5)
+            soft = () if design.flat else (Rim(0.03, colours.skin_shade, 0.6), light)
+            under.fill(whole, colours.skin, *soft)
+            if shut < 0.92:
+                x = side * design.eyes.x
+                lid_shade = Glow(x, -0.13, 0.2, 0.06, colours.eye_shade, 0.75)
+                ball = () if design.flat else (lid_shade, Rim(0.015, colours.skin_deep, 0.25))
+                under.fill(opening, colours.eye_white, *ball)
+                if not design.flat:
+                    corner = ellipse(side * 0.2, 0.028, 0.022, 0.016)
+                    under.fill(corner, colours.eye_corner, within=opening, blur=0.004)
+                    over.fill(ellipse(x, -0.12, 0.12, 0.05), colours.pupil, opacity=0.3, blur=0.02, within=opening)
+                almond.fill(opening, WHITE)
+            if not design.flat:
+                over.fill(stroke(bottom, [0.004, 0.01, 0.014, 0.012]), colours.skin_deep, opacity=0.5, blur=0.004)
+            _crease(over, design, shut, side)
+            _lashes(over, design, shut, side)
+        return under.pixels, almond.pixels[..., 3], over.pixels
 
 
-def _upper_lid(shut: float) -> list[tuple[float, float]]:
-    return [(x, y + shut * (low - y)) for (x, y), (_, low) in zip(UPPER_LID, LOWER_LID, strict=True)]
+def _upper_lid(design: Design, shut: float) -> list[tuple[float, float]]:
+    pairs = zip(design.eyes.upper, design.eyes.lower, strict=True)
+    return [(x, y + shut * (low - y)) for (x, y), (_, low) in pairs]
 
 
 def _on(side: int, curve: Points) -> Points:
     return curve if side == 1 else mirrored(curve)
 
 
-def _lids(layer: Layer, shut: float, side: int) -> None:
-    top, bottom = _on(side, open_curve(_upper_lid(shut))), _on(side, open_curve(LOWER_LID))
-    skin = np.vstack([_on(side, open_curve(UPPER_LID)), bottom[::-1]])
-    light = Glow(side * CENTRE_X, 0.0, 0.1, 0.05, palette.SKIN_LIGHT, 0.5)
-    layer.fill(skin, palette.SKIN, Rim(0.03, palette.SKIN_SHADE, 0.6), light)
-    if shut < 0.9:
-        _ball(layer, np.vstack([top, bottom[::-1]]), side)
-    rim = stroke(bottom, [0.004, 0.01, 0.014, 0.012])
-    layer.fill(rim, palette.SKIN_DEEP, opacity=0.5, blur=0.004)
-    fold = [(x, min(y, -0.02) - 0.045 + 0.03 * shut) for x, y in (*UPPER_LID[1:-1], (0.53, -0.01))]
-    crease = stroke(_on(side, open_curve(fold)), [0, 0.014, 0.012, 0])
-    layer.fill(crease, palette.SKIN_DEEP, opacity=0.55, blur=0.006)
+def _almonds(design: Design, shut: float, side: int) -> tuple[Points, Points, Points]:
+    """Return the outlines of the whole eye and of its opening, and the lower lid."""
+    top, bottom = _on(side, open_curve(_upper_lid(design, shut))), _on(side, open_curve(design.eyes.lower))
+    return np.vstack([_on(side, open_curve(design.eyes.upper)), bottom[::-1]]), np.vstack([top, bottom[::-1]]), bottom
 
 
-def _lashes(layer: Layer, shut: float, side: int) -> None:
-    lid = _upper_lid(shut)
-    layer.fill(stroke(_on(side, open_curve(lid)), [0.012, 0.03, 0.036, 0.034, 0.02]), palette.HAIR_DARK)
-    root_y = lid[-1][1] + 0.35 * (lid[-2][1] - lid[-1][1])
-    wing = open_curve([(0.48, root_y), (0.525, -0.022), (0.556, -0.05)])
-    layer.fill(_on(side, stroke(wing, [0.03, 0.02, 0])), palette.HAIR_DARK)
+def _crease(layer: Layer, design: Design, shut: float, side: int) -> None:
+    if not design.flat:
+        upper = design.eyes.upper
+        fold = [(x, min(y, -0.02) - 0.045 + 0.03 * shut) for x, y in (*upper[1:-1], (upper[-1][0] + 0.02, -0.01))]
+        crease = stroke(_on(side, open_curve(fold)), [0, 0.014, 0.012, 0])
+        layer.fill(crease, design.palette.skin_deep, opacity=0.55, blur=0.006)
 
 
-def _ball(layer: Layer, almond: Points, side: int) -> None:
-    x, y = side * CENTRE_X, CENTRE_Y
-    lid_shade = Glow(x, -0.13, 0.2, 0.06, palette.EYE_SHADE, 0.75)
-    layer.fill(almond, palette.EYE_WHITE, lid_shade, Rim(0.015, palette.SKIN_DEEP, 0.25))
-    layer.fill(ellipse(side * 0.2, 0.028, 0.022, 0.016), palette.EYE_CORNER, within=almond, blur=0.004)
-    light = Glow(x, y + 0.05, 0.06, 0.04, palette.IRIS_LIGHT, 0.9)
-    layer.fill(ellipse(x, y, 0.1, 0.1), palette.IRIS, Rim(0.016, palette.IRIS_DARK, 1.0), light, within=almond)
-    layer.fill(ellipse(x, y, 0.046, 0.046), palette.PUPIL, within=almond)
-    layer.fill(ellipse(x, -0.12, 0.12, 0.05), palette.PUPIL, opacity=0.3, blur=0.02, within=almond)
-    layer.fill(ellipse(x - 0.03, y - 0.032, 0.022, 0.022), palette.WHITE, opacity=0.95, within=almond)
-    layer.fill(ellipse(x + 0.032, y + 0.034, 0.011, 0.011), palette.WHITE, opacity=0.6, within=almond)
+def _lashes(layer: Layer, design: Design, shut: float, side: int) -> None:
+    lid, strength, colour = _upper_lid(design, shut), design.eyes.lashes, design.palette.lashes
+    widths = [strength * width for width in (0.012, 0.03, 0.036, 0.034, 0.02)]
+    layer.fill(stroke(_on(side, open_curve(lid)), widths), colour)
+    if design.flat:
+        layer.fill(stroke(_on(side, open_curve(design.eyes.lower)), [0.01] * 3), colour)
+    if strength > 0.5 and not design.flat:
+        x, y = lid[-1]
+        root_y = y + 0.35 * (lid[-2][1] - y)
+        wing = open_curve([(x - 0.03, root_y), (x + 0.015, y - 0.012), (x + 0.046, y - 0.04)])
+        layer.fill(_on(side, stroke(wing, [0.03, 0.02, 0])), colour)
+
+
+def _iris(window: Window, design: Design) -> Layer:
+    """Return a layer with both irises, looking straight ahead; the lights on them move with them only a little."""
+    layer, colours, eyes = Layer(window), design.palette, design.eyes
+    y, r = eyes.y, eyes.iris
+    for x in (eyes.x, -eyes.x):
+        if design.flat:
+            layer.fill(ellipse(x, y, r, r), colours.iris)
+            layer.fill(ellipse(x, y, 0.6 * r, 0.6 * r), colours.pupil)
+            layer.fill(ellipse(x - 0.3 * r, y - 0.35 * r, 0.28 * r, 0.28 * r), WHITE)
+            continue
+        light = Glow(x, y + 0.5 * r, 0.6 * r, 0.4 * r, colours.iris_light, 0.9)
+        layer.fill(ellipse(x, y, r, r), colours.iris, Rim(0.16 * r, colours.iris_dark, 1.0), light)
+        layer.fill(ellipse(x, y, 0.46 * r, 0.46 * r), colours.pupil)
+        layer.fill(ellipse(x - 0.3 * r, y - 0.32 * r, 0.22 * r, 0.22 * r), WHITE, opacity=0.95)
+        layer.fill(ellipse(x + 0.32 * r, y + 0.34 * r, 0.11 * r, 0.11 * r), WHITE, opacity=0.6)
+    return layer

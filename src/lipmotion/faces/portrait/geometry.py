@@ -9,20 +9,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
+from lipmotion.faces.portrait.design import LipDesign
 from lipmotion.faces.portrait.outlines import open_curve
 from lipmotion.faces.portrait.pose import MouthPose, upper_share
-from lipmotion.faces.portrait.view import Pixels
 
-LINE_Y = 0.9
-HALF_WIDTH = 0.3
-UPPER_LIP, LOWER_LIP = 0.085, 0.135
-TEETH_EDGE = 0.028
+Heights = NDArray[np.float64]
+
+TEETH_EDGE = 0.03
 """The upper incisors end this far below the line of the closed lips; they belong to the skull."""
-LOWER_TEETH_EDGE = 0.01
-"""The lower incisors begin here when the jaw is closed, behind the upper ones; they move with the jaw."""
+TUCK_OVERLAP = 0.012
+"""So far the upper teeth stand in front of the lower lip that is tucked under them."""
 
-_LINE = [(0, 0.007), (0.14, 0.004), (0.38, -0.004), (0.7, -0.015), (1, -0.036)]
+_LINE = [(0, 0.006), (0.16, 0.005), (0.4, -0.005), (0.72, -0.004), (1, 0.004)]
 _CUPIDS_BOW = [(0, 0.82), (0.08, 0.87), (0.22, 1.0), (0.36, 0.94), (0.62, 0.66), (0.85, 0.29), (1, 0)]
 _LOWER = [(0, 1), (0.25, 0.975), (0.5, 0.855), (0.72, 0.61), (0.89, 0.29), (1, 0)]
 _CURVES = {name: open_curve(knots).T for name, knots in (("line", _LINE), ("upper", _CUPIDS_BOW), ("lower", _LOWER))}
@@ -33,101 +33,119 @@ class LipOutlines:
     """Heights of the lips' outlines over columns [shape=(C, ...)], top to bottom; all meet at the corners and beyond.
 
     seam : half the thickness of the line where the lips meet
+    inner_half_width : half the width of the opening
     """
 
     half_width: float
+    inner_half_width: float
     corner_y: float
-    upper_outer: Pixels
-    upper_inner: Pixels
-    lower_inner: Pixels
-    lower_outer: Pixels
-    seam: Pixels
+    upper_outer: Heights
+    upper_inner: Heights
+    lower_inner: Heights
+    lower_outer: Heights
+    seam: Heights
 
 
 @dataclass(frozen=True, eq=False)
 class MouthInterior:
     """Heights of the teeth and the tongue over columns [shape=(C, ...)], cut by the inner lips.
 
-    Upper teeth reach down to ``teeth_upper``, lower teeth up to ``teeth_lower``.
+    Upper teeth reach down to ``teeth_upper``, lower teeth up to ``teeth_lower``. Where the lip is tucked, or the tongue
+    is between the teeth, these reach a little over the lower lip.
     """
 
-    teeth_upper: Pixels
-    teeth_lower: Pixels
-    tongue_top: Pixels
-    tongue_bottom: Pixels
+    teeth_upper: Heights
+    teeth_lower: Heights
+    tongue_top: Heights
+    tongue_bottom: Heights
 
 
-def lip_outlines(pose: MouthPose, x: Pixels) -> LipOutlines:
+def lip_outlines(lips: LipDesign, pose: MouthPose, x: Heights) -> LipOutlines:
     """Return the outlines of the lips of a pose over the columns ``x`` [shape=(C, ...)]."""
-    half_width = HALF_WIDTH * pose.width
+    half_width = lips.half_width * pose.width
     u = np.minimum(np.abs(x) / half_width, 1)
-    round_ = roundness(pose)
-    rise = float(upper_share(pose.gap))
+    out, wide = pose.protrusion, pose.spread
+    rise = float(upper_share(pose.gap)) * (1 + 0.5 * pose.tuck)
+    rise += out * (0.45 * pose.gap - rise)
     drop = pose.gap - rise
-    to_teeth = TEETH_EDGE - 0.004 - drop - _LINE[0][1]
-    middle = LINE_Y + pose.tuck * max(to_teeth, -0.04)
-    sag = 0.4 * pose.jaw + 0.04 * round_
-    line = middle + _on("line", u) + sag * u * u
-    inner = u / _inner_width(pose.gap, round_)
-    upper_inner = line - rise * _arch(inner, 0.75 - 0.2 * round_)
-    lower_inner = line + drop * _arch(inner, 0.54 - 0.06 * round_)
-    upper_lip = UPPER_LIP * pose.fullness * (1 - 0.15 * pose.tuck + 0.25 * round_) * _thickness("upper", u, round_)
-    lower_lip = LOWER_LIP * pose.fullness * (1 - 0.35 * pose.tuck - 0.15 * round_) * _thickness("lower", u, round_)
+    middle = lips.line_y + pose.tuck * max(TEETH_EDGE + 0.002 - drop, -0.06) - 0.008 * out
+    sag = (0.5 - 0.3 * wide) * drop * (1 - pose.tuck) + 0.018 * out - 0.012 * wide * (1 - pose.press)
+    bend = sag * u * u
+    line = middle + (1 - 0.7 * out) * _on("line", u) + lips.smile * u**3 + bend
+    inner_share = _inner_share(pose.gap, out, wide)
+    inner = u / inner_share
+    open_share = min(pose.gap / 0.05, 1)
+    upper_inner = line - rise * _arch(inner, 0.7 - 0.22 * open_share * max(out, 1 - wide) - 0.26 * wide)
+    lower_inner = line + drop * _arch(inner, 0.6 - 0.12 * out - 0.26 * wide)
+    thin = 1 - 0.28 * pose.press
+    upper = lips.upper * pose.fullness * thin * (1 - 0.12 * pose.tuck + 0.22 * out - 0.14 * wide)
+    lower = lips.lower * pose.fullness * thin * (1 - 0.42 * pose.tuck + 0.12 * out - 0.16 * wide)
+    follow = 0.85 * (1 - 0.35 * out)
     return LipOutlines(
         half_width=half_width,
-        corner_y=middle + _LINE[-1][1] + sag,
-        upper_outer=np.minimum(line - rise * _arch(u, 0.85) - upper_lip, upper_inner),
+        inner_half_width=half_width * inner_share,
+        corner_y=float(middle + (1 - 0.7 * out) * _LINE[-1][1] + lips.smile + sag),
+        upper_outer=np.minimum(line - rise * _arch(u, follow) - upper * _thickness("upper", u, out), upper_inner),
         upper_inner=upper_inner,
         lower_inner=lower_inner,
-        lower_outer=np.maximum(line + drop * _arch(u, 0.6) + lower_lip, lower_inner),
-        seam=0.0065 * (1 - u**4),
+        lower_outer=np.maximum(
+            line + drop * _arch(u, 0.62 - 0.15 * wide) + lower * _thickness("lower", u, out), lower_inner
+        ),
+        seam=lips.seam * (1 - u**4) * (1 + 0.2 * pose.press),
     )
 
 
-def mouth_interior(pose: MouthPose, x: Pixels, outlines: LipOutlines) -> MouthInterior:
+def mouth_interior(lips: LipDesign, pose: MouthPose, x: Heights, outlines: LipOutlines) -> MouthInterior:
     """Return teeth and tongue of a pose between the lips, over the columns ``x`` [shape=(C, ...)].
 
     outlines : of the lips of this pose
     """
-    upper = LINE_Y + TEETH_EDGE - 0.03 * roundness(pose) - 0.5 * x * x
-    lower = LINE_Y + LOWER_TEETH_EDGE + pose.jaw + 0.25 * x * x
-    top, bottom = _tongue(pose, x)
-    heights = (upper, lower, top, np.maximum(top, bottom))
-    return MouthInterior(*(np.clip(height, outlines.upper_inner, outlines.lower_inner) for height in heights))
+    edge = lips.line_y + TEETH_EDGE
+    upper_edge = edge - 0.03 * pose.protrusion - 0.05 * max(0.5 - pose.teeth, 0)
+    upper = upper_edge - 0.35 * x * x
+    reveal = min(max(2.5 * pose.teeth - 1.25, 0), 1)
+    low_lip = float(outlines.lower_inner.max())
+    below_lip = low_lip + 0.012 - 0.1 * pose.gap
+    met = upper_edge + 0.002 + 0.1 * pose.jaw + 0.1 * max(1 - pose.teeth, 0)
+    lower = below_lip + reveal * (min(met, below_lip) - below_lip) + (0.2 - 0.55 * reveal) * x * x
+    top, bottom = _tongue(pose, x, edge, low_lip)
+    over = max(pose.tongue - 0.6, 0) / 0.4 * 0.026 * _arch(x / min(0.14, 0.9 * outlines.inner_half_width), 0.5)
+    tucked = TUCK_OVERLAP * pose.tuck * _arch(x / outlines.inner_half_width, 0.5)
+    cut = outlines.upper_inner, outlines.lower_inner
+    return MouthInterior(
+        np.clip(upper, cut[0], cut[1] + tucked),
+        np.clip(np.maximum(lower, upper), *cut),
+        np.clip(top, *cut),
+        np.clip(np.maximum(top, bottom), cut[0], cut[1] + over),
+    )
 
 
-def roundness(pose: MouthPose) -> float:
-    """Return how rounded the lips are, 0..1: 1 at 70 % of their rest width."""
-    return min(max((0.97 - pose.width) / 0.27, 0), 1)
+def _on(curve: str, u: Heights) -> Heights:
+    return np.interp(u, *_CURVES[curve])
 
 
-def _on(curve: str, u: Pixels) -> Pixels:
-    return np.interp(u, *_CURVES[curve]).astype(np.float32)
-
-
-def _thickness(lip: str, u: Pixels, round_: float) -> Pixels:
+def _thickness(lip: str, u: Heights, out: float) -> Heights:
     """Return the thickness of a lip along its half width; rounded lips stay thick towards their corners."""
-    return (1 - 0.6 * round_) * _on(lip, u) + 0.6 * round_ * _arch(u, 0.5)
+    return (1 - 0.75 * out) * _on(lip, u) + 0.75 * out * _arch(u, 0.5)
 
 
-def _arch(u: Pixels, power: float) -> Pixels:
+def _arch(u: Heights, power: float) -> Heights:
     """Return an arch over -1 <= u <= 1: 1 in the middle, 0 at the ends and beyond."""
     return np.maximum(1 - u * u, 0) ** power
 
 
-def _inner_width(gap: float, round_: float) -> float:
+def _inner_share(gap: float, out: float, wide: float) -> float:
     """Return the share of the mouth's width along which the lips are apart; it grows with the gap."""
-    return (0.74 + 0.18 * min(gap / 0.12, 1)) * (1 - 0.32 * round_)
+    share = 0.72 + 0.2 * min(gap / 0.12, 1) + 0.1 * wide * min(gap / 0.05, 1)
+    return min(share, 0.95) * (1 - out * (0.68 - 0.25 * min(gap / 0.2, 1)))
 
 
-def _tongue(pose: MouthPose, x: Pixels) -> tuple[Pixels, Pixels]:
-    """Return top and bottom of the visible tongue: its back behind the lower teeth, or its tip between the teeth."""
-    teeth = LINE_Y + LOWER_TEETH_EDGE + pose.jaw
-    upper_teeth = LINE_Y + TEETH_EDGE
-    back = max(teeth - min(0.08, 0.32 * pose.gap), upper_teeth)
-    tip = upper_teeth - 0.014
-    top = back + pose.tip * (tip - back)
-    half_width = 0.2 - 0.04 * pose.tip
-    bulge = 0.06 - 0.01 * pose.tip
-    bottom = teeth + 0.25 * x * x + pose.tip * 0.02
-    return top + bulge * (x / half_width) ** 2, bottom
+def _tongue(pose: MouthPose, x: Heights, edge: float, low_lip: float) -> tuple[Heights, Heights]:
+    """Return top and bottom of the visible tongue: low, its tip behind the upper teeth, or between the teeth."""
+    up, out = min(pose.tongue / 0.6, 1), max(pose.tongue - 0.6, 0) / 0.4
+    rest = max(low_lip - (0.3 * pose.gap + 0.012) * (1 - pose.protrusion) + 0.02 * pose.protrusion, edge - 0.01)
+    top = rest + up * (min(edge - 0.01, rest) - rest) + 0.004 * out
+    half_width = 0.2 - 0.085 * up + 0.025 * out
+    across = (x / half_width) ** 2
+    bulge = (1 - up) * 0.05 * (across + across**2) + up * 0.05 * across**2 * (0.5 + 0.5 * across)
+    return top + bulge, low_lip + 0.03 - 0.03 * across

@@ -70,6 +70,15 @@ class Layer:
         pixels[..., :3] += cover * (paint - pixels[..., :3])
         pixels[..., 3:] += cover * (1 - pixels[..., 3:])
 
+    def contour(self, outline: Points, width: float, colour: Colour) -> None:
+        """Paint a line of even width along a closed outline; nothing where the width is 0."""
+        if width > 0:
+            closed = np.vstack([outline[-1:], outline, outline[:2]])
+            along = (np.gradient(closed, axis=0))[1:-1]
+            normal = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.maximum(np.hypot(*along.T), 1e-9)[:, None]
+            line = closed[1:-1]
+            self.fill(np.vstack([line + width / 2 * normal, (line - width / 2 * normal)[::-1]]), colour)
+
     def cut(self, outline: Points) -> None:
         """Make the inside of an outline transparent."""
         self.pixels *= 1 - _mask(self.window, outline)[..., None]

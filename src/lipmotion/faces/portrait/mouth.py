@@ -2,78 +2,111 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
-from lipmotion.faces.portrait import palette
-from lipmotion.faces.portrait.bands import COLUMNS, Bands
-from lipmotion.faces.portrait.geometry import LipOutlines, MouthInterior, lip_outlines, mouth_interior, roundness
-from lipmotion.faces.portrait.palette import Colour
+from lipmotion.faces.portrait.design import Design
+from lipmotion.faces.portrait.geometry import Heights, LipOutlines, lip_outlines, mouth_interior
 from lipmotion.faces.portrait.pose import MouthPose
-from lipmotion.faces.portrait.view import Pixels, Window
+from lipmotion.faces.portrait.textures import SPAN, Texture, mouth_textures
+from lipmotion.faces.portrait.view import Window
+from lipmotion.kernels.painting import paint_band
 
-UPPER_TOOTH_GAPS = (0.0, 0.045, 0.083, 0.115, 0.145)
-LOWER_TOOTH_GAPS = (0.0, 0.034, 0.068, 0.105)
-"""Distances from the middle of the face."""
-
-
-def paint_mouth(picture: Pixels, window: Window, pose: MouthPose) -> None:
-    """Paint the mouth of a pose into the pixels of a window [shape=(h, w, 3)], in place."""
-    x = window.columns(COLUMNS).reshape(-1, COLUMNS).T
-    shape = lip_outlines(pose, x)
-    face = Bands.of(picture, window).between(float(shape.upper_outer.min()), float(shape.lower_outer.max()) + 0.12)
-    _skin_shadows(face, shape)
-    _upper_and_lower_lip(face, shape)
-    if pose.gap > 0:
-        _teeth_and_tongue(face, shape, mouth_interior(pose, x, shape), pose)
+COLUMNS = 4
+"""Places in each column of pixels at which heights are computed."""
+CORNER_REACH = 1.28
+"""The shadows beside the corners are painted up to this multiple of the mouth's half width."""
 
 
-def _skin_shadows(face: Bands, shape: LipOutlines) -> None:
-    """Shade the skin under the lower lip and beside the corners."""
-    under = ((face.y - shape.lower_outer.mean(axis=0) - 0.03) / 0.04) ** 2
-    face.blend(0.4 * np.exp(-under - (face.x / (0.62 * shape.half_width)) ** 2), palette.MOUTH_SHADOW)
-    away = ((np.abs(face.x) - shape.half_width - 0.005) / 0.03) ** 2
-    face.blend(0.3 * np.exp(-away - ((face.y - shape.corner_y) / 0.026) ** 2), palette.MOUTH_SHADOW)
+class MouthPainter:
+    """Paints mouths of one character into the pixels of one window."""
+
+    def __init__(self, design: Design, window: Window) -> None:
+        self._lips, self._textures = design.lips, mouth_textures(design)
+        self._x = window.columns(COLUMNS).reshape(-1, COLUMNS).T.astype(np.float64)
+        self._scale, self._first_row = window.view.scale, window.y0 - window.view.origin[1]
+
+    def paint(self, layer: NDArray[np.float32], pose: MouthPose) -> None:
+        """Paint the mouth of a pose on the window's pixels [shape=(h, w, 4)], in place."""
+        shape = lip_outlines(self._lips, pose, self._x)
+        within = np.abs(self._x).max(axis=0) < shape.half_width * CORNER_REACH
+        columns = np.flatnonzero(within)
+        on = _Columns(layer, columns[0], columns[-1] + 1, self._scale, self._first_row)
+        x = self._x[:, on.first : on.last]
+        on_lips = _place(x, shape.half_width)
+        shape = lip_outlines(self._lips, pose, x)
+        self._skin_shadows(on, shape, pose, x, on_lips)
+        self._inside(on, shape, pose, x, on_lips)
+        self._lips_around(on, shape, on_lips)
+        if pose.gap > 0:
+            self._in_front(on, shape, pose, x)
+
+    def _skin_shadows(self, on: _Columns, shape: LipOutlines, pose: MouthPose, x: Heights, on_lips: Heights) -> None:
+        art = self._textures
+        depth = 0.085 + 0.03 * pose.protrusion
+        on.paint(shape.lower_outer, shape.lower_outer + depth, on_lips, art.under_lip)
+        corner = np.full_like(x, shape.corner_y)
+        on.paint(corner - 0.06, corner + 0.06, _place(x, shape.half_width * CORNER_REACH), art.corners)
+
+    def _lips_around(self, on: _Columns, shape: LipOutlines, on_lips: Heights) -> None:
+        art = self._textures
+        on.paint(shape.upper_outer, shape.upper_inner, on_lips, art.upper_lip)
+        on.paint(shape.lower_inner, shape.lower_outer, on_lips, art.lower_lip)
+        closed = shape.lower_inner - shape.upper_inner < 2 * shape.seam
+        middle = (shape.upper_inner + shape.lower_inner) / 2
+        thick = np.where(closed, shape.seam, 0)
+        on.paint(middle - thick, middle + thick, on_lips, art.seam)
+
+    def _inside(self, on: _Columns, shape: LipOutlines, pose: MouthPose, x: Heights, on_lips: Heights) -> None:
+        if pose.gap <= 0:
+            return
+        art, within = self._textures, mouth_interior(self._lips, pose, x, shape)
+        top, bottom = shape.upper_inner, shape.lower_inner
+        across = _place(x, SPAN)
+        on.paint(top, bottom, on_lips, art.cavity)
+        on.paint(within.tongue_top, np.minimum(within.tongue_bottom, bottom), across, art.tongue)
+        on.paint(within.teeth_lower, bottom, across, art.lower_teeth, min(2.5 * pose.teeth, 1))
+
+    def _in_front(self, on: _Columns, shape: LipOutlines, pose: MouthPose, x: Heights) -> None:
+        """Paint the upper teeth, and what of the tongue is in front of the lower lip."""
+        art, within = self._textures, mouth_interior(self._lips, pose, x, shape)
+        top, bottom = shape.upper_inner, shape.lower_inner
+        across = _place(x, SPAN)
+        if pose.tongue > 0.6:
+            on.paint(within.tongue_top, within.tongue_bottom, across, art.tongue, (pose.tongue - 0.6) / 0.4)
+        on.paint(top, within.teeth_upper, across, art.upper_teeth, min(2.5 * pose.teeth, 1) * _lit(pose))
+        on.paint(top, np.minimum(top + 0.028, bottom), across, art.lip_shadow)
+        if line := self._lips.outline:
+            part = 0.8 * line * np.minimum((bottom - top) / 0.01, 1)
+            for edge in (top, bottom):
+                on.paint(edge - part / 2, edge + part / 2, across, art.outline)
 
 
-def _upper_and_lower_lip(face: Bands, shape: LipOutlines) -> None:
-    x = face.x / shape.half_width
-    lower = face.between(float(shape.lower_inner.min()), float(shape.lower_outer.max()))
-    depth = lower.depth(shape.lower_inner, shape.lower_outer)
-    gloss = 0.55 * np.exp(-(((depth - 0.4) / 0.22) ** 2) - ((x + 0.06) / 0.36) ** 2)
-    colour = _mix(_mix(palette.LOWER_LIP_LIGHT, palette.LOWER_LIP_DARK, (2 * depth - 0.8) ** 2), palette.GLOSS, gloss)
-    lower.fill(shape.upper_outer, shape.lower_outer, colour)
-
-    upper = face.between(float(shape.upper_outer.min()), float(shape.upper_inner.max()))
-    depth = upper.depth(shape.upper_outer, shape.upper_inner)
-    shine = 0.3 * np.exp(-(((depth - 0.2) / 0.16) ** 2) - ((np.abs(x) - 0.2) / 0.16) ** 2)
-    colour = _mix(_mix(palette.UPPER_LIP_LIGHT, palette.UPPER_LIP_DARK, depth), palette.GLOSS, shine)
-    upper.fill(shape.upper_outer, shape.upper_inner, colour)
-    face.fill(shape.upper_inner - shape.seam, shape.lower_inner + shape.seam, palette.SEAM)
+def _lit(pose: MouthPose) -> float:
+    """Return how well the upper teeth are lit, 0..1: less behind lips that hardly part, unless the sound shows them."""
+    return float(max(min(max((pose.gap - 0.015) / 0.06, 0.15), 1), pose.tuck, 2 * pose.teeth - 1))
 
 
-def _teeth_and_tongue(face: Bands, shape: LipOutlines, within: MouthInterior, pose: MouthPose) -> None:
-    top, bottom = shape.upper_inner, shape.lower_inner
-    hole = face.between(float(top.min()), float(bottom.max()))
-    hole.fill(top, bottom, palette.CAVITY)
-    arch = np.exp(-((hole.x / 0.19) ** 4)) * (1 - 0.4 * roundness(pose)) * pose.teeth
-    hole.fill(within.teeth_lower, bottom, palette.LOWER_TOOTH, 0.95 * arch)
-    hole.fill(within.teeth_lower, bottom, palette.MOUTH_SHADOW, 0.32 * pose.teeth * _lines(hole, LOWER_TOOTH_GAPS))
-    hole.fill(top, within.teeth_upper, palette.TOOTH, arch)
-    hole.fill(top, within.teeth_upper, palette.MOUTH_SHADOW, 0.32 * pose.teeth * _lines(hole, UPPER_TOOTH_GAPS))
-    lit = np.exp(-((hole.x / 0.16) ** 2)) * (0.75 + 0.25 * pose.tip)
-    hole.fill(within.tongue_top, within.tongue_bottom, palette.TONGUE, lit)
-    groove = 0.2 * np.exp(-((hole.x / 0.018) ** 2))
-    hole.fill(within.tongue_top + 0.015, within.tongue_bottom, palette.SEAM, groove)
-    under_lip = np.exp(-np.maximum(hole.y - top.mean(axis=0), 0) / 0.02)
-    hole.fill(top, bottom, palette.CAVITY, 0.5 * under_lip)
+class _Columns(NamedTuple):
+    """Some columns of a layer to paint on, with heights in eye distances."""
+
+    layer: NDArray[np.float32]
+    first: int
+    last: int
+    scale: float
+    first_row: float
+
+    def paint(self, top: Heights, bottom: Heights, across: Heights, texture: Texture, opacity: float = 1.0) -> None:
+        if opacity <= 0:
+            return
+        if opacity < 1:
+            texture = texture * (1, 1, 1, opacity)
+        rows = top * self.scale - self.first_row, bottom * self.scale - self.first_row
+        paint_band(self.layer[:, self.first : self.last], *rows, across, texture)
 
 
-def _lines(hole: Bands, distances: tuple[float, ...]) -> Pixels:
-    """Return the coverage by thin vertical lines at these distances on both sides, 0..1 [shape=(W,)]."""
-    away = np.abs(np.abs(hole.x) - np.array(distances, dtype=np.float32)[:, None]).min(axis=0)
-    return np.exp(-((away / max(0.0035, 0.6 * hole.pixel)) ** 2))
-
-
-def _mix(first: Colour | Pixels, second: Colour, share: Pixels) -> Pixels:
-    start = np.asarray(first, dtype=np.float32)
-    return start + np.clip(share, 0, 1)[..., None] * (np.asarray(second, dtype=np.float32) - start)
+def _place(x: Heights, half_width: float) -> Heights:
+    """Return the place of columns in a texture that spans a width, 0..1 [shape=(W,)]."""
+    return np.clip(x.mean(axis=0) / (2 * half_width) + 0.5, 0, 1)

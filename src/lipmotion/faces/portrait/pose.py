@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.faces.portrait.articulation import CLOSURES, TIP_RAISES, TUCKS, gesture_weight, pause_weight
+from lipmotion.motion.gestures import GESTURES, gesture_curves, pause_curve
 from lipmotion.types import Motion, Timeline, Unit
 from lipmotion.units import is_silent
 
@@ -17,16 +17,24 @@ Curve = NDArray[np.float64]
 CLOSED_BELOW = 0.012
 """Tracked lips that touch have openings up to this; smaller openings are drawn closed."""
 FAITHFUL_ABOVE = 0.03
-"""From here on the drawn gap equals the opening; between the two limits it rises linearly."""
-WIDEST = 0.4
+"""From here on the drawn gap follows the opening; between the two limits it rises linearly."""
+WIDER = 0.4
+"""Openings are drawn by so much larger than measured, beyond ``FAITHFUL_ABOVE``: a drawing shows less than a face."""
+WIDEST = 0.45
 """Largest drawn gap; openings of speech stay below 0.35."""
-WIDTH_GAIN, WIDTH_REACH = 1.5, 0.3
+WIDTH_GAIN, WIDTH_REACH = 2.0, 0.32
 """Changes of width are exaggerated: small ones by the factor, none beyond the reach."""
-TUCKED_GAP = (0.03, 0.055)
+ROUNDED, STRETCHED = 0.23, 0.06
+"""So much narrower are protruded lips, and so much wider are spread ones, beside what was measured."""
+TUCKED_GAP = (0.05, 0.07)
 """Range of the gap while the lower lip is on the teeth: enough to show them."""
-PAUSED_GAP = 0.035
-"""Largest gap in pauses, in which people breathe with lips that hardly part."""
-DRAWN = ("opening", "width", "outer", "y_152")
+TONGUE_GAP, TEETH_GAP, ROUND_GAP = 0.085, 0.05, 0.07
+"""Least gap while the tongue is between the teeth, while both rows of teeth are shown, and of protruded lips."""
+OVAL = 0.4
+"""How much narrower a mouth is that opens far, relative to the rest pose and for each eye distance."""
+PAUSE_S = 0.15
+"""In pauses of at least this duration the mouth closes."""
+DRAWN = ("opening", "width", "outer", "y_152", *GESTURES)
 """The channels that are drawn."""
 
 
@@ -37,50 +45,70 @@ class MouthPose(NamedTuple):
     width    : distance of the lip corners relative to the rest pose
     fullness : thickness of the lips relative to the rest pose
     jaw      : drop of the chin, in eye distances
-    tuck     : 0..1, how far the lower lip is against the upper teeth (f v)
-    tip      : 0..1, how far the tip of the tongue is raised to the upper teeth (th dh l; less for t d n)
-    teeth    : 0..1, how far teeth can be seen: in pauses the lips hide them
+    tongue, tuck, protrusion, spread, press, teeth : the articulatory channels, 0..1 (docs/articulation.md)
     """
 
     gap: float
-    width: float
-    fullness: float
-    jaw: float
-    tuck: float
-    tip: float
-    teeth: float = 1.0
+    width: float = 1.0
+    fullness: float = 1.0
+    jaw: float = 0.0
+    tongue: float = 0.0
+    tuck: float = 0.0
+    protrusion: float = 0.0
+    spread: float = 0.0
+    press: float = 0.0
+    teeth: float = 0.5
 
 
-def mouth_poses(motion: Motion, units: Timeline[Unit], fps: float) -> list[MouthPose]:
+def frame_times(motion: Motion, fps: float) -> Curve:
+    """Return the times of the video frames of a motion, to its end [shape=(N,)]."""
+    return np.arange(int(np.floor((len(motion.values) - 1) / motion.rate_hz * fps + 1e-9)) + 1) / fps
+
+
+def mouth_poses(motion: Motion, units: Timeline[Unit], fps: float, intensity: float = 1.0) -> list[MouthPose]:
     """Return the pose of every video frame, frame n at ``n / fps`` seconds, to the end of the motion.
 
+    intensity : 1: as spoken; more: the same movements, larger. Closed lips stay closed at any intensity.
+    Articulatory channels are those of the motion, or else follow from the phones.
     Lips that close between two video frames are drawn closed in the nearer one.
     Raises InputError: no channel ``opening``, no frames, a value that is not finite, or fps not positive.
     """
     _check(motion, fps)
-    time_s = np.arange(int(np.floor((len(motion.values) - 1) / motion.rate_hz * fps + 1e-9)) + 1) / fps
+    time_s = frame_times(motion, fps)
     rest = _rest_frames(motion, units)
-    tuck = np.maximum(gesture_weight(units, TUCKS, time_s) - gesture_weight(units, CLOSURES, time_s), 0)
-    gap = _gap(motion, time_s, fps)
-    gap += tuck * (np.clip(gap, *TUCKED_GAP) - gap)
-    pause = pause_weight(units, time_s)
-    gap += pause * (np.minimum(gap, PAUSED_GAP) - gap)
-    curves = (
-        gap,
-        _at(motion, _width(motion, rest), time_s),
-        _at(motion, _fullness(motion, rest), time_s),
-        _jaw(motion, rest, gap, time_s),
-        tuck,
-        gesture_weight(units, TIP_RAISES, time_s),
-        1 - pause,
-    )
+    tongue, tuck, protrusion, spread, press, teeth = _gestures(motion, units, time_s, intensity)
+    gap = _gap(motion, time_s, fps, intensity)
+    free = (1 - press) * np.clip(gap / FAITHFUL_ABOVE, 0, 1)
+    gap += np.maximum(tuck - press, 0) * (np.clip(gap, *TUCKED_GAP) - gap)
+    shown = np.maximum(2 * teeth - 1, 0)
+    for weight, least in (
+        (np.maximum(tongue - 0.5, 0) / 0.5, TONGUE_GAP),
+        (shown, TEETH_GAP),
+        (protrusion**2, ROUND_GAP),
+    ):
+        gap += free * weight * (np.maximum(gap, least) - gap)
+    gap *= 1 - 0.12 * (protrusion + shown) * np.clip((gap - 0.05) / 0.05, 0, 1)
+    gap *= 1 - pause_curve(units, time_s, PAUSE_S, blend_s=0.1, after_s=0.08, before_s=0.14)
+    width = _at(motion, _width(motion, rest, intensity), time_s)
+    width += intensity * (STRETCHED * spread - ROUNDED * protrusion * np.minimum(width, 1))
+    width -= OVAL * np.maximum(gap - 0.08, 0) * (1 - spread)
+    width = np.clip(width, 0.5, 1.35)
+    fullness = _at(motion, _fullness(motion, rest), time_s)
+    jaw = _jaw(motion, rest, gap, time_s)
+    curves = gap, width, fullness, jaw, tongue, tuck, protrusion, spread, press, teeth
     return [MouthPose(*row) for row in np.stack(curves, axis=1).tolist()]
 
 
-def drawn_gap(opening: Curve) -> Curve:
-    """Return the gap to draw for a measured opening [shape=(T,)]; exactly 0 where the lips touch."""
+def drawn_gap(opening: Curve, intensity: float = 1.0) -> Curve:
+    """Return the gap to draw for a measured opening [shape=(T,)]; exactly 0 where the lips touch.
+
+    It is continuous and never falls where the opening rises. Large gaps approach ``WIDEST``.
+    """
     rising = (opening - CLOSED_BELOW) * (FAITHFUL_ABOVE / (FAITHFUL_ABOVE - CLOSED_BELOW))
-    return np.clip(np.minimum(opening, rising), 0, WIDEST)
+    gap = np.maximum(np.minimum(opening, rising), 0)
+    gap = (gap + WIDER * np.maximum(gap - FAITHFUL_ABOVE, 0)) * intensity
+    bend = 0.6 * WIDEST
+    return np.where(gap < bend, gap, bend + (WIDEST - bend) * np.tanh((gap - bend) / (WIDEST - bend)))
 
 
 def upper_share(gap: Curve | float) -> Curve:
@@ -111,12 +139,21 @@ def _check(motion: Motion, fps: float) -> None:
             )
 
 
+def _gestures(motion: Motion, units: Timeline[Unit], time_s: Curve, intensity: float) -> list[Curve]:
+    curves = gesture_curves(units, time_s, [name for name in GESTURES if name not in motion.names])
+    for name in {*GESTURES} & {*motion.names}:
+        curves[name] = np.clip(_at(motion, motion[name].astype(float), time_s), 0, 1)
+    for name in ("protrusion", "spread"):  # grows with the intensity, without a corner at 1
+        curves[name] = 1 - (1 - curves[name]) ** np.sqrt(intensity)
+    return [curves[name] for name in GESTURES]
+
+
 def _at(motion: Motion, curve: Curve, time_s: Curve) -> Curve:
     return np.interp(time_s, motion.time_s, curve)
 
 
-def _gap(motion: Motion, time_s: Curve, fps: float) -> Curve:
-    gap = drawn_gap(motion["opening"].astype(float))
+def _gap(motion: Motion, time_s: Curve, fps: float, intensity: float) -> Curve:
+    gap = drawn_gap(motion["opening"].astype(float), intensity)
     gap_at_frames = _at(motion, gap, time_s)
     nearest = np.rint(motion.time_s[gap == 0] * fps).astype(int)
     gap_at_frames[nearest[nearest < len(gap_at_frames)]] = 0
@@ -145,16 +182,16 @@ def _against_rest(name: str, curve: Curve, rest: NDArray[np.bool_]) -> Curve:
     return curve / value
 
 
-def _width(motion: Motion, rest: NDArray[np.bool_]) -> Curve:
+def _width(motion: Motion, rest: NDArray[np.bool_], intensity: float) -> Curve:
     if "width" not in motion.names:
-        return 1 - 0.25 * np.clip(motion["opening"], 0, WIDEST)
+        return 1 - 0.25 * np.clip(motion["opening"], 0, 0.4)
     change = _against_rest("width", motion["width"].astype(float), rest) - 1
-    return 1 + WIDTH_REACH * np.tanh(WIDTH_GAIN * change / WIDTH_REACH)
+    return 1 + WIDTH_REACH * np.tanh(intensity * WIDTH_GAIN * change / WIDTH_REACH)
 
 
 def _fullness(motion: Motion, rest: NDArray[np.bool_]) -> Curve:
     if "outer" not in motion.names:
-        return 1 - 0.4 * np.clip(motion["opening"], 0, WIDEST)
+        return 1 - 0.4 * np.clip(motion["opening"], 0, 0.4)
     thickness = motion["outer"] - motion["opening"]
     return np.clip(_against_rest("thickness of the lips (outer - opening)", thickness, rest), 0.75, 1.25)
 

@@ -1,76 +1,150 @@
-"""Pictures of poses. The portrait is painted once; for each frame only jaw, mouth and eyes are painted again."""
+"""Pictures of poses. The portrait is painted once; for each frame only what moves is painted again."""
 
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.faces.portrait import surroundings
-from lipmotion.faces.portrait.eyes import paint_eyes
+from lipmotion.faces.portrait.design import Design
+from lipmotion.faces.portrait.eyes import EyePainter
 from lipmotion.faces.portrait.head import paint_head
-from lipmotion.faces.portrait.mouth import paint_mouth
+from lipmotion.faces.portrait.layer import Layer
+from lipmotion.faces.portrait.mouth import MouthPainter
+from lipmotion.faces.portrait.movement import STEP, BrowField, HeadField, HeadPlacement, SkinField
+from lipmotion.faces.portrait.palette import Colour
 from lipmotion.faces.portrait.pose import MouthPose
-from lipmotion.faces.portrait.view import Pixels, View
+from lipmotion.faces.portrait.view import View, Window
+from lipmotion.kernels.painting import stack, warp, warp_bytes
 
-JAW_TOP, CHIN = 0.66, 1.3
-"""Between these heights the skin is stretched when the jaw drops; below, it moves with the chin."""
-LID_POSITIONS = 12
+Pixels = NDArray[np.float32]
+Bytes = NDArray[np.uint8]
+Canvas = NDArray[np.uint16]
+SCENE = "scene"
+BROW_STEPS = 8
+"""Positions of the brows in a pixel."""
+
+
+class FacePose(NamedTuple):
+    """Everything that moves, in one frame.
+
+    lids           : how far the eyes are closed, 0..1
+    gaze_x, gaze_y : how far the irises are to the right and down, in eye distances
+    brows, worry   : how far the brows are raised, and their inner ends beyond that, in eye distances
+    """
+
+    mouth: MouthPose
+    lids: float = 0.0
+    gaze_x: float = 0.0
+    gaze_y: float = 0.0
+    brows: float = 0.0
+    worry: float = 0.0
+    head: HeadPlacement = HeadPlacement()
 
 
 class Rasteriser:
-    """Draws the face at one size."""
+    """Draws a character at one size; ``picture`` may be called by several threads, each with a canvas of its own.
 
-    def __init__(self, size: int) -> None:
+    background : ``scene`` (the character's own), a colour, or None (transparent)
+    """
+
+    def __init__(self, design: Design, size: int, background: Colour | str | None = SCENE) -> None:
         view = View(size)
         whole = view.window(-9, -9, 9, 9)
-        self._jaw = view.window(-0.8, JAW_TOP, 0.8, 1.95)
-        self._mouth = view.window(-0.46, JAW_TOP, 0.46, 1.6)
-        self._mouth_in_jaw = self._mouth.area_in(self._jaw)
-        self._eyes = view.window(-0.62, -0.2, 0.62, 0.14)
-        backdrop, skin = surroundings.backdrop(whole), paint_head(whole)
-        face = surroundings.hair(whole).over(skin.over(backdrop))
-        self._still = _bytes(face)
-        self._bare_eyes = face[self._eyes.area]
-        self._behind_jaw = backdrop[self._jaw.area]
-        self._neck_shade = surroundings.shaded_neck(self._jaw).over(self._behind_jaw) - self._behind_jaw
-        shadow = surroundings.chin_shadow(self._jaw)
-        self._jaw_skin = np.dstack([skin.pixels[self._jaw.area], shadow])
-        self._jaw_steps = np.diff(self._jaw_skin, axis=0)
-        self._lids = lru_cache(maxsize=LID_POSITIONS + 1)(self._painted_eyes)
+        line_y = design.lips.line_y
+        self._opaque = background is not None
+        self._jaw = view.window(-0.86, line_y - 0.5, 0.86, line_y + 0.95)
+        self._mouth = view.window(-0.56, line_y - 0.24, 0.56, line_y + 0.7)
+        self._eyes = view.window(-0.66, -0.24, 0.66, 0.21)
+        self._brow = view.window(-0.8, -0.64, 0.8, -0.06)
+        self._below_brows = Window(view, self._eyes.x0, self._brow.y1, self._eyes.x1, self._eyes.y1)
+        self._head = view.window(-1.3, -9, 1.3, 1.9)
+        behind, skin = surroundings.behind_head(whole, design), paint_head(whole, design)
+        front = surroundings.hair(whole, design).pixels
+        below = _over(behind.pixels, _backdrop(whole, design, background))
+        shade = _over(surroundings.shaded_neck(whole, design).pixels, below) - below
+        shadow = surroundings.chin_shadow(whole, design)
+        self._skin = np.dstack([skin.pixels, shadow])
+        self._below, self._shade, self._front = below, shade, front
+        still = _over(front, _over(skin.pixels, below + shadow[..., None] * shade))
+        self._eye_painter = EyePainter(design, self._eyes)
+        self._still = (still * (1, 1, 1, 255) + 0.5).astype(np.uint16)
+        self._frame = self._still[..., : 3 if self._opaque else 4].astype(np.uint8)
+        self._brows = lru_cache(maxsize=64)(self._painted_brows)
+        self._skin_field, self._brow_field = SkinField(self._jaw, design.lips), BrowField(self._brow)
+        self._head_field = HeadField(self._head)
+        self._mouth_painter = MouthPainter(design, self._mouth)
 
-    def picture(self, pose: MouthPose, shut: float) -> NDArray[np.uint8]:
-        """Return one RGB frame [shape=(size, size, 3)].
+    def canvas(self) -> Canvas:
+        """Return the picture of the resting face without eyes and mouth, to draw on [shape=(size, size, 4)]."""
+        return self._still.copy()
 
-        shut : how far the eyes are closed, 0..1
+    def picture(self, pose: FacePose, canvas: Canvas) -> Bytes:
+        """Return one frame [shape=(size, size, 3)], or where the background is transparent [shape=(size, size, 4)].
+
+        canvas : from ``canvas``; changed
         """
-        frame = self._still.copy()
-        frame[self._eyes.area] = self._lids(round(shut * LID_POSITIONS))
-        skin = self._dropped(pose.jaw)
-        paint_mouth(skin[self._mouth_in_jaw], self._mouth, pose)
-        frame[self._jaw.area] = _bytes(skin)
-        return frame
+        skin = self._moved(self._jaw, self._skin_field.shifts(pose.mouth))
+        self._mouth_painter.paint(skin[self._mouth.area_in(self._jaw)][..., :4], pose.mouth)
+        self._lay(skin, self._jaw, canvas[self._jaw.area])
+        steps = BROW_STEPS * self._brow.view.scale
+        canvas[self._brow.area] = self._brows(round(pose.brows * steps), round(pose.worry * steps))
+        canvas[self._below_brows.area] = self._still[self._below_brows.area]
+        _put(self._eye_painter.painted(pose.lids, pose.gaze_x, pose.gaze_y), canvas[self._eyes.area])
+        frame = self._frame.copy()
+        area = self._head.area
+        warp_bytes(canvas[area], *self._head_field.shifts(pose.head), STEP, frame[area])
+        return frame if self._opaque else _straight(frame)
 
-    def _painted_eyes(self, position: int) -> NDArray[np.uint8]:
-        return _bytes(paint_eyes(self._eyes, position / LID_POSITIONS).over(self._bare_eyes))
+    def _painted_brows(self, raised: int, worried: int) -> Canvas:
+        steps = BROW_STEPS * self._brow.view.scale
+        picture = np.empty_like(self._still[self._brow.area])
+        self._lay(
+            self._moved(self._brow, self._brow_field.shifts(raised / steps, worried / steps)), self._brow, picture
+        )
+        return picture
 
-    def _dropped(self, jaw: float) -> Pixels:
-        """Return the lower face with the chin lowered by ``jaw`` [shape=(h, w, 3)]; the skin above is stretched."""
-        y = self._jaw.rows()
-        share = np.clip((y - JAW_TOP) / (CHIN - JAW_TOP), 0, 1)
-        row = np.interp(y, y + jaw * share * share * (3 - 2 * share), np.arange(len(y)))
-        low = np.minimum(row.astype(int), len(y) - 2)
-        part = (row - low).astype(np.float32)[:, None, None]
-        skin = self._jaw_steps[low]
-        skin *= part
-        skin += self._jaw_skin[low]
-        behind = skin[..., 4:] * self._neck_shade
-        behind += self._behind_jaw
-        behind *= 1 - skin[..., 3:4]
-        behind += skin[..., :3]
-        return behind
+    def _moved(self, window: Window, shifts: tuple[NDArray[np.float64], NDArray[np.float64]]) -> Pixels:
+        source = self._skin[window.area]
+        skin = np.empty_like(source)
+        warp(source, *shifts, STEP, skin)
+        return skin
+
+    def _lay(self, skin: Pixels, window: Window, target: Canvas) -> None:
+        area = window.area
+        stack(self._below[area], self._shade[area], skin, self._front[area], target)
 
 
-def _bytes(pixels: Pixels) -> NDArray[np.uint8]:
-    return (pixels + np.float32(0.5)).astype(np.uint8)
+_WHOLE = np.array([1, 1, 1, 255], np.float32)
+
+
+def _backdrop(window: Window, design: Design, background: Colour | str | None) -> Pixels:
+    if background == SCENE:
+        return surroundings.wall(window, design).pixels
+    pixels = Layer(window).pixels
+    if background is not None:
+        pixels[...] = (*background, 1)
+    return pixels
+
+
+def _over(above: NDArray[np.floating], below: NDArray[np.floating]) -> Pixels:
+    return np.asarray(above + (1 - above[..., 3:4]) * below, dtype=np.float32)
+
+
+def _put(above: Pixels, canvas: Canvas) -> None:
+    """Lay premultiplied pixels over a canvas, in place."""
+    mixed = above * _WHOLE
+    mixed += (1 - above[..., 3:]) * canvas
+    mixed += np.float32(0.5)
+    canvas[...] = mixed
+
+
+def _straight(frame: Bytes) -> Bytes:
+    """Return premultiplied pixels with straight alpha, as files store them."""
+    cover = frame[..., 3:].astype(np.uint16)
+    edge = (cover[..., 0] > 0) & (cover[..., 0] < 255)
+    frame[edge, :3] = np.minimum((frame[edge, :3].astype(np.uint16) * 255 + cover[edge] // 2) // cover[edge], 255)
+    return frame

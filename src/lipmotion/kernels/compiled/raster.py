@@ -89,17 +89,17 @@ def _triangle(
         of_b = (xa - xc) * (py - yc) - step_b * (px - xc)
         of_c = (xb - xa) * (py - ya) - step_c * (px - xa)
         within = False
-        for column in range(x0, x1):
+        i = row - top
+        for j in range(x0 - left, x1 - left):
             if of_a >= bias_a and of_b >= bias_b and of_c >= bias_c:
                 within = True
                 share_b, share_c = np.float32(of_b * inverse), np.float32(of_c * inverse)
                 away = za + (share_b * zb + share_c * zc)
-                if away < depth[row - top, column - left]:
-                    depth[row - top, column - left] = away
-                    sample = colour[row - top, column - left]
-                    sample[0] = red + (share_b * red_b + share_c * red_c)
-                    sample[1] = green + (share_b * green_b + share_c * green_c)
-                    sample[2] = blue + (share_b * blue_b + share_c * blue_c)
+                if away < depth[i, j]:
+                    depth[i, j] = away
+                    colour[i, j, 0] = red + (share_b * red_b + share_c * red_c)
+                    colour[i, j, 1] = green + (share_b * green_b + share_c * green_c)
+                    colour[i, j, 2] = blue + (share_b * blue_b + share_c * blue_c)
             elif within:
                 break
             of_a -= step_a  # exact, as the corners are

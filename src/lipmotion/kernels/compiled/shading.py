@@ -22,9 +22,7 @@ def shade(
     """Fill in the light that vertices send to the viewer; arguments as of ``kernels.shading``."""
     for v in range(len(normals)):
         nx, ny, nz = normals[v]
-        ex, ey, ez = viewer[0] - places[v, 0], viewer[1] - places[v, 1], viewer[2] - places[v, 2]
-        far = np.sqrt(ex * ex + ey * ey + ez * ez)
-        ex, ey, ez = ex / far, ey / far, ez / far
+        ex, ey, ez = _towards(viewer, places[v])
         faces = nx * ex + ny * ey + nz * ez
         if faces < AWAY:
             light[v] = 0.0
@@ -50,14 +48,8 @@ def shade(
             if finish[3] > 0.0:
                 hx, hy, hz = ex + lx, ey + ly, ez + lz
                 length = np.sqrt(hx * hx + hy * hy + hz * hz)
-                if finish[6] > 0.0:
-                    along = (strands[v, 0] * hx + strands[v, 1] * hy + strands[v, 2] * hz) / length
-                    across = np.sqrt(max(1.0 - along * along, 0.0))
-                else:
-                    across = max((nx * hx + ny * hy + nz * hz) / length, 0.0)
-                for _ in range(int(finish[4])):
-                    across = across * across
-                glint = finish[3] * across * min(max(4.0 * facing + 0.3, 0.0), 1.0) * arrives
+                along = (strands[v, 0] * hx + strands[v, 1] * hy + strands[v, 2] * hz) / length
+                glint = _highlight(finish, (nx * hx + ny * hy + nz * hz) / length, along, facing) * arrives
                 if finish[6] > 0.0:
                     shine_r += glint * lamps[n, 3] * (4.0 * cr)
                     shine_g += glint * lamps[n, 4] * (4.0 * cg)
@@ -78,6 +70,21 @@ def shade(
         light[v, 0] = cr * red + shine_r
         light[v, 1] = cg * green + shine_g
         light[v, 2] = cb * blue + shine_b
+
+
+@compiled
+def _towards(viewer: Real, place: Real) -> tuple[float, float, float]:
+    x, y, z = viewer[0] - place[0], viewer[1] - place[1], viewer[2] - place[2]
+    far = np.sqrt(x * x + y * y + z * z)
+    return x / far, y / far, z / far
+
+
+@compiled
+def _highlight(finish: Real, normal: float, along: float, facing: float) -> float:
+    across = np.sqrt(max(1.0 - along * along, 0.0)) if finish[6] > 0.0 else max(normal, 0.0)
+    for _ in range(int(finish[4])):
+        across = across * across
+    return finish[3] * across * min(max(4.0 * facing + 0.3, 0.0), 1.0)
 
 
 @compiled

@@ -5,20 +5,24 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
+from lipmotion.appearance.frame_descriptors import describe_frames
+from lipmotion.appearance.looping import LoopOrder, loop_order, scenes_of
 from lipmotion.appearance.mouth_region import CORNER, EYE_DISTANCE_PX, HEIGHT
 from lipmotion.faces.filmed.face import StoredBackground
 from lipmotion.faces.filmed.renderer import Background
+from lipmotion.stats.pca import evenly_spaced
 from lipmotion.storage.coded_video import encode_video
 from lipmotion.storage.frame_groups import FrameGroups
 from lipmotion.vision.footage import Footage, footage_frames, footage_groups, track_footage
-from lipmotion.vision.frames import VideoSpan
-from lipmotion.vision.steadying import registered_maps, steady_maps
+from lipmotion.vision.frames import WHOLE, VideoSpan
+from lipmotion.vision.steadying import REGISTERED_NOISE_PX, registered_maps, steady_maps
 
 MOST_BACKGROUND_S = 10.0
 """Longest background that is kept in the file of a face."""
@@ -28,8 +32,18 @@ CHIN = "y_152"
 """The tip of the chin."""
 SMOOTHING_FRAMES = 0.7
 """Standard deviation of the smoothing of its place, frames: the tracker trembles."""
+MOST_TRIED = 12
+"""Parts of the footage that are tried as backgrounds."""
+SHOWN_S = 60.0
+"""How long they are shown then."""
+SHORT_S, SHORT_COST = 3.0, 2.0
+"""A part that is shorter costs so much more, in proportion to what is missing: it would repeat too soon."""
+ALMOST = 0.9
+"""A part of this share of ``SHORT_S`` is still compared."""
 MOST_TRACKED_S = 120.0
 """Seconds of a video that are used as a background."""
+LONGEST_GAP_S = 0.2
+"""Where the face is not seen for so short a time, as where pictures were dropped, its interpolated place will do."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,12 +54,19 @@ class BackgroundSequence:
     rate_hz       : frames a second
     face_to_frame : affine maps from px of the face to px of the frame [shape=(T, 2, 3)]
     chin_px       : how far the tip of the chin is below the eyes, px of the face [shape=(T,)]
+    usable        : frames in which the face is seen [shape=(T,)]
+    cuts          : frames before which the camera changes
+    in_time       : whether it is the video of the speech, so that every frame is shown at its own time, also those
+                    without a face, and the last one stays
     """
 
     groups: Callable[[], FrameGroups]
     rate_hz: float
     face_to_frame: NDArray[np.float64]
     chin_px: NDArray[np.float64]
+    usable: NDArray[np.bool_]
+    cuts: tuple[int, ...] = ()
+    in_time: bool = False
 
     @property
     def face_box(self) -> tuple[float, float, float, float]:
@@ -64,40 +85,105 @@ class BackgroundSequence:
         return replace(self, face_to_frame=maps)
 
     def frames(self, count: int, rate_hz: float) -> Iterator[Background]:
-        """Yield ``count`` frames at a rate: forwards, backwards, and so on."""
-        seconds = count / rate_hz
-        order = pingpong(len(self.chin_px), int(np.ceil(seconds * self.rate_hz)) + 1)
+        """Yield ``count`` frames at a rate, in ``order``."""
         groups = self.groups()
-        for number in order[np.floor(np.arange(count) * (self.rate_hz / rate_hz) + 0.5).astype(int)].tolist():
-            frame = groups.frame(number)
-            height, width = (length // 2 * 2 for length in frame.shape[:2])
-            yield Background(frame[:height, :width], self.face_to_frame[number], float(self.chin_px[number]))
+        shown = np.floor(np.arange(count) * (self.rate_hz / rate_hz) + 0.5).astype(int)
+        order = self.order(groups, int(shown[-1]) + 1)
+        for first, second, weight in zip(order.first[shown], order.second[shown], order.weight[shown], strict=True):
+            one, other = (self._frame(groups, int(number)) for number in (first, second))
+            yield one if weight == 0 else _mixed(one, other, float(weight))
+
+    def order(self, groups: FrameGroups, count: int) -> LoopOrder:
+        """Return which frames are shown, at the background's own rate.
+
+        They are the first ones, if these are as many and show the face without a cut; others are in ``loop_order``,
+        which shows no frame without a face.
+        """
+        total = len(self.chin_px)
+        is_whole = count <= total and self.usable[:count].all() and not any(0 < cut < count for cut in self.cuts)
+        if self.in_time or is_whole:
+            shown = np.minimum(np.arange(count), total - 1)
+            return LoopOrder(shown, shown, np.zeros(count), ())
+        descriptors = describe_frames((groups.frame(number) for number in range(total)), self.face_to_frame)
+        return loop_order(descriptors, count, self.rate_hz, usable=self.usable, cuts=self.cuts)
+
+    def _frame(self, groups: FrameGroups, number: int) -> Background:
+        frame = groups.frame(number)
+        height, width = (length // 2 * 2 for length in frame.shape[:2])
+        place, chin_px = self.face_to_frame[number], float(self.chin_px[number])
+        return Background(frame[:height, :width], place, chin_px, bool(self.usable[number]))
 
 
 def best_background(footages: Sequence[Footage]) -> StoredBackground:
-    """Return the best part of some footage."""
-    footage = max(footages, key=len)
-    count = min(len(footage), round(MOST_BACKGROUND_S * footage.rate_hz))
+    """Return the part of some footage that can be shown for a minute with the least visible join.
+
+    ``MOST_TRIED`` parts, spread evenly, are compared. They last at most ``MOST_BACKGROUND_S``, show the face in all
+    frames, and have no cut. Parts much shorter than ``SHORT_S`` are compared only if there are no longer ones.
+    """
+    parts = [part for footage in footages for part in _parts(footage)]
+    least_s = ALMOST * min(SHORT_S, max(map(_duration_s, parts)))
+    parts = [part for part in parts if _duration_s(part) >= least_s]
+    tried = [parts[number] for number in evenly_spaced(MOST_TRIED, len(parts))]
+    footage, start, stop = min(tried, key=_blemish)
     height, width = (length // 2 * 2 for length in footage.size)
-    frames = (frame[:height, :width] for frame in footage_frames(footage, 0, count))
-    return StoredBackground(
-        encode_video(frames, footage.rate_hz), placed_maps(footage)[:count], chin_px(footage)[:count]
-    )
+    frames = (frame[:height, :width] for frame in footage_frames(footage, start, stop))
+    video = encode_video(frames, footage.rate_hz)
+    return StoredBackground(video, placed_maps(footage)[start:stop], chin_px(footage)[start:stop])
+
+
+_Part = tuple[Footage, int, int]
+
+
+def _parts(footage: Footage) -> list[_Part]:
+    """Return the parts of some footage that show the face without a cut: first frame, and the one after the last."""
+    longest = max(1, round(MOST_BACKGROUND_S * footage.rate_hz))
+    parts = []
+    for first, last in scenes_of(_usable(footage), footage.cuts):
+        count = -(-(last - first) // longest)
+        ends = np.linspace(first, last, count + 1).astype(int).tolist()
+        parts += [(footage, start, stop) for start, stop in pairwise(ends)]
+    return parts
+
+
+def _duration_s(part: _Part) -> float:
+    footage, start, stop = part
+    return (stop - start) / footage.rate_hz
+
+
+def _usable(footage: Footage) -> NDArray[np.bool_]:
+    """Return the frames that show the face, and those of gaps of at most ``LONGEST_GAP_S`` [shape=(T,)]."""
+    usable = np.array(footage.track.seen)
+    for start, stop in scenes_of(~usable, ()):
+        if start > 0 and stop < len(usable) and stop - start <= LONGEST_GAP_S * footage.rate_hz:
+            usable[start:stop] = True
+    return usable
+
+
+def _blemish(part: _Part) -> float:
+    """Return how visible the worst join is if a part is shown for a minute; short ones are worse."""
+    footage, start, stop = part
+    descriptors = describe_frames(footage_frames(footage, start, stop), footage.face_to_image[start:stop])
+    order = loop_order(descriptors, round(SHOWN_S * footage.rate_hz), footage.rate_hz)
+    worst = max((join.cost for join in order.joins), default=0.0)
+    return worst + SHORT_COST * max(0.0, 1 - _duration_s(part) / SHORT_S)
 
 
 def stored_sequence(background: StoredBackground) -> BackgroundSequence:
     """Return the background in the file of a face."""
     video = background.video
-    return BackgroundSequence(video.groups, video.rate_hz, background.face_to_frame, background.chin_px)
+    usable = np.ones(len(video), bool)
+    return BackgroundSequence(video.groups, video.rate_hz, background.face_to_frame, background.chin_px, usable)
 
 
-def open_background(path: Path) -> BackgroundSequence:
-    """Return a video as a background; at most ``MOST_TRACKED_S`` of it.
+def open_background(path: Path, *, in_time: bool = False) -> BackgroundSequence:
+    """Return a video as a background.
 
+    in_time : as of ``BackgroundSequence``: all of the video is used; False: at most ``MOST_TRACKED_S`` of it
     Raises InputError: no video, or no face in it.
     """
-    footage = track_footage(path, VideoSpan(0.0, MOST_TRACKED_S))
-    return BackgroundSequence(partial(footage_groups, footage), footage.rate_hz, placed_maps(footage), chin_px(footage))
+    footage = track_footage(path, WHOLE if in_time else VideoSpan(0.0, MOST_TRACKED_S))
+    groups, maps = partial(footage_groups, footage), placed_maps(footage)
+    return BackgroundSequence(groups, footage.rate_hz, maps, chin_px(footage), _usable(footage), footage.cuts, in_time)
 
 
 def chin_px(footage: Footage) -> NDArray[np.float64]:
@@ -107,10 +193,12 @@ def chin_px(footage: Footage) -> NDArray[np.float64]:
 
 def placed_maps(footage: Footage) -> NDArray[np.float64]:
     """Return where the face is in every frame of some footage, without the noise of tracking [shape=(T, 2, 3)]."""
-    return steady_maps(registered_maps(footage), footage.rate_hz, footage.cuts)
+    return steady_maps(registered_maps(footage), footage.rate_hz, footage.cuts, noise_px=REGISTERED_NOISE_PX)
 
 
-def pingpong(count: int, frames: int) -> NDArray[np.intp]:
-    """Return the numbers of frames, forwards and backwards in turn [shape=(frames,)]."""
-    place = np.arange(frames) % max(1, 2 * (count - 1))
-    return np.where(place < count, place, 2 * (count - 1) - place)
+def _mixed(one: Background, other: Background, weight: float) -> Background:
+    """Return a frame between two, of which the second has some weight."""
+    frame = np.rint((1 - weight) * one.frame + weight * other.frame).astype(np.uint8)
+    place = (1 - weight) * one.face_to_frame + weight * other.face_to_frame
+    chin_px = (1 - weight) * one.chin_px + weight * other.chin_px
+    return Background(frame, place, chin_px, one.has_face and other.has_face)

@@ -22,7 +22,7 @@ from lipmotion.pipeline.film.background import best_background, chin_px
 from lipmotion.pipeline.film.takes import Take, takes_of
 from lipmotion.pipeline.workers import worker_pool
 from lipmotion.speech.audio_files import read_audio
-from lipmotion.speech.pauses import STEP_S, levels_db
+from lipmotion.speech.pauses import QUIETEST_DB, levels_db_at
 from lipmotion.types import Audio, Item, Monitor, Progress, silent_monitor
 from lipmotion.vision.footage import Footage, footage_frames, track_footage
 
@@ -36,8 +36,8 @@ MOST_PICTURES_HZ = 30.0
 """Of faster video every second frame, or fewer, are learned from."""
 SPOKEN_TAKES_S = 20.0
 """Seconds of speech that are kept, for motion of other people's models."""
-SILENT_DB = -100.0
-"""Level of video without sound."""
+LEAST_SPOKEN_S = 0.5
+"""Shorter parts of a take are not kept for that."""
 JAW_ENDS = ("x_150", "x_379")
 """The ends of the tracked jaw line, right and left."""
 UNUSED_AXIS = "z_"
@@ -154,14 +154,15 @@ def _film(take: Take) -> _Filmed | str:
 
 
 def _sound(take: Take) -> Audio | None:
-    """Return the sound of a take; None if the video has none."""
+    """Return the sound of a take; None if the video has none, or only silence."""
     try:
         whole = read_audio(take.file, warn=False)
     except InputError:
         return None
     first = round(take.span.start_s * whole.rate_hz)
     last = len(whole.samples) if np.isinf(take.span.end_s) else round(take.span.end_s * whole.rate_hz)
-    return Audio(whole.samples[first:last], whole.rate_hz)
+    part = whole.samples[first:last]
+    return Audio(part, whole.rate_hz) if len(part) and part.any() else None
 
 
 def _step(footage: Footage) -> int:
@@ -223,18 +224,16 @@ def _finer(
 def _levels(take: _Filmed) -> NDArray[np.float64]:
     """Return the level of the sound at the frames that are used, dB [shape=(n,)]."""
     if take.sound is None:
-        return np.full(len(take.used), SILENT_DB)
-    levels = levels_db(take.sound)
-    times_s = take.used / take.footage.rate_hz
-    return np.interp(times_s, (np.arange(len(levels)) + 0.5) * STEP_S, levels)
+        return np.full(len(take.used), QUIETEST_DB)
+    return levels_db_at(take.sound, take.used / take.footage.rate_hz)
 
 
 def _spoken(filmed: Sequence[_Filmed]) -> tuple[SpokenTake, ...]:
-    """Return some speech with its motion, ``SPOKEN_TAKES_S`` or the first take with sound."""
+    """Return the first ``SPOKEN_TAKES_S`` of the takes with sound, and their motion; none where no take has sound."""
     takes: list[SpokenTake] = []
     left_s = SPOKEN_TAKES_S
     for take in filmed:
-        if take.sound is None or left_s <= 0:
+        if take.sound is None or min(left_s, take.sound.duration_s) < LEAST_SPOKEN_S:
             continue
         footage = take.footage
         count = min(len(footage), round(left_s * footage.rate_hz))

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 from typing import Literal
 
@@ -13,7 +15,7 @@ from numpy.typing import NDArray
 from lipmotion.appearance.eigenlips import Eigenlips
 from lipmotion.appearance.person import FaceCodes
 from lipmotion.errors import InputError
-from lipmotion.export.inset import with_inset
+from lipmotion.export.inset import inset_box, with_inset
 from lipmotion.export.synthetic_mark import mark_frames, mark_metadata
 from lipmotion.export.video import write_mp4
 from lipmotion.faces.base import Face
@@ -22,8 +24,11 @@ from lipmotion.faces.filmed.renderer import BATCH, STITCHING, Stitcher, Stitchin
 from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.film.background import BackgroundSequence, open_background, stored_sequence
 from lipmotion.pipeline.model import Model
-from lipmotion.speech.pauses import STEP_S, levels_db
-from lipmotion.types import GREY, Audio, Motion
+from lipmotion.speech.pauses import levels_db_at
+from lipmotion.storage.files import check_source
+from lipmotion.storage.media import has_video
+from lipmotion.types import GREY, Audio, Monitor, Motion, silent_monitor
+from lipmotion.types.progress import with_reports
 from lipmotion.vision.footage import untracked_frames
 
 Floats = NDArray[np.float32]
@@ -31,6 +36,9 @@ Frames = Iterator[NDArray[np.uint8]]
 Jaw = Literal["motion", "energy", "none"]
 Overlay = Literal["inset", "mouth"]
 Mark = Literal["metadata", "visible", "none"]
+RENDERING = "rendering the video"
+"""Name of the stage in reports of progress."""
+LOG = logging.getLogger("lipmotion")
 ZOOM = 1.3
 """How much larger than the speaker's own the mouth over it is."""
 
@@ -47,6 +55,10 @@ class FilmOptions:
     mark       : how the video says that it is synthetic: in its metadata, there and in a corner of the picture
                  (``visible``), or not at all (docs/consent.md)
     stitching  : how pictures are made
+
+    >>> import lipmotion
+    >>> lipmotion.FilmOptions(jaw="none").mark
+    'metadata'
     """
 
     background: Path | None = None
@@ -64,14 +76,15 @@ class Film:
     """A video that is made while it is read.
 
     frames  : each uint8 RGB [shape=(H, W, 3)], of even sizes
+    count   : number of the frames
     rate_hz : frames a second
-    covered : the part of the frames in which the face, or the inset, is at any time: left, top, right, bottom, px; None
-              where it is not known
+    covered : the part of the frames in which the face, or the inset, is at any time: left, top, right, bottom, px
     """
 
     frames: Frames
+    count: int
     rate_hz: float
-    covered: tuple[float, float, float, float] | None
+    covered: tuple[float, float, float, float]
 
 
 @one_thread()
@@ -81,7 +94,7 @@ def film_of(
     *,
     speech: Path | None = None,
     sound: Audio | None = None,
-    eigenlips: Eigenlips | None = None,
+    model: Model | None = None,
     fps: float | None = None,
     options: FilmOptions = FILM,
 ) -> Film:
@@ -91,25 +104,28 @@ def film_of(
     motion    : of tracked points of the same person, or eigenlips
     speech    : the video of the speech, for an overlay
     sound     : for a jaw that follows the energy
-    eigenlips : of the model that generated ``motion``, if it has any
+    model     : that generated the motion; needed where the motion is eigenlips
     fps       : frames a second; None, and with an overlay: those of the footage
     Frame n shows the time n / fps; the last one is at or before the end of the motion. Frames are made a few at a time.
     Raises InputError: motion without the channels that the face needs, no sound for ``energy``, a background in which
     there is no face, a rate that is not positive, or an overlay of a sound without video.
     """
-    if options.overlay is not None and (speech is None or options.background is not None):
-        raise InputError("an overlay shows the video of the speech: give a video as speech, and no background")
+    check_film(face, options, speech)
+    eigenlips = model.eigenlips if model is not None else None
     if options.overlay == "inset" and speech is not None:
         frames, rate_hz = untracked_frames(speech)
         codes = _codes(face, motion, sound, rate_hz, eigenlips, options)
         mouths = Stitcher(face.appearance, options.stitching).mouths(codes)
-        return Film(with_inset(_even(frames), mouths), rate_hz, None)
+        first, frames = _first_of(_even(frames), speech)
+        covered = inset_box((first.shape[0], first.shape[1]), face.appearance.mouths.shape[1:3])
+        return Film(with_inset(frames, mouths), len(codes), rate_hz, covered)
     background = _background(face, options, speech)
     rate_hz = background.rate_hz if fps is None or options.overlay is not None else fps
     codes = _codes(face, motion, sound, rate_hz, eigenlips, options)
     has_jaw = options.jaw != "none" and options.overlay is None
     stitcher = Stitcher(face.appearance, options.stitching if has_jaw else replace(options.stitching, jaw=False))
-    return Film(stitcher.stitch(codes, background.frames(len(codes), rate_hz)), rate_hz, background.face_box)
+    frames = stitcher.stitch(codes, background.frames(len(codes), rate_hz))
+    return Film(frames, len(codes), rate_hz, background.face_box)
 
 
 def _codes(
@@ -132,7 +148,7 @@ def _codes(
 
 def _background(face: FilmedFace, options: FilmOptions, speech: Path | None) -> BackgroundSequence:
     if options.overlay is not None and speech is not None:
-        return open_background(speech).enlarged(ZOOM)
+        return open_background(speech, in_time=True).enlarged(ZOOM)
     return stored_sequence(face.background) if options.background is None else open_background(options.background)
 
 
@@ -163,20 +179,31 @@ def person_shown(model: Model, face: Face | FilmedFace, speaker: str = "") -> Fi
     """Return a filmed face if it is of another person than the motion of a model, so that it must be mapped onto it.
 
     speaker : of the people of the model whose motion is generated
-    A drawn face shows anybody. Raises InputError: as ``is_person_of``.
+    A drawn face shows anybody. A filmed face without speech (its footage has no sound) cannot be mapped onto: that is
+    logged as a warning, and the motion stays as it is. Raises InputError: as ``is_person_of``.
     """
-    return face if isinstance(face, FilmedFace) and not is_person_of(model, face, speaker) else None
+    if not isinstance(face, FilmedFace) or is_person_of(model, face, speaker):
+        return None
+    if not face.takes:
+        LOG.warning(
+            "the face was built from footage without sound, so the motion, which is another person's, is not fitted to "
+            "it; build it from footage with sound"
+        )
+        return None
+    return face
 
 
 def is_person_of(model: Model, face: FilmedFace, speaker: str = "") -> bool:
     """Return whether a model generates the motion of the person of a face: they are of one corpus and speaker.
 
     speaker : of the people of the model whose motion is generated
+    The only person of a model is that of a face of the same corpus unless both have names, and these differ.
     Raises InputError: it does not, and generates eigenlips alone, which cannot be mapped onto another person.
     """
     people = model.about.get("speakers") or [""]
     same = bool(set(model.about.get("corpus", ())) & set(face.about.get("corpus", ())))
-    same = same and (len(people) < 2 or speaker == face.about.get("speaker"))
+    filmed = face.about.get("speaker", "")
+    same = same and (speaker == filmed if len(people) > 1 else people[0] == filmed or not (people[0] and filmed))
     if not same and model.visual == "eigenlips":
         raise InputError(
             "the model generates mouth pictures of the person of "
@@ -190,9 +217,15 @@ def _levels(sound: Audio | None, count: int, rate_hz: float) -> NDArray[np.float
     """Return the level of the sound in every frame of a video, dB [shape=(count,)]."""
     if sound is None:
         raise InputError("a jaw that follows the energy needs the sound; give the recording")
-    levels = levels_db(sound)
-    centres_s = (np.arange(len(levels)) + 0.5) * STEP_S
-    return np.interp(np.arange(count) / rate_hz, centres_s, levels)
+    return levels_db_at(sound, np.arange(count) / rate_hz)
+
+
+def _first_of(frames: Frames, speech: Path) -> tuple[NDArray[np.uint8], Frames]:
+    """Return the first frame, and all of them. Raises InputError: there are none."""
+    first = next(frames, None)
+    if first is None:
+        raise InputError(f"{speech}: holds no pictures; give a video as speech")
+    return first, chain([first], frames)
 
 
 def _even(frames: Frames) -> Frames:
@@ -202,26 +235,37 @@ def _even(frames: Frames) -> Frames:
         yield frame[:height, :width]
 
 
+@one_thread()
 def write_film(
-    path: Path,
-    face: FilmedFace,
-    motion: Motion,
-    sound: Audio,
-    *,
-    speech: Path | None = None,
-    model: Model | None = None,
-    fps: float | None = None,
-    options: FilmOptions = FILM,
+    path: Path, film: Film, sound: Audio, *, mark: Mark = "metadata", monitor: Monitor = silent_monitor
 ) -> None:
     """Write a video of a filmed face, with sound; whole or not at all.
 
-    model : that generated the motion; needed where the motion is eigenlips
-    The other arguments are those of ``film_of``. Raises InputError: as ``film_of``. Raises ExportError: the file cannot
-    be written.
+    film, mark : of ``film_of``, which is read to its end; how the video says that it is synthetic
+    monitor    : receives reports of the progress
+    Raises InputError: the background cannot be read to its end. Raises ExportError: the file cannot be written, or the
+    face leaves no corner for a visible mark.
     """
-    eigenlips = model.eigenlips if model is not None else None
-    film = film_of(face, motion, speech=speech, sound=sound, eigenlips=eigenlips, fps=fps, options=options)
-    frames = mark_frames(film.frames, film.covered) if options.mark == "visible" else film.frames
-    metadata = mark_metadata() if options.mark != "none" else None
+    frames = with_reports(film.frames, film.count, RENDERING, monitor)
+    if mark == "visible":
+        frames = mark_frames(frames, film.covered)
+    metadata = mark_metadata() if mark != "none" else None
     tags, xmp = (metadata.tags, metadata.xmp) if metadata is not None else (None, None)
     write_mp4(path, frames, fps=film.rate_hz, audio=sound, tags=tags, xmp=xmp)
+
+
+def check_film(face: Face | FilmedFace, options: FilmOptions, speech: str | Path | None = None) -> None:
+    """Raise InputError if options do not go with a face, or with the speech; called before long work begins.
+
+    speech : the recording; None: it is a sound that is in no file
+    """
+    filmed = {"a background": options.background, "an overlay": options.overlay}
+    given = next((name for name, value in filmed.items() if value is not None), None)
+    if given is not None and not isinstance(face, FilmedFace):
+        raise InputError(f"{given} is for filmed faces; give one: --face FILE.face (docs/filmed-face.md)")
+    if options.background is not None:
+        check_source(Path(options.background), "video")
+    if options.overlay is not None and (speech is None or options.background is not None):
+        raise InputError("an overlay shows the video of the speech: give a video as speech, and no background")
+    if options.overlay is not None and not has_video(Path(str(speech))):
+        raise InputError(f"{speech}: has no pictures, and an overlay shows them; give a video as speech")

@@ -1,0 +1,155 @@
+"""Descriptors of a background's frames: what a viewer would see change from one to another, mouth aside."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import InputError
+
+Array = NDArray[np.float64]
+Scenes = Sequence[tuple[int, int]]
+
+WHOLE_CELLS = 32
+"""Cells of the thumbnail of the whole frame along its longer side."""
+UPPER_FACE = (-54.0, -45.0, 54.0, 42.0)
+EYES = (-50.0, -14.0, 50.0, 14.0)
+"""Left, top, right and bottom of the regions that are compared with the face aligned, px of the face that looks
+straight ahead, from the point between the eyes."""
+LOWER_FACE = (-60.0, 42.0, 60.0, 140.0)
+"""The region that is replaced, or moves with speech: not compared."""
+FACE_STEP, EYES_STEP = 6.0, 4.0
+"""Distance of the samples of these regions, px of the face that looks straight ahead."""
+LEAST_ORDINARY = (0.2, 0.2, 0.2)
+"""Least ordinary difference of neighbouring frames, in the whole frame and the upper face, levels, and of the
+place of the face, px of the frame: smaller differences are not seen."""
+
+
+@dataclass(frozen=True, eq=False)
+class FrameDescriptors:
+    """What T frames look like, in levels of green.
+
+    whole : thumbnails of the whole frame; the cells of the lower face are 0 in all of them [shape=(T, A)]
+    face  : the upper face, aligned [shape=(T, B)]
+    eyes  : the eyes, aligned [shape=(T, C)]
+    place : x and then y of the eye corners and the mouth in the frame, px [shape=(T, 6)]
+    """
+
+    whole: Array
+    face: Array
+    eyes: Array
+    place: Array
+
+    def __len__(self) -> int:
+        return len(self.whole)
+
+    def standardised(self, scenes: Scenes) -> Array:
+        """Return rows whose distances count in ordinary differences: that of neighbours has a median of about 1.
+
+        scenes : first frame of each part without a cut, and the one after its last
+        Whole frame, upper face and place of the face have the same weight [shape=(T, A + B + 6)].
+        """
+        groups = [
+            rows / max(_ordinary(rows, scenes), least * np.sqrt(rows.shape[1]))
+            for rows, least in zip((self.whole, self.face, self.place), LEAST_ORDINARY, strict=True)
+        ]
+        return np.concatenate(groups, axis=1) / np.sqrt(len(groups))
+
+    def distances(self, scenes: Scenes) -> Array:
+        """Return the distance between every two frames, in ordinary differences [shape=(T, T)]."""
+        rows = self.standardised(scenes)
+        rows = rows - rows.mean(axis=0)
+        power = np.square(rows).sum(axis=1)
+        squares: Array = np.sqrt(np.maximum(power[:, None] + power - 2 * rows @ rows.T, 0))
+        return squares
+
+
+def describe_frames(frames: Iterable[NDArray[np.uint8]], face_to_image: Array) -> FrameDescriptors:
+    """Return descriptors of the frames of a background.
+
+    frames        : uint8 RGB, all of one size [shape=(H, W, 3)]; taken one at a time
+    face_to_image : the affine map of each frame, from px of the face that looks straight ahead to px of the frame
+                    [shape=(T, 2, 3)]
+    Raises InputError: another number of frames, or frames of several sizes.
+    """
+    whole, face, eyes = [], [], []
+    lower: NDArray[np.bool_] | None = None
+    cell = 1
+    size: tuple[int, ...] = ()
+    for n, frame in enumerate(frames):
+        if n == len(face_to_image) or (size and frame.shape != size):
+            raise InputError(
+                f"frame {n} of shape {frame.shape} with {len(face_to_image)} maps; required as many frames, of one size"
+            )
+        if not size:
+            size, cell = frame.shape, max(1, round(max(frame.shape[:2]) / WHOLE_CELLS))
+        grey = frame[:, :, 1].astype(np.float64)  # green, of which a camera has most pixels
+        thumbnail = _cells(grey, cell)
+        hidden = _inside(face_to_image[n], LOWER_FACE, thumbnail.shape, cell)
+        lower = hidden if lower is None else lower | hidden
+        whole.append(thumbnail)
+        face.append(_sampled(grey, face_to_image[n], UPPER_FACE, FACE_STEP))
+        eyes.append(_sampled(grey, face_to_image[n], EYES, EYES_STEP))
+    if len(whole) != len(face_to_image) or lower is None:
+        raise InputError(f"{len(whole)} frames with {len(face_to_image)} maps, required as many, at least one")
+    points = np.array([[-45.0, 0, 1], [45, 0, 1], [0, 76, 1]]).T
+    place = (face_to_image @ points).reshape(len(whole), 6)
+    shown = np.stack(whole) * ~lower
+    return FrameDescriptors(shown.reshape(len(whole), -1), np.stack(face), np.stack(eyes), place)
+
+
+def _ordinary(rows: Array, scenes: Scenes) -> float:
+    """Return the median distance of neighbouring frames that are not equal, 0 if all are."""
+    steps = [np.linalg.norm(np.diff(rows[start:stop], axis=0), axis=1) for start, stop in scenes]
+    different = np.concatenate([part[part > 0] for part in steps])
+    return float(np.median(different)) if len(different) else 0.0
+
+
+def _cells(grey: Array, cell: int) -> Array:
+    """Return means of square cells; pixels beyond the last whole cell are left out."""
+    height, width = (side // cell for side in grey.shape)
+    if not height or not width:
+        return grey.mean(keepdims=True)
+    means: Array = grey[: height * cell, : width * cell].reshape(height, cell, width, cell).mean(axis=(1, 3))
+    return means
+
+
+def _sampled(grey: Array, to_image: Array, box: tuple[float, float, float, float], step: float) -> Array:
+    """Return a region of the aligned face on a grid, each sample the mean of about its part [shape=(N,)]."""
+    left, top, right, bottom = box
+    scale = float(np.sqrt(abs(np.linalg.det(to_image[:, :2]))))
+    shrink = max(1, int(scale * step / 2))
+    x, y = np.meshgrid(np.arange(left + step / 2, right, step), np.arange(top + step / 2, bottom, step))
+    columns, rows = (to_image[:, :2] @ np.stack([x.ravel(), y.ravel()]) + to_image[:, 2:]) / shrink - 0.5
+    small = _cells(grey, shrink)
+    return _between(small, rows, columns)
+
+
+def _between(image: Array, rows: Array, columns: Array) -> Array:
+    """Return bilinear samples of a picture; outside it is as at its edge."""
+    height, width = image.shape
+    rows, columns = np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)
+    top, left = (
+        np.minimum(values.astype(int), max(side - 2, 0)) for values, side in ((rows, height), (columns, width))
+    )
+    below, beside = np.minimum(top + 1, height - 1), np.minimum(left + 1, width - 1)
+    down, across = rows - top, columns - left
+    upper = (1 - across) * image[top, left] + across * image[top, beside]
+    under = (1 - across) * image[below, left] + across * image[below, beside]
+    samples: Array = (1 - down) * upper + down * under
+    return samples
+
+
+def _inside(
+    to_image: Array, box: tuple[float, float, float, float], shape: tuple[int, ...], cell: int
+) -> NDArray[np.bool_]:
+    """Return which cells of a frame show a region of the face."""
+    rows, columns = np.mgrid[: shape[0], : shape[1]]
+    points = np.stack([(columns.ravel() + 0.5) * cell, (rows.ravel() + 0.5) * cell]) - to_image[:, 2:]
+    x, y = np.linalg.solve(to_image[:, :2], points)
+    left, top, right, bottom = box
+    inside: NDArray[np.bool_] = (x > left) & (x < right) & (y > top) & (y < bottom)
+    return inside.reshape(shape[:2])

@@ -1,0 +1,246 @@
+"""What a speaking head does beside speaking: blinks, glances, raised brows, nods and sway.
+
+Everything follows from the phones in time, the loudness and pitch of the voice, and one seed; nothing depends on the
+frame rate. Accents, where the voice is loud and high, raise the brows and nod the head; blinks prefer the ends of
+phrases; the eyes leave the listener at the beginning of some phrases, and stay on him while the head turns.
+
+Sources: blinks and phrases, A. R. Bentivoglio et al., "Analysis of blink rate patterns in normal subjects", Movement
+Disorders 12, 1997 (26 a minute in conversation; here fewer, as a drawn face blinks too much sooner); brows with pitch,
+C. Cavé et al., "About the relationship between eyebrow movements and F0 variations", ICSLP 1996; nods with accents,
+H. P. Graf et al., "Visual prosody: facial movements accompanying speech", FG 2002. The sizes are ours, set by eye.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.types import FRAME_RATE_HZ, Motion, Prosody, Timeline, Unit
+from lipmotion.units import is_silent
+
+Curve = NDArray[np.float64]
+
+BLINK_S, MEAN_BLINK_S, LEAST_BLINK_S = 0.24, 3.3, 1.1
+"""Duration of a blink; mean and least time between two."""
+RESTING_LIDS = 0.07
+"""Awake and calm, the upper lids cover a little of the irises."""
+PHRASE_PAUSE_S = 0.15
+"""A pause of at least this duration ends a phrase."""
+SACCADE_S = 0.05
+"""Duration of a movement of the eyes."""
+LARGEST_GLANCE = (0.05, 0.018)
+"""Of the irises, to the side and up or down, in eye distances."""
+BROW_RAISE = 0.03
+"""For a strong accent, in eye distances."""
+
+
+class Expression(NamedTuple):
+    """Movements beside the mouth's, each a curve over the video frames [each shape=(N,)].
+
+    lids           : how far the eyes are closed, 0..1
+    gaze_x, gaze_y : of the irises, to the right and down, in eye distances
+    brows, worry   : how far the brows are raised, and their inner ends beyond that, in eye distances
+    head           : x, y, roll, yaw, pitch as of ``HeadPlacement`` [shape=(N, 5)]
+    """
+
+    lids: Curve
+    gaze_x: Curve
+    gaze_y: Curve
+    brows: Curve
+    worry: Curve
+    head: Curve
+
+
+def expression(
+    time_s: Curve,
+    motion: Motion,
+    units: Timeline[Unit],
+    prosody: Prosody | None,
+    *,
+    seed: int = 0,
+    blinks: bool = True,
+    gaze: bool = True,
+    brows: bool = True,
+    head: bool = True,
+) -> Expression:
+    """Return the movements beside the mouth's at the times of video frames.
+
+    prosody : of the speech; None: accents are where the mouth opens far
+    Each of ``blinks``, ``gaze``, ``brows``, ``head`` that is off leaves the others as they are.
+    """
+    still = np.zeros(len(time_s))
+    end_s = float(time_s[-1]) if len(time_s) else 0.0
+    spoken = phrases(units)
+    accent = _accents(motion, prosody)
+    talking = _talking(spoken, time_s)
+    pose = _head(time_s, accent, talking, spoken, _generator(seed, 1)) if head else np.zeros((len(time_s), 5))
+    blink_s = blink_times(end_s, spoken, _generator(seed, 2))
+    lids = np.maximum(lid_closure(time_s, blink_s) if blinks else still, RESTING_LIDS)
+    look_x, look_y = _gaze(time_s, end_s, spoken, _generator(seed, 3)) if gaze else (still, still)
+    if gaze:
+        look_x, look_y = look_x - 0.55 * pose[:, 3] - 0.2 * pose[:, 0], look_y - 0.4 * pose[:, 4]
+    raised, worry = _brows(time_s, accent, spoken, _generator(seed, 4)) if brows else (still, still)
+    return Expression(lids, look_x, look_y, raised, worry, pose)
+
+
+def phrases(units: Timeline[Unit]) -> list[tuple[float, float]]:
+    """Return start and end, in seconds, of every stretch of speech without a pause of ``PHRASE_PAUSE_S``."""
+    found: list[tuple[float, float]] = []
+    for span in units:
+        if not is_silent(span.label.phone):
+            if found and span.start_s - found[-1][1] < PHRASE_PAUSE_S:
+                found[-1] = found[-1][0], span.end_s
+            else:
+                found.append((span.start_s, span.end_s))
+    return found
+
+
+def blink_times(end_s: float, spoken: list[tuple[float, float]], rng: np.random.Generator) -> list[float]:
+    """Return when blinks begin, in seconds: at random, but rather at the end of a phrase where one is near."""
+    ends = np.array([end for _, end in spoken] or [-np.inf])
+    found: list[float] = []
+    at = float(rng.uniform(0.6, 2.2))
+    while at < end_s:
+        near = ends[np.abs(ends - at) < 0.7]
+        chosen = float(near[0]) - 0.05 if len(near) and rng.random() < 0.7 else at
+        if not found or chosen > found[-1] + LEAST_BLINK_S:
+            found.append(max(chosen, 0.0))
+            if rng.random() < 0.1:  # a double blink
+                found.append(found[-1] + 0.34)
+        at += LEAST_BLINK_S + float(rng.gamma(2.0, (MEAN_BLINK_S - LEAST_BLINK_S) / 2))
+    return found
+
+
+def lid_closure(time_s: Curve, blink_s: list[float]) -> Curve:
+    """Return how far the eyes are closed at each time, 0..1 [shape=(T,)]; the lids fall faster than they rise."""
+    closed = np.zeros(len(time_s))
+    for begin in blink_s:
+        first, last = np.searchsorted(time_s, (begin, begin + BLINK_S))
+        share = (time_s[first:last] - begin) / BLINK_S
+        shut = np.clip(np.where(share < 0.38, share / 0.3, (1 - share) / 0.55), 0, 1)
+        closed[first:last] = np.maximum(closed[first:last], np.sin(shut * np.pi / 2) ** 2)
+    return closed
+
+
+def _generator(seed: int, part: int) -> np.random.Generator:
+    return np.random.default_rng([seed, part])
+
+
+def _smoothed(curve: Curve, deviation_s: float) -> Curve:
+    """Return a curve at 100 Hz smoothed by a Gaussian; the ends are repeated."""
+    reach = max(1, int(4 * deviation_s * FRAME_RATE_HZ))
+    weights = np.exp(-np.square(np.arange(-reach, reach + 1) / (deviation_s * FRAME_RATE_HZ)) / 2)
+    return np.convolve(np.pad(curve, reach, mode="edge"), weights / weights.sum(), mode="valid")
+
+
+def _accents(motion: Motion, prosody: Prosody | None) -> Curve:
+    """Return how strongly the voice is accented at 100 Hz, about 0 to 1 [shape=(T,)]."""
+    if prosody is None or len(prosody.level_db) < 2:
+        opening = motion.resampled(FRAME_RATE_HZ)["opening"].astype(float)
+        loud = _smoothed(opening, 0.07) / max(float(np.percentile(opening, 95)), 0.05)
+        return np.clip(loud - 0.45, 0, 1) * 1.2
+    level = _smoothed(np.maximum(prosody.level_db, prosody.level_db.max() - 40), 0.05)
+    loud = np.clip((level - (level.max() - 18)) / 18, 0, 1)
+    voiced = np.isfinite(prosody.log_f0)
+    if voiced.sum() < 10:
+        return 0.7 * np.clip(loud - 0.4, 0, 1)
+    pitch = np.where(voiced, prosody.log_f0, 0.0).astype(float)
+    centre, spread = float(np.median(pitch[voiced])), max(float(pitch[voiced].std()), 0.05)
+    weight = _smoothed(voiced.astype(float), 0.06)
+    high = _smoothed(np.where(voiced, (pitch - centre) / spread, 0), 0.06) / np.maximum(weight, 0.2)
+    return np.clip(0.35 * np.clip(high, -1, 2.5) + 0.8 * loud - 0.45, 0, 1.2)
+
+
+def _at(curve: Curve, time_s: Curve) -> Curve:
+    return np.interp(time_s, np.arange(len(curve)) / FRAME_RATE_HZ, curve)
+
+
+def _talking(spoken: list[tuple[float, float]], time_s: Curve) -> Curve:
+    """Return 1 in phrases and 0 away from them, with soft edges [shape=(N,)]."""
+    level = np.zeros(len(time_s))
+    for begin, end in spoken:
+        first, last = np.searchsorted(time_s, (begin - 0.6, end + 0.9))
+        near = time_s[first:last]
+        rise = np.clip((near - begin + 0.6) / 0.6, 0, 1) * np.clip((end + 0.9 - near) / 0.9, 0, 1)
+        level[first:last] = np.maximum(level[first:last], rise * rise * (3 - 2 * rise))
+    return level
+
+
+def _sway(time_s: Curve, rng: np.random.Generator, slowest_hz: float, fastest_hz: float) -> Curve:
+    """Return smooth noise of about unit deviation: five sines of random frequencies and phases [shape=(N,)]."""
+    rates = np.exp(rng.uniform(np.log(slowest_hz), np.log(fastest_hz), 5))
+    phases = rng.uniform(0, 2 * np.pi, 5)
+    strengths = 1 / np.sqrt(rates / slowest_hz)
+    waves = np.sin(2 * np.pi * rates[:, None] * time_s + phases[:, None])
+    return np.asarray(strengths @ waves / np.sqrt(np.sum(strengths**2) / 2))
+
+
+def _head(
+    time_s: Curve, accent: Curve, talking: Curve, spoken: list[tuple[float, float]], rng: np.random.Generator
+) -> Curve:
+    lively = 0.4 + 0.6 * talking
+    x, y, roll, yaw, pitch = (_sway(time_s, rng, 0.08, 0.45) for _ in range(5))
+    nod = _at(_smoothed(accent, 0.11), time_s + 0.04)
+    tilt = np.zeros(len(time_s))
+    for begin, end in spoken:  # every phrase has its own pose, and ends a little lower
+        side, turn = rng.normal(0, 1, 2)
+        first, last = np.searchsorted(time_s, (begin - 0.5, end + 0.8))
+        near = time_s[first:last]
+        rise = np.clip((near - begin + 0.5) / 0.7, 0, 1) * np.clip((end + 0.8 - near) / 0.8, 0, 1)
+        rise = rise * rise * (3 - 2 * rise)
+        roll[first:last] += 0.9 * side * rise
+        yaw[first:last] += 0.9 * turn * rise
+        tilt[first:last] += rise * (np.clip((near - begin) / max(end - begin, 0.1), 0, 1) - 0.5)
+    return np.stack(
+        [
+            0.014 * lively * x + 0.16 * 0.016 * lively * roll,
+            0.006 * lively * y + 0.016 * nod + 0.006 * tilt,
+            0.012 * lively * roll,
+            0.016 * lively * yaw,
+            0.008 * lively * pitch + 0.03 * nod + 0.016 * tilt,
+        ],
+        axis=1,
+    )
+
+
+def _brows(
+    time_s: Curve, accent: Curve, spoken: list[tuple[float, float]], rng: np.random.Generator
+) -> tuple[Curve, Curve]:
+    raised = BROW_RAISE * _at(_smoothed(accent, 0.1), time_s + 0.06) + 0.004 * _sway(time_s, rng, 0.05, 0.3)
+    for begin, _ in spoken:  # some phrases begin with raised brows
+        strength = float(rng.uniform(-0.6, 1.0))
+        if strength > 0:
+            first, last = np.searchsorted(time_s, (begin - 0.25, begin + 0.75))
+            wave = np.sin(np.pi * np.clip((time_s[first:last] - begin + 0.25) / 1.0, 0, 1)) ** 2
+            raised[first:last] += 0.6 * BROW_RAISE * strength * wave
+    return raised, 0.003 * _sway(time_s, rng, 0.04, 0.2) - 0.004
+
+
+def _gaze(
+    time_s: Curve, end_s: float, spoken: list[tuple[float, float]], rng: np.random.Generator
+) -> tuple[Curve, Curve]:
+    """Return where the eyes look: steps between fixations."""
+    moments, targets = [0.0], [(0.0, 0.0)]
+    begins = np.array([begin for begin, _ in spoken] or [np.inf])
+    at = float(rng.uniform(0.4, 1.2))
+    while at < end_s:
+        away = targets[-1] == (0.0, 0.0) or abs(targets[-1][0]) < 0.01
+        near_begin = np.abs(begins - at).min() < 0.8
+        if away and rng.random() < (0.5 if near_begin else 0.14):
+            side = rng.choice([-1.0, 1.0])
+            target = (side * LARGEST_GLANCE[0] * rng.uniform(0.45, 1), LARGEST_GLANCE[1] * rng.uniform(-1, 0.6))
+            stay = rng.uniform(0.35, 0.9)
+        else:
+            target = (float(rng.normal(0, 0.0045)), float(rng.normal(0, 0.003)))
+            stay = rng.uniform(0.5, 2.0)
+        moments.append(at)
+        targets.append((float(target[0]), float(target[1])))
+        at += float(stay)
+    steps = np.array(targets)
+    moved = np.zeros((len(time_s), 2)) + steps[0]
+    for moment, change in zip(moments[1:], np.diff(steps, axis=0), strict=True):
+        share = np.clip((time_s - moment) / SACCADE_S, 0, 1)
+        moved += (share * share * (3 - 2 * share))[:, None] * change
+    return moved[:, 0], moved[:, 1]

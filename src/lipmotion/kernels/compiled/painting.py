@@ -1,0 +1,139 @@
+"""Painting of pictures, compiled: the same operations in the same order as in ``kernels.painting``."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.kernels.compiled.compiler import compiled
+
+Layer = NDArray[np.float32]
+Floats = NDArray[np.float64]
+Bytes = NDArray[np.uint8]
+Packed = NDArray[np.uint64]
+ONE = 1 << 16
+"""A pixel, in whole numbers."""
+
+
+@compiled
+def paint_band(
+    layer: Layer, first: int, last: int, top: Floats, bottom: Floats, across: Floats, texture: Floats
+) -> None:
+    """Paint a texture between two heights on rows of a layer, as ``kernels.painting.paint_band``."""
+    places, columns = top.shape
+    deep, wide = texture.shape[0], texture.shape[1]
+    for column in range(columns):
+        start, end = top[0, column], bottom[0, column]
+        highest, lowest = start, end
+        for place in range(1, places):
+            start += top[place, column]
+            end += bottom[place, column]
+            highest, lowest = min(highest, top[place, column]), max(lowest, bottom[place, column])
+        start, end = start / places, end / places
+        length = max(end - start, 1e-3)
+        beside = across[column] * (wide - 1)
+        u0 = min(int(beside), max(wide - 2, 0))
+        u1 = min(u0 + 1, wide - 1)
+        fu = beside - u0
+        for row in range(max(first, int(np.floor(highest))), min(last, int(np.ceil(lowest)))):
+            cover = 0.0
+            for place in range(places):
+                upper, lower = max(top[place, column], float(row)), min(bottom[place, column], row + 1.0)
+                cover += max(lower - upper, 0.0)
+            cover = cover / places
+            if cover > 0:
+                depth = min(max((row + 0.5 - start) / length, 0.0), 1.0)
+                down = depth * (deep - 1)
+                d0 = min(int(down), max(deep - 2, 0))
+                d1 = min(d0 + 1, deep - 1)
+                fd = down - d0
+                above = texture[d0, u0, 3] + fu * (texture[d0, u1, 3] - texture[d0, u0, 3])
+                below = texture[d1, u0, 3] + fu * (texture[d1, u1, 3] - texture[d1, u0, 3])
+                opacity = cover * (above + fd * (below - above))
+                for channel in range(3):
+                    above = texture[d0, u0, channel] + fu * (texture[d0, u1, channel] - texture[d0, u0, channel])
+                    below = texture[d1, u0, channel] + fu * (texture[d1, u1, channel] - texture[d1, u0, channel])
+                    texel = above + fd * (below - above)
+                    layer[row, column, channel] += np.float32(opacity * (texel - layer[row, column, channel]))
+                layer[row, column, 3] += np.float32(opacity * (1.0 - layer[row, column, 3]))
+
+
+@compiled
+def warp_floats(source: Layer, shift_x: Floats, shift_y: Floats, step: int, target: Layer) -> None:
+    """Fill a float32 picture with another one that is shifted, as ``kernels.painting.warp``."""
+    height, width, channels = target.shape
+    last_x, last_y = source.shape[1] - 1.0, source.shape[0] - 1.0
+    row_x, row_y = np.empty(shift_x.shape[1]), np.empty(shift_x.shape[1])
+    for row in range(height):
+        _row_of_grids(shift_x, shift_y, row / step, row_x, row_y)
+        for cell in range((width + step - 1) // step):
+            cell_x, more_x = row_x[cell], row_x[cell + 1] - row_x[cell]
+            cell_y, more_y = row_y[cell], row_y[cell + 1] - row_y[cell]
+            for column in range(cell * step, min(cell * step + step, width)):
+                share = column / step - cell
+                x = min(max(column + (cell_x + share * more_x), 0.0), last_x)
+                y = min(max(row + (cell_y + share * more_y), 0.0), last_y)
+                x0, y0 = min(np.uint64(x), np.uint64(last_x - 1)), min(np.uint64(y), np.uint64(last_y - 1))
+                x1, y1 = x0 + np.uint64(1), y0 + np.uint64(1)
+                fx, fy = np.float32(x - x0), np.float32(y - y0)
+                for channel in range(channels):
+                    left, right = source[y0, x0, channel], source[y0, x1, channel]
+                    above = left + fx * (right - left)
+                    left, right = source[y1, x0, channel], source[y1, x1, channel]
+                    target[row, column, channel] = above + fy * (left + fx * (right - left) - above)
+
+
+@compiled
+def warp_packed(source: Packed, shift_x: Floats, shift_y: Floats, step: int, target: Bytes) -> None:
+    """Fill a picture of bytes with one of packed pixels that is shifted, as ``kernels.painting.warp_bytes``.
+
+    All four channels are mixed at once, in the parts of a number; no sum needs more than 16 bits.
+    """
+    height, width, channels = target.shape
+    end_x, end_y = (source.shape[1] - 1 << 16) - 1, (source.shape[0] - 1 << 16) - 1
+    row_x, row_y = np.empty(shift_x.shape[1]), np.empty(shift_x.shape[1])
+    one, two, half = np.uint64(1), np.uint64(8), np.uint64(0x0080008000800080)
+    share, byte = np.uint64(256), np.uint64(255)
+    for row in range(height):
+        _row_of_grids(shift_x, shift_y, row / step, row_x, row_y)
+        for cell in range((width + step - 1) // step):
+            x, more_x = int(np.floor(row_x[cell] * ONE)), int(np.floor((row_x[cell + 1] - row_x[cell]) * ONE / step))
+            y, more_y = int(np.floor(row_y[cell] * ONE)), int(np.floor((row_y[cell + 1] - row_y[cell]) * ONE / step))
+            x, y = x + (cell * step << 16), y + (row << 16)
+            for column in range(cell * step, min(cell * step + step, width)):
+                at_x, at_y = np.uint64(min(max(x, 0), end_x)), np.uint64(min(max(y, 0), end_y))
+                x, y = x + more_x + ONE, y + more_y
+                x0, y0 = at_x >> np.uint64(16), at_y >> np.uint64(16)
+                fx, fy = at_x >> two & byte, at_y >> two & byte
+                both = fx * fy >> two
+                mixed = source[y0, x0] * (share - fx - fy + both) + source[y0, x0 + one] * (fx - both)
+                mixed += source[y0 + one, x0] * (fy - both) + source[y0 + one, x0 + one] * both + half
+                target[row, column, 0] = np.uint8(mixed >> np.uint64(8) & byte)
+                target[row, column, 1] = np.uint8(mixed >> np.uint64(24) & byte)
+                target[row, column, 2] = np.uint8(mixed >> np.uint64(40) & byte)
+                if channels == 4:
+                    target[row, column, 3] = np.uint8(mixed >> np.uint64(56))
+
+
+@compiled
+def _row_of_grids(shift_x: Floats, shift_y: Floats, down: float, row_x: Floats, row_y: Floats) -> None:
+    """Fill in the values of two grids in one row of pixels."""
+    r = min(int(down), shift_x.shape[0] - 2)
+    share = down - r
+    for column in range(shift_x.shape[1]):
+        row_x[column] = shift_x[r, column] + share * (shift_x[r + 1, column] - shift_x[r, column])
+        row_y[column] = shift_y[r, column] + share * (shift_y[r + 1, column] - shift_y[r, column])
+
+
+@compiled
+def stack(below: Layer, shade: Layer, skin: Layer, above: Layer, target: NDArray[np.uint16]) -> None:
+    """Fill in the bytes of layers over one another, as ``kernels.painting.stack``."""
+    for row in range(target.shape[0]):
+        for column in range(target.shape[1]):
+            shadow = np.float64(skin[row, column, 4])
+            behind_skin, behind_above = 1 - np.float64(skin[row, column, 3]), 1 - np.float64(above[row, column, 3])
+            for channel in range(4):
+                mixed = below[row, column, channel] + shadow * shade[row, column, channel]
+                mixed = skin[row, column, channel] + behind_skin * mixed
+                mixed = above[row, column, channel] + behind_above * mixed
+                target[row, column, channel] = np.uint16(mixed * (255.0 if channel == 3 else 1.0) + 0.5)

@@ -1,0 +1,179 @@
+"""Articulatory channels: what lips and tongue do in each phone that distances between lip points do not show.
+
+Every phone has a target for every channel, and a dominance: how strongly it pulls the channel towards its target. The
+value at a time is the mean of all targets, weighted by the dominances there. A consonant that asks nothing of the lips
+has little dominance over protrusion, so that the lips round before the vowel that needs it; a phone without which a
+channel would be wrong (f for the tuck of the lip) has much.
+
+Source: M. M. Cohen and D. W. Massaro, "Modeling coarticulation in synthetic visual speech", in Models and Techniques in
+Computer Animation, 1993. Deviations: dominance is constant within a phone and falls off as a Gaussian beside it; the
+targets are ours, set by eye, and those of diphthongs change within the phone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.types import WEIGHT, Channel, Motion, Timeline, Unit
+from lipmotion.units import LIP_CLOSING, is_silent
+
+Curve = NDArray[np.float64]
+GESTURES = ("tongue", "lip_tuck", "protrusion", "spread", "lip_press", "teeth")
+"""The articulatory channels; each is a weight from 0 to 1 (docs/articulation.md)."""
+TIP_UP, TIP_OUT = 0.6, 1.0
+"""Values of ``tongue``: the tip is at the ridge behind the upper teeth; the tip is between the teeth."""
+REACH = 4.0
+"""Dominance is 0 further than so many widths from a phone."""
+LEAST_PAUSE_S = 0.06
+"""In shorter pauses the mouth goes on."""
+
+
+class GestureTarget(NamedTuple):
+    """What a phone asks of a channel.
+
+    begin, end : target at the first and the last moment of the phone, 0 to 1
+    dominance  : weight beside other phones
+    width_s    : standard deviation of the Gaussian by which dominance falls off beside the phone, in seconds
+    """
+
+    begin: float
+    end: float
+    dominance: float = 1.0
+    width_s: float = 0.035
+
+
+Targets = Mapping[str, GestureTarget]
+
+
+def _steady(values: Mapping[str, float], dominance: float = 1.0, width_s: float = 0.035) -> dict[str, GestureTarget]:
+    """Return the same target from begin to end for phones: ``{"t d n": 0.6}``."""
+    return {
+        p: GestureTarget(value, value, dominance, width_s) for phones, value in values.items() for p in phones.split()
+    }
+
+
+_CLOSED = " ".join(LIP_CLOSING)
+_TARGETS: dict[str, tuple[GestureTarget, Targets]] = {
+    "tongue": (
+        GestureTarget(0, 0, 0.5, 0.025),
+        _steady({"th dh": TIP_OUT}, 5.0, 0.02)
+        | _steady({"l el": TIP_UP, "t d n en": 0.55, "ch jh": 0.45}, 2.5, 0.022)
+        | _steady({"s z": 0.3, "sh zh": 0.25, "iy ih ey y": 0.2, "r er axr": 0.2}, 0.8, 0.03),
+    ),
+    "lip_tuck": (
+        GestureTarget(0, 0, 1.0, 0.022),
+        _steady({"f v": 1.0}, 4.0, 0.018) | _steady({_CLOSED: 0.0}, 8.0, 0.022),
+    ),
+    "protrusion": (
+        GestureTarget(0, 0, 0.25, 0.03),
+        _steady({"uw w": 1.0}, 3.0, 0.05)
+        | _steady({"uh": 0.65, "ao": 0.4}, 1.6, 0.05)
+        | {
+            "ow": GestureTarget(0.55, 1.0, 2.2, 0.05),
+            "oy": GestureTarget(0.6, 0.0, 1.6, 0.04),
+            "aw": GestureTarget(0.0, 0.75, 1.4, 0.04),
+        }
+        | _steady({"sh zh ch jh": 0.6}, 1.4, 0.04)
+        | _steady({"r": 0.55, "er axr": 0.4}, 1.2, 0.04)
+        | _steady({"iy ih ey ae eh ay aa ah": 0.0}, 1.2, 0.035)
+        | _steady({"f v": 0.0, "s z": 0.0, "sil sp": 0.0}, 0.7, 0.03),
+    ),
+    "spread": (
+        GestureTarget(0, 0, 0.25, 0.03),
+        _steady({"iy": 1.0}, 2.0, 0.04)
+        | {
+            "ey": GestureTarget(0.5, 0.8, 1.4, 0.04),
+            "ay": GestureTarget(0.0, 0.6, 1.0, 0.035),
+            "oy": GestureTarget(0, 0.6, 1.0, 0.035),
+        }
+        | _steady({"ih ix": 0.55, "ae eh": 0.45, "y": 0.7}, 1.0, 0.035)
+        | _steady({"s z": 0.6}, 0.8, 0.03)
+        | _steady({"uw w uh ow ao aa r er axr sh zh ch jh": 0.0}, 1.5, 0.04)
+        | _steady({"sil sp": 0.0}, 0.7, 0.03),
+    ),
+    "lip_press": (GestureTarget(0, 0, 1.0, 0.02), _steady({_CLOSED: 1.0}, 3.0, 0.02)),
+    "teeth": (
+        GestureTarget(0.5, 0.5, 0.5, 0.03),
+        _steady({"s z": 1.0, "iy": 0.9, "sh zh ch jh": 0.95}, 2.0, 0.03)
+        | _steady({"ih ix ey y": 0.75, "t d n en": 0.7, "ae eh": 0.6, "k g ng": 0.6}, 0.8, 0.03)
+        | _steady({"f v th dh": 0.5}, 2.0, 0.025)
+        | _steady({"uw w": 0.0, "uh": 0.15, "ao": 0.3, "aa": 0.4}, 2.0, 0.04)
+        | {"ow": GestureTarget(0.3, 0.0, 1.6, 0.04)}
+        | _steady({"sil sp": 0.0}, 2.5, 0.03),
+    ),
+}
+
+
+def gesture_curves(units: Timeline[Unit], time_s: Curve, names: Collection[str] = GESTURES) -> dict[str, Curve]:
+    """Return articulatory channels at some times [each shape=(T,)], by name; values from 0 to 1.
+
+    units  : the phones in time; an unknown phone asks nothing special
+    time_s : in seconds, rising
+    names  : of ``GESTURES``
+    Without phones, ``teeth`` is that of speech, and all others are 0.
+    """
+    return {name: _curve(name, units, time_s) for name in names}
+
+
+def with_gestures(motion: Motion, units: Timeline[Unit], names: Collection[str] = GESTURES) -> Motion:
+    """Return the motion with the articulatory channels that it lacks, after its own channels."""
+    missing = [name for name in names if name in GESTURES and name not in motion.names]
+    curves = gesture_curves(units, motion.time_s, missing)
+    if not curves:
+        return motion
+    values = np.hstack([motion.values, np.stack(list(curves.values()), axis=1).astype(motion.values.dtype)])
+    return Motion(values, motion.rate_hz, (*motion.channels, *(Channel(name, WEIGHT) for name in curves)))
+
+
+def pause_curve(
+    units: Timeline[Unit],
+    time_s: Curve,
+    least_s: float = LEAST_PAUSE_S,
+    *,
+    blend_s: float = 0.06,
+    after_s: float = 0.0,
+    before_s: float = 0.0,
+) -> Curve:
+    """Return the weight of pauses at each time, 0 to 1 [shape=(T,)]; it is 0.5 at the boundaries of a pause.
+
+    least_s : shorter pauses are none
+    blend_s : duration of the change
+    after_s, before_s : the pause begins so much after the last phone, and ends so much before the next one
+    """
+    total = np.zeros(len(time_s))
+    for span in units:
+        if is_silent(span.label.phone) and span.duration_s >= least_s:
+            start_s, end_s = span.start_s, span.end_s
+            if start_s > 0:
+                start_s += min(after_s, span.duration_s / 4)
+            end_s -= min(before_s, span.duration_s / 4)
+            total += _risen((time_s - start_s) / blend_s) - _risen((time_s - end_s) / blend_s)
+    return np.clip(total, 0, 1)
+
+
+def _risen(share: Curve) -> Curve:
+    """Return a smooth step from 0 to 1 that is 0.5 at 0."""
+    clipped = np.clip(share + 0.5, 0, 1)
+    return np.asarray(clipped * clipped * (3 - 2 * clipped))
+
+
+def _curve(name: str, units: Timeline[Unit], time_s: Curve) -> Curve:
+    default, targets = _TARGETS[name]
+    weighted, weights = np.full(len(time_s), 1e-6 * default.begin), np.full(len(time_s), 1e-6)
+    for span in units:
+        target = targets.get(span.label.phone, default)
+        first, last = np.searchsorted(
+            time_s, (span.start_s - REACH * target.width_s, span.end_s + REACH * target.width_s)
+        )
+        if first < last:
+            time = time_s[first:last]
+            outside = np.maximum(np.maximum(span.start_s - time, time - span.end_s), 0) / target.width_s
+            dominance = target.dominance * np.exp(-outside * outside)
+            share = np.clip((time - span.start_s) / max(span.duration_s, 1e-9), 0, 1)
+            weighted[first:last] += dominance * (target.begin + share * (target.end - target.begin))
+            weights[first:last] += dominance
+    return np.clip(weighted / weights, 0, 1)

@@ -1,0 +1,80 @@
+"""Generated motion as a drawn face: videos with sound, videos that are transparent, pictures."""
+
+from __future__ import annotations
+
+import re
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+
+from lipmotion.errors import ExportError, InputError
+from lipmotion.faces.base import TRANSPARENT, Face, Staging
+from lipmotion.faces.filmed.face import FilmedFace
+from lipmotion.faces.registry import staged_face
+from lipmotion.pipeline.film.video import RENDERING
+from lipmotion.speech.audio_files import SPEECH_RATE_HZ
+from lipmotion.speech.prosody import prosody_of
+from lipmotion.types import Audio, Generation, Monitor, Prosody
+from lipmotion.types.progress import with_reports
+
+OPAQUE_SUFFIX = ".mp4"
+VIDEO_SUFFIXES = (OPAQUE_SUFFIX, ".webm", ".mov")
+"""Videos with sound; all but the first can be transparent."""
+
+
+def shows_face(path: Path) -> bool:
+    """Return whether a path is that of a drawn face: a video, or pictures such as ``frame%05d.png``."""
+    return path.suffix.lower() in VIDEO_SUFFIXES or is_picture_sequence(path)
+
+
+def is_picture_sequence(path: Path) -> bool:
+    """Return whether a path stands for numbered pictures: ``frame%05d.png``."""
+    return path.suffix.lower() == ".png" and re.search(r"%0?\d?d", path.name) is not None
+
+
+def check_background(path: Path, staging: Staging) -> None:
+    """Raise ExportError if a face is to be transparent in a file that cannot be."""
+    if staging.background == TRANSPARENT and path.suffix.lower() == OPAQUE_SUFFIX:
+        raise ExportError(
+            f"{path}: {OPAQUE_SUFFIX} cannot be transparent; write .webm, .mov or %05d.png, or give a colour"
+        )
+
+
+def check_staging(face: Face | FilmedFace, staging: Staging) -> None:
+    """Raise InputError if a face cannot be staged so."""
+    if not isinstance(face, FilmedFace):
+        staged_face(face, staging)
+    elif staging != Staging():
+        raise InputError("size, colour of the background, intensity and what moves are of drawn faces; leave them out")
+
+
+def write_drawn_face(
+    path: Path, generation: Generation, sound: Audio, fps: float, face: Face, staging: Staging, monitor: Monitor
+) -> None:
+    """Write generated motion as a drawn face, in the format of the suffix; brows and head move with the sound.
+
+    monitor : receives reports of the progress
+    Raises ExportError: the file cannot be written.  Raises InputError: no such face, or it cannot be staged so.
+    """
+    from lipmotion.export.transparent import write_pictures, write_with_alpha
+    from lipmotion.export.video import write_mp4
+
+    drawn = staged_face(face, staging, _prosody(sound)).render(generation.motion, generation.units, fps=fps)
+    frames = with_reports(drawn, int(generation.motion.time_s[-1] * fps + 1e-9) + 1, RENDERING, monitor)
+    if is_picture_sequence(path):
+        write_pictures(path, frames)
+    elif path.suffix.lower() == OPAQUE_SUFFIX:
+        write_mp4(path, frames, fps=fps, audio=sound)
+    else:
+        write_with_alpha(path, frames, fps=fps, audio=sound)
+
+
+def _prosody(sound: Audio) -> Prosody:
+    from scipy.signal import resample_poly
+
+    ratio = Fraction(SPEECH_RATE_HZ, int(sound.rate_hz))
+    samples = sound.samples.astype(np.float32)
+    if ratio != 1:
+        samples = resample_poly(samples, ratio.numerator, ratio.denominator).astype(np.float32)
+    return prosody_of(Audio(samples, SPEECH_RATE_HZ))

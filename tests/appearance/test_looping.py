@@ -1,0 +1,159 @@
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from lipmotion.appearance.frame_descriptors import FrameDescriptors
+from lipmotion.appearance.looping import FADE_FRAMES, JUMP_LIMIT, LoopOrder, loop_order
+from lipmotion.errors import InputError
+
+RATE_HZ = 25.0
+
+
+def background(path, blinks=(), noise: float = 0.02) -> FrameDescriptors:
+    """A head whose position is a path [shape=(T,)], and that blinks at some frames."""
+    count = len(path)
+    draw = np.random.default_rng(2)
+    patterns = draw.normal(size=(2, 40))
+    position = np.asarray(path, float)[:, None]
+    rows = np.sin(position + patterns[0]) * 5 + noise * draw.normal(size=(count, 40))
+    eyes = 50 + 0.3 * draw.normal(size=(count, 20))
+    for blink in blinks:
+        eyes[blink - 1 : blink + 3] += np.array([10, 25, 20, 8])[: max(0, count - blink + 1), None]
+    return FrameDescriptors(rows, rows + 1, eyes, np.repeat(position, 6, axis=1))
+
+
+def wander(count: int, seed: int = 0) -> np.ndarray:
+    """A path that does not repeat."""
+    steps = np.convolve(np.random.default_rng(seed).normal(size=count + 20), np.ones(12) / 12, "same")[10 : 10 + count]
+    return np.cumsum(steps * 0.3) + np.arange(count) * 0.05
+
+
+def displayed(order: LoopOrder, rows) -> np.ndarray:
+    return (1 - order.weight[:, None]) * rows[order.first] + order.weight[:, None] * rows[order.second]
+
+
+def runs_of(order: LoopOrder) -> list[int]:
+    return [after - before for before, after in pairwise([0, *(join.at for join in order.joins), len(order)])]
+
+
+@pytest.mark.parametrize("count", [1, 2, 30, 74, 75])
+def test_a_long_background_is_shown_as_it_is(count):
+    order = loop_order(background(wander(75)), count, RATE_HZ)
+    assert len(order) == count
+    assert order.joins == ()
+    np.testing.assert_array_equal(np.diff(order.first), 1)
+    assert not order.weight.any()
+
+
+def test_it_begins_and_ends_calmly():
+    steps = np.full(200, 1.0)
+    steps[[*range(40, 50), *range(140, 150)]] = 0.01
+    order = loop_order(background(np.cumsum(steps) * 0.1), 101, RATE_HZ)
+    assert 40 <= order.first[0] < 50
+    assert 140 <= order.first[-1] < 150
+
+
+@pytest.mark.parametrize("count", [76, 200, 4000])
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_a_short_one_goes_to_and_fro(count, seed):
+    descriptors = background(wander(75))
+    order = loop_order(descriptors, count, RATE_HZ, seed=seed)
+    assert len(order) == len(list(order)) == count
+    assert order.first.min() >= 0
+    assert max(order.first.max(), order.second.max()) < 75
+    steps = np.diff(order.first)
+    jumps = {join.at for join in order.joins if join.kind == "jump"}
+    for at in np.flatnonzero(np.abs(steps) != 1) + 1:
+        assert any(abs(at - jump) <= FADE_FRAMES for jump in jumps)
+
+
+def test_no_step_is_much_larger_than_usual():
+    descriptors = background(wander(150))
+    rows = descriptors.standardised([(0, 150)])
+    usual = np.linalg.norm(np.diff(rows, axis=0), axis=1)
+    order = loop_order(descriptors, 3000, RATE_HZ)
+    shown = np.linalg.norm(np.diff(displayed(order, rows), axis=0), axis=1)
+    assert shown.max() <= max(usual.max(), JUMP_LIMIT) + 1e-9
+    turns = [join.cost for join in order.joins if join.kind == "turn"]
+    assert max(turns) < 1.5  # of the median speed
+
+
+def test_a_motion_that_repeats_is_looped_forwards():
+    path = 3 * np.sin(2 * np.pi * np.arange(130) / 50)
+    descriptors = background(path)
+    order = loop_order(descriptors, 1500, RATE_HZ)
+    jumps = [join for join in order.joins if join.kind == "jump"]
+    assert len(jumps) >= 3
+    for jump in jumps:
+        assert jump.cost < JUMP_LIMIT
+    rows = descriptors.standardised([(0, 130)])
+    shown = np.linalg.norm(np.diff(displayed(order, rows), axis=0), axis=1)
+    assert shown.max() < JUMP_LIMIT + np.linalg.norm(np.diff(rows, axis=0), axis=1).max()
+
+
+def test_jumps_go_on_in_the_same_direction():
+    path = np.abs(np.arange(240) % 80 - 40) * 0.2  # to and fro: the same places, in both directions
+    order = loop_order(background(path), 2000, RATE_HZ)
+    for join in order.joins:
+        if join.kind == "jump":
+            old, new = order.first[join.at - FADE_FRAMES], order.first[min(join.at + FADE_FRAMES, 1999)]
+            way = 1 if order.first[join.at - FADE_FRAMES] > order.first[join.at - FADE_FRAMES - 1] else -1
+            before = path[old] - path[old - way]
+            after = path[new] - path[new - way]
+            is_near_turn = min(old % 40, 40 - old % 40) <= 2 * FADE_FRAMES  # of the path itself
+            assert np.sign(before) == np.sign(after) or is_near_turn
+
+
+def test_no_join_in_a_blink():
+    descriptors = background(wander(150), blinks=(30, 75, 120))
+    order = loop_order(descriptors, 4000, RATE_HZ)
+    assert len(order.joins) > 20
+    for join in order.joins:
+        near = {*range(order.first[join.at - 1] - 1, order.first[join.at - 1] + 2)}
+        assert not near & {29, 30, 31, 32, 74, 75, 76, 77, 119, 120, 121, 122}
+    assert order.first[-1] not in (29, 30, 31, 32, 74, 75, 76, 77, 119, 120, 121, 122)
+
+
+def test_runs_are_not_short():
+    order = loop_order(background(wander(150)), 4000, RATE_HZ)
+    assert min(runs_of(order)[:-1]) >= 0.8 * RATE_HZ
+
+
+def test_the_seed_alone_decides():
+    descriptors = background(wander(100))
+    orders = [loop_order(descriptors, 1000, RATE_HZ, seed=seed).first for seed in (4, 4, 5)]
+    np.testing.assert_array_equal(orders[0], orders[1])
+    assert (orders[0] != orders[2]).any()
+
+
+def test_only_frames_that_may_be_shown():
+    usable = np.ones(120, bool)
+    usable[[0, 1, 50, 51, 119]] = False
+    order = loop_order(background(wander(120)), 2000, RATE_HZ, usable=usable, cuts=(90,))
+    assert usable[order.first].all()
+    assert usable[order.second].all()
+    crossings = [(a, b) for a, b in pairwise(order.first.tolist()) if (a < 90) != (b < 90)]
+    jumps = {join.at for join in order.joins if join.kind == "jump"}
+    assert len(crossings) <= len(jumps)
+
+
+@pytest.mark.parametrize("length", [1, 2, 3, 5, 21])
+def test_tiny_backgrounds(length):
+    order = loop_order(background(wander(length)), 100, RATE_HZ)
+    assert len(order) == 100
+    assert set(order.first.tolist()) <= set(range(length))
+    assert np.abs(np.diff(order.first)).max() <= 1
+
+
+def test_a_still_picture():
+    order = loop_order(background(np.zeros(60), noise=0.0), 500, RATE_HZ)
+    assert len(order) == 500
+
+
+@pytest.mark.parametrize(("count", "usable"), [(0, None), (5, np.zeros(50, bool)), (5, np.ones(49, bool))])
+def test_nothing_to_show_is_refused(count, usable):
+    with pytest.raises(InputError, match="required at least one of each"):
+        loop_order(background(wander(50)), count, RATE_HZ, usable=usable)

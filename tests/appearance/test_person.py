@@ -1,0 +1,174 @@
+"""The appearance of a drawn person: mouth, jaw and chin for motion, mouth pictures and sound."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from lipmotion.appearance import person
+from lipmotion.appearance.lower_face import cheek_light, mouth_ellipse, mouth_part, relit, replaced_part
+from lipmotion.appearance.person import (
+    CANDIDATES,
+    EDGE_PX,
+    JAW_CANDIDATES,
+    Appearance,
+    FootagePictures,
+    learn_appearance,
+)
+from lipmotion.appearance.refinement import STEADY
+from lipmotion.errors import InputError
+from lipmotion.faces.filmed.face import FilmedFace
+from lipmotion.stats.pca import evenly_spaced
+from lipmotion.testing.toy import toy_motion, toy_sentences
+from lipmotion.testing.toy_face import NOISE, SHAPE, toy_chin_px, toy_footage_pictures, toy_lower_faces
+from lipmotion.types import Motion
+
+MOUTH = (slice(None), *mouth_part(1))
+
+
+@pytest.fixture(scope="module")
+def appearance(filmed_face: FilmedFace) -> Appearance:
+    return filmed_face.appearance
+
+
+@pytest.fixture(scope="module")
+def footage() -> FootagePictures:
+    return toy_footage_pictures()
+
+
+@pytest.fixture(scope="module")
+def unseen() -> Motion:
+    """Of a sentence that the appearance was not learned from."""
+    return toy_motion(toy_sentences(8)[6].units, 25.0)
+
+
+def test_its_parts(appearance: Appearance, footage: FootagePictures) -> None:
+    count = len(footage.motion)
+    assert (appearance.shape, appearance.scale) == (SHAPE, 1)
+    assert appearance.mouth_codes.shape == (len(appearance.mouths), 90)
+    assert 200 < len(appearance.mouths) <= min(CANDIDATES, count)
+    assert appearance.jaw_codes.shape == (len(appearance.jaws), 36)
+    assert len(appearance.jaws) == JAW_CANDIDATES
+    assert appearance.from_motion.names == ("opening", "width", "outer")
+    assert (appearance.mouth.explained > 0.98).all()
+    assert appearance.noise.deviation == pytest.approx([NOISE] * 3, rel=0.05)
+    light = np.median(cheek_light(np.concatenate(footage.clips)[MOUTH]), axis=0)
+    assert appearance.light == pytest.approx(light)
+
+
+def test_motion_becomes_the_mouth_that_was_drawn(appearance: Appearance, unseen: Motion) -> None:
+    codes, drawn = appearance.of_motion(unseen), toy_lower_faces(unseen, noise=0)[MOUTH].astype(float)
+    assert len(codes) == len(unseen.values)
+    shown = appearance.mouth.restore(codes.mouth).astype(float)
+    mean = drawn.mean(axis=0)
+    assert np.square(shown - drawn).mean() < 0.4 * np.square(mean - drawn).mean()
+    dark = [(mouths < 90).all(axis=3).sum(axis=(1, 2)) for mouths in (shown, drawn)]
+    assert np.corrcoef(dark)[0, 1] > 0.95  # the mouth opens when it should
+    assert codes.chin_px == pytest.approx(toy_chin_px(unseen), abs=1.5)
+
+
+def test_pictures_of_the_mouth_in_any_light(appearance: Appearance, unseen: Motion) -> None:
+    drawn = toy_lower_faces(unseen, noise=0)[MOUTH]
+    dim = relit(drawn, np.tile([0.6, 0.7, 0.9], (len(drawn), 1)))
+    bright, dark = appearance.of_mouths(drawn), appearance.of_mouths(dim)
+    assert bright.chin_px == pytest.approx(toy_chin_px(unseen), abs=1.0)
+    assert dark.chin_px == pytest.approx(bright.chin_px, abs=0.3)
+    assert np.abs(dark.mouth - bright.mouth).max() < 0.02 * np.abs(bright.mouth).max()
+    assert np.abs(dark.jaw - bright.jaw).max() < 0.05 * np.abs(bright.jaw).max()
+
+
+def test_a_jaw_of_sound_is_proportional_to_its_level(appearance: Appearance, unseen: Motion) -> None:
+    codes = appearance.of_motion(unseen)
+    frames = len(codes)
+    quiet, middle, loud = (appearance.with_jaw_of_sound(codes, np.full(frames, level)) for level in (-60, -40, -20))
+    assert np.array_equal(loud.mouth, codes.mouth)
+    assert quiet.chin_px[0] + 1 < middle.chin_px[0] < loud.chin_px[0] - 1
+    assert middle.chin_px == pytest.approx((quiet.chin_px + loud.chin_px) / 2, abs=1e-3)
+    assert middle.jaw == pytest.approx((quiet.jaw + loud.jaw) / 2, abs=1e-2)
+
+
+def test_the_regression_on_sound_is_the_least_squares_line(appearance: Appearance, footage: FootagePictures) -> None:
+    slope, start = np.polyfit(footage.levels_db, footage.chin_px, 1)
+    assert appearance.from_sound[:, -1] == pytest.approx([start, slope], rel=0.01)
+
+
+def test_jaws_differ_in_the_jaw_alone(appearance: Appearance) -> None:
+    """Their mouth is the mean one, and so is what is further away from the jaw than cloning reads."""
+    same = (appearance.jaws == appearance.jaws[0]).all(axis=(0, 3))
+    inside = replaced_part(SHAPE, 1)
+    assert same[mouth_ellipse(1)].all()
+    assert not same[inside & ~mouth_ellipse(1)].any()
+    rows, columns = np.nonzero(~same)
+    reach = np.nonzero(inside)
+    for found, wanted in ((rows, reach[0]), (columns, reach[1])):
+        assert (found.min(), found.max()) == (wanted.min() - EDGE_PX, wanted.max() + EDGE_PX)
+
+
+def test_candidates_are_restored_as_recorded(appearance: Appearance) -> None:
+    """The eigenlips of a recorded mouth with its own detail are that mouth."""
+    chosen = np.arange(0, len(appearance.mouths), 7)
+    refiner = appearance.mouth_refiner(STEADY)
+    made = refiner.pictures(appearance.mouth_codes[chosen], np.repeat(chosen[:, None], 3, axis=1))
+    assert np.abs(made.astype(int) - appearance.mouths[chosen]).max() <= 1
+    jaws = appearance.jaw_refiner()
+    made = jaws.pictures(appearance.jaw_codes[:9], np.repeat(np.arange(9)[:, None], 3, axis=1))
+    assert np.abs(made.astype(int) - appearance.jaws[:9]).max() <= 1
+
+
+@pytest.mark.long
+def test_all_pictures_are_in_one_light(footage: FootagePictures) -> None:
+    """A clip under another lamp is learned as if it had been the same."""
+    lamp = np.tile([0.7, 0.8, 0.9], (len(footage.clips[1]), 1))
+    dimmed = replace(footage, clips=(footage.clips[0], relit(footage.clips[1], lamp), *footage.clips[2:]))
+    found, wanted = learn_appearance(dimmed), learn_appearance(footage)
+    assert found.light == pytest.approx(wanted.light, abs=0.5)
+    assert cheek_light(found.mouths) == pytest.approx(np.tile(found.light, (len(found.mouths), 1)), abs=0.5)
+    motion = Motion(footage.motion[::5], 25.0, footage.channels)
+    pictures = [each.mouth.restore(each.of_motion(motion).mouth).astype(int) for each in (found, wanted)]
+    assert np.abs(pictures[0] - pictures[1]).mean() < 1.0
+
+
+@pytest.mark.long
+def test_large_footage_gives_finer_pictures(footage: FootagePictures) -> None:
+    fine = learn_appearance(toy_footage_pictures(scale=2))
+    assert fine.scale == 2
+    assert fine.mouths.shape[1:] == (112, 144, 3)
+    assert fine.jaws.shape[1:] == (256, 256, 3)
+    chosen = fine.mouths[:, ::2, ::2].astype(int)
+    coarse = fine.mouth.restore(fine.mouth_codes).astype(int)
+    assert np.abs(chosen - coarse).mean() < 4  # of the same frames
+    motion = Motion(footage.motion[60:80], 25.0, footage.channels)
+    refiner = fine.mouth_refiner(STEADY)
+    made = refiner.refine(fine.of_motion(motion).mouth).astype(float)
+    drawn = toy_lower_faces(motion, 2)[(slice(None), *mouth_part(2))].astype(float)
+    edges = [np.abs(np.diff(pictures, axis=1)).mean() for pictures in (made, drawn)]
+    assert 0.8 < edges[0] / edges[1] < 1.25
+
+
+@pytest.mark.long
+def test_damaged_pictures_are_no_candidates(footage: FootagePictures, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A blue square, as errors of video leave it, in a picture from which no component is learned."""
+    monkeypatch.setattr(person, "LEARNED_FROM", 120)
+    learned = set(evenly_spaced(120, len(footage.motion)))
+    damaged = next(n for n in range(20, 60) if n not in learned)
+    clip = footage.clips[0].copy()
+    rows, columns = mouth_part(1)
+    clip[damaged, rows.start + 20 : rows.start + 28, columns.start + 30 : columns.start + 38] = [0, 0, 255]
+    found = learn_appearance(replace(footage, clips=(clip, *footage.clips[1:])))
+    whole = learn_appearance(footage)
+    assert len(found.mouths) == len(whole.mouths) - 1
+    blue = (found.mouths[:, 20:28, 30:38].astype(int) @ [-1, -1, 1]).mean(axis=(1, 2))
+    assert blue.max() < 100
+
+
+@pytest.mark.parametrize("wrong", ["motion", "levels_db"])
+def test_footage_that_does_not_fit_together(footage: FootagePictures, wrong: str) -> None:
+    shorter = replace(footage, **{wrong: getattr(footage, wrong)[:-1]})
+    with pytest.raises(
+        InputError, match=r"266 pictures, 26[56] frames of motion and 26[56] of sound; required as many"
+    ):
+        learn_appearance(shorter)
+    with pytest.raises(InputError, match="0 pictures"):
+        learn_appearance(replace(footage, clips=()))

@@ -1,0 +1,272 @@
+"""``lipmotion face``, and ``animate`` and ``speak`` with a filmed face."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+import pytest
+
+from cli.conftest import RunCommand, is_one_error
+from lipmotion.faces.filmed.face import VERSION, FilmedFace, load_face, save_face
+from lipmotion.pipeline.film import build
+from lipmotion.storage.archive import HEADER
+from lipmotion.testing.toy import toy_sentences
+from pipeline.film.toy_footage import ToyVideo, install, write_video
+from speech import stand_in_voice
+
+SENTENCES = 3
+
+
+@pytest.fixture(scope="module")
+def videos(tmp_path_factory: pytest.TempPathFactory) -> dict[Path, ToyVideo]:
+    folder = tmp_path_factory.mktemp("filmed") / "anna"
+    folder.mkdir()
+    found = [write_video(folder / f"{sentence.name}.mp4", sentence) for sentence in toy_sentences(SENTENCES)]
+    return {video.path.resolve(): video for video in found}
+
+
+@pytest.fixture
+def tracker(videos: dict[Path, ToyVideo], monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Installs a tracker without errors; returns the folder of the videos."""
+    install(monkeypatch, videos, {})
+    monkeypatch.setattr(build, "LEAST_FOOTAGE_S", 5.0)
+    return next(iter(videos)).parent
+
+
+@pytest.fixture
+def basics(toy_speech: Path, toy_model_file: Path, filmed_face_file: Path) -> tuple[object, ...]:
+    return ("animate", toy_speech, "--model", toy_model_file, "--recogniser", "own", "--face", filmed_face_file)
+
+
+def comment(path: Path) -> str:
+    with av.open(str(path)) as container:
+        return str(container.metadata.get("comment", ""))
+
+
+def decoded(path: Path) -> np.ndarray:
+    with av.open(str(path)) as container:
+        return np.stack([frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)])
+
+
+@pytest.mark.long
+def test_build_and_info(run: RunCommand, tracker: Path, here: Path) -> None:
+    done = run("face", "build", tracker, "-o", "anna.face", "--name", "Anna", "--workers", "1")
+    assert done.code == 0, done
+    lines = dict(line.split(maxsplit=1) for line in done.out)
+    assert (lines["name"], lines["recordings"], lines["file"]) == ("Anna", str(SENTENCES), "anna.face")
+    assert done.err == []
+    assert [path.name for path in here.iterdir()] == ["anna.face"]
+    info = run("face", "info", "anna.face")
+    assert info == (0, done.out[:-1], [])
+    assert load_face("anna.face").about["name"] == "Anna"
+
+
+@pytest.mark.long
+def test_build_for_a_program(run: RunCommand, tracker: Path, here: Path) -> None:
+    """One object a line: progress that rises, and at the end the name of the file."""
+    done = run("face", "build", tracker, "-o", "anna.face", "--workers", "1", "--machine-readable")
+    events: list[dict[str, Any]] = [json.loads(line) for line in done.out]
+    assert done.code == 0
+    assert done.err == []
+    progress = [event for event in events if event["type"] == "progress"]
+    assert [event["value"] for event in progress] == sorted(event["value"] for event in progress)
+    assert progress[-1]["value"] == 1.0
+    assert [event["type"] for event in events[-1:]] == ["success"]
+    assert events[-1]["file"] == "anna.face"
+    assert any("60 s of varied speech" in event.get("message", "") for event in events)
+    assert (here / "anna.face").is_file()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (["missing.mp4", "-o", "a.face"], 3, "missing.mp4: no such"),
+        (["{folder}", "-o", "a.mp4"], 7, "a.mp4: a face is a file ending in .face; name it so"),
+        (["{folder}", "-o", "missing/a.face"], 7, "the folder missing does not exist"),
+        (["{folder}", "-o", "a.face", "--speaker", "ben"], 3, "no speaker 'ben', a face is that of one person"),
+        (["{folder}/toy00.mp4", "-o", "a.face"], 3, "s of footage with the face, required 5 s or more"),
+    ],
+)
+def test_what_cannot_be_built(
+    run: RunCommand, tracker: Path, here: Path, arguments: list[str], code: int, words: str
+) -> None:
+    named = [argument.format(folder=tracker) for argument in arguments]
+    done = run("face", "build", *named, "--workers", "1")
+    assert is_one_error(done, code), done
+    assert words in done.err[0]
+    assert list(here.iterdir()) == []
+
+
+@pytest.mark.parametrize("arguments", [[], ["build"], ["build", "a.mp4"], ["info"], ["paint", "a.mp4"]])
+def test_a_wrong_command_line(run: RunCommand, here: Path, arguments: list[str]) -> None:
+    assert run("face", *arguments).code == 2
+    assert list(here.iterdir()) == []
+
+
+def test_an_output_does_not_replace_the_footage(run: RunCommand, tracker: Path) -> None:
+    video = tracker / "toy00.mp4"
+    before = video.read_bytes()
+    done = run("face", "build", video, "-o", video, "--workers", "1")
+    assert done.code == 7
+    assert video.read_bytes() == before
+
+
+def test_info(run: RunCommand, filmed_face_file: Path) -> None:
+    done = run("face", "info", filmed_face_file)
+    assert (done.code, done.err) == (0, [])
+    assert done.out[0] == "name         toy"
+    assert "background   2.0 s of 224 × 288 px at 25 frames a second" in done.out
+
+
+def test_a_video_of_the_person(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:
+    done = run(*basics, "-o", "a.mp4", "a.json")
+    assert done == (0, ["a.mp4", "a.json"], [])
+    assert sorted(path.name for path in here.iterdir()) == ["a.json", "a.mp4"]
+    assert comment(here / "a.mp4").startswith("synthetic:")
+    frames = decoded(here / "a.mp4")
+    assert frames.shape[1:] == (288, 224, 3)
+    opening = np.array([row[0] for row in json.loads((here / "a.json").read_text())["values"]])[::4]
+    dark = (frames[:, 150:230, 70:154] < 90).all(axis=3).sum(axis=(1, 2))
+    count = min(len(dark), len(opening))
+    assert np.corrcoef(dark[:count], opening[:count])[0, 1] > 0.8
+
+
+@pytest.mark.usefixtures("here")
+def test_frames_a_second_and_the_mark(run: RunCommand, basics: tuple[object, ...]) -> None:
+    assert run(*basics, "-o", "a.mp4", "--fps", "10", "--mark", "none").code == 0
+    assert run(*basics, "-o", "b.mp4", "--fps", "10", "--mark", "visible", "--jaw", "energy").code == 0
+    assert [comment(Path(name))[:9] for name in ("a.mp4", "b.mp4")] == ["", "synthetic"]
+    first, second = (decoded(Path(name)).astype(int) for name in ("a.mp4", "b.mp4"))
+    assert first.shape == second.shape
+    assert np.abs(first - second)[:, -40:].max() > 60
+
+
+@pytest.mark.usefixtures("here")
+def test_another_background(
+    run: RunCommand, basics: tuple[object, ...], tracker: Path, videos: dict[Path, ToyVideo]
+) -> None:
+    path = tracker / "toy01.mp4"
+    done = run(*basics, "-o", "a.mp4", "--background", path)
+    assert done == (0, ["a.mp4"], [])
+    shown, footage = decoded(Path("a.mp4")), decoded(path)
+    count = min(len(shown), len(footage))
+    away = np.abs(shown[:count].astype(int) - footage[:count])[:, :100]
+    assert away.mean() < 2
+    assert len(videos[path.resolve()].motion.values) == len(footage)
+
+
+@pytest.mark.parametrize("overlay", ["inset", "mouth"])
+def test_an_aid_to_lip_reading(
+    run: RunCommand, basics: tuple[object, ...], tracker: Path, here: Path, overlay: str
+) -> None:
+    """On the video of the speech itself."""
+    video = tracker / "toy01.mp4"
+    done = run(basics[0], video, *basics[2:], "-o", "a.mp4", "--overlay", overlay)
+    assert done == (0, ["a.mp4"], [])
+    shown, footage = decoded(here / "a.mp4").astype(int), decoded(video).astype(int)
+    assert abs(len(shown) - len(footage)) <= 1
+    count = min(len(shown), len(footage))
+    changed = (np.abs(shown[:count] - footage[:count]) > 40).any(axis=(0, 3))
+    rows, columns = np.nonzero(changed)
+    if overlay == "inset":
+        assert rows.min() > 288 * 0.55
+        assert columns.min() > 224 * 0.6
+    else:
+        assert 130 < rows.min() < rows.max() < 250
+        assert changed.mean() < 0.15
+
+
+@pytest.mark.parametrize(
+    ("options", "code", "words"),
+    [
+        (["--face", "missing.face"], 3, "missing.face: no such face"),
+        (["--face", "nobody"], 3, "nobody"),
+        (["--background", "missing.mp4"], 3, "missing.mp4: no such background"),
+        (["--overlay", "inset"], 3, "has no video stream"),
+        (["--overlay", "mouth"], 3, "no video"),
+        (["--fps", "0"], 3, "the frame rate is 0.0"),
+    ],
+)
+def test_films_that_cannot_be_made(
+    run: RunCommand, basics: tuple[object, ...], here: Path, options: list[str], code: int, words: str
+) -> None:
+    done = run(*basics, *options, "-o", "a.mp4")
+    assert is_one_error(done, code), done
+    assert words in done.err[0]
+    assert list(here.iterdir()) == []
+
+
+def test_options_of_filmed_faces_alone(
+    run: RunCommand, basics: tuple[object, ...], here: Path, toy_speech: Path
+) -> None:
+    """A drawn face has no background, and is no recording in which a mark would be needed."""
+    done = run(*basics[:-2], "-o", "a.mp4", "--overlay", "inset")
+    assert is_one_error(done, 3), done
+    done = run(*basics[:-2], "-o", "a.mp4", "--background", toy_speech)
+    assert is_one_error(done, 3), done
+    assert list(here.iterdir()) == []
+
+
+def test_a_face_of_a_later_version(
+    run: RunCommand, basics: tuple[object, ...], here: Path, filmed_face_file: Path
+) -> None:
+    newer = here.parent / "newer.face"
+    with zipfile.ZipFile(filmed_face_file) as old, zipfile.ZipFile(newer, "w") as new:
+        for name in old.namelist():
+            content = old.read(name)
+            header = json.dumps(json.loads(content) | {"version": VERSION + 1}) if name == HEADER else content
+            new.writestr(name, header)
+    for done in (run("face", "info", newer), run(*basics[:-1], newer, "-o", "a.mp4")):
+        assert is_one_error(done, 6)
+        assert f"face version {VERSION + 1}, this lipmotion reads version {VERSION}; upgrade lipmotion" in done.err[0]
+    assert list(here.iterdir()) == []
+
+
+def test_a_face_that_is_none(run: RunCommand, basics: tuple[object, ...], here: Path, toy_speech: Path) -> None:
+    wrong = here.parent / "wrong.face"
+    wrong.write_bytes(toy_speech.read_bytes())
+    for done in (run("face", "info", wrong), run(*basics[:-1], wrong, "-o", "a.mp4"), run("face", "info", toy_speech)):
+        assert is_one_error(done, 6)
+        assert "not a face" in done.err[0]
+    assert list(here.iterdir()) == []
+
+
+@pytest.mark.long
+def test_a_face_of_another_person(
+    run: RunCommand, basics: tuple[object, ...], here: Path, filmed_face: FilmedFace
+) -> None:
+    """The motion is mapped onto that person by the speech in the file."""
+    from dataclasses import replace
+
+    about = filmed_face.about | {"corpus": ["someone/else"]}
+    save_face(replace(filmed_face, about=about), here / "else.face")
+    assert run(*basics[:-1], "else.face", "-o", "a.mp4") == (0, ["a.mp4"], [])
+    save_face(replace(filmed_face, about=about, takes=()), here / "mute.face")
+    done = run(*basics[:-1], "mute.face", "-o", "b.mp4")
+    assert is_one_error(done, 3)
+    assert "0.00 s of speech with a measured face" in done.err[0]
+    assert sorted(path.name for path in here.iterdir()) == ["a.mp4", "else.face", "mute.face"]
+
+
+def test_speak(
+    run: RunCommand,
+    here: Path,
+    toy_model_file: Path,
+    filmed_face_file: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    stand_in_voice.install(monkeypatch)
+    done = run("speak", "mama", "--model", toy_model_file, "--face", filmed_face_file, "-o", "a.mp4")
+    assert (done.code, done.out) == (0, ["a.mp4"]), done
+    assert comment(here / "a.mp4").startswith("synthetic:")
+    done = run(
+        "speak", "mama", "--model", toy_model_file, "--face", filmed_face_file, "-o", "b.mp4", "--overlay", "inset"
+    )
+    assert is_one_error(done, 3)
+    assert "an overlay shows the video of the speech" in done.err[0]
+    assert [path.name for path in here.iterdir()] == ["a.mp4"]

@@ -1,0 +1,299 @@
+"""Filmed faces as files: there and back, and nothing but a whole face is read."""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+import zipfile
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lipmotion.appearance.person_arrays import APPEARANCE, PARTS, appearance_arrays, appearance_from_arrays
+from lipmotion.errors import ExportError, InputError, ModelFormatError
+from lipmotion.faces.filmed.face import (
+    BACKGROUND,
+    MOST_TAKES,
+    TAKE,
+    VERSION,
+    FilmedFace,
+    load_face,
+    read_face_header,
+    save_face,
+)
+from lipmotion.storage.archive import read_archive, read_archive_header, write_archive
+from lipmotion.storage.coded_video import STORED_VIDEO
+from lipmotion.types import Motion
+from pipeline.damage import DAMAGES, UNREADABLE, damaged
+
+CODED = ("appearance/mouths", "appearance/jaws", "background/data")
+"""Arrays of compressed pictures: their bytes are judged by the decoder."""
+
+
+@pytest.fixture(scope="module")
+def arrays(filmed_face: FilmedFace, tmp_path_factory: pytest.TempPathFactory) -> dict[str, np.ndarray]:
+    """The arrays of a face with few candidates, which is read in no time."""
+    whole, few = filmed_face.appearance, slice(8)
+    candidates = {name: getattr(whole, name)[few] for name in ("mouths", "mouth_codes", "jaws", "jaw_codes")}
+    path = tmp_path_factory.mktemp("small") / "small.face"
+    save_face(replace(filmed_face, appearance=replace(whole, **candidates)), path)
+    return read_archive(path)
+
+
+@pytest.fixture(scope="module")
+def header(filmed_face_file: Path) -> dict[str, object]:
+    found: dict[str, object] = read_archive_header(filmed_face_file)
+    return found
+
+
+def refusal(path: Path, header: dict[str, object], arrays: dict[str, np.ndarray]) -> str:
+    """Return the message with which a face of these arrays is refused; empty: it is read."""
+    write_archive(path, header, arrays, compressed=False)
+    try:
+        load_face(path)
+    except ModelFormatError as error:
+        message = str(error)
+        assert message.startswith(f"{path}: ")
+        assert "\n" not in message
+        return message
+    return ""
+
+
+def test_there_and_back(filmed_face: FilmedFace, filmed_face_file: Path) -> None:
+    again = load_face(filmed_face_file)
+    assert again.about == filmed_face.about
+    assert again.summary == filmed_face.summary
+    assert again.appearance.shape == filmed_face.appearance.shape
+    motion = filmed_face.takes[0].motion
+    codes, expected = again.appearance.of_motion(motion), filmed_face.appearance.of_motion(motion)
+    for name in ("mouth", "jaw", "chin_px"):
+        assert np.array_equal(getattr(codes, name), getattr(expected, name))
+    for name in ("mouths", "jaws"):
+        pictures, original = (getattr(face.appearance, name).astype(int) for face in (again, filmed_face))
+        assert np.abs(pictures - original).mean() < 1.5  # coded
+    assert np.array_equal(again.appearance.mouth_codes, filmed_face.appearance.mouth_codes)
+    assert np.array_equal(again.background.video.data, filmed_face.background.video.data)
+    assert np.array_equal(again.background.face_to_frame, filmed_face.background.face_to_frame)
+    assert np.array_equal(again.background.chin_px, filmed_face.background.chin_px)
+    for take, stored in zip(filmed_face.takes, again.takes, strict=True):
+        assert stored.sound.rate_hz == take.sound.rate_hz
+        assert stored.sound.samples == pytest.approx(take.sound.samples, abs=1e-4)
+        assert stored.motion.values == pytest.approx(take.motion.values, abs=1e-6)
+        assert (stored.motion.channels, stored.motion.rate_hz) == (take.motion.channels, take.motion.rate_hz)
+        assert np.array_equal(stored.seen, take.seen)
+
+
+def test_the_same_face_is_the_same_file(filmed_face: FilmedFace, filmed_face_file: Path, tmp_path: Path) -> None:
+    save_face(filmed_face, tmp_path / "again.face")
+    first, again = (read_archive(path) for path in (filmed_face_file, tmp_path / "again.face"))
+    coded = {"appearance/mouths"}  # x264 does not always write the same bytes for pictures of 72 × 56 px
+    assert [name for name in first if not np.array_equal(first[name], again[name]) and name not in coded] == []
+    assert filmed_face_file.stat().st_size < 5_000_000
+
+
+def test_a_face_without_speech(filmed_face: FilmedFace, tmp_path: Path) -> None:
+    save_face(replace(filmed_face, takes=()), tmp_path / "mute.face")
+    assert load_face(tmp_path / "mute.face").takes == ()
+
+
+def test_the_summary_says_what_it_is(filmed_face: FilmedFace) -> None:
+    summary = filmed_face.summary
+    assert summary["name"] == "toy"
+    assert summary["background"] == "2.0 s of 224 × 288 px at 25 frames a second"
+    assert summary["needs"] == "3 channels of tracked points, or eigenlips"
+    assert summary["jaw"].endswith("of the variance; 120 candidates")
+    assert summary["licence"] == "synthesised by lipmotion"
+
+
+def test_nothing_is_left_where_it_cannot_be_written(filmed_face: FilmedFace, tmp_path: Path) -> None:
+    with pytest.raises(ExportError):
+        save_face(filmed_face, tmp_path / "missing" / "a.face")
+    (tmp_path / "a.face").write_text("older")
+    broken = replace(filmed_face, about={"name": object()})
+    with pytest.raises(TypeError):
+        save_face(broken, tmp_path / "a.face")
+    assert [path.name for path in tmp_path.iterdir()] == ["a.face"]
+    assert (tmp_path / "a.face").read_text() == "older"
+
+
+def test_every_array_is_needed(arrays: dict[str, np.ndarray], header: dict[str, object], tmp_path: Path) -> None:
+    assert refusal(tmp_path / "a.face", header, arrays) == ""
+    read = [
+        name
+        for name in arrays
+        if "missing" not in refusal(tmp_path / "a.face", header, {key: arrays[key] for key in arrays if key != name})
+    ]
+    assert read == []
+
+
+def test_every_array_is_declared(arrays: dict[str, np.ndarray]) -> None:
+    named = {f"appearance/{name}" for name in APPEARANCE} | {
+        f"background/{name}" for name in (*BACKGROUND, *STORED_VIDEO)
+    }
+    named |= {f"take{number}/{name}" for number in range(2) for name in TAKE}
+    parts = tuple(f"appearance/{part}/" for part in PARTS)
+    assert {name for name in arrays if not name.startswith(parts)} == named
+    assert all(any(name.startswith(part) for name in arrays) for part in parts)
+
+
+UNDECLARED = """more appearance/more appearance/mouth/more appearance/from_motion/more appearance/noise/more
+appearance/noises background/more take0/more take2/sound takes/more jaw/mean""".split()
+
+
+@pytest.mark.parametrize("more", UNDECLARED)
+def test_an_array_that_nothing_declares(
+    arrays: dict[str, np.ndarray], header: dict[str, object], tmp_path: Path, more: str
+) -> None:
+    message = refusal(tmp_path / "a.face", header, arrays | {more: np.zeros(3)})
+    assert "undeclared '" in message
+    assert more.rpartition("/")[2] in message
+
+
+@pytest.mark.long
+def test_damaged_arrays_are_refused(arrays: dict[str, np.ndarray], header: dict[str, object], tmp_path: Path) -> None:
+    chosen = {damage: DAMAGES[damage] for damage in UNREADABLE}
+    small = {name: array for name, array in arrays.items() if name not in CODED and array.dtype.kind in "fiub"}
+    read, tried = [], 0
+    for name, what, changed in damaged(small, chosen):
+        tried += 1
+        if not refusal(tmp_path / "a.face", header, {**arrays, name: changed[name]}):
+            read.append(f"{name}: {what}")
+    assert tried > 100
+    # sound and which frames were seen may be of any length, but for the frames of the motion beside them
+    assert read == [f"take{number}/sound: a row less" for number in range(2)]
+
+
+@pytest.mark.parametrize("name", CODED)
+@pytest.mark.parametrize("what", ["cut off", "emptied", "zeros", "noise", "a byte less", "twice", "of other numbers"])
+def test_damaged_pictures_are_refused_or_shown(
+    arrays: dict[str, np.ndarray], header: dict[str, object], tmp_path: Path, name: str, what: str
+) -> None:
+    """A stream whose frames are not all there is refused before anything is shown of it."""
+    data = arrays[name]
+    changed = {
+        "cut off": data[: len(data) // 2],
+        "emptied": data[:0],
+        "zeros": data * 0,
+        "noise": np.random.default_rng(0).integers(0, 256, len(data), np.uint8),
+        "a byte less": data[1:],
+        "twice": np.concatenate([data, data]),
+        "of other numbers": data.astype(np.float32),
+    }[what]
+    message = refusal(tmp_path / "a.face", header, arrays | {name: changed})
+    if (what, name) == ("a byte less", "background/data"):
+        return  # the start code may lack its zero
+    assert "damaged" in message or what == "a byte less"
+
+
+CHANGES: dict[str, tuple[dict[str, np.ndarray], str]] = {
+    "scale 0": ({"appearance/scale": np.array(0)}, "scale holds 0 to 0, required 1 to 4"),
+    "scale 2": ({"appearance/scale": np.array(2)}, "pictures of shape"),
+    "a narrow face": ({"appearance/shape": np.array([3.0, 110.0])}, "a lower face of 3 px to 110 px below the eyes"),
+    "a deep chin": ({"appearance/shape": np.array([44.0, 160.0])}, "a lower face of 44 px to 160 px below the eyes"),
+    "no light": ({"appearance/light": np.zeros(3)}, "light holds 0 to 0, required 1 to 255"),
+    "a flat place": ({"background/face_to_frame": np.zeros((50, 2, 3))}, "flat places of the face"),
+    "other frames": ({"background/face_to_frame": np.ones((49, 2, 3))}, r"face_to_frame of shape \(49, 2, 3\)"),
+    "an odd size": ({"background/size": np.array([287, 224])}, "frames of odd sizes"),
+    "huge frames": ({"background/size": np.array([9000, 9000])}, "frames of 9000 × 9000 pixels"),
+    "no rate": ({"background/rate_hz": np.array(0.0)}, "rate_hz holds 0 to 0"),
+    "more frames": ({"background/count": np.array(51)}, "50 frames, required 51"),
+    "a slow sound": ({"take0/sound_rate_hz": np.array(100)}, "sound_rate_hz holds 100 to 100"),
+    "other motion": ({"take0/motion": np.zeros((63, 2), np.float32)}, "motion of shape"),
+    "no covariance": ({"appearance/noise/noise_covariance": -np.eye(3)}, "is no covariance matrix"),
+    "no basis": ({"appearance/mouth/basis": np.ones((3, 30, 4032), np.float32)}, "basis"),
+    "small mouths": ({"appearance/mouth/size": np.array([28, 144])}, r"pictures of the mouth of \(28, 144\) px"),
+}
+
+
+@pytest.mark.parametrize("what", CHANGES)
+def test_arrays_that_do_not_fit_together(
+    arrays: dict[str, np.ndarray], header: dict[str, object], tmp_path: Path, what: str
+) -> None:
+    changed, words = CHANGES[what]
+    assert re.search(words, refusal(tmp_path / "a.face", header, {**arrays, **changed}))
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"version": VERSION + 1}, f"face version {VERSION + 1}, this lipmotion reads version {VERSION}; upgrade"),
+        ({"version": None}, "face version None"),
+        ({"format": "lipmotion.model"}, "not a face; give a file that `lipmotion face build` wrote"),
+        ({"takes": -1}, f"-1 takes, required 0 to {MOST_TAKES}"),
+        ({"takes": 10**9}, f"1000000000 takes, required 0 to {MOST_TAKES}"),
+        ({"takes": "two"}, "the face is damaged"),
+        ({"takes": None}, "the face is damaged"),
+        ({"takes": 1}, "undeclared 'take1/"),
+        ({"takes": 3}, "is missing"),
+        ({"about": ["toy"]}, "about is no table"),
+        ({"channels": [{"name": "opening"}]}, "the face is damaged"),
+        ({"channels": [{"name": "opening", "unit": "eye_distance"}]}, "motion of shape"),
+        ({"channels": [{"name": "=opening", "unit": "a"}] * 3}, "formula"),
+        ({"channels": [{"name": "opening", "unit": "a"}] * 3}, "repeat"),
+        ({"channels": 7}, "the face is damaged"),
+    ],
+)
+def test_other_headers(
+    arrays: dict[str, np.ndarray], header: dict[str, object], tmp_path: Path, changed: dict[str, object], words: str
+) -> None:
+    message = refusal(tmp_path / "a.face", header | changed, arrays)
+    assert words in message
+
+
+def files(face: Path) -> Iterator[tuple[str, bytes]]:
+    """Files that are no faces."""
+    content = face.read_bytes()
+    yield "text", b"a face\n" * 100
+    yield "truncated", content[: len(content) // 2]
+    yield "without its end", content[:-1]
+    yield "without its beginning", content[100:]
+    for place in (len(content) // 3, len(content) // 2):
+        yield f"changed at {place}", content[:place] + bytes([content[place] ^ 0x55]) + content[place + 1 :]
+    made = io.BytesIO()
+    with zipfile.ZipFile(made, "w") as file:
+        file.writestr("header.json", json.dumps({"format": "lipmotion.face", "version": VERSION}))
+    yield "a header alone", made.getvalue()
+    made = io.BytesIO()
+    with zipfile.ZipFile(made, "w") as file:
+        file.writestr("header.json", "[1, 2]")
+    yield "a list", made.getvalue()
+    made = io.BytesIO()
+    with zipfile.ZipFile(made, "w") as file:
+        file.writestr("other.txt", "face")
+    yield "another zip", made.getvalue()
+
+
+def test_what_is_no_face(filmed_face_file: Path, tmp_path: Path, toy_model_file: Path) -> None:
+    path = tmp_path / "a.face"
+    for what, content in (*files(filmed_face_file), ("a model", toy_model_file.read_bytes())):
+        path.write_bytes(content)
+        with pytest.raises(ModelFormatError) as caught:
+            load_face(path)
+        message = str(caught.value)
+        assert message.startswith(f"{path}: "), what
+        assert "\n" not in message, what
+        assert "build" in message, (what, message)
+    with pytest.raises(InputError, match=r"missing\.face: no such file"):
+        load_face(tmp_path / "missing.face")
+    path.write_bytes(b"")
+    with pytest.raises(InputError, match="the file is empty; give a face"):
+        load_face(path)
+    with pytest.raises(InputError, match="is a folder"):
+        load_face(tmp_path)
+
+
+def test_a_header_is_read_without_the_pictures(filmed_face_file: Path) -> None:
+    header = read_face_header(filmed_face_file)
+    assert header["takes"] == 2
+    assert [channel["name"] for channel in header["channels"]] == ["opening", "width", "outer"]
+
+
+def test_an_appearance_as_arrays_and_back(filmed_face: FilmedFace) -> None:
+    arrays = appearance_arrays(filmed_face.appearance)
+    again = appearance_from_arrays(arrays)
+    motion = Motion(filmed_face.takes[1].motion.values, 25.0, filmed_face.takes[1].motion.channels)
+    assert np.array_equal(again.of_motion(motion).mouth, filmed_face.appearance.of_motion(motion).mouth)

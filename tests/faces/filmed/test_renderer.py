@@ -1,0 +1,210 @@
+"""Stitching: the footage comes back where nothing is to change, and what is to change is what was drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from lipmotion.appearance.chin import moved_part
+from lipmotion.appearance.lower_face import mouth_ellipse, mouth_part, region_map, relit
+from lipmotion.appearance.person import Appearance, FaceCodes
+from lipmotion.appearance.placing import cut
+from lipmotion.appearance.refinement import STEADY
+from lipmotion.errors import InputError
+from lipmotion.faces.filmed.face import FilmedFace
+from lipmotion.faces.filmed.renderer import BATCH, Background, Stitcher, StitchingOptions
+from lipmotion.testing.toy import toy_motion, toy_sentences
+from lipmotion.testing.toy_face import FRAME_HEIGHT, FRAME_WIDTH, toy_chin_px, toy_frames, toy_places
+from lipmotion.types import Motion
+
+FRAMES = BATCH + 8
+"""More than one batch."""
+MOUTH_ALONE = StitchingOptions(jaw=False)
+
+
+@pytest.fixture(scope="module")
+def appearance(filmed_face: FilmedFace) -> Appearance:
+    return filmed_face.appearance
+
+
+@pytest.fixture(scope="module")
+def spoken() -> Motion:
+    """The middle of a sentence, which the mouth opens and closes in."""
+    motion = toy_motion(toy_sentences(4)[1].units, 25.0)
+    return Motion(motion.values[10 : 10 + FRAMES], 25.0, motion.channels)
+
+
+@pytest.fixture(scope="module")
+def backgrounds(spoken: Motion) -> list[Background]:
+    return footage_of(spoken)
+
+
+def footage_of(motion: Motion, **more: float) -> list[Background]:
+    places = toy_places(len(motion.values))
+    frames = toy_frames(motion, places, **more)  # type: ignore[arg-type]
+    chins = toy_chin_px(motion)
+    return [Background(frame, place, float(chin)) for frame, place, chin in zip(frames, places, chins, strict=True)]
+
+
+def closed(motion: Motion) -> Motion:
+    """The same person, silent."""
+    return Motion(np.tile([[0.0, 0.55, 0.22]], (len(motion.values), 1)), motion.rate_hz, motion.channels)
+
+
+def codes_in(appearance: Appearance, backgrounds: list[Background]) -> FaceCodes:
+    """What the lower face is like in the footage itself."""
+    faces = [cut(each.frame, region_map(each.face_to_frame, 1), (128, 128)) for each in backgrounds]
+    mouths = np.clip(np.rint(np.stack(faces)), 0, 255).astype(np.uint8)[(slice(None), *mouth_part(1))]
+    chins = np.array([each.chin_px for each in backgrounds], np.float32)
+    return replace(appearance.of_mouths(mouths), chin_px=chins)
+
+
+def part_in_frame(part: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """Return which pixels of the frame look at a part of the lower face, or have a neighbour that does."""
+    rows, columns = np.mgrid[:FRAME_HEIGHT, :FRAME_WIDTH]
+    to_frame = region_map(place, 1)
+    position = np.linalg.solve(to_frame[:, :2], np.stack([columns.ravel(), rows.ravel()]) - to_frame[:, 2:])
+    x, y = (np.floor(each).astype(int) for each in position)
+    found = np.zeros(rows.size, bool)
+    for right in (0, 1):
+        for down in (0, 1):
+            inside = (x + right >= 0) & (x + right < 128) & (y + down >= 0) & (y + down < 128)
+            found[inside] |= part[y[inside] + down, x[inside] + right]
+    return found.reshape(rows.shape)
+
+
+def stitched(appearance: Appearance, codes: FaceCodes, backgrounds: list[Background], **options: object) -> np.ndarray:
+    """Return the frames [shape=(T, H, W, 3)], whole numbers."""
+    stitcher = Stitcher(appearance, StitchingOptions(**options))  # type: ignore[arg-type]
+    return np.stack(list(stitcher.stitch(codes, backgrounds))).astype(int)
+
+
+@pytest.mark.parametrize("jaw", [True, False])
+def test_a_face_in_its_own_footage_is_that_footage(
+    appearance: Appearance, backgrounds: list[Background], jaw: bool
+) -> None:
+    made = stitched(appearance, codes_in(appearance, backgrounds), backgrounds, jaw=jaw)
+    footage = np.stack([each.frame for each in backgrounds]).astype(int)
+    part = moved_part(1) if jaw else mouth_ellipse(1)
+    inside = np.stack([part_in_frame(part, each.face_to_frame) for each in backgrounds])
+    difference = np.abs(made - footage)[inside]
+    assert difference.mean() < 3
+    assert np.percentile(difference, 95) < 10
+
+
+@pytest.mark.parametrize("jaw", [True, False])
+def test_outside_nothing_changes(
+    appearance: Appearance, backgrounds: list[Background], spoken: Motion, jaw: bool
+) -> None:
+    """To the bit; and the given frames are not changed."""
+    footage = np.stack([each.frame for each in backgrounds])
+    before = footage.copy()
+    codes = appearance.of_motion(Motion(spoken.values[::-1], 25.0, spoken.channels))
+    made = stitched(appearance, codes, backgrounds, jaw=jaw)
+    part = moved_part(1) if jaw else mouth_ellipse(1)
+    outside = ~np.stack([part_in_frame(part, each.face_to_frame) for each in backgrounds])
+    assert np.array_equal(made[outside], footage[outside])
+    assert (made[~outside] != footage[~outside]).mean() > 0.3
+    assert np.array_equal(np.stack([each.frame for each in backgrounds]), before)
+    assert outside.mean() > 0.5
+
+
+def test_a_silent_mouth_onto_a_talking_one(
+    appearance: Appearance, backgrounds: list[Background], spoken: Motion
+) -> None:
+    """The footage's own mouth does not shine through, and its chin goes up."""
+    silent = closed(spoken)
+    made = stitched(appearance, appearance.of_motion(silent), backgrounds)
+    wanted = np.stack([each.frame for each in footage_of(silent, noise=0.0)]).astype(int)
+    footage = np.stack([each.frame for each in backgrounds]).astype(int)
+    inside = np.stack([part_in_frame(moved_part(1), each.face_to_frame) for each in backgrounds])
+    talks = spoken["opening"] > 0.12
+    assert talks.sum() >= 4
+    errors = [np.square((each - wanted)[talks][inside[talks]]).mean() for each in (made, footage)]
+    assert errors[0] < 0.25 * errors[1]
+    dark = [(each < 90).all(axis=3) & inside for each in (made, footage)]
+    assert dark[1][talks].sum(axis=(1, 2)).min() > 100
+    assert dark[0].sum(axis=(1, 2)).max() < 60
+
+
+def test_a_talking_mouth_onto_a_silent_one(appearance: Appearance, spoken: Motion) -> None:
+    backgrounds = footage_of(closed(spoken))
+    made = stitched(appearance, appearance.of_motion(spoken), backgrounds)
+    inside = np.stack([part_in_frame(mouth_ellipse(1), each.face_to_frame) for each in backgrounds])
+    dark = ((made < 90).all(axis=3) & inside).sum(axis=(1, 2))
+    assert np.corrcoef(dark, spoken["opening"])[0, 1] > 0.85
+
+
+@pytest.mark.parametrize("gains", [(0.7, 0.7, 0.7), (1.1, 0.9, 0.8)])
+def test_the_light_is_that_of_the_footage(
+    appearance: Appearance, backgrounds: list[Background], gains: tuple[float, float, float]
+) -> None:
+    """Under another lamp the same frames are made, under that lamp."""
+    lamp = np.array([gains])
+    lit = [replace(each, frame=relit(each.frame[None], lamp)[0]) for each in backgrounds[:8]]
+    codes = appearance.of_motion(Motion(np.tile([[0.2, 0.55, 0.42]], (8, 1)), 25.0, TOY))
+    plain, made = (stitched(appearance, codes, each) for each in (backgrounds[:8], lit))
+    wanted = relit(plain.astype(np.uint8), np.repeat(lamp, 8, axis=0)).astype(int)
+    assert np.abs(made - wanted).mean() < 0.5
+    assert np.abs(made - wanted).max() <= 12
+
+
+TOY = toy_motion(toy_sentences(3)[0].units, 25.0).channels
+
+
+def test_frames_do_not_depend_on_the_batch_they_are_made_in(
+    appearance: Appearance, backgrounds: list[Background], spoken: Motion
+) -> None:
+    """The detail of the mouth is chosen for the whole speech, and the noise of a frame is that of its number."""
+    codes = appearance.of_motion(spoken)
+    several = stitched(appearance, codes, backgrounds * 2, noise=True)
+    assert len(several) == FRAMES
+    again = stitched(appearance, codes, backgrounds, noise=True)
+    assert np.array_equal(several, again)
+    other = stitched(appearance, codes, backgrounds, noise=True, seed=1)
+    assert 0 < np.abs(other - again).mean() < 1
+
+
+def test_frames_are_taken_a_few_at_a_time(appearance: Appearance, spoken: Motion) -> None:
+    backgrounds = footage_of(closed(spoken))[:4]
+    taken = 0
+
+    def endless() -> Iterator[Background]:
+        nonlocal taken
+        while True:
+            taken += 1
+            yield backgrounds[taken % 4]
+
+    frames = Stitcher(appearance, MOUTH_ALONE).stitch(appearance.of_motion(spoken), endless())
+    next(frames)
+    assert taken == BATCH
+    assert len(list(frames)) == FRAMES - 1
+    assert taken == FRAMES
+
+
+def test_too_few_frames_of_background(appearance: Appearance, backgrounds: list[Background], spoken: Motion) -> None:
+    frames = Stitcher(appearance).stitch(appearance.of_motion(spoken), backgrounds[:-1])
+    with pytest.raises(InputError, match=f"{FRAMES - 1} frames of background, required {FRAMES}; give longer footage"):
+        list(frames)
+
+
+def test_mouths_of_chosen_codes(appearance: Appearance) -> None:
+    """The eigenlips of recorded mouths, far apart from one another, are these mouths."""
+    options = StitchingOptions(mouth=replace(STEADY, steadiness=0.0, neighbours=1))
+    chosen = np.arange(0, len(appearance.mouths), 6)
+    zeros = np.zeros((len(chosen), appearance.jaw_codes.shape[1]), np.float32)
+    codes = FaceCodes(appearance.mouth_codes[chosen], zeros, zeros[:, 0])
+    assert len(chosen) > BATCH
+    made = np.stack(list(Stitcher(appearance, options).mouths(codes))).astype(int)
+    assert np.abs(made - appearance.mouths[chosen]).max() <= 1
+    blurred = np.stack(list(Stitcher(appearance, StitchingOptions(mouth=None)).mouths(codes)))
+    assert np.array_equal(blurred, appearance.mouth.restore(codes.mouth))
+
+
+def test_no_frames(appearance: Appearance) -> None:
+    codes = FaceCodes(*(np.zeros((0, n), np.float32) for n in (90, 36)), np.zeros(0, np.float32))
+    assert list(Stitcher(appearance).stitch(codes, [])) == []
+    assert list(Stitcher(appearance).mouths(codes)) == []

@@ -1,0 +1,175 @@
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lipmotion.errors import InputError
+from lipmotion.faces import Staging, face_named, staged_face
+from lipmotion.faces.portrait.layered import MOUTHS, chosen_mouths
+from lipmotion.faces.portrait.pose import MouthPose
+from lipmotion.faces.portrait.svg_document import drawing_of
+from lipmotion.faces.portrait.svg_painting import painted
+from lipmotion.testing import check_face
+from lipmotion.types import Channel, Motion, Span, Timeline, Unit
+
+ROBOT = Path(__file__).parents[2] / "examples" / "robot.svg"
+WHOLE = np.array([[1.0, 0, 0], [0, 1, 0]])
+MOUTH_ONLY = '<g id="mouth-rest"><rect width="10" height="5"/></g>'
+
+
+def svg(inside: str, box: str = "0 0 40 40") -> bytes:
+    return f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="{box}">{inside}</svg>'.encode()
+
+
+def picture(inside: str, size: int = 40) -> np.ndarray:
+    """Return the cover of shapes [shape=(size, size)]."""
+    shapes = [(shape, (0.0, 0.0)) for _, shape in drawing_of(svg(inside)).shapes]
+    return painted(shapes, WHOLE, size, size)[..., 3]
+
+
+def test_the_example_keeps_the_contract():
+    check_face(face_named(str(ROBOT)))
+
+
+@pytest.mark.parametrize(
+    ("shape", "area"),
+    [
+        ('<rect x="5" y="5" width="20" height="10"/>', 200),
+        ('<rect x="5" y="5" width="20" height="20" rx="10"/>', np.pi * 100),
+        ('<circle cx="20" cy="20" r="10"/>', np.pi * 100),
+        ('<ellipse cx="20" cy="20" rx="15" ry="5"/>', np.pi * 75),
+        ('<polygon points="5,5 25,5 25,25"/>', 200),
+        ('<path d="M5 5h20v10H5z"/>', 200),
+        ('<path d="M10 20a10 10 0 1 1 20 0a10 10 0 1 1-20 0z"/>', np.pi * 100),
+        ('<path d="M10 10 C10 10 30 10 30 10 S30 30 30 30 Q20 30 10 30 z"/>', 400),
+        ('<path d="M5 5H35V35H5zM15 15V25H25V15z"/>', 800),
+        ('<path fill-rule="evenodd" d="M5 5H35V35H5zM15 15H25V25H15z"/>', 800),
+        ('<path d="M5 5H35V35H5zM15 15H25V25H15z"/>', 900),
+        ('<line x1="5" y1="20" x2="35" y2="20" stroke="red" stroke-width="4"/>', 120 + np.pi * 4),
+        ('<g transform="translate(10,10) scale(2)"><rect width="5" height="5"/></g>', 100),
+        ('<rect transform="rotate(90 20 20)" x="10" y="18" width="20" height="4"/>', 80),
+        ('<rect width="10" height="10" fill="none"/>', 0),
+        ('<rect width="10" height="10" opacity="0.5"/>', 50),
+        ('<rect width="10" height="10" style="fill:#ff0000;fill-opacity:.25"/>', 25),
+    ],
+)
+def test_shapes_cover_what_they_should(shape, area):
+    assert picture(shape).sum() == pytest.approx(area, rel=0.06, abs=12)
+
+
+def test_colours_and_order():
+    drawing = drawing_of(svg('<rect width="40" height="40" fill="#f00"/><rect width="20" height="40" fill="blue"/>'))
+    layer = painted([(shape, (0.0, 0.0)) for _, shape in drawing.shapes], WHOLE, 40, 40)
+    assert layer[20, 10].tolist() == [0, 0, 255, 1]
+    assert layer[20, 30].tolist() == [255, 0, 0, 1]
+
+
+@pytest.mark.parametrize(
+    ("inside", "words"),
+    [
+        ('<image href="http://host/a.png"/>', "not read|reference"),
+        ('<rect fill="url(#a)" width="1" height="1"/>', "reference"),
+        ('<g style="filter:url(file:///etc/passwd)"><rect width="1" height="1"/></g>', "reference"),
+        ('<use xmlns:xlink="http://www.w3.org/1999/xlink" xlink:href="other.svg#a"/>', "not read|reference"),
+        ("<script>alert(1)</script>", "<script> is not read"),
+        ('<rect width="1" height="1" onclick="x()"/>', "script"),
+        ("<style>@import url(a.css)</style>", "<style> is not read"),
+        ("<text>a</text>", "<text> is not read"),
+        ("<foreignObject/>", "not read"),
+        ('<path d="M 0 0 L 1"/>', "ends within"),
+        ('<path d="M 0 0 X 1"/>', "cannot be read"),
+        ('<path d="1 2 3"/>', "without a command"),
+        ('<rect width="wide" height="1"/>', "width is 'wide'"),
+        ('<rect width="1" height="1" fill="nocolour"/>', "required a plain colour"),
+        ('<polygon points="1 2 3"/>', "pairs"),
+        ('<g transform="rotate(a)"><rect width="1" height="1"/></g>', "transform"),
+        ("<g>" * 80 + "</g>" * 80, "deep"),
+        ("", "no shape"),
+    ],
+)
+def test_what_is_unsafe_or_would_be_drawn_wrongly_is_refused(inside, words):
+    with pytest.raises(InputError, match=words):
+        drawing_of(svg(inside))
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"", b"not xml", b"<html/>", b"<svg", b"\xff\xfe\x00", b'<svg viewBox="0 0 0 0"><rect/></svg>',
+        b'<!DOCTYPE svg [<!ENTITY a "b">]><svg>&a;</svg>', b'<!DOCTYPE svg [ <!ENTITY % x SYSTEM "file:///x"> ]><svg/>',
+    ],
+)  # fmt: skip
+def test_what_is_no_drawing_is_refused(data):
+    with pytest.raises(InputError):
+        drawing_of(data)
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.text(alphabet="MmLlHhVvCcSsQqTtAaZz0123456789.,- e", max_size=40))
+def test_any_path_is_read_or_refused(path):
+    try:
+        drawing = drawing_of(svg(f'<path d="{path}"/>'))
+    except InputError:
+        return
+    for _, shape in drawing.shapes:
+        assert all(np.isfinite(line.points).all() for line in shape.lines)
+
+
+def test_a_drawing_needs_a_resting_mouth_and_known_ones(tmp_path):
+    path = tmp_path / "a.svg"
+    path.write_bytes(svg('<g id="mouth-aa"><rect width="1" height="1"/></g>'))
+    with pytest.raises(InputError, match="no layer mouth-rest"):
+        face_named(str(path))
+    path.write_bytes(svg(MOUTH_ONLY + '<g id="mouth-q"><rect width="1" height="1"/></g>'))
+    with pytest.raises(InputError, match=r"mouth-q.*mouth-oo"):
+        face_named(str(path))
+    with pytest.raises(InputError, match="cannot be read"):
+        face_named(str(tmp_path / "none.svg"))
+
+
+def said(*phones: str) -> Timeline[Unit]:
+    return Timeline(tuple(Span(0.4 * n, 0.4 * n + 0.4, Unit(phone)) for n, phone in enumerate(phones)))
+
+
+def test_sounds_choose_their_mouths():
+    key = MOUTHS["rest"]
+    poses = [MouthPose(key.gap, teeth=0)] * 5
+    for name in ("fv", "aa", "oo", "th", "ee", "mbp"):
+        k = MOUTHS[name]
+        poses += [MouthPose(k.gap, k.width, tongue=k.tongue, tuck=k.tuck, protrusion=k.protrusion, teeth=k.teeth)] * 5
+    shown = chosen_mouths(poses, list(MOUTHS), 25.0)
+    assert shown[2::5] == ["rest", "fv", "aa", "oo", "th", "ee", "mbp"]
+
+
+def test_a_mouth_that_is_missing_is_replaced_and_closures_are_never_skipped():
+    poses = [MouthPose(0.2)] * 10 + [MouthPose(0.0, press=1.0)] + [MouthPose(0.2)] * 10
+    assert chosen_mouths(poses, ["rest", "eh"], 60.0) == ["eh"] * 10 + ["rest"] + ["eh"] * 10
+
+
+def test_mouths_do_not_flicker():
+    rng = np.random.default_rng(0)
+    poses = [MouthPose(float(gap)) for gap in 0.16 + 0.02 * rng.standard_normal(100)]
+    shown = chosen_mouths(poses, list(MOUTHS), 25.0)
+    alone = [chosen_mouths([pose], list(MOUTHS), 25.0)[0] for pose in poses]
+
+    def changes(names):
+        return sum(one != other for one, other in pairwise(names))
+
+    assert changes(shown) < 0.4 * changes(alone)
+
+
+def test_the_picture_has_the_shape_of_the_drawing_and_may_be_transparent(tmp_path):
+    path = tmp_path / "wide.svg"
+    ground = '<g id="background"><rect width="80" height="40" fill="#00ff00"/></g>'
+    path.write_bytes(svg(ground + f'<g id="head">{MOUTH_ONLY}</g>', "0 0 80 40"))
+    motion = Motion(np.zeros((3, 1)), 25.0, (Channel("opening"),))
+    frame = next(iter(staged_face(str(path), Staging(size=64)).render(motion, said("sil"))))
+    assert frame.shape == (64, 128, 3)
+    assert frame[60, 100].tolist() == [0, 255, 0]
+    clear = next(iter(staged_face(str(path), Staging(size=64, background="transparent")).render(motion, said("sil"))))
+    assert clear.shape == (64, 128, 4)
+    assert clear[60, 100, 3] == 0
+    assert clear[..., 3].max() > 200

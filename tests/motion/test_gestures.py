@@ -1,0 +1,77 @@
+import numpy as np
+import pytest
+
+from lipmotion.motion.gestures import GESTURES, TIP_OUT, gesture_curves, pause_curve, with_gestures
+from lipmotion.types import WEIGHT, Channel, Motion, Span, Timeline, Unit
+
+TIME_S = np.arange(0, 1.2, 0.01)
+
+
+def said(*phones: str, each_s: float = 0.12) -> Timeline[Unit]:
+    return Timeline(tuple(Span(i * each_s, (i + 1) * each_s, Unit(phone)) for i, phone in enumerate(phones)))
+
+
+def middle(phones: tuple[str, ...], number: int, name: str) -> float:
+    time_s = np.array([(number + 0.5) * 0.12])
+    return float(gesture_curves(said(*phones), time_s, [name])[name][0])
+
+
+@pytest.mark.parametrize(
+    ("name", "phone"),
+    [("lip_tuck", "f"), ("lip_tuck", "v"), ("tongue", "th"), ("tongue", "dh"), ("protrusion", "uw"),
+     ("protrusion", "w"),
+     ("spread", "iy"), ("lip_press", "p"), ("lip_press", "b"), ("lip_press", "m"), ("teeth", "s")],
+)  # fmt: skip
+def test_a_phone_reaches_its_target_whatever_is_beside_it(name, phone):
+    for left in ("aa", "iy", "uw", "m", "f", "th", "sil"):
+        if left != phone:
+            assert middle((left, phone, "aa"), 1, name) > 0.85
+
+
+@pytest.mark.parametrize("phone", ["l", "t", "d", "n"])
+def test_the_tip_of_the_tongue_is_up_but_not_out(phone):
+    assert 0.4 < middle(("aa", phone, "aa"), 1, "tongue") < 0.75 < TIP_OUT
+
+
+def test_lips_round_before_the_vowel_that_needs_it():
+    assert middle(("s", "t", "uw"), 1, "protrusion") > 0.3
+    assert middle(("s", "t", "iy"), 1, "protrusion") < 0.05
+
+
+def test_no_tuck_while_the_lips_are_closed():
+    assert middle(("f", "m", "v"), 1, "lip_tuck") < 0.05
+
+
+@pytest.mark.parametrize("pause", ["sil", "sp"])
+def test_teeth_are_hidden_in_pauses(pause):
+    assert middle(("s", pause, "s"), 1, "teeth") < 0.1
+
+
+def test_curves_are_smooth_and_in_range():
+    curves = gesture_curves(said("f", "m", "th", "uw", "s", "w", "l", "sil"), TIME_S)
+    assert tuple(curves) == GESTURES
+    for curve in curves.values():
+        assert (curve >= 0).all()
+        assert (curve <= 1).all()
+        assert np.abs(np.diff(curve)).max() < 0.4
+
+
+def test_without_phones_there_is_the_pose_of_speech():
+    curves = gesture_curves(Timeline(()), TIME_S)
+    assert curves.pop("teeth") == pytest.approx(np.full(len(TIME_S), 0.5))
+    assert not np.any(list(curves.values()))
+
+
+def test_channels_are_added_where_they_lack():
+    motion = Motion(np.full((50, 2), 0.3), 100.0, (Channel("opening"), Channel("tongue", WEIGHT)))
+    more = with_gestures(motion, said("f", "th"))
+    assert more.names == ("opening", "tongue", *(name for name in GESTURES if name != "tongue"))
+    assert more["tongue"] == pytest.approx(0.3)
+    assert more["lip_tuck"].max() > 0.9
+    assert with_gestures(more, said("f")) is more
+
+
+def test_short_pauses_are_none():
+    units = Timeline((Span(0.0, 0.3, Unit("aa")), Span(0.3, 0.34, Unit("sp")), Span(0.34, 0.8, Unit("aa"))))
+    assert not pause_curve(units, TIME_S).any()
+    assert pause_curve(said("aa", "sp", "aa"), TIME_S).max() == pytest.approx(1)

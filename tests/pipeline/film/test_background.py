@@ -1,0 +1,138 @@
+"""Backgrounds: any length of some footage, and where the face is in it."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lipmotion.faces.filmed.face import FilmedFace
+from lipmotion.faces.filmed.renderer import Background
+from lipmotion.pipeline.film import background
+from lipmotion.pipeline.film.background import (
+    HEAD_PX,
+    BackgroundSequence,
+    best_background,
+    chin_px,
+    open_background,
+    pingpong,
+    stored_sequence,
+)
+from lipmotion.testing.toy import toy_sentences
+from lipmotion.testing.toy_face import SCALE, toy_chin_px, toy_frames, toy_places
+from pipeline.film.toy_footage import ToyVideo, footage_of, install, write_video
+
+
+@pytest.fixture(scope="module")
+def sequence(filmed_face: FilmedFace) -> BackgroundSequence:
+    return stored_sequence(filmed_face.background)
+
+
+@pytest.fixture(scope="module")
+def video(tmp_path_factory: pytest.TempPathFactory) -> ToyVideo:
+    return write_video(tmp_path_factory.mktemp("background") / "a.mp4", toy_sentences(3)[0])
+
+
+def numbers(sequence: BackgroundSequence, shown: list[Background]) -> list[int]:
+    """Return which frames of the footage were shown, by the place of the face."""
+    places = sequence.face_to_frame.reshape(len(sequence.chin_px), -1)
+    return [int(np.abs(places - each.face_to_frame.ravel()).sum(axis=1).argmin()) for each in shown]
+
+
+def test_forwards_and_backwards() -> None:
+    assert pingpong(4, 12).tolist() == [0, 1, 2, 3, 2, 1, 0, 1, 2, 3, 2, 1]
+    assert pingpong(1, 3).tolist() == [0, 0, 0]
+    assert pingpong(2, 5).tolist() == [0, 1, 0, 1, 0]
+    assert pingpong(5, 0).tolist() == []
+
+
+@pytest.mark.parametrize("count", [1, 7, 50, 51, 173])
+def test_any_length(sequence: BackgroundSequence, count: int) -> None:
+    shown = list(sequence.frames(count, 25.0))
+    assert len(shown) == count
+    wanted = pingpong(50, count).tolist()
+    assert numbers(sequence, shown) == wanted
+    for number, each in zip(wanted, shown, strict=True):
+        assert each.chin_px == pytest.approx(sequence.chin_px[number])
+    steps = [np.abs(a.frame.astype(int) - b.frame).mean() for a, b in pairwise(shown)]
+    assert max(steps, default=0.0) < 8  # no jump where it turns
+
+
+@pytest.mark.parametrize(
+    ("rate_hz", "frames"), [(25.0, 60), (30.0, 70), (50.0, 120), (60.0, 140), (12.5, 30), (29.97, 70)]
+)
+def test_any_rate(sequence: BackgroundSequence, rate_hz: float, frames: int) -> None:
+    shown = numbers(sequence, list(sequence.frames(frames, rate_hz)))
+    wanted_s = np.arange(frames) / rate_hz
+    there = np.minimum(wanted_s * 25, 49) - np.maximum(wanted_s * 25 - 49, 0)  # back again after its end
+    assert len(shown) == frames
+    assert np.abs(np.array(shown) - there).max() <= 1.0
+
+
+def test_frames_are_those_that_were_filmed(sequence: BackgroundSequence, filmed_face: FilmedFace) -> None:
+    (first,) = sequence.frames(1, 25.0)
+    motion = filmed_face.takes[0].motion
+    drawn = next(toy_frames(motion, toy_places(len(motion.values))))
+    assert np.abs(first.frame.astype(int) - drawn).mean() < 2
+
+
+def test_the_face_box_holds_the_head_in_every_frame(sequence: BackgroundSequence) -> None:
+    left, top, right, bottom = sequence.face_box
+    for place in sequence.face_to_frame:
+        for x in HEAD_PX[::2]:
+            for y in HEAD_PX[1::2]:
+                across, down = place @ [x, y, 1]
+                assert left - 1e-9 <= across <= right + 1e-9
+                assert top - 1e-9 <= down <= bottom + 1e-9
+    assert right - left < (HEAD_PX[2] - HEAD_PX[0]) * SCALE + 20
+
+
+def test_a_larger_mouth_in_the_same_place(sequence: BackgroundSequence) -> None:
+    middle = np.array([0.0, 76.0, 1.0])
+    larger = sequence.enlarged(1.3)
+    for old, new in zip(sequence.face_to_frame, larger.face_to_frame, strict=True):
+        assert new @ middle == pytest.approx(old @ middle)
+        assert new[:, :2] == pytest.approx(1.3 * old[:, :2])
+    assert np.array_equal(larger.chin_px, sequence.chin_px)
+
+
+def test_the_chin_is_where_the_tracker_sees_it(video: ToyVideo) -> None:
+    found, drawn = chin_px(footage_of(video)), toy_chin_px(video.motion)
+    assert np.abs(found - drawn).max() < 4  # it is smoothed over about a frame
+    assert np.corrcoef(found, drawn)[0, 1] > 0.98
+
+
+def test_a_video_as_a_background(video: ToyVideo, monkeypatch: pytest.MonkeyPatch) -> None:
+    install(monkeypatch, {video.path: video}, {})
+    opened = open_background(video.path)
+    count = len(opened.chin_px)
+    assert count == len(video.motion.values)
+    shown = list(opened.frames(2 * count, 25.0))
+    assert numbers(opened, shown[:count]) == list(range(count))
+    assert np.abs(shown[0].frame.astype(int) - shown[-2].frame).max() == 0  # back at the beginning
+    assert opened.face_to_frame[:, :, 2] == pytest.approx(toy_places(count)[:, :, 2], abs=1.0)
+
+
+def test_the_best_background_is_the_longest(video: ToyVideo, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    other = write_video(tmp_path / "b.mp4", toy_sentences(4)[1])
+    monkeypatch.setattr(background, "registered_maps", lambda footage: footage.face_to_image)
+    footages = [footage_of(video), footage_of(other)]
+    longest = max(footages, key=len)
+    assert len(footages[0]) != len(footages[1])
+    best = best_background(footages)
+    assert len(best.video) == len(best.chin_px) == len(best.face_to_frame) == len(longest)
+    monkeypatch.setattr(background, "MOST_BACKGROUND_S", 1.0)
+    assert len(best_background(footages).video) == 25
+
+
+def test_frames_of_odd_sizes_are_cut(sequence: BackgroundSequence) -> None:
+    """H.264 with half the colours takes even sizes only."""
+
+    class OddGroups:
+        def frame(self, _: int) -> np.ndarray:
+            return np.zeros((101, 75, 3), np.uint8)
+
+    odd = BackgroundSequence(OddGroups, 25.0, sequence.face_to_frame, sequence.chin_px)  # type: ignore[arg-type]
+    assert {each.frame.shape for each in odd.frames(3, 25.0)} == {(100, 74, 3)}

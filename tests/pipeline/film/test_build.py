@@ -1,0 +1,201 @@
+"""A face built from videos of the drawn person, tracked without errors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lipmotion.errors import InputError
+from lipmotion.faces.filmed.face import FilmedFace, load_face, save_face
+from lipmotion.pipeline.film import build
+from lipmotion.pipeline.film.build import SILENT_DB, build_face
+from lipmotion.storage.archive import read_archive
+from lipmotion.testing.toy import toy_sentences
+from lipmotion.testing.toy_face import toy_chin_px
+from lipmotion.types import Item, Motion, Progress
+from pipeline.film.toy_footage import ToyVideo, footage_of, install, write_video
+
+SENTENCES = 5
+Videos = dict[Path, ToyVideo]
+Event = Progress | Item
+
+
+@pytest.fixture(scope="module")
+def videos(tmp_path_factory: pytest.TempPathFactory) -> Videos:
+    """About twelve seconds."""
+    folder = tmp_path_factory.mktemp("filmed") / "anna"
+    folder.mkdir()
+    found = [write_video(folder / f"{sentence.name}.mp4", sentence) for sentence in toy_sentences(SENTENCES)]
+    return {video.path.resolve(): video for video in found}
+
+
+@pytest.fixture
+def tracker(videos: Videos, monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """Installs a tracker without errors; in some videos it sees only some frames."""
+
+    def start(seen: dict[Path, np.ndarray] | None = None, more: Videos | None = None) -> None:
+        install(monkeypatch, videos | (more or {}), seen or {})
+
+    start()
+    return start
+
+
+def folder_of(videos: Videos) -> Path:
+    return next(iter(videos)).parent
+
+
+@pytest.fixture(scope="module")
+def built(videos: Videos) -> tuple[FilmedFace, list[Event]]:
+    events: list[Event] = []
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        install(monkeypatch, videos, {})
+        face = build_face(folder_of(videos), name="Anna", workers=1, monitor=events.append)
+    return face, events
+
+
+def test_what_was_built(built: tuple[FilmedFace, list[Event]], videos: Videos, tmp_path: Path) -> None:
+    face, _ = built
+    frames = sum(len(video.motion.values) for video in videos.values())
+    assert face.about == {
+        "name": "Anna",
+        "corpus": ["/".join(folder_of(videos).parts[-2:])],
+        "speaker": "",
+        "footage_s": round(frames / 25, 1),
+        "recordings": SENTENCES,
+    }
+    assert face.appearance.scale == 1
+    assert set(face.appearance.from_motion.names) == {"opening", "width", "outer", "y_152"}  # no depth
+    assert face.background.video.size == (288, 224)
+    assert len(face.takes) == SENTENCES
+    save_face(face, tmp_path / "a.face")
+    assert load_face(tmp_path / "a.face").summary == face.summary
+
+
+def test_motion_becomes_the_person(built: tuple[FilmedFace, list[Event]]) -> None:
+    face, _ = built
+    take = face.takes[2]
+    codes = face.appearance.of_motion(take.motion)
+    mouths = face.appearance.mouth.restore(codes.mouth)
+    dark = (mouths < 90).all(axis=3).sum(axis=(1, 2))
+    assert np.corrcoef(dark, take.motion["opening"])[0, 1] > 0.8
+    lips = Motion(take.motion.values[:, :3], 25.0, take.motion.channels[:3])
+    assert codes.chin_px == pytest.approx(toy_chin_px(lips), abs=3)
+
+
+def test_progress_rises_to_the_end(built: tuple[FilmedFace, list[Event]]) -> None:
+    _, events = built
+    progress = [event for event in events if isinstance(event, Progress)]
+    assert len(progress) == len(events) == SENTENCES + 3
+    values = [event.share for event in progress]
+    assert values == sorted(values)
+    assert values[-1] == pytest.approx(1.0)
+    stages = list(dict.fromkeys(event.stage for event in progress))
+    assert stages == ["tracking the face", "learning the face", "choosing the background"]
+    assert [event.step for event in progress[:SENTENCES]] == list(range(1, SENTENCES + 1))
+
+
+def test_the_speech_is_kept_with_its_motion(built: tuple[FilmedFace, list[Event]]) -> None:
+    face, _ = built
+    for take, sentence in zip(face.takes, toy_sentences(SENTENCES), strict=True):
+        assert take.sound.duration_s == pytest.approx(sentence.audio.duration_s, abs=0.1)
+        assert len(take.motion.values) / 25 == pytest.approx(take.sound.duration_s, abs=0.1)
+        assert take.motion.names[:3] == ("opening", "width", "outer")
+    assert sum(take.sound.duration_s for take in face.takes) < build.SPOKEN_TAKES_S + 1
+
+
+@pytest.mark.long
+@pytest.mark.usefixtures("tracker")
+def test_the_same_footage_is_the_same_face(
+    built: tuple[FilmedFace, list[Event]], videos: Videos, tmp_path: Path
+) -> None:
+    save_face(built[0], tmp_path / "a.face")
+    save_face(build_face(folder_of(videos), name="Anna", workers=1), tmp_path / "b.face")
+    first, again = (read_archive(tmp_path / name) for name in ("a.face", "b.face"))
+    assert first.keys() == again.keys()
+    coded = {"appearance/mouths"}  # x264 does not always write the same bytes for pictures of 72 × 56 px
+    assert [name for name in first if not np.array_equal(first[name], again[name]) and name not in coded] == []
+
+
+@pytest.mark.usefixtures("tracker")
+def test_short_footage_is_refused(videos: Videos) -> None:
+    video = next(iter(videos))
+    with pytest.raises(InputError) as caught:
+        build_face(video, workers=1)
+    seconds = len(videos[video].motion.values) / 25
+    assert str(caught.value) == (
+        f"{video}: {seconds:.1f} s of footage with the face, required 10 s or more, 60 s of varied speech for good "
+        "pictures; give a longer video, or a folder of several"
+    )
+
+
+@pytest.mark.long
+def test_what_is_not_enough_is_said(
+    videos: Videos, tracker: Callable[..., None], caplog: pytest.LogCaptureFixture
+) -> None:
+    """Frames in which the face is not seen do not count."""
+    half = {path: np.arange(200) % 2 == 0 for path in list(videos)[:1]}
+    tracker(half)
+    face = build_face(folder_of(videos), workers=1)
+    frames = sum(len(video.motion.values) for video in videos.values())
+    first = len(next(iter(videos.values())).motion.values)
+    assert face.about["footage_s"] == pytest.approx((frames - first / 2) / 25, abs=0.1)
+    assert "s of footage with the face; with 60 s of varied speech the mouth would be truer" in caplog.text
+    assert face.about["name"] == "anna"
+    tracker({path: np.arange(200) % 5 == 0 for path in videos})
+    with pytest.raises(InputError, match=r"2\.\d s of footage with the face, required 10 s or more"):
+        build_face(folder_of(videos), workers=1)
+
+
+@pytest.mark.long
+@pytest.mark.usefixtures("tracker")
+def test_recordings_that_cannot_be_used_are_left_out(videos: Videos, monkeypatch: pytest.MonkeyPatch) -> None:
+    def film(path: Path, *more: object) -> object:
+        if path.name == "toy00.mp4":
+            raise InputError(f"{path}: no face in 60 of 60 frames")
+        return whole(path, *more)  # type: ignore[arg-type]
+
+    whole = build.track_footage
+    monkeypatch.setattr(build, "track_footage", film)
+    monkeypatch.setattr(build, "LEAST_FOOTAGE_S", 5.0)
+    events: list[Event] = []
+    face = build_face(folder_of(videos), workers=1, monitor=events.append)
+    assert face.about["recordings"] == SENTENCES - 1
+    (skipped,) = (event for event in events if isinstance(event, Item))
+    assert (skipped.name, skipped.outcome) == ("toy00", "skipped")
+    assert "no face in 60 of 60 frames" in skipped.reason
+    with pytest.raises(InputError, match=r"none of 1 recordings can be used; the first: .*no face in 60 of 60 frames"):
+        build_face(folder_of(videos) / "toy00.mp4", workers=1)
+
+
+@pytest.mark.long
+def test_footage_without_sound(tracker: Callable[..., None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The face is built; its jaw cannot follow the energy, and other people's motion cannot be mapped onto it."""
+    monkeypatch.setattr(build, "LEAST_FOOTAGE_S", 2.0)
+    monkeypatch.setattr(build, "_sound", lambda _: None)
+    video = write_video(tmp_path / "mute.mp4", toy_sentences(3)[0])
+    tracker(more={video.path.resolve(): video})
+    face = build_face(video.path, workers=1)
+    assert face.takes == ()
+    codes = face.appearance.of_motion(footage_of(video).track.motion)
+    level = face.appearance.with_jaw_of_sound(codes, np.full(len(codes), SILENT_DB))
+    assert np.isfinite(level.chin_px).all()
+    assert level.chin_px == pytest.approx(np.full(len(codes), toy_chin_px(video.motion).mean()), abs=1)
+
+
+@pytest.mark.long
+def test_fast_video_is_learned_from_in_part(
+    tracker: Callable[..., None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of 60 frames a second every second is enough; seconds are counted, not frames."""
+    monkeypatch.setattr(build, "LEAST_FOOTAGE_S", 2.0)
+    video = write_video(tmp_path / "fast.mp4", toy_sentences(3)[0], 60.0)
+    tracker(more={video.path.resolve(): video})
+    face = build_face(video.path, workers=1)
+    seconds = len(video.motion.values) / 60
+    assert face.about["footage_s"] == pytest.approx(seconds, abs=0.1)
+    assert len(face.appearance.mouths) <= round(seconds * 30) + 1
+    assert face.background.video.rate_hz == pytest.approx(60.0)
+    assert len(face.background.video) == len(video.motion.values)

@@ -1,0 +1,112 @@
+"""A face from real recordings: what it says is what was said, to a tracker too."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cli.conftest import RunCommand, here, is_one_error, run
+from lipmotion.faces.filmed.face import load_face
+from lipmotion.pipeline.animate import animate
+from lipmotion.pipeline.film.video import write_film
+from lipmotion.pipeline.request import SpeechRequest
+from lipmotion.speech.audio_files import read_audio
+from lipmotion.types import Motion
+from lipmotion.vision.track import track
+
+__all__ = ["here", "run"]
+pytestmark = [pytest.mark.recordings, pytest.mark.video, pytest.mark.long]
+CLIPS = 6
+
+
+@pytest.fixture(scope="module")
+def clips(recordings: Path) -> list[Path]:
+    pytest.importorskip("mediapipe")
+    folder = recordings / "grid-s1"
+    if not folder.is_dir():
+        pytest.skip("no GRID recordings")
+    return [folder / "clips" / f"{name}.mkv" for name in (folder / "order.txt").read_text().split()[: CLIPS + 1]]
+
+
+@pytest.fixture(scope="module")
+def some_clips(clips: list[Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Eighteen seconds of one person."""
+    folder = tmp_path_factory.mktemp("filmed") / "someone"
+    folder.mkdir()
+    for clip in clips[:CLIPS]:
+        (folder / clip.name).symlink_to(clip.resolve())
+    return folder
+
+
+@pytest.fixture(scope="module")
+def built(some_clips: Path) -> Path:
+    from lipmotion.faces.filmed.face import save_face
+    from lipmotion.pipeline.film.build import build_face
+
+    path = some_clips.parent / "someone.face"
+    save_face(build_face(some_clips, workers=1), path)
+    return path
+
+
+def opening_in(video: Path, rate_hz: float = 25.0) -> np.ndarray:
+    """Return the opening that a tracker finds, a value a frame."""
+    tracked = track(video, crops=False)
+    assert tracked.seen.mean() > 0.95
+    return np.asarray(
+        Motion(tracked.motion.values, tracked.motion.rate_hz, tracked.motion.channels).resampled(rate_hz)["opening"]
+    )
+
+
+def likeness(first: np.ndarray, second: np.ndarray) -> float:
+    count = min(len(first), len(second))
+    return float(np.corrcoef(first[:count], second[:count])[0, 1])
+
+
+def test_what_was_built(built: Path) -> None:
+    face = load_face(built)
+    assert face.about["recordings"] == CLIPS
+    assert face.about["footage_s"] == pytest.approx(3.0 * CLIPS, abs=1)
+    assert built.stat().st_size < 20_000_000
+    assert face.background.video.size == (288, 360)
+    assert (face.appearance.mouth.explained > 0.85).all()
+    assert sum(take.sound.duration_s for take in face.takes) > 10
+
+
+def test_tracked_motion_of_unseen_speech_is_tracked_again(built: Path, clips: list[Path], tmp_path: Path) -> None:
+    clip = clips[CLIPS]
+    original = track(clip, crops=False).motion
+    write_film(tmp_path / "a.mp4", load_face(built), original, read_audio(clip))
+    assert likeness(opening_in(tmp_path / "a.mp4"), np.asarray(original["opening"])) > 0.85
+
+
+def test_from_sound_to_video(built: Path, clips: list[Path], here: Path, run: RunCommand) -> None:
+    done = run("animate", clips[CLIPS], "--face", built, "-o", "a.mp4", "--mark", "visible")
+    assert (done.code, done.out) == (0, ["a.mp4"]), done
+    generated = animate(SpeechRequest(clips[CLIPS], onto=load_face(built))).motion
+    assert likeness(opening_in(here / "a.mp4"), np.asarray(generated.resampled(25.0)["opening"])) > 0.8
+
+
+def test_into_another_background_of_the_same_person(
+    built: Path, clips: list[Path], here: Path, run: RunCommand
+) -> None:
+    done = run("animate", clips[CLIPS], "--face", built, "--background", clips[0], "--jaw", "energy", "-o", "a.mp4")
+    assert (done.code, done.out) == (0, ["a.mp4"]), done
+    generated = animate(SpeechRequest(clips[CLIPS], onto=load_face(built))).motion
+    assert likeness(opening_in(here / "a.mp4"), np.asarray(generated.resampled(25.0)["opening"])) > 0.75
+
+
+@pytest.mark.parametrize("overlay", ["inset", "mouth"])
+def test_an_aid_to_lip_reading(built: Path, clips: list[Path], here: Path, run: RunCommand, overlay: str) -> None:
+    done = run("animate", clips[CLIPS], "--face", built, "--overlay", overlay, "-o", "a.mp4")
+    assert (done.code, done.out) == (0, ["a.mp4"]), done
+    assert opening_in(here / "a.mp4").shape[0] == pytest.approx(75, abs=1)
+
+
+@pytest.mark.usefixtures("here")
+def test_one_clip_is_too_little(clips: list[Path], run: RunCommand) -> None:
+    done = run("face", "build", clips[0], "-o", "a.face", "--workers", "1")
+    assert is_one_error(done, 3)
+    assert "s of footage with the face, required 10 s or more, 60 s of varied speech for good pictures" in done.err[0]
+    assert not Path("a.face").exists()

@@ -1,0 +1,139 @@
+"""Which recordings a face is learned from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from lipmotion.corpora.store import Corpus
+from lipmotion.errors import CorpusError, InputError
+from lipmotion.pipeline.film import takes
+from lipmotion.pipeline.film.takes import MOST_FOOTAGE_S, takes_of
+from lipmotion.testing.toy import toy_utterances
+from speech.sound import tone, write_sound
+
+MakeVideos = Callable[..., Path]
+
+
+@pytest.fixture
+def videos(tmp_path: Path) -> MakeVideos:
+    """Writes videos of a second into a folder."""
+
+    def make(*names: str, folder: str = "filmed/anna") -> Path:
+        directory = tmp_path / folder
+        first: Path | None = None
+        for name in names:
+            path = directory / f"{name}.mkv"
+            path.parent.mkdir(parents=True, exist_ok=True)
+            if first is None:
+                first = write_sound(path, tone(16_000), 16_000, "flac", video=True)
+            else:
+                path.write_bytes(first.read_bytes())
+        return directory
+
+    return make
+
+
+def names(found: list[takes.Take]) -> list[str]:
+    return [take.name for take in found]
+
+
+def test_one_video(videos: MakeVideos) -> None:
+    video = videos("a") / "a.mkv"
+    (take,) = takes_of(video)
+    assert (take.name, take.file, take.collection, take.speaker) == ("a", video, "filmed/anna", "")
+    assert (take.span.start_s, take.span.end_s) == (0.0, MOST_FOOTAGE_S)
+
+
+def test_a_folder(videos: MakeVideos) -> None:
+    folder = videos("a", "b", "c")
+    found = takes_of(folder)
+    assert names(found) == ["a", "b", "c"]
+    assert {take.collection for take in found} == {"filmed/anna"}
+    assert all(take.file.parent == folder for take in found)
+    assert found[0].span.end_s == float("inf")
+
+
+def test_of_a_folder_with_lists_the_training_list(videos: MakeVideos) -> None:
+    folder = videos("a", "b", "c", "d")
+    (folder / "train.txt").write_text("b\nd\n")
+    (folder / "test.txt").write_text("a\n")
+    (folder / "val.txt").write_text("c\n")
+    assert names(takes_of(folder)) == ["b", "d"]
+
+
+def test_long_footage_is_used_in_part_evenly(videos: MakeVideos, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(takes, "MOST_FOOTAGE_S", 3.0)
+    found = takes_of(videos(*(f"clip{number}" for number in range(9))))
+    assert 3 <= len(found) <= 4
+    numbers = [int(name[-1]) for name in names(found)]
+    assert numbers[0] <= 1
+    assert numbers[-1] >= 7
+    assert numbers == sorted(set(numbers))
+
+
+def test_one_of_several_people(videos: MakeVideos, tmp_path: Path) -> None:
+    videos("a", "b", folder="filmed/anna")
+    videos("c", folder="filmed/ben")
+    folder = tmp_path / "filmed"
+    found = takes_of(folder, speaker="anna")
+    assert [take.speaker for take in found] == ["anna", "anna"]
+    assert {Path(take.file).stem for take in found} == {"a", "b"}
+    with pytest.raises(InputError, match=r"2 speakers, a face is that of one person; name it \(--speaker\): anna, ben"):
+        takes_of(folder)
+    with pytest.raises(InputError, match=r"no speaker 'cleo', a face is that of one person; name it .*: anna, ben"):
+        takes_of(folder, speaker="cleo")
+
+
+def test_no_videos(tmp_path: Path, videos: MakeVideos) -> None:
+    with pytest.raises(InputError, match="no such"):
+        takes_of(tmp_path / "missing.mp4")
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(CorpusError, match="no videos in it"):
+        takes_of(tmp_path / "empty")
+    (tmp_path / "empty.mp4").touch()
+    with pytest.raises(InputError, match="the file is empty; give a video"):
+        takes_of(tmp_path / "empty.mp4")
+    (videos("a") / "a.mkv").write_text("no video\n" * 99)
+    with pytest.raises(InputError, match=r"a.mkv: not a readable video \(.*\); give a video file"):
+        takes_of(tmp_path / "filmed" / "anna")
+
+
+def prepared(folder: Path, files: list[str], speakers: tuple[str, ...] = ("",)) -> Corpus:
+    """Return a corpus that says which videos it was prepared from."""
+    corpus = Corpus.create(folder)
+    for number, (utterance, file) in enumerate(zip(toy_utterances(max(3, len(files))), files, strict=False)):
+        source = {"file": file, "licence": "CC BY 4.0", "attribution": "anna", "collection": "filmed/anna"}
+        corpus.add(replace(utterance, source=source, speaker=speakers[number % len(speakers)], split="train"))
+    return corpus
+
+
+def test_a_corpus_with_its_videos(tmp_path: Path, videos: MakeVideos) -> None:
+    folder = videos("a", "b", "c")
+    corpus = prepared(tmp_path / "corpus", ["a.mkv", "b.mkv", "gone.mkv"])
+    found = takes_of(corpus.path, folder)
+    assert names(found) == ["toy00", "toy01"]
+    assert [take.file.name for take in found] == ["a.mkv", "b.mkv"]
+    assert {take.collection for take in found} == {"filmed/anna"}
+    assert dict(found[0].rights) == {"licence": "CC BY 4.0", "attribution": "anna"}
+
+
+def test_a_corpus_of_several_people(tmp_path: Path, videos: MakeVideos) -> None:
+    folder = videos("a", "b", "c", "d")
+    corpus = prepared(tmp_path / "corpus", ["a.mkv", "b.mkv", "c.mkv", "d.mkv"], ("anna", "ben"))
+    assert [take.file.name for take in takes_of(corpus.path, folder, "ben")] == ["b.mkv", "d.mkv"]
+    with pytest.raises(InputError, match=r"2 speakers, a face is that of one person"):
+        takes_of(corpus.path, folder)
+
+
+def test_a_corpus_without_its_videos(tmp_path: Path, videos: MakeVideos) -> None:
+    corpus = prepared(tmp_path / "corpus", ["a.mkv"])
+    with pytest.raises(InputError, match=r"holds the pictures of mouths, but not of faces; .* --recordings FOLDER"):
+        takes_of(corpus.path)
+    with pytest.raises(InputError, match="no such folder; give the one of the videos of the corpus"):
+        takes_of(corpus.path, tmp_path / "missing")
+    with pytest.raises(InputError, match=r"holds none of the videos of .*; give the folder that they are in"):
+        takes_of(corpus.path, videos("other"))

@@ -1,0 +1,255 @@
+"""Films: any motion of the person, at any rate, of any length, in any background."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+import pytest
+
+from lipmotion.errors import ExportError, InputError, ModelFormatError
+from lipmotion.export.synthetic_mark import SOURCE_TYPE
+from lipmotion.faces.filmed.face import FilmedFace
+from lipmotion.pipeline.animate import animate, write
+from lipmotion.pipeline.film.video import FilmOptions, film_of, is_person_of, person_shown, write_film
+from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.request import SpeechRequest
+from lipmotion.testing.toy import ToySentence, toy_motion
+from lipmotion.testing.toy_face import FRAME_HEIGHT, FRAME_WIDTH, toy_face
+from lipmotion.types import Audio, Channel, Motion
+from speech.sound import tone, write_sound
+
+MIDDLE = (slice(150, 230), slice(70, 154))
+"""Rows and columns of the background in which the mouth is."""
+
+
+@pytest.fixture(scope="module")
+def motion(toy_sentence: ToySentence) -> Motion:
+    return toy_motion(toy_sentence.units, 100.0)
+
+
+def dark(frames: list[np.ndarray]) -> np.ndarray:
+    """Return how many pixels of the mouth are dark: how far it is open [shape=(T,)]."""
+    return np.array([(frame[MIDDLE] < 90).all(axis=2).sum() for frame in frames])
+
+
+def pictures(path: Path) -> tuple[list[np.ndarray], Any, dict[str, str]]:
+    """Return the frames of a video, its frame rate, and its tags."""
+    with av.open(str(path)) as container:
+        stream = container.streams.video[0]
+        frames = [frame.to_ndarray(format="rgb24") for frame in container.decode(stream)]
+        return frames, stream.average_rate, dict(container.metadata)
+
+
+@pytest.mark.parametrize("fps", [None, 12.5, 25.0, 30.0, 60.0])
+def test_any_rate(filmed_face: FilmedFace, motion: Motion, fps: float | None) -> None:
+    film = film_of(filmed_face, motion, fps=fps)
+    frames = list(film.frames)
+    assert film.rate_hz == pytest.approx(fps or 25.0)
+    assert len(frames) == int((len(motion.values) - 1) / 100 * film.rate_hz + 1e-9) + 1
+    assert {(frame.shape, str(frame.dtype)) for frame in frames} == {((FRAME_HEIGHT, FRAME_WIDTH, 3), "uint8")}
+    opening = motion.at(np.arange(len(frames)) / film.rate_hz)[:, 0]
+    assert np.corrcoef(dark(frames), opening)[0, 1] > 0.85
+
+
+def test_speech_longer_and_shorter_than_the_background(filmed_face: FilmedFace, motion: Motion) -> None:
+    long = Motion(np.tile(motion.values, (3, 1)), 100.0, motion.channels)
+    frames = list(film_of(filmed_face, long).frames)
+    assert len(frames) == pytest.approx(3 * len(motion.values) / 4, abs=1)
+    assert len(frames) > 3 * len(filmed_face.background.video)
+    short = Motion(motion.values[:9], 100.0, motion.channels)
+    assert len(list(film_of(filmed_face, short).frames)) == 3
+    one = Motion(motion.values[:1], 100.0, motion.channels)
+    assert len(list(film_of(filmed_face, one).frames)) == 1
+
+
+def test_the_jaw_follows_what_it_is_told(filmed_face: FilmedFace, motion: Motion, toy_sentence: ToySentence) -> None:
+    closed = Motion(np.tile([[0.0, 0.55, 0.22]], (len(motion.values), 1)), 100.0, motion.channels)
+    sound = toy_sentence.audio
+    films = {
+        jaw: np.stack(list(film_of(filmed_face, closed, sound=sound, options=FilmOptions(jaw=jaw)).frames)).astype(int)
+        for jaw in ("motion", "energy", "none")
+    }
+    below = (slice(None), slice(212, 240), slice(90, 134))  # the chin
+    assert np.abs(films["motion"][below] - films["energy"][below]).mean() > 0.3
+    assert np.abs(films["motion"][below] - films["none"][below]).mean() > 0.3
+    shown = np.stack([each.copy() for each in filmed_face.background.video.frames(range(20))]).astype(int)
+    assert np.array_equal(films["none"][:20][:, 225:], shown[:, 225:])  # the background's own jaw
+    with pytest.raises(InputError, match="a jaw that follows the energy needs the sound; give the recording"):
+        film_of(filmed_face, motion, options=FilmOptions(jaw="energy"))
+
+
+def test_the_same_motion_is_the_same_film(
+    filmed_face: FilmedFace, motion: Motion, toy_sentence: ToySentence, tmp_path: Path
+) -> None:
+    for name in ("a.mp4", "b.mp4"):
+        write_film(tmp_path / name, filmed_face, motion, toy_sentence.audio)
+    assert (tmp_path / "a.mp4").read_bytes() == (tmp_path / "b.mp4").read_bytes()
+
+
+def test_sound_and_pictures_are_as_long(
+    filmed_face: FilmedFace, motion: Motion, toy_sentence: ToySentence, tmp_path: Path
+) -> None:
+    write_film(tmp_path / "a.mp4", filmed_face, motion, toy_sentence.audio)
+    frames, rate, _ = pictures(tmp_path / "a.mp4")
+    assert rate == 25
+    assert len(frames) / 25 == pytest.approx(toy_sentence.audio.duration_s, abs=0.08)
+    drawn = list(film_of(filmed_face, motion).frames)
+    assert np.abs(np.stack(frames).astype(int) - np.stack(drawn)).mean() < 2
+
+
+@pytest.mark.parametrize("mark", ["metadata", "visible", "none"])
+def test_the_mark(
+    filmed_face: FilmedFace, motion: Motion, toy_sentence: ToySentence, tmp_path: Path, mark: Any
+) -> None:
+    path = tmp_path / "a.mp4"
+    write_film(path, filmed_face, motion, toy_sentence.audio, options=FilmOptions(mark=mark))
+    frames, _, tags = pictures(path)
+    assert tags.get("comment", "").startswith("synthetic:") == (mark != "none")
+    assert (SOURCE_TYPE.encode() in path.read_bytes()) == (mark != "none")
+    plain = np.stack(list(film_of(filmed_face, motion).frames))[::10].astype(int)
+    corners = np.abs(np.stack(frames)[::10].astype(int) - plain)[:, -40:]
+    assert (corners.max() > 60) == (mark == "visible")
+
+
+def test_the_mark_is_the_default(
+    filmed_face: FilmedFace, motion: Motion, toy_sentence: ToySentence, tmp_path: Path
+) -> None:
+    write_film(tmp_path / "a.mp4", filmed_face, motion, toy_sentence.audio)
+    assert pictures(tmp_path / "a.mp4")[2]["comment"].startswith("synthetic:")
+
+
+def test_motion_that_the_face_cannot_show(
+    filmed_face: FilmedFace, motion: Motion, toy_sentence: ToySentence, tmp_path: Path
+) -> None:
+    blendshapes = Motion(motion.values, 100.0, tuple(Channel(name, "weight") for name in ("jawOpen", "a", "b")))
+    with pytest.raises(InputError, match=r"no channel 'opening' \(3 of the 3 that this face needs are missing\)"):
+        film_of(filmed_face, blendshapes)
+    broken = motion.values.copy()
+    broken[48:53, 1] = np.nan
+    with pytest.raises(InputError, match="not finite"):
+        write_film(tmp_path / "a.mp4", filmed_face, Motion(broken, 100.0, motion.channels), toy_sentence.audio)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("fps", [0.0, -25.0, float("nan"), float("inf")])
+def test_rates_that_are_none(filmed_face: FilmedFace, motion: Motion, fps: float) -> None:
+    with pytest.raises(InputError, match=r"the frame rate is .*, required more than 0"):
+        film_of(filmed_face, motion, fps=fps)
+
+
+def test_overlays_need_the_video(filmed_face: FilmedFace, motion: Motion, toy_speech: Path, tmp_path: Path) -> None:
+    words = "an overlay shows the video of the speech: give a video as speech, and no background"
+    for overlay in ("inset", "mouth"):
+        with pytest.raises(InputError, match=words):
+            film_of(filmed_face, motion, options=FilmOptions(overlay=overlay))
+        both = FilmOptions(overlay=overlay, background=tmp_path / "b.mp4")
+        with pytest.raises(InputError, match=words):
+            film_of(filmed_face, motion, speech=toy_speech, options=both)
+    with pytest.raises(InputError, match="has no video stream"):
+        film_of(filmed_face, motion, speech=toy_speech, options=FilmOptions(overlay="inset"))
+
+
+def test_an_inset_on_the_video_of_the_speech(filmed_face: FilmedFace, motion: Motion, tmp_path: Path) -> None:
+    """The video is shorter than the speech: as many frames as there are of both."""
+    video = write_sound(tmp_path / "a.mkv", tone(16_000, 2.0), 16_000, "flac", video=True)
+    film = film_of(filmed_face, motion, speech=video, options=FilmOptions(overlay="inset"))
+    frames = np.stack(list(film.frames))
+    assert frames.shape == (25, 48, 64, 3)
+    assert film.rate_hz == pytest.approx(25.0)
+    assert film.covered is None
+    assert np.ptp(frames[:, :20, :30]) == 0  # the video itself, flat and grey
+    assert np.ptp(frames[0, -19:, -24:]) > 60
+
+
+def test_eigenlips_become_the_person(
+    filmed_face: FilmedFace, pictured_model: Model, toy_sentence: ToySentence, tmp_path: Path
+) -> None:
+    """A model of mouth pictures drives the mouth by its pictures, and the jaw by points where it has them."""
+    request = SpeechRequest(toy_sentence.audio, units=toy_sentence.units)
+    result = animate(request, model=pictured_model)
+    eigenlips = pictured_model.eigenlips
+    assert eigenlips is not None
+    names = {channel.name for channel in eigenlips.channels}
+    assert names < set(result.motion.names)
+    frames = list(film_of(filmed_face, result.motion, eigenlips=eigenlips).frames)
+    opening = toy_motion(toy_sentence.units, 25.0)["opening"][: len(frames)]
+    assert np.corrcoef(dark(frames)[: len(opening)], opening)[0, 1] > 0.7
+    only = [n for n, name in enumerate(result.motion.names) if name in names]
+    alone = Motion(result.motion.values[:, only], 100.0, tuple(result.motion.channels[n] for n in only))
+    again = list(film_of(filmed_face, alone, eigenlips=eigenlips).frames)
+    assert np.corrcoef(dark(again), dark(frames))[0, 1] > 0.9
+    with pytest.raises(InputError, match="no channel 'opening'"):
+        film_of(filmed_face, alone)
+    write(result, tmp_path / "a.mp4", speech=toy_sentence.audio, model=pictured_model, face=filmed_face)
+    assert len(pictures(tmp_path / "a.mp4")[0]) == len(frames)
+
+
+def test_whose_motion_it_is(filmed_face: FilmedFace, toy_model: Model, pictured_model: Model) -> None:
+    assert is_person_of(toy_model, filmed_face)
+    assert person_shown(toy_model, filmed_face) is None
+    other = replace(filmed_face, about=filmed_face.about | {"corpus": ["someone/else"]})
+    assert not is_person_of(toy_model, other)
+    assert person_shown(toy_model, other) is other
+    people = replace(toy_model, about=toy_model.about | {"speakers": ["anna", "ben"]})
+    ben = replace(filmed_face, about=filmed_face.about | {"speaker": "ben"})
+    assert [is_person_of(people, ben, name) for name in ("ben", "anna", "")] == [True, False, False]
+    pictured = replace(pictured_model, about=pictured_model.about | {"visual": "eigenlips"})
+    with pytest.raises(InputError, match=r"mouth pictures of the person of toy, the face is that of another"):
+        is_person_of(pictured, other)
+
+
+@pytest.mark.long
+def test_another_persons_motion_is_mapped_onto_the_face(
+    toy_model: Model, filmed_face: FilmedFace, toy_sentence: ToySentence
+) -> None:
+    """The person of the face opens the mouth half as far, and says the same."""
+    takes = tuple(
+        replace(take, motion=Motion(take.motion.values * [0.5, 1, 0.5], 25.0, take.motion.channels))
+        for take in filmed_face.takes
+    )
+    other = replace(filmed_face, about=filmed_face.about | {"corpus": ["someone/else"]}, takes=takes)
+    own, mapped = (
+        animate(SpeechRequest(toy_sentence.audio, units=toy_sentence.units, onto=onto), model=toy_model).motion
+        for onto in (None, other)
+    )
+    ratio = np.percentile(mapped["opening"], 95) / np.percentile(own["opening"], 95)
+    assert 0.35 < ratio < 0.75
+    assert np.corrcoef(own["opening"], mapped["opening"])[0, 1] > 0.95
+    mute = replace(other, takes=())
+    with pytest.raises(InputError, match=r"the face: 0\.00 s of speech with a measured face, required 0\.5 s or more"):
+        animate(SpeechRequest(toy_sentence.audio, onto=mute), model=toy_model)
+
+
+def test_writing_is_whole_or_not_at_all(
+    filmed_face: FilmedFace, motion: Motion, toy_sentence: ToySentence, tmp_path: Path
+) -> None:
+    (tmp_path / "a.mp4").write_text("older")
+    with pytest.raises(ExportError):
+        write_film(tmp_path / "a.mp4", filmed_face, motion, Audio(np.zeros(0, np.float32), 16_000))
+    damaged = replace(filmed_face.background.video, data=_spoiled(filmed_face.background.video.data))
+    background = replace(filmed_face.background, video=damaged)
+    with pytest.raises(ModelFormatError):
+        write_film(tmp_path / "a.mp4", replace(filmed_face, background=background), motion, toy_sentence.audio)
+    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("a.mp4", "older")]
+
+
+def _spoiled(data: np.ndarray) -> np.ndarray:
+    """Return a stream whose frames begin as they should, and hold zeros from the middle on."""
+    changed = data.copy()
+    starts = np.flatnonzero((data[:-3] == 0) & (data[1:-2] == 0) & (data[2:-1] == 1))
+    keep = np.zeros(len(data), bool)
+    for start in starts:
+        keep[max(0, start - 1) : start + 6] = True
+    changed[~keep & (np.arange(len(data)) > len(data) // 2)] = 77
+    return changed
+
+
+@pytest.mark.long
+def test_large_footage(motion: Motion) -> None:
+    face = toy_face(3, scale=2)
+    frames = list(film_of(face, Motion(motion.values[::5], 20.0, motion.channels)).frames)
+    assert np.corrcoef(dark(frames), motion.at(np.arange(len(frames)) / 25)[:, 0])[0, 1] > 0.8
