@@ -15,19 +15,18 @@ import json
 import time
 import zlib
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter
 
 from lipmotion.appearance.camera_noise import NoiseSource, estimate_noise
 from lipmotion.appearance.candidates import CANDIDATES, choose_candidates, make_candidates, squared_distances
 from lipmotion.appearance.eigenlips import Eigenlips, fit_eigenlips
 from lipmotion.appearance.refinement import PAPER, RefinementOptions, Refiner, moving_average
 from lipmotion.corpora.store import Corpus
+from lipmotion.measures.pictures import picture_figures, sharpness
 from lipmotion.pipeline.training.channels import PICTURES
 from lipmotion.stats.pca import evenly_spaced
 
@@ -139,48 +138,19 @@ def figures(method: Method, wanted: list[Array], held_out: list[Pictures]) -> di
     rows = []
     for values, true in zip(wanted, held_out, strict=True):
         made = method(values)
-        error = np.square(made.astype(np.float32) - true).mean(axis=(1, 2, 3))
+        row = picture_figures(made, true)
+        lips = float(sharpness(made[INNER]).mean() / sharpness(true[INNER]).mean())
         rows.append(
             {
-                "PSNR, dB": float(np.mean(10 * np.log10(255**2 / error))),
-                "SSIM": ssim(made, true),
-                "sharpness": sharpness(made) / sharpness(true),
-                "of the lips": sharpness(made[INNER]) / sharpness(true[INNER]),
-                "colour edges": colour_edges(made) / colour_edges(true),
-                "flicker": flicker(made) / flicker(true),
+                "PSNR, dB": row["psnr_db"],
+                "SSIM": row["ssim"],
+                "sharpness": row["sharpness"],
+                "of the lips": lips,
+                "colour edges": row["colour_edges"],
+                "flicker": row["flicker"],
             }
         )
     return {key: round(float(np.mean([row[key] for row in rows])), 3) for key in rows[0]}
-
-
-def sharpness(pictures: Array) -> float:
-    """Return the mean energy of the gradient."""
-    levels = pictures.astype(np.float32)
-    return float(np.square(np.diff(levels, axis=1)).mean() + np.square(np.diff(levels, axis=2)).mean())
-
-
-def colour_edges(pictures: Pictures) -> float:
-    """Return the mean energy of the gradient of red less green and of blue less green: fringes have much of it."""
-    levels = pictures.astype(np.float32)
-    return sharpness(levels[..., [0, 2]] - levels[..., [1]])
-
-
-def flicker(pictures: Pictures) -> float:
-    """Return the mean absolute second difference over time."""
-    return float(np.abs(np.diff(pictures.astype(np.float32), 2, axis=0)).mean())
-
-
-def ssim(made: Pictures, true: Pictures) -> float:
-    """Return the mean structural similarity of all frames and colours (Wang et al. 2004: Gaussian window, σ 1.5 px)."""
-    some, others = made.astype(np.float32), true.astype(np.float32)
-    local = partial(gaussian_filter, sigma=(0, 1.5, 1.5, 0), truncate=3.5)
-    mean, true_mean = local(some), local(others)
-    variance, true_variance = local(some * some) - mean**2, local(others * others) - true_mean**2
-    shared = local(some * others) - mean * true_mean
-    light, contrast = (0.01 * 255) ** 2, (0.03 * 255) ** 2
-    above = (2 * mean * true_mean + light) * (2 * shared + contrast)
-    below = (mean**2 + true_mean**2 + light) * (variance + true_variance + contrast)
-    return float((above / below).mean())
 
 
 def speed(refiner: Refiner, source: NoiseSource, values: Array) -> None:

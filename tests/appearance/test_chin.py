@@ -96,3 +96,16 @@ def test_the_part_that_may_differ_holds_all_that_does(scale: int) -> None:
     assert not np.concatenate([part[[0, -1]].ravel(), part[:, [0, -1]].ravel()]).any()
     inside = replaced_part(FaceShape(44.0, 120.0), scale)
     assert (part & inside).sum() == inside.sum()
+
+
+@pytest.mark.parametrize("chin_px", [60.0, 80.0, 86.0, 92.0, 99.0])
+@pytest.mark.parametrize("drop_px", [-LARGEST_PX, LARGEST_PX])
+def test_short_chins_do_not_fold_or_tear(chin_px: float, drop_px: float) -> None:
+    """Those of children, or of what a tracker takes for a chin: they move less."""
+    ramp = np.repeat(np.repeat(np.arange(HEIGHT, dtype=np.uint8)[:, None], WIDTH, axis=1)[..., None], 3, axis=2)
+    moved = with_chin_moved(ramp[None], np.array([chin_px]), np.array([drop_px]))[0].astype(int)
+    above = round(STILL_PX - CORNER[1])
+    assert np.array_equal(moved[:above], ramp[:above])
+    steps = np.diff(moved[:, WIDTH // 2, 0])
+    assert steps.min() >= 0
+    assert steps.max() <= 5

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from lipmotion.appearance import person
+from lipmotion.appearance.candidates import CANDIDATES
 from lipmotion.appearance.lower_face import cheek_light, mouth_ellipse, mouth_part, relit, replaced_part
 from lipmotion.appearance.person import (
-    CANDIDATES,
     EDGE_PX,
     JAW_CANDIDATES,
     Appearance,

@@ -38,6 +38,34 @@ def test_animate(toy_speech: Path, toy_model_file: Path, here: Path, name: str) 
     assert list(here.iterdir()) == []
 
 
+def test_a_film(toy_speech: Path, toy_model_file: Path, filmed_face_file: Path, here: Path) -> None:
+    basics = ("animate", toy_speech, "--model", toy_model_file, "--face", filmed_face_file)
+    for limit in (LIMIT, 20_000):
+        code, line = run_limited(*basics, "-o", "a.mp4", limit=limit)
+        assert (code, line.startswith("lipmotion: error: a.mp4: cannot be written: ")) == (7, True)
+        assert list(here.iterdir()) == []
+
+
+def test_a_face(filmed_face_file: Path, here: Path) -> None:
+    code = (
+        "import resource, sys\n"
+        "from lipmotion.errors import ExportError\n"
+        "from lipmotion.faces.filmed.face import load_face, save_face\n"
+        "face = load_face(sys.argv[1])\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))\n"
+        "try:\n"
+        "    save_face(face, 'a.face')\n"
+        "except ExportError as error:\n"
+        "    print(error)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(filmed_face_file)], capture_output=True, text=True, check=False
+    )
+    assert done.stderr == ""
+    assert done.stdout.startswith("a.face: cannot be written: ")
+    assert list(here.iterdir()) == []
+
+
 def test_evaluate(toy_corpus: Corpus, toy_model_file: Path, here: Path) -> None:
     code, line = run_limited("evaluate", toy_model_file, toy_corpus.path, "-o", "figures.json", limit=100)
     assert (code, "figures.json: cannot be written" in line) == (7, True)

@@ -223,6 +223,22 @@ def test_whenever_the_signal_comes(name: str, lines: dict[str, tuple[list[object
     assert codes == {code, 130, 143}
 
 
+@pytest.mark.long
+def test_a_film_that_is_stopped(toy_speech: Path, toy_model_file: Path, filmed_face_file: Path, here: Path) -> None:
+    """Before frames are made, and while they are."""
+    own = ["--model", toy_model_file, "--recogniser", "own", "--face", filmed_face_file, "--machine-readable"]
+    arguments = ["animate", toy_speech, *own, "-o", here / "a.mp4"]
+    assert signalled_at(0, signal.SIGTERM, arguments).returncode == 0
+    steps = int((here / "steps").read_text())
+    (here / "steps").unlink()
+    (here / "a.mp4").unlink()
+    for step in (steps // 3, steps - steps // 20):
+        done = signalled_at(step, signal.SIGTERM, arguments)
+        assert done.returncode == 143, (step, done)
+        assert ends_with_one_final_event(done, signal.SIGTERM, events_only=False), (step, done)
+        assert list(here.iterdir()) == []
+
+
 def test_a_late_signal_does_not_change_what_is_done(toy_model_file: Path, here: Path) -> None:
     for number in (signal.SIGINT, signal.SIGTERM):
         for step in (signalled.RETURNED, signalled.CLEARED):

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lipmotion.export.inset import HEIGHT_SHARE, MARGIN_SHARE, WHITE, WIDTH_SHARE, with_inset
+from lipmotion.export.inset import HEIGHT_SHARE, MARGIN_SHARE, WHITE, WIDTH_SHARE, inset_box, with_inset
+from lipmotion.export.synthetic_mark import mark_frames
 
 
 def frames(count: int = 3, height: int = 120, width: int = 160) -> list[np.ndarray]:
@@ -63,3 +64,20 @@ def test_every_frame_has_its_own_picture_and_is_not_changed() -> None:
     assert all(np.array_equal(frame, old) for frame, old in zip(films, before, strict=True))
     assert [frame[0, 0, 0] for frame in made] == [0, 10, 20, 30]
     assert list(with_inset([], pictures)) == []
+
+
+@pytest.mark.parametrize("size", [(56, 72), (112, 144), (300, 10)])
+@pytest.mark.parametrize("frame_size", [(120, 160), (288, 360), (480, 270)])
+def test_the_box_is_what_the_inset_covers(size: tuple[int, int], frame_size: tuple[int, int]) -> None:
+    (frame,) = frames(1, *frame_size)
+    (made,) = with_inset([frame], [np.full((*size, 3), 130, np.uint8)])
+    rows, columns = drawn(frame, made)
+    assert inset_box(frame_size, size) == (columns.start, rows.start, columns.stop, rows.stop)
+
+
+def test_a_label_leaves_the_inset_free() -> None:
+    (made,) = with_inset(frames(1, 288, 360), [np.full((56, 72, 3), 130, np.uint8)])
+    left, top, right, bottom = inset_box((288, 360), (56, 72))
+    (marked,) = mark_frames([made], (left, top, right, bottom))
+    assert np.array_equal(marked[top:bottom, left:right], made[top:bottom, left:right])
+    assert (marked != made).any()

@@ -24,6 +24,7 @@ class Bench:
     model    : of the default engine
     coupled  : a model of the coupled engine
     pictured : a model with eigenlips
+    face     : of the drawn person
     """
 
     folder: Path
@@ -32,6 +33,7 @@ class Bench:
     corpus: Path
     coupled: Path
     pictured: Path
+    face: Path
 
     def file(self, name: str, content: bytes | str) -> Path:
         """Write a file; return its path."""

@@ -26,11 +26,13 @@ def bench(
     toy_corpus: Corpus,
     coupled_model_file: Path,
     pictured_model_file: Path,
+    filmed_face_file: Path,
 ) -> Bench:
     """Good inputs, and a folder in which bad ones are written."""
     folder = tmp_path / "bad"
     folder.mkdir()
-    return Bench(folder, toy_speech, toy_model_file, toy_corpus.path, coupled_model_file, pictured_model_file)
+    models = toy_model_file, toy_corpus.path, coupled_model_file, pictured_model_file
+    return Bench(folder, toy_speech, *models, filmed_face_file)
 
 
 @pytest.fixture(autouse=True)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from robustness import (
     corpus_cases,
+    face_cases,
     model_cases,
     motion_cases,
     option_cases,
@@ -17,7 +18,17 @@ from robustness import (
 )
 from robustness.case import CASES
 
-MODULES = (speech_cases, spoken_cases, text_cases, motion_cases, model_cases, corpus_cases, option_cases, video_cases)
+MODULES = (
+    speech_cases,
+    spoken_cases,
+    text_cases,
+    motion_cases,
+    model_cases,
+    face_cases,
+    corpus_cases,
+    option_cases,
+    video_cases,
+)
 DOCUMENT = Path(__file__).parent / "table.md"
 HEAD = """# Bad input, row by row
 

@@ -78,6 +78,32 @@ def _(bench: Bench) -> list[object]:
     return ["corpus", "prepare", bench.folder, "-o", "corpus"]
 
 
+@case(GROUP, "face of grey pictures", 3, "none of 1 recordings can be used; the first:", "no face in 25 of 25 frames")
+def _(bench: Bench) -> list[object]:
+    _video(bench, (64, 64), [GREY] * 25)
+    return ["face", "build", bench.folder / "a.mkv", "-o", "a.face", "--workers", "1"]
+
+
+@case(GROUP, "background of grey pictures", 3, "no face in 25 of 25 frames; required: a face in at least 80%")
+def _(bench: Bench) -> list[object]:
+    _video(bench, (64, 64), [GREY] * 25)
+    video = bench.folder / "a.mkv"
+    return bench.animate(None, "--face", bench.face, "--background", video, output="a.mp4")
+
+
+@case(GROUP, "background that is cut off", 3, "a.mkv: ")
+def _(bench: Bench) -> list[object]:
+    _video(bench, (64, 64), [GREY] * 25)
+    video = bench.file("a.mkv", (bench.folder / "a.mkv").read_bytes()[:400])
+    return bench.animate(None, "--face", bench.face, "--background", video, output="a.mp4")
+
+
+@case(GROUP, "overlay of a large mouth on grey pictures", 3, "no face in 25 of 25 frames")
+def _(bench: Bench) -> list[object]:
+    _video(bench, (64, 64), [GREY] * 25)
+    return bench.animate(bench.folder / "a.mkv", "--face", bench.face, "--overlay", "mouth", output="a.mp4")
+
+
 @case(GROUP, "damaged in the middle", 4, NONE)
 def _(bench: Bench) -> list[object]:
     path = write_sound(bench.folder / "a.mkv", tone(16_000), 16_000, "flac", video=True)

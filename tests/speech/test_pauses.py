@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lipmotion.speech.pauses import levels_db, quietest_s, spoken_spans
+from lipmotion.speech.pauses import QUIETEST_DB, levels_db, levels_db_at, quietest_s, spoken_spans
 from lipmotion.types import Audio
 
 RATE = 16_000
@@ -56,3 +56,16 @@ def test_the_quietest_place():
     levels = levels_db(spoken([(0.0, 1.0), (1.1, 2.0)], 2.0))
     assert quietest_s(levels, 0.5, 1.8) == pytest.approx(1.05, abs=0.06)
     assert quietest_s(levels, 1.0, 1.0) == pytest.approx(1.0)
+
+
+def test_levels_at_any_time():
+    sound = spoken(SPANS, 5.0)
+    levels, times_s = levels_db(sound), np.array([-1.0, 0.005, 1.005, 1.01, 99.0])
+    found = levels_db_at(sound, times_s)
+    assert found == pytest.approx([levels[0], levels[0], levels[100], levels[100:102].mean(), levels[-1]])
+
+
+@pytest.mark.parametrize("samples", [0, 1, 159])
+def test_sound_of_less_than_a_step_is_quiet(samples: int):
+    found = levels_db_at(Audio(np.ones(samples, np.float32), RATE), np.arange(3.0))
+    assert found == pytest.approx([QUIETEST_DB] * 3)

@@ -20,7 +20,7 @@ from lipmotion.testing.toy import toy_motion, toy_sentences
 from lipmotion.testing.toy_face import FRAME_HEIGHT, FRAME_WIDTH, toy_chin_px, toy_frames, toy_places
 from lipmotion.types import Motion
 
-FRAMES = BATCH + 8
+FRAMES = 40
 """More than one batch."""
 MOUTH_ALONE = StitchingOptions(jaw=False)
 
@@ -193,18 +193,28 @@ def test_too_few_frames_of_background(appearance: Appearance, backgrounds: list[
 
 def test_mouths_of_chosen_codes(appearance: Appearance) -> None:
     """The eigenlips of recorded mouths, far apart from one another, are these mouths."""
-    options = StitchingOptions(mouth=replace(STEADY, steadiness=0.0, neighbours=1))
+    options = StitchingOptions(mouth=replace(STEADY, steadiness=0.0, neighbours=1), noise=False)
     chosen = np.arange(0, len(appearance.mouths), 6)
     zeros = np.zeros((len(chosen), appearance.jaw_codes.shape[1]), np.float32)
     codes = FaceCodes(appearance.mouth_codes[chosen], zeros, zeros[:, 0])
     assert len(chosen) > BATCH
     made = np.stack(list(Stitcher(appearance, options).mouths(codes))).astype(int)
     assert np.abs(made - appearance.mouths[chosen]).max() <= 1
-    blurred = np.stack(list(Stitcher(appearance, StitchingOptions(mouth=None)).mouths(codes)))
+    blurred = np.stack(list(Stitcher(appearance, StitchingOptions(mouth=None, noise=False)).mouths(codes)))
     assert np.array_equal(blurred, appearance.mouth.restore(codes.mouth))
 
 
 def test_no_frames(appearance: Appearance) -> None:
-    codes = FaceCodes(*(np.zeros((0, n), np.float32) for n in (90, 36)), np.zeros(0, np.float32))
+    codes = FaceCodes(np.zeros((0, 90), np.float32), np.zeros((0, 36), np.float32), np.zeros(0, np.float32))
     assert list(Stitcher(appearance).stitch(codes, [])) == []
     assert list(Stitcher(appearance).mouths(codes)) == []
+
+
+def test_a_frame_without_a_face_stays_as_it_is(
+    appearance: Appearance, backgrounds: list[Background], spoken: Motion
+) -> None:
+    hidden = [replace(each, has_face=n not in (3, BATCH + 1)) for n, each in enumerate(backgrounds)]
+    codes = appearance.of_motion(Motion(spoken.values[::-1], 25.0, spoken.channels))
+    made, all_made = (stitched(appearance, codes, given) for given in (hidden, backgrounds))
+    for n, each in enumerate(hidden):
+        assert np.array_equal(made[n], all_made[n] if each.has_face else each.frame)

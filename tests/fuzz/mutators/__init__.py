@@ -16,6 +16,7 @@ FORMS: dict[str, tuple[Mutate, ...]] = {
     ".npy": (arrays.change, arrays.change),
     ".npz": (zips.change, zips.change),
     ".lipmotion": (zips.change, zips.change),
+    ".face": (zips.change, zips.change),
     ".wav": (riff.change, riff.change),
     ".avi": (riff.change,),
     ".mp4": (boxes.change, boxes.change),

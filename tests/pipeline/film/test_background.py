@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,7 +16,6 @@ from lipmotion.pipeline.film.background import (
     best_background,
     chin_px,
     open_background,
-    pingpong,
     stored_sequence,
 )
 from lipmotion.testing.toy import toy_sentences
@@ -41,34 +39,33 @@ def numbers(sequence: BackgroundSequence, shown: list[Background]) -> list[int]:
     return [int(np.abs(places - each.face_to_frame.ravel()).sum(axis=1).argmin()) for each in shown]
 
 
-def test_forwards_and_backwards() -> None:
-    assert pingpong(4, 12).tolist() == [0, 1, 2, 3, 2, 1, 0, 1, 2, 3, 2, 1]
-    assert pingpong(1, 3).tolist() == [0, 0, 0]
-    assert pingpong(2, 5).tolist() == [0, 1, 0, 1, 0]
-    assert pingpong(5, 0).tolist() == []
+@pytest.mark.parametrize("count", [1, 7, 50])
+def test_short_speech_shows_the_beginning(sequence: BackgroundSequence, count: int) -> None:
+    shown = list(sequence.frames(count, 25.0))
+    assert numbers(sequence, shown) == list(range(count))
+    for number, each in enumerate(shown):
+        assert each.chin_px == pytest.approx(sequence.chin_px[number])
 
 
-@pytest.mark.parametrize("count", [1, 7, 50, 51, 173])
+@pytest.mark.parametrize("count", [51, 173])
 def test_any_length(sequence: BackgroundSequence, count: int) -> None:
+    """It goes on without a jump: neither the picture nor the place of the face."""
     shown = list(sequence.frames(count, 25.0))
     assert len(shown) == count
-    wanted = pingpong(50, count).tolist()
-    assert numbers(sequence, shown) == wanted
-    for number, each in zip(wanted, shown, strict=True):
-        assert each.chin_px == pytest.approx(sequence.chin_px[number])
     steps = [np.abs(a.frame.astype(int) - b.frame).mean() for a, b in pairwise(shown)]
-    assert max(steps, default=0.0) < 8  # no jump where it turns
+    assert max(steps) < 8
+    moves = [np.abs(a.face_to_frame - b.face_to_frame).max() for a, b in pairwise(shown)]
+    assert max(moves) < 3
+    assert len({each.frame.tobytes() for each in shown}) > 25
 
 
 @pytest.mark.parametrize(
-    ("rate_hz", "frames"), [(25.0, 60), (30.0, 70), (50.0, 120), (60.0, 140), (12.5, 30), (29.97, 70)]
+    ("rate_hz", "frames"), [(25.0, 50), (30.0, 58), (50.0, 98), (60.0, 118), (12.5, 24), (29.97, 58)]
 )
 def test_any_rate(sequence: BackgroundSequence, rate_hz: float, frames: int) -> None:
     shown = numbers(sequence, list(sequence.frames(frames, rate_hz)))
-    wanted_s = np.arange(frames) / rate_hz
-    there = np.minimum(wanted_s * 25, 49) - np.maximum(wanted_s * 25 - 49, 0)  # back again after its end
     assert len(shown) == frames
-    assert np.abs(np.array(shown) - there).max() <= 1.0
+    assert np.abs(np.array(shown) - np.arange(frames) / rate_hz * 25).max() <= 0.5 + 1e-6
 
 
 def test_frames_are_those_that_were_filmed(sequence: BackgroundSequence, filmed_face: FilmedFace) -> None:
@@ -101,7 +98,7 @@ def test_a_larger_mouth_in_the_same_place(sequence: BackgroundSequence) -> None:
 def test_the_chin_is_where_the_tracker_sees_it(video: ToyVideo) -> None:
     found, drawn = chin_px(footage_of(video)), toy_chin_px(video.motion)
     assert np.abs(found - drawn).max() < 4  # it is smoothed over about a frame
-    assert np.corrcoef(found, drawn)[0, 1] > 0.98
+    assert np.corrcoef(found, drawn)[0, 1] > 0.95
 
 
 def test_a_video_as_a_background(video: ToyVideo, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -109,22 +106,23 @@ def test_a_video_as_a_background(video: ToyVideo, monkeypatch: pytest.MonkeyPatc
     opened = open_background(video.path)
     count = len(opened.chin_px)
     assert count == len(video.motion.values)
-    shown = list(opened.frames(2 * count, 25.0))
-    assert numbers(opened, shown[:count]) == list(range(count))
-    assert np.abs(shown[0].frame.astype(int) - shown[-2].frame).max() == 0  # back at the beginning
+    assert opened.usable.all()
+    assert numbers(opened, list(opened.frames(count, 25.0))) == list(range(count))
+    assert len(list(opened.frames(2 * count, 25.0))) == 2 * count
     assert opened.face_to_frame[:, :, 2] == pytest.approx(toy_places(count)[:, :, 2], abs=1.0)
 
 
-def test_the_best_background_is_the_longest(video: ToyVideo, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    other = write_video(tmp_path / "b.mp4", toy_sentences(4)[1])
+@pytest.mark.long
+def test_the_best_background_is_one_part(video: ToyVideo, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of at most some seconds, without cuts, in which the face is seen."""
     monkeypatch.setattr(background, "registered_maps", lambda footage: footage.face_to_image)
-    footages = [footage_of(video), footage_of(other)]
-    longest = max(footages, key=len)
-    assert len(footages[0]) != len(footages[1])
-    best = best_background(footages)
-    assert len(best.video) == len(best.chin_px) == len(best.face_to_frame) == len(longest)
     monkeypatch.setattr(background, "MOST_BACKGROUND_S", 1.0)
-    assert len(best_background(footages).video) == 25
+    best = best_background([footage_of(video)])
+    assert 20 <= len(best.video) <= 25
+    assert len(best.video) == len(best.chin_px) == len(best.face_to_frame)
+    seen = np.arange(len(video.motion.values)) < 25
+    early = best_background([footage_of(video, seen=seen)])
+    assert early.chin_px == pytest.approx(chin_px(footage_of(video))[: len(early.chin_px)])
 
 
 def test_frames_of_odd_sizes_are_cut(sequence: BackgroundSequence) -> None:
@@ -134,5 +132,5 @@ def test_frames_of_odd_sizes_are_cut(sequence: BackgroundSequence) -> None:
         def frame(self, _: int) -> np.ndarray:
             return np.zeros((101, 75, 3), np.uint8)
 
-    odd = BackgroundSequence(OddGroups, 25.0, sequence.face_to_frame, sequence.chin_px)  # type: ignore[arg-type]
+    odd = BackgroundSequence(OddGroups, 25.0, sequence.face_to_frame, sequence.chin_px, sequence.usable)  # type: ignore[arg-type]
     assert {each.frame.shape for each in odd.frames(3, 25.0)} == {(100, 74, 3)}

@@ -11,11 +11,15 @@ import pytest
 from lipmotion.errors import InputError
 from lipmotion.faces.filmed.face import FilmedFace, load_face, save_face
 from lipmotion.pipeline.film import build
-from lipmotion.pipeline.film.build import SILENT_DB, build_face
+from lipmotion.pipeline.film.build import build_face
+from lipmotion.pipeline.film.takes import Take
+from lipmotion.speech.pauses import QUIETEST_DB
 from lipmotion.storage.archive import read_archive
 from lipmotion.testing.toy import toy_sentences
 from lipmotion.testing.toy_face import toy_chin_px
-from lipmotion.types import Item, Motion, Progress
+from lipmotion.types import Audio, Channel, Item, Motion, Progress, Track
+from lipmotion.vision.footage import Footage
+from lipmotion.vision.frames import WHOLE, VideoSpan
 from pipeline.film.toy_footage import ToyVideo, footage_of, install, write_video
 
 SENTENCES = 5
@@ -155,9 +159,9 @@ def test_recordings_that_cannot_be_used_are_left_out(videos: Videos, monkeypatch
     def film(path: Path, *more: object) -> object:
         if path.name == "toy00.mp4":
             raise InputError(f"{path}: no face in 60 of 60 frames")
-        return whole(path, *more)  # type: ignore[arg-type]
+        return whole(path, *more)
 
-    whole = build.track_footage
+    whole: Callable[..., Footage] = vars(build)["track_footage"]  # that of the drawn person
     monkeypatch.setattr(build, "track_footage", film)
     monkeypatch.setattr(build, "LEAST_FOOTAGE_S", 5.0)
     events: list[Event] = []
@@ -180,7 +184,7 @@ def test_footage_without_sound(tracker: Callable[..., None], tmp_path: Path, mon
     face = build_face(video.path, workers=1)
     assert face.takes == ()
     codes = face.appearance.of_motion(footage_of(video).track.motion)
-    level = face.appearance.with_jaw_of_sound(codes, np.full(len(codes), SILENT_DB))
+    level = face.appearance.with_jaw_of_sound(codes, np.full(len(codes), QUIETEST_DB))
     assert np.isfinite(level.chin_px).all()
     assert level.chin_px == pytest.approx(np.full(len(codes), toy_chin_px(video.motion).mean()), abs=1)
 
@@ -199,3 +203,32 @@ def test_fast_video_is_learned_from_in_part(
     assert len(face.appearance.mouths) <= round(seconds * 30) + 1
     assert face.background.video.rate_hz == pytest.approx(60.0)
     assert len(face.background.video) == len(video.motion.values)
+
+
+def test_what_is_left_of_the_seconds_may_be_less_than_a_frame(tmp_path: Path) -> None:
+    """599 of 600 frames of 29.97 a second are 19.99 s: no take of 0 frames follows, which no file could hold."""
+    rate_hz, count = 30_000 / 1001, 600
+    channels = (Channel("opening"),)
+    footage = Footage(
+        tmp_path / "a.mp4",
+        WHOLE,
+        Track(Motion(np.zeros((count, 1)), rate_hz, channels), np.ones(count, bool)),
+        np.zeros((count, 2, 3)),
+        np.arange(count) / rate_hz,
+        (),
+        (288, 224),
+        rate_hz,
+    )
+    sound = Audio(np.ones(round(16_000 * count / rate_hz), np.float32), 16_000)
+    take = build._Filmed(footage, np.arange(count), np.zeros((0, 128, 128, 3), np.uint8), sound)
+    (kept,) = build._spoken([take, take])
+    assert len(kept.motion.values) == 599
+
+
+def test_silence_is_no_sound(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    take = Take("a", tmp_path / "a.mp4", VideoSpan(1.0, 3.0), "", "", ())
+    for count, level, expected_s in ((64_000, 1.0, 2.0), (24_000, 1.0, 0.5), (8000, 1.0, 0.0), (64_000, 0.0, 0.0)):
+        audio = Audio(np.full(count, level, np.float32), 16_000)
+        monkeypatch.setattr(build, "read_audio", lambda *_, audio=audio, **__: audio)
+        found = build._sound(take)
+        assert (0 if found is None else found.duration_s) == pytest.approx(expected_s)

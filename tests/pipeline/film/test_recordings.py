@@ -10,7 +10,7 @@ import pytest
 from cli.conftest import RunCommand, here, is_one_error, run
 from lipmotion.faces.filmed.face import load_face
 from lipmotion.pipeline.animate import animate
-from lipmotion.pipeline.film.video import write_film
+from lipmotion.pipeline.film.video import film_of, write_film
 from lipmotion.pipeline.request import SpeechRequest
 from lipmotion.speech.audio_files import read_audio
 from lipmotion.types import Motion
@@ -77,7 +77,7 @@ def test_what_was_built(built: Path) -> None:
 def test_tracked_motion_of_unseen_speech_is_tracked_again(built: Path, clips: list[Path], tmp_path: Path) -> None:
     clip = clips[CLIPS]
     original = track(clip, crops=False).motion
-    write_film(tmp_path / "a.mp4", load_face(built), original, read_audio(clip))
+    write_film(tmp_path / "a.mp4", film_of(load_face(built), original), read_audio(clip))
     assert likeness(opening_in(tmp_path / "a.mp4"), np.asarray(original["opening"])) > 0.85
 
 

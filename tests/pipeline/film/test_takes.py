@@ -12,6 +12,7 @@ from lipmotion.corpora.store import Corpus
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.pipeline.film import takes
 from lipmotion.pipeline.film.takes import MOST_FOOTAGE_S, takes_of
+from lipmotion.storage.files import sha256_of
 from lipmotion.testing.toy import toy_utterances
 from speech.sound import tone, write_sound
 
@@ -88,7 +89,7 @@ def test_one_of_several_people(videos: MakeVideos, tmp_path: Path) -> None:
         takes_of(folder, speaker="cleo")
 
 
-def test_no_videos(tmp_path: Path, videos: MakeVideos) -> None:
+def test_no_videos(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no such"):
         takes_of(tmp_path / "missing.mp4")
     (tmp_path / "empty").mkdir()
@@ -97,9 +98,13 @@ def test_no_videos(tmp_path: Path, videos: MakeVideos) -> None:
     (tmp_path / "empty.mp4").touch()
     with pytest.raises(InputError, match="the file is empty; give a video"):
         takes_of(tmp_path / "empty.mp4")
-    (videos("a") / "a.mkv").write_text("no video\n" * 99)
-    with pytest.raises(InputError, match=r"a.mkv: not a readable video \(.*\); give a video file"):
-        takes_of(tmp_path / "filmed" / "anna")
+
+
+def test_a_video_that_cannot_be_read_is_left_to_tracking(videos: MakeVideos) -> None:
+    """There it is reported, and the others are used."""
+    folder = videos("a", "b")
+    (folder / "a.mkv").write_text("no video\n" * 99)
+    assert names(takes_of(folder)) == ["a", "b"]
 
 
 def prepared(folder: Path, files: list[str], speakers: tuple[str, ...] = ("",)) -> Corpus:
@@ -137,3 +142,40 @@ def test_a_corpus_without_its_videos(tmp_path: Path, videos: MakeVideos) -> None
         takes_of(corpus.path, tmp_path / "missing")
     with pytest.raises(InputError, match=r"holds none of the videos of .*; give the folder that they are in"):
         takes_of(corpus.path, videos("other"))
+
+
+def test_long_videos_are_shortened_before_short_ones_are_left_out(
+    videos: MakeVideos, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The seconds of a folder are bounded, and not by the first of its videos."""
+    durations = {"a": 300.0, "b": 3.0, "c": 3.0, "d": 7200.0}
+    monkeypatch.setattr(takes, "_duration_s", lambda take: durations[take.name])
+    found = takes_of(videos(*durations))
+    assert names(found) == list(durations)
+    used = [min(take.span.end_s - take.span.start_s, durations[take.name]) for take in found]
+    assert sum(used) == pytest.approx(MOST_FOOTAGE_S)
+    assert used == pytest.approx([117.0, 3.0, 3.0, 117.0])
+
+
+def test_many_long_videos_are_used_in_part(videos: MakeVideos, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(takes, "MOST_FOOTAGE_S", 30.0)
+    monkeypatch.setattr(takes, "_duration_s", lambda _: 600.0)
+    found = takes_of(videos("a", "b", "c", "d", "e", "f"))
+    assert [take.span.end_s for take in found] == [takes.LONG_S] * 3
+
+
+def test_videos_of_the_same_name_are_told_apart(tmp_path: Path, videos: MakeVideos) -> None:
+    """Every person of GRID says the same sentences, in files of the same names."""
+    videos("x", folder="filmed/anna")
+    ben = write_sound(videos("y", folder="filmed/ben") / "x.mkv", tone(16_000, 0.9), 16_000, "flac", video=True)
+    for file in (ben, tmp_path / "filmed/anna/x.mkv"):
+        corpus = Corpus.create(tmp_path / f"corpus-{file.parent.name}")
+        source = {"file": "x.mkv", "bytes": str(file.stat().st_size), "sha256": sha256_of(file)}
+        for utterance in toy_utterances(3)[:1]:
+            corpus.add(replace(utterance, source=source, split="train"))
+        (found,) = takes_of(corpus.path, tmp_path / "filmed")
+        assert found.file == file
+    (tmp_path / "other").mkdir()
+    other = write_sound(tmp_path / "other" / "x.mkv", tone(16_000, 0.5), 16_000, "flac", video=True)
+    with pytest.raises(InputError, match="holds none of the videos"):
+        takes_of(corpus.path, other.parent)

@@ -13,13 +13,14 @@ import pytest
 from lipmotion.errors import ExportError, InputError, ModelFormatError
 from lipmotion.export.synthetic_mark import SOURCE_TYPE
 from lipmotion.faces.filmed.face import FilmedFace
+from lipmotion.faces.registry import face_named
 from lipmotion.pipeline.animate import animate, write
-from lipmotion.pipeline.film.video import FilmOptions, film_of, is_person_of, person_shown, write_film
+from lipmotion.pipeline.film.video import FilmOptions, check_film, film_of, is_person_of, person_shown, write_film
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import SpeechRequest
 from lipmotion.testing.toy import ToySentence, toy_motion
 from lipmotion.testing.toy_face import FRAME_HEIGHT, FRAME_WIDTH, toy_face
-from lipmotion.types import Audio, Channel, Motion
+from lipmotion.types import Audio, Channel, Item, Motion, Progress
 from speech.sound import tone, write_sound
 
 MIDDLE = (slice(150, 230), slice(70, 154))
@@ -86,14 +87,14 @@ def test_the_same_motion_is_the_same_film(
     filmed_face: FilmedFace, motion: Motion, toy_sentence: ToySentence, tmp_path: Path
 ) -> None:
     for name in ("a.mp4", "b.mp4"):
-        write_film(tmp_path / name, filmed_face, motion, toy_sentence.audio)
+        write_film(tmp_path / name, film_of(filmed_face, motion), toy_sentence.audio)
     assert (tmp_path / "a.mp4").read_bytes() == (tmp_path / "b.mp4").read_bytes()
 
 
 def test_sound_and_pictures_are_as_long(
     filmed_face: FilmedFace, motion: Motion, toy_sentence: ToySentence, tmp_path: Path
 ) -> None:
-    write_film(tmp_path / "a.mp4", filmed_face, motion, toy_sentence.audio)
+    write_film(tmp_path / "a.mp4", film_of(filmed_face, motion), toy_sentence.audio)
     frames, rate, _ = pictures(tmp_path / "a.mp4")
     assert rate == 25
     assert len(frames) / 25 == pytest.approx(toy_sentence.audio.duration_s, abs=0.08)
@@ -106,7 +107,7 @@ def test_the_mark(
     filmed_face: FilmedFace, motion: Motion, toy_sentence: ToySentence, tmp_path: Path, mark: Any
 ) -> None:
     path = tmp_path / "a.mp4"
-    write_film(path, filmed_face, motion, toy_sentence.audio, options=FilmOptions(mark=mark))
+    write_film(path, film_of(filmed_face, motion), toy_sentence.audio, mark=mark)
     frames, _, tags = pictures(path)
     assert tags.get("comment", "").startswith("synthetic:") == (mark != "none")
     assert (SOURCE_TYPE.encode() in path.read_bytes()) == (mark != "none")
@@ -118,7 +119,7 @@ def test_the_mark(
 def test_the_mark_is_the_default(
     filmed_face: FilmedFace, motion: Motion, toy_sentence: ToySentence, tmp_path: Path
 ) -> None:
-    write_film(tmp_path / "a.mp4", filmed_face, motion, toy_sentence.audio)
+    write_film(tmp_path / "a.mp4", film_of(filmed_face, motion), toy_sentence.audio)
     assert pictures(tmp_path / "a.mp4")[2]["comment"].startswith("synthetic:")
 
 
@@ -131,7 +132,7 @@ def test_motion_that_the_face_cannot_show(
     broken = motion.values.copy()
     broken[48:53, 1] = np.nan
     with pytest.raises(InputError, match="not finite"):
-        write_film(tmp_path / "a.mp4", filmed_face, Motion(broken, 100.0, motion.channels), toy_sentence.audio)
+        write_film(tmp_path / "a.mp4", film_of(filmed_face, Motion(broken, 100.0, motion.channels)), toy_sentence.audio)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -146,11 +147,42 @@ def test_overlays_need_the_video(filmed_face: FilmedFace, motion: Motion, toy_sp
     for overlay in ("inset", "mouth"):
         with pytest.raises(InputError, match=words):
             film_of(filmed_face, motion, options=FilmOptions(overlay=overlay))
+        (tmp_path / "b.mp4").write_text("video")
         both = FilmOptions(overlay=overlay, background=tmp_path / "b.mp4")
         with pytest.raises(InputError, match=words):
             film_of(filmed_face, motion, speech=toy_speech, options=both)
-    with pytest.raises(InputError, match="has no video stream"):
-        film_of(filmed_face, motion, speech=toy_speech, options=FilmOptions(overlay="inset"))
+        with pytest.raises(InputError, match="has no pictures, and an overlay shows them; give a video as speech"):
+            film_of(filmed_face, motion, speech=toy_speech, options=FilmOptions(overlay=overlay))
+
+
+def test_progress_is_that_of_the_frames(
+    filmed_face: FilmedFace, motion: Motion, toy_sentence: ToySentence, tmp_path: Path
+) -> None:
+    events: list[Progress | Item] = []
+    film = film_of(filmed_face, motion)
+    write_film(tmp_path / "a.mp4", film, toy_sentence.audio, monitor=events.append)
+    shares = [event.share for event in events if isinstance(event, Progress)]
+    assert len(shares) == len(events) > 2
+    assert shares == sorted(shares)
+    assert shares[-1] == pytest.approx(1.0)
+    assert {event.steps for event in events if isinstance(event, Progress)} == {film.count}
+    assert len(pictures(tmp_path / "a.mp4")[0]) == film.count
+
+
+def test_options_of_filmed_faces_alone(tmp_path: Path, toy_speech: Path) -> None:
+    drawn = face_named("portrait")
+    video = tmp_path / "a.mp4"
+    video.touch()
+    for options, words in (
+        (FilmOptions(background=video), "a background"),
+        (FilmOptions(overlay="inset"), "an overlay"),
+        (FilmOptions(jaw="energy"), "another jaw"),
+        (FilmOptions(mark="visible"), "a visible mark"),
+    ):
+        with pytest.raises(InputError, match=rf"{words} is for filmed faces; give one: --face FILE\.face"):
+            check_film(drawn, options, toy_speech)
+    for unmarked in ("metadata", "none"):
+        check_film(drawn, FilmOptions(mark=unmarked), toy_speech)  # a drawn face needs no mark
 
 
 def test_an_inset_on_the_video_of_the_speech(filmed_face: FilmedFace, motion: Motion, tmp_path: Path) -> None:
@@ -175,12 +207,12 @@ def test_eigenlips_become_the_person(
     assert eigenlips is not None
     names = {channel.name for channel in eigenlips.channels}
     assert names < set(result.motion.names)
-    frames = list(film_of(filmed_face, result.motion, eigenlips=eigenlips).frames)
+    frames = list(film_of(filmed_face, result.motion, model=pictured_model).frames)
     opening = toy_motion(toy_sentence.units, 25.0)["opening"][: len(frames)]
     assert np.corrcoef(dark(frames)[: len(opening)], opening)[0, 1] > 0.7
     only = [n for n, name in enumerate(result.motion.names) if name in names]
     alone = Motion(result.motion.values[:, only], 100.0, tuple(result.motion.channels[n] for n in only))
-    again = list(film_of(filmed_face, alone, eigenlips=eigenlips).frames)
+    again = list(film_of(filmed_face, alone, model=pictured_model).frames)
     assert np.corrcoef(dark(again), dark(frames))[0, 1] > 0.9
     with pytest.raises(InputError, match="no channel 'opening'"):
         film_of(filmed_face, alone)
@@ -229,11 +261,11 @@ def test_writing_is_whole_or_not_at_all(
 ) -> None:
     (tmp_path / "a.mp4").write_text("older")
     with pytest.raises(ExportError):
-        write_film(tmp_path / "a.mp4", filmed_face, motion, Audio(np.zeros(0, np.float32), 16_000))
+        write_film(tmp_path / "a.mp4", film_of(filmed_face, motion), Audio(np.zeros(0, np.float32), 16_000))
     damaged = replace(filmed_face.background.video, data=_spoiled(filmed_face.background.video.data))
     background = replace(filmed_face.background, video=damaged)
     with pytest.raises(ModelFormatError):
-        write_film(tmp_path / "a.mp4", replace(filmed_face, background=background), motion, toy_sentence.audio)
+        write_film(tmp_path / "a.mp4", film_of(replace(filmed_face, background=background), motion), toy_sentence.audio)
     assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("a.mp4", "older")]
 
 

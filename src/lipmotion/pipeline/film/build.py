@@ -72,7 +72,7 @@ def build_face(
     """Return the face of a person, learned from footage.
 
     source     : a video of the person speaking, a folder of videos, or a prepared corpus; of folders and corpora the
-                 training list. At most four minutes are used, spread evenly
+                 training list. About four minutes are used: of one video the first ones, of several spread evenly
     recordings : of a corpus, the folder of the videos that it was prepared from
     speaker    : whose face, where there are several people
     name       : of the face; empty: the speaker's, or the file's

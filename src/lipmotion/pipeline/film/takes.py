@@ -80,6 +80,8 @@ def _evenly_used(takes: Sequence[Take]) -> list[Take]:
     longest_s = _longest_s(durations_s)
     mean_s = sum(min(duration_s, longest_s) for duration_s in durations_s) / len(durations_s)
     chosen = evenly_spaced(ceil(MOST_FOOTAGE_S / max(mean_s, 0.1) - 1e-6), len(takes))
+    if max(durations_s) <= longest_s:
+        return [takes[index] for index in chosen]
     return [_shortened(takes[index], longest_s) for index in chosen]
 
 

@@ -259,7 +259,12 @@ def check_film(face: Face | FilmedFace, options: FilmOptions, speech: str | Path
 
     speech : the recording; None: it is a sound that is in no file
     """
-    filmed = {"a background": options.background, "an overlay": options.overlay}
+    filmed = {
+        "a background": options.background,
+        "an overlay": options.overlay,
+        "another jaw": options.jaw if options.jaw != FILM.jaw else None,
+        "a visible mark": options.mark if options.mark == "visible" else None,
+    }
     given = next((name for name, value in filmed.items() if value is not None), None)
     if given is not None and not isinstance(face, FilmedFace):
         raise InputError(f"{given} is for filmed faces; give one: --face FILE.face (docs/filmed-face.md)")

@@ -1,0 +1,212 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.ndimage import gaussian_filter
+
+from lipmotion.errors import InputError
+from lipmotion.measures.pictures import (
+    colour_change,
+    colour_edges,
+    contrast,
+    flicker,
+    outline_figures,
+    outline_slopes,
+    picture_figures,
+    psnr_db,
+    sharpness,
+    skin_beside,
+    structural_similarity,
+)
+
+HEIGHT, WIDTH = 56, 72
+
+
+def blobs(seed: int, frames: int = 4, spread: float = 3.0):
+    """Smooth pictures of all grey levels."""
+    draw = np.random.default_rng(seed)
+    values = gaussian_filter(draw.normal(size=(frames, HEIGHT, WIDTH, 3)), (0, spread, spread, 0))
+    return np.clip(127 + values * 50 / values.std(), 0, 255).astype(np.uint8)
+
+
+def ramp(slope: float = 2.0, frames: int = 4):
+    """Pictures that brighten to the right."""
+    return np.broadcast_to((slope * np.arange(WIDTH))[None, None, :, None], (frames, HEIGHT, WIDTH, 3)).copy()
+
+
+def rectangle(margin: int = 16):
+    region = np.zeros((HEIGHT, WIDTH), bool)
+    region[margin:-margin, margin:-margin] = True
+    return region
+
+
+def test_a_level_more_everywhere_is_48_db():
+    true = blobs(0) // 2
+    assert psnr_db(true + 1, true) == pytest.approx([20 * np.log10(255)] * 4)
+    assert psnr_db(true, true) == pytest.approx([100] * 4)
+
+
+def test_each_frame_has_its_own_psnr():
+    true = blobs(0).astype(float)
+    made = true + np.array([1, 2, 4, 8])[:, None, None, None]
+    assert psnr_db(made, true) == pytest.approx(20 * np.log10(255 / np.array([1, 2, 4, 8])))
+
+
+def test_similarity_is_that_of_scikit_image():
+    """0.26: mean of structural_similarity(true, made, gaussian_weights=True, sigma=1.5, use_sample_covariance=False,
+    data_range=255, channel_axis=2, full=True)[1], the map with the pixels near the edge, of float64 pictures."""
+    true = blobs(1)
+    made = np.clip(true + np.random.default_rng(2).normal(0, 8, true.shape), 0, 255).astype(np.uint8)
+    assert structural_similarity(made, true) == pytest.approx(
+        [0.903145894, 0.913533544, 0.904709417, 0.918917066], abs=1e-5
+    )
+
+
+@given(light=st.integers(1, 255), other=st.integers(1, 255))
+@settings(deadline=None, max_examples=20)
+def test_similarity_of_flat_pictures_is_that_of_their_light(light, other):
+    made, true = (np.full((1, 20, 20, 3), level, np.uint8) for level in (light, other))
+    stable = (0.01 * 255) ** 2
+    expected = (2 * light * other + stable) / (light**2 + other**2 + stable)
+    assert structural_similarity(made, true) == pytest.approx([expected], abs=1e-3)
+
+
+def test_a_blurred_picture_is_less_similar_and_less_sharp():
+    true = blobs(3, spread=1.0)
+    made = gaussian_filter(true.astype(float), (0, 1, 1, 0))
+    assert (structural_similarity(made, true) < 0.9).all()
+    assert (sharpness(made) < 0.5 * sharpness(true)).all()
+    assert picture_figures(made, true)["sharpness"] == pytest.approx(sharpness(made).mean() / sharpness(true).mean())
+
+
+def test_sharpness_of_a_ramp_is_the_square_of_its_slope():
+    assert sharpness(ramp(3.0)) == pytest.approx([9] * 4)
+    assert sharpness(ramp(3.0).swapaxes(1, 2)) == pytest.approx([9] * 4)
+
+
+def test_contrast_is_the_deviation_of_the_brightness():
+    halves = np.zeros((3, HEIGHT, WIDTH, 3))
+    halves[:, :, WIDTH // 2 :] = (60, 90, 120)
+    assert contrast(halves) == pytest.approx([45] * 3)
+    assert contrast(halves[:, :, ::-1] + 50) == pytest.approx([45] * 3)
+    assert picture_figures(halves / 2, halves)["contrast"] == pytest.approx(0.5)
+
+
+def test_grey_pictures_have_no_colour_edges_and_red_ones_half():
+    grey = ramp(3.0)
+    assert colour_edges(grey) == pytest.approx([0] * 4)
+    red = grey * (1, 0, 0)
+    assert colour_edges(red) == pytest.approx([9 / 2] * 4)
+    green = grey * (0, 1, 0)
+    assert colour_edges(green) == pytest.approx([9] * 4)
+
+
+def test_flicker_of_even_and_of_alternating_light():
+    even = ramp(0, 6) + 5.0 * np.arange(6)[:, None, None, None]
+    assert flicker(even) == pytest.approx([0] * 4)
+    alternating = ramp(1, 6) + np.array([0, 2, 0, 2, 0, 2])[:, None, None, None]
+    assert flicker(alternating) == pytest.approx([4] * 4)
+
+
+def test_a_smooth_picture_has_no_seam():
+    slopes = outline_slopes(ramp(2.0), rectangle())
+    assert slopes.seam == pytest.approx(1, abs=0.15)
+
+
+def test_a_step_at_the_outline_is_a_seam():
+    region = rectangle()
+    made = ramp(2.0) + 20.0 * region[None, ..., None]
+    slopes, smooth = outline_slopes(made, region), outline_slopes(ramp(2.0), region)
+    assert slopes.seam > 4
+    assert slopes.inside == pytest.approx(smooth.inside)
+    assert slopes.outside == pytest.approx(smooth.outside)
+    assert outline_figures(made, ramp(2.0), region)["seam_ratio"] == pytest.approx(
+        float((slopes.at / smooth.at).mean())
+    )
+
+
+def test_a_step_of_a_vertical_edge_has_half_its_height_on_two_pixels():
+    region = np.zeros((HEIGHT, WIDTH), bool)
+    region[:, WIDTH // 2 :] = True
+    pictures = np.where(region[None, ..., None], 130.0, 100.0) * np.ones((2, 1, 1, 3))
+    slopes = outline_slopes(pictures, region)
+    assert slopes.at == pytest.approx([15, 15])
+    assert slopes.inside == pytest.approx([0, 0], abs=1e-9)
+    assert np.isnan(slopes.seam)
+
+
+def test_what_happens_in_the_middle_of_a_region_is_no_seam():
+    region = rectangle(10)
+    made, true = ramp(2.0), ramp(2.0)
+    made[:, 24:32, 30:42] += 60
+    assert outline_slopes(made, region).seam == pytest.approx(outline_slopes(true, region).seam)
+
+
+def test_skin_beside_an_outline_lies_on_either_side():
+    region = rectangle()
+    inside, outside = skin_beside(region)
+    assert region[inside].all()
+    assert not region[outside].any()
+    assert inside[HEIGHT // 2, 16:24].tolist() == [False, False, True, True, True, True, False, False]
+    assert outside[HEIGHT // 2, 8:16].tolist() == [False, False, True, True, True, True, False, False]
+
+
+def test_a_redder_patch_has_an_offset_and_one_that_reddens_a_drift():
+    true, region = blobs(5, 6).astype(float), rectangle()
+    inside, outside = skin_beside(region)
+    redder = true + np.array([6.0, 0, 0]) * region[..., None]
+    steady = colour_change(redder, true, inside, outside)
+    assert steady.offset == pytest.approx(2, abs=1e-4)
+    assert steady.drift == pytest.approx(0, abs=1e-4)
+    steps = np.arange(6) - 2.5
+    reddens = true + steps[:, None, None, None] * np.array([3.0, 0, 0]) * region[..., None]
+    moving = colour_change(reddens, true, inside, outside)
+    assert moving.offset == pytest.approx(0, abs=1e-4)
+    assert moving.drift == pytest.approx(3 * steps.std() / np.sqrt(3), abs=1e-4)
+
+
+def test_a_darker_film_is_no_change_of_colour():
+    """What changes the patch and its surroundings alike is the light of the film."""
+    true = blobs(6)
+    inside, outside = skin_beside(rectangle())
+    change = colour_change(true.astype(float) - 10, true, inside, outside)
+    assert change.offset == pytest.approx(0, abs=1e-4)
+
+
+def test_equal_pictures_have_the_best_figures():
+    true = blobs(7)
+    figures = picture_figures(true, true)
+    assert figures.pop("psnr_db") == pytest.approx(100)
+    assert list(figures) == ["ssim", "sharpness", "contrast", "colour_edges", "flicker"]
+    assert list(figures.values()) == pytest.approx([1] * 5)
+
+
+def test_equal_pictures_have_no_seam():
+    figures = outline_figures(blobs(7), blobs(7), rectangle())
+    assert 0.7 < figures.pop("seam") < 1.4
+    assert figures == pytest.approx({"seam_ratio": 1, "colour_offset": 0, "colour_drift": 0})
+
+
+def test_a_still_original_has_no_ratio_of_flicker():
+    true = np.repeat(blobs(8, 1), 4, axis=0)
+    assert np.isnan(picture_figures(true, true)["flicker"])
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        (lambda p: psnr_db(p, p[:, 1:]), "required"),
+        (lambda p: structural_similarity(p[..., :2], p[..., :2]), "three colours"),
+        (lambda p: sharpness(p[0]), "required"),
+        (lambda p: sharpness(p[:0]), "at least one"),
+        (lambda p: flicker(p[:2]), "at least 3"),
+        (lambda p: outline_figures(p, p[1:], rectangle()), "required"),
+        (lambda p: outline_slopes(p, np.ones((HEIGHT, WIDTH), bool)), "inside and outside"),
+        (lambda p: outline_slopes(p, rectangle()[1:]), "of shape"),
+        (lambda p: outline_slopes(p, rectangle(27)), "on either side"),
+        (lambda p: colour_change(p, p, rectangle(), np.zeros((HEIGHT, WIDTH), bool)), "at least one pixel"),
+    ],
+)
+def test_what_cannot_be_measured_is_refused(wrong, message):
+    with pytest.raises(InputError, match=message):
+        wrong(blobs(0))

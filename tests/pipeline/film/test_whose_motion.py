@@ -1,0 +1,49 @@
+"""Whose motion a model generates, and whose face it is shown on."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from lipmotion.faces.filmed.face import FilmedFace
+from lipmotion.pipeline.film.video import is_person_of, person_shown
+
+
+def model_of(*speakers: str, corpus: str = "filmed/many") -> Any:
+    return SimpleNamespace(about={"corpus": [corpus], "speakers": list(speakers)}, visual="points")
+
+
+def face_of(face: FilmedFace, speaker: str) -> FilmedFace:
+    return replace(face, about={"corpus": ["filmed/many"], "speaker": speaker})
+
+
+@pytest.mark.parametrize(
+    ("people", "speaker", "filmed", "same"),
+    [
+        ((), "", "anna", True),  # a corpus without names has one person
+        (("anna",), "", "anna", True),
+        (("anna",), "", "", True),
+        (("ben",), "", "anna", False),
+        (("anna", "ben"), "anna", "anna", True),
+        (("anna", "ben"), "ben", "anna", False),
+        (("anna", "ben"), "", "anna", False),  # the mean person
+    ],
+)
+def test_the_person_of_one_corpus(
+    filmed_face: FilmedFace, people: tuple[str, ...], speaker: str, filmed: str, same: bool
+) -> None:
+    face = face_of(filmed_face, filmed)
+    assert is_person_of(model_of(*people), face, speaker) == same
+    assert not is_person_of(model_of(*people, corpus="filmed/other"), face, speaker)
+
+
+def test_without_speech_nothing_is_mapped(filmed_face: FilmedFace, caplog: pytest.LogCaptureFixture) -> None:
+    face = face_of(filmed_face, "anna")
+    assert person_shown(model_of("ben"), face) is face
+    assert person_shown(model_of("ben"), replace(face, takes=())) is None
+    assert "built from footage without sound" in caplog.text
+    assert person_shown(model_of("anna"), face) is None
+    assert person_shown(model_of("ben"), "portrait") is None  # type: ignore[arg-type]
