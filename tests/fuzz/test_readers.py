@@ -16,7 +16,7 @@ from fuzz.worker import Worker
 
 FOUND = Path(__file__).parent / "found"
 FOLDERS = sorted(path for path in FOUND.glob("*/*") if path.is_dir())
-INPUTS = {"model": 8, "face": 12, "video": 20, "transcript": 20, "lexicon": 20}
+INPUTS = {"model": 8, "face": 12, "video": 20, "transcript": 20, "lexicon": 20, "character": 8}
 """Numbers of changed inputs of slower readers."""
 
 

@@ -6,6 +6,13 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from lipmotion.cli.characters import (
+    add_character_arguments,
+    chosen_curves,
+    open_character,
+    other_outputs,
+    write_animated_outputs,
+)
 from lipmotion.cli.faces import add_face_arguments, film_options
 from lipmotion.cli.paths import add_output
 from lipmotion.cli.staging import add_staging_arguments, staging_of
@@ -32,6 +39,7 @@ def add_result_arguments(parser: argparse.ArgumentParser, files: str, *, require
     articulation = "add tongue, lip_tuck, protrusion, spread, lip_press, teeth to motion files"
     parser.add_argument("--articulation", action="store_true", help=articulation)
     add_face_arguments(parser)
+    add_character_arguments(parser)
     add_staging_arguments(parser)
 
 
@@ -42,9 +50,10 @@ def check_results(options: argparse.Namespace, speech: Path | None = None) -> No
     """
     from lipmotion.pipeline.animate import check_outputs, opened_face
 
+    open_character(options)
     options.face = opened_face(options.face)
     checked = {"rate_hz": options.rate, "fps": options.fps, "face": options.face, "film": film_options(options)}
-    check_outputs(options.output, speech, **checked, staging=staging_of(options), with_sound=speech is None)
+    check_outputs(other_outputs(options), speech, **checked, staging=staging_of(options), with_sound=speech is None)
 
 
 def write_results(
@@ -57,12 +66,13 @@ def write_results(
     """
     from lipmotion.pipeline.animate import with_articulation, write
 
+    drawn, channels = chosen_curves(options, result)
     write(
-        with_articulation(result) if options.articulation else result,
-        options.output,
+        with_articulation(drawn) if options.articulation else drawn,
+        other_outputs(options),
         speech=speech,
         model=model,
-        channels=options.channels.split(",") if options.channels is not None else None,
+        channels=channels,
         rate_hz=options.rate,
         fps=options.fps,
         face=options.face,
@@ -70,3 +80,4 @@ def write_results(
         staging=staging_of(options),
         monitor=report.receive,
     )
+    write_animated_outputs(options, result)

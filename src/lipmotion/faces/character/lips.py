@@ -1,0 +1,143 @@
+"""The lips of one pose: contours from the motion, a rounded cross-section at every column of them.
+
+The lips are a closed loop of ``COLUMNS`` columns: the upper lip from the right corner to the left one, then the lower
+lip back. Every column runs through ``RINGS`` rings: from the skin over the lip into the mouth, and on along the wall of
+the mouth to the throat.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from lipmotion.faces.character.forms import MOUTH_Y
+from lipmotion.faces.character.pose import FacePose
+
+Real = NDArray[np.float64]
+
+_UPPER = 41
+COLUMNS = 2 * _UPPER - 2
+REST_HALF_WIDTH = 0.268
+TEETH_Z = -0.055
+"""Front of the incisors."""
+TEETH_EDGE = MOUTH_Y - 0.008
+"""Height of the edge of the upper incisors; they belong to the skull."""
+ARCH = 1.15
+"""Curvature of lips and teeth seen from above: how far they lie back, over x squared."""
+_UPPER_LIP, _LOWER_LIP = 0.076, 0.106
+_KNOTS = np.array([0, 0.22, 0.5, 0.72, 0.88, 0.98, 1.12, 1.4])
+_AT = np.array([0.0, 0.09, 0.2, 0.31, 0.41, 0.5, 0.58, 0.66, 0.74, 0.81, 0.88, 0.94, 1.0, 1.12, 1.4])
+_SECTION: Real = np.asarray(CubicSpline(_KNOTS, np.eye(len(_KNOTS)))(_AT))
+_WALL = ((0.3, -0.16), (0.5, -0.30), (0.8, -0.40), (1.0, -0.42))
+"""Rings behind the lips: how far towards the middle of the throat, and how far back."""
+RINGS = len(_AT) + len(_WALL)
+VISIBLE = 11
+"""Rings up to this one can be seen as lips; those behind are the wall of the mouth."""
+
+
+def _columns() -> tuple[Real, Real]:
+    across = np.sin(np.linspace(-np.pi / 2, np.pi / 2, _UPPER))
+    return np.concatenate([across, across[-2:0:-1]]), np.concatenate([np.ones(_UPPER), -np.ones(_UPPER - 2)])
+
+
+ACROSS, SIDE = _columns()
+"""Place of every column between the right corner (-1) and the left one (1), and 1 on the upper lip, -1 on the lower."""
+
+
+def _smooth(knots: list[tuple[float, float]]) -> Real:
+    x, y = np.array(knots).T
+    x, y = np.concatenate([-x[:0:-1], x]), np.concatenate([y[:0:-1], y])
+    return np.asarray(CubicSpline(x, y)(ACROSS))
+
+
+_BOW = _smooth([(0, 0.80), (0.2, 0.97), (0.36, 0.93), (0.62, 0.66), (0.85, 0.3), (1, 0)])
+_BELOW = _smooth([(0, 1.0), (0.25, 0.97), (0.5, 0.83), (0.72, 0.58), (0.89, 0.27), (1, 0)])
+_LINE = _smooth([(0, -0.009), (0.15, -0.005), (0.4, 0.004), (0.7, 0.016), (1, 0.044)])
+_ENVELOPE = np.sqrt(np.maximum(1 - ACROSS**2, 0))
+_FULL = np.where(SIDE > 0, _BOW, _BELOW)
+
+
+def section_points(pose: FacePose, base_z: Real) -> Real:
+    """Return the eight points of the cross-section of every column [shape=(8, COLUMNS, 3)].
+
+    base_z : depth of the skin under the outer contour at rest [shape=(COLUMNS,)]
+    The fifth point is where the lips meet; the first is the contour, where the skin begins.
+    """
+    upper = SIDE > 0
+    half = REST_HALF_WIDTH * pose.width
+    x = half * ACROSS
+    rise = pose.upper_rise
+    drop = pose.gap - rise
+    middle = MOUTH_Y + (1 - 0.8 * pose.roundness) * _LINE + pose.smile * ACROSS**2 - 0.22 * pose.gap * ACROSS**2
+    hole, contour = _opening(pose)
+    inner_y = middle + np.where(upper, rise, -drop) * hole
+    full = _FULL + 0.7 * pose.roundness * np.where(upper, _ENVELOPE - _FULL, 0)
+    thick = np.where(upper, _UPPER_LIP, _LOWER_LIP) * full
+    thick = thick * pose.fullness * (1 - 0.35 * pose.press) * np.where(upper, 1.0, 1 - 0.45 * pose.tuck)
+    outer_y = middle + np.where(upper, rise, -drop) * contour + SIDE * thick * _rounded(pose)
+    forward = pose.protrusion * (1 - 0.45 * ACROSS**2)
+    arch = -ARCH * (x**2 - (REST_HALF_WIDTH * ACROSS) ** 2)
+    back = np.where(upper, 0.0, 0.22 * drop + 0.05 * pose.tuck * _ENVELOPE)
+    outer_z = base_z + 0.85 * forward + arch - back
+    meet = np.interp(ACROSS, ACROSS[:_UPPER], 0.5 * (base_z[:_UPPER] + _opposite(base_z))) + forward + arch
+    meet = meet - np.where(upper, 0.0, 0.25 * drop) * contour
+    bulge = np.where(upper, 0.05, 0.062) * _ENVELOPE * pose.fullness * (1 - 0.3 * pose.press)
+    inner_x = x * (1 - 0.12 * pose.roundness * _ENVELOPE)
+    teeth = TEETH_Z - ARCH * x**2
+    up = SIDE * 1.0
+    tuck = pose.tuck * np.where(upper, 0.0, 1.0) * _ENVELOPE
+    contact_z = meet - 0.002 + 0.02 * _ENVELOPE * pose.roundness
+    contact_z = contact_z + tuck * (teeth + 0.02 - contact_z)
+    inner_y = np.where(upper, inner_y, inner_y + tuck * (np.minimum(TEETH_EDGE + 0.004, inner_y + 0.07) - inner_y))
+    crest = meet + bulge * (1 - 0.25 * tuck) - 0.03 * tuck
+    behind = np.maximum(teeth + 0.022, contact_z - 0.10)
+    y, z = outer_y, outer_z
+    rows = [
+        (x, y, z),
+        (x, inner_y + 0.76 * (y - inner_y), outer_z + 0.5 * (crest - outer_z)),
+        (inner_x, inner_y + 0.42 * (y - inner_y), crest),
+        (inner_x, inner_y + 0.13 * (y - inner_y), contact_z + 0.66 * (crest - contact_z)),
+        (inner_x, inner_y, contact_z),
+        (inner_x, inner_y + up * 0.014 * _ENVELOPE, 0.5 * (contact_z + behind)),
+        (x, inner_y + up * (0.05 * _ENVELOPE + 0.002), behind),
+        (1.12 * x, inner_y + up * (0.13 * _ENVELOPE + 0.012), behind - 0.01),
+    ]
+    return np.stack([np.stack(row, axis=1) for row in rows])
+
+
+def _opposite(base_z: Real) -> Real:
+    """Return the values of the lower lip at the columns of the upper one [shape=(41,)]."""
+    return np.concatenate([base_z[:1], base_z[: _UPPER - 1 : -1], base_z[_UPPER - 1 : _UPPER]])
+
+
+def _opening(pose: FacePose) -> tuple[Real, Real]:
+    """Return the shapes of hole and outer contour, 1 in the middle, 0 at the corners [shape=(COLUMNS,), both].
+
+    A round mouth has an elliptic hole that ends before the corners; a spread one is a slot with a flat edge.
+    """
+    reach = 1 - 0.47 * pose.roundness - 0.10 * pose.oval
+    power = 2 + 1.2 * pose.spread
+    inside = np.maximum(1 - np.abs(ACROSS / reach) ** power, 0)
+    oval = (0.25 * np.clip(pose.gap / 0.2, 0, 1) + 0.2 * pose.oval) * (1 - pose.spread) * (1 - pose.roundness)
+    hole = inside ** (0.92 - 0.40 * pose.roundness - 0.36 * pose.spread - oval)
+    contour = np.maximum(1 - ACROSS**2, 0) ** (0.85 - 0.25 * pose.roundness)
+    return hole, contour
+
+
+def _rounded(pose: FacePose) -> Real:
+    """Return how much fuller the lips are near the corners of a round mouth [shape=(COLUMNS,)]."""
+    return 1 + pose.roundness * 0.35 * ACROSS**2 * _ENVELOPE
+
+
+def lip_surface(points: Real) -> Real:
+    """Return the places of lips and wall of the mouth [shape=(RINGS, COLUMNS, 3)] from ``section_points``."""
+    front = np.einsum("rp,pcx->rcx", _SECTION, points)
+    last = front[-1]
+    throat = last.mean(axis=0) * np.array([0, 1, 0]) + np.array([0, 0, 0])
+    wall = []
+    for inward, back in _WALL:
+        ring = last + inward * (throat - last) * np.array([1, 1, 0])
+        ring[:, 2] = last[:, 2] + back + inward * (last[:, 2].mean() - last[:, 2])
+        wall.append(ring)
+    return np.concatenate([front, np.stack(wall)])

@@ -1,0 +1,201 @@
+"""Poses of video frames from motion and phones."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import InputError
+from lipmotion.faces.character import gestures
+from lipmotion.faces.character.liveliness import SEED, liveliness
+from lipmotion.faces.character.pose import FacePose
+from lipmotion.types import Motion, Timeline, Unit
+from lipmotion.units import LIP_CLOSING, is_silent
+
+Curve = NDArray[np.float64]
+
+CLOSED_BELOW = 0.012
+"""Tracked lips that touch have openings up to this; smaller openings are drawn closed."""
+OPEN_FROM, PARTED, GROWTH = 0.03, 0.022, 0.86
+"""From this opening on the gap is the opening times the growth, plus the length: trackers read less of small openings
+and more of wide ones (docs/results/head.md). Below it rises from 0, where the lips touch."""
+WIDEST = 0.4
+"""Largest drawn gap; openings of speech stay below 0.35."""
+WIDTH_GAIN, WIDTH_REACH = 1.5, 0.34
+"""Changes of width are exaggerated: small ones by the factor, none beyond the reach."""
+TUCKED_GAP = (0.045, 0.06)
+"""Range of the gap while the lower lip is on the teeth."""
+TONGUE_GAP = 0.045
+"""Least gap while the tongue is between the teeth."""
+OVAL_GROWTH = 0.04
+"""How much further the mouth opens in AA and the like."""
+ROUND_GAP, TONGUE_UP_GAP = -0.012, 0.012
+"""Added to the gap of round lips, of which trackers read more, and where the tongue fills it: they read less."""
+PAUSED_GAP = 0.03
+"""Largest gap in pauses, in which people breathe with lips that hardly part."""
+DRAWN = ("opening", "width", "outer", "y_152")
+"""The channels that are drawn."""
+
+
+def head_poses(motion: Motion, units: Timeline[Unit], fps: float, *, seed: int = SEED) -> list[FacePose]:
+    """Return the pose of every video frame, frame n at ``n / fps`` seconds, to the end of the motion.
+
+    seed : of blinks, glances and the movement of the head
+    Lips that close between two video frames are drawn closed in the nearer one; in every p, b and m there is a frame in
+    which they are closed.
+    Raises InputError: no channel ``opening``, no frames, a value that is not finite, or fps not positive.
+    """
+    _check(motion, fps)
+    time_s = np.arange(int(np.floor((len(motion.values) - 1) / motion.rate_hz * fps + 1e-9)) + 1) / fps
+    rest = _rest_frames(motion, units)
+    said = {name: gesture.weight(units, time_s) for name, gesture in gestures.GESTURES.items()}
+    pause = gestures.pause_weight(units, time_s)
+    for name in ("round", "spread", "oval", "bite"):
+        said[name] *= 1 - pause
+    for name in ("tuck", "tongue_out"):
+        said[name] *= 1 - said["press"]
+    change = _at(motion, _width(motion, rest), time_s)
+    narrow = np.clip(-change / 0.16, 0, 1) * (1 - said["spread"])
+    roundness = np.maximum(said["round"], 0.4 * narrow)
+    wide = np.clip(np.maximum(said["spread"], np.clip(change / 0.12, 0, 1)) - roundness, 0, 1)
+    gap = _closed(_articulated(_gap(motion, time_s, fps), said, roundness, pause), units, time_s)
+    alive = liveliness(gap, pause, fps, seed=seed)
+    curves = {
+        "gap": gap,
+        "upper_rise": _rise(gap, roundness, said["tuck"]),
+        "jaw": _jaw(motion, rest, gap, time_s) * (1 - 0.85 * said["bite"]),
+        "bite": np.maximum(np.maximum(said["bite"], 0.6 * said["spread"]), said["press"]),
+        "width": 1 + change - 0.14 * said["round"] + 0.05 * said["spread"] - 0.05 * said["oval"],
+        "fullness": _at(motion, _fullness(motion, rest), time_s) * (1 + 0.08 * roundness),
+        "roundness": roundness,
+        "spread": wide,
+        "oval": said["oval"],
+        "protrusion": 0.085 * roundness,
+        "press": said["press"],
+        "tuck": said["tuck"],
+        "tongue_out": said["tongue_out"],
+        "tongue_up": said["tongue_up"] * (1 - said["tongue_out"]) * (1 - said["bite"]),
+        "smile": 0.012 * wide,
+        "shut": alive.shut,
+        "brows": alive.brows,
+    }
+    rows = np.stack(list(curves.values()), axis=1).tolist()
+    return [
+        FacePose(**dict(zip(curves, row, strict=True)), gaze=(gaze[0], gaze[1]), turn=(turn[0], turn[1], turn[2]))
+        for row, gaze, turn in zip(rows, alive.gaze.tolist(), alive.turn.tolist(), strict=True)
+    ]
+
+
+def _articulated(gap: Curve, said: dict[str, Curve], roundness: Curve, pause: Curve) -> Curve:
+    """Return the gap that suits what is said: teeth on the lip, tongue between the teeth, lips at rest in pauses."""
+    gap = gap * (1 + OVAL_GROWTH * said["oval"])
+    gap = gap + ROUND_GAP * roundness * np.clip(gap / 0.03, 0, 1)
+    gap = gap + TONGUE_UP_GAP * said["tongue_up"] * np.clip(gap / 0.05, 0, 1)
+    gap = gap + said["tuck"] * (np.clip(gap, *TUCKED_GAP) - gap)
+    gap = gap + said["tongue_out"] * (np.maximum(gap, TONGUE_GAP) - gap)
+    gap = gap + pause * (np.minimum(gap, PAUSED_GAP) - gap)
+    return np.maximum(gap * (1 - said["close"]), 0)
+
+
+def _rise(gap: Curve, roundness: Curve, tuck: Curve) -> Curve:
+    """Return how far the upper lip rises [shape=(T,)]: round lips part evenly, and F bares the upper teeth."""
+    rise = upper_share(gap) + roundness * np.maximum(0.42 * gap - upper_share(gap), 0)
+    return np.minimum(rise + tuck * np.maximum(0.036 - rise, 0), gap)
+
+
+def drawn_gap(opening: Curve) -> Curve:
+    """Return the gap to draw for a measured opening [shape=(T,)]; exactly 0 where the lips touch."""
+    parted = GROWTH * opening + PARTED
+    risen = np.clip((opening - CLOSED_BELOW) / (OPEN_FROM - CLOSED_BELOW), 0, 1)
+    return np.clip(parted * risen, 0, WIDEST)
+
+
+def upper_share(gap: Curve) -> Curve:
+    """Return how far the upper lip rises for a gap [shape=(T,)]: at most about 5 mm; the rest is the lower lip's."""
+    return np.asarray(0.055 * (1 - np.exp(-5.5 * gap)))
+
+
+def _check(motion: Motion, fps: float) -> None:
+    if not 0 < fps < np.inf:
+        raise InputError(f"the frame rate is {fps}, required more than 0")
+    if "opening" not in motion.names:
+        names = ", ".join(motion.names[:6]) + (", ..." if len(motion.names) > 6 else "") or "no channels"
+        raise InputError(f"no channel 'opening' to draw a face from; the motion has: {names}")
+    if not len(motion.values):
+        raise InputError("the motion has no frames; there is nothing to draw")
+    for name in {*DRAWN} & {*motion.names}:
+        if not np.isfinite(motion[name]).all():
+            raise InputError(
+                f"the channel {name!r} has values that are not finite; interpolate the missing frames first"
+            )
+
+
+def _at(motion: Motion, curve: Curve, time_s: Curve) -> Curve:
+    return np.interp(time_s, motion.time_s, curve)
+
+
+def _gap(motion: Motion, time_s: Curve, fps: float) -> Curve:
+    gap = drawn_gap(motion["opening"].astype(float))
+    gap_at_frames = _at(motion, gap, time_s)
+    nearest = np.rint(motion.time_s[gap == 0] * fps).astype(int)
+    gap_at_frames[nearest[nearest < len(gap_at_frames)]] = 0
+    return gap_at_frames
+
+
+def _closed(gap: Curve, units: Timeline[Unit], time_s: Curve) -> Curve:
+    """Return the gap with one frame closed in every phone of closed lips: the one of least gap."""
+    closed = gap.copy()
+    for span in units:
+        if span.label.phone in LIP_CLOSING and len(time_s):
+            first, stop = np.searchsorted(time_s, (span.start_s, span.end_s))
+            if first == stop:
+                first = min(first, len(time_s) - 1)
+                stop = first + 1
+            closed[first + int(np.argmin(gap[first:stop]))] = 0
+    return closed
+
+
+def _rest_frames(motion: Motion, units: Timeline[Unit]) -> NDArray[np.bool_]:
+    """Return the frames of the rest pose [shape=(T,)]: silence, or else the tenth of the frames that is most closed."""
+    time_s = motion.time_s
+    rest = np.zeros(len(time_s), dtype=bool)
+    for span in units:
+        if is_silent(span.label.phone):
+            rest |= (span.start_s <= time_s) & (time_s < span.end_s)
+    if rest.any():
+        return rest
+    most_closed = np.argsort(motion["opening"], kind="stable")[: max(1, len(time_s) // 10)]
+    rest[most_closed] = True
+    return rest
+
+
+def _against_rest(name: str, curve: Curve, rest: NDArray[np.bool_]) -> Curve:
+    """Return the curve relative to its median at rest."""
+    value = float(np.median(curve[rest]))
+    if not value > 0:
+        raise InputError(f"the {name} is {value:g} at rest, required more than 0")
+    return curve / value
+
+
+def _width(motion: Motion, rest: NDArray[np.bool_]) -> Curve:
+    """Return the change of width against the rest pose, as a part of it [shape=(T,)]."""
+    if "width" not in motion.names:
+        return -0.2 * np.clip(motion["opening"].astype(float), 0, WIDEST)
+    change = _against_rest("width", motion["width"].astype(float), rest) - 1
+    return np.asarray(WIDTH_REACH * np.tanh(WIDTH_GAIN * change / WIDTH_REACH))
+
+
+def _fullness(motion: Motion, rest: NDArray[np.bool_]) -> Curve:
+    if "outer" not in motion.names:
+        return 1 - 0.4 * np.clip(motion["opening"].astype(float), 0, WIDEST)
+    thickness = (motion["outer"] - motion["opening"]).astype(float)
+    return np.clip(_against_rest("thickness of the lips (outer - opening)", thickness, rest), 0.75, 1.25)
+
+
+def _jaw(motion: Motion, rest: NDArray[np.bool_], gap: Curve, time_s: Curve) -> Curve:
+    """Return how far the chin drops: as tracked (point 152, y upwards), within limits that suit the gap."""
+    usual = 0.85 * (gap - upper_share(gap))
+    if "y_152" not in motion.names:
+        return usual
+    chin = motion["y_152"].astype(float)
+    return np.clip(_at(motion, np.median(chin[rest]) - chin, time_s), 0.65 * usual, 1.15 * usual + 0.01)

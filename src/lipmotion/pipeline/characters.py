@@ -1,0 +1,109 @@
+"""Motion for characters: weights of blendshapes, visemes, MPEG-4 parameters, controls of a user's rig."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from lipmotion.errors import InputError
+from lipmotion.rig.driven import DrivenCharacter
+from lipmotion.rig.facial_animation import fap_motion
+from lipmotion.rig.gltf_writer import write_glb
+from lipmotion.rig.reference_mouth import arkit_mouth
+from lipmotion.rig.rig_tables import read_rig_table, rig_motion
+from lipmotion.rig.shape_weights import shape_weights
+from lipmotion.rig.visemes import viseme_motion
+from lipmotion.storage.files import whole_file
+from lipmotion.types import Generation, Motion, Timeline, Unit
+
+SHAPE_SETS = ("arkit", "visemes", "fap")
+"""Sets of curves that need no mesh: ARKit's blendshapes of the mouth, the 15 visemes of Oculus and OpenXR, and MPEG-4's
+facial animation parameters of lips and jaw."""
+
+
+def check_curve_set(curves: str | Path) -> None:
+    """Raise InputError unless there is such a set of curves, or such a table of a rig, for ``curves_of``."""
+    if Path(curves).suffix.lower() == ".csv":
+        read_rig_table(Path(curves))
+    elif curves not in SHAPE_SETS:
+        raise InputError(f"no set of curves {str(curves)!r}, required one of {', '.join(SHAPE_SETS)}, or a FILE.csv")
+
+
+def curves_of(motion: Motion, units: Timeline[Unit], curves: str | Path | DrivenCharacter) -> Motion:
+    """Return motion as curves that drive a character.
+
+    curves : ``arkit``, ``visemes``, ``fap``, a table of a rig's controls (``.csv``), or a character with blendshapes
+    Raises InputError: no such set or file, the character has no blendshapes, or the motion has no channel ``opening``.
+    """
+    if isinstance(curves, DrivenCharacter):
+        return curves.weights(motion, units)
+    check_curve_set(curves)
+    if curves == "arkit":
+        return shape_weights(motion, units, arkit_mouth())
+    if curves == "visemes":
+        return viseme_motion(units, len(motion.values), motion.rate_hz)
+    if curves == "fap":
+        return fap_motion(motion, units)
+    rows = read_rig_table(Path(curves))
+    sets = (motion, curves_of(motion, units, "arkit"), curves_of(motion, units, "visemes"))
+    sources = {name: each[name].astype(np.float64) for each in sets for name in each.names}
+    return rig_motion(rows, sources, motion.rate_hz)
+
+
+def with_curves(generation: Generation, curves: str | Path | DrivenCharacter) -> tuple[Generation, tuple[str, ...]]:
+    """Return a generation with the channels of ``curves_of`` after its own, and the names of those channels.
+
+    The variance of these channels is 0. Raises InputError: as ``curves_of``, or a name that the motion has already.
+    """
+    motion = generation.motion
+    added = curves_of(motion, generation.units, curves)
+    both = Motion(
+        np.concatenate([motion.values, added.values], axis=1), motion.rate_hz, motion.channels + added.channels
+    )
+    variance = np.pad(generation.variance, ((0, 0), (0, len(added.channels))))
+    return replace(generation, motion=both, spread=variance), added.names
+
+
+def write_animated(
+    path: Path, generation: Generation, character: DrivenCharacter, rate_hz: float | None = None
+) -> None:
+    """Write a character with the weights of its blendshapes as an animated ``.glb``.
+
+    rate_hz : keys a second; None: those of the motion
+    Raises InputError: the character has no blendshapes. Raises ExportError: the file cannot be written.
+    """
+    weights = character.weights(generation.motion, generation.units)
+    write_glb(path, character.mesh, weights if rate_hz is None else weights.resampled(rate_hz))
+
+
+def write_picture(path: Path, character: DrivenCharacter) -> None:
+    """Write a picture of a character at rest as PNG. Raises ExportError: it cannot be written."""
+    from PIL import Image
+
+    from lipmotion.faces.mesh import HEIGHT, WIDTH, MeshStage
+
+    picture = MeshStage(character, WIDTH, HEIGHT).picture(character.mesh.vertices)
+    with whole_file(path) as unfinished:
+        Image.fromarray(picture).save(unfinished, format="PNG")
+
+
+def described(character: DrivenCharacter) -> Iterator[str]:
+    """Yield what was found in a character's files, line by line."""
+    mesh, placement = character.mesh, character.placement
+    parts = ", ".join(part.name or "(no name)" for part in mesh.parts)
+    yield f"{'vertices':14} {len(mesh.vertices)}, triangles {len(mesh.triangles)}"
+    yield f"{'parts':14} {parts}"
+    yield f"{'blendshapes':14} {len(mesh.shapes)}"
+    yield f"{'eye distance':14} {placement.scale:.6g} units of the mesh, by the width of the mouth"
+    if character.shapes is not None:
+        named = zip(character.shapes.names, character.shapes.known, strict=True)
+        listed = ", ".join(name if known in {"", name} else f"{name} = {known}" for name, known in named)
+        yield f"{'moved by':14} {character.shapes.style}: {listed}"
+        widest = int(character.shapes.gap.argmax())
+        opens = f"{character.shapes.names[widest]} opens the lips by {character.shapes.gap[widest]:.3g} eye distances"
+        yield f"{'opening':14} {opens}"
+    elif character.binding is not None:
+        yield f"{'moved by':14} {len(placement.points)} control points, {len(character.binding.rows)} vertices follow"

@@ -1,0 +1,170 @@
+"""A character that motion moves: a mesh with blendshapes, or with control points, from its files to its vertices."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import InputError
+from lipmotion.rig.binding import ControlBinding, bind, painted
+from lipmotion.rig.binding_files import BINDING_SUFFIX, load_binding, read_points, read_weights
+from lipmotion.rig.character_files import read_character
+from lipmotion.rig.face_shapes import FaceShapes, face_shapes
+from lipmotion.rig.lip_placement import LipPlacement, placed_by_points, placed_by_shape, surface_of_named
+from lipmotion.rig.mesh import Mesh
+from lipmotion.rig.point_motion import closed_displacements, point_motion
+from lipmotion.rig.shape_names import by_arkit_name
+from lipmotion.rig.shape_weights import shape_weights
+from lipmotion.rig.surface import mesh_surface
+from lipmotion.types import Motion, Timeline, Unit
+from lipmotion.types.motion import between_frames
+
+Array = NDArray[np.float64]
+
+BLINKS = ("eyeBlinkLeft", "eyeBlinkRight")
+
+
+@dataclass(frozen=True, eq=False)
+class DrivenCharacter:
+    """A mesh, where its lip points are, and what moves it: its own blendshapes, or else control points.
+
+    shapes  : the blendshapes of its mouth; None: control points move it
+    binding : weights of control points; None: blendshapes move it
+    """
+
+    mesh: Mesh
+    placement: LipPlacement
+    shapes: FaceShapes | None
+    binding: ControlBinding | None
+
+    def weights(self, motion: Motion, units: Timeline[Unit]) -> Motion:
+        """Return the weights of the blendshapes over time, channels by the names of the mesh, 0 to 1.
+
+        Raises InputError: the character has no blendshapes of the mouth, or as ``shape_weights``.
+        """
+        if self.shapes is None:
+            raise InputError(
+                "the character is moved by control points and has no weights of blendshapes; write a video, or the "
+                "motion without --character"
+            )
+        return shape_weights(motion, units, self.shapes)
+
+    def vertices(
+        self, motion: Motion, units: Timeline[Unit], time_s: Array, blinks: Array | None = None
+    ) -> Iterator[Array]:
+        """Yield the vertices at some times in seconds [each shape=(V, 3)].
+
+        blinks : how far the eyes are shut at each time, 0 to 1 [shape=(T,)]; None: they stay open
+        A closure between two times is shown at the nearer one.
+        Raises InputError: as ``point_motion``.
+        """
+        points = point_motion(motion, units)
+        if self.shapes is not None:
+            rows = at_times(self.weights(motion, units).values.astype(np.float64), points.gap, motion.rate_hz, time_s)
+            shut = np.zeros(len(time_s)) if blinks is None or self._eyelids is None else blinks
+            for row, closed in zip(rows, shut, strict=True):
+                yield self._shaped(row, float(closed))
+        elif self.binding is not None:
+            flat = closed_displacements(points).reshape(len(points.gap), -1)
+            for row in at_times(flat, points.gap, motion.rate_hz, time_s):
+                yield self.binding.moved(self.mesh, row.reshape(-1, 3))
+
+    @cached_property
+    def moving(self) -> NDArray[np.int64]:
+        """The vertices that ever move, ascending [shape=(N,)]."""
+        if self.binding is not None:
+            return self.binding.rows
+        names = {*(self.shapes.names if self.shapes else ()), *self._blink_names}
+        rows = [shape.rows for shape in self.mesh.shapes if shape.name in names]
+        return np.unique(np.concatenate(rows)) if rows else np.zeros(0, np.int64)
+
+    @property
+    def _blink_names(self) -> tuple[str, ...]:
+        known = by_arkit_name(self.mesh.shape_names)
+        return tuple(known[name] for name in BLINKS if name in known)
+
+    @cached_property
+    def _displacements(self) -> Array:
+        """What every blendshape of the mouth does to the moving vertices [shape=(S, N · 3)]."""
+        names = self.shapes.names if self.shapes else ()
+        chosen = [self.mesh.shape_names.index(name) for name in names]
+        return self.mesh.displacements(self.moving)[chosen].reshape(len(chosen), -1)
+
+    @cached_property
+    def _eyelids(self) -> Array | None:
+        """What shut eyes do to the moving vertices [shape=(N, 3)], or None."""
+        chosen = [self.mesh.shape_names.index(name) for name in self._blink_names]
+        return self.mesh.displacements(self.moving)[chosen].sum(axis=0) if chosen else None
+
+    def _shaped(self, weights: Array, shut: float) -> Array:
+        vertices = self.mesh.vertices.copy()
+        vertices[self.moving] += (weights @ self._displacements).reshape(-1, 3)
+        if shut and self._eyelids is not None:
+            vertices[self.moving] += shut * self._eyelids
+        return vertices
+
+
+def driven_character(
+    path: str | Path,
+    *,
+    points: Path | None = None,
+    binding: Path | None = None,
+    by_points: bool = False,
+    only: Sequence[str] = (),
+) -> DrivenCharacter:
+    """Return a character from its files, ready to be moved.
+
+    path      : ``.glb``, ``.gltf``, ``.vrm``, ``.obj``, or a folder of OBJ files
+    points    : a table of the vertices of lip points; None: they are found by the blendshape that opens the mouth
+    binding   : a binding file, or a table of painted weights (``.csv``); both mean control points
+    by_points : move it by control points, though it has blendshapes
+    only      : the names of the blendshapes to use; empty: those that are understood
+    Raises InputError: a file is damaged, or what moves the mouth is not found in it.
+    Raises ModelFormatError: the binding is damaged.
+    """
+    mesh = read_character(path)
+    is_stored = binding is not None and binding.suffix.lower() == BINDING_SUFFIX
+    try:
+        if is_stored and binding is not None:
+            stored = load_binding(binding, mesh)
+            return DrivenCharacter(mesh, stored.placement, None, stored)
+        if points is not None:
+            named = read_points(points)
+            surface = surface_of_named(mesh, named)
+            placement = placed_by_points(mesh, surface, named)
+        else:
+            surface = mesh_surface(mesh)
+            placement = placed_by_shape(mesh, surface)
+        if mesh.shapes and not by_points and binding is None:
+            return DrivenCharacter(mesh, placement, face_shapes(mesh, placement, only), None)
+        bound = bind(mesh, surface, placement)
+        if binding is not None:
+            bound = painted(bound, mesh, read_weights(binding))
+        return DrivenCharacter(mesh, placement, None, bound)
+    except InputError as error:
+        text = str(error)
+        raise InputError(text if str(path) in text else f"{path}: {text}") from error
+
+
+def at_times(rows: Array, gap: Array, rate_hz: float, time_s: Array) -> Array:
+    """Return rows of curves at some times, evenly spaced [shape=(len(time_s), N)].
+
+    rows : one a frame [shape=(T, N)]; gap : of the lips [shape=(T,)]; at the time nearest to a frame with gap 0 the row
+    of that frame is returned, so that no closure is lost between pictures
+    """
+    values = between_frames(rows, rate_hz, time_s)
+    if len(time_s) > 1:
+        step = float(time_s[1] - time_s[0])
+        closed = np.flatnonzero(gap <= 0)
+        nearest = np.rint((closed / rate_hz - time_s[0]) / step).astype(int)
+        inside = (nearest >= 0) & (nearest < len(time_s))
+        away = np.abs(closed / rate_hz - time_s[np.clip(nearest, 0, len(time_s) - 1)])
+        order = np.argsort(-away, kind="stable")  # of several, the nearest is written last
+        for number in order[inside[order]]:
+            values[nearest[number]] = rows[closed[number]]
+    return values

@@ -1,0 +1,89 @@
+"""The lip and jaw points of a mouth at rest: where to look for them on a mesh, and which of them are mirrored.
+
+The table is the rest pose of the shipped model, made symmetrical: eye distances, in the head frame of motion (origin
+between the eyes, x to the speaker's left, y up, z out of the face). Points have the numbers of MediaPipe's face mesh,
+as in the names of the channels (``x_13``, ``y_13``, ``z_13``).
+"""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+
+import numpy as np
+from numpy.typing import NDArray
+
+UPPER_MIDDLE, LOWER_MIDDLE = 13, 14
+"""The middles of the inner lips; the channel ``opening`` is their distance."""
+RIGHT_CORNER, LEFT_CORNER = 61, 291
+"""The lip corners; the channel ``width`` is their distance."""
+INNER_CORNERS = (78, 308)
+"""Where the lips part, right and left."""
+UPPER_EDGE, LOWER_EDGE = 0, 17
+"""The middles of the outer lips; the channel ``outer`` is their distance."""
+CHIN = 152
+FACING = ((13, 14), (82, 87), (312, 317), (81, 178), (311, 402))
+"""Pairs of an upper and a lower point of the inner lips that touch when the mouth is closed."""
+
+
+@dataclass(frozen=True, eq=False)
+class MouthTemplate:
+    """Lip and jaw points at rest.
+
+    points   : numbers of the 52 points, in the order of the rows
+    places   : [shape=(52, 3)], eye distances
+    upper, lower, corner, jaw, inner : which rows are what [shape=(52,), bool]; a corner is neither upper nor lower
+    mirrored : the row of the point on the other side [shape=(52,)]
+    """
+
+    points: tuple[int, ...]
+    places: NDArray[np.float64]
+    upper: NDArray[np.bool_]
+    lower: NDArray[np.bool_]
+    corner: NDArray[np.bool_]
+    jaw: NDArray[np.bool_]
+    inner: NDArray[np.bool_]
+    mirrored: NDArray[np.int64]
+
+    def row(self, point: int) -> int:
+        """Return the row of a point."""
+        return self.points.index(point)
+
+    @property
+    def centre(self) -> NDArray[np.float64]:
+        """The point between the lip corners [shape=(3,)]."""
+        return (self.places[self.row(RIGHT_CORNER)] + self.places[self.row(LEFT_CORNER)]) / 2
+
+    @property
+    def width(self) -> float:
+        """The distance of the lip corners, eye distances."""
+        return float(np.linalg.norm(self.places[self.row(RIGHT_CORNER)] - self.places[self.row(LEFT_CORNER)]))
+
+    @property
+    def inner_width(self) -> float:
+        """The distance of the inner lip corners (78, 308), where the lips part, eye distances."""
+        right, left = (self.places[self.row(point)] for point in INNER_CORNERS)
+        return float(np.linalg.norm(left - right))
+
+    def seam(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the height at which the closed lips meet, at some places from right to left [shape=(len(x),)]."""
+        rows = np.flatnonzero(self.inner)
+        order = rows[np.argsort(self.places[rows, 0], kind="stable")]
+        return np.interp(x, self.places[order, 0], self.places[order, 1])
+
+
+@cache
+def mouth_template() -> MouthTemplate:
+    """Return the template of the table ``mouth_template.csv``."""
+    text = resources.files("lipmotion.rig").joinpath("mouth_template.csv").read_text(encoding="ascii")
+    rows = list(csv.DictReader(text.splitlines()))
+    points = tuple(int(row["point"]) for row in rows)
+    kinds = {kind: np.array([kind in row["place"] for row in rows]) for kind in "upper lower corner jaw inner".split()}
+    return MouthTemplate(
+        points,
+        np.array([[float(row[axis]) for axis in "xyz"] for row in rows]),
+        mirrored=np.array([points.index(int(row["mirrored"])) for row in rows]),
+        **kinds,
+    )

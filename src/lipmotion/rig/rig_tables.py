@@ -1,0 +1,101 @@
+"""A user's own rig: a table that says which controls follow which curves."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import InputError, shortened
+from lipmotion.storage.files import read_text_file
+from lipmotion.types import Channel, Motion
+
+COLUMNS = ("control", "source", "gain", "offset", "low", "high")
+CONTROL = "control"
+"""The unit of controls of a user's rig."""
+LARGEST_TABLE, MOST_CONTROLS = 1 << 20, 2000
+LARGEST_NUMBER = 1e6
+
+
+@dataclass(frozen=True)
+class RigRow:
+    """One row of the table: a control follows ``offset + gain · source``; rows of one control are added up.
+
+    low, high : limits of the control; of several rows, those of the first count
+    """
+
+    control: str
+    source: str
+    gain: float = 1.0
+    offset: float = 0.0
+    low: float = -np.inf
+    high: float = np.inf
+
+
+def read_rig_table(path: Path) -> tuple[RigRow, ...]:
+    """Return the rows of a table ``control,source,gain,offset,low,high`` (CSV); empty fields have their usual value.
+
+    Raises InputError: no such file, other columns, no rows, or a row that is damaged.
+    """
+    reader = csv.DictReader(io.StringIO(read_text_file(path, "rig table", LARGEST_TABLE)))
+    found = [name.strip() for name in reader.fieldnames or ()]
+    if found[:2] != list(COLUMNS[:2]) or not set(found) <= set(COLUMNS):
+        raise InputError(f"{path}: the columns are {shortened(','.join(found))!r}, required {','.join(COLUMNS)}")
+    reader.fieldnames = found
+    rows = []
+    for fields in reader:
+        texts = {name: (fields.get(name) or "").strip() for name in COLUMNS}
+        if texts["control"].startswith("#") or not any(texts.values()):
+            continue
+        try:
+            rows.append(_row(texts))
+        except ValueError as error:
+            raise InputError(f"{path}: line {reader.line_num}: {shortened(str(error))}") from error
+    if not rows or len(rows) > MOST_CONTROLS:
+        raise InputError(f"{path}: {len(rows)} rows, required 1 to {MOST_CONTROLS}")
+    return tuple(rows)
+
+
+def rig_motion(rows: tuple[RigRow, ...], sources: Mapping[str, NDArray[np.float64]], rate_hz: float) -> Motion:
+    """Return the controls of a rig over time, in the order of the table.
+
+    sources : curves by name, blendshapes of ARKit, visemes, channels of motion [each shape=(T,)]
+    Raises InputError: a row asks for a source that is not among them.
+    """
+    curves: dict[str, NDArray[np.float64]] = {}
+    limits: dict[str, tuple[float, float]] = {}
+    for row in rows:
+        if row.source and row.source not in sources:
+            some = ", ".join(list(sources)[:8])
+            raise InputError(f"the control {row.control!r} follows {row.source!r}, required one of {some}, ...")
+        value = row.gain * sources[row.source] if row.source else np.zeros(len(next(iter(sources.values()))))
+        curves[row.control] = curves.get(row.control, 0.0) + value + row.offset
+        limits.setdefault(row.control, (row.low, row.high))
+    columns = [np.clip(curve, *limits[name]) for name, curve in curves.items()]
+    return Motion(np.stack(columns, axis=1), rate_hz, tuple(Channel(name, CONTROL) for name in curves))
+
+
+def _row(texts: Mapping[str, str]) -> RigRow:
+    if not texts["control"]:
+        raise ValueError("a row without a control")
+    numbers = {
+        name: _number(texts[name], default)
+        for name, default in (("gain", 1.0), ("offset", 0.0), ("low", -np.inf), ("high", np.inf))
+    }
+    if numbers["low"] > numbers["high"]:
+        raise ValueError(f"the control {texts['control']!r} goes from {numbers['low']:g} to {numbers['high']:g}")
+    return RigRow(texts["control"], texts["source"], **numbers)
+
+
+def _number(text: str, default: float) -> float:
+    if not text:
+        return default
+    value = float(text)
+    if not abs(value) <= LARGEST_NUMBER:
+        raise ValueError(f"the number {text}, required at most {LARGEST_NUMBER:g}")
+    return value

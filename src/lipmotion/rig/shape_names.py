@@ -1,0 +1,75 @@
+"""Names of blendshapes: ARKit's 52, the 15 visemes of Oculus and OpenXR, the vowels of VRM, and how files spell
+them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+
+SIDED = (
+    *("mouthSmile", "mouthFrown", "mouthDimple", "mouthStretch", "mouthPress", "mouthLowerDown", "mouthUpperUp"),
+    *("cheekSquint", "noseSneer", "eyeBlink", "eyeLookDown", "eyeLookIn", "eyeLookOut", "eyeLookUp", "eyeSquint"),
+    *("eyeWide", "browDown", "browOuterUp"),
+)
+ARKIT_MOUTH = (
+    *("jawForward", "jawLeft", "jawRight", "jawOpen", "mouthClose", "mouthFunnel", "mouthPucker"),
+    *("mouthLeft", "mouthRight", "mouthSmileLeft", "mouthSmileRight", "mouthFrownLeft", "mouthFrownRight"),
+    *("mouthDimpleLeft", "mouthDimpleRight", "mouthStretchLeft", "mouthStretchRight", "mouthRollLower"),
+    *("mouthRollUpper", "mouthShrugLower", "mouthShrugUpper", "mouthPressLeft", "mouthPressRight"),
+    *("mouthLowerDownLeft", "mouthLowerDownRight", "mouthUpperUpLeft", "mouthUpperUpRight", "tongueOut"),
+)
+"""ARKit's blendshapes of lips, jaw and tongue, in the order of its documentation."""
+ARKIT_OTHERS = (
+    *("eyeBlinkLeft", "eyeLookDownLeft", "eyeLookInLeft", "eyeLookOutLeft", "eyeLookUpLeft", "eyeSquintLeft"),
+    *("eyeWideLeft", "eyeBlinkRight", "eyeLookDownRight", "eyeLookInRight", "eyeLookOutRight", "eyeLookUpRight"),
+    *("eyeSquintRight", "eyeWideRight", "browDownLeft", "browDownRight", "browInnerUp", "browOuterUpLeft"),
+    *("browOuterUpRight", "cheekPuff", "cheekSquintLeft", "cheekSquintRight", "noseSneerLeft", "noseSneerRight"),
+)
+"""The other 24 of ARKit's 52."""
+VISEMES_15 = ("sil", "PP", "FF", "TH", "DD", "kk", "CH", "SS", "nn", "RR", "aa", "E", "ih", "oh", "ou")
+"""The visemes of Oculus and OpenXR, in their order."""
+VRM_VOWELS = ("aa", "ih", "ou", "ee", "oh")
+"""The mouth shapes of VRM."""
+_VISEME_SPELLINGS = {"i": "ih", "o": "oh", "u": "ou"} | {name.lower(): name for name in VISEMES_15}
+_VOWEL_SPELLINGS = {"a": "aa", "i": "ih", "u": "ou", "e": "ee", "o": "oh"} | {name: name for name in VRM_VOWELS}
+_ARKIT = {name.lower(): name for name in (*ARKIT_MOUTH, *ARKIT_OTHERS)}
+_SIDES = {"l": "left", "r": "right", "left": "left", "right": "right"}
+
+
+def arkit_name(name: str) -> str | None:
+    """Return ARKit's name of a blendshape as files spell it, or None: ``head.mouthSmile_L`` is ``mouthSmileLeft``."""
+    text = re.split(r"[.:|]", name)[-1]
+    words = [word for word in re.split(r"[\s_\-]+", text) if word]
+    for first in range(len(words)):
+        rest = [word.lower() for word in words[first:]]
+        joined = "".join([*rest[:-1], _SIDES.get(rest[-1], rest[-1])])
+        if joined in _ARKIT:
+            return _ARKIT[joined]
+    return None
+
+
+def viseme_name(name: str) -> str | None:
+    """Return the Oculus name of a viseme as files spell it, or None: ``viseme_I`` and ``vrc.v_ih`` are ``ih``."""
+    found = re.search(r"(?:viseme|vrc\.v|v)[_.\-](\w+)$", name, re.IGNORECASE)
+    return _VISEME_SPELLINGS.get(found[1].lower()) if found else None
+
+
+def vowel_name(name: str) -> str | None:
+    """Return the VRM name of a vowel as files spell it, or None: ``Fcl_MTH_A`` and ``aa`` are ``aa``."""
+    found = re.search(r"(?:^|mth_|mouth_)(aa|ih|ou|ee|oh|[aiueo])$", name, re.IGNORECASE)
+    return _VOWEL_SPELLINGS[found[1].lower()] if found else None
+
+
+def by_arkit_name(names: Iterable[str]) -> dict[str, str]:
+    """Return the names of a mesh by ARKit's names; of two spellings of one, the first."""
+    found: dict[str, str] = {}
+    for name in names:
+        known = arkit_name(name)
+        if known is not None:
+            found.setdefault(known, name)
+    return found
+
+
+def is_known(name: str) -> bool:
+    """Return whether a blendshape has a name that is understood."""
+    return arkit_name(name) is not None or viseme_name(name) is not None or vowel_name(name) is not None

@@ -1,0 +1,107 @@
+"""Characters on the command line: looked into, animated, and driven elsewhere."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+
+from cli.conftest import RunCommand, is_one_error
+from lipmotion.export.base import read_motion
+from lipmotion.rig.character_files import read_character
+from lipmotion.rig.gltf_writer import write_glb
+from lipmotion.rig.obj_files import write_obj
+from rig.heads import head, lip_points
+
+
+@pytest.fixture
+def glb(here: Path) -> Path:
+    write_glb(here / "head.glb", head())
+    return here / "head.glb"
+
+
+@pytest.fixture
+def basics(toy_speech: Path, toy_model_file: Path) -> tuple[object, ...]:
+    return ("animate", toy_speech, "--model", toy_model_file)
+
+
+def test_what_is_in_a_file_is_printed(run: RunCommand, glb: Path) -> None:
+    done = run("character", glb, "--write-points", "points.csv", "--picture", "head.png")
+    assert done.code == 0
+    assert done.out[0].startswith("vertices")
+    assert any("moved by       arkit: jawOpen, mouthClose" in line for line in done.out)
+    assert done.out[-2:] == ["points.csv", "head.png"]
+    assert Path("points.csv").read_text().startswith("point,vertex\n61,")
+    assert Path("head.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_mesh_without_blendshapes_is_bound_once(run: RunCommand, here: Path, basics: tuple[object, ...]) -> None:
+    plain = head(shapes=False)
+    write_obj(here / "head.obj", plain)
+    rows = "".join(f"{point},{vertex}\n" for point, vertex in lip_points(plain).items())
+    (here / "points.csv").write_text("point,vertex\n" + rows)
+    bound = run("character", "head.obj", "--lip-points", "points.csv", "--write-binding", "head.binding")
+    assert bound.code == 0
+    assert (here / "head.binding").exists()
+    done = run(*basics, "--character", "head.obj", "--binding", "head.binding", "-o", "said.mp4", "--fps", "10")
+    assert done == (0, ["said.mp4"], [])
+
+
+def test_a_character_speaks(run: RunCommand, glb: Path, basics: tuple[object, ...], here: Path) -> None:
+    done = run(*basics, "--character", glb, "-o", "said.mp4", "said.json", "said.glb", "--fps", "10")
+    assert done == (0, ["said.mp4", "said.json", "said.glb"], [])
+    with av.open(str(here / "said.mp4")) as video:
+        assert (video.streams.video[0].width, video.streams.video[0].height) == (1280, 720)
+    motion, units = read_motion(here / "said.json")
+    assert {channel.unit for channel in motion.channels} == {"weight"}
+    assert motion.names[0] == "jawOpen"
+    assert len(units) > 1
+    assert 0 <= motion.values.min() <= motion.values.max() <= 1
+    assert read_character(here / "said.glb").shape_names == head().shape_names
+    stored = json.loads((here / "said.glb").read_bytes()[20:].split(b"\0")[0].rsplit(b"}", 1)[0] + b"}")
+    assert stored["animations"][0]["name"] == "speech"
+
+
+@pytest.mark.parametrize(
+    ("curves", "first"), [("arkit", "jawForward"), ("visemes", "viseme_sil"), ("fap", "fap3_open_jaw")]
+)
+def test_curves_without_a_mesh(
+    run: RunCommand, here: Path, basics: tuple[object, ...], curves: str, first: str
+) -> None:
+    assert run(*basics, "--curves", curves, "-o", "curves.csv").code == 0
+    assert (here / "curves.csv").read_text().startswith(f"time_s,{first},")
+
+
+def test_a_rig_of_the_users_own(run: RunCommand, here: Path, basics: tuple[object, ...]) -> None:
+    (here / "rig.csv").write_text("control,source,gain\nJaw,jawOpen,-25\nDrop,opening,1\nOh,viseme_oh,1\n")
+    assert run(*basics, "--curves", "rig.csv", "-o", "rig.json", "--rate", "25").code == 0
+    motion, _ = read_motion(here / "rig.json")
+    assert motion.names == ("Jaw", "Drop", "Oh")
+    assert motion["Jaw"].min() < 0
+    assert np.abs(motion.values[0]).max() < 1
+
+
+def test_some_channels_of_a_set(run: RunCommand, here: Path, basics: tuple[object, ...]) -> None:
+    assert run(*basics, "--curves", "arkit", "--channels", "opening,jawOpen", "-o", "two.csv").code == 0
+    assert (here / "two.csv").read_text().startswith("time_s,opening,jawOpen\n")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "message"),
+    [
+        (("--curves", "visems", "-o", "a.csv"), 3, "no set of curves 'visems', required one of arkit, visemes, fap"),
+        (("-o", "a.glb"), 7, "name it: --character FILE"),
+        (("--control-points", "-o", "a.csv"), 3, "belong to a character"),
+        (("--character", "nothing.glb", "-o", "a.mp4"), 3, "no such file"),
+    ],
+)
+def test_what_is_wrong_is_said_in_one_line(
+    run: RunCommand, here: Path, basics: tuple[object, ...], arguments: tuple[str, ...], code: int, message: str
+) -> None:
+    done = run(*basics, *arguments)
+    assert is_one_error(done, code)
+    assert message in done.err[0]
+    assert list(here.iterdir()) == []

@@ -1,0 +1,21 @@
+"""Motions and labels that the tests of the head share."""
+
+import numpy as np
+
+from lipmotion.types import Channel, Motion, Span, Timeline, Unit
+
+NOTHING_SAID: Timeline[Unit] = Timeline(())
+
+
+def opening(*values: float, rate_hz: float = 25.0) -> Motion:
+    return Motion(np.array(values)[:, None], rate_hz, (Channel("opening"),))
+
+
+def said(*phones: str, duration_s: float = 0.4) -> Timeline[Unit]:
+    spans = (Span(duration_s * n, duration_s * (n + 1), Unit(phone)) for n, phone in enumerate(phones))
+    return Timeline(tuple(spans))
+
+
+def steady(phones: tuple[str, ...], values: float = 0.08, duration_s: float = 0.4) -> Motion:
+    """Return a motion of one opening for as long as the phones take."""
+    return opening(*[values] * (int(100 * duration_s) * len(phones) + 1), rate_hz=100.0)

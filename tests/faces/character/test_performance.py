@@ -1,0 +1,99 @@
+import numpy as np
+import pytest
+
+from faces.character.motions import NOTHING_SAID, opening, said, steady
+from lipmotion.errors import InputError
+from lipmotion.faces.character.performance import drawn_gap, head_poses, upper_share
+from lipmotion.types import Channel, Motion
+from lipmotion.units import LIP_CLOSING
+
+
+def middle(phone: str, value: float = 0.08, before: str = "ah", after: str = "ah"):
+    """Return the pose in the middle of a phone."""
+    phones = (before, phone, after)
+    return head_poses(steady(phones, value), said(*phones), 25.0)[15]
+
+
+def test_lips_that_touch_are_drawn_closed_and_wider_openings_wider():
+    gap = drawn_gap(np.array([-0.01, 0.0, 0.012, 0.02, 0.03, 0.1, 0.2, 0.9]))
+    assert (gap[:3] == 0).all()
+    assert (np.diff(gap[2:7]) > 0).all()
+    assert gap[-1] == pytest.approx(0.4)
+
+
+def test_the_upper_lip_rises_less_than_the_gap():
+    gap = np.linspace(0.001, 0.4, 50)
+    assert (upper_share(gap) < gap).all()
+    assert upper_share(gap).max() < 0.06
+
+
+@pytest.mark.parametrize("phone", sorted(LIP_CLOSING))
+@pytest.mark.parametrize("value", [0.0, 0.05, 0.2])
+def test_p_b_and_m_are_closed_exactly_whatever_the_motion_is(phone, value):
+    poses = head_poses(steady(("aa", phone, "aa"), value), said("aa", phone, "aa"), 25.0)
+    assert min(pose.gap for pose in poses[10:20]) == 0
+    assert poses[15].press > 0.9
+
+
+@pytest.mark.parametrize("start", [0.0, 0.013, 0.02, 0.031])
+def test_a_closed_sound_shorter_than_a_frame_is_closed_in_one(start):
+    labels = said("aa", "b", duration_s=0.02).shifted(0.4 + start)
+    poses = head_poses(steady(("aa", "aa", "aa"), 0.1), labels, 25.0)
+    assert sum(pose.gap == 0 for pose in poses) == 1
+
+
+def test_each_sound_has_its_own_shape():
+    f, th, oo, aa, ee, n, s = (middle(phone) for phone in ("f", "th", "uw", "aa", "iy", "n", "s"))
+    assert min(f.tuck, th.tongue_out, oo.roundness, aa.oval, s.bite) > 0.9
+    assert max(pose.tuck for pose in (th, oo, aa, ee, n, s)) < 0.1
+    assert max(pose.tongue_out for pose in (f, oo, aa, ee, n, s)) < 0.1
+    assert max(pose.roundness for pose in (f, th, aa, ee, n, s)) < 0.1
+    assert max(pose.bite for pose in (f, th, oo, aa, n)) < 0.1
+    assert n.tongue_up > 0.5
+    assert oo.protrusion > 0.05
+    assert oo.width < aa.width < ee.width
+
+
+def test_long_pauses_are_nearly_closed_and_short_ones_are_not():
+    quiet = head_poses(steady(("aa", "sil", "aa"), 0.1), said("aa", "sil", "aa"), 25.0)
+    assert quiet[14].gap < 0.035
+    phones = ("aa", "sp", "aa")
+    short = head_poses(steady(phones, 0.1, 0.1), said(*phones, duration_s=0.1), 25.0)
+    assert short[4].gap > 0.08
+
+
+def test_the_motion_alone_moves_the_corners():
+    values = np.array([[0.05, width] for width in (0.57, 0.57, 0.57, 0.5, 0.5, 0.62, 0.62)])
+    motion = Motion(values, 25.0, (Channel("opening"), Channel("width")))
+    narrow, wide = (head_poses(motion, NOTHING_SAID, 25.0)[frame] for frame in (4, 6))
+    assert narrow.width < 0.95
+    assert wide.width > 1.05
+    assert narrow.roundness > wide.roundness
+    assert wide.spread > narrow.spread
+
+
+def test_tracked_jaws_are_followed_within_limits():
+    values = np.array([[0.0, -1.0], [0.2, -1.05], [0.2, -1.15], [0.2, -9.0]])
+    motion = Motion(np.repeat(values, 3, axis=0), 25.0, (Channel("opening"), Channel("y_152")))
+    jaws = [head_poses(motion, NOTHING_SAID, 25.0)[frame].jaw for frame in (1, 4, 7, 10)]
+    assert jaws[0] == pytest.approx(0, abs=0.011)
+    assert jaws[1] < jaws[2] < jaws[3] < 0.25
+
+
+@pytest.mark.parametrize(
+    ("motion", "message"),
+    [
+        (Motion(np.zeros((3, 1)), 25.0, (Channel("width"),)), "no channel 'opening'"),
+        (opening(), "no frames"),
+        (opening(0.0, float("nan")), "not finite"),
+    ],
+)
+def test_an_unusable_motion_is_refused(motion, message):
+    with pytest.raises(InputError, match=message):
+        head_poses(motion, NOTHING_SAID, 25.0)
+
+
+@pytest.mark.parametrize("fps", [0.0, -1.0, float("inf")])
+def test_an_unusable_frame_rate_is_refused(fps):
+    with pytest.raises(InputError, match="frame rate"):
+        head_poses(opening(0.0), NOTHING_SAID, fps)

@@ -1,0 +1,58 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lipmotion.kernels import shading
+from lipmotion.kernels.choice import numba_works
+
+
+def unit(vectors):
+    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+
+
+@given(seed=st.integers(0, 2**32 - 1))
+@settings(deadline=None, max_examples=20)
+def test_both_forms_give_the_same_bits(seed):
+    if not numba_works():
+        pytest.skip("numba is not installed")
+    draw = np.random.default_rng(seed)
+    count = 60
+    finishes = draw.uniform(0, 1, (4, 7))
+    finishes[:, 4] = [3, 6, 4, 5]
+    finishes[:, 6] = [0, 1, 0, 1]
+    finishes[2, 3] = 0
+    given_ = (
+        unit(draw.normal(size=(count, 3))), draw.normal(size=(count, 3)), np.array([0.0, 0.1, 9.0]),
+        draw.uniform(0, 1, (count, 3)), draw.uniform(0, 1, (count, 2)), unit(draw.normal(size=(count, 3))),
+        draw.integers(0, 4, count), finishes, draw.uniform(-1, 1, (6, 6)),
+    )  # fmt: skip
+    forms = []
+    for compiled in (False, True):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(shading, "compiled_pays", lambda _, form=compiled: form)
+            forms.append(shading.shade(*given_))
+    assert np.array_equal(*forms)
+    assert forms[0].any()
+
+
+def light_of(normal, *, reaches=(1.0, 1.0)) -> np.ndarray:
+    lamps = np.zeros((6, 6))
+    lamps[0] = [0, 0, 1, 1, 1, 1]
+    lamps[4:, :3] = 0.1
+    finish = np.array([[0.2, 0.2, 0.2, 0.0, 4, 0.0, 0.0]])
+    return shading.shade(
+        np.array([normal], float), np.zeros((1, 3)), np.array([0, 0, 9.0]), np.full((1, 3), 0.5),
+        np.array([reaches]), np.zeros((1, 3)), np.zeros(1, int), finish, lamps,
+    )[0]  # fmt: skip
+
+
+def test_a_surface_that_faces_the_lamp_is_brightest():
+    facing, turned, away = (float(light_of(n)[0]) for n in ([0, 0, 1], [0.8, 0, 0.6], [0.99, 0, -0.14]))
+    assert facing > turned > away > 0
+
+
+def test_what_is_hidden_from_lamp_and_sky_is_dark():
+    open_, shaded, hidden = (float(light_of([0, 0, 1], reaches=r)[0]) for r in ((1, 1), (1, 0), (0, 0)))
+    assert open_ > shaded > hidden
+    assert hidden == pytest.approx(0)

@@ -1,0 +1,97 @@
+"""glTF files for tests, written by hand: a square of two triangles with two morph targets."""
+
+from __future__ import annotations
+
+import base64
+import json
+import struct
+
+import numpy as np
+
+POSITIONS = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], "<f4")
+INDICES = np.array([0, 1, 2, 0, 2, 3], "<u2")
+OPEN = np.array([[0.0, 0, 0], [0, 0, 0], [0, 0.5, 0], [0, 0.25, 0]], "<f4")
+WIDE = np.array([[-1.0, 0, 0], [1, 0, 0], [0, 0, 0], [0, 0, 0]], "<f4")
+
+
+def document() -> tuple[dict, bytes]:
+    """The square as JSON and bytes."""
+    arrays = [POSITIONS, OPEN, WIDE, INDICES]
+    views, offset = [], 0
+    for array in arrays:
+        views.append({"buffer": 0, "byteOffset": offset, "byteLength": array.nbytes})
+        offset += array.nbytes
+    accessors = [{"bufferView": n, "componentType": 5126, "count": 4, "type": "VEC3"} for n in range(3)]
+    accessors.append({"bufferView": 3, "componentType": 5123, "count": 6, "type": "SCALAR"})
+    primitive = {"attributes": {"POSITION": 0}, "indices": 3, "targets": [{"POSITION": 1}, {"POSITION": 2}]}
+    content = {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"name": "head", "mesh": 0}],
+        "meshes": [{"primitives": [primitive], "extras": {"targetNames": ["jawOpen", "mouthWide"]}}],
+        "accessors": accessors,
+        "bufferViews": views,
+        "buffers": [{"byteLength": offset}],
+    }
+    return content, b"".join(array.tobytes() for array in arrays)
+
+
+def glb(content: dict, binary: bytes) -> bytes:
+    """A document and its bytes as GLB."""
+    text = json.dumps(content).encode()
+    text += b" " * (-len(text) % 4)
+    binary += b"\0" * (-len(binary) % 4)
+    length = 12 + 8 + len(text) + 8 + len(binary)
+    head = struct.pack("<4sII", b"glTF", 2, length) + struct.pack("<II", len(text), 0x4E4F534A)
+    return head + text + struct.pack("<II", len(binary), 0x004E4942) + binary
+
+
+def data_uri(binary: bytes) -> str:
+    """Bytes inside a document."""
+    return "data:application/octet-stream;base64," + base64.b64encode(binary).decode()
+
+
+def packed_attributes(elements: np.ndarray) -> bytes:
+    """Elements [shape=(N, stride), uint8] as a meshopt stream of attributes, every group stored as whole bytes or
+    zeros."""
+    count, stride = elements.shape
+    rows = min((8192 // stride) & ~15, 256)
+    out, baseline = bytearray([0xA0]), elements[0].copy()
+    last = baseline.copy()
+    for first in range(0, count, rows):
+        block = elements[first : first + rows]
+        for column in range(stride):
+            values = np.concatenate([[last[column]], block[:, column]]).astype(int)
+            deltas = np.diff(values) & 255
+            signed = np.where(deltas > 127, deltas - 256, deltas)
+            coded = np.where(signed < 0, -2 * signed - 1, 2 * signed).astype(np.uint8)
+            groups = -(-len(coded) // 16)
+            coded = np.concatenate([coded, np.zeros(groups * 16 - len(coded), np.uint8)]).reshape(groups, 16)
+            modes = [_mode(group) for group in coded]
+            header = bytearray((groups + 3) // 4)
+            for number, mode in enumerate(modes):
+                header[number // 4] |= mode << (number % 4 * 2)
+            out += header
+            for group, mode in zip(coded, modes, strict=True):
+                out += _packed_group(group, mode)
+        last = block[-1].copy()
+    tail = max(stride, 32)
+    return bytes(out) + b"\0" * (tail - stride) + baseline.tobytes()
+
+
+def _mode(group: np.ndarray) -> int:
+    if not group.any():
+        return 0
+    return 1 if (group >= 3).sum() <= 2 else 2 if (group >= 15).sum() <= 2 else 3
+
+
+def _packed_group(group: np.ndarray, mode: int) -> bytes:
+    if mode in {0, 3}:
+        return group.tobytes() if mode else b""
+    bits = 2 * mode
+    least = (1 << bits) - 1
+    whole = 0
+    for value in group.tolist():
+        whole = whole << bits | min(value, least)
+    return whole.to_bytes(2 * bits, "big") + bytes(value for value in group.tolist() if value >= least)
