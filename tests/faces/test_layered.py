@@ -88,6 +88,9 @@ def test_colours_and_order():
         ('<g transform="rotate(a)"><rect width="1" height="1"/></g>', "transform"),
         ("<g>" * 80 + "</g>" * 80, "deep"),
         ("", "no shape"),
+        ('<path d="M0 0L1e9 1"/>', "numbers up to"),
+        ('<rect width="1" height="1" transform="scale(1e200)"/>', "transform"),
+        ('<g transform="scale(1e5)"><g transform="scale(1e5)"><rect width="1" height="1"/></g></g>', "enlarge"),
     ],
 )
 def test_what_is_unsafe_or_would_be_drawn_wrongly_is_refused(inside, words):
@@ -99,6 +102,7 @@ def test_what_is_unsafe_or_would_be_drawn_wrongly_is_refused(inside, words):
     "data",
     [
         b"", b"not xml", b"<html/>", b"<svg", b"\xff\xfe\x00", b'<svg viewBox="0 0 0 0"><rect/></svg>',
+        b'<svg viewBox="0 0 900000 4"><rect/></svg>',
         b'<!DOCTYPE svg [<!ENTITY a "b">]><svg>&a;</svg>', b'<!DOCTYPE svg [ <!ENTITY % x SYSTEM "file:///x"> ]><svg/>',
     ],
 )  # fmt: skip

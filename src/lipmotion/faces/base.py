@@ -66,8 +66,8 @@ class Staging(Configuration):
             raise InputError(f"the intensity is {self.intensity:g}, required 0 to 3")
         if self.background not in (SCENE, TRANSPARENT) and not re.fullmatch("#[0-9a-fA-F]{6}", self.background):
             raise InputError(
-                f"the background is {shortened(self.background)!r}, required scene, transparent, or a colour as #40a0ff"
-                "; a video is for filmed faces; give one: --face FILE.face"
+                f"the background is {shortened(self.background)!r}, required scene, transparent, or a colour as "
+                "#40a0ff; a video is for filmed faces; give one: --face FILE.face"
             )
 
     @property

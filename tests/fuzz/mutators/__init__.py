@@ -27,6 +27,7 @@ FORMS: dict[str, tuple[Mutate, ...]] = {
     ".align": (text.change, text.change, text.change),
     ".lab": (text.change, text.change, text.change),
     ".TextGrid": (text.change, text.change, text.change),
+    ".svg": (text.change, text.change, text.change),
     ".dict": (text.change, text.change, text.change),
 }
 """By suffix; the bytes of any file are changed as well."""

@@ -3,9 +3,23 @@
 from __future__ import annotations
 
 from fuzz.inputs import Reader
-from fuzz.readers import audio, character, corpus, curves, face, labels, lexicon, model, transcript, units, video
+from fuzz.readers import (
+    audio,
+    character,
+    corpus,
+    curves,
+    drawing,
+    face,
+    labels,
+    lexicon,
+    model,
+    transcript,
+    units,
+    video,
+)
 
+_MODULES = (audio, video, transcript, lexicon, units, labels, model, face, drawing, corpus, curves, character)
 READERS: dict[str, Reader] = {
     module.__name__.rpartition(".")[2]: Reader(module.__name__.rpartition(".")[2], module.seeds, module.read)
-    for module in (audio, video, transcript, lexicon, units, labels, model, face, corpus, curves, character)
+    for module in _MODULES
 }

@@ -18,9 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shortened
-from lipmotion.faces.portrait.svg_paths import circle, path_lines, points_of, rectangle, transform_of
+from lipmotion.faces.portrait.svg_paths import LARGEST, circle, path_lines, points_of, rectangle, transform_of
 
 Points = NDArray[np.float64]
+WIDEST = 4.0
+"""Largest ratio of the sides of a picture."""
 LARGEST_FILE, MOST_SHAPES, DEEPEST = 8 << 20, 20_000, 60
 """Most bytes of a drawing, shapes in it, and groups in one another."""
 _SHAPES = {"path", "rect", "circle", "ellipse", "polygon", "polyline", "line"}
@@ -111,6 +113,10 @@ def _box(root: ElementTree.Element) -> tuple[float, float, float, float]:
         numbers = [0, 0, *(_number(root.get(name, "0"), name) for name in ("width", "height"))]
     if len(numbers) != 4 or not (0 < numbers[2] < 1e6 and 0 < numbers[3] < 1e6):
         raise InputError(f"the view box is {shortened(str(text))!r}, required four numbers, the last two positive")
+    if not 1 / WIDEST <= numbers[2] / numbers[3] <= WIDEST:
+        raise InputError(
+            f"the picture is {numbers[2]:g} by {numbers[3]:g}, required at most {WIDEST:g} times as long as wide"
+        )
     return numbers[0], numbers[1], numbers[2], numbers[3]
 
 
@@ -132,7 +138,7 @@ def _shapes(
     _check_references(element)
     style = dict(inherited) | _style(element)
     opacity = opacity * float(np.clip(_number(style.pop("opacity", "1"), "opacity"), 0, 1))
-    matrix = matrix @ transform_of(element.get("transform", ""))
+    matrix = _bounded(matrix @ transform_of(element.get("transform", "")))
     name = element.get(_LABEL) or element.get("id") or ""
     for child in element:
         tag = _local(child.tag)
@@ -142,6 +148,12 @@ def _shapes(
             yield (*layers, name), _shape(child, tag, matrix, _kept(style), opacity)
         elif tag not in _PASSED_OVER and isinstance(child.tag, str):
             raise InputError(f"<{shortened(tag)}> is not read; convert it to paths with plain colours")
+
+
+def _bounded(matrix: Points) -> Points:
+    if not np.abs(matrix).max() <= LARGEST:
+        raise InputError(f"transforms in one another enlarge beyond {LARGEST:g} times")
+    return matrix
 
 
 def _kept(style: Mapping[str, str]) -> dict[str, str]:
@@ -171,10 +183,12 @@ def _shape(
 ) -> Shape:
     _check_references(element)
     style = dict(inherited) | _style(element)
-    matrix = matrix @ transform_of(element.get("transform", ""))
+    matrix = _bounded(matrix @ transform_of(element.get("transform", "")))
     share = opacity * _number(style.get("opacity", "1"), "opacity")
     alphas = tuple(share * _number(style.get(f"{kind}-opacity", "1"), f"{kind}-opacity") for kind in ("fill", "stroke"))
     lines = tuple(Line(points @ matrix[:2, :2].T + matrix[:2, 2], closed) for points, closed in _lines(element, tag))
+    if not all(np.abs(line.points).max(initial=0) <= 1e3 * LARGEST for line in lines):
+        raise InputError(f"a shape is {1e3 * LARGEST:g} units away; check the transforms")
     scale = float(np.sqrt(abs(np.linalg.det(matrix[:2, :2]))))
     shape = Shape(
         lines,

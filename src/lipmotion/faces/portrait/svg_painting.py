@@ -25,7 +25,10 @@ def painted(
     layer = np.zeros((height, width, 4), np.float32)
     scale = float(np.sqrt(abs(np.linalg.det(to_pixels[:, :2]))))
     for shape, moved in shapes:
-        lines = [(line.points @ to_pixels[:, :2].T + to_pixels[:, 2] + moved, line.closed) for line in shape.lines]
+        lines = [
+            (np.clip(line.points @ to_pixels[:, :2].T + to_pixels[:, 2] + moved, -1e5, 1e5), line.closed)
+            for line in shape.lines
+        ]
         if shape.fill is not None and shape.opacities[0] > 0:
             _lay(layer, _filled(lines, shape.even_odd, width, height), shape.fill, shape.opacities[0])
         if shape.stroke is not None and shape.opacities[1] > 0 and shape.width > 0:
@@ -64,7 +67,7 @@ def _stroked(lines: Sequence[tuple[NDArray[np.float64], bool]], thickness: float
     from PIL import Image, ImageDraw
 
     large = Image.new("L", (width * SUPERSAMPLING, height * SUPERSAMPLING))
-    draw, thick = ImageDraw.Draw(large), max(1, round(thickness * SUPERSAMPLING))
+    draw, thick = ImageDraw.Draw(large), max(1, round(min(thickness, 2 * height) * SUPERSAMPLING))
     for points, closed in lines:
         path = np.vstack([points, points[:1]]) if closed else points
         at = [tuple(p) for p in (path * SUPERSAMPLING - 0.5).tolist()]

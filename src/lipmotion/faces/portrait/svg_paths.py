@@ -14,6 +14,8 @@ Points = NDArray[np.float64]
 STEPS = 12
 """Points for each Bézier curve, and for a quarter of an ellipse."""
 MOST_NUMBERS = 200_000
+LARGEST = 1e6
+"""Largest magnitude of a number in a drawing."""
 _TOKEN = re.compile(r"([MmLlHhVvCcSsQqTtAaZz])|([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)")
 _COUNTS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7, "Z": 0}
 
@@ -81,7 +83,7 @@ def _commands(text: str) -> list[tuple[str, list[float]]]:
     letter, numbers = "", []
     for name, number in [*tokens, ("Z", "")]:
         if number:
-            numbers.append(float(number))
+            numbers.append(within(float(number), text))
             if letter and letter not in "Zz" and len(numbers) == _COUNTS[letter.upper()]:
                 commands.append((letter, numbers))
                 letter, numbers = {"M": "L", "m": "l"}.get(letter, letter), []
@@ -137,12 +139,21 @@ def _arc(at: Points, end: Points, rx: float, ry: float, turned: float, large: fl
     return list(np.stack([rx * np.cos(angles), ry * np.sin(angles)], axis=1) @ turn + middle)
 
 
+def within(number: float, text: str) -> float:
+    """Return the number. Raises InputError, with ``text``: it is larger than ``LARGEST``, or not finite."""
+    if not abs(number) <= LARGEST:
+        raise InputError(f"{number:g} in {shortened(text)!r}, required numbers up to {LARGEST:g}")
+    return number
+
+
 def points_of(text: str) -> Points:
     """Return the points of a polygon [shape=(N, 2)]. Raises InputError: an odd count, or no numbers."""
     try:
         numbers = [float(part) for part in re.split(r"[\s,]+", text.strip()) if part]
     except ValueError as error:
         raise InputError(f"points are {shortened(text)!r}, required numbers") from error
+    for number in numbers:
+        within(number, text)
     if len(numbers) % 2 or len(numbers) < 4:
         raise InputError(f"points have {len(numbers)} numbers, required pairs, two at least")
     return np.array(numbers).reshape(-1, 2)
@@ -172,7 +183,7 @@ def transform_of(text: str) -> Points:
     matrix = np.eye(3)
     for name, inside in re.findall(r"(\w+)\s*\(([^)]*)\)", text):
         try:
-            numbers = [float(part) for part in re.split(r"[\s,]+", inside.strip()) if part]
+            numbers = [within(float(part), text) for part in re.split(r"[\s,]+", inside.strip()) if part]
             matrix = matrix @ _transform(name, numbers)
         except (ValueError, IndexError, KeyError) as error:
             raise InputError(f"the transform {shortened(f'{name}({inside})')!r} cannot be read") from error

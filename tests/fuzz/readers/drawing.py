@@ -1,0 +1,32 @@
+"""Drawings in layers, as characters of the user's own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from fuzz.inputs import Files, Good
+from fuzz.readers.plausible import require
+from lipmotion.faces import Staging, staged_face
+from lipmotion.types import Channel, Motion, Timeline
+
+ROBOT = Path(__file__).parents[3] / "examples" / "robot.svg"
+SMALL = """<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 40 40"><g id="head" transform="rotate(5) scale(1.1 1)">
+<path d="M5 5C8 2 30 2 35 9S30 30 20 35Q5 30 4 20T5 5A9 6 30 0 1 9 9zm4 4h9v-3l2 2" fill="#fa8" stroke="navy"/>
+<g id="mouth-rest" style="fill:none;stroke:rgb(9,9,9);stroke-width:2"><line x1="10" y1="25" x2="30" y2="25"/></g>
+<g id="mouth-aa" opacity=".9"><ellipse cx="20" cy="25" rx="8" ry="6" fill-opacity="0.8"/></g>
+<g id="eyes-open"><circle cx="12" cy="12" r="3"/><polygon points="25,10 31,10 28,15" fill-rule="evenodd"/></g></g></svg>
+"""
+
+
+def seeds(_: Good) -> list[Files]:
+    """Return the example, and a small drawing with every kind of shape."""
+    return [{"face.svg": ROBOT.read_bytes()}, {"face.svg": SMALL.encode()}]
+
+
+def read(folder: Path, _: Good) -> None:
+    """Read a drawing; draw two frames."""
+    motion = Motion(np.array([[0.0], [0.2]]), 25.0, (Channel("opening"),))
+    for frame in staged_face(str(folder / "face.svg"), Staging(size=64)).render(motion, Timeline(()), fps=25.0):
+        require(frame.ndim == 3 and frame.shape[0] == 64 and frame.shape[2] == 3, "a frame of another shape")
