@@ -9,13 +9,13 @@ from faces.character.motions import NOTHING_SAID, opening, said, steady
 from lipmotion.errors import InputError
 from lipmotion.faces import face_named
 from lipmotion.faces.base import Staging
-from lipmotion.faces.character import render
+from lipmotion.faces.character import Head, render
 from lipmotion.faces.character.pose import CharacterPose
 from lipmotion.faces.character.stage import Stage, camera_for
 from lipmotion.rig.rasteriser import Camera
 from lipmotion.testing import check_face
 
-SMALL = {"width": 160, "height": 120}
+SMALL: dict[str, Any] = {"width": 160, "height": 120}
 
 
 def test_frames_are_rgb_of_the_size_asked():
@@ -92,7 +92,7 @@ def test_f_shows_teeth_where_m_shows_none():
 
 
 def first(motion=None, **settings: Any) -> np.ndarray:
-    face = face_named("head").staged(Staging(size=120, **settings))
+    face = Head(Staging(size=120, **settings))
     return next(iter(face.render(opening(*[0.1] * 5) if motion is None else motion, NOTHING_SAID)))
 
 
@@ -109,7 +109,7 @@ def test_a_transparent_picture_over_a_colour_is_the_picture_on_that_colour():
 def test_what_is_switched_off_does_not_move():
     moved = opening(*[0.0] * 150)
     still = Staging(size=64, blinks=False, gaze=False, brows=False, head=False)
-    frames = list(face_named("head").staged(still).render(moved, NOTHING_SAID))
+    frames = list(Head(still).render(moved, NOTHING_SAID))
     assert all(np.array_equal(frame, frames[0]) for frame in frames[1:])
-    lively = list(face_named("head").staged(Staging(size=64)).render(moved, NOTHING_SAID))
+    lively = list(Head().staged(Staging(size=64)).render(moved, NOTHING_SAID))
     assert not np.array_equal(lively[0], lively[30])

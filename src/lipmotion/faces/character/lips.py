@@ -116,7 +116,7 @@ def _opening(pose: CharacterPose) -> tuple[Real, Real]:
 
     A round mouth has an elliptic hole that ends before the corners; a spread one is a slot with a flat edge.
     """
-    reach = 1 - 0.47 * pose.roundness - 0.10 * pose.oval
+    reach = 1 - 0.56 * pose.roundness - 0.10 * pose.oval
     power = 2 + 1.2 * pose.spread
     inside = np.maximum(1 - np.abs(ACROSS / reach) ** power, 0)
     oval = (0.25 * np.clip(pose.gap / 0.2, 0, 1) + 0.2 * pose.oval) * (1 - pose.spread) * (1 - pose.roundness)
