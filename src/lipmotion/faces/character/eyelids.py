@@ -63,7 +63,7 @@ class Eyelids:
         upper = UPPER_LID + gaze * (1 - LID_ACROSS**2) + 0.15 * pose.brows * (1 - LID_ACROSS**2)
         lower = LOWER_LID + (0.5 * gaze + squint + 0.012 * pose.shut) * (1 - LID_ACROSS**2)
         closed = _SHUT + 0.012 * pose.shut * (1 - LID_ACROSS**2)
-        upper = np.maximum(upper + pose.shut * (closed - upper), lower)
+        upper = np.maximum(upper + min(1.12 * pose.shut, 1.0) * (closed - upper), lower)
         return EYE[0] + HALF_WIDTH * LID_ACROSS, np.where(LID_SIDE > 0, upper, lower)
 
     def rings(self, pose: CharacterPose) -> Real:

@@ -27,7 +27,7 @@ TUCKED_GAP = (0.045, 0.06)
 """Range of the gap while the lower lip is on the teeth."""
 TONGUE_GAP = 0.045
 """Least gap while the tongue is between the teeth."""
-OVAL_GROWTH = 0.04
+OVAL_GROWTH = 0.12
 """How much further the mouth opens in AA and the like."""
 ROUND_GAP, TONGUE_UP_GAP = -0.012, 0.012
 """Added to the gap of round lips, of which trackers read more, and where the tongue fills it: they read less."""
