@@ -32,7 +32,7 @@ from lipmotion.export.sound import write_sound
 from lipmotion.export.video import write_mp4
 from lipmotion.faces import face_named
 from lipmotion.faces.character.performance import head_poses
-from lipmotion.faces.character.pose import FacePose
+from lipmotion.faces.character.pose import CharacterPose
 from lipmotion.faces.character.stage import Stage, camera_for
 from lipmotion.rig.rasteriser import Camera
 from lipmotion.types import Audio, Channel, Motion, Span, SpokenText, Timeline, Unit
@@ -158,7 +158,7 @@ def apart(spoken: list[SpokenText]) -> dict[str, object]:
     return {"right": right, "share": round(float(np.trace(table) / table.sum()), 3), "table": taken}
 
 
-def mouth_seen(pose: FacePose) -> list[float]:
+def mouth_seen(pose: CharacterPose) -> list[float]:
     """Return what the picture shows of the mouth, head straight: widths, heights and areas, in eye distances.
 
     Width and height of the lips and of what is between them; areas of lips, upper teeth, lower teeth and tongue.
@@ -235,7 +235,7 @@ def sheet(path: Path) -> None:
     Image.fromarray(np.concatenate([np.concatenate([left, right], axis=1), *rows])).save(path, optimize=True)
 
 
-def sheet_poses() -> Iterator[FacePose]:
+def sheet_poses() -> Iterator[CharacterPose]:
     """Yield the poses of the sounds of the sheet, eyes open and the head straight."""
     spans, values, start_s = [], [], 0.0
     for _, phone, opening, wider in SHEET:

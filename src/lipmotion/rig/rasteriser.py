@@ -14,6 +14,7 @@ from lipmotion.rig.mesh import Mesh
 
 Real = NDArray[np.float64]
 Colours = NDArray[np.float32]
+LARGEST_GREY = 255
 
 
 @dataclass(frozen=True)
@@ -96,18 +97,40 @@ class Canvas:
             draw(screen, colours, triangles, area, self.background, self._tone, picture)
         return picture
 
+    def cut_out(self, places: Real, colours: Colours, triangles: NDArray[np.int32]) -> NDArray[np.uint8]:
+        """Return triangles without background: red, green, blue and straight alpha [shape=(H, W, 4)].
+
+        Arguments as of ``picture``; the background of the canvas must be black.
+        """
+        picture = self.picture(places, colours, triangles)
+        alpha = self._coverage(places, np.ones(len(places), bool), triangles)
+        partly = (alpha > 0) & (alpha < LARGEST_GREY)
+        level = np.searchsorted(self._tone, picture[partly]) / (alpha[partly, None] / LARGEST_GREY)
+        picture[partly] = self._tone[np.minimum(level, LEVELS - 1).astype(int)]
+        return np.concatenate([picture, alpha[..., None]], axis=2)
+
     def shown(self, places: Real, marked: NDArray[np.bool_], triangles: NDArray[np.int32]) -> NDArray[np.bool_]:
         """Return the pixels of which at least half shows marked vertices [shape=(H, W)].
 
         places : of the vertices in space [shape=(V, 3)];  marked : which of them [shape=(V,)]
         triangles : those that are not marked hide what is behind them [shape=(F, 3)]
         """
+        return self._coverage(places, marked, triangles) > LARGEST_GREY // 2
+
+    def _coverage(self, places: Real, marked: NDArray[np.bool_], triangles: NDArray[np.int32]) -> NDArray[np.uint8]:
+        """Return which part of every pixel shows marked vertices, 0 to 255 [shape=(H, W)]."""
         size = self.camera.height, self.camera.width, 3
         light = np.repeat(marked[:, None], 3, axis=1).astype(np.float32)
         picture, area = np.zeros(size, np.uint8), (0, 0, size[1], size[0])
         tone = np.arange(256).astype(np.uint8)
         draw(self.camera.on_screen(places), light, triangles, area, np.zeros(size, np.float32), tone, picture)
-        return np.asarray(picture[..., 0] >= 128)
+        return picture[..., 0]
+
+
+def flat(camera: Camera, colour: tuple[int, int, int]) -> Colours:
+    """Return a background of one colour (sRGB, 0 to 255), as parts of ``WHITE`` [shape=(H, W, 3)]."""
+    level = np.searchsorted(tone_table(), np.array(colour)) / (LEVELS - 1)
+    return np.broadcast_to(np.asarray(level, np.float32), (camera.height, camera.width, 3)).copy()
 
 
 def gradient(

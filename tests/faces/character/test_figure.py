@@ -3,13 +3,13 @@ import pytest
 
 from lipmotion.faces.character.figure import turned
 from lipmotion.faces.character.forms import MOUTH_Y, head
-from lipmotion.faces.character.pose import FacePose
+from lipmotion.faces.character.pose import CharacterPose
 from lipmotion.faces.character.shapes import POSES, SIDED_POSES, head_mesh
 from lipmotion.faces.character.skin import REST
 from lipmotion.faces.character.stage import camera_for, figure
 
 VIEWER = camera_for(640, 360).place
-OPEN = FacePose(gap=0.25, upper_rise=0.04, jaw=0.18)
+OPEN = CharacterPose(gap=0.25, upper_rise=0.04, jaw=0.18)
 
 
 def rows(name: str) -> np.ndarray:
@@ -51,7 +51,7 @@ def test_opening_moves_chin_and_lips_but_neither_forehead_nor_eyes():
 
 def test_shut_eyes_cover_the_eyeballs():
     def edge(shut: float) -> float:
-        x, y = figure().skin.lids_of_eye.opening(FacePose(shut=shut))
+        x, y = figure().skin.lids_of_eye.opening(CharacterPose(shut=shut))
         return float(np.ptp(y[np.abs(x - 0.315) < 0.05]))
 
     assert edge(0.0) > 0.15
@@ -59,7 +59,9 @@ def test_shut_eyes_cover_the_eyeballs():
 
 
 def test_turning_moves_the_head_and_not_the_body():
-    straight, aside = (figure().frame(FacePose(turn=turn), VIEWER).places for turn in ((0, 0, 0), (0.3, 0.1, 0.05)))
+    straight, aside = (
+        figure().frame(CharacterPose(turn=turn), VIEWER).places for turn in ((0, 0, 0), (0.3, 0.1, 0.05))
+    )
     body = figure().rows["clothing"]
     assert np.array_equal(straight[body], aside[body])
     nose = int(np.argmax(straight[figure().rows["skin"], 2]))
@@ -75,7 +77,7 @@ def test_turns_keep_lengths(angles):
 
 
 def test_the_mouth_is_darker_in_its_depth_and_when_it_closes():
-    def brightness(pose: FacePose, name: str) -> float:
+    def brightness(pose: CharacterPose, name: str) -> float:
         return float(figure().frame(pose, VIEWER).light[figure().mouth_rows()[name]].mean())
 
     assert brightness(OPEN, "wall") < 0.3 * brightness(OPEN, "lips")
@@ -104,7 +106,7 @@ def test_the_mesh_has_the_shapes_that_are_promised(mesh):
 def test_a_shape_at_full_weight_is_its_pose(mesh):
     assert mesh.shaped({"jawOpen": 1.0}) == pytest.approx(figure().placed(POSES["jawOpen"])[0], abs=1e-4)
     both = mesh.shaped({"eyeBlinkLeft": 1.0, "eyeBlinkRight": 1.0})
-    assert both == pytest.approx(figure().placed(FacePose(shut=1))[0], abs=1e-4)
+    assert both == pytest.approx(figure().placed(CharacterPose(shut=1))[0], abs=1e-4)
 
 
 def test_mouth_close_brings_the_lips_of_an_open_jaw_together(mesh):

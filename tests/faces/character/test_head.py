@@ -8,13 +8,14 @@ import pytest
 from faces.character.motions import NOTHING_SAID, opening, said, steady
 from lipmotion.errors import InputError
 from lipmotion.faces import face_named
-from lipmotion.faces.character import render
-from lipmotion.faces.character.pose import FacePose
+from lipmotion.faces.base import Staging
+from lipmotion.faces.character import Head, render
+from lipmotion.faces.character.pose import CharacterPose
 from lipmotion.faces.character.stage import Stage, camera_for
 from lipmotion.rig.rasteriser import Camera
 from lipmotion.testing import check_face
 
-SMALL = {"width": 160, "height": 120}
+SMALL: dict[str, Any] = {"width": 160, "height": 120}
 
 
 def test_frames_are_rgb_of_the_size_asked():
@@ -30,7 +31,9 @@ def test_the_number_of_frames_follows_the_frame_rate():
 
 def test_the_same_input_gives_the_same_pixels_and_another_seed_others():
     moved = opening(*np.linspace(0, 0.2, 30))
-    first, second, other = (np.array(list(render(moved, NOTHING_SAID, seed=seed, **SMALL))) for seed in (1, 1, 2))
+    first, second, other = (
+        np.array(list(render(moved, NOTHING_SAID, staging=Staging(seed=seed), **SMALL))) for seed in (1, 1, 2)
+    )
     assert np.array_equal(first, second)
     assert not np.array_equal(first, other)
 
@@ -51,7 +54,7 @@ def front() -> Stage:
 
 
 def areas(stage: Stage, **pose: Any) -> dict[str, int]:
-    return {name: int(mask.sum()) for name, mask in stage.parts_seen(FacePose(**pose)).items()}
+    return {name: int(mask.sum()) for name, mask in stage.parts_seen(CharacterPose(**pose)).items()}
 
 
 def test_closed_lips_show_nothing_of_the_mouth(front):
@@ -73,7 +76,7 @@ def test_what_is_seen_in_the_mouth_tells_the_sounds_apart(front):
 
 
 def test_a_picture_of_the_moving_part_is_the_whole_picture():
-    stage, pose = Stage(camera_for(320, 240)), FacePose(gap=0.1, turn=(0.2, 0.05, 0.0))
+    stage, pose = Stage(camera_for(320, 240)), CharacterPose(gap=0.1, turn=(0.2, 0.05, 0.0))
     drawn = stage.figure.frame(pose, stage.canvas.camera.place)
     whole = stage.canvas.picture(drawn.places, drawn.light, stage.figure.triangles)
     assert np.array_equal(stage.picture(pose), whole)
@@ -86,3 +89,27 @@ def test_f_shows_teeth_where_m_shows_none():
         return int(frames[15][row - 4 : row + 6, column - 6 : column + 6].min(axis=2).max())
 
     assert brightest("f") > brightest("m") + 30
+
+
+def first(motion=None, **settings: Any) -> np.ndarray:
+    face = Head(Staging(size=120, **settings))
+    return next(iter(face.render(opening(*[0.1] * 5) if motion is None else motion, NOTHING_SAID)))
+
+
+def test_a_transparent_picture_over_a_colour_is_the_picture_on_that_colour():
+    clear, on_grey = first(background="transparent").astype(float), first(background="#808080").astype(float)
+    alpha = clear[..., 3:] / 255
+    over = alpha * clear[..., :3] + (1 - alpha) * 128
+    whole = (alpha[..., 0] == 0) | (alpha[..., 0] == 1)
+    assert np.abs(over - on_grey)[whole].max() <= 1
+    assert np.abs(over - on_grey).max() < 40  # edges are mixed as light, not as grey levels
+    assert 0.2 < (alpha == 0).mean() < 0.9
+
+
+def test_what_is_switched_off_does_not_move():
+    moved = opening(*[0.0] * 150)
+    still = Staging(size=64, blinks=False, gaze=False, brows=False, head=False)
+    frames = list(Head(still).render(moved, NOTHING_SAID))
+    assert all(np.array_equal(frame, frames[0]) for frame in frames[1:])
+    lively = list(Head().staged(Staging(size=64)).render(moved, NOTHING_SAID))
+    assert not np.array_equal(lively[0], lively[30])

@@ -15,7 +15,7 @@ from lipmotion.faces.character.lips import (
     lip_surface,
     section_points,
 )
-from lipmotion.faces.character.pose import FacePose
+from lipmotion.faces.character.pose import CharacterPose
 from lipmotion.faces.character.skin import jaw_moved
 from lipmotion.faces.character.stage import figure
 
@@ -28,23 +28,28 @@ SHARES = st.floats(0, 1)
 
 
 @st.composite
-def poses(draw) -> FacePose:
+def poses(draw) -> CharacterPose:
     gap = draw(st.floats(0, 0.3))
     roundness = draw(SHARES)
-    return FacePose(
+    return CharacterPose(
         gap=gap, upper_rise=gap * draw(st.floats(0.15, 0.5)), jaw=0.85 * gap, width=draw(st.floats(0.65, 1.25)),
         fullness=draw(st.floats(0.75, 1.25)), roundness=roundness, spread=draw(SHARES) * (1 - roundness),
         protrusion=0.085 * roundness, bite=draw(SHARES),
     )  # fmt: skip
 
 
-def contact(pose: FacePose) -> np.ndarray:
+def contact(pose: CharacterPose) -> np.ndarray:
     """Return where each column of the lips would meet the other lip [shape=(COLUMNS, 3)]."""
     return section_points(pose, figure().skin.base_z)[MEET]
 
 
 def test_closed_lips_meet_at_every_column():
-    for pose in (FacePose(), FacePose(press=1), FacePose(roundness=1, protrusion=0.08, width=0.7), FacePose(width=1.2)):
+    for pose in (
+        CharacterPose(),
+        CharacterPose(press=1),
+        CharacterPose(roundness=1, protrusion=0.08, width=0.7),
+        CharacterPose(width=1.2),
+    ):
         places = contact(pose)
         for upper, lower in PAIRS:
             assert places[upper] == pytest.approx(places[lower], abs=1e-12)
@@ -91,37 +96,37 @@ def test_the_model_of_the_teeth_in_these_tests_is_that_of_the_teeth():
 
 
 def test_lower_teeth_close_behind_the_upper_ones():
-    shut = jaw_moved(lower_teeth().places, lower_drop(FacePose(bite=1)))
+    shut = jaw_moved(lower_teeth().places, lower_drop(CharacterPose(bite=1)))
     assert shut[:, 1].max() > TEETH_EDGE
-    apart = jaw_moved(lower_teeth().places, lower_drop(FacePose(gap=0.2, jaw=0.15)))
+    apart = jaw_moved(lower_teeth().places, lower_drop(CharacterPose(gap=0.2, jaw=0.15)))
     assert apart[:, 1].max() < TEETH_EDGE - 0.1
 
 
 def test_round_lips_have_a_narrower_hole_and_lie_further_forward():
     """The hole is where the lips are at least a hundredth of an eye distance apart."""
 
-    def hole(pose: FacePose) -> tuple[float, float]:
+    def hole(pose: CharacterPose) -> tuple[float, float]:
         places = contact(pose)
         apart = [places[a, 1] - places[b, 1] > 0.01 for a, b in PAIRS]
         inside = places[[a for (a, _), is_apart in zip(PAIRS, apart, strict=True) if is_apart], 0]
         return float(np.ptp(inside)), float(places[20, 2])
 
-    flat, flat_z = hole(FacePose(gap=0.07, upper_rise=0.02))
-    round_, round_z = hole(FacePose(gap=0.07, upper_rise=0.03, roundness=1, protrusion=0.085, width=0.8))
+    flat, flat_z = hole(CharacterPose(gap=0.07, upper_rise=0.02))
+    round_, round_z = hole(CharacterPose(gap=0.07, upper_rise=0.03, roundness=1, protrusion=0.085, width=0.8))
     assert round_ < 0.5 * flat
     assert round_z > flat_z + 0.06
 
 
 def test_the_lower_lip_of_f_touches_the_upper_teeth():
-    pose = FacePose(gap=0.05, upper_rise=0.036, tuck=1)
+    pose = CharacterPose(gap=0.05, upper_rise=0.036, tuck=1)
     lower = contact(pose)[60]
     assert lower[1] == pytest.approx(TEETH_EDGE, abs=0.012)
     assert 0 < lower[2] - TEETH_Z < 0.035
-    assert contact(FacePose(gap=0.05, upper_rise=0.036))[60][2] > lower[2] + 0.02
+    assert contact(CharacterPose(gap=0.05, upper_rise=0.036))[60][2] > lower[2] + 0.02
 
 
 def test_the_surface_has_its_rings_and_columns():
-    surface = lip_surface(section_points(FacePose(gap=0.1), figure().skin.base_z))
+    surface = lip_surface(section_points(CharacterPose(gap=0.1), figure().skin.base_z))
     assert surface.shape == (RINGS, COLUMNS, 3)
     assert np.ptp(surface[-1], axis=0) == pytest.approx([0, 0, 0], abs=1e-9)  # the throat is closed
     assert ACROSS[0] == pytest.approx(-1)

@@ -4,7 +4,7 @@ import pytest
 from faces.character.motions import NOTHING_SAID, opening, said, steady
 from lipmotion.errors import InputError
 from lipmotion.faces.character.performance import drawn_gap, head_poses, upper_share
-from lipmotion.types import Channel, Motion
+from lipmotion.types import Channel, Motion, Prosody
 from lipmotion.units import LIP_CLOSING
 
 
@@ -97,3 +97,30 @@ def test_an_unusable_motion_is_refused(motion, message):
 def test_an_unusable_frame_rate_is_refused(fps):
     with pytest.raises(InputError, match="frame rate"):
         head_poses(opening(0.0), NOTHING_SAID, fps)
+
+
+def test_intensity_makes_movements_larger_and_keeps_lips_closed():
+    motion, labels = steady(("aa", "m", "uw"), 0.1), said("aa", "m", "uw")
+    plain, large = (head_poses(motion, labels, 25.0, intensity=x) for x in (1.0, 2.0))
+    assert large[5].gap > 1.5 * plain[5].gap
+    assert min(pose.gap for pose in large[10:20]) == 0
+    assert large[25].roundness >= plain[25].roundness
+    assert max(pose.gap for pose in large) <= 0.45
+
+
+def test_articulatory_channels_of_the_motion_come_before_the_phones():
+    names = ("opening", "tongue", "lip_tuck", "teeth")
+    rows = np.tile([0.08, 1.0, 0.0, 1.0], (31, 1))
+    motion = Motion(rows, 25.0, tuple(map(Channel, names)))
+    pose = head_poses(motion, said("f", "aa", "f"), 25.0)[15]
+    assert pose.tongue_out > 0.99
+    assert pose.bite > 0.99
+    assert head_poses(motion, said("f", "f", "f"), 25.0)[15].tuck < 0.01
+
+
+def test_a_loud_high_voice_raises_the_brows():
+    level, pitch = np.full(300, -30.0), np.full(300, np.log(150.0))
+    level[150:170], pitch[150:170] = -10.0, np.log(260.0)
+    motion = opening(*[0.05] * 75)
+    with_voice, without = (head_poses(motion, NOTHING_SAID, 25.0, prosody=p) for p in (Prosody(level, pitch), None))
+    assert with_voice[40].brows > without[40].brows + 0.005

@@ -15,27 +15,42 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.faces.base import Face
+from lipmotion.faces.base import SMALLEST, TRANSPARENT, Face, Staging
 from lipmotion.faces.character.liveliness import SEED
 from lipmotion.faces.character.performance import head_poses
-from lipmotion.faces.character.pose import FacePose
-from lipmotion.types import Motion, Timeline, Unit
+from lipmotion.faces.character.pose import CharacterPose
+from lipmotion.types import Motion, Prosody, Timeline, Unit
 
 if TYPE_CHECKING:
     from lipmotion.rig.rasteriser import Camera
 
 __all__ = ["Head", "render"]
 
+OWN_SIZE = 720
+"""Height of pictures whose size is not given."""
 THREADS = 2
 """Frames that are drawn at the same time."""
 
 
 @final
 class Head(Face):
-    """The three-dimensional head, 1280 × 720 pixels, as ``render`` draws it."""
+    """The three-dimensional head, 1280 × 720 pixels if no size is asked for, as ``render`` draws it."""
+
+    def __init__(self, staging: Staging | None = None, prosody: Prosody | None = None) -> None:
+        self.staging, self.prosody = staging or Staging(), prosody
+
+    def staged(self, staging: Staging, prosody: Prosody | None = None) -> Head:
+        """Return the same character with other settings; pictures are 16 to 9.
+
+        prosody : of the speech that will be rendered, for accents of brows and head; None: not known
+        """
+        return Head(staging, prosody)
 
     def render(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> Iterator[NDArray[np.uint8]]:  # noqa: D102
-        return render(motion, units, fps=fps)
+        height = self.staging.size or OWN_SIZE
+        width = max(2 * round(height * 8 / 9), SMALLEST)
+        staging, prosody = self.staging, self.prosody
+        return render(motion, units, fps=fps, width=width, height=height, staging=staging, prosody=prosody)
 
 
 def render(
@@ -44,35 +59,51 @@ def render(
     *,
     fps: float = 25.0,
     width: int = 1280,
-    height: int = 720,
-    seed: int = SEED,
+    height: int = OWN_SIZE,
+    staging: Staging | None = None,
+    prosody: Prosody | None = None,
 ) -> Iterator[NDArray[np.uint8]]:
-    """Yield RGB frames [shape=(height, width, 3)] of a motion to its end, frame n at ``n / fps`` seconds.
+    """Yield frames [shape=(height, width, 3)] of a motion to its end, frame n at ``n / fps`` seconds.
 
-    motion : needs ``opening``; ``width``, ``outer`` and the chin ``y_152`` are used where they exist.
-             ``width`` and ``outer`` are taken relative to the rest pose in silence, so they suit any speaker.
-    units  : the phones, for tongue, teeth and the shape of the lips; may be empty
-    width, height : even numbers of pixels, at least 64
-    seed   : of blinks, glances and the movement of the head
+    motion  : needs ``opening``; ``width``, ``outer``, the chin ``y_152`` and the articulatory channels are used where
+              they exist. ``width`` and ``outer`` count relative to the rest pose in silence, so they suit any speaker
+    units   : the phones, for tongue, teeth and the shape of the lips; may be empty
+    width, height : even numbers of pixels, at least 64; the size of the staging does not count here
+    staging : background, intensity, seed, and what moves on its own; None: everything moves
+    prosody : of the speech, for accents of brows and head; None: not known
+    Returns RGB, or RGBA [shape=(height, width, 4)] with straight alpha where the background is transparent.
     Raises InputError: no ``opening``, no frames, values that are not finite, a size that is odd or under 64,
     or fps not positive.
     The same input gives the same pixels.
     """
     from lipmotion.faces.character.stage import camera_for
 
-    poses = head_poses(motion, units, fps, seed=seed)
-    camera = camera_for(width, height)
-    return _frames(poses, camera)
+    chosen = staging or Staging()
+    poses = head_poses(motion, units, fps, seed=SEED + chosen.seed, intensity=chosen.intensity, prosody=prosody)
+    poses = [_still(pose, chosen) for pose in poses]
+    return _frames(poses, camera_for(width, height), chosen)
 
 
-def _frames(poses: list[FacePose], camera: Camera) -> Iterator[NDArray[np.uint8]]:
+def _still(pose: CharacterPose, staging: Staging) -> CharacterPose:
+    """Return the pose without the movements that are switched off."""
+    gaze = pose.gaze if staging.gaze else (-0.85 * pose.turn[0], -0.85 * pose.turn[1])
+    return pose._replace(
+        shut=pose.shut if staging.blinks else 0.0,
+        brows=pose.brows if staging.brows else 0.0,
+        gaze=gaze if staging.head else (gaze[0] + 0.85 * pose.turn[0], gaze[1] + 0.85 * pose.turn[1]),
+        turn=pose.turn if staging.head else (0.0, 0.0, 0.0),
+    )
+
+
+def _frames(poses: list[CharacterPose], camera: Camera, staging: Staging) -> Iterator[NDArray[np.uint8]]:
     from lipmotion.faces.character.stage import Stage
 
-    stage = Stage(camera)
+    stage = Stage(camera, staging.colour)
+    draw = stage.cut_out if staging.background == TRANSPARENT else stage.picture
     with ThreadPoolExecutor(THREADS) as threads:
         waiting: deque[Future[NDArray[np.uint8]]] = deque()
         for pose in poses:
-            waiting.append(threads.submit(stage.picture, pose))
+            waiting.append(threads.submit(draw, pose))
             if len(waiting) > THREADS:
                 yield waiting.popleft().result()
         while waiting:

@@ -8,7 +8,7 @@ from scipy.interpolate import CubicSpline
 from scipy.ndimage import map_coordinates, spline_filter
 
 from lipmotion.faces.character.forms import EYE, EYEBALL, head, seen_from_front
-from lipmotion.faces.character.pose import FacePose
+from lipmotion.faces.character.pose import CharacterPose
 
 Real = NDArray[np.float64]
 
@@ -56,17 +56,17 @@ class Eyelids:
         up = np.where(LID_SIDE > 0, _EDGE_UP, _EDGE_DOWN)
         return self._lifted(EYE[0] + _EDGE_X * np.cos(angle), up * np.sin(angle))
 
-    def opening(self, pose: FacePose) -> tuple[Real, Real]:
+    def opening(self, pose: CharacterPose) -> tuple[Real, Real]:
         """Return column and height of the edge of the lids [shape=(LID_COLUMNS,), both]."""
         gaze = 0.10 * pose.gaze[1]
         squint = 0.6 * max(pose.smile, 0.0)
         upper = UPPER_LID + gaze * (1 - LID_ACROSS**2) + 0.15 * pose.brows * (1 - LID_ACROSS**2)
         lower = LOWER_LID + (0.5 * gaze + squint + 0.012 * pose.shut) * (1 - LID_ACROSS**2)
         closed = _SHUT + 0.012 * pose.shut * (1 - LID_ACROSS**2)
-        upper = np.maximum(upper + pose.shut * (closed - upper), lower)
+        upper = np.maximum(upper + min(1.12 * pose.shut, 1.0) * (closed - upper), lower)
         return EYE[0] + HALF_WIDTH * LID_ACROSS, np.where(LID_SIDE > 0, upper, lower)
 
-    def rings(self, pose: FacePose) -> Real:
+    def rings(self, pose: CharacterPose) -> Real:
         """Return all rings but the outermost, from the eyeball outwards [shape=(LID_RINGS, LID_COLUMNS, 3)]."""
         x, y = self.opening(pose)
         edge = self.edge()

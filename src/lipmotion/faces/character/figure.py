@@ -16,7 +16,7 @@ from lipmotion.faces.character.hair import hair
 from lipmotion.faces.character.inside import lower_drop, lower_teeth, tongue, tongue_triangles, upper_teeth
 from lipmotion.faces.character.lips import RINGS, VISIBLE
 from lipmotion.faces.character.part import part
-from lipmotion.faces.character.pose import FacePose
+from lipmotion.faces.character.pose import CharacterPose
 from lipmotion.faces.character.skin import REST, Skin, jaw_moved
 from lipmotion.faces.character.tint import skin_colours
 from lipmotion.rig.lighting import Lighting
@@ -93,7 +93,7 @@ class Figure:
         share = np.clip((-1.0 - self._places[self.rows["neck"], 1]) / 0.6, 0, 1)
         self._held[self.rows["neck"], 0] = share * share * (3 - 2 * share)
 
-    def placed(self, pose: FacePose) -> tuple[Real, Real]:
+    def placed(self, pose: CharacterPose) -> tuple[Real, Real]:
         """Return places and normals of all vertices in a pose, the head not turned [shape=(V, 3), both]."""
         places, normals = self._places.copy(), self._normals.copy()
         places[self.rows["skin"]], normals[self.rows["skin"]] = self.skin.posed(pose)
@@ -105,7 +105,7 @@ class Figure:
         self._look(pose, places, normals)
         return places, normals
 
-    def frame(self, pose: FacePose, viewer: Real) -> Drawn:
+    def frame(self, pose: CharacterPose, viewer: Real) -> Drawn:
         """Return places and light of all vertices in a pose, seen from a place [shape=(3,)]."""
         places, normals = self.placed(pose)
         colours, arrives = self._shaded(pose, places)
@@ -125,7 +125,7 @@ class Figure:
         lips = self.skin.lip_rows()
         return {"lips": lips[1 : VISIBLE + 1].ravel(), "wall": self._wall, **rows}
 
-    def _look(self, pose: FacePose, places: Real, normals: Real) -> None:
+    def _look(self, pose: CharacterPose, places: Real, normals: Real) -> None:
         """Place eyeballs, reflections and lashes."""
         look, half = turned(*pose.gaze), turned(0.35 * pose.gaze[0], 0.35 * pose.gaze[1])
         lid = places[self.skin.lid_rows(0)[1][:LASHES]]
@@ -138,7 +138,7 @@ class Figure:
             places[self.rows[name + "lashes"]] = lashes(lid, pose.shut) * flip
             normals[self.rows[name + "lashes"]] = [0.0, 0.0, 1.0]
 
-    def _shaded(self, pose: FacePose, places: Real) -> tuple[Real, Real]:
+    def _shaded(self, pose: CharacterPose, places: Real) -> tuple[Real, Real]:
         """Return colours and arriving light: eyes are darker under their lids, the mouth is darker inside."""
         colours, arrives = self.colours.copy(), self._reaches.copy()
         x, y = self.skin.lids_of_eye.opening(pose)
@@ -153,7 +153,7 @@ class Figure:
         arrives[self.rows["tongue"]] = np.minimum(1.0, TONGUE_LIGHT * arrives[self.rows["tongue"]])
         return colours, arrives
 
-    def _lit_inside(self, pose: FacePose, skin: Real) -> Callable[[Real], Real]:
+    def _lit_inside(self, pose: CharacterPose, skin: Real) -> Callable[[Real], Real]:
         """Return the function from places in the mouth to the part of the light that arrives there."""
         ring = skin[self.skin.lip_rows()[VISIBLE - 1]]
         top, low, front = ring[_MIDDLE, 1], ring[_LAST, 1], 0.5 * (ring[_MIDDLE, 2] + ring[_LAST, 2])

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from lipmotion.faces.character import palette
 from lipmotion.faces.character.lips import ARCH, TEETH_EDGE, TEETH_Z
 from lipmotion.faces.character.part import Part, grid_triangles, joined_parts, part
-from lipmotion.faces.character.pose import FacePose
+from lipmotion.faces.character.pose import CharacterPose
 from lipmotion.faces.character.skin import jaw_moved
 
 Real = NDArray[np.float64]
@@ -74,7 +74,7 @@ def _tooth(a: float, b: float, number: int, edge_y: float, height: float, up: fl
     )
 
 
-def lower_drop(pose: FacePose) -> float:
+def lower_drop(pose: CharacterPose) -> float:
     """Return how far the lower teeth drop with the jaw, a length; bitten together they touch the upper ones."""
     return pose.jaw + PARTED_TEETH * (1 - pose.bite)
 
@@ -84,7 +84,7 @@ def tongue_triangles() -> NDArray[np.int32]:
     return grid_triangles(_TONGUE_RINGS, _TONGUE_SIDES, closed=True)[:, ::-1]
 
 
-def tongue(pose: FacePose) -> Real:
+def tongue(pose: CharacterPose) -> Real:
     """Return the places of the tongue from root to tip [shape=(V, 3)], the head not turned."""
     floor = LOWER_EDGE - 0.075
     root, body = np.array([0, floor - 0.05, -0.46]), np.array([0, floor + 0.075, -0.36])

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from lipmotion.faces.character.forms import MOUTH_Y
-from lipmotion.faces.character.pose import FacePose
+from lipmotion.faces.character.pose import CharacterPose
 
 Real = NDArray[np.float64]
 
@@ -58,7 +58,7 @@ _ENVELOPE = np.sqrt(np.maximum(1 - ACROSS**2, 0))
 _FULL = np.where(SIDE > 0, _BOW, _BELOW)
 
 
-def section_points(pose: FacePose, base_z: Real) -> Real:
+def section_points(pose: CharacterPose, base_z: Real) -> Real:
     """Return the eight points of the cross-section of every column [shape=(8, COLUMNS, 3)].
 
     base_z : depth of the skin under the outer contour at rest [shape=(COLUMNS,)]
@@ -111,12 +111,12 @@ def _opposite(base_z: Real) -> Real:
     return np.concatenate([base_z[:1], base_z[: _UPPER - 1 : -1], base_z[_UPPER - 1 : _UPPER]])
 
 
-def _opening(pose: FacePose) -> tuple[Real, Real]:
+def _opening(pose: CharacterPose) -> tuple[Real, Real]:
     """Return the shapes of hole and outer contour, 1 in the middle, 0 at the corners [shape=(COLUMNS,), both].
 
     A round mouth has an elliptic hole that ends before the corners; a spread one is a slot with a flat edge.
     """
-    reach = 1 - 0.47 * pose.roundness - 0.10 * pose.oval
+    reach = 1 - 0.56 * pose.roundness - 0.10 * pose.oval
     power = 2 + 1.2 * pose.spread
     inside = np.maximum(1 - np.abs(ACROSS / reach) ** power, 0)
     oval = (0.25 * np.clip(pose.gap / 0.2, 0, 1) + 0.2 * pose.oval) * (1 - pose.spread) * (1 - pose.roundness)
@@ -125,7 +125,7 @@ def _opening(pose: FacePose) -> tuple[Real, Real]:
     return hole, contour
 
 
-def _rounded(pose: FacePose) -> Real:
+def _rounded(pose: CharacterPose) -> Real:
     """Return how much fuller the lips are near the corners of a round mouth [shape=(COLUMNS,)]."""
     return 1 + pose.roundness * 0.35 * ACROSS**2 * _ENVELOPE
 

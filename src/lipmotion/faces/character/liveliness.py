@@ -29,16 +29,19 @@ class Liveliness(NamedTuple):
     turn: Curve
 
 
-def liveliness(opening: Curve, pause: Curve, fps: float, *, seed: int = SEED) -> Liveliness:
+def liveliness(
+    opening: Curve, pause: Curve, fps: float, *, seed: int = SEED, accent: Curve | None = None
+) -> Liveliness:
     """Return the movements for every frame.
 
     opening : of the mouth [shape=(T,)];  pause : weight of pauses, 0 to 1 [shape=(T,)]
+    accent  : how loud and high the voice is, about -1 to 1 [shape=(T,)]; None: the opening stands for it
     The same input and seed give the same movements.
     """
     draw = np.random.default_rng(seed)
     count = len(opening)
     time_s = np.arange(count) / fps
-    beat = _beats(opening, fps)
+    beat = _beats(opening, fps) if accent is None else gaussian_filter1d(accent, 0.1 * fps, mode="nearest")
     speaking = gaussian_filter1d(1 - pause, 0.25 * fps, mode="nearest")
     turn = _drift(draw, time_s) * (0.45 + 0.55 * speaking)[:, None]
     turn[:, 1] += -0.045 * beat + 0.012 * (1 - speaking)

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError
 from lipmotion.faces.character import gestures
 from lipmotion.faces.character.liveliness import SEED, liveliness
-from lipmotion.faces.character.pose import FacePose
-from lipmotion.types import Motion, Timeline, Unit
+from lipmotion.faces.character.pose import CharacterPose
+from lipmotion.types import Motion, Prosody, Timeline, Unit
 from lipmotion.units import LIP_CLOSING, is_silent
 
 Curve = NDArray[np.float64]
@@ -27,20 +27,34 @@ TUCKED_GAP = (0.045, 0.06)
 """Range of the gap while the lower lip is on the teeth."""
 TONGUE_GAP = 0.045
 """Least gap while the tongue is between the teeth."""
-OVAL_GROWTH = 0.04
+OVAL_GROWTH = 0.12
 """How much further the mouth opens in AA and the like."""
 ROUND_GAP, TONGUE_UP_GAP = -0.012, 0.012
 """Added to the gap of round lips, of which trackers read more, and where the tongue fills it: they read less."""
 PAUSED_GAP = 0.03
 """Largest gap in pauses, in which people breathe with lips that hardly part."""
-DRAWN = ("opening", "width", "outer", "y_152")
+ARTICULATED = ("tongue", "lip_tuck", "protrusion", "spread", "press", "teeth")
+"""Articulatory channels that a motion may have (docs/articulation.md); what it lacks follows from the phones."""
+RAISED = 0.6
+"""The value of ``tongue`` with its tip behind the upper teeth; 1 is between the teeth."""
+DRAWN = ("opening", "width", "outer", "y_152", *ARTICULATED)
 """The channels that are drawn."""
 
 
-def head_poses(motion: Motion, units: Timeline[Unit], fps: float, *, seed: int = SEED) -> list[FacePose]:
+def head_poses(
+    motion: Motion,
+    units: Timeline[Unit],
+    fps: float,
+    *,
+    seed: int = SEED,
+    intensity: float = 1.0,
+    prosody: Prosody | None = None,
+) -> list[CharacterPose]:
     """Return the pose of every video frame, frame n at ``n / fps`` seconds, to the end of the motion.
 
-    seed : of blinks, glances and the movement of the head
+    seed      : of blinks, glances and the movement of the head
+    intensity : 1: as spoken; more: the same movements, larger. Closed lips stay closed at any intensity
+    prosody   : of the speech, for accents of brows and head; None: they follow the opening
     Lips that close between two video frames are drawn closed in the nearer one; in every p, b and m there is a frame in
     which they are closed.
     Raises InputError: no channel ``opening``, no frames, a value that is not finite, or fps not positive.
@@ -48,18 +62,21 @@ def head_poses(motion: Motion, units: Timeline[Unit], fps: float, *, seed: int =
     _check(motion, fps)
     time_s = np.arange(int(np.floor((len(motion.values) - 1) / motion.rate_hz * fps + 1e-9)) + 1) / fps
     rest = _rest_frames(motion, units)
-    said = {name: gesture.weight(units, time_s) for name, gesture in gestures.GESTURES.items()}
+    said = _said(motion, units, time_s)
     pause = gestures.pause_weight(units, time_s)
     for name in ("round", "spread", "oval", "bite"):
         said[name] *= 1 - pause
     for name in ("tuck", "tongue_out"):
         said[name] *= 1 - said["press"]
-    change = _at(motion, _width(motion, rest), time_s)
+    for name in ("round", "spread", "oval"):  # grows with the intensity, without a corner at 1
+        said[name] = 1 - (1 - said[name]) ** np.sqrt(intensity)
+    change = np.clip(intensity * _at(motion, _width(motion, rest), time_s), -WIDTH_REACH, WIDTH_REACH)
     narrow = np.clip(-change / 0.16, 0, 1) * (1 - said["spread"])
     roundness = np.maximum(said["round"], 0.4 * narrow)
     wide = np.clip(np.maximum(said["spread"], np.clip(change / 0.12, 0, 1)) - roundness, 0, 1)
-    gap = _closed(_articulated(_gap(motion, time_s, fps), said, roundness, pause), units, time_s)
-    alive = liveliness(gap, pause, fps, seed=seed)
+    gap = _articulated(np.minimum(intensity * _gap(motion, time_s, fps), WIDEST), said, roundness, pause)
+    gap = _closed(gap, units, time_s)
+    alive = liveliness(gap, pause, fps, seed=seed, accent=_accent(prosody, time_s))
     curves = {
         "gap": gap,
         "upper_rise": _rise(gap, roundness, said["tuck"]),
@@ -81,9 +98,42 @@ def head_poses(motion: Motion, units: Timeline[Unit], fps: float, *, seed: int =
     }
     rows = np.stack(list(curves.values()), axis=1).tolist()
     return [
-        FacePose(**dict(zip(curves, row, strict=True)), gaze=(gaze[0], gaze[1]), turn=(turn[0], turn[1], turn[2]))
+        CharacterPose(**dict(zip(curves, row, strict=True)), gaze=(gaze[0], gaze[1]), turn=(turn[0], turn[1], turn[2]))
         for row, gaze, turn in zip(rows, alive.gaze.tolist(), alive.turn.tolist(), strict=True)
     ]
+
+
+def _said(motion: Motion, units: Timeline[Unit], time_s: Curve) -> dict[str, Curve]:
+    """Return the weights of all gestures: those of the motion's own articulatory channels where it has them."""
+    said = {name: gesture.weight(units, time_s) for name, gesture in gestures.GESTURES.items()}
+    given = {
+        name: np.clip(_at(motion, motion[name].astype(float), time_s), 0, 1)
+        for name in ARTICULATED
+        if name in motion.names
+    }
+    for name, channel in (("tuck", "lip_tuck"), ("round", "protrusion"), ("spread", "spread"), ("press", "press")):
+        said[name] = given.get(channel, said[name])
+    if "tongue" in given:
+        said["tongue_out"] = np.clip((given["tongue"] - RAISED) / (1 - RAISED), 0, 1)
+        said["tongue_up"] = np.minimum(given["tongue"] / RAISED, 1)
+    if "teeth" in given:
+        said["bite"] = np.clip(2 * given["teeth"] - 1, 0, 1)
+    return said
+
+
+def _accent(prosody: Prosody | None, time_s: Curve) -> Curve | None:
+    """Return how loud and high the voice is against its surroundings, about -1 to 1 [shape=(T,)]; None: not known."""
+    if prosody is None or not len(prosody.level_db):
+        return None
+    at_s = np.arange(len(prosody.level_db)) / 100.0
+    voiced = np.isfinite(prosody.log_f0)
+    high = np.zeros(len(at_s))
+    if voiced.any():
+        high = np.interp(at_s, at_s[voiced], prosody.log_f0[voiced])
+        high = (high - np.median(high[voiced])) / max(float(np.std(high[voiced])), 0.02)
+    loud = np.asarray(prosody.level_db, float)
+    loud = (loud - np.median(loud)) / max(float(np.std(loud)), 1.0)
+    return np.interp(time_s, at_s, np.tanh(0.6 * high + 0.4 * loud) * np.clip(loud + 1, 0, 1))
 
 
 def _articulated(gap: Curve, said: dict[str, Curve], roundness: Curve, pause: Curve) -> Curve:

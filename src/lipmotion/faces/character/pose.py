@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 
-class FacePose(NamedTuple):
+class CharacterPose(NamedTuple):
     """Numbers that move the head. Lengths are in eye distances; most others go from 0 to 1.
 
     gap        : distance of the inner lips; 0: they touch

@@ -10,30 +10,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.faces.character.figure import Figure
-from lipmotion.faces.character.pose import FacePose
+from lipmotion.faces.character.pose import CharacterPose
 from lipmotion.faces.character.skin import REST
 from lipmotion.rig.mesh import Blendshape, Material, Mesh, MeshPart
 
 Real = NDArray[np.float64]
 
 POSES = {
-    "jawOpen": FacePose(gap=0.3, upper_rise=0.03, jaw=0.23),
-    "mouthClose": FacePose(jaw=0.23),
-    "mouthFunnel": FacePose(gap=0.1, upper_rise=0.042, jaw=0.05, width=0.8, roundness=1, protrusion=0.09),
-    "mouthPucker": FacePose(width=0.7, roundness=1, protrusion=0.1, fullness=1.1),
-    "mouthRollLower": FacePose(gap=0.045, upper_rise=0.036, tuck=1),
-    "mouthPress": FacePose(press=1),
-    "tongueOut": FacePose(tongue_out=1),
-    "tongueUp": FacePose(tongue_up=1),
-    "browInnerUp": FacePose(brows=0.06),
+    "jawOpen": CharacterPose(gap=0.3, upper_rise=0.03, jaw=0.23),
+    "mouthClose": CharacterPose(jaw=0.23),
+    "mouthFunnel": CharacterPose(gap=0.1, upper_rise=0.042, jaw=0.05, width=0.8, roundness=1, protrusion=0.09),
+    "mouthPucker": CharacterPose(width=0.7, roundness=1, protrusion=0.1, fullness=1.1),
+    "mouthRollLower": CharacterPose(gap=0.045, upper_rise=0.036, tuck=1),
+    "mouthPress": CharacterPose(press=1),
+    "tongueOut": CharacterPose(tongue_out=1),
+    "tongueUp": CharacterPose(tongue_up=1),
+    "browInnerUp": CharacterPose(brows=0.06),
 }
 """The poses of the shapes that are the same on both sides."""
 SIDED_POSES = {
-    "mouthSmile": FacePose(smile=0.05, width=1.05),
-    "mouthStretch": FacePose(width=1.25, spread=1),
-    "mouthUpperUp": FacePose(gap=0.05, upper_rise=0.05),
-    "mouthLowerDown": FacePose(gap=0.08),
-    "eyeBlink": FacePose(shut=1),
+    "mouthSmile": CharacterPose(smile=0.05, width=1.05),
+    "mouthStretch": CharacterPose(width=1.25, spread=1),
+    "mouthUpperUp": CharacterPose(gap=0.05, upper_rise=0.05),
+    "mouthLowerDown": CharacterPose(gap=0.08),
+    "eyeBlink": CharacterPose(shut=1),
 }
 """The poses of the shapes that are one each for the left and the right side."""
 LEAST = 1e-5

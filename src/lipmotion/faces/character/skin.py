@@ -11,7 +11,7 @@ from lipmotion.faces.character.eyelids import LID_COLUMNS, LID_RINGS, Eyelids
 from lipmotion.faces.character.forms import MIDDLE, MOUTH_Y, head, outward, seen_from_front, seen_from_middle
 from lipmotion.faces.character.lips import ACROSS, COLUMNS, RINGS, SIDE, VISIBLE, lip_surface, section_points
 from lipmotion.faces.character.part import Part
-from lipmotion.faces.character.pose import FacePose
+from lipmotion.faces.character.pose import CharacterPose
 from lipmotion.rig.rasteriser import normals_of
 
 Real = NDArray[np.float64]
@@ -21,7 +21,7 @@ SPACING = 0.033
 """Distance of the vertices in the middle of the face, in radians about ``MIDDLE``."""
 HINGE = np.array([0.0, -0.32, -0.82])
 """The axis of the jaw goes through here, from ear to ear."""
-REST = FacePose()
+REST = CharacterPose()
 
 
 class Skin:
@@ -78,7 +78,7 @@ class Skin:
         """Return the skin at rest with the diffuse reflection of its vertices, linear [shape=(V, 3)]."""
         return Part("skin", self.rest, self.triangles, colours, palette.SKIN_FINISH, self.normals)
 
-    def posed(self, pose: FacePose) -> tuple[Real, Real]:
+    def posed(self, pose: CharacterPose) -> tuple[Real, Real]:
         """Return places and normals of all vertices [shape=(V, 3), both], the head not turned."""
         places = self._places(pose)
         change = normals_of(places, self.triangles) - self._meshed_rest
@@ -103,7 +103,7 @@ class Skin:
         shares *= np.exp(-across[self._bound] / 0.5)
         self._shares = shares / shares.sum(axis=1, keepdims=True) * self.lip_weight[self._bound, None]
 
-    def _places(self, pose: FacePose) -> Real:
+    def _places(self, pose: CharacterPose) -> Real:
         points = section_points(pose, self.base_z)
         lips = lip_surface(points)
         moved = lips[0] - self._contour

@@ -74,8 +74,10 @@ def _triangle(
     # The corners are in whole 1/256 of a sample, so that the edge functions are exact.
     xa, ya, xb, yb, xc, yc = x[a], y[a], x[c], y[c], x[b], y[b]  # clockwise on the screen, whose rows go down
     b, c = c, b
-    x0, x1 = max(left, int(np.floor(min(xa, xb, xc)))), min(right, int(np.ceil(max(xa, xb, xc))))
-    y0, y1 = max(top, int(np.floor(min(ya, yb, yc)))), min(bottom, int(np.ceil(max(ya, yb, yc))))
+    x0, x1 = max(left, int(np.ceil(min(xa, xb, xc) - 0.5))), min(right, int(np.floor(max(xa, xb, xc) + 0.5)))
+    y0, y1 = max(top, int(np.ceil(min(ya, yb, yc) - 0.5))), min(bottom, int(np.floor(max(ya, yb, yc) + 0.5)))
+    if x0 >= x1 or y0 >= y1:
+        return  # between the middles of samples
     inverse = 1.0 / ((xb - xa) * (yc - ya) - (xc - xa) * (yb - ya))
     bias_a, bias_b, bias_c = _bias(xb, yb, xc, yc), _bias(xc, yc, xa, ya), _bias(xa, ya, xb, yb)
     za, zb, zc = np.float32(z[a]), np.float32(z[b] - z[a]), np.float32(z[c] - z[a])
