@@ -155,12 +155,16 @@ def _whole(path: Path, line: int, text: str) -> int:
 def _rows(path: Path, columns: tuple[str, ...], kind: str) -> Iterator[tuple[int, list[str]]]:
     """Yield the rows of a table with their line numbers; empty lines and lines that begin with # are left out."""
     reader = csv.reader(io.StringIO(read_text_file(path, kind, LARGEST_TABLE)))
-    header = [word.strip() for word in next(reader, [])]
+    try:
+        table = [(reader.line_num, row) for row in reader]
+    except csv.Error as error:
+        raise InputError(f"{path}: no table ({shortened(str(error))}); required {','.join(columns)}") from error
+    header = [word.strip() for word in table[0][1]] if table else []
     if header != list(columns):
         found = shortened(",".join(header))
         raise InputError(f"{path}: the columns are {found!r}, required {','.join(columns)}")
-    for row in reader:
+    for line, row in table[1:]:
         if row and not row[0].startswith("#"):
             if len(row) != len(columns):
-                raise InputError(f"{path}: line {reader.line_num}: {len(row)} columns, required {','.join(columns)}")
-            yield reader.line_num, row
+                raise InputError(f"{path}: line {line}: {len(row)} columns, required {','.join(columns)}")
+            yield line, row

@@ -15,6 +15,7 @@ from lipmotion.rig.meshopt import decoded_attributes, decoded_exponents, decoded
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 COMPRESSION = ("EXT_meshopt_compression", "KHR_meshopt_compression")
+LARGEST_NUMBER = 1e9
 MOST_ELEMENTS = 3 * MOST_TRIANGLES
 
 
@@ -33,11 +34,12 @@ class GltfArrays:
         """
         accessor = self._document.item("accessors", number)
         raw = self._raw(accessor, width)
-        values = raw.astype(np.float64)
+        with np.errstate(invalid="ignore"):  # signalling NaN; refused below
+            values = raw.astype(np.float64)
         if accessor.get("normalized") is True and raw.dtype.kind in "iu":
             values = np.maximum(values / np.iinfo(raw.dtype).max, -1.0)
-        if not np.isfinite(values).all():
-            raise InputError("it has numbers that are not finite; export it again")
+        if not (np.abs(values) <= LARGEST_NUMBER).all():
+            raise InputError(f"it has numbers that are not finite, or beyond ±{LARGEST_NUMBER:g}; export it again")
         return values
 
     def whole(self, number: Any, width: int = 1) -> NDArray[np.int64]:

@@ -19,6 +19,7 @@ NEUTRAL = "neutral"
 LEAST_SHARE = 1e-5
 """Vertices that a blendshape moves by less than this share of the size of the mesh are not stored: OBJ files of one
 head are written with rounded numbers."""
+LARGEST_NUMBER = 1e9
 LARGEST_LIBRARY = 1 << 20
 MOST_CORNERS = 1000
 """Most corners of a polygon."""
@@ -171,8 +172,8 @@ def _numbers(rows: list[list[bytes]], width: int) -> NDArray[np.float64]:
     if wrong is not None:
         raise ValueError(f"{_text(wrong)!r} is no vertex of {width} numbers")
     values = np.array(rows, dtype="S32").reshape(-1, width).astype(np.float64)
-    if not np.isfinite(values).all():
-        raise ValueError("a vertex has numbers that are not finite")
+    if not (np.abs(values) <= LARGEST_NUMBER).all():
+        raise ValueError(f"a vertex has numbers that are not finite, or beyond ±{LARGEST_NUMBER:g}")
     return values
 
 

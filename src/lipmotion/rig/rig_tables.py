@@ -43,19 +43,23 @@ def read_rig_table(path: Path) -> tuple[RigRow, ...]:
     Raises InputError: no such file, other columns, no rows, or a row that is damaged.
     """
     reader = csv.DictReader(io.StringIO(read_text_file(path, "rig table", LARGEST_TABLE)))
-    found = [name.strip() for name in reader.fieldnames or ()]
+    try:
+        found = [name.strip() for name in reader.fieldnames or ()]
+        reader.fieldnames = found
+        table = [(reader.line_num, fields) for fields in reader]
+    except csv.Error as error:
+        raise InputError(f"{path}: no table ({shortened(str(error))}); required {','.join(COLUMNS)}") from error
     if found[:2] != list(COLUMNS[:2]) or not set(found) <= set(COLUMNS):
         raise InputError(f"{path}: the columns are {shortened(','.join(found))!r}, required {','.join(COLUMNS)}")
-    reader.fieldnames = found
     rows = []
-    for fields in reader:
+    for line, fields in table:
         texts = {name: (fields.get(name) or "").strip() for name in COLUMNS}
         if texts["control"].startswith("#") or not any(texts.values()):
             continue
         try:
             rows.append(_row(texts))
         except ValueError as error:
-            raise InputError(f"{path}: line {reader.line_num}: {shortened(str(error))}") from error
+            raise InputError(f"{path}: line {line}: {shortened(str(error))}") from error
     if not rows or len(rows) > MOST_CONTROLS:
         raise InputError(f"{path}: {len(rows)} rows, required 1 to {MOST_CONTROLS}")
     return tuple(rows)
