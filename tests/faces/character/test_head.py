@@ -88,7 +88,7 @@ def test_f_shows_teeth_where_m_shows_none():
         row, column = 120 + int((0.70 - 0.03) * 240 / 3.35), 160
         return int(frames[15][row - 4 : row + 6, column - 6 : column + 6].min(axis=2).max())
 
-    assert brightest("f") > brightest("m") + 30
+    assert brightest("f") > brightest("m") + 20
 
 
 def first(motion=None, **settings: Any) -> np.ndarray:
