@@ -124,6 +124,7 @@ def test_info(run: RunCommand, filmed_face_file: Path) -> None:
     assert "background   2.0 s of 224 × 288 px at 25 frames a second" in done.out
 
 
+@pytest.mark.long
 def test_a_video_of_the_person(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:
     done = run(*basics, "-o", "a.mp4", "a.json")
     assert done == (0, ["a.mp4", "a.json"], [])
@@ -137,6 +138,7 @@ def test_a_video_of_the_person(run: RunCommand, basics: tuple[object, ...], here
     assert np.corrcoef(dark[:count], opening[:count])[0, 1] > 0.8
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("here")
 def test_frames_a_second_and_the_mark(run: RunCommand, basics: tuple[object, ...]) -> None:
     assert run(*basics, "-o", "a.mp4", "--fps", "10", "--mark", "none").code == 0
@@ -147,6 +149,7 @@ def test_frames_a_second_and_the_mark(run: RunCommand, basics: tuple[object, ...
     assert np.abs(first - second)[:, -40:].max() > 60
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("here")
 def test_another_background(
     run: RunCommand, basics: tuple[object, ...], tracker: Path, videos: dict[Path, ToyVideo]
@@ -161,6 +164,7 @@ def test_another_background(
     assert len(videos[path.resolve()].motion.values) == len(footage)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("overlay", ["inset", "mouth"])
 def test_an_aid_to_lip_reading(
     run: RunCommand, basics: tuple[object, ...], tracker: Path, here: Path, overlay: str

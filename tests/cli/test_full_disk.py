@@ -38,6 +38,7 @@ def test_animate(toy_speech: Path, toy_model_file: Path, here: Path, name: str) 
     assert list(here.iterdir()) == []
 
 
+@pytest.mark.long
 def test_a_film(toy_speech: Path, toy_model_file: Path, filmed_face_file: Path, here: Path) -> None:
     basics = ("animate", toy_speech, "--model", toy_model_file, "--face", filmed_face_file)
     for limit in (LIMIT, 20_000):

@@ -30,6 +30,7 @@ def picture(inside: str, size: int = 40) -> np.ndarray:
     return painted(shapes, WHOLE, size, size)[..., 3]
 
 
+@pytest.mark.long
 def test_the_example_keeps_the_contract():
     check_face(face_named(str(ROBOT)))
 

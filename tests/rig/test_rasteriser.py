@@ -48,6 +48,7 @@ def test_normals_of_a_ball_point_outwards():
     assert np.einsum("ij,ij->i", normals_of(mesh.vertices, mesh.triangles)[inner], outward).min() > 0.99
 
 
+@pytest.mark.long
 def test_a_mesh_is_seen_in_its_colour_at_its_place():
     picture = picture_of(ball(), Camera(100, 100, across=2.0)).astype(int)
     red, green, blue = picture[50, 50]

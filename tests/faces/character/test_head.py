@@ -18,6 +18,7 @@ from lipmotion.testing import check_face
 SMALL: dict[str, Any] = {"width": 160, "height": 120}
 
 
+@pytest.mark.long
 def test_frames_are_rgb_of_the_size_asked():
     frames = list(render(opening(0, 0.2), NOTHING_SAID, **SMALL))
     assert [frame.shape for frame in frames] == [(120, 160, 3)] * 2
@@ -29,6 +30,7 @@ def test_the_number_of_frames_follows_the_frame_rate():
     assert [sum(1 for _ in render(moved, NOTHING_SAID, fps=fps, **SMALL)) for fps in (25, 30, 60)] == [6, 7, 13]
 
 
+@pytest.mark.long
 def test_the_same_input_gives_the_same_pixels_and_another_seed_others():
     moved = opening(*np.linspace(0, 0.2, 30))
     first, second, other = (
@@ -106,6 +108,7 @@ def test_a_transparent_picture_over_a_colour_is_the_picture_on_that_colour():
     assert 0.2 < (alpha == 0).mean() < 0.9
 
 
+@pytest.mark.long
 def test_what_is_switched_off_does_not_move():
     moved = opening(*[0.0] * 150)
     still = Staging(size=64, blinks=False, gaze=False, brows=False, head=False)

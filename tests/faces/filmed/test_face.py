@@ -109,6 +109,7 @@ def test_the_summary_says_what_it_is(filmed_face: FilmedFace) -> None:
     assert summary["licence"] == "synthesised by lipmotion"
 
 
+@pytest.mark.long
 def test_nothing_is_left_where_it_cannot_be_written(filmed_face: FilmedFace, tmp_path: Path) -> None:
     with pytest.raises(ExportError):
         save_face(filmed_face, tmp_path / "missing" / "a.face")
@@ -120,6 +121,7 @@ def test_nothing_is_left_where_it_cannot_be_written(filmed_face: FilmedFace, tmp
     assert (tmp_path / "a.face").read_text() == "older"
 
 
+@pytest.mark.long
 def test_every_array_is_needed(arrays: dict[str, np.ndarray], header: dict[str, object], tmp_path: Path) -> None:
     assert refusal(tmp_path / "a.face", header, arrays) == ""
     read = [
@@ -292,6 +294,7 @@ def test_a_header_is_read_without_the_pictures(filmed_face_file: Path) -> None:
     assert [channel["name"] for channel in header["channels"]] == ["opening", "width", "outer"]
 
 
+@pytest.mark.long
 def test_an_appearance_as_arrays_and_back(filmed_face: FilmedFace) -> None:
     arrays = appearance_arrays(filmed_face.appearance)
     again = appearance_from_arrays(arrays)

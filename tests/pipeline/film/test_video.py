@@ -83,6 +83,7 @@ def test_the_jaw_follows_what_it_is_told(filmed_face: FilmedFace, motion: Motion
         film_of(filmed_face, motion, options=FilmOptions(jaw="energy"))
 
 
+@pytest.mark.long
 def test_the_same_motion_is_the_same_film(
     filmed_face: FilmedFace, motion: Motion, toy_sentence: ToySentence, tmp_path: Path
 ) -> None:
@@ -91,6 +92,7 @@ def test_the_same_motion_is_the_same_film(
     assert (tmp_path / "a.mp4").read_bytes() == (tmp_path / "b.mp4").read_bytes()
 
 
+@pytest.mark.long
 def test_sound_and_pictures_are_as_long(
     filmed_face: FilmedFace, motion: Motion, toy_sentence: ToySentence, tmp_path: Path
 ) -> None:
@@ -116,6 +118,7 @@ def test_the_mark(
     assert (corners.max() > 60) == (mark == "visible")
 
 
+@pytest.mark.long
 def test_the_mark_is_the_default(
     filmed_face: FilmedFace, motion: Motion, toy_sentence: ToySentence, tmp_path: Path
 ) -> None:
@@ -155,6 +158,7 @@ def test_overlays_need_the_video(filmed_face: FilmedFace, motion: Motion, toy_sp
             film_of(filmed_face, motion, speech=toy_speech, options=FilmOptions(overlay=overlay))
 
 
+@pytest.mark.long
 def test_progress_is_that_of_the_frames(
     filmed_face: FilmedFace, motion: Motion, toy_sentence: ToySentence, tmp_path: Path
 ) -> None:
@@ -199,6 +203,7 @@ def test_an_inset_on_the_video_of_the_speech(filmed_face: FilmedFace, motion: Mo
     assert np.ptp(frames[0, -19:, -24:]) > 60
 
 
+@pytest.mark.long
 def test_eigenlips_become_the_person(
     filmed_face: FilmedFace, pictured_model: Model, toy_sentence: ToySentence, tmp_path: Path
 ) -> None:
