@@ -102,7 +102,8 @@ def test_a_damaged_picture_is_no_candidate(space: Eigenlips) -> None:
     images[7, :3, :3] = 255, 0, 255
     candidates = make_candidates(space, images)
     assert len(candidates) == 19
-    assert np.array_equal(candidates.coefficients, make_candidates(space, np.delete(images, 7, axis=0)).coefficients)
+    others = make_candidates(space, np.delete(images, 7, axis=0))
+    assert candidates.coefficients == pytest.approx(others.coefficients, abs=1e-2)
     with pytest.raises(InputError, match=r"1 pictures, all of which differ .* more than 100 grey levels"):
         make_candidates(space, images[7:8])
 
