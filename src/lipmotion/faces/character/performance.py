@@ -9,8 +9,9 @@ from lipmotion.errors import InputError
 from lipmotion.faces.character import gestures
 from lipmotion.faces.character.liveliness import SEED, liveliness
 from lipmotion.faces.character.pose import CharacterPose
+from lipmotion.motion.rest import against_rest, rest_frames
 from lipmotion.types import Motion, Prosody, Timeline, Unit
-from lipmotion.units import LIP_CLOSING, is_silent
+from lipmotion.units import LIP_CLOSING
 
 Curve = NDArray[np.float64]
 
@@ -61,7 +62,7 @@ def head_poses(
     """
     _check(motion, fps)
     time_s = np.arange(int(np.floor((len(motion.values) - 1) / motion.rate_hz * fps + 1e-9)) + 1) / fps
-    rest = _rest_frames(motion, units)
+    rest = rest_frames(motion, units)
     said = _said(motion, units, time_s)
     pause = gestures.pause_weight(units, time_s)
     for name in ("round", "spread", "oval", "bite"):
@@ -205,33 +206,11 @@ def _closed(gap: Curve, units: Timeline[Unit], time_s: Curve) -> Curve:
     return closed
 
 
-def _rest_frames(motion: Motion, units: Timeline[Unit]) -> NDArray[np.bool_]:
-    """Return the frames of the rest pose [shape=(T,)]: silence, or else the tenth of the frames that is most closed."""
-    time_s = motion.time_s
-    rest = np.zeros(len(time_s), dtype=bool)
-    for span in units:
-        if is_silent(span.label.phone):
-            rest |= (span.start_s <= time_s) & (time_s < span.end_s)
-    if rest.any():
-        return rest
-    most_closed = np.argsort(motion["opening"], kind="stable")[: max(1, len(time_s) // 10)]
-    rest[most_closed] = True
-    return rest
-
-
-def _against_rest(name: str, curve: Curve, rest: NDArray[np.bool_]) -> Curve:
-    """Return the curve relative to its median at rest."""
-    value = float(np.median(curve[rest]))
-    if not value > 0:
-        raise InputError(f"the {name} is {value:g} at rest, required more than 0")
-    return curve / value
-
-
 def _width(motion: Motion, rest: NDArray[np.bool_]) -> Curve:
     """Return the change of width against the rest pose, as a part of it [shape=(T,)]."""
     if "width" not in motion.names:
         return -0.2 * np.clip(motion["opening"].astype(float), 0, WIDEST)
-    change = _against_rest("width", motion["width"].astype(float), rest) - 1
+    change = against_rest("width", motion["width"].astype(float), rest) - 1
     return np.asarray(WIDTH_REACH * np.tanh(WIDTH_GAIN * change / WIDTH_REACH))
 
 
@@ -239,7 +218,7 @@ def _fullness(motion: Motion, rest: NDArray[np.bool_]) -> Curve:
     if "outer" not in motion.names:
         return 1 - 0.4 * np.clip(motion["opening"].astype(float), 0, WIDEST)
     thickness = (motion["outer"] - motion["opening"]).astype(float)
-    return np.clip(_against_rest("thickness of the lips (outer - opening)", thickness, rest), 0.75, 1.25)
+    return np.clip(against_rest("thickness of the lips (outer - opening)", thickness, rest), 0.75, 1.25)
 
 
 def _jaw(motion: Motion, rest: NDArray[np.bool_], gap: Curve, time_s: Curve) -> Curve:

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.motion.gestures import GESTURES, gesture_curves, pause_curve
+from lipmotion.motion.rest import against_rest, rest_frames
 from lipmotion.types import Motion, Timeline, Unit
-from lipmotion.units import is_silent
 
 Curve = NDArray[np.float64]
 
@@ -75,7 +75,7 @@ def mouth_poses(motion: Motion, units: Timeline[Unit], fps: float, intensity: fl
     """
     _check(motion, fps)
     time_s = frame_times(motion, fps)
-    rest = _rest_frames(motion, units)
+    rest = rest_frames(motion, units)
     tongue, tuck, protrusion, spread, press, teeth = _gestures(motion, units, time_s, intensity)
     gap = _gap(motion, time_s, fps, intensity)
     free = (1 - press) * np.clip(gap / FAITHFUL_ABOVE, 0, 1)
@@ -160,32 +160,10 @@ def _gap(motion: Motion, time_s: Curve, fps: float, intensity: float) -> Curve:
     return gap_at_frames
 
 
-def _rest_frames(motion: Motion, units: Timeline[Unit]) -> NDArray[np.bool_]:
-    """Return the frames of the rest pose [shape=(T,)]: silence, or else the tenth of the frames that is most closed."""
-    time_s = motion.time_s
-    rest = np.zeros(len(time_s), dtype=bool)
-    for span in units:
-        if is_silent(span.label.phone):
-            rest |= (span.start_s <= time_s) & (time_s < span.end_s)
-    if rest.any():
-        return rest
-    most_closed = np.argsort(motion["opening"], kind="stable")[: max(1, len(time_s) // 10)]
-    rest[most_closed] = True
-    return rest
-
-
-def _against_rest(name: str, curve: Curve, rest: NDArray[np.bool_]) -> Curve:
-    """Return the curve relative to its median at rest."""
-    value = float(np.median(curve[rest]))
-    if not value > 0:
-        raise InputError(f"the {name} is {value:g} at rest, required more than 0")
-    return curve / value
-
-
 def _width(motion: Motion, rest: NDArray[np.bool_], intensity: float) -> Curve:
     if "width" not in motion.names:
         return 1 - 0.25 * np.clip(motion["opening"], 0, 0.4)
-    change = _against_rest("width", motion["width"].astype(float), rest) - 1
+    change = against_rest("width", motion["width"].astype(float), rest) - 1
     return 1 + WIDTH_REACH * np.tanh(intensity * WIDTH_GAIN * change / WIDTH_REACH)
 
 
@@ -193,7 +171,7 @@ def _fullness(motion: Motion, rest: NDArray[np.bool_]) -> Curve:
     if "outer" not in motion.names:
         return 1 - 0.4 * np.clip(motion["opening"], 0, 0.4)
     thickness = motion["outer"] - motion["opening"]
-    return np.clip(_against_rest("thickness of the lips (outer - opening)", thickness, rest), 0.75, 1.25)
+    return np.clip(against_rest("thickness of the lips (outer - opening)", thickness, rest), 0.75, 1.25)
 
 
 def _jaw(motion: Motion, rest: NDArray[np.bool_], gap: Curve, time_s: Curve) -> Curve:
