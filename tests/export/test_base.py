@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.export import motion_suffixes, read_motion, write_motion
+from lipmotion.export import motion_suffix, motion_suffixes, read_motion, readable_suffixes, write_motion
+from lipmotion.export.base import MOTION_FORMATS, MotionFormat
 from lipmotion.types import Channel, Generation, Motion, Timeline
 
 
@@ -14,7 +15,7 @@ def write(path: Path, generation: Generation) -> Path:
     return path
 
 
-@pytest.mark.parametrize("suffix", motion_suffixes())
+@pytest.mark.parametrize("suffix", readable_suffixes())
 def test_motion_comes_back(tmp_path, generation, suffix):
     motion, units = read_motion(write(tmp_path / f"a{suffix}", generation))
     assert motion.names == generation.motion.names
@@ -23,7 +24,7 @@ def test_motion_comes_back(tmp_path, generation, suffix):
     assert len(units) == (0 if suffix == ".csv" else 2)
 
 
-@pytest.mark.parametrize("suffix", motion_suffixes())
+@pytest.mark.parametrize("suffix", readable_suffixes())
 @pytest.mark.parametrize("rate_hz", [25.0, 29.97, 30.0, 60.0, 100.0])
 def test_the_rate_comes_back(tmp_path, generation, suffix, rate_hz):
     moved = replace(generation, motion=replace(generation.motion, rate_hz=rate_hz))
@@ -38,6 +39,39 @@ def test_the_same_motion_gives_the_same_bytes(tmp_path, generation, suffix):
 
 def test_the_suffix_may_be_in_capitals(tmp_path, generation):
     assert read_motion(write(tmp_path / "A.JSON", generation))[0].names == generation.motion.names
+
+
+@pytest.fixture
+def compound(monkeypatch):
+    """A format with a suffix of two parts, which cannot be read, beside the one of its last part."""
+    monkeypatch.setitem(MOTION_FORMATS.built_in, "take.csv", f"{__name__}:TAKE")
+
+
+def _write_take(path, generation, _source, _model):
+    path.write_text(f"take of {len(generation.motion.values)}\n")
+
+
+TAKE = MotionFormat(_write_take)
+
+
+@pytest.mark.usefixtures("compound")
+@pytest.mark.parametrize(
+    ("name", "suffix"),
+    [("a.take.csv", ".take.csv"), ("a.b.TAKE.Csv", ".take.csv"), ("a.mistake.csv", ".csv"), ("take.csv", ".csv")],
+)
+def test_the_longest_suffix_chooses_the_format(tmp_path, generation, name, suffix):
+    assert motion_suffix(Path(name)) == suffix
+    text = write(tmp_path / name, generation).read_text()
+    assert text.startswith("take of" if suffix == ".take.csv" else "time_s,")
+
+
+@pytest.mark.usefixtures("compound")
+def test_a_format_without_reader_is_not_offered_for_reading(tmp_path, generation):
+    assert ".take.csv" in motion_suffixes()
+    assert ".take.csv" not in readable_suffixes()
+    path = write(tmp_path / "a.take.csv", generation)
+    with pytest.raises(InputError, match=r"cannot read motion from '\.take\.csv'; use one of \.json, \.csv, \.npz$"):
+        read_motion(path)
 
 
 @pytest.mark.parametrize(("name", "found"), [("a.fbx", "'.fbx'"), ("a", "without a suffix")])
@@ -72,7 +106,7 @@ def test_an_old_file_survives_a_failure(tmp_path, generation, suffix, monkeypatc
     assert list(tmp_path.iterdir()) == [path]
 
 
-@pytest.mark.parametrize("suffix", motion_suffixes())
+@pytest.mark.parametrize("suffix", readable_suffixes())
 def test_a_missing_and_a_damaged_file_are_named(tmp_path, suffix):
     path = tmp_path / f"a{suffix}"
     with pytest.raises(InputError, match=rf"a\{suffix}: cannot be read: No such file"):

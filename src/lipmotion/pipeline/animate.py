@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.export.base import check_motion, motion_suffixes, write_motion
+from lipmotion.export.base import check_motion, motion_suffix, motion_suffixes, write_motion
 from lipmotion.export.sound import SOUND_CODECS, write_sound
 from lipmotion.export.textgrid import TEXTGRID_SUFFIX, write_textgrid
 from lipmotion.faces.base import Face, Staging
@@ -27,6 +27,7 @@ from lipmotion.pipeline.drawn_video import (
 )
 from lipmotion.pipeline.film.video import FILM, FilmOptions, check_film, film_of, write_film
 from lipmotion.pipeline.model import Model, load_model
+from lipmotion.pipeline.motion_files import in_format
 from lipmotion.pipeline.outlook import outlook_of
 from lipmotion.pipeline.request import SpeechInput, request_of
 from lipmotion.pipeline.speakers import generate_for
@@ -145,13 +146,13 @@ def write(
         raise ExportError(f"{videos[0]}: the motion has no channel 'opening' to draw a face from; write motion files")
     if {*(channels or ())} & {*GESTURES}:
         generation = with_articulation(generation, channels or ())
-    written = generation.selected(channels) if channels is not None else generation
-    if rate_hz is not None:
-        written = written.resampled(rate_hz)
     sounds = [path for path in paths if path.suffix.lower() in SOUND_CODECS]
-    for path in paths:
-        if path.suffix.lower() in motion_suffixes():
-            check_motion(path, written.motion)
+    chosen = generation.selected(channels) if channels is not None else generation
+    if rate_hz is not None:
+        chosen = chosen.resampled(rate_hz)
+    written = {path: in_format(path, generation, chosen, rate_hz) for path in paths if motion_suffix(path)}
+    for path, held in written.items():
+        check_motion(path, held.motion)
     for path in paths:
         if path in sounds and sound is not None:
             write_sound(path, sound)
@@ -169,7 +170,7 @@ def write(
         elif path.suffix.lower() == TEXTGRID_SUFFIX.lower():
             write_textgrid(path, generation.units)
         else:
-            _write_motion(written, path, recording, model)
+            _write_motion(written[path], path, recording, model)
 
 
 def check_outputs(
@@ -197,7 +198,7 @@ def check_outputs(
     suffixes = (*motion_suffixes(), *VIDEO_SUFFIXES, TEXTGRID_SUFFIX, *(SOUND_CODECS if with_sound else ()))
     check_distinct([Path(path) for path in outputs])
     for path in map(Path, outputs):
-        if path.suffix.lower() not in map(str.lower, suffixes) and not shows_face(path):
+        if not (motion_suffix(path) or path.suffix.lower() in map(str.lower, suffixes) or shows_face(path)):
             raise ExportError(f"{path}: unknown format {path.suffix!r}; required one of: {' '.join(suffixes)} %05d.png")
         check_target(path, speech)
         check_background(path, staging or Staging())

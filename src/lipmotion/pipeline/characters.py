@@ -19,7 +19,8 @@ from lipmotion.rig.visemes import viseme_motion
 from lipmotion.storage.files import whole_file
 from lipmotion.types import Generation, Motion, Timeline, Unit
 
-SHAPE_SETS = ("arkit", "visemes", "fap")
+ARKIT = "arkit"
+SHAPE_SETS = (ARKIT, "visemes", "fap")
 """Sets of curves that need no mesh: ARKit's blendshapes of the mouth, the 15 visemes of Oculus and OpenXR, and MPEG-4's
 facial animation parameters of lips and jaw."""
 
