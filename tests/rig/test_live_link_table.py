@@ -134,5 +134,5 @@ def test_what_is_wrong_is_said(tmp_path, lines, message):
 
 def test_a_table_that_is_not_text_is_refused(tmp_path):
     (tmp_path / "take.csv").write_bytes(HEAD.encode() + b"\n\xff\xfe\x00")
-    with pytest.raises(InputError, match="not a table of Live Link Face"):
+    with pytest.raises(InputError, match="not a table of"):
         read_motion(tmp_path / "take.csv")

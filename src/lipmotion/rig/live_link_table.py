@@ -32,7 +32,7 @@ SPEECH_CURVES = frozenset(
 """The curves that speech moves: those of mouth, jaw, tongue, cheeks and nose."""
 TIMECODE_RATES = (24, 25, 30, 48, 50, 60, 120)
 APP_RATE = 60
-"""Frames a second of the timecode where a take is too short to show it: what the app has by default."""
+"""Frames a second of the timecode where a take does not show it: what the app has by default."""
 DAY_S = 86_400.0
 BACKWARDS_S = 0.5
 """A row whose time is earlier than that of the row before by less than this is left out; more is an error."""
@@ -165,7 +165,7 @@ def _seconds(codes: list[Timecode]) -> Array:
 
 def _timecode_rate(whole: Array, frames: Array) -> int:
     """Return how many frames of the timecode make a second."""
-    passed = np.flatnonzero(np.diff(whole) > 0)
+    passed = np.flatnonzero(np.diff(whole) == 1)
     most = int(frames.max() if len(passed) > 1 else frames[passed].max() if len(passed) else frames.max())
     if most >= TIMECODE_RATES[-1]:
         raise InputError(f"a timecode has frame {most}, required less than {TIMECODE_RATES[-1]}")
