@@ -40,9 +40,7 @@ def test_a_take_comes_back(tmp_path, curves):
     write_take(tmp_path / "take.csv", curves)
     motion, units = read_motion(tmp_path / "take.csv")
     assert (motion.rate_hz, len(units)) == (60.0, 0)
-    assert set(motion.names) == {*ARKIT_MOUTH, *ARKIT_OTHERS} | {
-        name[0].lower() + name[1:] for name in COLUMNS[52:]
-    }
+    assert set(motion.names) == {*ARKIT_MOUTH, *ARKIT_OTHERS} | {name[0].lower() + name[1:] for name in COLUMNS[52:]}
     assert {c.unit for c in motion.channels if not c.name.endswith(("Yaw", "Pitch", "Roll"))} == {WEIGHT}
     assert {c.unit for c in motion.channels if c.name.endswith(("Yaw", "Pitch", "Roll"))} == {"radian"}
     np.testing.assert_allclose(motion.values, curves.values, atol=6e-11)

@@ -11,7 +11,7 @@ import numpy as np
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export.base import check_motion, motion_suffix, motion_suffixes, write_motion
 from lipmotion.export.sound import SOUND_CODECS, write_sound
-from lipmotion.export.textgrid import TEXTGRID_SUFFIX, write_textgrid
+from lipmotion.export.timed_labels import LABEL_SUFFIXES, holds_labels, write_labels
 from lipmotion.faces.base import Face, Staging
 from lipmotion.faces.filmed.face import SUFFIX, FilmedFace, load_face
 from lipmotion.faces.registry import FACES, face_named
@@ -167,8 +167,8 @@ def write(
             else:
                 hertz = DRAWN_HZ if fps is None else fps
                 write_drawn_face(path, generation, played, hertz, shown_face, staging or Staging(), monitor)
-        elif path.suffix.lower() == TEXTGRID_SUFFIX.lower():
-            write_textgrid(path, generation.units)
+        elif holds_labels(path):
+            write_labels(path, generation.units)
         else:
             _write_motion(written[path], path, recording, model)
 
@@ -195,7 +195,7 @@ def check_outputs(
     shown_face = opened_face(face)
     check_film(shown_face, film, speech)
     check_staging(shown_face, staging or Staging())
-    suffixes = (*motion_suffixes(), *VIDEO_SUFFIXES, TEXTGRID_SUFFIX, *(SOUND_CODECS if with_sound else ()))
+    suffixes = (*motion_suffixes(), *VIDEO_SUFFIXES, *LABEL_SUFFIXES, *(SOUND_CODECS if with_sound else ()))
     check_distinct([Path(path) for path in outputs])
     for path in map(Path, outputs):
         if not (motion_suffix(path) or path.suffix.lower() in map(str.lower, suffixes) or shows_face(path)):

@@ -9,6 +9,7 @@ import numpy as np
 
 from lipmotion.export.base import motion_format
 from lipmotion.pipeline.characters import ARKIT, curves_of
+from lipmotion.rig.facial_animation import FAP
 from lipmotion.rig.shape_names import arkit_name
 from lipmotion.types import Channel, Generation, Motion
 
@@ -24,12 +25,22 @@ def in_format(path: Path, generation: Generation, chosen: Generation, rate_hz: f
     form = motion_format(path)
     held = chosen
     if form.curves:
-        curves = _blendshapes(generation.motion) if form.curves == ARKIT else None
+        curves = _held_already(generation.motion, form.curves)
         if curves is None:
             curves = curves_of(generation.motion, generation.units, form.curves)
         held = replace(generation, motion=curves, spread=np.zeros(curves.values.shape))
     hertz = rate_hz or form.rate_hz
     return held if hertz in {None, held.motion.rate_hz} else held.resampled(hertz)
+
+
+def _held_already(motion: Motion, curves: str) -> Motion | None:
+    """Return the channels of a motion that are curves of a set already; None: there are none."""
+    if curves == ARKIT:
+        return _blendshapes(motion)
+    columns = [column for column, channel in enumerate(motion.channels) if channel.unit == curves == FAP]
+    if not columns:
+        return None
+    return Motion(motion.values[:, columns], motion.rate_hz, tuple(motion.channels[column] for column in columns))
 
 
 def _blendshapes(motion: Motion) -> Motion | None:

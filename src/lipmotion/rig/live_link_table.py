@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shortened
-from lipmotion.rig.steady_rate import steady_rows
 from lipmotion.rig.shape_names import ARKIT_MOUTH, arkit_name
+from lipmotion.rig.steady_rate import steady_rows
 from lipmotion.types import WEIGHT, Channel, Motion, Timeline, Unit
 
 Array = NDArray[np.float64]
@@ -102,7 +102,9 @@ def _names(head: str) -> tuple[list[str], int]:
     skipped = 2 if len(fields) > 1 and fields[1].lower() == COUNT else 1
     names = fields[skipped:]
     if fields[0].lower() != FIRST or not 0 < len(names) <= MOST_CURVES:
-        raise ValueError(f"the first line is {shortened(head.strip())!r}, required Timecode,BlendshapeCount,JawOpen,...")
+        raise ValueError(
+            f"the first line is {shortened(head.strip())!r}, required Timecode,BlendshapeCount,JawOpen,..."
+        )
     return names, skipped
 
 

@@ -27,8 +27,8 @@ def steady_rows(time_s: Array, rows: Array) -> tuple[Array, float]:
     """Return rows at a steady rate that begin at the first time, and the rate in hertz.
 
     time_s : increasing, seconds [shape=(N,)];  rows : one for each time [shape=(N, P)]
-    The rate of uneven rows is that of the median step, or the usual rate next to it. Rows that are even already are returned as they
-    are; between others the values are linear, and gaps are bridged.
+    The rate of uneven rows is that of the median step, or the usual rate next to it. Rows that are
+    even already are returned as they are; between others the values are linear, and gaps are bridged.
     Raises InputError: fewer than two rows, times that do not increase, or far more gaps than rows.
     """
     if len(time_s) < 2:

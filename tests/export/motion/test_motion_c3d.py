@@ -1,4 +1,4 @@
-"""C3D: what is written is read by others and by us, and what others write is read; the head's movements are taken out."""
+"""C3D: what is written is read by others and by us, what others write is read; movements of the head are taken out."""
 
 from __future__ import annotations
 
@@ -183,15 +183,18 @@ def test_points_as_whole_numbers_are_read(tmp_path):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda content: b"", "not a C3D file"),
-        (lambda content: b"x" * 2000, "not a C3D file"),
+        (lambda _: b"", "not a C3D file"),
+        (lambda _: b"x" * 2000, "not a C3D file"),
         (lambda content: content[:1600], "cut short|not a C3D file"),
         (lambda content: content[:-2000], "cut short: .* bytes of data, required"),
         (lambda content: content[:515] + b"\x55" + content[516:], "its processor type is 85, required 84"),
         (lambda content: content[:8] + b"\xf0\xff" + content[10:], "cut short"),
         (lambda content: content[:2] + b"\xff\xff" + content[4:], "65535 points and"),
         (lambda content: content[:16] + b"\0\0" + content[18:], "cut short"),
-        (lambda content: content.replace(b"mm", b"ly"), "its unit of length is 'ly', required one of mm"),
+        (
+            lambda content: content.replace(b"mm", b"ly").replace(b"lipmotion", b"otherprog"),
+            "its unit of length is 'ly', required one of mm",
+        ),
         (lambda content: content.replace(struct.pack("<f", 100.0), struct.pack("<f", float("nan"))), "rate is nan"),
         (lambda content: content[:800].ljust(512 * 40, b"\1"), "required|again"),
     ],

@@ -85,7 +85,9 @@ def _parsed(content: bytes) -> C3dFile:
     if last == MOST_FRAMES:
         frames = int(max(frames, _number(found, "POINT.LONG_FRAMES", 0), _number(found, "POINT.FRAMES", 0) % (1 << 31)))
     if not (0 <= points <= MOST_POINTS and 0 <= analog <= MOST_ANALOG and points + analog > 0 and frames > 0):
-        raise InputError(f"{points} points and {analog} analog values in {frames} frames, required at least one of each")
+        raise InputError(
+            f"{points} points and {analog} analog values in {frames} frames, required at least one of each"
+        )
     if not 0 < rate_hz <= 1e5 or not np.isfinite(scale) or not scale:
         raise InputError(f"the rate is {rate_hz:g} Hz and the scale {scale:g}, required positive numbers")
     kind = np.dtype("<f4" if scale < 0 else "<i2")
@@ -97,9 +99,7 @@ def _parsed(content: bytes) -> C3dFile:
     return _content(found, rows, points, scale, rate_hz, samples)
 
 
-def _content(
-    found: dict[str, Values], rows: Array, points: int, scale: float, rate_hz: float, samples: int
-) -> C3dFile:
+def _content(found: dict[str, Values], rows: Array, points: int, scale: float, rate_hz: float, samples: int) -> C3dFile:
     """Return the content from rows of numbers, one a frame [shape=(T, 4 · points + analog values)]."""
     placed = rows[:, : points * 4].reshape(len(rows), points, 4)
     places = placed[..., :3] * (1.0 if scale < 0 else scale)
@@ -111,7 +111,9 @@ def _content(
     names = [*_texts(found, "ANALOG.LABELS"), *(f"analog{n}" for n in range(curves.shape[1]))][: curves.shape[1]]
     units = [*_texts(found, "ANALOG.UNITS"), *[""] * curves.shape[1]][: curves.shape[1]]
     unit, software = (next(iter(_texts(found, name)), "") for name in ("POINT.UNITS", "MANUFACTURER.SOFTWARE"))
-    return C3dFile(tuple(labels), places, float(f"{rate_hz:.6g}"), unit or "mm", software, curves, tuple(names), tuple(units))
+    return C3dFile(
+        tuple(labels), places, float(f"{rate_hz:.6g}"), unit or "mm", software, curves, tuple(names), tuple(units)
+    )
 
 
 def _texts(found: dict[str, Values], name: str) -> list[str]:

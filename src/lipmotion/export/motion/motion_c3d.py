@@ -1,4 +1,4 @@
-"""``.c3d``: lip and jaw points as markers of motion capture, all other channels as analog curves; and markers as motion.
+"""``.c3d``: lip and jaw points as markers of motion capture, other channels as analog curves; and markers as motion.
 
 Written points are in millimetres, with two markers more, ``EYE_L`` and ``EYE_R``, at the outer eye corners. Markers of
 others become channels ``x_NAME``, ``y_NAME``, ``z_NAME`` in the head's frame (``marker_frame``).
@@ -43,7 +43,9 @@ def check(motion: Motion) -> None:
         raise ExportError("the motion has no frames, required at least one in .c3d")
     for name in motion.names:
         if not (name.isascii() and name.isprintable() and len(name) <= LONGEST_LABEL):
-            raise ExportError(f"the channel name {name[:60]!r} does not fit into .c3d, required up to 64 ASCII characters")
+            raise ExportError(
+                f"the channel name {name[:60]!r} does not fit into .c3d, required up to 64 ASCII characters"
+            )
     points = len(_points(motion))
     if max(len(motion.names) - 3 * points, points + len(EYES)) > MOST_CURVES:
         raise ExportError(f"more than {MOST_CURVES} points, or other channels, which .c3d cannot name; write .npz")
