@@ -1,4 +1,4 @@
-"""``lipmotion corpus prepare|info|sync|offset|prompts|coverage``: make a corpus of recordings, inspect and correct it."""
+"""``lipmotion corpus prepare|info|sync|offset|prompts|coverage``: make a corpus of recordings, correct it."""
 
 from __future__ import annotations
 

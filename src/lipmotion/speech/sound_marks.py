@@ -109,11 +109,11 @@ def _beeps(audio: Audio) -> list[SoundMark]:
     starts = np.flatnonzero(same[1:] & ~same[:-1])
     ends = np.flatnonzero(same[:-1] & ~same[1:])
     least = LEAST_BEEP_S / BEEP_STEP_S
-    long = [(first, last) for first, last in zip(starts, ends, strict=True) if last - first >= least]
+    long = [(first, last) for first, last in zip(starts.tolist(), ends.tolist(), strict=True) if last - first >= least]
     marks = []
     for first, last in long:
         frames = slice(first, last + 1)
-        time_s, pitch = (float(first) * step + size / 2) / audio.rate_hz, float(np.median(hertz[frames]))
+        time_s, pitch = (first * step + size / 2) / audio.rate_hz, float(np.median(hertz[frames]))
         marks.append(SoundMark(time_s, BEEP, float(level[frames].mean()), pitch))
     return sorted(marks, key=lambda mark: -mark.strength_db)[:MOST_MARKS]
 
