@@ -49,6 +49,7 @@ MOTION_FORMATS: Registry[MotionFormat] = Registry(
         "json": "lipmotion.export.motion.motion_json:MOTION_FORMAT",
         "csv": "lipmotion.export.motion.motion_csv:MOTION_FORMAT",
         "npz": "lipmotion.export.motion.motion_npz:MOTION_FORMAT",
+        "livelink.csv": "lipmotion.export.motion.live_link:MOTION_FORMAT",
     },
 )
 """Motion formats by suffix, without the first dot; a suffix may have several parts, as ``livelink.csv``."""
