@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.export.base import check_motion, motion_suffix, motion_suffixes, write_motion
+from lipmotion.export.base import check_motion, motion_format, motion_suffix, motion_suffixes, write_motion
 from lipmotion.export.sound import SOUND_CODECS, write_sound
 from lipmotion.export.textgrid import TEXTGRID_SUFFIX, write_textgrid
 from lipmotion.faces.base import Face, Staging
@@ -31,7 +31,7 @@ from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.motion_files import in_format, needs_prosody
 from lipmotion.pipeline.outlook import outlook_of
 from lipmotion.pipeline.request import SpeechInput, request_of
-from lipmotion.pipeline.scenes import SCENE_SUFFIXES, is_scene, scene_of, write_scene
+from lipmotion.pipeline.scenes import SCENE_SUFFIXES, is_scene, scene_of, sound_reference, write_scene
 from lipmotion.pipeline.speakers import generate_for
 from lipmotion.pipeline.transfer import person_of
 from lipmotion.pipeline.understand import understood_speech
@@ -184,7 +184,7 @@ def write(
         elif path.suffix.lower() == TEXTGRID_SUFFIX.lower():
             write_textgrid(path, generation.units)
         else:
-            _write_motion(written[path], path, recording, model)
+            _write_motion(written[path], path, recording or heard_in, model)
 
 
 def check_outputs(
@@ -247,6 +247,8 @@ def _write_motion(generation: Generation, path: Path, speech: str | Path | None,
     about = model.about if model else {}
     named = {key: _text(about[key]) for key in ("name", "corpus", "licence", "attribution") if about.get(key)}
     source = {"file": as_text(Path(speech).name)} if speech else {}
+    if speech and motion_format(path).names_sound:
+        source["path"] = sound_reference(Path(speech), path)
     write_motion(path, generation, source=source, model=named)
 
 

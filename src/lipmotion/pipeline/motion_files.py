@@ -10,10 +10,13 @@ import numpy as np
 from lipmotion.export.base import motion_format, motion_suffix
 from lipmotion.faces.base import Staging
 from lipmotion.pipeline.characters import ARKIT, WHOLE_FACE, beside, curves_of
-from lipmotion.pipeline.living_curves import living_curves
+from lipmotion.pipeline.living_curves import RADIAN, living_curves
+from lipmotion.rig.rig_tables import CONTROL
 from lipmotion.rig.shape_names import arkit_name
-from lipmotion.types import Channel, Generation, Motion, Prosody
+from lipmotion.types import WEIGHT, Channel, Generation, Motion, Prosody
 
+CURVES = (WEIGHT, CONTROL, RADIAN)
+"""The units of curves that drive a character."""
 OPENING = "opening"
 
 
@@ -35,7 +38,8 @@ def in_format(
     """
     form = motion_format(path)
     held = chosen
-    if form.curves:
+    others = form.other_curves and all(channel.unit in CURVES for channel in held.motion.channels)
+    if form.curves and not others:
         curves = _curves(generation, form.curves, staging, prosody)
         held = replace(generation, motion=curves, spread=np.zeros(curves.values.shape))
     hertz = rate_hz or form.rate_hz

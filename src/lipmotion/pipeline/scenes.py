@@ -62,7 +62,7 @@ def write_scene(path: Path, scene: Scene, sound: Path | None = None) -> None:
     sound : the file that is referred to, by its path from the folder of the output; None: none
     Raises ExportError: the file cannot be written.
     """
-    heard = replace(scene, sound="" if sound is None else _reference(sound, path))
+    heard = replace(scene, sound="" if sound is None else sound_reference(sound, path))
     if path.suffix.lower() == USD:
         write_usda(path, heard)
     else:
@@ -136,7 +136,7 @@ def _continued(rotations: NDArray[np.float64]) -> NDArray[np.float64]:
     return rotations * signs[:, None]
 
 
-def _reference(sound: Path, path: Path) -> str:
+def sound_reference(sound: Path, path: Path) -> str:
     """Return the path of a sound from the folder of another file, with slashes; on another drive its name alone."""
     try:
         relative = os.path.relpath(sound, path.parent)

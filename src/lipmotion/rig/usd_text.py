@@ -12,9 +12,7 @@ from numpy.typing import NDArray
 INDENT = "    "
 
 
-def prim(
-    schema: str, name: str, inside: Iterable[str], *, schemas: Sequence[str] = (), **about: str
-) -> Iterator[str]:
+def prim(schema: str, name: str, inside: Iterable[str], *, schemas: Sequence[str] = (), **about: str) -> Iterator[str]:
     """Yield the lines of a prim.
 
     schema  : ``Mesh``, for instance
