@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from lipmotion.cli.paths import add_input
 
 if TYPE_CHECKING:
+    from lipmotion.motion.delivery import Delivery
     from lipmotion.rig.driven import DrivenCharacter
     from lipmotion.types import Generation
 
@@ -76,25 +77,20 @@ def other_outputs(options: argparse.Namespace) -> list[str]:
     return [path for path in options.output if Path(path).suffix.lower() != ANIMATED]
 
 
-def chosen_curves(options: argparse.Namespace, result: Generation) -> tuple[Generation, list[str] | None]:
-    """Return a generation with the curves that were asked for, and the channels of motion files (None: all).
+def chosen_curves(options: argparse.Namespace) -> str | DrivenCharacter | None:
+    """Return what motion files hold: the set of ``--curves``, else the weights of a character that has blendshapes.
 
-    With a character that has blendshapes, their weights; with ``--curves``, that set.
+    None: the channels of the motion.
     """
-    from lipmotion.pipeline.characters import with_curves
-
-    wanted = options.channels.split(",") if options.channels is not None else None
     weighed = options.driven if options.driven is not None and options.driven.shapes is not None else None
-    curves = options.curves or weighed
-    if curves is None:
-        return result, wanted
-    with_all, names = with_curves(result, curves)
-    return with_all, list(names) if wanted is None else wanted
+    return options.curves or weighed
 
 
-def write_animated_outputs(options: argparse.Namespace, result: Generation) -> None:
+def write_animated_outputs(options: argparse.Namespace, result: Generation, delivery: Delivery) -> None:
     """Write the character with its animation to the outputs that are ``.glb`` files."""
     from lipmotion.pipeline.characters import write_animated
+    from lipmotion.pipeline.delivered import delivered
 
     for path in animated_outputs(options):
-        write_animated(path, result, options.driven, options.rate)
+        rate_hz = options.fps if options.rate is None else options.rate
+        write_animated(path, delivered(result, delivery), options.driven, rate_hz, delivery)

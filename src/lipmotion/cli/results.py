@@ -13,6 +13,7 @@ from lipmotion.cli.characters import (
     other_outputs,
     write_animated_outputs,
 )
+from lipmotion.cli.delivery import add_delivery_arguments, delivery_of
 from lipmotion.cli.faces import add_face_arguments, film_options
 from lipmotion.cli.paths import add_output
 from lipmotion.cli.staging import add_staging_arguments, staging_of
@@ -32,7 +33,9 @@ def add_result_arguments(parser: argparse.ArgumentParser, files: str, *, require
     outputs: dict[str, Any] = {"type": str, "nargs": "+", "action": "extend", "required": required}
     outputs |= {} if required else {"default": []}
     add_output(parser, "-o", "--output", force=True, help=files, **outputs)
-    parser.add_argument("--rate", type=float, metavar="HZ", help="frames per second of motion files (default: 100)")
+    parser.add_argument(
+        "--rate", type=float, metavar="HZ", help="frames per second of motion files (default: --fps, or 100)"
+    )
     parser.add_argument("--channels", metavar="NAME,NAME", help="write only these to motion files: opening,width,...")
     rate = "frames per second of videos (default: 25; of filmed faces, those of the footage)"
     parser.add_argument("--fps", type=float, help=rate)
@@ -41,6 +44,7 @@ def add_result_arguments(parser: argparse.ArgumentParser, files: str, *, require
     add_face_arguments(parser)
     add_character_arguments(parser)
     add_staging_arguments(parser)
+    add_delivery_arguments(parser)
 
 
 def check_results(options: argparse.Namespace, speech: Path | None = None) -> None:
@@ -53,6 +57,7 @@ def check_results(options: argparse.Namespace, speech: Path | None = None) -> No
     open_character(options)
     options.face = opened_face(options.face)
     checked = {"rate_hz": options.rate, "fps": options.fps, "face": options.face, "film": film_options(options)}
+    checked["delivery"] = delivery_of(options)
     check_outputs(other_outputs(options), speech, **checked, staging=staging_of(options), with_sound=speech is None)
 
 
@@ -66,18 +71,26 @@ def write_results(
     """
     from lipmotion.pipeline.animate import with_articulation, write
 
-    drawn, channels = chosen_curves(options, result)
+    delivery = delivery_of(options)
     write(
-        with_articulation(drawn) if options.articulation else drawn,
+        with_articulation(result) if options.articulation else result,
         other_outputs(options),
         speech=speech,
         model=model,
-        channels=channels,
-        rate_hz=options.rate,
+        channels=options.channels.split(",") if options.channels is not None else None,
+        curves=chosen_curves(options),
+        rate_hz=rate_of(options),
         fps=options.fps,
         face=options.face,
         film=film_options(options),
         staging=staging_of(options),
+        delivery=delivery,
         monitor=report.receive,
     )
-    write_animated_outputs(options, result)
+    write_animated_outputs(options, result, delivery)
+
+
+def rate_of(options: argparse.Namespace) -> float | None:
+    """Return the frame rate of motion files: that of ``--rate``, else that of ``--fps``, else None: the model's."""
+    rate_hz: float | None = options.fps if options.rate is None else options.rate
+    return rate_hz

@@ -16,7 +16,10 @@ from lipmotion.faces.base import Face, Staging
 from lipmotion.faces.filmed.face import SUFFIX, FilmedFace, load_face
 from lipmotion.faces.registry import FACES, face_named
 from lipmotion.kernels.threads import one_thread
+from lipmotion.motion.delivery import Delivery, closed_on_grid, closed_times, held, sound_units
 from lipmotion.motion.gestures import GESTURES, with_gestures
+from lipmotion.pipeline.characters import with_curves
+from lipmotion.pipeline.delivered import check_delivery, delivered, shown, staged_intensity
 from lipmotion.pipeline.drawn_video import (
     OPAQUE_SUFFIX,
     VIDEO_SUFFIXES,
@@ -34,9 +37,11 @@ from lipmotion.pipeline.speakers import generate_for
 from lipmotion.pipeline.transfer import person_of
 from lipmotion.pipeline.understand import understood_speech
 from lipmotion.pipeline.workers import map_in_processes
+from lipmotion.rig.blendshape_motion import is_of_blendshapes
+from lipmotion.rig.driven import DrivenCharacter
 from lipmotion.speech.audio_files import read_audio
 from lipmotion.storage.files import as_text, check_distinct, check_target
-from lipmotion.types import Audio, Constraints, Generation, Monitor, TimedTranscript, silent_monitor
+from lipmotion.types import Audio, Constraints, Generation, Monitor, Motion, TimedTranscript, silent_monitor
 
 SOUND_RATE_HZ = 48_000
 """Sampling rate of the sound track of a drawn video."""
@@ -95,6 +100,8 @@ def write(
     face: str | Path | Face | FilmedFace = "portrait",
     film: FilmOptions = FILM,
     staging: Staging | None = None,
+    delivery: Delivery | None = None,
+    curves: str | Path | DrivenCharacter | None = None,
     monitor: Monitor = silent_monitor,
 ) -> None:
     """Write generated motion to one or several files, each in the format of its suffix.
@@ -114,6 +121,9 @@ def write(
     film     : how a filmed face is shown
     staging  : size, background, intensity of a drawn face, and what moves on its own (docs/faces.md); None: the
                defaults
+    delivery : intensity, anticipation, offset and held poses of every output (docs/controls.md); None: as generated
+    curves   : what motion files hold instead of the motion, unless ``channels`` asks for more: ``arkit``, ``visemes``,
+               ``fap``, a table of a rig (``.csv``), or a character with blendshapes (docs/meshes.md)
     monitor  : receives reports of the progress of videos
     Raises ExportError: unknown suffix, no such folder, or a file that cannot be written.
     Raises InputError: a frame rate out of its range, or an unknown channel or face.
@@ -131,6 +141,7 @@ def write(
     sound = speech if isinstance(speech, Audio) else None
     recording = None if isinstance(speech, Audio) else speech
     shown_face = opened_face(face)
+    delivery, staging = delivery or Delivery(), staging or Staging()
     check_outputs(
         paths,
         recording,
@@ -139,36 +150,37 @@ def write(
         face=shown_face,
         film=film,
         staging=staging,
+        delivery=delivery,
         with_sound=sound is not None,
     )
     videos = [path for path in paths if shows_face(path)]
-    if videos and not isinstance(shown_face, FilmedFace) and "opening" not in generation.motion.names:
-        raise ExportError(f"{videos[0]}: the motion has no channel 'opening' to draw a face from; write motion files")
-    if {*(channels or ())} & {*GESTURES}:
-        generation = with_articulation(generation, channels or ())
+    if videos and not isinstance(shown_face, FilmedFace):
+        check_drawable(videos[0], generation.motion)
     sounds = [path for path in paths if path.suffix.lower() in SOUND_CODECS]
-    chosen = generation.selected(channels) if channels is not None else generation
-    if rate_hz is not None:
-        chosen = chosen.resampled(rate_hz)
-    written = {path: in_format(path, generation, chosen, rate_hz) for path in paths if motion_suffix(path)}
-    for path, held in written.items():
-        check_motion(path, held.motion)
+    written = _motion_files(
+        [path for path in paths if motion_suffix(path)], generation, channels, curves, rate_hz, delivery
+    )
+    for path, each in written.items():
+        check_motion(path, each.motion)
     for path in paths:
         if path in sounds and sound is not None:
             write_sound(path, sound)
         elif path in videos:
             played = sound or read_audio(Path(str(recording)), SOUND_RATE_HZ, warn=False)
+            hertz = DRAWN_HZ if fps is None else fps
+            character = curves if isinstance(curves, DrivenCharacter) else None
+            seen = shown(generation, delivery, shown_face, hertz, character)
             if isinstance(shown_face, FilmedFace):
                 filmed = None if recording is None else Path(recording)
                 frames = film_of(
-                    shown_face, generation.motion, speech=filmed, sound=played, model=model, fps=fps, options=film
+                    shown_face, seen.motion, speech=filmed, sound=played, model=model, fps=fps, options=film
                 )
                 write_film(path, frames, played, mark=film.mark, monitor=monitor)
             else:
-                hertz = DRAWN_HZ if fps is None else fps
-                write_drawn_face(path, generation, played, hertz, shown_face, staging or Staging(), monitor)
+                staged = staged_intensity(staging, delivery, shown_face)
+                write_drawn_face(path, seen, played, hertz, shown_face, staged, monitor)
         elif path.suffix.lower() == TEXTGRID_SUFFIX.lower():
-            write_textgrid(path, generation.units)
+            write_textgrid(path, sound_units(generation.units, delivery, float(generation.motion.time_s[-1])))
         else:
             _write_motion(written[path], path, recording, model)
 
@@ -182,11 +194,12 @@ def check_outputs(
     face: str | Path | Face | FilmedFace = "portrait",
     film: FilmOptions = FILM,
     staging: Staging | None = None,
+    delivery: Delivery | None = None,
     with_sound: bool = False,
 ) -> None:
     """Raise ExportError or InputError if an output cannot be written; called before long work begins.
 
-    outputs, speech, rate_hz, fps, face, film, staging : as of ``write``
+    outputs, speech, rate_hz, fps, face, film, staging, delivery : as of ``write``
     with_sound : the speech is, or will be, a sound that is in no file
     """
     for hertz in (fps, rate_hz):
@@ -196,6 +209,7 @@ def check_outputs(
     check_film(shown_face, film, speech)
     check_staging(shown_face, staging or Staging())
     suffixes = (*motion_suffixes(), *VIDEO_SUFFIXES, TEXTGRID_SUFFIX, *(SOUND_CODECS if with_sound else ()))
+    check_delivery(delivery or Delivery(), map(Path, outputs), shown_face)
     check_distinct([Path(path) for path in outputs])
     for path in map(Path, outputs):
         if not (motion_suffix(path) or path.suffix.lower() in map(str.lower, suffixes) or shows_face(path)):
@@ -206,6 +220,15 @@ def check_outputs(
             raise ExportError(f"{path}: filmed faces are written as {OPAQUE_SUFFIX}; name the output so")
         if shows_face(path) and speech is None and not with_sound:
             raise ExportError(f"{path}: a video needs the recording: write(..., speech=FILE)")
+
+
+def check_drawable(path: Path, motion: Motion) -> None:
+    """Raise ExportError if motion has no channel from which a face can be drawn."""
+    if "opening" not in motion.names and not is_of_blendshapes(motion):
+        raise ExportError(
+            f"{path}: the motion has no channel 'opening' to draw a face from, nor the blendshape 'jawOpen'; write "
+            "motion files"
+        )
 
 
 def opened_face(face: str | Path | Face | FilmedFace) -> Face | FilmedFace:
@@ -221,6 +244,30 @@ def opened_face(face: str | Path | Face | FilmedFace) -> Face | FilmedFace:
     if str(face) not in FACES.names and beside.is_file():
         raise InputError(f"no drawn face {str(face)!r}; for the filmed face give its file: {beside}")
     return face_named(str(face))
+
+
+def _motion_files(
+    paths: Sequence[Path],
+    generation: Generation,
+    channels: Sequence[str] | None,
+    curves: str | Path | DrivenCharacter | None,
+    rate_hz: float | None,
+    delivery: Delivery,
+) -> dict[Path, Generation]:
+    """Return what each motion file holds."""
+    if {*(channels or ())} & {*GESTURES}:
+        generation = with_articulation(generation, channels or ())
+    spoken = delivered(generation, delivery)
+    closed_s = closed_times(spoken) if delivery.hold_ms else []
+    if closed_s and rate_hz is not None:
+        spoken = closed_on_grid(spoken, rate_hz)
+    if curves is not None and paths:
+        spoken, names = with_curves(spoken, curves)
+        channels = names if channels is None else channels
+    chosen = spoken.selected(channels) if channels is not None else spoken
+    chosen = chosen if rate_hz is None else chosen.resampled(rate_hz)
+    files = {path: in_format(path, spoken, chosen, rate_hz) for path in paths}
+    return {path: held(each, delivery.hold_frames(each.motion.rate_hz), closed_s) for path, each in files.items()}
 
 
 def _write_motion(generation: Generation, path: Path, speech: str | Path | None, model: Model | None) -> None:

@@ -9,15 +9,18 @@ from pathlib import Path
 import numpy as np
 
 from lipmotion.errors import InputError
+from lipmotion.motion.delivery import Delivery, closed_times, held
+from lipmotion.rig.blendshape_motion import arkit_weights, is_of_blendshapes, with_mouth
 from lipmotion.rig.driven import DrivenCharacter
 from lipmotion.rig.facial_animation import fap_motion
 from lipmotion.rig.gltf_writer import write_glb
 from lipmotion.rig.reference_mouth import arkit_mouth
 from lipmotion.rig.rig_tables import read_rig_table, rig_motion
+from lipmotion.rig.shape_names import ARKIT_MOUTH
 from lipmotion.rig.shape_weights import shape_weights
 from lipmotion.rig.visemes import viseme_motion
 from lipmotion.storage.files import whole_file
-from lipmotion.types import Generation, Motion, Timeline, Unit
+from lipmotion.types import WEIGHT, Channel, Generation, Motion, Timeline, Unit
 
 ARKIT = "arkit"
 SHAPE_SETS = (ARKIT, "visemes", "fap")
@@ -36,13 +39,17 @@ def check_curve_set(curves: str | Path) -> None:
 def curves_of(motion: Motion, units: Timeline[Unit], curves: str | Path | DrivenCharacter) -> Motion:
     """Return motion as curves that drive a character.
 
+    Motion of blendshapes keeps its weights.
     curves : ``arkit``, ``visemes``, ``fap``, a table of a rig's controls (``.csv``), or a character with blendshapes
     Raises InputError: no such set or file, the character has no blendshapes, or the motion has no channel ``opening``.
     """
     if isinstance(curves, DrivenCharacter):
         return curves.weights(motion, units)
     check_curve_set(curves)
-    if curves == "arkit":
+    if curves == ARKIT and is_of_blendshapes(motion):
+        return _given(motion)
+    motion = with_mouth(motion)
+    if curves == ARKIT:
         return shape_weights(motion, units, arkit_mouth())
     if curves == "visemes":
         return viseme_motion(units, len(motion.values), motion.rate_hz)
@@ -54,13 +61,24 @@ def curves_of(motion: Motion, units: Timeline[Unit], curves: str | Path | Driven
     return rig_motion(rows, sources, motion.rate_hz)
 
 
+def _given(motion: Motion) -> Motion:
+    """Return the blendshapes of the mouth that a motion has, by ARKit's names; those that it lacks are 0."""
+    weights, nothing = arkit_weights(motion), np.zeros(len(motion.values))
+    values = np.stack([weights.get(name, nothing) for name in ARKIT_MOUTH], axis=1)
+    return Motion(values, motion.rate_hz, tuple(Channel(name, WEIGHT) for name in ARKIT_MOUTH))
+
+
 def with_curves(generation: Generation, curves: str | Path | DrivenCharacter) -> tuple[Generation, tuple[str, ...]]:
     """Return a generation with the channels of ``curves_of`` after its own, and the names of those channels.
 
-    The variance of these channels is 0. Raises InputError: as ``curves_of``, or a name that the motion has already.
+    Channels that the motion has already are replaced. The variance of all channels of ``curves_of`` is 0.
+    Raises InputError: as ``curves_of``.
     """
+    added = curves_of(generation.motion, generation.units, curves)
+    kept = [name for name in generation.motion.names if name not in added.names]
+    if len(kept) < len(generation.motion.names):
+        generation = generation.selected(kept)
     motion = generation.motion
-    added = curves_of(motion, generation.units, curves)
     both = Motion(
         np.concatenate([motion.values, added.values], axis=1), motion.rate_hz, motion.channels + added.channels
     )
@@ -69,15 +87,26 @@ def with_curves(generation: Generation, curves: str | Path | DrivenCharacter) ->
 
 
 def write_animated(
-    path: Path, generation: Generation, character: DrivenCharacter, rate_hz: float | None = None
+    path: Path,
+    generation: Generation,
+    character: DrivenCharacter,
+    rate_hz: float | None = None,
+    delivery: Delivery | None = None,
 ) -> None:
     """Write a character with the weights of its blendshapes as an animated ``.glb``.
 
-    rate_hz : keys a second; None: those of the motion
+    rate_hz  : keys a second; None: those of the motion
+    delivery : whether its poses are held; the rest of it is in the generation already
     Raises InputError: the character has no blendshapes. Raises ExportError: the file cannot be written.
     """
     weights = character.weights(generation.motion, generation.units)
-    write_glb(path, character.mesh, weights if rate_hz is None else weights.resampled(rate_hz))
+    weights = weights if rate_hz is None else weights.resampled(rate_hz)
+    frames = (delivery or Delivery()).hold_frames(weights.rate_hz)
+    if frames > 1:
+        chosen = generation.resampled(weights.rate_hz)
+        chosen = replace(chosen, motion=weights, spread=np.zeros(weights.values.shape))
+        weights = held(chosen, frames, closed_times(generation)).motion
+    write_glb(path, character.mesh, weights)
 
 
 def write_picture(path: Path, character: DrivenCharacter) -> None:
