@@ -21,7 +21,10 @@ from lipmotion.cli.staging import add_staging_arguments, staging_of
 if TYPE_CHECKING:
     from lipmotion.cli.progress import Report
     from lipmotion.pipeline.model import Model
-    from lipmotion.types import Audio, Generation
+    from lipmotion.types import Audio, Generation, Monitor
+
+RECOGNITION = 0.3
+"""The share of the work that is recognition, where a video is drawn, too."""
 
 
 def add_result_arguments(parser: argparse.ArgumentParser, files: str, *, required: bool = True) -> None:
@@ -62,7 +65,7 @@ def check_results(options: argparse.Namespace, speech: Path | None = None) -> No
 
 
 def write_results(
-    options: argparse.Namespace, result: Generation, speech: Path | Audio, model: Model, report: Report
+    options: argparse.Namespace, result: Generation, speech: Path | Audio, model: Model | None, report: Report
 ) -> None:
     """Write generated motion to the outputs.
 
@@ -70,6 +73,7 @@ def write_results(
     report : receives the progress of videos
     """
     from lipmotion.pipeline.animate import with_articulation, write
+    from lipmotion.types.progress import sub_monitor
 
     delivery = delivery_of(options)
     write(
@@ -85,9 +89,16 @@ def write_results(
         film=film_options(options),
         staging=staging_of(options),
         delivery=delivery,
-        monitor=report.receive,
+        monitor=sub_monitor(report.receive, RECOGNITION, 1.0),
     )
     write_animated_outputs(options, result, delivery)
+
+
+def recognition_of(report: Report) -> Monitor:
+    """Return the monitor of recognition, the first part of the work; the second draws videos."""
+    from lipmotion.types.progress import sub_monitor
+
+    return sub_monitor(report.receive, 0.0, RECOGNITION)
 
 
 def rate_of(options: argparse.Namespace) -> float | None:

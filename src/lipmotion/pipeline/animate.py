@@ -41,12 +41,14 @@ from lipmotion.rig.blendshape_motion import is_of_blendshapes
 from lipmotion.rig.driven import DrivenCharacter
 from lipmotion.speech.audio_files import read_audio
 from lipmotion.storage.files import as_text, check_distinct, check_target
-from lipmotion.types import Audio, Constraints, Generation, Monitor, Motion, TimedTranscript, silent_monitor
+from lipmotion.types import Audio, Constraints, Generation, Monitor, Motion, Progress, TimedTranscript, silent_monitor
 
 SOUND_RATE_HZ = 48_000
 """Sampling rate of the sound track of a drawn video."""
 DRAWN_HZ = 25.0
 """Frame rate of videos of drawn faces."""
+MOVING = 0.9
+"""The share of the work that is recognition, in reports; the rest is the generation of motion."""
 SLOWEST_HZ, FASTEST_HZ = 1.0, 1000.0
 """Smallest and largest frame rate of a file; a mistyped rate must not fill the memory."""
 
@@ -59,6 +61,7 @@ def animate(
     transcript: str | Path | TimedTranscript | None = None,
     constraints: Constraints | None = None,
     workers: int = 1,
+    monitor: Monitor = silent_monitor,
 ) -> Generation:
     """Return lip motion for speech: values of all channels at 100 Hz, variances, phones in time, and states.
 
@@ -68,6 +71,7 @@ def animate(
     constraints : values that the motion must take exactly, in the units of the request's speaker
     workers     : number of processes that recognise the words of a long recording. With more than one, a script must be
                   guarded by ``if __name__ == "__main__":``
+    monitor     : receives reports of the progress
     Raises InputError: the recording, the transcript or a constraint is not usable, or the model knows no such speaker.
     Raises AlignmentError: the transcript cannot be aligned with the recording.
     Source: Hofer, Yamagishi & Shimodaira 2008 (``engines.trajectory``, the engine of the shipped model).
@@ -83,8 +87,10 @@ def animate(
     chosen = model if isinstance(model, Model) else load_model(model)
     request = request_of(speech, transcript)
     person = person_of(chosen, request)
-    understood = understood_speech(chosen, request, map_in_processes(workers))
+    understood = understood_speech(chosen, request, map_in_processes(workers), monitor)
+    monitor(Progress("moving the mouth", 0, 1, MOVING))
     generation = generate_for(person, chosen.engine, chosen.learned, understood.speech, constraints)
+    monitor(Progress("moving the mouth", 1, 1, 1.0))
     return replace(generation, outlook=outlook_of(request, understood))
 
 
