@@ -12,11 +12,12 @@ from lipmotion.errors import ExportError, InputError
 from lipmotion.faces.base import Face, Stageable, Staging
 from lipmotion.faces.filmed.face import FilmedFace
 from lipmotion.motion.delivery import Delivery, closed_on_grid, closed_times, held, intensified, moved_in_time
+from lipmotion.motion.gestures import with_gestures
 from lipmotion.pipeline.characters import with_curves
 from lipmotion.pipeline.drawn_video import is_picture_sequence, shows_face
 from lipmotion.rig.blendshape_motion import is_of_blendshapes, with_mouth
 from lipmotion.rig.driven import DrivenCharacter
-from lipmotion.types import Generation
+from lipmotion.types import Generation, Motion
 
 
 def check_delivery(delivery: Delivery, outputs: Iterable[Path], face: Face | FilmedFace) -> None:
@@ -56,12 +57,11 @@ def shown(
     moved = generation if isinstance(face, Stageable) else _larger(generation, delivery.intensity)
     moved = moved_in_time(moved, delivery)
     if is_of_blendshapes(moved.motion):
-        motion = with_mouth(moved.motion)
-        added = len(motion.channels) - len(moved.motion.channels)
-        moved = replace(moved, motion=motion, spread=np.pad(moved.variance, ((0, 0), (0, added))))
+        moved = _with(moved, with_mouth(moved.motion))
     frames = delivery.hold_frames(fps)
     if not frames:
         return moved
+    moved = _with(moved, with_gestures(moved.motion, moved.units))
     closed_s, moved = closed_times(moved), closed_on_grid(moved, fps)
     if character is not None and character.shapes is not None:
         moved = with_curves(moved, character)[0]
@@ -73,6 +73,13 @@ def staged_intensity(staging: Staging, delivery: Delivery, face: Face | FilmedFa
     if delivery.intensity == 1 or not isinstance(face, Stageable):
         return staging
     return replace(staging, intensity=staging.intensity * delivery.intensity)
+
+
+def _with(generation: Generation, motion: Motion) -> Generation:
+    """Return a generation with more channels after its own, of variance 0."""
+    added = len(motion.channels) - len(generation.motion.channels)
+    variance = np.pad(generation.variance, ((0, 0), (0, added))) if added else generation.spread
+    return replace(generation, motion=motion, spread=variance)
 
 
 def _larger(generation: Generation, intensity: float) -> Generation:
