@@ -45,7 +45,8 @@ class JsonLines(Events):
         self._on_error = False
 
     def start(self, options: Namespace) -> None:  # noqa: D102
-        self._on_error = STANDARD_OUTPUT in (getattr(options, "output", None) or ())
+        outputs = getattr(options, "output", None)
+        self._on_error = isinstance(outputs, list) and STANDARD_OUTPUT in outputs
         self.emit("start")
 
     def emit(self, kind: str, /, **fields: Any) -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from lipmotion.cli.options import add_machine_readable
 from lipmotion.cli.paths import add_input
+from lipmotion.cli.pipes import add_pipe_format, written_pipe
 from lipmotion.cli.results import add_result_arguments, check_results, write_results
 from lipmotion.printable import printable
 
@@ -24,6 +25,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     phones = "phones in time for motion without them: they move tongue and lips where the channels do not"
     add_input(parser, "--units", what="units file", replaceable=True, metavar="FILE", help=phones)
     add_result_arguments(parser, "FILE.mp4 .webm .mov %%05d.png .json .csv .npz .TextGrid, or several")
+    add_pipe_format(parser)
     add_machine_readable(parser)
     parser.set_defaults(run=run)
 
@@ -33,7 +35,10 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.cli.progress import reporting
 
     with reporting(options) as report:
-        _render(options, report)
+        with written_pipe(options) as pipe:
+            _render(options, report)
+        written = [] if pipe else options.output
+        report.finish("\n".join(map(printable, written)), files=written)
 
 
 def _render(options: argparse.Namespace, report: Report) -> None:
@@ -51,7 +56,6 @@ def _render(options: argparse.Namespace, report: Report) -> None:
     else:
         generation = as_long_as(generation, read_audio(options.sound).duration_s)
         write_results(options, generation, options.sound, None, report)
-    report.finish("\n".join(map(printable, options.output)), files=options.output)
 
 
 SILENT_HZ = 16_000
