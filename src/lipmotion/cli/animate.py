@@ -65,6 +65,6 @@ def _animate(load: Callable[[], Model], options: argparse.Namespace, report: Rep
         result, posteriors = animate_with_posteriors(request, model=model)
         write_posteriors(options.posteriors, result, posteriors)
     else:
-        result = animate(request, model=model, workers=worker_count(options), monitor=recognition_of(report))
+        result = animate(request, model=model, workers=worker_count(options), monitor=recognition_of(options, report))
     write_results(options, result, options.speech, model, report)
     return result.outlook.text if result.outlook is not None else ""

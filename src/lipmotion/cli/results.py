@@ -10,8 +10,6 @@ from lipmotion.cli.characters import (
     add_character_arguments,
     chosen_curves,
     open_character,
-    other_outputs,
-    write_animated_outputs,
 )
 from lipmotion.cli.delivery import add_delivery_arguments, delivery_of
 from lipmotion.cli.faces import add_face_arguments, film_options
@@ -61,7 +59,7 @@ def check_results(options: argparse.Namespace, speech: Path | None = None) -> No
     options.face = opened_face(options.face)
     checked = {"rate_hz": options.rate, "fps": options.fps, "face": options.face, "film": film_options(options)}
     checked["delivery"] = delivery_of(options)
-    check_outputs(other_outputs(options), speech, **checked, staging=staging_of(options), with_sound=speech is None)
+    check_outputs(options.output, speech, **checked, staging=staging_of(options), with_sound=speech is None)
 
 
 def write_results(
@@ -78,7 +76,7 @@ def write_results(
     delivery = delivery_of(options)
     write(
         with_articulation(result) if options.articulation else result,
-        other_outputs(options),
+        options.output,
         speech=speech,
         model=model,
         channels=options.channels.split(",") if options.channels is not None else None,
@@ -91,14 +89,15 @@ def write_results(
         delivery=delivery,
         monitor=sub_monitor(report.receive, RECOGNITION, 1.0),
     )
-    write_animated_outputs(options, result, delivery)
 
 
-def recognition_of(report: Report) -> Monitor:
-    """Return the monitor of recognition, the first part of the work; the second draws videos."""
+def recognition_of(options: argparse.Namespace, report: Report) -> Monitor:
+    """Return the monitor of recognition: the whole work, or its first part where a video is drawn, too."""
+    from lipmotion.pipeline.drawn_video import shows_face
     from lipmotion.types.progress import sub_monitor
 
-    return sub_monitor(report.receive, 0.0, RECOGNITION)
+    draws = any(shows_face(Path(output)) for output in options.output)
+    return sub_monitor(report.receive, 0.0, RECOGNITION if draws else 1.0)
 
 
 def rate_of(options: argparse.Namespace) -> float | None:

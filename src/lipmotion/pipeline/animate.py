@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.export.base import check_motion, motion_suffix, motion_suffixes, write_motion
+from lipmotion.export.base import check_motion, motion_format, motion_suffix, motion_suffixes, write_motion
 from lipmotion.export.sound import SOUND_CODECS, write_sound
 from lipmotion.export.textgrid import TEXTGRID_SUFFIX, write_textgrid
 from lipmotion.faces.base import Face, Staging
@@ -18,21 +18,30 @@ from lipmotion.faces.registry import FACES, face_named
 from lipmotion.kernels.threads import one_thread
 from lipmotion.motion.delivery import Delivery, closed_on_grid, closed_times, held, sound_units
 from lipmotion.motion.gestures import GESTURES, with_gestures
-from lipmotion.pipeline.characters import with_curves
-from lipmotion.pipeline.delivered import check_delivery, delivered, shown, staged_intensity
+from lipmotion.pipeline.characters import WHOLE_FACE, with_curves
+from lipmotion.pipeline.delivered import (
+    check_delivery,
+    delivered,
+    delivered_scene,
+    moved_prosody,
+    shown,
+    staged_intensity,
+)
 from lipmotion.pipeline.drawn_video import (
     OPAQUE_SUFFIX,
     VIDEO_SUFFIXES,
     check_background,
     check_staging,
+    prosody_heard,
     shows_face,
     write_drawn_face,
 )
 from lipmotion.pipeline.film.video import FILM, FilmOptions, check_film, film_of, write_film
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.pipeline.motion_files import in_format
+from lipmotion.pipeline.motion_files import in_format, needs_prosody
 from lipmotion.pipeline.outlook import outlook_of
 from lipmotion.pipeline.request import SpeechInput, request_of
+from lipmotion.pipeline.scenes import SCENE_SUFFIXES, is_scene, sound_reference, write_scene
 from lipmotion.pipeline.speakers import generate_for
 from lipmotion.pipeline.transfer import person_of
 from lipmotion.pipeline.understand import understood_speech
@@ -41,7 +50,17 @@ from lipmotion.rig.blendshape_motion import is_of_blendshapes
 from lipmotion.rig.driven import DrivenCharacter
 from lipmotion.speech.audio_files import read_audio
 from lipmotion.storage.files import as_text, check_distinct, check_target
-from lipmotion.types import Audio, Constraints, Generation, Monitor, Motion, Progress, TimedTranscript, silent_monitor
+from lipmotion.types import (
+    Audio,
+    Constraints,
+    Generation,
+    Monitor,
+    Motion,
+    Progress,
+    Prosody,
+    TimedTranscript,
+    silent_monitor,
+)
 
 SOUND_RATE_HZ = 48_000
 """Sampling rate of the sound track of a drawn video."""
@@ -113,17 +132,19 @@ def write(
     """Write generated motion to one or several files, each in the format of its suffix.
 
     generation : from ``animate``
-    outputs  : paths of files: ``.json``, ``.csv``, ``.npz`` (motion), ``.TextGrid`` (phones in time), ``.mp4``,
+    outputs  : paths of files: ``.json``, ``.csv``, ``.npz`` (motion), ``.livelink.csv`` (a take of Live Link Face),
+               ``.glb``, ``.usda`` (a 3D character with its animation), ``.TextGrid`` (phones in time), ``.mp4``,
                ``.webm``, ``.mov`` (a drawn face, with sound), or ``NAME%05d.png`` (its pictures, without sound); where
                ``speech`` is a sound, also ``.wav``, ``.flac``, ``.ogg``
     speech   : the recording that was animated, or the sound, as of ``speak``; a video needs it for its sound
     model    : the model that generated the motion; motion files then name its corpus and licence
     channels : channels of motion files, in this order, also articulatory ones as ``tongue`` (docs/articulation.md);
                None: all of the motion
-    rate_hz  : frames per second of motion files, 1 to 1000; None: the 100 of the model
+    rate_hz  : frames per second of motion files, 1 to 1000; None: the 100 of the model (Live Link Face: 60)
     fps      : frames per second of videos, 1 to 1000; None: 25 for drawn faces, those of the footage for filmed ones
     face     : the face of videos: ``portrait``, ``woman``, ``man``, ``cartoon``, one of an installed package, or a
-               filmed face (a value or a ``.face`` file), which is written as ``.mp4``
+               filmed face (a value or a ``.face`` file), which is written as ``.mp4``. ``.glb`` and ``.usda`` hold the
+               character of a ``MeshFace``, or else the 3D head
     film     : how a filmed face is shown
     staging  : size, background, intensity of a drawn face, and what moves on its own (docs/faces.md); None: the
                defaults
@@ -160,14 +181,18 @@ def write(
         with_sound=sound is not None,
     )
     videos = [path for path in paths if shows_face(path)]
-    if videos and not isinstance(shown_face, FilmedFace):
-        check_drawable(videos[0], generation.motion)
+    drawn = [path for path in paths if is_scene(path) or (shows_face(path) and not isinstance(shown_face, FilmedFace))]
+    if drawn:
+        check_drawable(drawn[0], generation.motion)
     sounds = [path for path in paths if path.suffix.lower() in SOUND_CODECS]
-    written = _motion_files(
-        [path for path in paths if motion_suffix(path)], generation, channels, curves, rate_hz, delivery
-    )
+    scenes = [path for path in paths if is_scene(path)]
+    lives = bool(scenes) or curves == WHOLE_FACE or any(map(needs_prosody, paths))
+    heard = moved_prosody(prosody_heard(speech), delivery) if speech is not None and lives else None
+    written = _motion_files(paths, generation, channels, curves, rate_hz, delivery, staging, heard)
     for path, each in written.items():
         check_motion(path, each.motion)
+    heard_in = next(iter(sounds), None) if recording is None else Path(recording)
+    scene = None
     for path in paths:
         if path in sounds and sound is not None:
             write_sound(path, sound)
@@ -185,10 +210,13 @@ def write(
             else:
                 staged = staged_intensity(staging, delivery, shown_face)
                 write_drawn_face(path, seen, played, hertz, shown_face, staged, monitor)
+        elif path in scenes:
+            scene = scene or delivered_scene(generation, delivery, shown_face, rate_hz, staging=staging, prosody=heard)
+            write_scene(path, scene, sound=heard_in)
         elif path.suffix.lower() == TEXTGRID_SUFFIX.lower():
             write_textgrid(path, sound_units(generation.units, delivery, float(generation.motion.time_s[-1])))
         else:
-            _write_motion(written[path], path, recording, model)
+            _write_motion(written[path], path, recording or heard_in, model)
 
 
 def check_outputs(
@@ -214,8 +242,14 @@ def check_outputs(
     shown_face = opened_face(face)
     check_film(shown_face, film, speech)
     check_staging(shown_face, staging or Staging())
-    suffixes = (*motion_suffixes(), *VIDEO_SUFFIXES, TEXTGRID_SUFFIX, *(SOUND_CODECS if with_sound else ()))
     check_delivery(delivery or Delivery(), map(Path, outputs), shown_face)
+    suffixes = (
+        *motion_suffixes(),
+        *VIDEO_SUFFIXES,
+        *SCENE_SUFFIXES,
+        TEXTGRID_SUFFIX,
+        *(SOUND_CODECS if with_sound else ()),
+    )
     check_distinct([Path(path) for path in outputs])
     for path in map(Path, outputs):
         if not (motion_suffix(path) or path.suffix.lower() in map(str.lower, suffixes) or shows_face(path)):
@@ -259,27 +293,32 @@ def _motion_files(
     curves: str | Path | DrivenCharacter | None,
     rate_hz: float | None,
     delivery: Delivery,
+    staging: Staging,
+    prosody: Prosody | None,
 ) -> dict[Path, Generation]:
-    """Return what each motion file holds."""
+    """Return what each motion file among some outputs holds."""
+    files = [path for path in paths if motion_suffix(path)]
     if {*(channels or ())} & {*GESTURES}:
         generation = with_articulation(generation, channels or ())
     spoken = delivered(generation, delivery)
     closed_s = closed_times(spoken) if delivery.hold_ms else []
     if closed_s and rate_hz is not None:
         spoken = closed_on_grid(spoken, rate_hz)
-    if curves is not None and paths:
-        spoken, names = with_curves(spoken, curves)
+    if curves is not None and files:
+        spoken, names = with_curves(spoken, curves, staging=staging, prosody=prosody)
         channels = names if channels is None else channels
     chosen = spoken.selected(channels) if channels is not None else spoken
     chosen = chosen if rate_hz is None else chosen.resampled(rate_hz)
-    files = {path: in_format(path, spoken, chosen, rate_hz) for path in paths}
-    return {path: held(each, delivery.hold_frames(each.motion.rate_hz), closed_s) for path, each in files.items()}
+    written = {path: in_format(path, spoken, chosen, rate_hz, staging, prosody) for path in files}
+    return {path: held(each, delivery.hold_frames(each.motion.rate_hz), closed_s) for path, each in written.items()}
 
 
 def _write_motion(generation: Generation, path: Path, speech: str | Path | None, model: Model | None) -> None:
     about = model.about if model else {}
     named = {key: _text(about[key]) for key in ("name", "corpus", "licence", "attribution") if about.get(key)}
     source = {"file": as_text(Path(speech).name)} if speech else {}
+    if speech and motion_format(path).names_sound:
+        source["path"] = sound_reference(Path(speech), path)
     write_motion(path, generation, source=source, model=named)
 
 

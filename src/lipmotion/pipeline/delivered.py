@@ -15,9 +15,12 @@ from lipmotion.motion.delivery import Delivery, closed_on_grid, closed_times, he
 from lipmotion.motion.gestures import with_gestures
 from lipmotion.pipeline.characters import with_curves
 from lipmotion.pipeline.drawn_video import is_picture_sequence, shows_face
+from lipmotion.pipeline.scenes import scene_of
 from lipmotion.rig.blendshape_motion import is_of_blendshapes, with_mouth
 from lipmotion.rig.driven import DrivenCharacter
-from lipmotion.types import Generation, Motion
+from lipmotion.rig.scene import Scene
+from lipmotion.rig.shape_names import ARKIT_OTHERS, arkit_name
+from lipmotion.types import Generation, Motion, Prosody, StateTrace
 
 
 def check_delivery(delivery: Delivery, outputs: Iterable[Path], face: Face | FilmedFace) -> None:
@@ -66,6 +69,42 @@ def shown(
     if character is not None and character.shapes is not None:
         moved = with_curves(moved, character)[0]
     return held(moved.resampled(fps), frames, closed_s)
+
+
+def delivered_scene(
+    generation: Generation,
+    delivery: Delivery,
+    face: Face | FilmedFace,
+    rate_hz: float | None,
+    *,
+    staging: Staging,
+    prosody: Prosody | None,
+) -> Scene:
+    """Return the scene of a face (``scene_of``) as it is delivered; held poses are those of the mouth."""
+    moved = delivered(generation, delivery)
+    if is_of_blendshapes(moved.motion):
+        moved = _with(moved, with_mouth(moved.motion))
+    scene = scene_of(moved, face, rate_hz, staging=staging, prosody=prosody)
+    weights = scene.weights
+    frames = 0 if weights is None else delivery.hold_frames(weights.rate_hz)
+    if weights is None or frames < 2:
+        return scene
+    mouth = [name for name in weights.names if arkit_name(name) not in ARKIT_OTHERS]
+    states = StateTrace(("",), np.zeros(len(weights.values), np.intp))
+    whole = Generation(weights, np.zeros(weights.values.shape), moved.units, states)
+    steps = held(whole.selected(mouth), frames, closed_times(moved)).motion
+    values = weights.values.astype(np.float64)
+    values[:, [weights.column(name) for name in mouth]] = steps.values
+    return replace(scene, weights=replace(weights, values=values))
+
+
+def moved_prosody(prosody: Prosody, delivery: Delivery) -> Prosody:
+    """Return loudness and pitch on the timeline of files: later by the offset."""
+    frames = round(delivery.offset_ms / 10)
+    if frames <= 0:
+        return Prosody(prosody.level_db[-frames:], prosody.log_f0[-frames:])
+    quiet = np.full(frames, prosody.level_db.min(initial=0.0))
+    return Prosody(np.concatenate([quiet, prosody.level_db]), np.concatenate([quiet * np.nan, prosody.log_f0]))
 
 
 def staged_intensity(staging: Staging, delivery: Delivery, face: Face | FilmedFace) -> Staging:
