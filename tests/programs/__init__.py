@@ -50,8 +50,6 @@ def gltf_report(path: Path) -> Any:
 
 
 def _json_of(command: list[str], environment: dict[str, str]) -> Any:
-    done = subprocess.run(  # noqa: S603
-        command, capture_output=True, text=True, timeout=LONGEST_S, env=environment, check=False
-    )
+    done = subprocess.run(command, capture_output=True, text=True, timeout=LONGEST_S, env=environment, check=False)
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
     return json.loads(done.stdout.strip().splitlines()[-1])

@@ -56,7 +56,10 @@ for each in (first, other, bones):
     each.select_set(True)
 answer: list[str] = []
 if kind == "script":
-    exec(compile(Path(program).read_text(encoding="utf-8"), program, "exec"), {"__name__": "__main__", "__file__": program})  # noqa: S102, E501
+    exec(
+        compile(Path(program).read_text(encoding="utf-8"), program, "exec"),
+        {"__name__": "__main__", "__file__": program},
+    )  # noqa: S102, E501
 else:
     if kind == "legacy":
         bpy.ops.preferences.addon_install(filepath=program)
@@ -66,17 +69,18 @@ else:
     scene.lipmotion.motion, scene.lipmotion.sound = sys.argv[3:5]
     for _ in range(2):  # keying again changes nothing
         answer = list(bpy.ops.lipmotion.key())
-last = math.ceil(max(point.co[0] for point in first.data.shape_keys.animation_data.action.layers[0].strips[0]
-                     .channelbag(first.data.shape_keys.animation_data.action_slot).fcurves[0].keyframe_points))  # fmt: skip
+moving = first.data.shape_keys
+strip = moving.animation_data.action.layers[0].strips[0]
+points = strip.channelbag(moving.animation_data.action_slot).fcurves[0].keyframe_points
+last = math.ceil(max(point.co[0] for point in points))
 frames = []
 for frame in range(1, last + 1):
     scene.frame_set(frame)
-    posed = bones.evaluated_get(bpy.context.evaluated_depsgraph_get())
-    jaw = posed.pose.bones["jaw.master"]
+    jaw = bones.pose.bones["jaw.master"]
     keys = first.data.shape_keys.key_blocks[1:]
     frames.append(
         {"face": [key.value for key in keys], "other": [key.value for key in other.data.shape_keys.key_blocks[1:]],
-         "jaw": math.degrees(jaw.rotation_euler.x), "open": jaw["open"], "lips": posed["lips"]}
+         "jaw": math.degrees(jaw.rotation_euler.x), "open": jaw["open"], "lips": bones["lips"]}
     )  # fmt: skip
 strips = [] if scene.sequence_editor is None else [strip.name for strip in scene.sequence_editor.strips]
 found = {"version": bpy.app.version_string, "fps": scene.render.fps, "answer": answer, "frames": frames}
