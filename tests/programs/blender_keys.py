@@ -59,7 +59,7 @@ if kind == "script":
     exec(
         compile(Path(program).read_text(encoding="utf-8"), program, "exec"),
         {"__name__": "__main__", "__file__": program},
-    )  # noqa: S102, E501
+    )
 else:
     if kind == "legacy":
         bpy.ops.preferences.addon_install(filepath=program)

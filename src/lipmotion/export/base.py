@@ -56,6 +56,10 @@ MOTION_FORMATS: Registry[MotionFormat] = Registry(
         "npz": "lipmotion.export.motion.motion_npz:MOTION_FORMAT",
         "livelink.csv": "lipmotion.export.motion.live_link:MOTION_FORMAT",
         "blender.py": "lipmotion.export.motion.blender_script:MOTION_FORMAT",
+        "c3d": "lipmotion.export.motion.motion_c3d:MOTION_FORMAT",
+        "fap": "lipmotion.export.motion.motion_fap:MOTION_FORMAT",
+        "bvh": "lipmotion.export.motion.motion_bvh:MOTION_FORMAT",
+        "motion3.json": "lipmotion.export.motion.live2d:MOTION_FORMAT",
     },
 )
 """Motion formats by suffix, without the first dot; a suffix may have several parts, as ``livelink.csv``."""

@@ -11,7 +11,7 @@ import numpy as np
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export.base import check_motion, motion_format, motion_suffix, motion_suffixes, write_motion
 from lipmotion.export.sound import SOUND_CODECS, write_sound
-from lipmotion.export.textgrid import TEXTGRID_SUFFIX, write_textgrid
+from lipmotion.export.timed_labels import LABEL_SUFFIXES, holds_labels, write_labels
 from lipmotion.faces.base import Face, Staging
 from lipmotion.faces.filmed.face import SUFFIX, FilmedFace, load_face
 from lipmotion.faces.registry import FACES, face_named
@@ -181,8 +181,8 @@ def write(
         elif path in scenes:
             scene = scene or scene_of(generation, shown_face, rate_hz, staging=staging, prosody=heard)
             write_scene(path, scene, sound=heard_in)
-        elif path.suffix.lower() == TEXTGRID_SUFFIX.lower():
-            write_textgrid(path, generation.units)
+        elif holds_labels(path):
+            write_labels(path, generation.units)
         else:
             _write_motion(written[path], path, recording or heard_in, model)
 
@@ -213,7 +213,7 @@ def check_outputs(
         *motion_suffixes(),
         *VIDEO_SUFFIXES,
         *SCENE_SUFFIXES,
-        TEXTGRID_SUFFIX,
+        *LABEL_SUFFIXES,
         *(SOUND_CODECS if with_sound else ()),
     )
     check_distinct([Path(path) for path in outputs])

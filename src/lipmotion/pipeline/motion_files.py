@@ -12,6 +12,7 @@ from lipmotion.faces.base import Staging
 from lipmotion.pipeline.characters import ARKIT, WHOLE_FACE, beside, curves_of
 from lipmotion.pipeline.living_curves import RADIAN, living_curves
 from lipmotion.rig.driven import at_times
+from lipmotion.rig.facial_animation import FAP
 from lipmotion.rig.point_motion import point_motion
 from lipmotion.rig.rig_tables import CONTROL
 from lipmotion.rig.shape_names import arkit_name
@@ -63,17 +64,27 @@ def needs_prosody(path: Path) -> bool:
 
 
 def _curves(generation: Generation, name: str, staging: Staging | None, prosody: Prosody | None) -> Motion:
-    """Return a set of curves, with the blendshapes that the motion has already."""
+    """Return a set of curves, with those that the motion has already."""
     motion, units = generation.motion, generation.units
-    own = _blendshapes(motion) if name in (ARKIT, WHOLE_FACE) else None
+    own = _held_already(motion, name)
     if own is None:
         return curves_of(motion, units, name, staging=staging, prosody=prosody)
-    if name == ARKIT or OPENING not in motion.names:
+    if name != WHOLE_FACE or OPENING not in motion.names:
         return own
     living = living_curves(motion, units, staging, prosody)
     added = [column for column, name in enumerate(living.names) if name not in own.names]
     channels = tuple(living.channels[column] for column in added)
     return beside(own, Motion(living.values[:, added], motion.rate_hz, channels))
+
+
+def _held_already(motion: Motion, curves: str) -> Motion | None:
+    """Return the channels of a motion that are curves of a set already; None: there are none."""
+    if curves in (ARKIT, WHOLE_FACE):
+        return _blendshapes(motion)
+    columns = [column for column, channel in enumerate(motion.channels) if channel.unit == curves == FAP]
+    if not columns:
+        return None
+    return Motion(motion.values[:, columns], motion.rate_hz, tuple(motion.channels[column] for column in columns))
 
 
 def _blendshapes(motion: Motion) -> Motion | None:
