@@ -46,7 +46,7 @@ def test_a_take_at_30_frames_keeps_its_time(tmp_path: Path) -> None:
 def test_other_files_are_refused(tmp_path: Path, text: str) -> None:
     for name in ("a.csv", "a.json"):
         (tmp_path / name).write_text(text)
-        with pytest.raises(ValueError, match="first column|'format' must be|Expecting value"):
+        with pytest.raises(ValueError, match=r"first column|'format' must be|Expecting value"):
             read_motion(str(tmp_path / name))
 
 

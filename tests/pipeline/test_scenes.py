@@ -111,7 +111,7 @@ def test_closures_between_two_keys_are_kept(generation: Generation, character: S
     assert parted[closed].min() < 0.02
 
 
-def test_a_motion_without_opening_is_refused(generation: Generation) -> None:
+def test_a_motion_without_opening_is_refused() -> None:
     other = Motion(np.zeros((10, 1)), 100.0, (Channel("x_61"),))
     trace = StateTrace(("a",), np.zeros(10, np.intp))
     with pytest.raises(InputError, match="no channel 'opening'"):

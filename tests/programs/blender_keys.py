@@ -56,7 +56,7 @@ for each in (first, other, bones):
     each.select_set(True)
 answer: list[str] = []
 if kind == "script":
-    exec(
+    exec(  # noqa: S102
         compile(Path(program).read_text(encoding="utf-8"), program, "exec"),
         {"__name__": "__main__", "__file__": program},
     )
