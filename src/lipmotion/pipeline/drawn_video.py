@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.faces.base import TRANSPARENT, Face, Staging
+from lipmotion.faces.base import TRANSPARENT, DrawsPlanes, Face, Staging
 from lipmotion.faces.filmed.face import FilmedFace
 from lipmotion.faces.registry import staged_face
 from lipmotion.pipeline.film.video import RENDERING
@@ -60,7 +60,11 @@ def write_drawn_face(
     from lipmotion.export.transparent import write_pictures, write_with_alpha
     from lipmotion.export.video import write_mp4
 
-    drawn = staged_face(face, staging, _prosody(sound)).render(generation.motion, generation.units, fps=fps)
+    staged, drawn = staged_face(face, staging, _prosody(sound)), None
+    if path.suffix.lower() == OPAQUE_SUFFIX and isinstance(staged, DrawsPlanes):
+        drawn = staged.render_planes(generation.motion, generation.units, fps=fps)
+    if drawn is None:
+        drawn = staged.render(generation.motion, generation.units, fps=fps)
     frames = with_reports(drawn, int(generation.motion.time_s[-1] * fps + 1e-9) + 1, RENDERING, monitor)
     if is_picture_sequence(path):
         write_pictures(path, frames)
