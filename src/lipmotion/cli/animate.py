@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 from lipmotion.cli.options import add_execution, worker_count
 from lipmotion.cli.output import print_note
 from lipmotion.cli.paths import add_output
-from lipmotion.cli.results import add_result_arguments, check_results, write_results
+from lipmotion.cli.results import add_result_arguments, check_results, load_what_draws, write_results
 from lipmotion.cli.speech import add_speech_arguments, request_and_model
 from lipmotion.printable import printable
 
@@ -55,7 +56,8 @@ def _animate(options: argparse.Namespace, report: Report) -> Outlook | None:
         result, posteriors = animate_with_posteriors(request, model=model)
         write_posteriors(options.posteriors, result, posteriors)
     else:
-        result = animate(request, model=model, workers=worker_count(options))
+        load = partial(load_what_draws, options)
+        result = animate(request, model=model, workers=worker_count(options), meanwhile=load)
     write_results(options, result, options.speech, model, report)
     written = [str(path) for path in (*options.output, options.posteriors) if path]
     report.finish("\n".join(map(printable, written)), files=written)

@@ -142,7 +142,7 @@ def _picture(frame: Frame, n: int, rate: Fraction, converter: Any) -> Any:
     from av import VideoFrame
 
     if frame.ndim == 2:
-        picture = VideoFrame.from_ndarray(np.ascontiguousarray(frame), format="yuv420p")
+        picture = VideoFrame.from_numpy_buffer(np.ascontiguousarray(frame), format="yuv420p")
         picture.colorspace, picture.color_range = _BT601, _LIMITED
     else:
         picture = VideoFrame.from_ndarray(np.ascontiguousarray(frame), format="rgb24")

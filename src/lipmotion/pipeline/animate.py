@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -54,6 +54,7 @@ def animate(
     transcript: str | Path | TimedTranscript | None = None,
     constraints: Constraints | None = None,
     workers: int = 1,
+    meanwhile: Callable[[], None] | None = None,
 ) -> Generation:
     """Return lip motion for speech: values of all channels at 100 Hz, variances, phones in time, and states.
 
@@ -63,6 +64,7 @@ def animate(
     constraints : values that the motion must take exactly, in the units of the request's speaker
     workers     : number of processes that recognise the words of a long recording. With more than one, a script must be
                   guarded by ``if __name__ == "__main__":``
+    meanwhile   : is called while these processes work, where there are several: to prepare what is done next
     Raises InputError: the recording, the transcript or a constraint is not usable, or the model knows no such speaker.
     Raises AlignmentError: the transcript cannot be aligned with the recording.
     Source: Hofer, Yamagishi & Shimodaira 2008 (``engines.trajectory``, the engine of the shipped model).
@@ -78,7 +80,7 @@ def animate(
     chosen = model if isinstance(model, Model) else load_model(model)
     request = request_of(speech, transcript)
     person = person_of(chosen, request)
-    understood = understood_speech(chosen, request, map_in_processes(workers))
+    understood = understood_speech(chosen, request, map_in_processes(workers, meanwhile))
     generation = generate_for(person, chosen.engine, chosen.learned, understood.speech, constraints)
     return replace(generation, outlook=outlook_of(request, understood))
 

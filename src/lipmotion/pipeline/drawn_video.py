@@ -9,13 +9,15 @@ from pathlib import Path
 import numpy as np
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.faces.base import TRANSPARENT, DrawsPlanes, Face, Staging
+from lipmotion.faces.base import SMALLEST, TRANSPARENT, DrawsPlanes, Face, Staging
 from lipmotion.faces.filmed.face import FilmedFace
 from lipmotion.faces.registry import staged_face
+from lipmotion.kernels.choice import numba_works
 from lipmotion.pipeline.film.video import RENDERING
 from lipmotion.speech.audio_files import SPEECH_RATE_HZ
+from lipmotion.speech.decimation import decimated
 from lipmotion.speech.prosody import prosody_of
-from lipmotion.types import Audio, Generation, Monitor, Prosody
+from lipmotion.types import Audio, Channel, Generation, Monitor, Motion, Prosody, Timeline
 from lipmotion.types.progress import with_reports
 
 OPAQUE_SUFFIX = ".mp4"
@@ -74,11 +76,22 @@ def write_drawn_face(
         write_with_alpha(path, frames, fps=fps, audio=sound)
 
 
-def _prosody(sound: Audio) -> Prosody:
-    from scipy.signal import resample_poly
+def load_drawing(face: Face) -> None:
+    """Load what draws a face for videos (compiled kernels), so that drawing it begins sooner."""
+    if isinstance(face, DrawsPlanes) and numba_works():
+        closed = Motion(np.zeros((1, 1)), 1.0, (Channel("opening"),))
+        smallest = staged_face(face, Staging(size=SMALLEST))
+        if isinstance(smallest, DrawsPlanes) and (frames := smallest.render_planes(closed, Timeline(()))) is not None:
+            list(frames)
 
+
+def _prosody(sound: Audio) -> Prosody:
     ratio = Fraction(SPEECH_RATE_HZ, int(sound.rate_hz))
     samples = sound.samples.astype(np.float32)
-    if ratio != 1:
+    if ratio.numerator == 1:
+        samples = decimated(samples, ratio.denominator)
+    else:
+        from scipy.signal import resample_poly
+
         samples = resample_poly(samples, ratio.numerator, ratio.denominator).astype(np.float32)
     return prosody_of(Audio(samples, SPEECH_RATE_HZ))

@@ -7,7 +7,7 @@ video have a quarter of its pixels, and there is nothing to convert: a frame tak
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import fields
 from functools import lru_cache
 from typing import Any
 
@@ -46,9 +46,8 @@ OFFSETS = np.array([16.0, 128.0, 128.0])
 """Source of both: ITU-R BT.601, limited range, as ``export.video`` marks its files."""
 
 
-@dataclass(eq=False)
 class PlanarCanvas:
-    """What one thread draws on.
+    """What one thread draws on; it changes with every picture.
 
     planes : the picture before the head is moved [shape=(3, size, size)]
     packed : the same, packed for its warp
@@ -56,10 +55,11 @@ class PlanarCanvas:
     upper  : what the upper half shows: lids, gaze, brows
     """
 
-    planes: Bytes
-    packed: Packed
-    mouth: Singles
-    upper: tuple[int, ...] = field(default=())
+    def __init__(self, planes: Bytes, mouth: Window) -> None:
+        self.planes, self.packed = planes, np.zeros(planes.shape, np.uint32)
+        self.mouth = np.empty((mouth.y1 - mouth.y0, mouth.x1 - mouth.x0, 4), np.float32)
+        self.upper: tuple[int, ...] = ()
+        _pack(self, Box(0, 0, *planes.shape[1:]))
 
 
 class PlanarRasteriser:
@@ -88,11 +88,7 @@ class PlanarRasteriser:
 
     def canvas(self) -> PlanarCanvas:
         """Return a canvas with the resting face without eyes and mouth."""
-        mouth = self._parts.mouth
-        layer = np.empty((mouth.y1 - mouth.y0, mouth.x1 - mouth.x0, 4), np.float32)
-        canvas = PlanarCanvas(self._still.copy(), np.zeros(self._still.shape, np.uint32), layer)
-        _pack(canvas, Box(0, 0, *self._still.shape[1:]))
-        return canvas
+        return PlanarCanvas(self._still.copy(), self._parts.mouth)
 
     def picture(self, pose: FacePose, canvas: PlanarCanvas) -> Bytes:
         """Return one frame: brightness, and below it the two colours [shape=(size · 3 / 2, size)].
