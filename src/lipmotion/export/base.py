@@ -32,6 +32,9 @@ class MotionFormat:
     curves  : the set of curves that such a file holds, as of ``pipeline.characters.curves_of`` (``arkit``, for
               instance): the pipeline computes them from the motion; empty: the channels of the motion
     rate_hz : frames per second where the user asks for none; None: those of the motion
+    other_curves : whether weights and controls that the user asks for take the place of ``curves``
+    names_sound  : whether the file names the recording: the description of the speech then has ``path``, the path from
+                   the folder of the file
     """
 
     write: Callable[[Path, Generation, About, About], None]
@@ -40,6 +43,8 @@ class MotionFormat:
     units: Callable[[Path], Timeline[Unit] | None] | None = None
     curves: str = ""
     rate_hz: float | None = None
+    other_curves: bool = False
+    names_sound: bool = False
 
 
 MOTION_FORMATS: Registry[MotionFormat] = Registry(
@@ -49,6 +54,12 @@ MOTION_FORMATS: Registry[MotionFormat] = Registry(
         "json": "lipmotion.export.motion.motion_json:MOTION_FORMAT",
         "csv": "lipmotion.export.motion.motion_csv:MOTION_FORMAT",
         "npz": "lipmotion.export.motion.motion_npz:MOTION_FORMAT",
+        "livelink.csv": "lipmotion.export.motion.live_link:MOTION_FORMAT",
+        "blender.py": "lipmotion.export.motion.blender_script:MOTION_FORMAT",
+        "c3d": "lipmotion.export.motion.motion_c3d:MOTION_FORMAT",
+        "fap": "lipmotion.export.motion.motion_fap:MOTION_FORMAT",
+        "bvh": "lipmotion.export.motion.motion_bvh:MOTION_FORMAT",
+        "motion3.json": "lipmotion.export.motion.live2d:MOTION_FORMAT",
     },
 )
 """Motion formats by suffix, without the first dot; a suffix may have several parts, as ``livelink.csv``."""

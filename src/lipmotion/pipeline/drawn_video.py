@@ -14,7 +14,7 @@ from lipmotion.faces.filmed.face import FilmedFace
 from lipmotion.faces.registry import staged_face
 from lipmotion.kernels.choice import numba_works
 from lipmotion.pipeline.film.video import RENDERING
-from lipmotion.speech.audio_files import SPEECH_RATE_HZ
+from lipmotion.speech.audio_files import SPEECH_RATE_HZ, read_audio
 from lipmotion.speech.decimation import decimated
 from lipmotion.speech.prosody import prosody_of
 from lipmotion.types import Audio, Channel, Generation, Monitor, Motion, Prosody, Timeline
@@ -62,7 +62,7 @@ def write_drawn_face(
     from lipmotion.export.transparent import write_pictures, write_with_alpha
     from lipmotion.export.video import write_mp4
 
-    staged, drawn = staged_face(face, staging, _prosody(sound)), None
+    staged, drawn = staged_face(face, staging, prosody_heard(sound)), None
     if path.suffix.lower() == OPAQUE_SUFFIX and isinstance(staged, DrawsPlanes):
         drawn = staged.render_planes(generation.motion, generation.units, fps=fps)
     if drawn is None:
@@ -85,7 +85,12 @@ def load_drawing(face: Face) -> None:
             list(frames)
 
 
-def _prosody(sound: Audio) -> Prosody:
+def prosody_heard(speech: str | Path | Audio) -> Prosody:
+    """Return loudness and pitch of a recording or a sound, for movements of brows and head.
+
+    Raises InputError: the recording cannot be read.
+    """
+    sound = speech if isinstance(speech, Audio) else read_audio(Path(speech), SPEECH_RATE_HZ, warn=False)
     ratio = Fraction(SPEECH_RATE_HZ, int(sound.rate_hz))
     samples = sound.samples.astype(np.float32)
     if ratio.numerator == 1:
