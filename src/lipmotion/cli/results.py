@@ -59,7 +59,7 @@ def load_what_draws(options: argparse.Namespace) -> None:
     from lipmotion.faces.base import Face
     from lipmotion.pipeline.drawn_video import load_drawing, shows_face
 
-    if isinstance(options.face, Face) and any(map(shows_face, map(Path, other_outputs(options)))):
+    if isinstance(options.face, Face) and any(map(shows_face, map(Path, options.output))):
         load_drawing(options.face)
 
 
