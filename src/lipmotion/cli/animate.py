@@ -12,7 +12,13 @@ from lipmotion.cli.options import add_execution, worker_count
 from lipmotion.cli.output import print_note
 from lipmotion.cli.paths import add_output
 from lipmotion.cli.pipes import add_pipe_format, read_pipe, written_pipe
-from lipmotion.cli.results import add_result_arguments, check_results, recognition_of, write_results
+from lipmotion.cli.results import (
+    add_result_arguments,
+    check_results,
+    load_what_draws,
+    recognition_of,
+    write_results,
+)
 from lipmotion.cli.several import add_kinds_argument, animated_one_by_one
 from lipmotion.cli.speech import add_speech_arguments, model_loader, spoken_request
 from lipmotion.printable import printable
@@ -65,6 +71,7 @@ def _animate(load: Callable[[], Model], options: argparse.Namespace, report: Rep
         result, posteriors = animate_with_posteriors(request, model=model)
         write_posteriors(options.posteriors, result, posteriors)
     else:
-        result = animate(request, model=model, workers=worker_count(options), monitor=recognition_of(options, report))
+        shown, load = recognition_of(options, report), partial(load_what_draws, options)
+        result = animate(request, model=model, workers=worker_count(options), monitor=shown, meanwhile=load)
     write_results(options, result, options.speech, model, report)
     return result.outlook.text if result.outlook is not None else ""

@@ -62,6 +62,15 @@ def check_results(options: argparse.Namespace, speech: Path | None = None) -> No
     check_outputs(options.output, speech, **checked, staging=staging_of(options), with_sound=speech is None)
 
 
+def load_what_draws(options: argparse.Namespace) -> None:
+    """Load what draws the outputs, if a drawn face is among them; ``check_results`` has opened it."""
+    from lipmotion.faces.base import Face
+    from lipmotion.pipeline.drawn_video import load_drawing, shows_face
+
+    if isinstance(options.face, Face) and any(map(shows_face, map(Path, options.output))):
+        load_drawing(options.face)
+
+
 def write_results(
     options: argparse.Namespace, result: Generation, speech: Path | Audio, model: Model | None, report: Report
 ) -> None:
