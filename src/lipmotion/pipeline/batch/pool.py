@@ -19,6 +19,7 @@ ItemT = TypeVar("ItemT")
 ResultT = TypeVar("ResultT")
 PARENT_CHECK_S = 0.2
 CONNECT_S = 20
+GRACE_S = 5.0
 AHEAD = 4
 """Items a worker that are sent ahead: with ``Parallel``'s own bundles of short items none waits, and memory is flat."""
 
@@ -45,15 +46,47 @@ def local_pool(jobs: int) -> Iterator[Pool]:
     """
     from joblib.externals.loky import get_reusable_executor
 
-    chosen = {"backend": "loky", "n_jobs": jobs, "initializer": _begin_worker, "initargs": (os.getpid(),)}
     if jobs == 1:
-        chosen = {"backend": "sequential"}
-    try:
         with one_thread():
-            yield _pool(chosen)
+            yield _pool({"backend": "sequential"})
+        return
+    _start_tracker()
+    shown, ended = threading.excepthook, threading.Event()
+    threading.excepthook = _reporter(shown, ended)
+    try:
+        yield _pool({"backend": "loky", "n_jobs": jobs, "initializer": _begin_worker, "initargs": (os.getpid(),)})
     finally:
-        if jobs > 1:
-            get_reusable_executor(max_workers=jobs).shutdown(wait=True, kill_workers=True)
+        get_reusable_executor(max_workers=jobs).shutdown(wait=True, kill_workers=True)
+        ended.set()
+        threading.excepthook = shown
+
+
+def _start_tracker() -> None:
+    """Start loky's process that deletes what killed processes leave, and let it do so without a word."""
+    from joblib.externals.loky.backend.resource_tracker import ensure_running
+
+    before = os.environ.get("PYTHONWARNINGS")
+    os.environ["PYTHONWARNINGS"] = "ignore"
+    try:
+        ensure_running()
+    finally:
+        if before is None:
+            del os.environ["PYTHONWARNINGS"]
+        else:
+            os.environ["PYTHONWARNINGS"] = before
+
+
+def _reporter(shown: Callable[[Any], object], ended: threading.Event) -> Callable[[Any], None]:
+    """Return a hook for errors of threads that reports them by ``shown``, unless the pool ends within ``GRACE_S``.
+
+    A thread of loky's fails when it meets work that was withdrawn, because a signal has come.
+    """
+
+    def report(error: Any) -> None:
+        if not ended.wait(GRACE_S):
+            shown(error)
+
+    return lambda error: threading.Thread(target=report, args=(error,), daemon=True).start()
 
 
 @contextmanager

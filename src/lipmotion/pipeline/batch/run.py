@@ -9,7 +9,7 @@ from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
-from lipmotion.errors import ExportError
+from lipmotion.errors import CorpusError, ExportError
 from lipmotion.pipeline.batch.ledger import FAILED, Place, Record, opened_ledger
 from lipmotion.pipeline.batch.lines import Line, check_names, read_lines
 from lipmotion.pipeline.batch.one_line import LineWork, check_line_settings, finished_line
@@ -20,6 +20,8 @@ from lipmotion.storage.sources import Source, check_apart
 from lipmotion.types import Item, Monitor, Progress, silent_monitor
 
 STAGE = "animating"
+MOST_DEATHS = 3
+"""After so many deaths of workers in a row that no line explains, the batch ends."""
 
 
 @dataclass(frozen=True)
@@ -124,14 +126,22 @@ def _forget(place: Place, record: Record) -> None:
 
 def _finished(each: Pool, waiting: Sequence[LineWork]) -> Iterator[Record]:
     """Yield the record of every line. Where a worker dies, the lines go on that it had; one that kills again fails."""
-    left = {work.line.name: work for work in waiting}
+    left, deaths = {work.line.name: work for work in waiting}, 0
     while left:
         try:
             for record in each(finished_line, list(left.values())):
                 del left[record["name"]]
+                deaths = 0
                 yield record
-        except WorkerDied:
-            for work in [work for work in left.values() if work.place.work(work.line.name).is_dir()]:
+        except WorkerDied as error:
+            deaths += 1
+            suspects = [work for work in left.values() if work.place.work(work.line.name).is_dir()]
+            if not suspects and deaths >= MOST_DEATHS:
+                raise CorpusError(
+                    f"the worker processes die before they begin ({error}); is there enough memory? what is finished "
+                    "is kept: run it again, with fewer --jobs"
+                ) from error
+            for work in suspects:
                 del left[work.line.name]
                 yield _alone(each, work)
 
