@@ -14,15 +14,17 @@ from lipmotion.cli.status import status_lines
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb to the parser of the command line."""
-    parser = verbs.add_parser("cues", help="turn speech into mouth shapes for 2D animation (Rhubarb, Moho, OpenToonz)")
+    parser = verbs.add_parser(
+        "cues", help="turn speech into mouth shapes for 2D animation (Rhubarb, Moho, OpenToonz, Papagayo)"
+    )
     add_speech_arguments(parser)
     add = parser.add_argument
     outputs: dict[str, Any] = {"nargs": "+", "action": "extend", "default": []}
-    add_output(parser, "-o", "--output", force=True, help="FILE.tsv .xml .json .dat, or several", **outputs)
+    add_output(parser, "-o", "--output", force=True, help="FILE.tsv .xml .json .dat .pgo, or several", **outputs)
     add(
         "-f",
         "--format",
-        choices=("tsv", "xml", "json", "dat"),
+        choices=("tsv", "xml", "json", "dat", "pgo"),
         help="(default: that of the suffix; tsv on standard output)",
     )
     add("--fps", type=float, default=24.0, help="frames per second of the animation (default: 24)")

@@ -10,8 +10,6 @@ from lipmotion.cli.characters import (
     add_character_arguments,
     chosen_curves,
     open_character,
-    other_outputs,
-    write_animated_outputs,
 )
 from lipmotion.cli.faces import add_face_arguments, film_options
 from lipmotion.cli.paths import add_output
@@ -53,7 +51,7 @@ def check_results(options: argparse.Namespace, speech: Path | None = None) -> No
     open_character(options)
     options.face = opened_face(options.face)
     checked = {"rate_hz": options.rate, "fps": options.fps, "face": options.face, "film": film_options(options)}
-    check_outputs(other_outputs(options), speech, **checked, staging=staging_of(options), with_sound=speech is None)
+    check_outputs(options.output, speech, **checked, staging=staging_of(options), with_sound=speech is None)
 
 
 def write_results(
@@ -66,10 +64,10 @@ def write_results(
     """
     from lipmotion.pipeline.animate import with_articulation, write
 
-    drawn, channels = chosen_curves(options, result)
+    drawn, channels = chosen_curves(options, result, speech)
     write(
         with_articulation(drawn) if options.articulation else drawn,
-        other_outputs(options),
+        options.output,
         speech=speech,
         model=model,
         channels=channels,
@@ -80,4 +78,3 @@ def write_results(
         staging=staging_of(options),
         monitor=report.receive,
     )
-    write_animated_outputs(options, result)

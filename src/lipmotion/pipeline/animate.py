@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.export.base import check_motion, motion_suffixes, write_motion
+from lipmotion.export.base import check_motion, motion_format, motion_suffix, motion_suffixes, write_motion
 from lipmotion.export.sound import SOUND_CODECS, write_sound
-from lipmotion.export.textgrid import TEXTGRID_SUFFIX, write_textgrid
+from lipmotion.export.timed_labels import LABEL_SUFFIXES, holds_labels, write_labels
 from lipmotion.faces.base import Face, Staging
 from lipmotion.faces.filmed.face import SUFFIX, FilmedFace, load_face
 from lipmotion.faces.registry import FACES, face_named
@@ -22,13 +22,16 @@ from lipmotion.pipeline.drawn_video import (
     VIDEO_SUFFIXES,
     check_background,
     check_staging,
+    prosody_heard,
     shows_face,
     write_drawn_face,
 )
 from lipmotion.pipeline.film.video import FILM, FilmOptions, check_film, film_of, write_film
 from lipmotion.pipeline.model import Model, load_model
+from lipmotion.pipeline.motion_files import in_format, needs_prosody
 from lipmotion.pipeline.outlook import outlook_of
 from lipmotion.pipeline.request import SpeechInput, request_of
+from lipmotion.pipeline.scenes import SCENE_SUFFIXES, is_scene, scene_of, sound_reference, write_scene
 from lipmotion.pipeline.speakers import generate_for
 from lipmotion.pipeline.transfer import person_of
 from lipmotion.pipeline.understand import understood_speech
@@ -99,17 +102,19 @@ def write(
     """Write generated motion to one or several files, each in the format of its suffix.
 
     generation : from ``animate``
-    outputs  : paths of files: ``.json``, ``.csv``, ``.npz`` (motion), ``.TextGrid`` (phones in time), ``.mp4``,
+    outputs  : paths of files: ``.json``, ``.csv``, ``.npz`` (motion), ``.livelink.csv`` (a take of Live Link Face),
+               ``.glb``, ``.usda`` (a 3D character with its animation), ``.TextGrid`` (phones in time), ``.mp4``,
                ``.webm``, ``.mov`` (a drawn face, with sound), or ``NAME%05d.png`` (its pictures, without sound); where
                ``speech`` is a sound, also ``.wav``, ``.flac``, ``.ogg``
     speech   : the recording that was animated, or the sound, as of ``speak``; a video needs it for its sound
     model    : the model that generated the motion; motion files then name its corpus and licence
     channels : channels of motion files, in this order, also articulatory ones as ``tongue`` (docs/articulation.md);
                None: all of the motion
-    rate_hz  : frames per second of motion files, 1 to 1000; None: the 100 of the model
+    rate_hz  : frames per second of motion files, 1 to 1000; None: the 100 of the model (Live Link Face: 60)
     fps      : frames per second of videos, 1 to 1000; None: 25 for drawn faces, those of the footage for filmed ones
     face     : the face of videos: ``portrait``, ``woman``, ``man``, ``cartoon``, one of an installed package, or a
-               filmed face (a value or a ``.face`` file), which is written as ``.mp4``
+               filmed face (a value or a ``.face`` file), which is written as ``.mp4``. ``.glb`` and ``.usda`` hold the
+               character of a ``MeshFace``, or else the 3D head
     film     : how a filmed face is shown
     staging  : size, background, intensity of a drawn face, and what moves on its own (docs/faces.md); None: the
                defaults
@@ -141,17 +146,24 @@ def write(
         with_sound=sound is not None,
     )
     videos = [path for path in paths if shows_face(path)]
-    if videos and not isinstance(shown_face, FilmedFace) and "opening" not in generation.motion.names:
-        raise ExportError(f"{videos[0]}: the motion has no channel 'opening' to draw a face from; write motion files")
+    drawn = [path for path in paths if is_scene(path) or (shows_face(path) and not isinstance(shown_face, FilmedFace))]
+    if drawn and "opening" not in generation.motion.names:
+        raise ExportError(f"{drawn[0]}: the motion has no channel 'opening' to draw a face from; write motion files")
     if {*(channels or ())} & {*GESTURES}:
         generation = with_articulation(generation, channels or ())
-    written = generation.selected(channels) if channels is not None else generation
-    if rate_hz is not None:
-        written = written.resampled(rate_hz)
     sounds = [path for path in paths if path.suffix.lower() in SOUND_CODECS]
-    for path in paths:
-        if path.suffix.lower() in motion_suffixes():
-            check_motion(path, written.motion)
+    chosen = generation.selected(channels) if channels is not None else generation
+    if rate_hz is not None:
+        chosen = chosen.resampled(rate_hz)
+    scenes = [path for path in paths if is_scene(path)]
+    heard = prosody_heard(speech) if speech is not None and (scenes or any(map(needs_prosody, paths))) else None
+    written = {
+        path: in_format(path, generation, chosen, rate_hz, staging, heard) for path in paths if motion_suffix(path)
+    }
+    for path, held in written.items():
+        check_motion(path, held.motion)
+    heard_in = next(iter(sounds), None) if recording is None else Path(recording)
+    scene = None
     for path in paths:
         if path in sounds and sound is not None:
             write_sound(path, sound)
@@ -166,10 +178,13 @@ def write(
             else:
                 hertz = DRAWN_HZ if fps is None else fps
                 write_drawn_face(path, generation, played, hertz, shown_face, staging or Staging(), monitor)
-        elif path.suffix.lower() == TEXTGRID_SUFFIX.lower():
-            write_textgrid(path, generation.units)
+        elif path in scenes:
+            scene = scene or scene_of(generation, shown_face, rate_hz, staging=staging, prosody=heard)
+            write_scene(path, scene, sound=heard_in)
+        elif holds_labels(path):
+            write_labels(path, generation.units)
         else:
-            _write_motion(written, path, recording, model)
+            _write_motion(written[path], path, recording or heard_in, model)
 
 
 def check_outputs(
@@ -194,10 +209,16 @@ def check_outputs(
     shown_face = opened_face(face)
     check_film(shown_face, film, speech)
     check_staging(shown_face, staging or Staging())
-    suffixes = (*motion_suffixes(), *VIDEO_SUFFIXES, TEXTGRID_SUFFIX, *(SOUND_CODECS if with_sound else ()))
+    suffixes = (
+        *motion_suffixes(),
+        *VIDEO_SUFFIXES,
+        *SCENE_SUFFIXES,
+        *LABEL_SUFFIXES,
+        *(SOUND_CODECS if with_sound else ()),
+    )
     check_distinct([Path(path) for path in outputs])
     for path in map(Path, outputs):
-        if path.suffix.lower() not in map(str.lower, suffixes) and not shows_face(path):
+        if not (motion_suffix(path) or path.suffix.lower() in map(str.lower, suffixes) or shows_face(path)):
             raise ExportError(f"{path}: unknown format {path.suffix!r}; required one of: {' '.join(suffixes)} %05d.png")
         check_target(path, speech)
         check_background(path, staging or Staging())
@@ -226,6 +247,8 @@ def _write_motion(generation: Generation, path: Path, speech: str | Path | None,
     about = model.about if model else {}
     named = {key: _text(about[key]) for key in ("name", "corpus", "licence", "attribution") if about.get(key)}
     source = {"file": as_text(Path(speech).name)} if speech else {}
+    if speech and motion_format(path).names_sound:
+        source["path"] = sound_reference(Path(speech), path)
     write_motion(path, generation, source=source, model=named)
 
 

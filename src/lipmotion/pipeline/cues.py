@@ -47,9 +47,9 @@ def write_cues(
     """Write a cue sheet to one or several files, each in the format of its suffix.
 
     sheet   : from ``cues``
-    outputs : paths of files: ``.tsv``, ``.xml``, ``.json`` (formats of Rhubarb) or ``.dat`` (Moho)
+    outputs : paths of files: ``.tsv``, ``.xml``, ``.json`` (formats of Rhubarb), ``.dat`` (Moho) or ``.pgo`` (Papagayo)
     speech  : the recording that was animated; ``.xml`` and ``.json`` files name it
-    form    : ``tsv``, ``xml``, ``json`` or ``dat``: the format of all files; None: that of the suffix
+    form    : ``tsv``, ``xml``, ``json``, ``dat`` or ``pgo``: the format of all files; None: that of the suffix
     Raises ExportError: unknown format, no such folder, or a file that cannot be written.
     Formats and folders are checked before the first file is written.
 
@@ -70,7 +70,7 @@ def write_cues(
 def cue_text(sheet: CueSheet, *, speech: str | Path = "", form: str = "tsv") -> str:
     """Return the text of the file that ``write_cues`` would write.
 
-    speech : the recording that was animated;  form : ``tsv``, ``xml``, ``json`` or ``dat``
+    speech : the recording that was animated;  form : ``tsv``, ``xml``, ``json``, ``dat`` or ``pgo``
     """
     return CUE_FORMATS[form](sheet, as_text(speech))
 

@@ -13,7 +13,7 @@ from lipmotion.faces.base import TRANSPARENT, Face, Staging
 from lipmotion.faces.filmed.face import FilmedFace
 from lipmotion.faces.registry import staged_face
 from lipmotion.pipeline.film.video import RENDERING
-from lipmotion.speech.audio_files import SPEECH_RATE_HZ
+from lipmotion.speech.audio_files import SPEECH_RATE_HZ, read_audio
 from lipmotion.speech.prosody import prosody_of
 from lipmotion.types import Audio, Generation, Monitor, Prosody
 from lipmotion.types.progress import with_reports
@@ -60,7 +60,7 @@ def write_drawn_face(
     from lipmotion.export.transparent import write_pictures, write_with_alpha
     from lipmotion.export.video import write_mp4
 
-    drawn = staged_face(face, staging, _prosody(sound)).render(generation.motion, generation.units, fps=fps)
+    drawn = staged_face(face, staging, prosody_heard(sound)).render(generation.motion, generation.units, fps=fps)
     frames = with_reports(drawn, int(generation.motion.time_s[-1] * fps + 1e-9) + 1, RENDERING, monitor)
     if is_picture_sequence(path):
         write_pictures(path, frames)
@@ -70,9 +70,14 @@ def write_drawn_face(
         write_with_alpha(path, frames, fps=fps, audio=sound)
 
 
-def _prosody(sound: Audio) -> Prosody:
+def prosody_heard(speech: str | Path | Audio) -> Prosody:
+    """Return loudness and pitch of a recording or a sound, for movements of brows and head.
+
+    Raises InputError: the recording cannot be read.
+    """
     from scipy.signal import resample_poly
 
+    sound = speech if isinstance(speech, Audio) else read_audio(Path(speech), SPEECH_RATE_HZ, warn=False)
     ratio = Fraction(SPEECH_RATE_HZ, int(sound.rate_hz))
     samples = sound.samples.astype(np.float32)
     if ratio != 1:

@@ -112,7 +112,12 @@ def _understood(model: Model, request: SpeechRequest, audio: AnalysedAudio, each
 def audio_of(request: SpeechRequest) -> Audio:
     """Return the samples of a request's recording. Raises InputError: it cannot be read."""
     recording = request.recording
-    return recording if isinstance(recording, Audio) else read_audio(Path(recording))
+    if isinstance(recording, Audio):
+        return recording
+    if not isinstance(recording, str | Path):
+        kind = type(recording).__name__
+        raise InputError(f"the recording is a {kind}, required a path, or samples as lipmotion.Audio(samples, rate_hz)")
+    return read_audio(Path(recording))
 
 
 def speech_of(engine: Animator[Any], audio: Audio, features: Features, units: Timeline[Unit]) -> Speech:

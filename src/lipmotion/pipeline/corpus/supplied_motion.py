@@ -12,6 +12,7 @@ from lipmotion.corpora.facegood import read_bare_motion
 from lipmotion.corpora.source_recordings import MotionFile, SourceRecording
 from lipmotion.errors import InputError
 from lipmotion.export.base import read_motion
+from lipmotion.rig.live_link_table import is_live_link_file, speech_curves
 from lipmotion.speech.recogniser import SHORT_PAUSE_S
 from lipmotion.storage.files import sha256_of
 from lipmotion.types import Span, Timeline, Track, Unit
@@ -42,9 +43,12 @@ def supplied_track(curves: MotionFile, duration_s: float) -> Track:
     """Return the motion in a file as a track that is valid in all frames, without mouth pictures.
 
     duration_s : of the sound
+    Of a table of Live Link Face, the curves that speech moves.
     Raises InputError: not a motion file, or of another length than the sound.
     """
     motion = read_bare_motion(curves) if curves.channels else read_motion(curves.file)[0]
+    if is_live_link_file(curves.file):
+        motion = speech_curves(motion)
     length_s = len(motion.values) / motion.rate_hz
     if abs(length_s - duration_s) > max(CURVES_MARGIN_S, CURVES_MARGIN_SHARE * duration_s):
         raise InputError(
