@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 
 import bpy
@@ -29,3 +30,5 @@ for time_s in times_s:
         bone = rigs[0].evaluated_get(depsgraph).pose.bones["head"]
         turns.append(list((bone.matrix @ bone.bone.matrix_local.inverted()).to_quaternion()))
 print(json.dumps({"version": bpy.app.version_string, "fps": fps, "values": values, "turns": turns, "moved": moved}))
+sys.stdout.flush()
+os._exit(0)  # bpy 4.2 may crash when it is unloaded
