@@ -78,6 +78,9 @@ def asked(path: Path, scene: Scene) -> dict[str, object]:
         report = gltf_report(path)
         counts = {name: report[name] for name in ("numErrors", "numWarnings", "numInfos", "numHints")}
         found["gltf-validator"] = {"version": report["version"], **counts}
+        if scene.original is not None:
+            before = gltf_report(scene.original)
+            found["of the original"] = {name: before[name] for name in ("numErrors", "numWarnings")}
     if path.suffix == ".usda" and python_with("pxr"):
         usd = run_with("pxr", "usd_scene.py", path, *(24 * times_s))
         error = largest_error(scene, times_s, usd["values"])
