@@ -8,16 +8,8 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from lipmotion.faces.base import Staging
-from lipmotion.faces.character import staged_pose
-from lipmotion.faces.character.figure import PIVOT, turned
-from lipmotion.faces.character.liveliness import SEED
-from lipmotion.faces.character.performance import head_poses
-from lipmotion.faces.character.shape_fit import mouth_weights
-from lipmotion.faces.character.shapes import head_mesh
-from lipmotion.faces.character.stage import figure
 from lipmotion.faces.mesh import MeshFace
 from lipmotion.pipeline.living_curves import curves_of_poses, living_curves
 from lipmotion.rig.driven import DrivenCharacter, at_times
@@ -95,6 +87,16 @@ def head_scene(
     staging, prosody : as of videos; size and background do not count
     The mesh is in metres. Raises InputError: the motion has no channel ``opening``.
     """
+    from scipy.spatial.transform import Rotation
+
+    from lipmotion.faces.character import staged_pose
+    from lipmotion.faces.character.figure import PIVOT, turned
+    from lipmotion.faces.character.liveliness import SEED
+    from lipmotion.faces.character.performance import head_poses
+    from lipmotion.faces.character.shape_fit import mouth_weights
+    from lipmotion.faces.character.shapes import head_mesh
+    from lipmotion.faces.character.stage import figure
+
     hertz, chosen = rate_hz or generation.motion.rate_hz, staging or Staging()
     drawn = head_poses(
         generation.motion, generation.units, hertz, seed=SEED + chosen.seed, intensity=chosen.intensity, prosody=prosody
