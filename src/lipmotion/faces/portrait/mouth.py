@@ -79,9 +79,13 @@ class MouthPainter:
             on.paint(within.tongue_top, within.tongue_bottom, across, art.tongue, (pose.tongue - 0.6) / 0.4)
         on.paint(top, within.teeth_upper, across, art.upper_teeth, min(2.5 * pose.teeth, 1) * _lit(pose))
         on.paint(top, np.minimum(top + 0.028, bottom), across, art.lip_shadow)
+        if pose.tuck > 0:  # the teeth stand on the lip, and throw a shadow on it
+            edge = within.teeth_upper
+            on.paint(edge, np.where(edge > top, edge + 0.02, edge), across, art.lip_shadow, pose.tuck)
         if line := self._lips.outline:
             part = 0.8 * line * np.minimum((bottom - top) / 0.01, 1)
-            for edge in (top, bottom):
+            out = np.maximum(bottom, within.tongue_bottom) if pose.tongue > 0.6 else bottom
+            for edge in (top, out):
                 on.paint(edge - part / 2, edge + part / 2, across, art.outline)
 
 
