@@ -247,3 +247,12 @@ def test_aa_is_taller_and_narrower_than_the_same_opening_of_another_vowel() -> N
     assert aa.gap > 1.1 * eh.gap
     assert aa.width < eh.width - 0.08
     assert aa.jaw > eh.jaw
+
+
+@pytest.mark.parametrize("phone", ["th", "dh", "w"])
+def test_lips_that_were_tracked_as_closed_part_for_th_and_w_but_not_beside_b(phone: str) -> None:
+    poses = mouth_poses(
+        motion(100.0, opening=np.zeros(101)), said((0.3, 0.4, phone), (0.4, 0.5, "b"), (0.5, 0.6, phone)), 100.0
+    )
+    assert poses[33].gap > 0.03
+    assert [pose.gap for pose in poses[42:48]] == [0] * 6

@@ -70,7 +70,7 @@ def lip_outlines(lips: LipDesign, pose: MouthPose, x: Heights) -> LipOutlines:
     drop = pose.gap - rise
     middle = lips.line_y + pose.tuck * max(TEETH_EDGE - 0.01 - drop, -0.06) - 0.008 * out
     sag = (0.5 - 0.3 * wide) * drop * (1 - pose.tuck) + 0.018 * out - 0.012 * wide * (1 - pose.press)
-    sag += pose.oval * (0.5 * (drop - rise) - sag)
+    sag += pose.oval * (0.5 * (drop - rise) - sag) + 0.014 * pose.tuck
     bend = sag * u * u
     line = middle + (1 - 0.7 * out) * _on("line", u) + lips.smile * u**3 + bend
     inner_share = _inner_share(pose, half_width)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.motion.gestures import GESTURES, OVAL, PURSED, gesture_curves, pause_curve
+from lipmotion.motion.gestures import GESTURES, OVAL, PURSED, TIP_OUT, TIP_UP, gesture_curves, pause_curve
 from lipmotion.motion.rest import against_rest, rest_frames
 from lipmotion.types import Motion, Timeline, Unit
 
@@ -95,14 +95,13 @@ def mouth_poses(motion: Motion, units: Timeline[Unit], fps: float, intensity: fl
     pursed = np.minimum(press / (0.8 * PURSED), 1) * protrusion
     gap += np.maximum(tuck - press, 0) * (np.clip(gap, *TUCKED_GAP) - gap)
     shown = np.maximum(2 * teeth - 1, 0)
-    for weight, least in (
-        (np.maximum(tongue - 0.5, 0) / 0.5, TONGUE_GAP),
-        (shown, TEETH_GAP),
-        (protrusion**2 * (1 - pursed), ROUND_GAP),
-    ):
+    for weight, least in ((shown, TEETH_GAP), (protrusion**2 * (1 - pursed), ROUND_GAP)):
         gap += free * weight * (np.maximum(gap, least) - gap)
     gap += free * (1 - tuck) * (TEETH_FILL * shown + ROUND_FILL * protrusion)
-    gap += pursed * np.clip(gap / PURSED_GAP[0], 0, 1) * (np.clip(gap, *PURSED_GAP) - gap)
+    parted = np.clip((0.75 - press) / 0.15, 0, 1)  # lips of th and w are apart, also where they were tracked as closed
+    gap += pursed * parted * (np.clip(gap, *PURSED_GAP) - gap)
+    between = parted * np.clip((tongue - TIP_UP) / (TIP_OUT - TIP_UP), 0, 1)
+    gap += between * (np.maximum(gap, TONGUE_GAP) - gap)
     oval = _oval(units, time_s) * np.clip((gap - OVAL_GAPS[0]) / (OVAL_GAPS[1] - OVAL_GAPS[0]), 0, 1)
     gap *= 1 + OVAL_TALLER * oval
     gap *= 1 - pause_curve(units, time_s, PAUSE_S, blend_s=0.1, after_s=0.08, before_s=0.2)
