@@ -66,9 +66,9 @@ def lip_outlines(lips: LipDesign, pose: MouthPose, x: Heights) -> LipOutlines:
     u = np.minimum(np.abs(x) / half_width, 1)
     out, wide = pose.protrusion, pose.spread
     rise = float(upper_share(pose.gap))
-    rise += pose.tuck * (1 - out) * max(min(0.65 * pose.gap, 0.06) - rise, 0) + out * (0.45 * pose.gap - rise)
+    rise += pose.tuck * (1 - out) * max(min(0.6 * pose.gap, 0.036) - rise, 0) + out * (0.45 * pose.gap - rise)
     drop = pose.gap - rise
-    middle = lips.line_y + pose.tuck * max(TEETH_EDGE - 0.01 - drop, -0.06) - 0.008 * out
+    middle = lips.line_y + pose.tuck * max(TEETH_EDGE - 0.01 - drop, -0.03) - 0.008 * out
     sag = (0.5 - 0.3 * wide) * drop * (1 - pose.tuck) + 0.018 * out - 0.012 * wide * (1 - pose.press)
     sag += pose.oval * (0.5 * (drop - rise) - sag) + 0.014 * pose.tuck
     bend = sag * u * u
@@ -102,12 +102,12 @@ def mouth_interior(lips: LipDesign, pose: MouthPose, x: Heights, outlines: LipOu
     outlines : of the lips of this pose
     """
     edge = lips.line_y + TEETH_EDGE
-    upper_edge = edge - 0.03 * pose.protrusion - 0.05 * max(0.5 - pose.teeth, 0)
+    upper_edge = edge - 0.03 * pose.protrusion - 0.05 * max(0.5 - pose.teeth, 0) * (1 - far_open(pose))
     upper = upper_edge - 0.35 * x * x
     reveal = min(max(2.5 * pose.teeth - 1.25, 0), 1)
     low_lip = float(outlines.lower_inner.max())
     below_lip = low_lip + 0.012 - 0.1 * pose.gap
-    met = upper_edge + 0.002 + 0.1 * pose.jaw + max(0.94 - pose.teeth, 0) * (0.1 + 8 * max(pose.gap - 0.07, 0))
+    met = upper_edge + 0.002 + 0.1 * pose.jaw + max(0.93 - pose.teeth, 0) * (0.1 + 5 * max(pose.gap - 0.07, 0))
     lower = below_lip + reveal * (min(met, below_lip) - below_lip) + (0.2 - 0.55 * reveal) * x * x
     top, bottom = _tongue(pose, x, edge, low_lip)
     over = max(pose.tongue - 0.6, 0) / 0.4 * 0.03 * _arch(x / min(0.15, 0.9 * outlines.inner_half_width), 0.5)
@@ -119,6 +119,11 @@ def mouth_interior(lips: LipDesign, pose: MouthPose, x: Heights, outlines: LipOu
         np.clip(top, *cut),
         np.clip(np.maximum(top, bottom), cut[0], cut[1] + over),
     )
+
+
+def far_open(pose: MouthPose) -> float:
+    """Return how far a mouth is open so wide that its upper teeth are seen whatever the sound, 0..1."""
+    return min(max((pose.gap - 0.06) / 0.05, 0), 1) * (1 - pose.protrusion)
 
 
 def _on(curve: str, u: Heights) -> Heights:
@@ -143,7 +148,7 @@ def _inner_share(pose: MouthPose, half_width: float) -> float:
     gap, wide = pose.gap, pose.spread
     share = min(0.72 + 0.2 * min(gap / 0.12, 1) + 0.1 * wide * min(gap / 0.05, 1), 0.95) * (1 - 0.26 * pose.tuck)
     hole = min((0.012 + 0.62 * gap) / half_width, share)
-    return share + pose.protrusion * (hole - share)
+    return share + min(pose.protrusion / 0.85, 1) * (hole - share)
 
 
 def _tongue(pose: MouthPose, x: Heights, edge: float, low_lip: float) -> tuple[Heights, Heights]:

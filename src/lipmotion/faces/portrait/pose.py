@@ -31,7 +31,7 @@ ROUNDED, PURSED_MORE, STRETCHED = 0.1, 0.06, 0.04
 """So much narrower are protruded lips, pursed ones beyond that, and so much wider spread ones, than was measured."""
 ROUNDED_UNMEASURED = 0.2
 """``ROUNDED`` for a motion without ``width``."""
-TUCKED_GAP = (0.06, 0.075)
+TUCKED_GAP = (0.052, 0.062)
 """Range of the gap while the lower lip is on the teeth: enough to show them."""
 TONGUE_GAP, TEETH_GAP, ROUND_GAP = 0.085, 0.05, 0.08
 """Least gap while the tongue is between the teeth, while both rows of teeth are shown, and of protruded lips."""
