@@ -117,6 +117,12 @@ class Figure:
         light = self._lighting.light(places, normals, colours, self._kinds, viewer, reaches=arrives, strands=strands)
         return Drawn(places, light)
 
+    def turning(self) -> Real:
+        """Return how far each vertex turns with the head about ``PIVOT``: 0 the body, 1 the head [shape=(V,)]."""
+        share = np.zeros(len(self._places))
+        share[self.head] = 1 - self._held[self.head, 0]
+        return share
+
     def mouth_rows(self) -> dict[str, NDArray[np.intp]]:
         """Return the vertices of the parts of the mouth: lips, wall, tongue, teeth (the lower ones), upper teeth."""
         rows = {

@@ -56,7 +56,7 @@ class Skin:
             "lids": len(grids[1]) + len(grids[2]),
         }
         self._bind(contour)
-        self.rest = self._places(REST)
+        self.rest = self.places(REST)
         meshed = normals_of(self.rest, self.triangles)
         self.normals = meshed.copy()
         self.normals[len(contour) + len(edges) : len(self.face)] = outward(head, fill)
@@ -80,7 +80,7 @@ class Skin:
 
     def posed(self, pose: CharacterPose) -> tuple[Real, Real]:
         """Return places and normals of all vertices [shape=(V, 3), both], the head not turned."""
-        places = self._places(pose)
+        places = self.places(pose)
         change = normals_of(places, self.triangles) - self._meshed_rest
         normals = self.normals + change
         return places, normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
@@ -103,7 +103,8 @@ class Skin:
         shares *= np.exp(-across[self._bound] / 0.5)
         self._shares = shares / shares.sum(axis=1, keepdims=True) * self.lip_weight[self._bound, None]
 
-    def _places(self, pose: CharacterPose) -> Real:
+    def places(self, pose: CharacterPose) -> Real:
+        """Return the places of all vertices [shape=(V, 3)], the head not turned."""
         points = section_points(pose, self.base_z)
         lips = lip_surface(points)
         moved = lips[0] - self._contour
