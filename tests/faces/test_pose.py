@@ -256,3 +256,10 @@ def test_lips_that_were_tracked_as_closed_part_for_th_and_w_but_not_beside_b(pho
     )
     assert poses[33].gap > 0.03
     assert [pose.gap for pose in poses[42:48]] == [0] * 6
+
+
+@pytest.mark.parametrize("phone", ["f", "th", "w"])
+def test_without_intensity_the_lips_stay_closed(phone: str) -> None:
+    opening = np.full(101, 0.1)
+    poses = mouth_poses(motion(100.0, opening=opening), said((0.3, 0.6, phone)), 25.0, intensity=0.0)
+    assert max(pose.gap for pose in poses) < 1e-9

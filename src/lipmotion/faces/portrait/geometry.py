@@ -102,7 +102,7 @@ def mouth_interior(lips: LipDesign, pose: MouthPose, x: Heights, outlines: LipOu
     outlines : of the lips of this pose
     """
     edge = lips.line_y + TEETH_EDGE
-    upper_edge = edge - 0.03 * pose.protrusion - 0.05 * max(0.5 - pose.teeth, 0) * (1 - far_open(pose))
+    upper_edge = edge - 0.05 * pose.protrusion - 0.05 * max(0.5 - pose.teeth, 0) * (1 - far_open(pose))
     upper = upper_edge - 0.35 * x * x
     reveal = min(max(2.5 * pose.teeth - 1.25, 0), 1)
     low_lip = float(outlines.lower_inner.max())
@@ -123,7 +123,7 @@ def mouth_interior(lips: LipDesign, pose: MouthPose, x: Heights, outlines: LipOu
 
 def far_open(pose: MouthPose) -> float:
     """Return how far a mouth is open so wide that its upper teeth are seen whatever the sound, 0..1."""
-    return min(max((pose.gap - 0.06) / 0.05, 0), 1) * (1 - pose.protrusion)
+    return min(max((pose.gap - 0.06 - 0.05 * pose.protrusion) / 0.05, 0), 1)
 
 
 def _on(curve: str, u: Heights) -> Heights:

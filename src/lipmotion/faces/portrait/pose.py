@@ -93,12 +93,13 @@ def mouth_poses(motion: Motion, units: Timeline[Unit], fps: float, intensity: fl
     gap = _gap(motion, time_s, fps, intensity)
     free = (1 - press) * np.clip(gap / 0.05, 0, 1)
     pursed = np.minimum(press / (0.8 * PURSED), 1) * protrusion
-    gap += np.maximum(tuck - press, 0) * (np.clip(gap, *TUCKED_GAP) - gap)
+    gap += min(intensity, 1) * np.maximum(tuck - press, 0) * (np.clip(gap, *TUCKED_GAP) - gap)
     shown = np.maximum(2 * teeth - 1, 0)
     for weight, least in ((shown, TEETH_GAP), (protrusion**2 * (1 - pursed), ROUND_GAP)):
         gap += free * weight * (np.maximum(gap, least) - gap)
     gap += free * (1 - tuck) * (TEETH_FILL * shown + ROUND_FILL * protrusion)
-    parted = np.clip((0.75 - press) / 0.15, 0, 1)  # lips of th and w are apart, also where they were tracked as closed
+    # lips of th and w are apart, also where they were tracked as closed
+    parted = min(intensity, 1) * np.clip((0.75 - press) / 0.15, 0, 1)
     gap += pursed * parted * (np.clip(gap, *PURSED_GAP) - gap)
     between = parted * np.clip((tongue - TIP_UP) / (TIP_OUT - TIP_UP), 0, 1)
     gap += between * (np.maximum(gap, TONGUE_GAP) - gap)
