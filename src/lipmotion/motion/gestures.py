@@ -70,7 +70,7 @@ _TARGETS: dict[str, tuple[GestureTarget, Targets]] = {
     ),
     "lip_tuck": (
         GestureTarget(0, 0, 1.0, 0.022),
-        _steady({"f v": 1.0}, 4.0, 0.026) | _steady({_CLOSED: 0.0}, 8.0, 0.022),
+        _steady({"f v": 1.0}, 4.0, 0.022) | _steady({_CLOSED: 0.0}, 8.0, 0.022),
     ),
     "protrusion": (
         GestureTarget(0, 0, 0.25, 0.03),

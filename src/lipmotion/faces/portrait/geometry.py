@@ -107,7 +107,7 @@ def mouth_interior(lips: LipDesign, pose: MouthPose, x: Heights, outlines: LipOu
     reveal = min(max(2.5 * pose.teeth - 1.25, 0), 1)
     low_lip = float(outlines.lower_inner.max())
     below_lip = low_lip + 0.012 - 0.1 * pose.gap
-    met = upper_edge + 0.002 + 0.1 * pose.jaw + max(0.93 - pose.teeth, 0) * (0.1 + 5 * max(pose.gap - 0.07, 0))
+    met = upper_edge + 0.002 + 0.1 * pose.jaw + max(0.93 - pose.teeth, 0) * (0.1 + 3 * max(pose.gap - 0.07, 0))
     lower = below_lip + reveal * (min(met, below_lip) - below_lip) + (0.2 - 0.55 * reveal) * x * x
     top, bottom = _tongue(pose, x, edge, low_lip)
     over = max(pose.tongue - 0.6, 0) / 0.4 * 0.03 * _arch(x / min(0.15, 0.9 * outlines.inner_half_width), 0.5)

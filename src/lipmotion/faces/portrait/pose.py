@@ -31,15 +31,17 @@ ROUNDED, PURSED_MORE, STRETCHED = 0.1, 0.06, 0.04
 """So much narrower are protruded lips, pursed ones beyond that, and so much wider spread ones, than was measured."""
 ROUNDED_UNMEASURED = 0.2
 """``ROUNDED`` for a motion without ``width``."""
-TUCKED_GAP = (0.052, 0.062)
+TUCKED_GAP = (0.06, 0.07)
 """Range of the gap while the lower lip is on the teeth: enough to show them."""
 TONGUE_GAP, TEETH_GAP, ROUND_GAP = 0.085, 0.05, 0.08
 """Least gap while the tongue is between the teeth, while both rows of teeth are shown, and of protruded lips."""
 PURSED_GAP = (0.045, 0.055)
 """Range of the gap of pursed lips: the hole of w is small, but seen."""
-TEETH_FILL, ROUND_FILL = 0.018, 0.012
+TEETH_FILL, ROUND_FILL = 0.012, 0.012
 """Openings look smaller where teeth fill them, or where they are small holes; they are drawn so much larger."""
-OVAL_NARROWER, OVAL_TALLER = 0.14, 0.2
+FLAT = 0.1
+"""Share by which the slot of spread lips is lower than an opening without phones."""
+OVAL_NARROWER, OVAL_TALLER = 0.14, 0.15
 """Shares of width and gap by which an oval mouth is narrower and taller than was measured."""
 OVAL_GAPS = (0.08, 0.18)
 """Gap at which the opening begins to become an oval, and at which it is one, where the phone asks for it."""
@@ -100,6 +102,7 @@ def mouth_poses(motion: Motion, units: Timeline[Unit], fps: float, intensity: fl
     gap += free * (1 - tuck) * (TEETH_FILL * shown + ROUND_FILL * protrusion)
     # lips of th and w are apart, also where they were tracked as closed
     parted = min(intensity, 1) * np.clip((0.75 - press) / 0.15, 0, 1)
+    gap *= 1 - FLAT * spread * np.clip((gap - 0.08) / 0.05, 0, 1)
     gap += pursed * parted * (np.clip(gap, *PURSED_GAP) - gap)
     between = parted * np.clip((tongue - TIP_UP) / (TIP_OUT - TIP_UP), 0, 1)
     gap += between * (np.maximum(gap, TONGUE_GAP) - gap)
