@@ -38,10 +38,12 @@ class SolverOptions:
 
     costs    : of large and of sudden weights
     gestures : whether phones add what points do not show (pressed lips, a tucked lip, the tongue)
+    intensity : 1: movements as they are; more: larger
     """
 
     costs: CurveCosts = field(default_factory=CurveCosts)
     gestures: bool = True
+    intensity: float = 1.0
 
 
 def shape_weights(
@@ -57,7 +59,7 @@ def shape_weights(
     Raises InputError: as ``point_motion``.
     """
     options = options or SolverOptions()
-    points = point_motion(motion, units)
+    points = point_motion(motion, units).scaled(options.intensity)
     if shapes.style == "visemes":
         weights = _spoken_weights(points, motion, units, shapes, options)
     else:
