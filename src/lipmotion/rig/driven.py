@@ -19,6 +19,7 @@ from lipmotion.rig.jaw_bone import with_jaw
 from lipmotion.rig.lip_placement import LipPlacement, placed_by_points, placed_by_shape, surface_of_named
 from lipmotion.rig.mesh import Mesh
 from lipmotion.rig.point_motion import closed_displacements, point_motion
+from lipmotion.rig.rounding import rounded_displacements, roundness
 from lipmotion.rig.shape_names import ARKIT_OTHERS, by_arkit_name
 from lipmotion.rig.shape_weights import SolverOptions, shape_weights
 from lipmotion.rig.surface import mesh_surface
@@ -80,7 +81,8 @@ class DrivenCharacter:
             for row, other in zip(rows, beside, strict=True):
                 yield self._shaped(row @ self._displacements, other)
         elif self.binding is not None:
-            flat = closed_displacements(points).reshape(len(points.gap), -1)
+            round_lips = rounded_displacements(closed_displacements(points), roundness(units, motion.time_s))
+            flat = round_lips.reshape(len(points.gap), -1)
             for row, other in zip(at_times(flat, points.gap, motion.rate_hz, time_s), beside, strict=True):
                 vertices = self.binding.moved(self.mesh, row.reshape(-1, 3))
                 vertices[self.moving] += (other @ self._others).reshape(-1, 3)
