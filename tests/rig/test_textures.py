@@ -12,12 +12,10 @@ from lipmotion.rig.obj_files import read_obj
 from lipmotion.rig.rasteriser import Camera, flat
 from lipmotion.rig.textured_canvas import TexturedCanvas
 from lipmotion.rig.textures import Texture, read_texture, texture_table
-from rig.gltf import document, glb
+from rig.gltf import UV, glb, textured_document
 
 QUARTERS = np.array([[[255, 0, 0, 255], [0, 255, 0, 255]], [[0, 0, 255, 255], [255, 255, 255, 0]]], np.uint8)
 """Red, green; blue, clear white."""
-UV = np.array([[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]], "<f4")
-"""Of the square of ``rig.gltf``, whose corners are lower left, lower right, upper right, upper left; v goes down."""
 
 
 def encoded(pixels=QUARTERS, form="PNG") -> bytes:
@@ -28,21 +26,9 @@ def encoded(pixels=QUARTERS, form="PNG") -> bytes:
 
 def textured(tmp_path, *, image: bytes | None = None, material=None, extension=None):
     """The square with a picture on it."""
-    content, binary = document()
-    picture = encoded() if image is None else image
-    start = len(binary)
-    content["bufferViews"] += [
-        {"buffer": 0, "byteOffset": start, "byteLength": UV.nbytes},
-        {"buffer": 0, "byteOffset": start + UV.nbytes, "byteLength": len(picture)},
-    ]
-    content["accessors"].append({"bufferView": 4, "componentType": 5126, "count": 4, "type": "VEC2"})
-    content["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"] = 4
-    content["meshes"][0]["primitives"][0]["material"] = 0
-    place = {"index": 0} | ({"extensions": extension} if extension else {})
-    content["materials"] = [{"pbrMetallicRoughness": {"baseColorTexture": place}} | (material or {})]
-    content["textures"], content["images"] = [{"source": 0}], [{"bufferView": 5, "mimeType": "image/png"}]
+    content, binary = textured_document(encoded() if image is None else image, material, extension)
     path = tmp_path / "head.glb"
-    path.write_bytes(glb(content, binary + UV.tobytes() + picture))
+    path.write_bytes(glb(content, binary))
     return read_gltf(path)
 
 

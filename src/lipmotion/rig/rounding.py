@@ -12,7 +12,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from lipmotion.rig.face_shapes import FaceShapes
 from lipmotion.rig.gestures import phone_weights
-from lipmotion.rig.mouth_template import mouth_template
+from lipmotion.rig.mouth_template import LEFT_CORNER, RIGHT_CORNER, mouth_template
 from lipmotion.types import Timeline, Unit
 
 Array = NDArray[np.float64]
@@ -28,11 +28,15 @@ SMOOTH_S = 0.03
 """Lips round before the vowel that needs it, and stay so behind it: standard deviation of the smoothing, in seconds."""
 PUCKER, FUNNEL = 0.7, 0.3
 """Least weights of ``mouthPucker`` and ``mouthFunnel`` in a phone of roundness 1."""
+ENOUGH = 0.11
+"""Less of both, where the mouth becomes narrower than this by them, in eye distances."""
+LEAST_SHARE = 0.6
+"""But not less than this part."""
 SPREADING = tuple(
     f"{name}{side}" for name in ("mouthSmile", "mouthStretch", "mouthDimple") for side in ("Left", "Right")
 )
 """Shapes that draw the corners apart: they vanish in round phones."""
-NARROWER, FORWARD = 0.22, 0.09
+NARROWER, FORWARD = 0.14, 0.09
 """Control points of lips come towards the middle by this part of their distance, and forward by this, in eye
 distances, in a phone of roundness 1."""
 
@@ -53,10 +57,14 @@ def rounded_weights(weights: Array, shapes: FaceShapes, roundness: Array) -> Arr
     weights : as solved from the points [shape=(T, S)];  roundness : 0 to 1 [shape=(T,)]
     """
     result = weights.copy()
-    for name, most in (("mouthPucker", PUCKER), ("mouthFunnel", FUNNEL)):
-        row = shapes.row(name)
-        if row is not None:
-            result[:, row] = np.maximum(result[:, row], most * roundness)
+    template = mouth_template()
+    right, left = template.row(RIGHT_CORNER), template.row(LEFT_CORNER)
+    wanted = [(shapes.row(name), most) for name, most in (("mouthPucker", PUCKER), ("mouthFunnel", FUNNEL))]
+    present = [(row, most) for row, most in wanted if row is not None]
+    narrower = sum(most * float(shapes.moved[row, right, 0] - shapes.moved[row, left, 0]) for row, most in present)
+    share = float(np.clip(ENOUGH / narrower, LEAST_SHARE, 1.0)) if narrower > 0 else 1.0
+    for row, most in present:
+        result[:, row] = np.maximum(result[:, row], share * most * roundness)
     rows = [row for row in map(shapes.row, SPREADING) if row is not None]
     result[:, rows] *= (1 - roundness)[:, None]
     return result
