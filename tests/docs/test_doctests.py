@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import doctest
 import inspect
-import time
 from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
@@ -14,8 +13,6 @@ import pytest
 import lipmotion
 
 ROOT = Path(__file__).parents[2]
-LONGEST_S = 2.0
-"""Largest processor time of the examples of one docstring."""
 
 
 def homes() -> Iterator[tuple[str, object, str]]:
@@ -41,12 +38,9 @@ EXAMPLES = documented()
 @pytest.mark.parametrize("name", sorted(EXAMPLES))
 def test_the_examples_of_a_docstring_run(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(ROOT)
-    lipmotion.animate("examples/welcome.flac")  # the first use loads and compiles
     reports: list[str] = []
-    start_s = time.process_time()
     result = doctest.DocTestRunner(verbose=False).run(EXAMPLES[name], out=reports.append)
     assert result.failed == 0, "".join(reports)
-    assert time.process_time() - start_s < LONGEST_S
 
 
 def test_every_public_name_has_an_example() -> None:

@@ -72,6 +72,11 @@ def test_a_file_its_name_and_its_samples_are_the_same(toy_model: Model, toy_spee
     assert np.array_equal(first, third)
 
 
+def test_an_array_without_its_rate_is_refused(toy_model: Model) -> None:
+    with pytest.raises(InputError, match="ndarray, required a path, or samples as lipmotion"):
+        animate(np.zeros(16_000, np.float32), model=toy_model)  # type: ignore[arg-type]
+
+
 def test_with_a_transcript_the_words_are_known(move: Animate, toy_sentence: ToySentence, transcript: str) -> None:
     result = move(transcript=transcript)
     assert [(s.label.phone, s.label.word) for s in result.units] == [

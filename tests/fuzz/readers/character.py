@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import tempfile
+import warnings
 from itertools import islice
 from pathlib import Path
 
@@ -51,10 +52,10 @@ def seeds(_: Good) -> list[Files]:
     picture = _picture()
     library = b"newmtl skin\nKd 0.9 0.8 0.7\nmap_Kd skin.png\n"
     mapped = b"mtllib head.mtl\nvt 0 0\nvt 1 0\nvt 1 1\nusemtl skin\n" + files["head.obj"].replace(b"usemtl", b"#")
-    extension = {"KHR_texture_transform": {"offset": [0.5, 0.25], "scale": [2, 2], "rotation": 0.3}}
+    moved = {"KHR_texture_transform": {"offset": [0.5, 0.25], "scale": [2, 2], "rotation": 0.3}}
     clear = {"alphaMode": "BLEND", "doubleSided": True}
     return [
-        {"head.glb": glb(*textured_document(picture, clear, extension))},
+        {"head.glb": glb(*textured_document(picture, clear, moved))},
         {"head.obj": mapped, "head.mtl": library, "skin.png": picture, "points.csv": files["points.csv"]},
         {"head.glb": glb(skinned, joints)},
         {"head.glb": files["head.glb"]},
@@ -84,7 +85,7 @@ def _skinned() -> tuple[dict, bytes]:
         {"name": "JawBone"},
     ]
     content["scenes"], content["skins"] = [{"nodes": [0, 1]}], [{"joints": [1, 2, 3]}]
-    views = [{"buffer": 0, "byteOffset": len(binary), "byteLength": 16}]
+    views: list[dict] = [{"buffer": 0, "byteOffset": len(binary), "byteLength": 16}]
     views.append({"buffer": 0, "byteOffset": len(binary) + 16, "byteLength": 64})
     content["bufferViews"] += views
     content["accessors"] += [
@@ -98,6 +99,7 @@ def _skinned() -> tuple[dict, bytes]:
 
 def read(folder: Path, _: Good) -> None:
     """Read a character and move it; read a table of controls and fill it."""
+    warnings.filterwarnings("ignore", ".*texture of the character.*")  # the surface then has one colour
     found = {path.name: path for path in folder.iterdir()}
     if "rig.csv" in found:
         controls = curves_of(motion(), units(), found["rig.csv"])

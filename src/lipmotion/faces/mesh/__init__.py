@@ -45,6 +45,11 @@ class MeshFace(Face):
         self.staging = staging or Staging()
         self._character, self._prosody, self._size = character, prosody, (width, height)
 
+    @property
+    def character(self) -> DrivenCharacter:
+        """The character that is shown."""
+        return self._character
+
     def staged(self, staging: Staging, prosody: Prosody | None = None) -> MeshFace:
         """Return the same character with other settings.
 
