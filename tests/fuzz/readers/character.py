@@ -55,9 +55,6 @@ def seeds(_: Good) -> list[Files]:
     moved = {"KHR_texture_transform": {"offset": [0.5, 0.25], "scale": [2, 2], "rotation": 0.3}}
     clear = {"alphaMode": "BLEND", "doubleSided": True}
     return [
-        {"head.glb": glb(*textured_document(picture, clear, moved))},
-        {"head.obj": mapped, "head.mtl": library, "skin.png": picture, "points.csv": files["points.csv"]},
-        {"head.glb": glb(skinned, joints)},
         {"head.glb": files["head.glb"]},
         {"head.obj": files["head.obj"], "points.csv": files["points.csv"]},
         {"head.obj": files["head.obj"], "head.binding": files["head.binding"]},
@@ -65,6 +62,9 @@ def seeds(_: Good) -> list[Files]:
         {"head.glb": files["head.glb"], "rig.csv": TABLE.encode()},
         {"head.glb": glb(small | {"bufferViews": squeezed}, b"")},
         {"head.glb": glb(content, binary)},
+        {"head.obj": mapped, "head.mtl": library, "skin.png": picture, "points.csv": files["points.csv"]},
+        {"head.glb": glb(*textured_document(picture, clear, moved))},
+        {"head.glb": glb(skinned, joints)},
     ]
 
 
