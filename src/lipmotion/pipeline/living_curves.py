@@ -32,7 +32,7 @@ def living_curves(
     Raises InputError: the motion has no channel ``opening``.
     """
     from lipmotion.faces.character import staged_pose
-    from lipmotion.faces.character.liveliness import SEED
+    from lipmotion.faces.liveliness import SEED
     from lipmotion.faces.character.performance import head_poses
 
     chosen = staging or Staging()

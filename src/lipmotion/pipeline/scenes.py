@@ -90,8 +90,8 @@ def head_scene(
     from scipy.spatial.transform import Rotation
 
     from lipmotion.faces.character import staged_pose
-    from lipmotion.faces.character.figure import PIVOT, turned
-    from lipmotion.faces.character.liveliness import SEED
+    from lipmotion.faces.character.figure import PIVOT
+    from lipmotion.faces.liveliness import SEED, turned
     from lipmotion.faces.character.performance import head_poses
     from lipmotion.faces.character.shape_fit import mouth_weights
     from lipmotion.faces.character.shapes import head_mesh
