@@ -34,7 +34,23 @@ from lipmotion.cli.paths import check_paths
 from lipmotion.cli.stop import Stopper
 from lipmotion.printable import printable
 
-VERBS = (animate, batch, speak, explain, cues, words, corpus, train, adapt, face, character, evaluate, experiment, info, cite)
+VERBS = (
+    animate,
+    batch,
+    speak,
+    explain,
+    cues,
+    words,
+    corpus,
+    train,
+    adapt,
+    face,
+    character,
+    evaluate,
+    experiment,
+    info,
+    cite,
+)
 EXIT_CODES = """exit codes: 0 done, 1 a bug, 2 wrong command line, 3 unusable input, 4 corpus, 5 alignment,
 6 model file, 7 output, 8 missing package, 130 interrupted, 143 terminated"""
 
