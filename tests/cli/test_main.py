@@ -44,6 +44,20 @@ def test_a_wrong_command_line(run: RunCommand, arguments: list[str]) -> None:
 
 
 @pytest.mark.parametrize(
+    ("misspelt", "hint"),
+    [
+        (["animate", "a.wav", "-o", "a.json", "--fase", "woman"], "--fase woman; did you mean --face?"),
+        (["face", "build", "a.mp4", "-o", "a.face", "--speker=x"], "--speker=x; did you mean --speaker?"),
+        (["info", "--zzz"], "--zzz; see: lipmotion info --help"),
+    ],
+)
+def test_a_misspelt_option(run: RunCommand, misspelt: list[str], hint: str) -> None:
+    done = run(*misspelt)
+    assert done.code == 2
+    assert done.err[-1] == f"lipmotion: error: unrecognized arguments: {hint}"
+
+
+@pytest.mark.parametrize(
     ("error", "code", "line"),
     [
         (LipMotionError("what"), 1, "lipmotion: error: what"),

@@ -95,6 +95,7 @@ def test_a_system_of_the_coupled_engine(run: RunCommand, toy_corpus: Corpus, her
     assert "chain 1: 2vis, 2 units of 3 states" in said
 
 
+@pytest.mark.long
 def test_units_of_a_table_that_is_not_needed_again(run: RunCommand, toy_corpus: Corpus, here: Path) -> None:
     units = unit_set("eVis")
     table = here / "mine.txt"

@@ -40,6 +40,7 @@ from lipmotion.pipeline.model import load_model
 from lipmotion.testing.examples import examples, speech, timeline
 from lipmotion.types import Constraints, Pin, Progress, silent_monitor
 
+pytestmark = pytest.mark.long
 SMALL = ExperimentSettings(recogniser=HmmConfig(mixtures=1, iterations=2))
 CONDITIONS = ["audio only", "with transcript"]
 SPOKEN = speech(timeline(("b", "aa", "t", "iy", "m", "uw", "s", "aa")))

@@ -5,8 +5,14 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.export import motion_suffixes, read_motion, write_motion
+from lipmotion.export import motion_suffix, motion_suffixes, read_motion, readable_suffixes, write_motion
+from lipmotion.export.base import MOTION_FORMATS, MotionFormat
 from lipmotion.types import Channel, Generation, Motion, Timeline
+
+EXACT = (".json", ".csv", ".npz", ".c3d")
+"""Formats that hold any channels."""
+UNITLESS = (".csv", ".c3d")
+"""Formats that hold no phones."""
 
 
 def write(path: Path, generation: Generation) -> Path:
@@ -14,23 +20,23 @@ def write(path: Path, generation: Generation) -> Path:
     return path
 
 
-@pytest.mark.parametrize("suffix", motion_suffixes())
+@pytest.mark.parametrize("suffix", EXACT)
 def test_motion_comes_back(tmp_path, generation, suffix):
     motion, units = read_motion(write(tmp_path / f"a{suffix}", generation))
     assert motion.names == generation.motion.names
     assert motion.rate_hz == 100.0
     assert np.abs(motion.values - generation.motion.values).max() <= 5.1e-6
-    assert len(units) == (0 if suffix == ".csv" else 2)
+    assert len(units) == (0 if suffix in UNITLESS else 2)
 
 
-@pytest.mark.parametrize("suffix", motion_suffixes())
+@pytest.mark.parametrize("suffix", EXACT)
 @pytest.mark.parametrize("rate_hz", [25.0, 29.97, 30.0, 60.0, 100.0])
 def test_the_rate_comes_back(tmp_path, generation, suffix, rate_hz):
     moved = replace(generation, motion=replace(generation.motion, rate_hz=rate_hz))
     assert read_motion(write(tmp_path / f"a{suffix}", moved))[0].rate_hz == rate_hz
 
 
-@pytest.mark.parametrize("suffix", motion_suffixes())
+@pytest.mark.parametrize("suffix", EXACT)
 def test_the_same_motion_gives_the_same_bytes(tmp_path, generation, suffix):
     first, second = (write(tmp_path / f"{name}{suffix}", generation).read_bytes() for name in "ab")
     assert first == second
@@ -38,6 +44,39 @@ def test_the_same_motion_gives_the_same_bytes(tmp_path, generation, suffix):
 
 def test_the_suffix_may_be_in_capitals(tmp_path, generation):
     assert read_motion(write(tmp_path / "A.JSON", generation))[0].names == generation.motion.names
+
+
+@pytest.fixture
+def compound(monkeypatch):
+    """A format with a suffix of two parts, which cannot be read, beside the one of its last part."""
+    monkeypatch.setitem(MOTION_FORMATS.built_in, "take.csv", f"{__name__}:TAKE")
+
+
+def _write_take(path, generation, _source, _model):
+    path.write_text(f"take of {len(generation.motion.values)}\n")
+
+
+TAKE = MotionFormat(_write_take)
+
+
+@pytest.mark.usefixtures("compound")
+@pytest.mark.parametrize(
+    ("name", "suffix"),
+    [("a.take.csv", ".take.csv"), ("a.b.TAKE.Csv", ".take.csv"), ("a.mistake.csv", ".csv"), ("take.csv", ".csv")],
+)
+def test_the_longest_suffix_chooses_the_format(tmp_path, generation, name, suffix):
+    assert motion_suffix(Path(name)) == suffix
+    text = write(tmp_path / name, generation).read_text()
+    assert text.startswith("take of" if suffix == ".take.csv" else "time_s,")
+
+
+@pytest.mark.usefixtures("compound")
+def test_a_format_without_reader_is_not_offered_for_reading(tmp_path, generation):
+    assert ".take.csv" in motion_suffixes()
+    assert ".take.csv" not in readable_suffixes()
+    path = write(tmp_path / "a.take.csv", generation)
+    with pytest.raises(InputError, match=r"cannot read motion from '\.take\.csv'; use one of \.json, \.csv, \.npz"):
+        read_motion(path)
 
 
 @pytest.mark.parametrize(("name", "found"), [("a.fbx", "'.fbx'"), ("a", "without a suffix")])
@@ -49,7 +88,7 @@ def test_an_unknown_suffix_names_the_known_ones(tmp_path, generation, name, foun
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("suffix", motion_suffixes())
+@pytest.mark.parametrize("suffix", EXACT)
 def test_values_that_are_not_finite_are_not_written(tmp_path, generation, suffix):
     broken = Motion(np.array([[0.0], [np.nan]]), 100.0, (Channel("opening"),))
     with pytest.raises(ExportError, match="not finite"):
@@ -57,7 +96,7 @@ def test_values_that_are_not_finite_are_not_written(tmp_path, generation, suffix
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("suffix", motion_suffixes())
+@pytest.mark.parametrize("suffix", EXACT)
 def test_an_old_file_survives_a_failure(tmp_path, generation, suffix, monkeypatch):
     path = write(tmp_path / f"a{suffix}", generation)
     before = path.read_bytes()
@@ -72,7 +111,7 @@ def test_an_old_file_survives_a_failure(tmp_path, generation, suffix, monkeypatc
     assert list(tmp_path.iterdir()) == [path]
 
 
-@pytest.mark.parametrize("suffix", motion_suffixes())
+@pytest.mark.parametrize("suffix", readable_suffixes())
 def test_a_missing_and_a_damaged_file_are_named(tmp_path, suffix):
     path = tmp_path / f"a{suffix}"
     with pytest.raises(InputError, match=rf"a\{suffix}: cannot be read: No such file"):

@@ -2,6 +2,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from lipmotion.corpora.labels import read_labels, read_phones
 from lipmotion.export.textgrid import write_textgrid
 from lipmotion.types import Span, Timeline, Unit
@@ -23,3 +25,18 @@ def test_gaps_become_intervals_without_text(tmp_path: Path) -> None:
     again = read_phones(tmp_path / "a.TextGrid")
     assert [s.label.phone for s in again] == ["sil", "m", "sil", "aa"]
     assert [s.end_s for s in again] == [0.1, 0.2, 0.3, 0.4]
+
+
+def test_others_read_it(tmp_path: Path) -> None:
+    """Oracles: praatio, and Praat itself in parselmouth."""
+    textgrid, parselmouth = pytest.importorskip("praatio.textgrid"), pytest.importorskip("parselmouth")
+    units = Timeline(tuple(Span(a, b, Unit(phone, "", word)) for a, b, phone, word in WORDS))
+    write_textgrid(tmp_path / "a.TextGrid", units)
+    found = textgrid.openTextgrid(str(tmp_path / "a.TextGrid"), includeEmptyIntervals=True, reportingMode="error")
+    assert found.tierNames == ("phones", "words")
+    assert [tuple(entry) for entry in found.getTier("phones").entries] == [row[:3] for row in WORDS]
+    assert [entry.label for entry in found.getTier("words").entries] == ["", "ma", 'a "the"']
+    praat = parselmouth.praat
+    grid = parselmouth.read(str(tmp_path / "a.TextGrid"))
+    assert praat.call(grid, "Get number of intervals", 1) == len(WORDS)
+    assert praat.call(grid, "Get label of interval", 2, 3) == 'a "the"'

@@ -73,7 +73,7 @@ def test_a_file_its_name_and_its_samples_are_the_same(toy_model: Model, toy_spee
 
 
 def test_an_array_without_its_rate_is_refused(toy_model: Model) -> None:
-    with pytest.raises(InputError, match="ndarray, required a path, or samples as lipmotion.Audio"):
+    with pytest.raises(InputError, match="ndarray, required a path, or samples as lipmotion"):
         animate(np.zeros(16_000, np.float32), model=toy_model)  # type: ignore[arg-type]
 
 

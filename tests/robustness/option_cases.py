@@ -113,7 +113,7 @@ def _output(name: str, output: str, *messages: str) -> None:
 
 
 _output("a folder that does not exist", "none/a.json", "the folder none does not exist; create it first")
-_output("an unknown format", "a.gif", "unknown format '.gif'; required one of: .json .csv .npz .mp4")
+_output("an unknown format", "a.gif", "unknown format '.gif'; required one of: .json .csv .npz ")
 _output("no suffix", "a", "unknown format ''; required one of:")
 _output("/dev/full", "/dev/full", "unknown format ''; required one of:")
 _output("a folder where nothing can be written", "/proc/a.json", "/proc/a.json: cannot be written")

@@ -13,9 +13,15 @@ from robustness.case import CASES, Bench, Case
 from robustness.document import DOCUMENT, rendered
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="pipes, devices and names as Linux has them")
+LARGE = ("five million rows", "two million words", "300,000 units", "half a million subtitles")
+"""Cases that take a second and more."""
 
 
-@pytest.mark.parametrize("case", CASES, ids=lambda case: f"{case.group}: {case.name}")
+@pytest.mark.parametrize(
+    "case",
+    [pytest.param(case, marks=[pytest.mark.long] * case.name.endswith(LARGE)) for case in CASES],
+    ids=lambda case: f"{case.group}: {case.name}",
+)
 def test_bad_input(case: Case, bench: Bench, run: RunCommand, here: Path, caplog: pytest.LogCaptureFixture) -> None:
     if case.group == "videos":
         pytest.importorskip("mediapipe")

@@ -93,7 +93,7 @@ def long_audio() -> Audio:
 
 
 @pytest.mark.parametrize("kind", RECOGNISER_KINDS)
-@pytest.mark.parametrize("is_long", [False, True])
+@pytest.mark.parametrize("is_long", [False, pytest.param(True, marks=pytest.mark.long)])
 def test_each_kind_is_computed_once_for_all_that_is_done_with_a_recording(
     sentence: ToySentence, kind: str, is_long: bool, computed: Counter[Any]
 ) -> None:

@@ -140,9 +140,13 @@ def eigenlips_arrays(eigenlips: Eigenlips) -> dict[str, NDArray[Any]]:
     }
 
 
-def eigenlips_from_arrays(arrays: Arrays) -> Eigenlips:
-    """Deserialise eigenlips. Raises ModelFormatError: an array is missing, or they do not fit together."""
-    with format_errors("the eigenlips", "train the model again", verb="are"):
+def eigenlips_from_arrays(arrays: Arrays, remedy: str = "train the model again") -> Eigenlips:
+    """Deserialise eigenlips.
+
+    remedy : what to do about damaged ones, for the message
+    Raises ModelFormatError: an array is missing, or they do not fit together.
+    """
+    with format_errors("the eigenlips", remedy, verb="are"):
         refuse_undeclared(arrays, SIZE, SPACES)
         height, width = checked_arrays(arrays, SIZE)["size"].tolist()
         spaces = checked_arrays(arrays, SPACES, D=height * width)

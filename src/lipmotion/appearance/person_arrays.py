@@ -24,6 +24,8 @@ CRF = 6.0
 """Quality of the pictures: detail is what they are kept for."""
 PARTS = ("mouth", "jaw", "from_motion", "noise")
 """Prefixes of the names of the arrays of parts."""
+REMEDY = "build the face again"
+"""What to do about a damaged file."""
 
 
 def appearance_arrays(appearance: Appearance) -> dict[str, NDArray[Any]]:
@@ -59,9 +61,9 @@ def appearance_from_arrays(arrays: Arrays) -> Appearance:
     """
     inner = {part: arrays_under(arrays, f"{part}/") for part in PARTS}
     own = {name: array for name, array in arrays.items() if name.partition("/")[0] not in PARTS or "/" not in name}
-    with format_errors("the appearance of the person", "build the face again"):
+    with format_errors("the appearance of the person", REMEDY):
         refuse_undeclared(own, APPEARANCE)
-        mouth, jaw = eigenlips_from_arrays(inner["mouth"]), eigenlips_from_arrays(inner["jaw"])
+        mouth, jaw = (eigenlips_from_arrays(inner[part], REMEDY) for part in ("mouth", "jaw"))
         _check_size("mouth", mouth, (MOUTH_HEIGHT, MOUTH_WIDTH))
         _check_size("jaw", jaw, (HEIGHT, WIDTH))
         codes, jaw_codes = len(mouth.channels), len(jaw.channels)

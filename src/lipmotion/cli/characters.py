@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from lipmotion.cli.paths import add_input
 
 if TYPE_CHECKING:
     from lipmotion.rig.driven import DrivenCharacter
-    from lipmotion.types import Generation
-
-ANIMATED = ".glb"
-"""The suffix of a character with its animation."""
 
 
 def add_character_file(parser: argparse.ArgumentParser) -> None:
@@ -31,23 +26,18 @@ def add_character_arguments(parser: argparse.ArgumentParser) -> None:
     shown = "your own character in videos: FILE.glb .gltf .vrm .obj, or a folder of .obj; motion files get its weights"
     add_input(parser, "--character", what="character", metavar="FILE", help=shown)
     add_character_file(parser)
-    curves = "what motion files hold: arkit, visemes, fap, or the controls of a rig (FILE.csv; docs/meshes.md)"
+    curves = "what motion files hold: arkit, face, visemes, fap, or the controls of a rig (FILE.csv; docs/meshes.md)"
     parser.add_argument("--curves", metavar="SET", help=curves)
 
 
 def open_character(options: argparse.Namespace) -> None:
     """Read the character that was asked for, as the face of videos; check what is written of it."""
-    from lipmotion.errors import ExportError, InputError
+    from lipmotion.errors import InputError
     from lipmotion.pipeline.characters import check_curve_set
-    from lipmotion.storage.files import check_target
 
     if options.curves:
         check_curve_set(options.curves)
     options.driven = None
-    for path in animated_outputs(options):
-        if options.character is None:
-            raise ExportError(f"{path}: a {ANIMATED} is a character that moves; name it: --character FILE")
-        check_target(path)
     if options.character is None:
         if options.lip_points or options.binding or options.control_points:
             raise InputError("lip points and bindings belong to a character; name it: --character FILE")
@@ -66,35 +56,10 @@ def driven(options: argparse.Namespace) -> DrivenCharacter:
     return driven_character(options.character, **how)
 
 
-def animated_outputs(options: argparse.Namespace) -> list[Path]:
-    """Return the outputs that are the character with its animation."""
-    return [Path(path) for path in options.output if Path(path).suffix.lower() == ANIMATED]
+def chosen_curves(options: argparse.Namespace) -> str | DrivenCharacter | None:
+    """Return what motion files hold: the set of ``--curves``, else the weights of a character that has blendshapes.
 
-
-def other_outputs(options: argparse.Namespace) -> list[str]:
-    """Return the outputs that are not the character itself."""
-    return [path for path in options.output if Path(path).suffix.lower() != ANIMATED]
-
-
-def chosen_curves(options: argparse.Namespace, result: Generation) -> tuple[Generation, list[str] | None]:
-    """Return a generation with the curves that were asked for, and the channels of motion files (None: all).
-
-    With a character that has blendshapes, their weights; with ``--curves``, that set.
+    None: the channels of the motion.
     """
-    from lipmotion.pipeline.characters import with_curves
-
-    wanted = options.channels.split(",") if options.channels is not None else None
     weighed = options.driven if options.driven is not None and options.driven.shapes is not None else None
-    curves = options.curves or weighed
-    if curves is None:
-        return result, wanted
-    with_all, names = with_curves(result, curves)
-    return with_all, list(names) if wanted is None else wanted
-
-
-def write_animated_outputs(options: argparse.Namespace, result: Generation) -> None:
-    """Write the character with its animation to the outputs that are ``.glb`` files."""
-    from lipmotion.pipeline.characters import write_animated
-
-    for path in animated_outputs(options):
-        write_animated(path, result, options.driven, options.rate)
+    return options.curves or weighed

@@ -9,10 +9,12 @@ import logging
 import sys
 import warnings
 from collections.abc import Sequence
+from difflib import get_close_matches
 from typing import NoReturn
 
 from lipmotion.cli import (
     adapt,
+    addon,
     animate,
     batch,
     character,
@@ -24,6 +26,7 @@ from lipmotion.cli import (
     explain,
     face,
     info,
+    render,
     speak,
     train,
     words,
@@ -35,21 +38,8 @@ from lipmotion.cli.stop import Stopper
 from lipmotion.printable import printable
 
 VERBS = (
-    animate,
-    batch,
-    speak,
-    explain,
-    cues,
-    words,
-    corpus,
-    train,
-    adapt,
-    face,
-    character,
-    evaluate,
-    experiment,
-    info,
-    cite,
+    *(animate, batch, speak, render, explain, cues, words, corpus, train, adapt, face),
+    *(character, addon, evaluate, experiment, info, cite),
 )
 EXIT_CODES = """exit codes: 0 done, 1 a bug, 2 wrong command line, 3 unusable input, 4 corpus, 5 alignment,
 6 model file, 7 output, 8 missing package, 130 interrupted, 143 terminated"""
@@ -66,7 +56,7 @@ def run(arguments: Sequence[str] | None, stopper: Stopper, events: Events) -> No
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # a terminal may not know every letter of a file's name
     try:
-        options = parser().parse_args(arguments, argparse.Namespace(stopper=stopper, events=events))
+        options = _parsed(parser(), arguments, argparse.Namespace(stopper=stopper, events=events))
         events.start(options)
         check_paths(options)
         options.run(options)
@@ -92,6 +82,31 @@ def parser() -> argparse.ArgumentParser:
     for verb in VERBS:
         verb.add(verbs)
     return whole
+
+
+def _parsed(
+    whole: argparse.ArgumentParser, arguments: Sequence[str] | None, options: argparse.Namespace
+) -> argparse.Namespace:
+    """Return the options; of a misspelt one the error names the nearest."""
+    options, unknown = whole.parse_known_args(arguments, options)
+    if unknown:
+        option = next((word for word in unknown if word.startswith("-")), unknown[0]).split("=")[0]
+        near = get_close_matches(option, _option_strings(whole, options.verb), n=1)
+        hint = f"did you mean {near[0]}?" if near else f"see: {whole.prog} {options.verb} --help"
+        whole.error(f"unrecognized arguments: {' '.join(unknown)}; {hint}")
+    return options
+
+
+def _option_strings(parser: argparse.ArgumentParser, verb: str = "") -> list[str]:
+    """Return the long options of a parser and of its verbs; of one verb, if it is named."""
+    found: list[str] = []
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for name, part in action.choices.items():
+                found += _option_strings(part) if verb in {"", name} else []
+        else:
+            found += [option for option in action.option_strings if option.startswith("--")]
+    return found
 
 
 class _Parser(argparse.ArgumentParser):

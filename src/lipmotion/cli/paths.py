@@ -89,7 +89,7 @@ def check_paths(options: argparse.Namespace) -> None:
 
 def _sources(options: argparse.Namespace) -> Iterator[Source]:
     """Yield the inputs of a command."""
-    for argument in options.reads:
+    for argument in getattr(options, "reads", ()):
         given = _paths(getattr(options, argument.name))
         paths = given or ([argument.default_path()] if argument.default_path else [])
         inputs = [path for path in paths if not (argument.is_text and is_folder(path))]

@@ -1,10 +1,14 @@
-"""Reader of folders with videos, or with sounds and motion files; labels beside both where there are any."""
+"""Reader of folders with videos, or with sounds and motion files; labels beside both where there are any.
+
+A video with a table of Live Link Face beside it is not tracked: the table is its motion.
+"""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 from lipmotion.corpora.labels import RecordingLabels, labels_beside
+from lipmotion.corpora.separate_sounds import is_of_recorder
 from lipmotion.corpora.source_recordings import (
     AUDIO_SUFFIXES,
     MotionFile,
@@ -14,12 +18,15 @@ from lipmotion.corpora.source_recordings import (
 )
 from lipmotion.corpora.splits import LISTS, assign_splits
 from lipmotion.errors import InputError
+from lipmotion.rig.live_link_table import is_live_link_file
 
 VIDEOS, SOUNDS, BOTH = "folder of videos", "folder of sounds with motion", "folder of videos, and of sounds with motion"
 VIDEO_KINDS = (VIDEOS, BOTH)
 """Kinds of folders whose videos may be longer than a sentence."""
-MOTION_SUFFIXES = (".csv", ".json", ".npz")
-"""Motion files that ``animate`` writes and ``read_motion`` reads."""
+MOTION_SUFFIXES = (".csv", ".json", ".npz", ".livelink.csv", ".c3d", ".fap")
+"""Motion files that ``read_motion`` reads, and that may lie beside a sound."""
+CAPTURE_SUFFIXES = (".csv", ".livelink.csv")
+"""Tables of Live Link Face, which may also lie beside the video that the app records with them."""
 
 
 def read_folder(directory: Path) -> RecordingFolder:
@@ -46,12 +53,10 @@ def read_folder(directory: Path) -> RecordingFolder:
 
 def _recording(name: str, path: Path, directory: Path, lists: frozenset[Path]) -> SourceRecording:
     labels: RecordingLabels = labels_beside(path, ignored=lists)
-    motion_file = None
-    if _is_sound(path):
-        beside = motion_files(path)
-        if len(beside) > 1:
-            raise InputError(f"{path}: {len(beside)} motion files beside it: {', '.join(map(str, beside))}; keep one")
-        motion_file = MotionFile(beside[0])
+    beside = motion_files(path) if _is_sound(path) else captures(path)
+    if len(beside) > 1:
+        raise InputError(f"{path}: {len(beside)} motion files beside it: {', '.join(map(str, beside))}; keep one")
+    motion_file = MotionFile(beside[0]) if beside else None
     folders = path.relative_to(directory).parts[:-1]
     speaker = folders[0] if folders else ""
     return SourceRecording(name, path, labels.words, speaker=speaker, phones=labels.phones, motion_file=motion_file)
@@ -62,12 +67,18 @@ def motion_files(sound: Path) -> list[Path]:
     return [path for suffix in MOTION_SUFFIXES if (path := sound.with_suffix(suffix)).is_file()]
 
 
+def captures(video: Path) -> list[Path]:
+    """Return the tables of Live Link Face with the name of a video, beside it: its motion need not be tracked."""
+    tables = (video.with_suffix(suffix) for suffix in CAPTURE_SUFFIXES)
+    return [path for path in tables if path.is_file() and is_live_link_file(path)]
+
+
 def _is_sound(path: Path) -> bool:
     return path.suffix.lower() in AUDIO_SUFFIXES
 
 
 def _has_motion(path: Path) -> bool:
-    return _is_sound(path) and path.is_file() and bool(motion_files(path))
+    return _is_sound(path) and not is_of_recorder(path) and path.is_file() and bool(motion_files(path))
 
 
 def _only(paths: list[Path]) -> Path:

@@ -25,16 +25,26 @@ LARGEST_UNITS = 1 << 28
 class MotionFormat:
     """How one kind of motion file is written and read.
 
-    write : writes a generation to a path; the mappings describe the origin of its speech and of its model
-    read  : returns motion and units of a file, or raises InputError; None: the format cannot be read
-    check : raises ExportError for motion that does not fit into such a file
-    units : returns the units of a file that holds units alone, and None of other files; None: there are no such files
+    write   : writes a generation to a path; the mappings describe the origin of its speech and of its model
+    read    : returns motion and units of a file, or raises InputError; None: the format cannot be read
+    check   : raises ExportError for motion that does not fit into such a file
+    units   : returns the units of a file that holds units alone, and None of other files; None: there are no such files
+    curves  : the set of curves that such a file holds, as of ``pipeline.characters.curves_of`` (``arkit``, for
+              instance): the pipeline computes them from the motion; empty: the channels of the motion
+    rate_hz : frames per second where the user asks for none; None: those of the motion
+    other_curves : whether weights and controls that the user asks for take the place of ``curves``
+    names_sound  : whether the file names the recording: the description of the speech then has ``path``, the path from
+                   the folder of the file
     """
 
     write: Callable[[Path, Generation, About, About], None]
     read: Callable[[Path], tuple[Motion, Timeline[Unit]]] | None = None
     check: Callable[[Motion], None] = lambda _: None
     units: Callable[[Path], Timeline[Unit] | None] | None = None
+    curves: str = ""
+    rate_hz: float | None = None
+    other_curves: bool = False
+    names_sound: bool = False
 
 
 MOTION_FORMATS: Registry[MotionFormat] = Registry(
@@ -44,14 +54,49 @@ MOTION_FORMATS: Registry[MotionFormat] = Registry(
         "json": "lipmotion.export.motion.motion_json:MOTION_FORMAT",
         "csv": "lipmotion.export.motion.motion_csv:MOTION_FORMAT",
         "npz": "lipmotion.export.motion.motion_npz:MOTION_FORMAT",
+        "livelink.csv": "lipmotion.export.motion.live_link:MOTION_FORMAT",
+        "blender.py": "lipmotion.export.motion.blender_script:MOTION_FORMAT",
+        "c3d": "lipmotion.export.motion.motion_c3d:MOTION_FORMAT",
+        "fap": "lipmotion.export.motion.motion_fap:MOTION_FORMAT",
+        "bvh": "lipmotion.export.motion.motion_bvh:MOTION_FORMAT",
+        "motion3.json": "lipmotion.export.motion.live2d:MOTION_FORMAT",
     },
 )
-"""Motion formats by suffix, without the dot."""
+"""Motion formats by suffix, without the first dot; a suffix may have several parts, as ``livelink.csv``."""
 
 
 def motion_suffixes() -> tuple[str, ...]:
     """Return the suffixes of all motion formats, with the dot."""
     return tuple(f".{name}" for name in MOTION_FORMATS.names)
+
+
+def readable_suffixes() -> tuple[str, ...]:
+    """Return the suffixes of the motion formats that ``read_motion`` reads, with the dot."""
+    return tuple(suffix for suffix in motion_suffixes() if _can_be_read(suffix))
+
+
+def motion_suffix(path: Path) -> str:
+    """Return the suffix that chooses the motion format of a file, in lower case, with the dot; empty: there is none.
+
+    The longest known suffix counts: ``take.livelink.csv`` has ``.livelink.csv``, ``take.1.csv`` ``.csv``.
+
+    >>> from pathlib import Path
+    >>> motion_suffix(Path("take.1.CSV")), motion_suffix(Path("take.fbx"))
+    ('.csv', '')
+    """
+    known, suffixes = motion_suffixes(), [suffix.lower() for suffix in path.suffixes]
+    endings = ("".join(suffixes[first:]) for first in range(len(suffixes)))
+    return next((ending for ending in endings if ending in known), "")
+
+
+def motion_format(path: Path) -> MotionFormat:
+    """Return the motion format that the suffix of a file chooses. Raises ExportError: the suffix is unknown."""
+    try:
+        return _format_of(path)
+    except InputError as error:
+        raise ExportError(
+            f"{path}: cannot write motion as {_suffix(path)}; use one of {', '.join(motion_suffixes())}"
+        ) from error
 
 
 def write_motion(path: Path, generation: Generation, *, source: dict[str, str], model: dict[str, str]) -> None:
@@ -67,10 +112,7 @@ def write_motion(path: Path, generation: Generation, *, source: dict[str, str], 
 
 def check_motion(path: Path, motion: Motion) -> None:
     """Raise ExportError if motion cannot be written to a file of that name: unknown suffix, or unsuitable motion."""
-    try:
-        chosen = _format_of(path)
-    except InputError as error:
-        raise ExportError(f"{path}: cannot write motion as {_suffix(path)}; use one of {_known()}") from error
+    chosen = motion_format(path)
     if not np.isfinite(motion.values).all():
         raise ExportError(f"{path}: the motion has values that are not finite; interpolate them before writing")
     chosen.check(motion)
@@ -91,11 +133,11 @@ def read_motion(path: str | Path) -> tuple[Motion, Timeline[Unit]]:
     (100.0, 'sil')
     """
     path = Path(path)
-    read = None
-    if path.suffix.lower() in motion_suffixes():
-        read = _format_of(path).read
+    read = _format_of(path).read if motion_suffix(path) else None
     if read is None:
-        raise InputError(f"{path}: cannot read motion from {_suffix(path)}; use one of {_known()}")
+        raise InputError(
+            f"{path}: cannot read motion from {_suffix(path)}; use one of {', '.join(readable_suffixes())}"
+        )
     check_regular(path, "motion file")
     try:
         size = path.stat().st_size
@@ -116,7 +158,7 @@ def read_units(path: Path) -> Timeline[Unit]:
 
     Raises InputError: as ``read_motion``.
     """
-    read = _format_of(path).units if path.suffix.lower() in motion_suffixes() else None
+    read = _format_of(path).units if motion_suffix(path) else None
     if read is not None and path.is_file() and path.stat().st_size <= LARGEST_UNITS:
         try:
             units = read(path)
@@ -131,15 +173,18 @@ def read_units(path: Path) -> Timeline[Unit]:
 
 def _format_of(path: Path) -> MotionFormat:
     """Return the format of a file's suffix. Raises InputError: none, or what a package adds is no format."""
-    chosen = MOTION_FORMATS.load(path.suffix.lower().removeprefix("."))
+    chosen = MOTION_FORMATS.load((motion_suffix(path) or path.suffix.lower()).removeprefix("."))
     if not isinstance(chosen, MotionFormat):
         raise InputError(f"what an installed package adds as {_suffix(path)} is {chosen!r}, required a MotionFormat")
     return chosen
 
 
-def _known() -> str:
-    return ", ".join(motion_suffixes())
+def _can_be_read(suffix: str) -> bool:
+    try:
+        return _format_of(Path(f"a{suffix}")).read is not None
+    except InputError:
+        return False
 
 
 def _suffix(path: Path) -> str:
-    return f"{path.suffix!r}" if path.suffix else "a file without a suffix"
+    return repr(motion_suffix(path) or path.suffix) if path.suffix else "a file without a suffix"

@@ -56,6 +56,11 @@ class MeshFace(Face):
         self._character, self._seed = character, seed
         self._stage = MeshStage(character, width, height)
 
+    @property
+    def character(self) -> DrivenCharacter:
+        """The character that is shown."""
+        return self._character
+
     def render(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> Iterator[NDArray[np.uint8]]:  # noqa: D102
         if not 0 < fps < np.inf:
             raise InputError(f"the frame rate is {fps}, required more than 0")

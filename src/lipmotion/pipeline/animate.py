@@ -2,45 +2,72 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.export.base import check_motion, motion_suffixes, write_motion
+from lipmotion.export.base import check_motion, motion_format, motion_suffix, motion_suffixes, write_motion
 from lipmotion.export.sound import SOUND_CODECS, write_sound
-from lipmotion.export.textgrid import TEXTGRID_SUFFIX, write_textgrid
+from lipmotion.export.timed_labels import LABEL_SUFFIXES, holds_labels, write_labels
 from lipmotion.faces.base import Face, Staging
 from lipmotion.faces.filmed.face import SUFFIX, FilmedFace, load_face
 from lipmotion.faces.registry import FACES, face_named
 from lipmotion.kernels.threads import one_thread
+from lipmotion.motion.delivery import Delivery, closed_on_grid, closed_times, held, sound_units
 from lipmotion.motion.gestures import GESTURES, with_gestures
+from lipmotion.pipeline.characters import WHOLE_FACE, with_curves
+from lipmotion.pipeline.delivered import (
+    check_delivery,
+    delivered,
+    delivered_scene,
+    moved_prosody,
+    shown,
+    staged_intensity,
+)
 from lipmotion.pipeline.drawn_video import (
     OPAQUE_SUFFIX,
     VIDEO_SUFFIXES,
     check_background,
     check_staging,
+    prosody_heard,
     shows_face,
     write_drawn_face,
 )
 from lipmotion.pipeline.film.video import FILM, FilmOptions, check_film, film_of, write_film
 from lipmotion.pipeline.model import Model, load_model
+from lipmotion.pipeline.motion_files import in_format, needs_prosody
 from lipmotion.pipeline.outlook import outlook_of
 from lipmotion.pipeline.request import SpeechInput, request_of
+from lipmotion.pipeline.scenes import SCENE_SUFFIXES, is_scene, sound_reference, write_scene
 from lipmotion.pipeline.speakers import generate_for
 from lipmotion.pipeline.transfer import person_of
 from lipmotion.pipeline.understand import understood_speech
 from lipmotion.pipeline.workers import map_in_processes
+from lipmotion.rig.blendshape_motion import is_of_blendshapes
+from lipmotion.rig.driven import DrivenCharacter
 from lipmotion.speech.audio_files import read_audio
 from lipmotion.storage.files import as_text, check_distinct, check_target
-from lipmotion.types import Audio, Constraints, Generation, Monitor, TimedTranscript, silent_monitor
+from lipmotion.types import (
+    Audio,
+    Constraints,
+    Generation,
+    Monitor,
+    Motion,
+    Progress,
+    Prosody,
+    TimedTranscript,
+    silent_monitor,
+)
 
 SOUND_RATE_HZ = 48_000
 """Sampling rate of the sound track of a drawn video."""
 DRAWN_HZ = 25.0
 """Frame rate of videos of drawn faces."""
+MOVING = 0.9
+"""The share of the work that is recognition, in reports; the rest is the generation of motion."""
 SLOWEST_HZ, FASTEST_HZ = 1.0, 1000.0
 """Smallest and largest frame rate of a file; a mistyped rate must not fill the memory."""
 
@@ -53,6 +80,8 @@ def animate(
     transcript: str | Path | TimedTranscript | None = None,
     constraints: Constraints | None = None,
     workers: int = 1,
+    monitor: Monitor = silent_monitor,
+    meanwhile: Callable[[], None] | None = None,
 ) -> Generation:
     """Return lip motion for speech: values of all channels at 100 Hz, variances, phones in time, and states.
 
@@ -62,6 +91,8 @@ def animate(
     constraints : values that the motion must take exactly, in the units of the request's speaker
     workers     : number of processes that recognise the words of a long recording. With more than one, a script must be
                   guarded by ``if __name__ == "__main__":``
+    monitor     : receives reports of the progress
+    meanwhile   : is called while these processes work, where there are several: to prepare what is done next
     Raises InputError: the recording, the transcript or a constraint is not usable, or the model knows no such speaker.
     Raises AlignmentError: the transcript cannot be aligned with the recording.
     Source: Hofer, Yamagishi & Shimodaira 2008 (``engines.trajectory``, the engine of the shipped model).
@@ -77,8 +108,10 @@ def animate(
     chosen = model if isinstance(model, Model) else load_model(model)
     request = request_of(speech, transcript)
     person = person_of(chosen, request)
-    understood = understood_speech(chosen, request, map_in_processes(workers))
+    understood = understood_speech(chosen, request, map_in_processes(workers, meanwhile), monitor)
+    monitor(Progress("moving the mouth", 0, 1, MOVING))
     generation = generate_for(person, chosen.engine, chosen.learned, understood.speech, constraints)
+    monitor(Progress("moving the mouth", 1, 1, 1.0))
     return replace(generation, outlook=outlook_of(request, understood))
 
 
@@ -94,25 +127,32 @@ def write(
     face: str | Path | Face | FilmedFace = "portrait",
     film: FilmOptions = FILM,
     staging: Staging | None = None,
+    delivery: Delivery | None = None,
+    curves: str | Path | DrivenCharacter | None = None,
     monitor: Monitor = silent_monitor,
 ) -> None:
     """Write generated motion to one or several files, each in the format of its suffix.
 
     generation : from ``animate``
-    outputs  : paths of files: ``.json``, ``.csv``, ``.npz`` (motion), ``.TextGrid`` (phones in time), ``.mp4``,
+    outputs  : paths of files: ``.json``, ``.csv``, ``.npz`` (motion), ``.livelink.csv`` (a take of Live Link Face),
+               ``.glb``, ``.usda`` (a 3D character with its animation), ``.TextGrid`` (phones in time), ``.mp4``,
                ``.webm``, ``.mov`` (a drawn face, with sound), or ``NAME%05d.png`` (its pictures, without sound); where
                ``speech`` is a sound, also ``.wav``, ``.flac``, ``.ogg``
     speech   : the recording that was animated, or the sound, as of ``speak``; a video needs it for its sound
     model    : the model that generated the motion; motion files then name its corpus and licence
     channels : channels of motion files, in this order, also articulatory ones as ``tongue`` (docs/articulation.md);
                None: all of the motion
-    rate_hz  : frames per second of motion files, 1 to 1000; None: the 100 of the model
+    rate_hz  : frames per second of motion files, 1 to 1000; None: the 100 of the model (Live Link Face: 60)
     fps      : frames per second of videos, 1 to 1000; None: 25 for drawn faces, those of the footage for filmed ones
     face     : the face of videos: ``portrait``, ``woman``, ``man``, ``cartoon``, one of an installed package, or a
-               filmed face (a value or a ``.face`` file), which is written as ``.mp4``
+               filmed face (a value or a ``.face`` file), which is written as ``.mp4``. ``.glb`` and ``.usda`` hold the
+               character of a ``MeshFace``, or else the 3D head
     film     : how a filmed face is shown
     staging  : size, background, intensity of a drawn face, and what moves on its own (docs/faces.md); None: the
                defaults
+    delivery : intensity, anticipation, offset and held poses of every output (docs/controls.md); None: as generated
+    curves   : what motion files hold instead of the motion, unless ``channels`` asks for more: ``arkit``, ``visemes``,
+               ``fap``, a table of a rig (``.csv``), or a character with blendshapes (docs/meshes.md)
     monitor  : receives reports of the progress of videos
     Raises ExportError: unknown suffix, no such folder, or a file that cannot be written.
     Raises InputError: a frame rate out of its range, or an unknown channel or face.
@@ -130,6 +170,7 @@ def write(
     sound = speech if isinstance(speech, Audio) else None
     recording = None if isinstance(speech, Audio) else speech
     shown_face = opened_face(face)
+    delivery, staging = delivery or Delivery(), staging or Staging()
     check_outputs(
         paths,
         recording,
@@ -138,38 +179,46 @@ def write(
         face=shown_face,
         film=film,
         staging=staging,
+        delivery=delivery,
         with_sound=sound is not None,
     )
     videos = [path for path in paths if shows_face(path)]
-    if videos and not isinstance(shown_face, FilmedFace) and "opening" not in generation.motion.names:
-        raise ExportError(f"{videos[0]}: the motion has no channel 'opening' to draw a face from; write motion files")
-    if {*(channels or ())} & {*GESTURES}:
-        generation = with_articulation(generation, channels or ())
-    written = generation.selected(channels) if channels is not None else generation
-    if rate_hz is not None:
-        written = written.resampled(rate_hz)
+    drawn = [path for path in paths if is_scene(path) or (shows_face(path) and not isinstance(shown_face, FilmedFace))]
+    if drawn:
+        check_drawable(drawn[0], generation.motion)
     sounds = [path for path in paths if path.suffix.lower() in SOUND_CODECS]
-    for path in paths:
-        if path.suffix.lower() in motion_suffixes():
-            check_motion(path, written.motion)
+    scenes = [path for path in paths if is_scene(path)]
+    lives = bool(scenes) or curves == WHOLE_FACE or any(map(needs_prosody, paths))
+    heard = moved_prosody(prosody_heard(speech), delivery) if speech is not None and lives else None
+    written = _motion_files(paths, generation, channels, curves, rate_hz, delivery, staging, heard)
+    for path, each in written.items():
+        check_motion(path, each.motion)
+    heard_in = next(iter(sounds), None) if recording is None else Path(recording)
+    scene = None
     for path in paths:
         if path in sounds and sound is not None:
             write_sound(path, sound)
         elif path in videos:
             played = sound or read_audio(Path(str(recording)), SOUND_RATE_HZ, warn=False)
+            hertz = DRAWN_HZ if fps is None else fps
+            character = curves if isinstance(curves, DrivenCharacter) else None
+            seen = shown(generation, delivery, shown_face, hertz, character)
             if isinstance(shown_face, FilmedFace):
                 filmed = None if recording is None else Path(recording)
                 frames = film_of(
-                    shown_face, generation.motion, speech=filmed, sound=played, model=model, fps=fps, options=film
+                    shown_face, seen.motion, speech=filmed, sound=played, model=model, fps=fps, options=film
                 )
                 write_film(path, frames, played, mark=film.mark, monitor=monitor)
             else:
-                hertz = DRAWN_HZ if fps is None else fps
-                write_drawn_face(path, generation, played, hertz, shown_face, staging or Staging(), monitor)
-        elif path.suffix.lower() == TEXTGRID_SUFFIX.lower():
-            write_textgrid(path, generation.units)
+                staged = staged_intensity(staging, delivery, shown_face)
+                write_drawn_face(path, seen, played, hertz, shown_face, staged, monitor)
+        elif path in scenes:
+            scene = scene or delivered_scene(generation, delivery, shown_face, rate_hz, staging=staging, prosody=heard)
+            write_scene(path, scene, sound=heard_in)
+        elif holds_labels(path):
+            write_labels(path, sound_units(generation.units, delivery, float(generation.motion.time_s[-1])))
         else:
-            _write_motion(written, path, recording, model)
+            _write_motion(written[path], path, recording or heard_in, model)
 
 
 def check_outputs(
@@ -181,11 +230,12 @@ def check_outputs(
     face: str | Path | Face | FilmedFace = "portrait",
     film: FilmOptions = FILM,
     staging: Staging | None = None,
+    delivery: Delivery | None = None,
     with_sound: bool = False,
 ) -> None:
     """Raise ExportError or InputError if an output cannot be written; called before long work begins.
 
-    outputs, speech, rate_hz, fps, face, film, staging : as of ``write``
+    outputs, speech, rate_hz, fps, face, film, staging, delivery : as of ``write``
     with_sound : the speech is, or will be, a sound that is in no file
     """
     for hertz in (fps, rate_hz):
@@ -194,10 +244,17 @@ def check_outputs(
     shown_face = opened_face(face)
     check_film(shown_face, film, speech)
     check_staging(shown_face, staging or Staging())
-    suffixes = (*motion_suffixes(), *VIDEO_SUFFIXES, TEXTGRID_SUFFIX, *(SOUND_CODECS if with_sound else ()))
+    check_delivery(delivery or Delivery(), map(Path, outputs), shown_face)
+    suffixes = (
+        *motion_suffixes(),
+        *VIDEO_SUFFIXES,
+        *SCENE_SUFFIXES,
+        *LABEL_SUFFIXES,
+        *(SOUND_CODECS if with_sound else ()),
+    )
     check_distinct([Path(path) for path in outputs])
     for path in map(Path, outputs):
-        if path.suffix.lower() not in map(str.lower, suffixes) and not shows_face(path):
+        if not (motion_suffix(path) or path.suffix.lower() in map(str.lower, suffixes) or shows_face(path)):
             raise ExportError(f"{path}: unknown format {path.suffix!r}; required one of: {' '.join(suffixes)} %05d.png")
         check_target(path, speech)
         check_background(path, staging or Staging())
@@ -205,6 +262,15 @@ def check_outputs(
             raise ExportError(f"{path}: filmed faces are written as {OPAQUE_SUFFIX}; name the output so")
         if shows_face(path) and speech is None and not with_sound:
             raise ExportError(f"{path}: a video needs the recording: write(..., speech=FILE)")
+
+
+def check_drawable(path: Path, motion: Motion) -> None:
+    """Raise ExportError if motion has no channel from which a face can be drawn."""
+    if "opening" not in motion.names and not is_of_blendshapes(motion):
+        raise ExportError(
+            f"{path}: the motion has no channel 'opening' to draw a face from, nor the blendshape 'jawOpen'; write "
+            "motion files"
+        )
 
 
 def opened_face(face: str | Path | Face | FilmedFace) -> Face | FilmedFace:
@@ -222,10 +288,39 @@ def opened_face(face: str | Path | Face | FilmedFace) -> Face | FilmedFace:
     return face_named(str(face))
 
 
+def _motion_files(
+    paths: Sequence[Path],
+    generation: Generation,
+    channels: Sequence[str] | None,
+    curves: str | Path | DrivenCharacter | None,
+    rate_hz: float | None,
+    delivery: Delivery,
+    staging: Staging,
+    prosody: Prosody | None,
+) -> dict[Path, Generation]:
+    """Return what each motion file among some outputs holds."""
+    files = [path for path in paths if motion_suffix(path)]
+    if {*(channels or ())} & {*GESTURES}:
+        generation = with_articulation(generation, channels or ())
+    spoken = delivered(generation, delivery)
+    closed_s = closed_times(spoken) if delivery.hold_ms else []
+    if closed_s and rate_hz is not None:
+        spoken = closed_on_grid(spoken, rate_hz)
+    if curves is not None and files:
+        spoken, names = with_curves(spoken, curves, staging=staging, prosody=prosody)
+        channels = names if channels is None else channels
+    chosen = spoken.selected(channels) if channels is not None else spoken
+    chosen = chosen if rate_hz is None else chosen.resampled(rate_hz)
+    written = {path: in_format(path, spoken, chosen, rate_hz, staging, prosody) for path in files}
+    return {path: held(each, delivery.hold_frames(each.motion.rate_hz), closed_s) for path, each in written.items()}
+
+
 def _write_motion(generation: Generation, path: Path, speech: str | Path | None, model: Model | None) -> None:
     about = model.about if model else {}
     named = {key: _text(about[key]) for key in ("name", "corpus", "licence", "attribution") if about.get(key)}
     source = {"file": as_text(Path(speech).name)} if speech else {}
+    if speech and motion_format(path).names_sound:
+        source["path"] = sound_reference(Path(speech), path)
     write_motion(path, generation, source=source, model=named)
 
 

@@ -9,19 +9,22 @@ from pathlib import Path
 import numpy as np
 
 from lipmotion.errors import InputError
+from lipmotion.faces.base import Staging
+from lipmotion.pipeline.living_curves import living_curves
+from lipmotion.rig.blendshape_motion import given_weights, with_mouth
 from lipmotion.rig.driven import DrivenCharacter
 from lipmotion.rig.facial_animation import fap_motion
-from lipmotion.rig.gltf_writer import write_glb
 from lipmotion.rig.reference_mouth import arkit_mouth
 from lipmotion.rig.rig_tables import read_rig_table, rig_motion
 from lipmotion.rig.shape_weights import shape_weights
 from lipmotion.rig.visemes import viseme_motion
 from lipmotion.storage.files import whole_file
-from lipmotion.types import Generation, Motion, Timeline, Unit
+from lipmotion.types import Generation, Motion, Prosody, Timeline, Unit
 
-SHAPE_SETS = ("arkit", "visemes", "fap")
-"""Sets of curves that need no mesh: ARKit's blendshapes of the mouth, the 15 visemes of Oculus and OpenXR, and MPEG-4's
-facial animation parameters of lips and jaw."""
+ARKIT, WHOLE_FACE = "arkit", "face"
+SHAPE_SETS = (ARKIT, WHOLE_FACE, "visemes", "fap")
+"""Sets of curves that need no mesh: ARKit's blendshapes of the mouth, the same with eyes, brows and head (which move on
+their own), the 15 visemes of Oculus and OpenXR, and MPEG-4's facial animation parameters of lips and jaw."""
 
 
 def check_curve_set(curves: str | Path) -> None:
@@ -32,51 +35,75 @@ def check_curve_set(curves: str | Path) -> None:
         raise InputError(f"no set of curves {str(curves)!r}, required one of {', '.join(SHAPE_SETS)}, or a FILE.csv")
 
 
-def curves_of(motion: Motion, units: Timeline[Unit], curves: str | Path | DrivenCharacter) -> Motion:
+def curves_of(
+    motion: Motion,
+    units: Timeline[Unit],
+    curves: str | Path | DrivenCharacter,
+    *,
+    staging: Staging | None = None,
+    prosody: Prosody | None = None,
+) -> Motion:
     """Return motion as curves that drive a character.
 
-    curves : ``arkit``, ``visemes``, ``fap``, a table of a rig's controls (``.csv``), or a character with blendshapes
+    Motion of blendshapes keeps its weights.
+    curves : ``arkit``, ``face``, ``visemes``, ``fap``, a table of a rig's controls (``.csv``), or a character with
+             blendshapes
+    staging, prosody : of the eyes, brows and head of ``face``, as of ``living_curves``
     Raises InputError: no such set or file, the character has no blendshapes, or the motion has no channel ``opening``.
     """
     if isinstance(curves, DrivenCharacter):
         return curves.weights(motion, units)
     check_curve_set(curves)
-    if curves == "arkit":
-        return shape_weights(motion, units, arkit_mouth())
+    if curves == ARKIT:
+        given = given_weights(motion, arkit_mouth())
+        return given or shape_weights(motion, units, arkit_mouth())
+    motion = with_mouth(motion)
+    if curves == WHOLE_FACE:
+        return beside(curves_of(motion, units, ARKIT), living_curves(motion, units, staging, prosody))
     if curves == "visemes":
         return viseme_motion(units, len(motion.values), motion.rate_hz)
     if curves == "fap":
         return fap_motion(motion, units)
     rows = read_rig_table(Path(curves))
-    sets = (motion, curves_of(motion, units, "arkit"), curves_of(motion, units, "visemes"))
+    sets = [motion, curves_of(motion, units, ARKIT), curves_of(motion, units, "visemes")]
+    if not all(row.source in {"", *(name for each in sets for name in each.names)} for row in rows):
+        sets.append(living_curves(motion, units, staging, prosody))
     sources = {name: each[name].astype(np.float64) for each in sets for name in each.names}
     return rig_motion(rows, sources, motion.rate_hz)
 
 
-def with_curves(generation: Generation, curves: str | Path | DrivenCharacter) -> tuple[Generation, tuple[str, ...]]:
+def beside(first: Motion, second: Motion) -> Motion:
+    """Return two motions of the same frames as one, the channels of the first one before those of the second one.
+
+    Raises InputError: other numbers of frames, or a channel that both have.
+    """
+    if len(first.values) != len(second.values):
+        raise InputError(f"motions have {len(first.values)} and {len(second.values)} frames, required the same number")
+    return Motion(
+        np.concatenate([first.values, second.values], axis=1), first.rate_hz, first.channels + second.channels
+    )
+
+
+def with_curves(
+    generation: Generation,
+    curves: str | Path | DrivenCharacter,
+    *,
+    staging: Staging | None = None,
+    prosody: Prosody | None = None,
+) -> tuple[Generation, tuple[str, ...]]:
     """Return a generation with the channels of ``curves_of`` after its own, and the names of those channels.
 
-    The variance of these channels is 0. Raises InputError: as ``curves_of``, or a name that the motion has already.
+    Channels that the motion has already are replaced. The variance of all channels of ``curves_of`` is 0.
+    Raises InputError: as ``curves_of``.
     """
+    added = curves_of(generation.motion, generation.units, curves, staging=staging, prosody=prosody)
+    kept = [name for name in generation.motion.names if name not in added.names]
+    if len(kept) < len(generation.motion.names):
+        generation = generation.selected(kept)
     motion = generation.motion
-    added = curves_of(motion, generation.units, curves)
-    both = Motion(
-        np.concatenate([motion.values, added.values], axis=1), motion.rate_hz, motion.channels + added.channels
-    )
+    both = beside(motion, added)
     variance = np.pad(generation.variance, ((0, 0), (0, len(added.channels))))
     return replace(generation, motion=both, spread=variance), added.names
-
-
-def write_animated(
-    path: Path, generation: Generation, character: DrivenCharacter, rate_hz: float | None = None
-) -> None:
-    """Write a character with the weights of its blendshapes as an animated ``.glb``.
-
-    rate_hz : keys a second; None: those of the motion
-    Raises InputError: the character has no blendshapes. Raises ExportError: the file cannot be written.
-    """
-    weights = character.weights(generation.motion, generation.units)
-    write_glb(path, character.mesh, weights if rate_hz is None else weights.resampled(rate_hz))
 
 
 def write_picture(path: Path, character: DrivenCharacter) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from lipmotion.corpora.labels import read_phones
 from lipmotion.errors import InputError
-from lipmotion.export.base import motion_suffixes
+from lipmotion.export.base import motion_suffix
 from lipmotion.export.base import read_units as read_units_of_motion
 from lipmotion.types import Timeline, Unit
 
@@ -22,7 +22,7 @@ def read_units(path: str | Path) -> Timeline[Unit]:
     Raises InputError: no such file, not one of these, or without phones.
     """
     path = Path(path)
-    if path.suffix.lower() in motion_suffixes():
+    if motion_suffix(path):
         return read_units_of_motion(path)
     if path.suffix.lower() in LABEL_SUFFIXES:
         return read_phones(path)

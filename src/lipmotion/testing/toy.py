@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -115,13 +116,18 @@ def toy_sentences(count: int, seed: int = 0) -> list[ToySentence]:
     same ones first.
     Raises InputError: fewer than three, so that a split would be empty.
     """
+    return list(_toy_sentences(count, seed))
+
+
+@lru_cache(maxsize=16)
+def _toy_sentences(count: int, seed: int) -> tuple[ToySentence, ...]:
     if count < 3:
         raise InputError(f"{count} toy sentences asked for, required at least 3: one each to train, validate and test")
     held_out = max(1, count // 6)
     splits = ["train"] * (count - 2 * held_out) + ["val"] * held_out + ["test"] * held_out
     rng = np.random.default_rng(seed)
     vocabulary = _shuffled_words(rng)
-    return [_sentence(f"toy{number:02d}", split, vocabulary, rng) for number, split in enumerate(splits)]
+    return tuple(_sentence(f"toy{number:02d}", split, vocabulary, rng) for number, split in enumerate(splits))
 
 
 def toy_motion(units: Timeline[Unit], rate_hz: float) -> Motion:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from lipmotion.errors import ExportError
-from lipmotion.export.cues import moho_dat, rhubarb_json, rhubarb_tsv, rhubarb_xml
+from lipmotion.export.cues import moho_dat, papagayo_pgo, rhubarb_json, rhubarb_tsv, rhubarb_xml
 from lipmotion.export.cues.sheet import CueSheet
 from lipmotion.storage.files import whole_file
 
@@ -15,6 +15,7 @@ CUE_FORMATS: dict[str, Callable[[CueSheet, str], str]] = {
     "xml": rhubarb_xml.text,
     "json": rhubarb_json.text,
     "dat": moho_dat.text,
+    "pgo": papagayo_pgo.text,
 }
 """Cues and the name of the recording → the text of a file, by format; a file's suffix is its format's name."""
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from itertools import groupby
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,7 +12,7 @@ from lipmotion.export.cues.costs import frame_costs
 from lipmotion.export.cues.shapes import OPTIONAL, SHAPES, drawn_shape
 from lipmotion.export.cues.sheet import CueSheet, cue_frame_count, cue_sheet, drawn_shapes
 from lipmotion.kernels.segments import best_segments
-from lipmotion.types import Generation
+from lipmotion.types import Generation, Span, Timeline, Unit
 
 CHANGE = 0.35
 """Cost of a change of shape, in the unit of ``costs``."""
@@ -22,22 +25,36 @@ def default_hold_frames(fps: float) -> int:
 
 
 def choose_cues(
-    generation: Generation, fps: float = 24.0, hold_frames: int | None = None, optional: str = OPTIONAL
+    generation: Generation,
+    fps: float = 24.0,
+    hold_frames: int | None = None,
+    optional: str = OPTIONAL,
+    intensity: float = 1.0,
 ) -> CueSheet:
     """Return the cues of generated motion.
 
     fps         : frames per second of the animation, 1 to 60
     hold_frames : minimum length of a cue in frames, > 0; a shorter recording has one cue
     optional    : which of the shapes G, H and X the character has
+    intensity   : openings and spread so many times as large, before shapes are chosen
     The result is exact: of all sequences that keep the hold, the one of least cost (``costs``, ``kernels.segments``).
     Cost: about 10 µs a frame.
     """
     motion, drawn = generation.motion, drawn_shapes(optional)
     duration_s = max(0.0, (len(motion.values) - 1) / motion.rate_hz, *(span.end_s for span in generation.units))
     frames = cue_frame_count(duration_s, fps)
-    cost = _costs_of_drawn_shapes(frame_costs(generation, frames, fps), drawn) if frames else np.empty((0, len(drawn)))
+    cost = np.empty((0, len(drawn)))
+    if frames:
+        cost = _costs_of_drawn_shapes(frame_costs(generation, frames, fps, intensity), drawn)
     segments = best_segments(cost, hold_frames or default_hold_frames(fps), CHANGE)
-    return cue_sheet([(frame, drawn[label]) for frame, label in segments], duration_s, fps, drawn)
+    sheet = cue_sheet([(frame, drawn[label]) for frame, label in segments], duration_s, fps, drawn)
+    return replace(sheet, words=_words(generation.units))
+
+
+def _words(units: Timeline[Unit]) -> Timeline[str]:
+    """Return the words in time; equal neighbours are one."""
+    runs = [(word, list(spans)) for word, spans in groupby(units, key=lambda span: span.label.word)]
+    return Timeline(tuple(Span(spans[0].start_s, spans[-1].end_s, word) for word, spans in runs if word))
 
 
 def _costs_of_drawn_shapes(cost: NDArray[np.float64], drawn: str) -> NDArray[np.float64]:

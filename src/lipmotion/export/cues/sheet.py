@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -18,6 +18,7 @@ class CueSheet:
     cues  : shapes without gaps from 0 to the end, at least one; times are whole hundredths of a second
     fps   : the frame rate that they were chosen for; ``int(fps * start_s)`` is a cue's first frame, the first is 0
     drawn : the shapes that the character has
+    words : the words in time, where they are known
 
     >>> sheet = CueSheet(Timeline((Span(0.0, 0.5, "X"), Span(0.5, 0.62, "A"))), fps=24.0, drawn="ABCDEFX")
     >>> sheet.duration_s, sheet.rest
@@ -27,6 +28,7 @@ class CueSheet:
     cues: Timeline[str]
     fps: float
     drawn: str
+    words: Timeline[str] = field(default_factory=lambda: Timeline(()))
 
     @property
     def rest(self) -> str:

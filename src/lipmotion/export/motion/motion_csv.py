@@ -1,4 +1,7 @@
-"""``.csv``: a table for spreadsheets and scripts: ``time_s`` and one column per channel, without units."""
+"""``.csv``: a table for spreadsheets and scripts: ``time_s`` and one column per channel, without units.
+
+Tables of Live Link Face and of other programs are read as well.
+"""
 
 from __future__ import annotations
 
@@ -14,12 +17,20 @@ from numpy.typing import NDArray
 from lipmotion.errors import ExportError, InputError, shortened
 from lipmotion.export.base import MotionFormat
 from lipmotion.export.motion.rounded import formatted_rows
-from lipmotion.types import Channel, Generation, Motion, Timeline, Unit
+from lipmotion.rig.live_link_table import is_live_link, read_live_link
+from lipmotion.rig.shape_names import ARKIT_MOUTH, ARKIT_OTHERS
+from lipmotion.rig.steady_rate import steady_rows
+from lipmotion.types import EYE_DISTANCE, WEIGHT, Channel, Generation, Motion, Timeline, Unit
 
 LONGEST_HEAD = 1 << 20
 """Most characters of a line."""
 LONGEST_S = 1e6
 """Largest time that is accepted: more than eleven days."""
+OTHER_TIMES = {"time": 1.0, "t": 1.0, "seconds": 1.0, "timestamp": 1.0, "time_ms": 0.001, "milliseconds": 0.001}
+"""Names of a first column that holds the time in tables of other programs, and its unit in seconds. Their times need
+not be even, nor begin at 0: the first row is the start."""
+WEIGHTS = frozenset((*ARKIT_MOUTH, *ARKIT_OTHERS))
+"""Channels of these names are blendshapes, whose unit a table need not say."""
 
 
 def check(motion: Motion) -> None:
@@ -40,20 +51,36 @@ def write(path: Path, generation: Generation, _source: Mapping[str, str], _model
 
 
 def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
-    """Return the motion of a table, all channels in eye distances, and an empty timeline.
+    """Return the motion of a table and an empty timeline.
 
+    Channels with ARKit's names are weights, all others are eye distances. A table of Live Link Face is read as the app
+    writes it (``live_link_table``).
     Raises InputError: not a table of numbers with a header, or times that are not even.
     """
     try:
         with path.open(encoding="utf-8-sig") as file:
             head = file.readline(LONGEST_HEAD).rstrip("\n")
+            if is_live_link(head):
+                return read_live_link(path)
             first, *names = head.split(",")
-            if first != "time_s" or not names:
-                raise ValueError(f"the first line is {head[:60]!r}, required 'time_s,opening,...'")
+            scale = OTHER_TIMES.get(first.strip().lower())
+            if (first != "time_s" and scale is None) or not names:
+                raise ValueError(f"the first line is {shortened(head)!r}, required 'time_s,opening,...'")
             table = _numbers(file, len(names) + 1)
     except ValueError as error:
+        if isinstance(error, InputError):
+            raise
         raise InputError(f"not a table of numbers under a header ({error}); export it again") from error
-    return Motion(table[:, 1:], _rate(table[:, 0]), tuple(Channel(name) for name in names)), Timeline(())
+    if scale is None:
+        return Motion(table[:, 1:], _rate(table[:, 0]), tuple(map(_channel, names))), Timeline(())
+    if not np.isfinite(table).all():
+        raise InputError("there are values that are not finite; interpolate them first")
+    rows, rate_hz = steady_rows(table[:, 0] * scale, table[:, 1:])
+    return Motion(rows, rate_hz, tuple(_channel(name.strip()) for name in names)), Timeline(())
+
+
+def _channel(name: str) -> Channel:
+    return Channel(name, WEIGHT if name[:1].lower() + name[1:] in WEIGHTS else EYE_DISTANCE)
 
 
 def _numbers(file: TextIO, columns: int) -> NDArray[np.float64]:

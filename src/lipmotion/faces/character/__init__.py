@@ -24,7 +24,7 @@ from lipmotion.types import Motion, Prosody, Timeline, Unit
 if TYPE_CHECKING:
     from lipmotion.rig.rasteriser import Camera
 
-__all__ = ["Head", "render"]
+__all__ = ["Head", "render", "staged_pose"]
 
 OWN_SIZE = 720
 """Height of pictures whose size is not given."""
@@ -80,11 +80,11 @@ def render(
 
     chosen = staging or Staging()
     poses = head_poses(motion, units, fps, seed=SEED + chosen.seed, intensity=chosen.intensity, prosody=prosody)
-    poses = [_still(pose, chosen) for pose in poses]
+    poses = [staged_pose(pose, chosen) for pose in poses]
     return _frames(poses, camera_for(width, height), chosen)
 
 
-def _still(pose: CharacterPose, staging: Staging) -> CharacterPose:
+def staged_pose(pose: CharacterPose, staging: Staging) -> CharacterPose:
     """Return the pose without the movements that are switched off."""
     gaze = pose.gaze if staging.gaze else (-0.85 * pose.turn[0], -0.85 * pose.turn[1])
     return pose._replace(

@@ -22,7 +22,6 @@ POSES = {
     "mouthFunnel": CharacterPose(gap=0.1, upper_rise=0.042, jaw=0.05, width=0.8, roundness=1, protrusion=0.09),
     "mouthPucker": CharacterPose(width=0.7, roundness=1, protrusion=0.1, fullness=1.1),
     "mouthRollLower": CharacterPose(gap=0.045, upper_rise=0.036, tuck=1),
-    "mouthPress": CharacterPose(press=1),
     "tongueOut": CharacterPose(tongue_out=1),
     "tongueUp": CharacterPose(tongue_up=1),
     "browInnerUp": CharacterPose(brows=0.06),
@@ -33,9 +32,15 @@ SIDED_POSES = {
     "mouthStretch": CharacterPose(width=1.25, spread=1),
     "mouthUpperUp": CharacterPose(gap=0.05, upper_rise=0.05),
     "mouthLowerDown": CharacterPose(gap=0.08),
+    "mouthPress": CharacterPose(press=1),
     "eyeBlink": CharacterPose(shut=1),
 }
 """The poses of the shapes that are one each for the left and the right side."""
+EYE_ACROSS, EYE_UPWARDS = 0.6, 0.45
+"""How far an eye turns to the side, and up or down, where its shape has the weight 1, in radians."""
+BROWS_UP = POSES["browInnerUp"].brows
+"""How far the brows rise where their shape has the weight 1."""
+_GAZES = {"Out": (EYE_ACROSS, 0.0), "In": (-EYE_ACROSS, 0.0), "Up": (0.0, EYE_UPWARDS), "Down": (0.0, -EYE_UPWARDS)}
 LEAST = 1e-5
 """Vertices that move less, in eye distances, are left out of a shape."""
 _SOFT = 0.12
@@ -43,7 +48,8 @@ _SOFT = 0.12
 
 
 def head_mesh(figure: Figure) -> Mesh:
-    """Return the character at rest, its parts named, with a blendshape for each of ``POSES`` and ``SIDED_POSES``.
+    """Return the character at rest, its parts named, with a blendshape for each of ``POSES`` and ``SIDED_POSES``, and
+    those that turn the eyes.
 
     ``mouthClose`` brings the lips together while the jaw is open: it is the difference from ``jawOpen``.
     """
@@ -57,7 +63,11 @@ def head_mesh(figure: Figure) -> Mesh:
         moved = figure.placed(pose)[0] - rest
         for side, share in (("Left", left), ("Right", 1 - left)):
             shapes.append(Blendshape.between(name + side, rest, rest + share * moved, least=LEAST))
-    return Mesh(rest, figure.triangles, _parts(figure), tuple(shapes))
+    for name, (across, upwards) in _GAZES.items():
+        for side, share, outward in (("Left", left, 1.0), ("Right", 1 - left, -1.0)):
+            moved = figure.placed(CharacterPose(gaze=(outward * across, upwards)))[0] - rest
+            shapes.append(Blendshape.between(f"eyeLook{name}{side}", rest, rest + share * moved, least=LEAST))
+    return Mesh(rest, figure.triangles, _parts(figure), tuple(shapes), colours=_encoded(figure.colours))
 
 
 def _parts(figure: Figure) -> tuple[MeshPart, ...]:

@@ -1,0 +1,174 @@
+"""Keys for Blender: curves become keys of shape keys, bones and custom properties. Runs inside Blender, 3.6 and later;
+no imports of lipmotion.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from typing import Any
+
+from .curves import Curves, at_frames, control, matched, read_motion
+
+AXES = {"x": 0, "y": 1, "z": 2}
+STRIP = "lipmotion sound"
+
+
+def key_objects(
+    objects: list[Any], motion: str, scene: Any, *, first: float = 1.0, replace: bool = True, sound: str = ""
+) -> tuple[int, list[str]]:
+    """Key objects from a motion file; return how many curves were used, and the names of those that were not.
+
+    first   : the frame at which the motion begins
+    replace : delete all earlier keys of what is keyed; otherwise only those in the range of the motion
+    sound   : a file for the sequencer; empty: none
+    Raises ValueError, OSError: the file cannot be read.
+    """
+    curves, times = read_motion(motion)
+    frames = at_frames(curves, times, frame_rate(scene))
+    return key_frames(objects, frames, scene, first=first, replace=replace, sound=sound)
+
+
+def key_frames(
+    objects: list[Any],
+    frames: Curves,
+    scene: Any,
+    *,
+    first: float = 1.0,
+    replace: bool = True,
+    sound: str = "",
+) -> tuple[int, list[str]]:
+    """Key objects from curves with one value a frame; arguments and what is returned as of ``key_objects``."""
+    used: set[str] = set()
+    named = {name: control(name) for name in frames}
+    controls = {name: found for name, found in named.items() if found}
+    for each in objects:
+        if getattr(each.data, "shape_keys", None):
+            keys = matched(list(frames), [block.name for block in each.data.shape_keys.key_blocks[1:]])
+            key_shapes(each, frames, keys, first, replace=replace)
+            used |= set(keys)
+        used |= set(key_controls(each, frames, controls, first, replace=replace))
+    if used:
+        show_all(scene, first + max(len(values) for values in frames.values()) - 1)
+        add_sound(scene, sound, first)
+    return len(used), [name for name in frames if name not in used]
+
+
+def key_shapes(mesh: Any, curves: Curves, keys: dict[str, str], first: float, *, replace: bool = True) -> int:
+    """Key shape keys of an object, one key a frame; return how many are keyed.
+
+    curves  : by name, one value a frame, the first at the frame ``first``
+    keys    : the shape key of each curve, as of ``matched``
+    replace : delete all earlier keys of these shape keys; otherwise only those between the first and the last frame
+    """
+    shapes = mesh.data.shape_keys
+    fcurves = _fcurves(shapes, f"{mesh.name} speech") if keys else None
+    for name, key in keys.items():
+        shapes.key_blocks[key].slider_min = min(shapes.key_blocks[key].slider_min, min(curves[name], default=0.0))
+        shapes.key_blocks[key].slider_max = max(shapes.key_blocks[key].slider_max, max(curves[name], default=0.0))
+        _key(fcurves, f'key_blocks["{_escaped(key)}"].value', -1, curves[name], first, replace)
+    return len(keys)
+
+
+def key_controls(
+    rig: Any,
+    curves: Curves,
+    controls: dict[str, tuple[str, str, str]],
+    first: float,
+    *,
+    replace: bool = True,
+) -> list[str]:
+    """Key bones and custom properties of an object, one key a frame; return the curves that found their control.
+
+    controls : of each curve, as of ``control``; rotations are in degrees
+    """
+    found = []
+    fcurves = None
+    for name, (bone, kind, axis) in controls.items():
+        place = _place_of(rig, bone, kind, axis)
+        if place is None:
+            continue
+        fcurves = fcurves if fcurves is not None else _fcurves(rig, f"{rig.name} speech")
+        values = curves[name]
+        if kind == "rotation":
+            rig.pose.bones[bone].rotation_mode = "XYZ"
+            values = [math.radians(value) for value in values]
+        _key(fcurves, *place, values, first, replace)
+        found.append(name)
+    return found
+
+
+def add_sound(scene: Any, path: str, first: float) -> bool:
+    """Add a sound to the sequencer at a frame, in place of an earlier one of its kind; return whether it exists."""
+    if not path or not os.path.isfile(path):  # noqa: PTH113
+        return False
+    editor = scene.sequence_editor or scene.sequence_editor_create()
+    strips = editor.strips if hasattr(editor, "strips") else editor.sequences
+    for strip in [strip for strip in strips if strip.name == STRIP]:
+        strips.remove(strip)
+    taken = {strip.channel for strip in strips}
+    channel = next(number for number in range(1, 130) if number not in taken)
+    strips.new_sound(STRIP, path, channel, round(first))
+    scene.sync_mode = "AUDIO_SYNC"
+    return True
+
+
+def show_all(scene: Any, last: float) -> None:
+    """Let the scene end at a frame or later."""
+    scene.frame_end = max(scene.frame_end, math.ceil(last))
+
+
+def frame_rate(scene: Any) -> float:
+    """Return the frames per second of a scene."""
+    return float(scene.render.fps / scene.render.fps_base)
+
+
+def _place_of(rig: Any, bone: str, kind: str, axis: str) -> tuple[str, int] | None:
+    """Return the path and the index of what a control moves, or None."""
+    owner = rig.pose.bones.get(bone) if bone and getattr(rig, "pose", None) else (rig if not bone else None)
+    if owner is None or (kind == "property" and axis not in owner.keys()):  # noqa: SIM118
+        return None
+    inside = f'pose.bones["{_escaped(bone)}"]' if bone else ""
+    if kind == "property":
+        return f'{inside}["{_escaped(axis)}"]', -1
+    return f"{inside}.{'rotation_euler' if kind == 'rotation' else kind}", AXES[axis]
+
+
+def _fcurves(owner: Any, name: str) -> Any:
+    """Return the curves of the action of a data-block; since Blender 4.4 an action has layers and slots."""
+    import bpy
+
+    data = owner.animation_data or owner.animation_data_create()
+    if data.action is None:
+        data.action = bpy.data.actions.new(name)
+    action = data.action
+    if not hasattr(action, "slots"):
+        return action.fcurves
+    if data.action_slot is None:
+        data.action_slot = action.slots.new(id_type=owner.id_type, name=owner.name)
+    layer = action.layers[0] if action.layers else action.layers.new("Layer")
+    strip = layer.strips[0] if layer.strips else layer.strips.new(type="KEYFRAME")
+    return strip.channelbag(data.action_slot, ensure=True).fcurves
+
+
+def _key(fcurves: Any, path: str, index: int, values: list[float], first: float, replace: bool) -> None:
+    """Write one key a frame."""
+    where = {"index": index} if index >= 0 else {}
+    curve = fcurves.find(path, **where) or fcurves.new(path, **where)
+    last = first + len(values) - 1
+    kept = [
+        (point.co[0], point.co[1], point.interpolation)
+        for point in curve.keyframe_points
+        if not replace and not first - 0.5 < point.co[0] < last + 0.5
+    ]
+    points = sorted([*kept, *((first + number, value, "LINEAR") for number, value in enumerate(values))])
+    curve.keyframe_points.clear()
+    curve.keyframe_points.add(len(points))
+    curve.keyframe_points.foreach_set("co", [number for point in points for number in point[:2]])
+    for point, (_, _, interpolation) in zip(curve.keyframe_points, points):  # noqa: B905
+        point.interpolation = interpolation
+    curve.update()
+
+
+def _escaped(name: str) -> str:
+    return name.replace("\\", "\\\\").replace('"', '\\"')

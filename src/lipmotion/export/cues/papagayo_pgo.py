@@ -1,0 +1,73 @@
+"""``pgo``: a project of Papagayo, version 1: phrases, words and Preston Blair's shapes in frames, to be edited there.
+
+Source: what Papagayo and Papagayo-NG write and read. Frames count from 0; a shape lasts to the next one of its word or
+to the word's last frame, which is included; outside of words the mouth is at rest.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from itertools import islice, takewhile
+
+from lipmotion.export.cues.shapes import REST, SHAPES
+from lipmotion.export.cues.sheet import CueSheet
+
+UNKNOWN = "speech"
+"""The text of speech without known words."""
+Part = tuple[int, int, str]
+"""First frame, last frame (included), and text."""
+
+
+def text(sheet: CueSheet, sound_file: str) -> str:
+    """Return the content of the file: one voice; a phrase lasts from rest to rest."""
+    shown = shown_shapes(sheet)
+    phrases = [words_of_run(sheet, first, last) for first, last in _runs(shown)]
+    said = [" ".join(word for *_, word in phrase) for phrase in phrases]
+    lines = ["lipsync version 1", " ".join(sound_file.split()) or "sound.wav", f"{round(sheet.fps)}", f"{len(shown)}"]
+    lines += ["1", "\tVoice 1", f"\t{'|'.join(said)}", f"\t{len(phrases)}"]
+    for phrase, words in zip(phrases, said, strict=True):
+        lines += [f"\t\t{words}", f"\t\t{phrase[0][0]}", f"\t\t{phrase[-1][1]}", f"\t\t{len(phrase)}"]
+        for first, last, word in phrase:
+            starts = [frame for frame in range(first, last + 1) if frame == first or shown[frame] != shown[frame - 1]]
+            lines.append(f"\t\t\t{word} {first} {last} {len(starts)}")
+            lines += [f"\t\t\t\t{frame} {SHAPES[shown[frame]].blair}" for frame in starts]
+    return "\n".join(lines) + "\n"
+
+
+def shown_shapes(sheet: CueSheet) -> list[str]:
+    """Return the shape of every frame."""
+    frames = max(1, int(sheet.fps * sheet.duration_s + 1 - 1e-9))
+    starts = [min(int(sheet.fps * cue.start_s), frames) for cue in sheet.cues] + [frames]
+    shown: list[str] = []
+    for cue, end in zip(sheet.cues, starts[1:], strict=True):
+        shown += [cue.label] * (end - len(shown))
+    return shown
+
+
+def words_of_run(sheet: CueSheet, first: int, last: int) -> list[Part]:
+    """Return the words from one frame to another, each with at least one frame, without gaps.
+
+    What is said in less than a frame is joined to the word before by a hyphen.
+    """
+    parts: list[Part] = []
+    spans = sheet.words.spans
+    begin = bisect_left(spans, first, key=lambda span: int(span.end_s * sheet.fps))
+    for span in takewhile(lambda span: int(span.start_s * sheet.fps) <= last, islice(spans, begin, None)):
+        start = int(span.start_s * sheet.fps)
+        start = first if not parts else max(start, first)
+        word = "".join(span.label.split()) or UNKNOWN
+        if parts and start <= parts[-1][0]:
+            parts[-1] = (parts[-1][0], last, f"{parts[-1][2]}-{word}")
+            continue
+        if parts:
+            parts[-1] = (parts[-1][0], start - 1, parts[-1][2])
+        parts.append((start, last, word))
+    return parts or [(first, last, UNKNOWN)]
+
+
+def _runs(shown: list[str]) -> list[tuple[int, int]]:
+    """Return the first and the last frame of each stretch without rest."""
+    moving = [False, *(shape != REST for shape in shown), False]
+    starts = [frame for frame in range(len(shown)) if moving[frame + 1] and not moving[frame]]
+    ends = [frame for frame in range(len(shown)) if moving[frame + 1] and not moving[frame + 2]]
+    return list(zip(starts, ends, strict=True))

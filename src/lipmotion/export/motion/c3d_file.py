@@ -1,0 +1,162 @@
+"""The binary format C3D of motion capture: labelled points, and curves beside them as analog channels.
+
+Source: The C3D File Format, A Technical User Guide (Motion Lab Systems). Files in Intel's order of bytes are read,
+points as fractions or as scaled whole numbers; ``c3d_writing`` writes fractions.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import InputError, shortened
+
+Array = NDArray[np.float64]
+Values = list[str] | NDArray[np.floating[Any]] | NDArray[np.integer[Any]]
+"""The values of a parameter: texts, or numbers in the order of the file."""
+
+BLOCK = 512
+MARK = 0x50
+INTEL = 84
+"""The processor type of files with the lowest byte first; others were written by old workstations."""
+MOST_FRAMES = 65_535
+"""Most frames that the header can number."""
+LARGEST = 1 << 28
+"""Most bytes of a file that is read."""
+MOST_POINTS, MOST_ANALOG = 2_000, 5_000
+LONGEST_LABEL = 64
+_KINDS = {1: "u1", 2: "<u2", 4: "<f4"}
+
+
+@dataclass(frozen=True, eq=False)
+class C3dFile:
+    """What a C3D file holds.
+
+    labels        : names of the N points
+    points        : places [shape=(T, N, 3)], in ``unit``; NaN where a marker was not seen
+    rate_hz       : frames per second
+    unit          : of the places: ``mm``, for instance
+    software      : the program that wrote it
+    analog        : curves beside the points, one sample a frame [shape=(T, A)]; none where there are several a frame
+    analog_labels, analog_units : of the A curves
+    """
+
+    labels: tuple[str, ...]
+    points: Array
+    rate_hz: float
+    unit: str = "mm"
+    software: str = ""
+    analog: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    analog_labels: tuple[str, ...] = ()
+    analog_units: tuple[str, ...] = ()
+
+
+def read_c3d(path: Path) -> C3dFile:
+    """Return the points of a file, and its analog channels if they have one sample a frame.
+
+    Raises InputError: not a C3D file, cut short, too large, of a processor that is not known, or sizes that disagree.
+    """
+    size = path.stat().st_size
+    if size > LARGEST:
+        raise InputError(f"{size} bytes, required at most {LARGEST}: divide the capture into takes")
+    try:
+        return _parsed(path.read_bytes())
+    except (struct.error, IndexError, UnicodeDecodeError, OverflowError) as error:
+        raise InputError(f"not a C3D file ({error}); export the capture again") from error
+
+
+def _parsed(content: bytes) -> C3dFile:
+    if len(content) < 2 * BLOCK or content[1] != MARK:
+        raise InputError("not a C3D file: its first bytes are not those of the format; export the capture again")
+    start = (content[0] - 1) * BLOCK
+    processor = content[start + 3]
+    if processor != INTEL:
+        raise InputError(f"its processor type is {processor}, required {INTEL} (Intel); export the capture so")
+    found = _parameters(content, start + 4)
+    points, analog, first, last, _, scale, block, samples, rate_hz = struct.unpack("<5HfHHf", content[2:24])
+    rate_hz = _number(found, "POINT.RATE", rate_hz)
+    scale = _number(found, "POINT.SCALE", scale)
+    frames = last - first + 1
+    if last == MOST_FRAMES:
+        frames = int(max(frames, _number(found, "POINT.LONG_FRAMES", 0), _number(found, "POINT.FRAMES", 0) % (1 << 31)))
+    if not (0 <= points <= MOST_POINTS and 0 <= analog <= MOST_ANALOG and points + analog > 0 and frames > 0):
+        raise InputError(
+            f"{points} points and {analog} analog values in {frames} frames, required at least one of each"
+        )
+    if not 0 < rate_hz <= 1e5 or not np.isfinite(scale) or not scale:
+        raise InputError(f"the rate is {rate_hz:g} Hz and the scale {scale:g}, required positive numbers")
+    kind = np.dtype("<f4" if scale < 0 else "<i2")
+    width = points * 4 + analog
+    held, needed = len(content) - (block - 1) * BLOCK, frames * width * kind.itemsize
+    if block < 2 or held < needed:
+        raise InputError(f"cut short: {max(held, 0)} bytes of data, required {needed} for {frames} frames")
+    rows = np.frombuffer(content, kind, frames * width, (block - 1) * BLOCK).reshape(frames, width).astype(np.float64)
+    return _content(found, rows, points, scale, rate_hz, samples)
+
+
+def _content(found: dict[str, Values], rows: Array, points: int, scale: float, rate_hz: float, samples: int) -> C3dFile:
+    """Return the content from rows of numbers, one a frame [shape=(T, 4 · points + analog values)]."""
+    placed = rows[:, : points * 4].reshape(len(rows), points, 4)
+    places = placed[..., :3] * (1.0 if scale < 0 else scale)
+    unseen = (placed[..., 3] < 0) | ~np.isfinite(places).all(axis=2) | (places == 0).all(axis=2)
+    places[unseen] = np.nan
+    labels = [label for name in ("POINT.LABELS", "POINT.LABELS2", "POINT.LABELS3") for label in _texts(found, name)]
+    labels = [*labels, *(f"point{number}" for number in range(len(labels) + 1, points + 1))][:points]
+    curves = rows[:, points * 4 :] if samples == 1 else rows[:, :0]
+    names = [*_texts(found, "ANALOG.LABELS"), *(f"analog{n}" for n in range(curves.shape[1]))][: curves.shape[1]]
+    units = [*_texts(found, "ANALOG.UNITS"), *[""] * curves.shape[1]][: curves.shape[1]]
+    unit, software = (next(iter(_texts(found, name)), "") for name in ("POINT.UNITS", "MANUFACTURER.SOFTWARE"))
+    return C3dFile(
+        tuple(labels), places, float(f"{rate_hz:.6g}"), unit or "mm", software, curves, tuple(names), tuple(units)
+    )
+
+
+def _texts(found: dict[str, Values], name: str) -> list[str]:
+    values = found.get(name, [])
+    return values if isinstance(values, list) else []
+
+
+def _number(found: dict[str, Values], name: str, otherwise: float) -> float:
+    values = found.get(name)
+    return float(values[0]) if isinstance(values, np.ndarray) and len(values) else float(otherwise)
+
+
+def _parameters(content: bytes, at: int) -> dict[str, Values]:
+    """Return the parameters by ``GROUP.NAME``."""
+    groups: dict[int, str] = {}
+    found: list[tuple[int, str, Values]] = []
+    while at + 2 <= len(content) and content[at]:
+        length, group = abs(struct.unpack_from("b", content, at)[0]), struct.unpack_from("b", content, at + 1)[0]
+        name = content[at + 2 : at + 2 + length].decode("ascii").strip().upper()
+        body = at + 2 + length
+        step = struct.unpack_from("<h", content, body)[0]
+        if group < 0:
+            groups[-group] = name
+        else:
+            found.append((group, name, _values(content, body + 2)))
+        if step == 0:
+            break
+        if step < 0:
+            raise InputError(f"the parameter {shortened(name)!r} is before its own place; export the capture again")
+        at = body + step
+    return {f"{groups.get(group, '')}.{name}": values for group, name, values in found}
+
+
+def _values(content: bytes, at: int) -> Values:
+    """Return the values of a parameter whose type stands at a place."""
+    kind, dimensions = struct.unpack_from("bB", content, at)
+    sizes = list(content[at + 2 : at + 2 + dimensions])
+    count = int(np.prod(sizes, dtype=np.int64)) if sizes else 1
+    data = content[at + 2 + dimensions : at + 2 + dimensions + count * abs(kind)]
+    if kind == -1:
+        width = sizes[0] if sizes else 1
+        texts = [data[start : start + width] for start in range(0, len(data), max(width, 1))]
+        return [text.decode("latin-1").rstrip("\0 ")[:LONGEST_LABEL] for text in texts]
+    if kind not in _KINDS or len(data) < count * kind:
+        raise InputError(f"a parameter of type {kind} and sizes {sizes} does not fit; export the capture again")
+    return np.frombuffer(data, _KINDS[kind], count).astype(np.float64)

@@ -1,0 +1,124 @@
+"""``.motion3.json``: a motion of Live2D Cubism: how far the mouth is open, and whether it is wide or puckered.
+
+Source: Live2D, Cubism specifications, "motion3.json". Curves are straight lines between keys (segment type 0); keys
+that a straight line between others replaces are left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import ExportError
+from lipmotion.export.base import MotionFormat
+from lipmotion.rig.mouth_template import LEFT_CORNER, RIGHT_CORNER, mouth_template
+from lipmotion.rig.point_motion import lip_gap, rest_frames
+from lipmotion.rig.reference_mouth import arkit_mouth
+from lipmotion.storage.json_text import as_json
+from lipmotion.types import Generation, Motion
+
+Array = NDArray[np.float64]
+
+OPEN, FORM = "ParamMouthOpenY", "ParamMouthForm"
+"""Live2D's standard parameters: 0 closed to 1 open; −1 puckered to 1 wide, as in a smile."""
+WHOLLY_OPEN = 0.20
+"""The gap between the lips that is drawn as wholly open, eye distances."""
+WIDEST, NARROWEST = 0.08, 0.12
+"""By how much the mouth is wider and narrower than at rest where the form is 1 and −1, eye distances."""
+FPS = 30.0
+"""The frame rate that the file states; its keys are at any time."""
+TOLERANCE = 0.005
+"""Largest error of a curve through the keys that are kept."""
+DECIMALS = 3
+
+
+def check(motion: Motion) -> None:
+    """Raise ExportError if motion shows neither an opening nor an open jaw, or has fewer than two frames."""
+    if not {"opening", "jawOpen"} & set(motion.names) or len(motion.values) < 2:
+        raise ExportError("the motion has no channel 'opening' or 'jawOpen', or no two frames; write .json or .csv")
+
+
+def write(path: Path, generation: Generation, _source: Mapping[str, str], _model: Mapping[str, str]) -> None:
+    """Write two curves, and how many keys they have."""
+    motion = generation.motion
+    curves = []
+    for name, values in ((OPEN, mouth_open(generation)), (FORM, mouth_form(generation))):
+        rounded = np.round(values, DECIMALS) + 0.0
+        kept = kept_keys(motion.time_s, rounded, TOLERANCE)
+        keys = [(round(float(motion.time_s[frame]), 6), float(rounded[frame])) for frame in kept]
+        segments: list[float] = [*keys[0]]
+        for time_s, value in keys[1:]:
+            segments += [0, time_s, value]
+        curves.append({"Target": "Parameter", "Id": name, "Segments": segments, "Points": len(keys)})
+    points = [int(curve.pop("Points")) for curve in curves]  # type: ignore[call-overload]
+    meta = {
+        "Duration": round(float(motion.time_s[-1]), 6),
+        "Fps": FPS,
+        "Loop": False,
+        "AreBeziersRestricted": True,
+        "CurveCount": len(curves),
+        "TotalSegmentCount": sum(points) - len(points),
+        "TotalPointCount": sum(points),
+        "UserDataCount": 0,
+        "TotalUserDataSize": 0,
+    }
+    path.write_text(as_json({"Version": 3, "Meta": meta, "Curves": curves}) + "\n", encoding="utf-8")
+
+
+def mouth_open(generation: Generation) -> Array:
+    """Return how far the mouth is open, 0 to 1 [shape=(T,)]; 0 where the lips touch."""
+    motion = generation.motion
+    if "opening" in motion.names:
+        gap = lip_gap(motion["opening"].astype(np.float64), rest_frames(motion, generation.units))
+    else:
+        gap = _by_weights(motion, arkit_mouth().gap)
+    return np.clip(gap / WHOLLY_OPEN, 0.0, 1.0)
+
+
+def mouth_form(generation: Generation) -> Array:
+    """Return the form of the mouth, −1 puckered to 1 wide [shape=(T,)]; 0 at rest, and where no channel says it."""
+    motion = generation.motion
+    if "opening" in motion.names and "width" in motion.names:
+        width = motion["width"].astype(np.float64)
+        wider = width - np.median(width[rest_frames(motion, generation.units)])
+    else:
+        template = mouth_template()
+        corners = arkit_mouth().moved[:, [template.row(LEFT_CORNER), template.row(RIGHT_CORNER)], 0]
+        wider = _by_weights(motion, corners[:, 0] - corners[:, 1])
+    return np.clip(wider / np.where(wider > 0, WIDEST, NARROWEST), -1.0, 1.0)
+
+
+def _by_weights(motion: Motion, effects: Array) -> Array:
+    """Return the sum of the effects of blendshapes by their weights [shape=(T,)]."""
+    total = np.zeros(len(motion.values))
+    for name, effect in zip(arkit_mouth().known, effects, strict=True):
+        if name in motion.names:
+            total += effect * motion[name]
+    return total
+
+
+def kept_keys(time_s: Array, values: Array, tolerance: float) -> list[int]:
+    """Return frames between which straight lines stay within a tolerance of all values, the first and last among them.
+
+    Source: Douglas and Peucker 1973, with vertical distances.  Cost: O(T log T) for most curves.
+    """
+    kept, spans = {0, len(values) - 1}, [(0, len(values) - 1)]
+    while spans:
+        first, last = spans.pop()
+        if last - first < 2:
+            continue
+        inner = slice(first + 1, last)
+        share = (time_s[inner] - time_s[first]) / (time_s[last] - time_s[first])
+        off = np.abs(values[inner] - values[first] - share * (values[last] - values[first]))
+        worst = int(off.argmax())
+        if off[worst] > tolerance:
+            middle = first + 1 + worst
+            kept.add(middle)
+            spans += [(first, middle), (middle, last)]
+    return sorted(kept)
+
+
+MOTION_FORMAT = MotionFormat(write, check=check)

@@ -1,0 +1,28 @@
+"""Files of labels in time: the format is chosen by the suffix."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from lipmotion.export.textgrid import TEXTGRID_SUFFIX, write_textgrid
+from lipmotion.export.webvtt import VTT_SUFFIX, write_webvtt
+from lipmotion.types import Timeline, Unit
+
+_WRITERS: dict[str, Callable[[Path, Timeline[Unit]], None]] = {
+    TEXTGRID_SUFFIX: write_textgrid,
+    VTT_SUFFIX: write_webvtt,
+}
+LABEL_SUFFIXES = tuple(_WRITERS)
+"""Suffixes of label files, as programs write them; capitals do not matter."""
+
+
+def holds_labels(path: Path) -> bool:
+    """Return whether a file of that name holds labels in time."""
+    return path.suffix.lower() in map(str.lower, LABEL_SUFFIXES)
+
+
+def write_labels(path: Path, units: Timeline[Unit]) -> None:
+    """Write phones and words in time in the format of the suffix. Raises ExportError: the file cannot be written."""
+    write = next(write for suffix, write in _WRITERS.items() if suffix.lower() == path.suffix.lower())
+    write(path, units)

@@ -1,0 +1,97 @@
+"""What a motion file holds: the channels that were asked for, or the curves of its format."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from lipmotion.export.base import motion_format, motion_suffix
+from lipmotion.faces.base import Staging
+from lipmotion.pipeline.characters import ARKIT, WHOLE_FACE, beside, curves_of
+from lipmotion.pipeline.living_curves import RADIAN, living_curves
+from lipmotion.rig.driven import at_times
+from lipmotion.rig.facial_animation import FAP
+from lipmotion.rig.point_motion import point_motion
+from lipmotion.rig.rig_tables import CONTROL
+from lipmotion.rig.shape_names import arkit_name
+from lipmotion.types import WEIGHT, Channel, Generation, Motion, Prosody
+
+CURVES = (WEIGHT, CONTROL, RADIAN)
+"""The units of curves that drive a character."""
+SAME_HZ = 1e-6
+OPENING = "opening"
+
+
+def in_format(
+    path: Path,
+    generation: Generation,
+    chosen: Generation,
+    rate_hz: float | None,
+    staging: Staging | None = None,
+    prosody: Prosody | None = None,
+) -> Generation:
+    """Return a generation as a motion file of that name holds it.
+
+    chosen  : the generation with the channels, and at the rate, that the user asked for: what most formats hold
+    rate_hz : the rate that the user asked for; None: that of the format, or else that of the motion
+    staging, prosody : of what moves on its own, in formats that hold a whole face; None: everything moves; not known
+    Where the lips close between two frames of curves, the nearer one shows it. Blendshapes that the motion has
+    already, by any spelling of ARKit's names, are taken as they are.
+    Raises ExportError: unknown suffix. Raises InputError: curves that cannot be computed.
+    """
+    form = motion_format(path)
+    held = chosen
+    others = form.other_curves and all(channel.unit in CURVES for channel in held.motion.channels)
+    if form.curves and not others:
+        curves = _curves(generation, form.curves, staging, prosody)
+        held = replace(generation, motion=curves, spread=np.zeros(curves.values.shape))
+    hertz = rate_hz or form.rate_hz
+    if hertz is None or abs(hertz - held.motion.rate_hz) < SAME_HZ:
+        return held
+    resampled = held.resampled(hertz)
+    if held is chosen or OPENING not in generation.motion.names:
+        return resampled
+    gap = point_motion(generation.motion, generation.units).gap
+    rows = at_times(held.motion.values.astype(np.float64), gap, held.motion.rate_hz, resampled.motion.time_s)
+    return replace(resampled, motion=replace(resampled.motion, values=rows))
+
+
+def needs_prosody(path: Path) -> bool:
+    """Return whether a motion file of that name holds movements that follow loudness and pitch."""
+    return bool(motion_suffix(path)) and motion_format(path).curves == WHOLE_FACE
+
+
+def _curves(generation: Generation, name: str, staging: Staging | None, prosody: Prosody | None) -> Motion:
+    """Return a set of curves, with those that the motion has already."""
+    motion, units = generation.motion, generation.units
+    own = _held_already(motion, name)
+    if own is None:
+        return curves_of(motion, units, name, staging=staging, prosody=prosody)
+    if name != WHOLE_FACE or OPENING not in motion.names:
+        return own
+    living = living_curves(motion, units, staging, prosody)
+    added = [column for column, name in enumerate(living.names) if name not in own.names]
+    channels = tuple(living.channels[column] for column in added)
+    return beside(own, Motion(living.values[:, added], motion.rate_hz, channels))
+
+
+def _held_already(motion: Motion, curves: str) -> Motion | None:
+    """Return the channels of a motion that are curves of a set already; None: there are none."""
+    if curves in (ARKIT, WHOLE_FACE):
+        return _blendshapes(motion)
+    columns = [column for column, channel in enumerate(motion.channels) if channel.unit == curves == FAP]
+    if not columns:
+        return None
+    return Motion(motion.values[:, columns], motion.rate_hz, tuple(motion.channels[column] for column in columns))
+
+
+def _blendshapes(motion: Motion) -> Motion | None:
+    """Return the channels of a motion that are ARKit's blendshapes, by ARKit's names; None: it has no jawOpen."""
+    known = {arkit_name(name): column for column, name in reversed(list(enumerate(motion.names)))}
+    columns = [(name, column) for name, column in sorted(known.items(), key=lambda each: each[1]) if name]
+    if "jawOpen" not in known:
+        return None
+    channels = tuple(Channel(name, motion.channels[column].unit) for name, column in columns)
+    return Motion(motion.values[:, [column for _, column in columns]], motion.rate_hz, channels)

@@ -1,0 +1,65 @@
+"""Rows that come at uneven times, as rows at a steady rate."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import InputError
+
+Array = NDArray[np.float64]
+
+USUAL_RATES_HZ = (24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 90.0, 100.0, 120.0, 240.0)
+"""Frame rates of cameras and of motion capture."""
+NEAR_RATE = 0.15
+"""Uneven rows whose median rate is this near to a usual one, as a share, are put on a grid of that rate. Times stay."""
+EVEN_SHARE = 0.1
+"""Times that are this near to an even grid, as a share of a step, are even: the rows are taken as they are."""
+ROUNDING = 0.002
+"""Rounding of times, as a share of a step: rows that are about as even at a usual rate have that rate."""
+LONGEST_GAP = 3
+"""Most frames of the steady rate for each row: a table whose time is mostly gaps is refused."""
+SPARE_FRAMES = 600
+"""Frames of gaps that are allowed besides, so that a short take may have a long gap."""
+
+
+def steady_rows(time_s: Array, rows: Array) -> tuple[Array, float]:
+    """Return rows at a steady rate that begin at the first time, and the rate in hertz.
+
+    time_s : increasing, seconds [shape=(N,)];  rows : one for each time [shape=(N, P)]
+    The rate of uneven rows is that of the median step, or the usual rate next to it. Rows that are
+    even already are returned as they are; between others the values are linear, and gaps are bridged.
+    Raises InputError: fewer than two rows, times that do not increase, or far more gaps than rows.
+    """
+    if len(time_s) < 2:
+        raise InputError(f"{len(time_s)} rows with values, required two or more; their times say the frame rate")
+    steps = np.diff(time_s)
+    if not steps.min() > 0:
+        row = int(np.argmin(steps)) + 2
+        raise InputError(f"the time of row {row} is not after that of the row before, required: times that increase")
+    passed_s = time_s - time_s[0]
+    mean_hz = (len(time_s) - 1) / float(passed_s[-1])
+    usual_hz = min(USUAL_RATES_HZ, key=lambda usual: abs(usual - mean_hz))
+    off, usual_off = (_unevenness(passed_s, hertz) for hertz in (mean_hz, usual_hz))
+    if min(off, usual_off) <= EVEN_SHARE:
+        return rows, usual_hz if usual_off <= 2 * off + ROUNDING else round(mean_hz, 6)
+    hertz = _usual(1 / float(np.median(steps)))
+    frames = round(float(passed_s[-1]) * hertz) + 1
+    if frames > LONGEST_GAP * len(time_s) + SPARE_FRAMES:
+        raise InputError(
+            f"{len(time_s)} rows in {passed_s[-1]:.1f} s at {hertz:g} rows a second: most of the time there are none; "
+            "cut the take where it has gaps"
+        )
+    grid_s = np.arange(frames) / hertz
+    return np.stack([np.interp(grid_s, passed_s, column) for column in rows.T], axis=1), round(hertz, 6)
+
+
+def _unevenness(passed_s: Array, hertz: float) -> float:
+    """Return how far times are from an even grid at most, as a share of a step."""
+    return float(np.abs(passed_s * hertz - np.arange(len(passed_s))).max())
+
+
+def _usual(hertz: float) -> float:
+    """Return the usual rate next to a measured one, or the measured one."""
+    nearest = min(USUAL_RATES_HZ, key=lambda usual: abs(usual - hertz))
+    return nearest if abs(nearest - hertz) <= NEAR_RATE * nearest else hertz

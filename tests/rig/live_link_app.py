@@ -1,0 +1,53 @@
+"""Files as the app Live Link Face writes them, for tests."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from lipmotion.types import Motion
+
+COLUMNS = (
+    *("EyeBlinkLeft", "EyeLookDownLeft", "EyeLookInLeft", "EyeLookOutLeft", "EyeLookUpLeft", "EyeSquintLeft"),
+    *("EyeWideLeft", "EyeBlinkRight", "EyeLookDownRight", "EyeLookInRight", "EyeLookOutRight", "EyeLookUpRight"),
+    *("EyeSquintRight", "EyeWideRight", "JawForward", "JawRight", "JawLeft", "JawOpen", "MouthClose", "MouthFunnel"),
+    *("MouthPucker", "MouthRight", "MouthLeft", "MouthSmileLeft", "MouthSmileRight", "MouthFrownLeft"),
+    *("MouthFrownRight", "MouthDimpleLeft", "MouthDimpleRight", "MouthStretchLeft", "MouthStretchRight"),
+    *("MouthRollLower", "MouthRollUpper", "MouthShrugLower", "MouthShrugUpper", "MouthPressLeft", "MouthPressRight"),
+    *("MouthLowerDownLeft", "MouthLowerDownRight", "MouthUpperUpLeft", "MouthUpperUpRight", "BrowDownLeft"),
+    *("BrowDownRight", "BrowInnerUp", "BrowOuterUpLeft", "BrowOuterUpRight", "CheekPuff", "CheekSquintLeft"),
+    *("CheekSquintRight", "NoseSneerLeft", "NoseSneerRight", "TongueOut", "HeadYaw", "HeadPitch", "HeadRoll"),
+    *("LeftEyeYaw", "LeftEyePitch", "LeftEyeRoll", "RightEyeYaw", "RightEyePitch", "RightEyeRoll"),
+)
+"""The 61 curves in the order of the app."""
+HEAD = ",".join(["Timecode", "BlendShapeCount", *COLUMNS])
+
+
+def timecode(time_s: float, rate: float = 60.0, mark: str = ":") -> str:
+    """Return a time as ``HH:MM:SS:FF.mmm``."""
+    thousandths = round(time_s * rate * 1000)
+    frames, thousandth = divmod(thousandths, 1000)
+    seconds, frame = divmod(frames, round(rate))
+    minutes, second = divmod(seconds, 60)
+    return f"{minutes // 60 % 24:02d}:{minutes % 60:02d}:{second:02d}{mark}{frame:02d}.{thousandth:03d}"
+
+
+def write_take(
+    path: Path, motion: Motion, times_s: np.ndarray | None = None, *, start_s: float = 62_000.0, rate: float = 60.0
+) -> None:
+    """Write motion as a take of the app; curves that it has not are 0.
+
+    motion  : channels with the names of ``COLUMNS``, in any capitals
+    times_s : of the rows, from the start of the take; the values are taken from the motion at these times
+    start_s : the timecode of the start, seconds since midnight
+    rate    : frames a second of the timecode
+    """
+    times_s = motion.time_s if times_s is None else times_s
+    held = motion.at(times_s)
+    lower = [name.lower() for name in motion.names]
+    columns = [held[:, lower.index(name.lower())] if name.lower() in lower else held[:, 0] * 0 for name in COLUMNS]
+    with path.open("w", encoding="utf-8", newline="\n") as file:
+        file.write(HEAD + "\n")
+        for time_s, row in zip(times_s, np.stack(columns, axis=1), strict=True):
+            file.write(f"{timecode(start_s + time_s, rate)},{len(COLUMNS)},{','.join(f'{v:.10f}' for v in row)}\n")
