@@ -3,29 +3,34 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
-from lipmotion.cli.options import add_execution, worker_count
+from lipmotion.cli.options import add_execution
 from lipmotion.cli.output import print_note
 from lipmotion.cli.paths import add_output
-from lipmotion.cli.results import add_result_arguments, check_results, write_results
-from lipmotion.cli.speech import add_speech_arguments, request_and_model
+from lipmotion.cli.pipes import add_pipe_format, read_pipe, written_pipe
+from lipmotion.cli.results import add_result_arguments, check_results, work_of, write_results
+from lipmotion.cli.several import add_kinds_argument, animated_one_by_one
+from lipmotion.cli.speech import add_speech_arguments, model_loader, spoken_request
 from lipmotion.printable import printable
 
 if TYPE_CHECKING:
     from lipmotion.cli.progress import Report
-    from lipmotion.types.generation import Outlook
+    from lipmotion.pipeline.model import Model
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb to the parser of the command line."""
     parser = verbs.add_parser("animate", help="turn speech into lip motion or an animated face")
-    add_speech_arguments(parser)
-    add_result_arguments(parser, "FILE.mp4 .webm .mov %%05d.png .json .csv .npz .TextGrid, or several")
+    add_speech_arguments(parser, several=True)
+    add_result_arguments(parser, "FILE.mp4 .webm .mov %%05d.png .json .csv .npz .TextGrid, or several; FOLDER/; -")
     posteriors = "draw the posterior probabilities of the chains' units over time (coupled models)"
     add_output(parser, "--posteriors", metavar="FILE.png", help=posteriors)
-    add_execution(parser)
+    for add_more in (add_kinds_argument, add_pipe_format, add_execution):
+        add_more(parser)
     parser.set_defaults(run=run)
 
 
@@ -33,14 +38,19 @@ def run(options: argparse.Namespace) -> None:
     """Call ``lipmotion.animate`` and ``lipmotion.write``; print the paths that were written."""
     from lipmotion.cli.progress import reporting
 
+    load, note = model_loader(options), ""
     with reporting(options) as report:
-        outlook = _animate(options, report)
-    if outlook is not None:
-        print_note(outlook.text)
+        if animated_one_by_one(options, report, partial(_animate, load)):
+            return
+        with read_pipe(options.speech[0]) as options.speech, written_pipe(options) as pipe:
+            note = _animate(load, options, report)
+        written = [str(path) for path in (*options.output, options.posteriors) if path and not pipe]
+        report.finish("\n".join(map(printable, written)), files=written)
+    print_note(note)
 
 
-def _animate(options: argparse.Namespace, report: Report) -> Outlook | None:
-    """Write the outputs; return what is to be said of the recording."""
+def _animate(load: Callable[[], Model], options: argparse.Namespace, report: Report) -> str:
+    """Write the outputs of one recording; return what is to be said of it."""
     from lipmotion.pipeline.animate import animate
     from lipmotion.pipeline.film.video import person_shown
     from lipmotion.pipeline.posteriors import animate_with_posteriors, check_picture, write_posteriors
@@ -48,15 +58,13 @@ def _animate(options: argparse.Namespace, report: Report) -> Outlook | None:
     check_results(options, options.speech)
     if options.posteriors:
         check_picture(options.posteriors, options.speech)
-    request, model = request_and_model(options)
+    request, model = spoken_request(options), load()
     if request.onto is None:
         request = replace(request, onto=person_shown(model, options.face, options.speaker))
     if options.posteriors:
         result, posteriors = animate_with_posteriors(request, model=model)
         write_posteriors(options.posteriors, result, posteriors)
     else:
-        result = animate(request, model=model, workers=worker_count(options))
+        result = animate(request, model=model, **work_of(options, report))
     write_results(options, result, options.speech, model, report)
-    written = [str(path) for path in (*options.output, options.posteriors) if path]
-    report.finish("\n".join(map(printable, written)), files=written)
-    return result.outlook
+    return result.outlook.text if result.outlook is not None else ""

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from lipmotion.cli.paths import add_input
-from lipmotion.cli.staging import staging_of
 
 if TYPE_CHECKING:
     from lipmotion.rig.driven import DrivenCharacter
-    from lipmotion.types import Audio, Generation
 
 
 def add_character_file(parser: argparse.ArgumentParser) -> None:
@@ -59,22 +56,10 @@ def driven(options: argparse.Namespace) -> DrivenCharacter:
     return driven_character(options.character, **how)
 
 
-def chosen_curves(
-    options: argparse.Namespace, result: Generation, speech: Path | Audio
-) -> tuple[Generation, list[str] | None]:
-    """Return a generation with the curves that were asked for, and the channels of motion files (None: all).
+def chosen_curves(options: argparse.Namespace) -> str | DrivenCharacter | None:
+    """Return what motion files hold: the set of ``--curves``, else the weights of a character that has blendshapes.
 
-    With a character that has blendshapes, their weights; with ``--curves``, that set.
-    speech : the recording, or the sound
+    None: the channels of the motion.
     """
-    from lipmotion.pipeline.characters import WHOLE_FACE, with_curves
-    from lipmotion.pipeline.drawn_video import prosody_heard
-
-    wanted = options.channels.split(",") if options.channels is not None else None
     weighed = options.driven if options.driven is not None and options.driven.shapes is not None else None
-    curves = options.curves or weighed
-    if curves is None:
-        return result, wanted
-    heard = prosody_heard(speech) if curves == WHOLE_FACE else None
-    with_all, names = with_curves(result, curves, staging=staging_of(options), prosody=heard)
-    return with_all, list(names) if wanted is None else wanted
+    return options.curves or weighed

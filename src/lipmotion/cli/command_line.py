@@ -16,6 +16,7 @@ from lipmotion.cli import (
     adapt,
     addon,
     animate,
+    batch,
     character,
     cite,
     corpus,
@@ -25,6 +26,7 @@ from lipmotion.cli import (
     explain,
     face,
     info,
+    render,
     speak,
     train,
     words,
@@ -36,7 +38,7 @@ from lipmotion.cli.stop import Stopper
 from lipmotion.printable import printable
 
 VERBS = (
-    *(animate, speak, explain, cues, words, corpus, train, adapt, face),
+    *(animate, batch, speak, render, explain, cues, words, corpus, train, adapt, face),
     *(character, addon, evaluate, experiment, info, cite),
 )
 EXIT_CODES = """exit codes: 0 done, 1 a bug, 2 wrong command line, 3 unusable input, 4 corpus, 5 alignment,

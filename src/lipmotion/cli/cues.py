@@ -6,8 +6,10 @@ import argparse
 from contextlib import nullcontext
 from typing import Any
 
+from lipmotion.cli.delivery import add_delivery_arguments, delivery_of
 from lipmotion.cli.output import flush_output, print_line, print_lines
 from lipmotion.cli.paths import add_output
+from lipmotion.cli.pipes import read_pipe
 from lipmotion.cli.speech import add_speech_arguments, request_and_model
 from lipmotion.cli.status import status_lines
 
@@ -31,6 +33,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     add("--hold", type=int, metavar="FRAMES", help="minimum length of a shape (default: that of two frames at 24 fps)")
     add("--shapes", default="GHX", help="optional shapes that the character has (default: GHX; none: '')")
     add("--machine-readable", "--machineReadable", action="store_true", help="progress as JSON lines on standard error")
+    add_delivery_arguments(parser, steps=False)
     parser.set_defaults(run=run)
 
 
@@ -39,7 +42,9 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.pipeline.animate import animate
     from lipmotion.pipeline.cues import check_cue_options, check_cue_outputs, cue_text, cues, write_cues
 
-    with status_lines(options) if options.machine_readable else nullcontext(lambda _: None) as set_progress:
+    status = status_lines(options) if options.machine_readable else nullcontext(lambda _: None)
+    with status as set_progress, read_pipe(options.speech) as options.speech:
+        delivery = delivery_of(options)
         check_cue_options(options.fps, options.hold, options.shapes)
         check_cue_outputs(options.output, options.speech, options.format)
         set_progress(0.0)
@@ -47,7 +52,7 @@ def run(options: argparse.Namespace) -> None:
         set_progress(0.1)
         result = animate(request, model=model)
         set_progress(0.9)
-        sheet = cues(result, fps=options.fps, hold_frames=options.hold, shapes=options.shapes)
+        sheet = cues(result, fps=options.fps, hold_frames=options.hold, shapes=options.shapes, delivery=delivery)
         write_cues(sheet, options.output, speech=options.speech, form=options.format)
         set_progress(1.0)
         for path in options.output:

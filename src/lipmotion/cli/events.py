@@ -16,8 +16,10 @@ if TYPE_CHECKING:
 OPTIONS = ("--machine-readable", "--machineReadable")
 STATUS_VERBS, LINES_VERBS = (
     ("cues",),
-    ("animate", "face", "speak", "words", "corpus", "train", "evaluate", "experiment"),
+    ("animate", "batch", "render", "face", "speak", "words", "corpus", "train", "evaluate", "experiment"),
 )
+
+STANDARD_OUTPUT = "-"
 
 
 class Events:
@@ -36,22 +38,25 @@ class Events:
 
 
 class JsonLines(Events):
-    """One JSON object per line on standard output (docs/long-work.md)."""
+    """One JSON object per line on standard output (docs/long-work.md), or on standard error if ``-`` is an output."""
 
     def __init__(self) -> None:
         self._ended = False
+        self._on_error = False
 
-    def start(self, options: Namespace) -> None:  # noqa: D102, ARG002
+    def start(self, options: Namespace) -> None:  # noqa: D102
+        outputs = getattr(options, "output", None)
+        self._on_error = isinstance(outputs, list) and STANDARD_OUTPUT in outputs
         self.emit("start")
 
     def emit(self, kind: str, /, **fields: Any) -> None:
         """Write one event; nothing after the last one. Raises ExportError: standard output cannot be written."""
         if self._ended:
             return
-        from lipmotion.cli.output import output_error, print_json
+        from lipmotion.cli.output import output_error, print_error_json, print_json
 
         try:
-            print_json({"type": kind, **fields})
+            (print_error_json if self._on_error else print_json)({"type": kind, **fields})
         except OSError as error:  # a full disk, or a reader that has gone: nobody would receive the result
             self._ended = True
             raise output_error(error) from error

@@ -6,8 +6,10 @@ Only this module writes to the standard streams.
 from __future__ import annotations
 
 import os
+import shutil
 import sys
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 from lipmotion.errors import ExportError
@@ -28,6 +30,19 @@ def print_lines(text: str) -> None:
     print("\n".join("\t".join(map(printable, line.split("\t"))) for line in text.split("\n")))
 
 
+def write_bytes(path: Path) -> None:
+    """Write the content of a file to standard output as it is. Raises ExportError: it cannot be written."""
+    flush_output()
+    try:
+        with path.open("rb") as file:
+            shutil.copyfileobj(file, sys.stdout.buffer)
+        sys.stdout.buffer.flush()
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise output_error(error) from error
+
+
 def print_error(text: object) -> None:
     """Print one line with the program's name on standard error, if standard error is open."""
     with suppress(OSError):
@@ -36,8 +51,11 @@ def print_error(text: object) -> None:
 
 
 def print_note(text: object) -> None:
-    """Print one line for people on standard error, if it is a terminal: programs find the same in files."""
-    if sys.stderr is not None and sys.stderr.isatty():
+    """Print one line for people on standard error, if it is a terminal: programs find the same in files.
+
+    An empty text is not printed.
+    """
+    if text and sys.stderr is not None and sys.stderr.isatty():
         print_error(text)
 
 

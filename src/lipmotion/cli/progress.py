@@ -84,7 +84,8 @@ class _TerminalReport:
     def finish(self, text: str, **_: Any) -> None:
         self.close()
         self._stopper.settle()
-        print_lines(text)
+        if text:
+            print_lines(text)
 
     def close(self) -> None:
         if self._bar is not None:

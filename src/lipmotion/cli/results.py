@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +12,9 @@ from lipmotion.cli.characters import (
     chosen_curves,
     open_character,
 )
+from lipmotion.cli.delivery import add_delivery_arguments, delivery_of
 from lipmotion.cli.faces import add_face_arguments, film_options
+from lipmotion.cli.options import worker_count
 from lipmotion.cli.paths import add_output
 from lipmotion.cli.staging import add_staging_arguments, staging_of
 
@@ -19,6 +22,9 @@ if TYPE_CHECKING:
     from lipmotion.cli.progress import Report
     from lipmotion.pipeline.model import Model
     from lipmotion.types import Audio, Generation
+
+RECOGNITION = 0.3
+"""The share of the work that is recognition, where a video is drawn, too."""
 
 
 def add_result_arguments(parser: argparse.ArgumentParser, files: str, *, required: bool = True) -> None:
@@ -30,7 +36,9 @@ def add_result_arguments(parser: argparse.ArgumentParser, files: str, *, require
     outputs: dict[str, Any] = {"type": str, "nargs": "+", "action": "extend", "required": required}
     outputs |= {} if required else {"default": []}
     add_output(parser, "-o", "--output", force=True, help=files, **outputs)
-    parser.add_argument("--rate", type=float, metavar="HZ", help="frames per second of motion files (default: 100)")
+    parser.add_argument(
+        "--rate", type=float, metavar="HZ", help="frames per second of motion files (default: --fps, or 100)"
+    )
     parser.add_argument("--channels", metavar="NAME,NAME", help="write only these to motion files: opening,width,...")
     rate = "frames per second of videos (default: 25; of filmed faces, those of the footage)"
     parser.add_argument("--fps", type=float, help=rate)
@@ -39,6 +47,7 @@ def add_result_arguments(parser: argparse.ArgumentParser, files: str, *, require
     add_face_arguments(parser)
     add_character_arguments(parser)
     add_staging_arguments(parser)
+    add_delivery_arguments(parser)
 
 
 def check_results(options: argparse.Namespace, speech: Path | None = None) -> None:
@@ -51,11 +60,12 @@ def check_results(options: argparse.Namespace, speech: Path | None = None) -> No
     open_character(options)
     options.face = opened_face(options.face)
     checked = {"rate_hz": options.rate, "fps": options.fps, "face": options.face, "film": film_options(options)}
+    checked["delivery"] = delivery_of(options)
     check_outputs(options.output, speech, **checked, staging=staging_of(options), with_sound=speech is None)
 
 
 def write_results(
-    options: argparse.Namespace, result: Generation, speech: Path | Audio, model: Model, report: Report
+    options: argparse.Namespace, result: Generation, speech: Path | Audio, model: Model | None, report: Report
 ) -> None:
     """Write generated motion to the outputs.
 
@@ -63,18 +73,44 @@ def write_results(
     report : receives the progress of videos
     """
     from lipmotion.pipeline.animate import with_articulation, write
+    from lipmotion.types.progress import sub_monitor
 
-    drawn, channels = chosen_curves(options, result, speech)
+    delivery = delivery_of(options)
     write(
-        with_articulation(drawn) if options.articulation else drawn,
+        with_articulation(result) if options.articulation else result,
         options.output,
         speech=speech,
         model=model,
-        channels=channels,
-        rate_hz=options.rate,
+        channels=options.channels.split(",") if options.channels is not None else None,
+        curves=chosen_curves(options),
+        rate_hz=rate_of(options),
         fps=options.fps,
         face=options.face,
         film=film_options(options),
         staging=staging_of(options),
-        monitor=report.receive,
+        delivery=delivery,
+        monitor=sub_monitor(report.receive, RECOGNITION, 1.0),
     )
+
+
+def work_of(options: argparse.Namespace, report: Report) -> dict[str, Any]:
+    """Return how ``animate`` works for the outputs: processes, monitor, and what it loads meanwhile.
+
+    Recognition is the whole work, or its first part where a video is drawn, too; what draws it is loaded meanwhile.
+    """
+    from lipmotion.faces.base import Face
+    from lipmotion.pipeline.drawn_video import load_drawing, shows_face
+    from lipmotion.types.progress import sub_monitor
+
+    draws = any(shows_face(Path(output)) for output in options.output)
+    return {
+        "workers": worker_count(options),
+        "monitor": sub_monitor(report.receive, 0.0, RECOGNITION if draws else 1.0),
+        "meanwhile": partial(load_drawing, options.face) if draws and isinstance(options.face, Face) else None,
+    }
+
+
+def rate_of(options: argparse.Namespace) -> float | None:
+    """Return the frame rate of motion files: that of ``--rate``, else that of ``--fps``, else None: the model's."""
+    rate_hz: float | None = options.fps if options.rate is None else options.rate
+    return rate_hz

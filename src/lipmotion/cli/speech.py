@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,9 +18,12 @@ LEXICON = "pronunciations, one per line: WORD PHONE PHONE ..."
 MODEL = "trained model (default: the one that ships with the package)"
 
 
-def add_speech_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the recording, its transcript, lexicon, units, recogniser and speaker, the model, and another person."""
-    add_recording_arguments(parser)
+def add_speech_arguments(parser: argparse.ArgumentParser, *, several: bool = False) -> None:
+    """Add the recording, its transcript, lexicon, units, recogniser and speaker, the model, and another person.
+
+    several : there may be several recordings, and folders of them
+    """
+    add_recording_arguments(parser, several=several)
     add_model_argument(parser)
     add_onto_arguments(parser)
 
@@ -31,9 +36,11 @@ def add_onto_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--onto-speaker", default="", metavar="NAME", help=which)
 
 
-def add_recording_arguments(parser: argparse.ArgumentParser) -> None:
+def add_recording_arguments(parser: argparse.ArgumentParser, *, several: bool = False) -> None:
     """Add the recording, its transcript, lexicon, units, recogniser and speaker."""
-    add_input(parser, "speech", what="recording", help="audio or video file")
+    many: dict[str, Any] = {"nargs": "+", "help": "audio or video file, -: standard input; several, or a folder"}
+    one = {"help": "audio or video file, -: standard input"}
+    add_input(parser, "speech", what="recording", **(many if several else one))
     transcript: dict[str, Any] = {
         "type": str,
         "metavar": "TEXT|FILE",
@@ -80,13 +87,31 @@ def add_recogniser_argument(parser: argparse.ArgumentParser) -> None:
 
 def request_and_model(options: argparse.Namespace) -> tuple[SpeechRequest, Model]:
     """Return the request of the arguments of ``add_speech_arguments``, files read, and the model."""
+    from lipmotion.pipeline.model import load_model
+
+    return spoken_request(options), load_model(options.model)
+
+
+def model_loader(options: argparse.Namespace) -> Callable[[], Model]:
+    """Return a function that loads the model when it is first called."""
+
+    @cache
+    def load() -> Model:
+        from lipmotion.pipeline.model import load_model
+
+        return load_model(options.model)
+
+    return load
+
+
+def spoken_request(options: argparse.Namespace) -> SpeechRequest:
+    """Return the request of the arguments of ``add_speech_arguments``, files read."""
     from lipmotion.cli.texts import text_or_file_content
     from lipmotion.pipeline.given_units import read_units
-    from lipmotion.pipeline.model import load_model
     from lipmotion.pipeline.request import SpeechRequest
     from lipmotion.units import Lexicon
 
-    request = SpeechRequest(
+    return SpeechRequest(
         options.speech,
         transcript=text_or_file_content(options.transcript) if options.transcript is not None else None,
         units=read_units(options.units) if options.units else None,
@@ -96,4 +121,3 @@ def request_and_model(options: argparse.Namespace) -> tuple[SpeechRequest, Model
         onto=options.onto,
         onto_speaker=options.onto_speaker,
     )
-    return request, load_model(options.model)

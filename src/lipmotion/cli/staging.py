@@ -16,9 +16,6 @@ MOVING = ("blinks", "gaze", "brows", "head")
 def add_staging_arguments(parser: argparse.ArgumentParser) -> None:
     """Add how a drawn face is shown (docs/faces.md)."""
     parser.add_argument("--size", type=int, default=0, metavar="PIXELS", help="height of the face's picture")
-    parser.add_argument(
-        "--intensity", type=float, default=1.0, metavar="X", help="movements of the face's mouth X times"
-    )
     still = "what does not move on its own, with commas: blinks,gaze,brows,head"
     parser.add_argument("--still", default="", metavar="NAME,NAME", help=still)
     parser.add_argument("--face-seed", type=int, default=0, metavar="N", help="other blinks, glances and nods")
@@ -36,7 +33,6 @@ def staging_of(options: argparse.Namespace) -> Staging:
     return Staging(
         size=options.size,
         background=SCENE if is_filmed(options) else options.background or SCENE,
-        intensity=options.intensity,
         seed=options.face_seed,
         **{name: name not in still for name in MOVING},
     )

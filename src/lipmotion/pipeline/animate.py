@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,7 +16,17 @@ from lipmotion.faces.base import Face, Staging
 from lipmotion.faces.filmed.face import SUFFIX, FilmedFace, load_face
 from lipmotion.faces.registry import FACES, face_named
 from lipmotion.kernels.threads import one_thread
+from lipmotion.motion.delivery import Delivery, closed_on_grid, closed_times, held, sound_units
 from lipmotion.motion.gestures import GESTURES, with_gestures
+from lipmotion.pipeline.characters import WHOLE_FACE, with_curves
+from lipmotion.pipeline.delivered import (
+    check_delivery,
+    delivered,
+    delivered_scene,
+    moved_prosody,
+    shown,
+    staged_intensity,
+)
 from lipmotion.pipeline.drawn_video import (
     OPAQUE_SUFFIX,
     VIDEO_SUFFIXES,
@@ -31,19 +41,33 @@ from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.motion_files import in_format, needs_prosody
 from lipmotion.pipeline.outlook import outlook_of
 from lipmotion.pipeline.request import SpeechInput, request_of
-from lipmotion.pipeline.scenes import SCENE_SUFFIXES, is_scene, scene_of, sound_reference, write_scene
+from lipmotion.pipeline.scenes import SCENE_SUFFIXES, is_scene, sound_reference, write_scene
 from lipmotion.pipeline.speakers import generate_for
 from lipmotion.pipeline.transfer import person_of
 from lipmotion.pipeline.understand import understood_speech
 from lipmotion.pipeline.workers import map_in_processes
+from lipmotion.rig.blendshape_motion import is_of_blendshapes
+from lipmotion.rig.driven import DrivenCharacter
 from lipmotion.speech.audio_files import read_audio
 from lipmotion.storage.files import as_text, check_distinct, check_target
-from lipmotion.types import Audio, Constraints, Generation, Monitor, TimedTranscript, silent_monitor
+from lipmotion.types import (
+    Audio,
+    Constraints,
+    Generation,
+    Monitor,
+    Motion,
+    Progress,
+    Prosody,
+    TimedTranscript,
+    silent_monitor,
+)
 
 SOUND_RATE_HZ = 48_000
 """Sampling rate of the sound track of a drawn video."""
 DRAWN_HZ = 25.0
 """Frame rate of videos of drawn faces."""
+MOVING = 0.9
+"""The share of the work that is recognition, in reports; the rest is the generation of motion."""
 SLOWEST_HZ, FASTEST_HZ = 1.0, 1000.0
 """Smallest and largest frame rate of a file; a mistyped rate must not fill the memory."""
 
@@ -56,6 +80,8 @@ def animate(
     transcript: str | Path | TimedTranscript | None = None,
     constraints: Constraints | None = None,
     workers: int = 1,
+    monitor: Monitor = silent_monitor,
+    meanwhile: Callable[[], None] | None = None,
 ) -> Generation:
     """Return lip motion for speech: values of all channels at 100 Hz, variances, phones in time, and states.
 
@@ -65,6 +91,8 @@ def animate(
     constraints : values that the motion must take exactly, in the units of the request's speaker
     workers     : number of processes that recognise the words of a long recording. With more than one, a script must be
                   guarded by ``if __name__ == "__main__":``
+    monitor     : receives reports of the progress
+    meanwhile   : is called while these processes work, where there are several: to prepare what is done next
     Raises InputError: the recording, the transcript or a constraint is not usable, or the model knows no such speaker.
     Raises AlignmentError: the transcript cannot be aligned with the recording.
     Source: Hofer, Yamagishi & Shimodaira 2008 (``engines.trajectory``, the engine of the shipped model).
@@ -80,8 +108,10 @@ def animate(
     chosen = model if isinstance(model, Model) else load_model(model)
     request = request_of(speech, transcript)
     person = person_of(chosen, request)
-    understood = understood_speech(chosen, request, map_in_processes(workers))
+    understood = understood_speech(chosen, request, map_in_processes(workers, meanwhile), monitor)
+    monitor(Progress("moving the mouth", 0, 1, MOVING))
     generation = generate_for(person, chosen.engine, chosen.learned, understood.speech, constraints)
+    monitor(Progress("moving the mouth", 1, 1, 1.0))
     return replace(generation, outlook=outlook_of(request, understood))
 
 
@@ -97,6 +127,8 @@ def write(
     face: str | Path | Face | FilmedFace = "portrait",
     film: FilmOptions = FILM,
     staging: Staging | None = None,
+    delivery: Delivery | None = None,
+    curves: str | Path | DrivenCharacter | None = None,
     monitor: Monitor = silent_monitor,
 ) -> None:
     """Write generated motion to one or several files, each in the format of its suffix.
@@ -118,6 +150,9 @@ def write(
     film     : how a filmed face is shown
     staging  : size, background, intensity of a drawn face, and what moves on its own (docs/faces.md); None: the
                defaults
+    delivery : intensity, anticipation, offset and held poses of every output (docs/controls.md); None: as generated
+    curves   : what motion files hold instead of the motion, unless ``channels`` asks for more: ``arkit``, ``visemes``,
+               ``fap``, a table of a rig (``.csv``), or a character with blendshapes (docs/meshes.md)
     monitor  : receives reports of the progress of videos
     Raises ExportError: unknown suffix, no such folder, or a file that cannot be written.
     Raises InputError: a frame rate out of its range, or an unknown channel or face.
@@ -135,6 +170,7 @@ def write(
     sound = speech if isinstance(speech, Audio) else None
     recording = None if isinstance(speech, Audio) else speech
     shown_face = opened_face(face)
+    delivery, staging = delivery or Delivery(), staging or Staging()
     check_outputs(
         paths,
         recording,
@@ -143,25 +179,20 @@ def write(
         face=shown_face,
         film=film,
         staging=staging,
+        delivery=delivery,
         with_sound=sound is not None,
     )
     videos = [path for path in paths if shows_face(path)]
     drawn = [path for path in paths if is_scene(path) or (shows_face(path) and not isinstance(shown_face, FilmedFace))]
-    if drawn and "opening" not in generation.motion.names:
-        raise ExportError(f"{drawn[0]}: the motion has no channel 'opening' to draw a face from; write motion files")
-    if {*(channels or ())} & {*GESTURES}:
-        generation = with_articulation(generation, channels or ())
+    if drawn:
+        check_drawable(drawn[0], generation.motion)
     sounds = [path for path in paths if path.suffix.lower() in SOUND_CODECS]
-    chosen = generation.selected(channels) if channels is not None else generation
-    if rate_hz is not None:
-        chosen = chosen.resampled(rate_hz)
     scenes = [path for path in paths if is_scene(path)]
-    heard = prosody_heard(speech) if speech is not None and (scenes or any(map(needs_prosody, paths))) else None
-    written = {
-        path: in_format(path, generation, chosen, rate_hz, staging, heard) for path in paths if motion_suffix(path)
-    }
-    for path, held in written.items():
-        check_motion(path, held.motion)
+    lives = bool(scenes) or curves == WHOLE_FACE or any(map(needs_prosody, paths))
+    heard = moved_prosody(prosody_heard(speech), delivery) if speech is not None and lives else None
+    written = _motion_files(paths, generation, channels, curves, rate_hz, delivery, staging, heard)
+    for path, each in written.items():
+        check_motion(path, each.motion)
     heard_in = next(iter(sounds), None) if recording is None else Path(recording)
     scene = None
     for path in paths:
@@ -169,20 +200,23 @@ def write(
             write_sound(path, sound)
         elif path in videos:
             played = sound or read_audio(Path(str(recording)), SOUND_RATE_HZ, warn=False)
+            hertz = DRAWN_HZ if fps is None else fps
+            character = curves if isinstance(curves, DrivenCharacter) else None
+            seen = shown(generation, delivery, shown_face, hertz, character)
             if isinstance(shown_face, FilmedFace):
                 filmed = None if recording is None else Path(recording)
                 frames = film_of(
-                    shown_face, generation.motion, speech=filmed, sound=played, model=model, fps=fps, options=film
+                    shown_face, seen.motion, speech=filmed, sound=played, model=model, fps=fps, options=film
                 )
                 write_film(path, frames, played, mark=film.mark, monitor=monitor)
             else:
-                hertz = DRAWN_HZ if fps is None else fps
-                write_drawn_face(path, generation, played, hertz, shown_face, staging or Staging(), monitor)
+                staged = staged_intensity(staging, delivery, shown_face)
+                write_drawn_face(path, seen, played, hertz, shown_face, staged, monitor)
         elif path in scenes:
-            scene = scene or scene_of(generation, shown_face, rate_hz, staging=staging, prosody=heard)
+            scene = scene or delivered_scene(generation, delivery, shown_face, rate_hz, staging=staging, prosody=heard)
             write_scene(path, scene, sound=heard_in)
         elif holds_labels(path):
-            write_labels(path, generation.units)
+            write_labels(path, sound_units(generation.units, delivery, float(generation.motion.time_s[-1])))
         else:
             _write_motion(written[path], path, recording or heard_in, model)
 
@@ -196,11 +230,12 @@ def check_outputs(
     face: str | Path | Face | FilmedFace = "portrait",
     film: FilmOptions = FILM,
     staging: Staging | None = None,
+    delivery: Delivery | None = None,
     with_sound: bool = False,
 ) -> None:
     """Raise ExportError or InputError if an output cannot be written; called before long work begins.
 
-    outputs, speech, rate_hz, fps, face, film, staging : as of ``write``
+    outputs, speech, rate_hz, fps, face, film, staging, delivery : as of ``write``
     with_sound : the speech is, or will be, a sound that is in no file
     """
     for hertz in (fps, rate_hz):
@@ -209,6 +244,7 @@ def check_outputs(
     shown_face = opened_face(face)
     check_film(shown_face, film, speech)
     check_staging(shown_face, staging or Staging())
+    check_delivery(delivery or Delivery(), map(Path, outputs), shown_face)
     suffixes = (
         *motion_suffixes(),
         *VIDEO_SUFFIXES,
@@ -228,6 +264,15 @@ def check_outputs(
             raise ExportError(f"{path}: a video needs the recording: write(..., speech=FILE)")
 
 
+def check_drawable(path: Path, motion: Motion) -> None:
+    """Raise ExportError if motion has no channel from which a face can be drawn."""
+    if "opening" not in motion.names and not is_of_blendshapes(motion):
+        raise ExportError(
+            f"{path}: the motion has no channel 'opening' to draw a face from, nor the blendshape 'jawOpen'; write "
+            "motion files"
+        )
+
+
 def opened_face(face: str | Path | Face | FilmedFace) -> Face | FilmedFace:
     """Return a face by its name, the one in a ``.face`` file, or the same face.
 
@@ -241,6 +286,33 @@ def opened_face(face: str | Path | Face | FilmedFace) -> Face | FilmedFace:
     if str(face) not in FACES.names and beside.is_file():
         raise InputError(f"no drawn face {str(face)!r}; for the filmed face give its file: {beside}")
     return face_named(str(face))
+
+
+def _motion_files(
+    paths: Sequence[Path],
+    generation: Generation,
+    channels: Sequence[str] | None,
+    curves: str | Path | DrivenCharacter | None,
+    rate_hz: float | None,
+    delivery: Delivery,
+    staging: Staging,
+    prosody: Prosody | None,
+) -> dict[Path, Generation]:
+    """Return what each motion file among some outputs holds."""
+    files = [path for path in paths if motion_suffix(path)]
+    if {*(channels or ())} & {*GESTURES}:
+        generation = with_articulation(generation, channels or ())
+    spoken = delivered(generation, delivery)
+    closed_s = closed_times(spoken) if delivery.hold_ms else []
+    if closed_s and rate_hz is not None:
+        spoken = closed_on_grid(spoken, rate_hz)
+    if curves is not None and files:
+        spoken, names = with_curves(spoken, curves, staging=staging, prosody=prosody)
+        channels = names if channels is None else channels
+    chosen = spoken.selected(channels) if channels is not None else spoken
+    chosen = chosen if rate_hz is None else chosen.resampled(rate_hz)
+    written = {path: in_format(path, spoken, chosen, rate_hz, staging, prosody) for path in files}
+    return {path: held(each, delivery.hold_frames(each.motion.rate_hz), closed_s) for path, each in written.items()}
 
 
 def _write_motion(generation: Generation, path: Path, speech: str | Path | None, model: Model | None) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 from lipmotion.errors import InputError
 from lipmotion.faces.base import Staging
 from lipmotion.pipeline.living_curves import living_curves
+from lipmotion.rig.blendshape_motion import given_weights, with_mouth
 from lipmotion.rig.driven import DrivenCharacter
 from lipmotion.rig.facial_animation import fap_motion
 from lipmotion.rig.reference_mouth import arkit_mouth
@@ -44,6 +45,7 @@ def curves_of(
 ) -> Motion:
     """Return motion as curves that drive a character.
 
+    Motion of blendshapes keeps its weights.
     curves : ``arkit``, ``face``, ``visemes``, ``fap``, a table of a rig's controls (``.csv``), or a character with
              blendshapes
     staging, prosody : of the eyes, brows and head of ``face``, as of ``living_curves``
@@ -52,8 +54,10 @@ def curves_of(
     if isinstance(curves, DrivenCharacter):
         return curves.weights(motion, units)
     check_curve_set(curves)
-    if curves == "arkit":
-        return shape_weights(motion, units, arkit_mouth())
+    if curves == ARKIT:
+        given = given_weights(motion, arkit_mouth())
+        return given or shape_weights(motion, units, arkit_mouth())
+    motion = with_mouth(motion)
     if curves == WHOLE_FACE:
         return beside(curves_of(motion, units, ARKIT), living_curves(motion, units, staging, prosody))
     if curves == "visemes":
@@ -89,10 +93,14 @@ def with_curves(
 ) -> tuple[Generation, tuple[str, ...]]:
     """Return a generation with the channels of ``curves_of`` after its own, and the names of those channels.
 
-    The variance of these channels is 0. Raises InputError: as ``curves_of``, or a name that the motion has already.
+    Channels that the motion has already are replaced. The variance of all channels of ``curves_of`` is 0.
+    Raises InputError: as ``curves_of``.
     """
+    added = curves_of(generation.motion, generation.units, curves, staging=staging, prosody=prosody)
+    kept = [name for name in generation.motion.names if name not in added.names]
+    if len(kept) < len(generation.motion.names):
+        generation = generation.selected(kept)
     motion = generation.motion
-    added = curves_of(motion, generation.units, curves, staging=staging, prosody=prosody)
     both = beside(motion, added)
     variance = np.pad(generation.variance, ((0, 0), (0, len(added.channels))))
     return replace(generation, motion=both, spread=variance), added.names

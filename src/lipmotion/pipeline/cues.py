@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export.cues import CUE_FORMATS, OPTIONAL, CueSheet, choose_cues, format_of, write_cue_file
+from lipmotion.motion.delivery import Delivery, moved_in_time
+from lipmotion.rig.blendshape_motion import with_mouth
 from lipmotion.storage.files import as_text, check_distinct, check_target
 from lipmotion.types import Generation
 
@@ -17,7 +20,12 @@ FASTEST_FPS = 60.0
 
 
 def cues(
-    generation: Generation, *, fps: float = 24.0, hold_frames: int | None = None, shapes: str = OPTIONAL
+    generation: Generation,
+    *,
+    fps: float = 24.0,
+    hold_frames: int | None = None,
+    shapes: str = OPTIONAL,
+    delivery: Delivery | None = None,
 ) -> CueSheet:
     """Return the mouth shapes of generated motion for 2D animation, each held for a least number of frames.
 
@@ -25,6 +33,8 @@ def cues(
     fps         : frames per second of the animation, 1 to 60
     hold_frames : smallest number of frames of a shape; None: as many as last two frames at 24 frames per second
     shapes      : the optional shapes among ``G``, ``H`` and ``X`` that the character has, besides A to F
+    delivery    : intensity, anticipation and offset of the shapes, and the least time of each (docs/controls.md); of
+                  this and ``hold_frames`` the longer one counts. None: as generated
     Raises InputError: an argument out of its range.
     Raises ExportError: the generation has no phones, or has values that are not finite.
 
@@ -38,7 +48,11 @@ def cues(
         raise ExportError("the generation has no phones, and cues need them; use one of lipmotion.animate")
     if not np.isfinite(generation.motion.values).all():
         raise ExportError("the motion has values that are not finite; interpolate them first")
-    return choose_cues(generation, fps, hold_frames, shapes)
+    chosen = delivery or Delivery()
+    if chosen.hold_ms:
+        hold_frames = max(hold_frames or 1, chosen.hold_frames(fps))
+    generation = replace(generation, motion=with_mouth(generation.motion))
+    return choose_cues(moved_in_time(generation, chosen), fps, hold_frames, shapes, intensity=chosen.intensity)
 
 
 def write_cues(

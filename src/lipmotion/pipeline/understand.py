@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -19,18 +20,34 @@ from lipmotion.pipeline.request import SpeechRequest
 from lipmotion.pipeline.transcribe import read_transcript, transcribe
 from lipmotion.speech.agreement import TranscriptFit
 from lipmotion.speech.analysed_audio import AnalysedAudio, analysed
-from lipmotion.speech.audio_files import read_audio
+from lipmotion.speech.audio_files import SPEECH_RATE_HZ, read_audio
 from lipmotion.speech.f0 import log_f0
 from lipmotion.speech.installed_recognisers import INSTALLED_RECOGNISERS, recognise_words
 from lipmotion.speech.recogniser import RECOGNISER_KINDS, Recogniser, cached_recogniser
 from lipmotion.speech.recognition import Recognition, level_range_db
-from lipmotion.types import Audio, Features, ParallelMap, Speech, TimedTranscript, Timeline, Unit
+from lipmotion.types import (
+    Audio,
+    Features,
+    Monitor,
+    ParallelMap,
+    Progress,
+    Speech,
+    TimedTranscript,
+    Timeline,
+    Unit,
+    silent_monitor,
+)
 from lipmotion.units import Lexicon, check_phones, check_text, is_silent, without_gaps, words_of
+
+ItemT = TypeVar("ItemT")
+ResultT = TypeVar("ResultT")
 
 LATE_S = 0.1
 """Seconds by which given units may end after the sound; editing programs round times."""
 LEAST_SPEECH_S = 0.2
 """Less recognised speech than this is none: the edge of a tone or of noise, taken as a consonant."""
+WORDS = (0.2, 0.9)
+"""Shares of the work at which the recognition of words begins and ends, in reports."""
 LOG = logging.getLogger("lipmotion")
 
 
@@ -69,13 +86,41 @@ def understand(model: Model, request: SpeechRequest, each: ParallelMap = map) ->
     return understood_speech(model, request, each).speech
 
 
-def understood_speech(model: Model, request: SpeechRequest, each: ParallelMap = map) -> UnderstoodSpeech:
-    """Return the speech of a request as ``understand`` does, with what was recognised."""
+def understood_speech(
+    model: Model, request: SpeechRequest, each: ParallelMap = map, monitor: Monitor = silent_monitor
+) -> UnderstoodSpeech:
+    """Return the speech of a request as ``understand`` does, with what was recognised.
+
+    monitor : receives reports of the progress; the share is that of recognition, up to ``WORDS[1]``
+    """
+    monitor(Progress("reading the sound", 0, 1, 0.0))
     audio = analysed(audio_of(request))
-    understood = _understood(model, request, audio, each)
+    monitor(Progress("recognising phones", 0, 1, 0.02))
+    understood = _understood(model, request, audio, _reported(each, audio.duration_s, monitor))
     if understood.is_without_speech:
         LOG.warning("no speech found in the recording: the mouth rests; give a recording in which something is said")
     return replace(understood, speech=with_prior(model.prior, understood.speech))
+
+
+def _reported(each: ParallelMap, duration_s: float, monitor: Monitor) -> ParallelMap:
+    """Return a map over stretches of samples (16 bit, 16 kHz) that reports how far into the sound it is."""
+
+    def mapped(function: Callable[[ItemT], ResultT], items: Iterable[ItemT], /) -> Iterator[ResultT]:
+        lengths_s: deque[float] = deque()
+
+        def measured() -> Iterator[ItemT]:
+            for item in items:
+                lengths_s.append(len(item) / 2 / SPEECH_RATE_HZ if isinstance(item, bytes) else 0.0)
+                yield item
+
+        done_s = 0.0
+        for result in each(function, measured()):
+            done_s += lengths_s.popleft()
+            share = WORDS[0] + (WORDS[1] - WORDS[0]) * min(done_s / duration_s, 1.0)
+            monitor(Progress("recognising words, seconds", int(done_s), int(duration_s), share))
+            yield result
+
+    return mapped
 
 
 def _understood(model: Model, request: SpeechRequest, audio: AnalysedAudio, each: ParallelMap) -> UnderstoodSpeech:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError
 from lipmotion.rig.binding import ControlBinding, bind, painted
 from lipmotion.rig.binding_files import BINDING_SUFFIX, load_binding, read_points, read_weights
+from lipmotion.rig.blendshape_motion import given_weights
 from lipmotion.rig.character_files import read_character
 from lipmotion.rig.face_shapes import FaceShapes, face_shapes
 from lipmotion.rig.lip_placement import LipPlacement, placed_by_points, placed_by_shape, surface_of_named
@@ -45,6 +46,7 @@ class DrivenCharacter:
     def weights(self, motion: Motion, units: Timeline[Unit]) -> Motion:
         """Return the weights of the blendshapes over time, channels by the names of the mesh, 0 to 1.
 
+        Motion that has weights for them is taken as it is.
         Raises InputError: the character has no blendshapes of the mouth, or as ``shape_weights``.
         """
         if self.shapes is None:
@@ -52,7 +54,8 @@ class DrivenCharacter:
                 "the character is moved by control points and has no weights of blendshapes; write a video, or the "
                 "motion without --character"
             )
-        return shape_weights(motion, units, self.shapes)
+        given = given_weights(motion, self.shapes)
+        return given or shape_weights(motion, units, self.shapes)
 
     def vertices(
         self, motion: Motion, units: Timeline[Unit], time_s: Array, blinks: Array | None = None

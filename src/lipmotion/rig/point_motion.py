@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
+from lipmotion.rig.blendshape_motion import with_mouth
 from lipmotion.rig.mouth_template import CHIN, LOWER_MIDDLE, UPPER_MIDDLE, mouth_template
 from lipmotion.types import Motion, Timeline, Unit
 from lipmotion.units import is_silent
@@ -44,12 +45,13 @@ def point_motion(motion: Motion, units: Timeline[Unit]) -> PointMotion:
     """Return the motion of lip and jaw points away from the rest pose, which is that of the silences.
 
     Motion that has points is taken as it is; of motion with distances alone (``opening``, perhaps ``width``, ``outer``)
-    the points are made up, as mouths usually move.
+    the points are made up, as mouths usually move. Motion of blendshapes alone moves the mouth of ``reference_mouth``.
     units : phones in time; without silence, the tenth of the frames that is most closed is the rest pose
     Raises InputError: no frames, no channel ``opening``, or values that are not finite.
     """
     if not len(motion.values):
         raise InputError("the motion has no frames; there is nothing to move a character by")
+    motion = with_mouth(motion)
     if "opening" not in motion.names:
         raise InputError(f"no channel 'opening' to move a character by among: {', '.join(motion.names[:6])}")
     if not np.isfinite(motion.values).all():

@@ -25,20 +25,27 @@ def default_hold_frames(fps: float) -> int:
 
 
 def choose_cues(
-    generation: Generation, fps: float = 24.0, hold_frames: int | None = None, optional: str = OPTIONAL
+    generation: Generation,
+    fps: float = 24.0,
+    hold_frames: int | None = None,
+    optional: str = OPTIONAL,
+    intensity: float = 1.0,
 ) -> CueSheet:
     """Return the cues of generated motion.
 
     fps         : frames per second of the animation, 1 to 60
     hold_frames : minimum length of a cue in frames, > 0; a shorter recording has one cue
     optional    : which of the shapes G, H and X the character has
+    intensity   : openings and spread so many times as large, before shapes are chosen
     The result is exact: of all sequences that keep the hold, the one of least cost (``costs``, ``kernels.segments``).
     Cost: about 10 µs a frame.
     """
     motion, drawn = generation.motion, drawn_shapes(optional)
     duration_s = max(0.0, (len(motion.values) - 1) / motion.rate_hz, *(span.end_s for span in generation.units))
     frames = cue_frame_count(duration_s, fps)
-    cost = _costs_of_drawn_shapes(frame_costs(generation, frames, fps), drawn) if frames else np.empty((0, len(drawn)))
+    cost = np.empty((0, len(drawn)))
+    if frames:
+        cost = _costs_of_drawn_shapes(frame_costs(generation, frames, fps, intensity), drawn)
     segments = best_segments(cost, hold_frames or default_hold_frames(fps), CHANGE)
     sheet = cue_sheet([(frame, drawn[label]) for frame, label in segments], duration_s, fps, drawn)
     return replace(sheet, words=_words(generation.units))

@@ -32,7 +32,7 @@ _NAMES = "".join(SHAPES)
 _POSES = np.array([(shape.opening, shape.spread) for shape in SHAPES.values()])
 
 
-def frame_costs(generation: Generation, frames: int, fps: float) -> Array:
+def frame_costs(generation: Generation, frames: int, fps: float, intensity: float = 1.0) -> Array:
     """Return the cost of every one of ``SHAPES`` in every frame [shape=(frames, 9)].
 
     Frame k is shown from ``k / fps`` to ``(k + 1) / fps``; phones and motion count by their share of that time.
@@ -43,9 +43,11 @@ def frame_costs(generation: Generation, frames: int, fps: float) -> Array:
     cost, voiced, nominal = phone_values[:, : len(_NAMES)].copy(), phone_values[:, -3], phone_values[:, -2:]
     if "opening" in generation.motion.names:
         opening = _relative_opening(_means(generation.motion, "opening", edges_s), nominal[:, 0], voiced)
+        opening = np.minimum(intensity * opening, WIDEST)
         cost += OPENING_WEIGHT * voiced[:, None] * (opening[:, None] - _POSES[:, 0]) ** 2
     if "width" in generation.motion.names:
         spread = _relative_spread(_means(generation.motion, "width", edges_s), nominal[:, 1], voiced)
+        spread = np.clip(intensity * spread, _POSES[:, 1].min(), _POSES[:, 1].max())
         cost += SPREAD_WEIGHT * voiced[:, None] * (spread[:, None] - _POSES[:, 1]) ** 2
     cost *= COST_RATE_HZ / fps
     for frame, shape, penalty in _required_shapes(generation, frames, fps):

@@ -69,7 +69,7 @@ _PHONE_SHAPES: tuple[tuple[str, tuple[PhoneShapes, ...]], ...] = (
     ("ao", (PhoneShapes(1, "E", "CD"),)),
     ("oy", (PhoneShapes(0.6, "E", "C"), PhoneShapes(0.4, "B", "C"))),
     ("er axr", (PhoneShapes(1, "E", "BC"),)),
-    ("aa", (PhoneShapes(1, "D", "C"),)),
+    ("aa", (PhoneShapes(1, "D"),)),
     ("ay", (PhoneShapes(0.6, "D", "C"), PhoneShapes(0.4, "B", "C"))),
     ("aw", (PhoneShapes(0.6, "D", "C"), PhoneShapes(0.4, "E", "F"))),
     ("ae eh ah", (PhoneShapes(1, "C", "D"),)),

@@ -1,0 +1,288 @@
+"""How generated motion is delivered: earlier than the sound, later on a timeline, larger, or as held poses.
+
+Each function returns a new generation; the values are those of the engine until one of them is asked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import InputError
+from lipmotion.kernels.holds import best_holds
+from lipmotion.motion.rest import rest_frames
+from lipmotion.types import EYE_DISTANCE, WEIGHT, Generation, Motion, Span, StateTrace, Timeline, Unit
+from lipmotion.types.generation import ReducedVariance
+from lipmotion.units import LIP_CLOSING, is_silent
+
+Curve = NDArray[np.float64]
+
+MOST_INTENSITY = 3.0
+MOST_ANTICIPATION_MS = 1000.0
+MOST_HOLD_MS = 10_000.0
+MOST_OFFSET_MS = 24 * 3600 * 1000.0
+USUAL_HOLD_MS = 2000 / 24
+"""Held poses last as long as two frames of an animation at 24 frames a second, if nothing else is asked for."""
+TOUCHING = 0.03
+"""Lips that are less further open than at rest, in eye distances, move less than in proportion to the intensity."""
+GROWING = ("protrusion", "spread")
+"""The articulatory channels that grow with the intensity; the others say what touches what."""
+DECIDING = ("opening", "width", "outer")
+"""The channels that decide where held poses begin, where the motion has them."""
+
+
+@dataclass(frozen=True)
+class Delivery:
+    """How motion is delivered to files and videos, beside what it says.
+
+    intensity       : 1: as spoken; up to 3: movements away from the rest pose so many times as large. What is closed
+                      stays closed, and silence stays at rest
+    anticipation_ms : the mouth moves so many milliseconds before the sound, -1000 to 1000
+    offset_ms       : the sound begins so many milliseconds after time 0 of the timeline; negative: before it, and what
+                      would be before time 0 is left out. For files that are put beside a sound; videos have their own
+    min_hold_ms     : 0: the curves are smooth; more: poses are held, each for at least so many milliseconds
+    stepped         : poses are held; with ``min_hold_ms`` 0, each for at least two frames at 24 frames a second
+    Raises InputError: a value out of its range.
+
+    >>> Delivery(anticipation_ms=40).hold_ms, Delivery(stepped=True).hold_ms > 80, Delivery(min_hold_ms=120).hold_ms
+    (0.0, True, 120)
+    """
+
+    intensity: float = 1.0
+    anticipation_ms: float = 0.0
+    offset_ms: float = 0.0
+    min_hold_ms: float = 0.0
+    stepped: bool = False
+
+    def __post_init__(self) -> None:
+        for name, least, most in (
+            ("intensity", 0.0, MOST_INTENSITY),
+            ("anticipation_ms", -MOST_ANTICIPATION_MS, MOST_ANTICIPATION_MS),
+            ("offset_ms", -MOST_OFFSET_MS, MOST_OFFSET_MS),
+            ("min_hold_ms", 0.0, MOST_HOLD_MS),
+        ):
+            value = getattr(self, name)
+            if not least <= value <= most:
+                what = name.removesuffix("_ms").replace("_", " ").replace("min hold", "least hold")
+                unit = " ms" if name.endswith("_ms") else ""
+                raise InputError(f"the {what} is {value:g}{unit}, required {least:g} to {most:g}{unit}")
+
+    @property
+    def hold_ms(self) -> float:
+        """Least duration of a held pose in milliseconds; 0: the curves are smooth."""
+        return self.min_hold_ms or (USUAL_HOLD_MS if self.stepped else 0.0)
+
+    def hold_frames(self, rate_hz: float) -> int:
+        """Return the least number of frames of a held pose, at least 1; 0: the curves are smooth."""
+        return max(int(np.ceil(self.hold_ms * rate_hz / 1000 - 1e-6)), 1) if self.hold_ms else 0
+
+
+def moved_in_time(generation: Generation, delivery: Delivery) -> Generation:
+    """Return a generation whose mouth moves by the anticipation earlier, and all of it by the offset later.
+
+    It lasts as long as before, and the offset longer. What is before time 0 is left out; where nothing is known, at the
+    edges, the nearest pose stays. A frame in which p, b or m closes the lips is kept as it is.
+    Raises InputError: nothing is left.
+    """
+    motion, rate_hz = generation.motion, generation.motion.rate_hz
+    by_s = (delivery.offset_ms - delivery.anticipation_ms) / 1000
+    if not (by_s or delivery.offset_ms) or not len(motion.values):
+        return generation
+    duration_s = (len(motion.values) - 1) / rate_hz + delivery.offset_ms / 1000
+    if duration_s < 0:
+        raise InputError(
+            f"the offset is {delivery.offset_ms:g} ms, and the motion lasts "
+            f"{duration_s - delivery.offset_ms / 1000:.2f} s: nothing is left; give a smaller one"
+        )
+    position: Curve = np.arange(int(np.floor(duration_s * rate_hz + 1e-6)) + 1.0) - by_s * rate_hz
+    nearest = np.clip(np.rint(position), 0, len(motion.values) - 1).astype(int)
+    if abs(by_s * rate_hz - round(by_s * rate_hz)) < 1e-6:
+        values, spread = motion.values[nearest], _rows_of(generation, nearest)
+    else:
+        values = motion.at(position / rate_hz)
+        spread = _rows_of(generation, nearest)
+        for frame in closed_frames(generation):
+            at = round(frame + by_s * rate_hz)
+            if 0 <= at < len(values):
+                values[at] = motion.values[frame]
+    return replace(
+        generation,
+        motion=Motion(values, rate_hz, motion.channels),
+        spread=spread,
+        units=moved_units(generation.units, by_s, duration_s),
+        trace=StateTrace(generation.trace.states, generation.trace.frames[nearest]),
+    )
+
+
+def moved_units(units: Timeline[Unit], by_s: float, end_s: float) -> Timeline[Unit]:
+    """Return phones in time so many seconds later, from 0 to ``end_s``; silence at an edge goes to that edge."""
+    first, last = 0, len(units) - 1
+    spans = []
+    for number, span in enumerate(units):
+        silent = is_silent(span.label.phone)
+        start_s = 0.0 if silent and number == first and by_s > 0 else max(span.start_s + by_s, 0.0)
+        stop_s = min(span.end_s + by_s, end_s)
+        stop_s = end_s if silent and number == last and by_s < 0 else stop_s
+        if stop_s > start_s:
+            spans.append(Span(start_s, stop_s, span.label))
+    return Timeline(tuple(spans))
+
+
+def intensified(generation: Generation, intensity: float, opening: Curve | None = None) -> Generation:
+    """Return a generation with movements away from the rest pose so many times as large.
+
+    opening : how far the lips are apart in every frame [shape=(T,)]; None: the channel ``opening``
+    In every frame the whole face moves by one factor, so that distances and points agree. It is 1 where the lips are no
+    further apart than at rest (silence, p b m), and the intensity where they are open; openings beyond the largest of
+    the motion approach twice that. Weights stay between 0 and 1.
+    Without an opening the factor is the intensity everywhere.
+    """
+    motion = generation.motion
+    if intensity == 1 or not len(motion.values):
+        return generation
+    if opening is None and "opening" in motion.names:
+        opening = motion["opening"].astype(np.float64)
+    rest = _at_rest(motion, generation.units, opening)
+    factor = np.full(len(motion.values), float(intensity))
+    if opening is not None:
+        factor = _factors(opening - float(np.median(opening[rest])), intensity)
+    values = motion.values.astype(np.float64)
+    still = np.median(values[rest], axis=0)
+    larger = still + factor[:, None] * (values - still)
+    for column, channel in enumerate(motion.channels):
+        if channel.unit == WEIGHT:
+            larger[:, column] = np.clip(larger[:, column], 0, 1)
+        if channel.name in ARTICULATORY:
+            larger[:, column] = values[:, column]
+        if channel.name in GROWING:
+            larger[:, column] = 1 - np.clip(1 - values[:, column], 0, 1) ** np.sqrt(intensity)
+    return replace(generation, motion=replace(motion, values=larger), spread=_scaled(generation.spread, factor**2))
+
+
+ARTICULATORY = ("tongue", "lip_tuck", "lip_press", "teeth", *GROWING)
+"""Channels that are not movements away from a rest pose (docs/articulation.md)."""
+
+
+def held(generation: Generation, frames: int, closed_s: Sequence[float] = ()) -> Generation:
+    """Return a generation whose poses are held, each for at least so many frames, and change at once.
+
+    frames   : less than 2: the curves stay as they are
+    closed_s : times in seconds at which the lips are closed in p, b and m (``closed_times``)
+    Where the poses begin is chosen so that they differ least from the curves (``kernels.holds.best_holds``). The pose
+    that shows p, b or m is that of the frame in which the lips are closed; every other pose is the mean of its frames.
+    """
+    motion = generation.motion
+    count = len(motion.values)
+    if frames < 2 or not count:
+        return generation
+    closed = np.unique([min(round(time_s * motion.rate_hz), count - 1) for time_s in closed_s]).astype(int)
+    borders = best_holds(_deciding(motion), frames, closed.tolist())
+    starts, lengths = np.array(borders[:-1]), np.diff(borders)
+    values = np.add.reduceat(motion.values.astype(np.float64), starts, axis=0) / lengths[:, None]
+    poses = np.searchsorted(starts, closed, side="right") - 1
+    for pose in np.unique(poses):
+        values[pose] = motion.values[closed[poses == pose]].mean(axis=0)
+    middle = np.repeat(starts + lengths // 2, lengths)
+    return replace(
+        generation,
+        motion=replace(motion, values=np.repeat(values, lengths, axis=0)),
+        spread=_rows_of(generation, middle),
+        trace=StateTrace(generation.trace.states, generation.trace.frames[middle]),
+    )
+
+
+def closed_on_grid(generation: Generation, rate_hz: float) -> Generation:
+    """Return a generation that shows every closure of p, b and m at the nearest time n / ``rate_hz`` seconds.
+
+    Held poses at that rate show them then; between two times a closure of 10 ms would be lost.
+    """
+    motion = generation.motion
+    values = motion.values.copy()
+    for frame in closed_frames(generation):
+        position = round(frame / motion.rate_hz * rate_hz) / rate_hz * motion.rate_hz
+        first, last = int(np.floor(position + 1e-6)), int(np.ceil(position - 1e-6))
+        values[min(first, len(values) - 1) : last + 1] = motion.values[frame]
+    return replace(generation, motion=replace(motion, values=values))
+
+
+def closed_times(generation: Generation) -> list[float]:
+    """Return the time in seconds at which each p, b and m closes the lips; none where no opening is known."""
+    return [frame / generation.motion.rate_hz for frame in closed_frames(generation)]
+
+
+def closed_frames(generation: Generation) -> list[int]:
+    """Return the frame of every p, b and m in which the lips are closest together; none where no opening is known."""
+    motion = generation.motion
+    if "opening" not in motion.names:
+        return []
+    opening, found = motion["opening"], []
+    for span in generation.units:
+        if span.label.phone in LIP_CLOSING:
+            first = max(int(np.ceil(span.start_s * motion.rate_hz - 1e-6)), 0)
+            stop = min(int(np.floor(span.end_s * motion.rate_hz + 1e-6)) + 1, len(opening))
+            if first < stop:
+                found.append(first + int(opening[first:stop].argmin()))
+    return sorted(set(found))
+
+
+def _factors(further: Curve, intensity: float) -> Curve:
+    """Return the factor of every frame, by how much further than at rest the lips are apart [shape=(T,)]."""
+    most = max(float(further.max()), 1e-9)
+    wanted = np.maximum(intensity * further, 0)
+    beyond = np.maximum(wanted - most, 0)
+    limited = np.where(beyond > 0, most + most * np.tanh(beyond / most), wanted)
+    share = np.clip(further / TOUCHING, 0, 1)
+    weight = share * share * (3 - 2 * share)
+    factor = np.divide(limited, further, out=np.ones_like(further), where=further > 0)
+    return 1 + weight * (factor - 1)
+
+
+def _at_rest(motion: Motion, units: Timeline[Unit], opening: Curve | None) -> NDArray[np.bool_]:
+    if "opening" in motion.names:
+        return rest_frames(motion, units)
+    rest = np.zeros(len(motion.values), bool)
+    for span in units:
+        if is_silent(span.label.phone):
+            rest |= (span.start_s <= motion.time_s) & (motion.time_s < span.end_s)
+    if not rest.any():
+        order = np.argsort(opening, kind="stable") if opening is not None else np.arange(len(rest))
+        rest[order[: max(1, len(rest) // 10)]] = True
+    return rest
+
+
+def _deciding(motion: Motion) -> Curve:
+    """Return the curves that decide where poses begin, each unit scaled to a standard deviation of 1 [shape=(T, D)]."""
+    chosen = [name for name in DECIDING if name in motion.names]
+    others = [channel.name for channel in motion.channels if channel.unit != EYE_DISTANCE or not chosen]
+    names = [*chosen, *(name for name in others if name not in chosen)]
+    rows = np.stack([motion[name].astype(np.float64) for name in names], axis=1)
+    kinds = np.array([motion.channels[motion.column(name)].unit for name in names])
+    for kind in set(kinds.tolist()):
+        rows[:, kinds == kind] /= max(float(rows[:, kinds == kind].std(axis=0).max()), 1e-12)
+    return rows
+
+
+def _rows_of(generation: Generation, frames: NDArray[np.intp]) -> NDArray[np.floating] | ReducedVariance:
+    """Return the variances of some frames."""
+    spread = generation.spread
+    if isinstance(spread, ReducedVariance):
+        return replace(spread, reduced=spread.reduced[frames])
+    return spread[frames]
+
+
+def _scaled(spread: NDArray[np.floating] | ReducedVariance, factor: Curve) -> NDArray[np.floating] | ReducedVariance:
+    if isinstance(spread, ReducedVariance):
+        return replace(spread, reduced=spread.reduced * factor[:, None])
+    return spread * factor[:, None]
+
+
+def sound_units(units: Timeline[Unit], delivery: Delivery, end_s: float) -> Timeline[Unit]:
+    """Return the phones in time of the sound, for label files: later by the offset, whatever the mouth anticipates."""
+    return (
+        moved_units(units, delivery.offset_ms / 1000, end_s + delivery.offset_ms / 1000)
+        if delivery.offset_ms
+        else units
+    )

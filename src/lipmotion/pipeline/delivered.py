@@ -1,0 +1,129 @@
+"""Motion as it is delivered: one place from which files, curves, cues and videos get it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from lipmotion.errors import ExportError, InputError
+from lipmotion.faces.base import Face, Stageable, Staging
+from lipmotion.faces.filmed.face import FilmedFace
+from lipmotion.motion.delivery import Delivery, closed_on_grid, closed_times, held, intensified, moved_in_time
+from lipmotion.motion.gestures import with_gestures
+from lipmotion.pipeline.characters import with_curves
+from lipmotion.pipeline.drawn_video import is_picture_sequence, shows_face
+from lipmotion.pipeline.scenes import scene_of
+from lipmotion.rig.blendshape_motion import is_of_blendshapes, with_mouth
+from lipmotion.rig.driven import DrivenCharacter
+from lipmotion.rig.scene import Scene
+from lipmotion.rig.shape_names import ARKIT_OTHERS, arkit_name
+from lipmotion.types import Generation, Motion, Prosody, StateTrace
+
+
+def check_delivery(delivery: Delivery, outputs: Iterable[Path], face: Face | FilmedFace) -> None:
+    """Raise ExportError or InputError if an output cannot be delivered so."""
+    videos = [path for path in outputs if shows_face(path)]
+    for path in videos:
+        if delivery.offset_ms and not is_picture_sequence(path):
+            raise ExportError(
+                f"{path}: a video has its own sound, which begins with it; an offset is for files that are put beside "
+                "a sound: write the video without it"
+            )
+    if videos and delivery.hold_ms and isinstance(face, FilmedFace):
+        raise InputError("the poses of a filmed face cannot be held; hold those of a drawn face, or of motion files")
+
+
+def delivered(generation: Generation, delivery: Delivery) -> Generation:
+    """Return generated motion with its intensity, anticipation and offset; held poses are made of it last (``held``).
+
+    Raises InputError: the offset leaves nothing.
+    """
+    return moved_in_time(_larger(generation, delivery.intensity), delivery)
+
+
+def shown(
+    generation: Generation,
+    delivery: Delivery,
+    face: Face | FilmedFace,
+    fps: float,
+    character: DrivenCharacter | None = None,
+) -> Generation:
+    """Return generated motion as a face shows it: with the channels that faces draw, and held poses at the frame rate.
+
+    The offset is left out where the file is a video. Faces that can be staged make movements larger themselves
+    (``staged_intensity``).
+    character : whose weights are shown, if the face is a character with blendshapes
+    """
+    moved = generation if isinstance(face, Stageable) else _larger(generation, delivery.intensity)
+    moved = moved_in_time(moved, delivery)
+    if is_of_blendshapes(moved.motion):
+        moved = _with(moved, with_mouth(moved.motion))
+    frames = delivery.hold_frames(fps)
+    if not frames:
+        return moved
+    moved = _with(moved, with_gestures(moved.motion, moved.units))
+    closed_s, moved = closed_times(moved), closed_on_grid(moved, fps)
+    if character is not None and character.shapes is not None:
+        moved = with_curves(moved, character)[0]
+    return held(moved.resampled(fps), frames, closed_s)
+
+
+def delivered_scene(
+    generation: Generation,
+    delivery: Delivery,
+    face: Face | FilmedFace,
+    rate_hz: float | None,
+    *,
+    staging: Staging,
+    prosody: Prosody | None,
+) -> Scene:
+    """Return the scene of a face (``scene_of``) as it is delivered; held poses are those of the mouth."""
+    moved = delivered(generation, delivery)
+    if is_of_blendshapes(moved.motion):
+        moved = _with(moved, with_mouth(moved.motion))
+    scene = scene_of(moved, face, rate_hz, staging=staging, prosody=prosody)
+    weights = scene.weights
+    frames = 0 if weights is None else delivery.hold_frames(weights.rate_hz)
+    if weights is None or frames < 2:
+        return scene
+    mouth = [name for name in weights.names if arkit_name(name) not in ARKIT_OTHERS]
+    states = StateTrace(("",), np.zeros(len(weights.values), np.intp))
+    whole = Generation(weights, np.zeros(weights.values.shape), moved.units, states)
+    steps = held(whole.selected(mouth), frames, closed_times(moved)).motion
+    values = weights.values.astype(np.float64)
+    values[:, [weights.column(name) for name in mouth]] = steps.values
+    return replace(scene, weights=replace(weights, values=values))
+
+
+def moved_prosody(prosody: Prosody, delivery: Delivery) -> Prosody:
+    """Return loudness and pitch on the timeline of files: later by the offset."""
+    frames = round(delivery.offset_ms / 10)
+    if frames <= 0:
+        return Prosody(prosody.level_db[-frames:], prosody.log_f0[-frames:])
+    quiet = np.full(frames, prosody.level_db.min(initial=0.0))
+    return Prosody(np.concatenate([quiet, prosody.level_db]), np.concatenate([quiet * np.nan, prosody.log_f0]))
+
+
+def staged_intensity(staging: Staging, delivery: Delivery, face: Face | FilmedFace) -> Staging:
+    """Return how a face is shown, with the intensity of the delivery where the face makes movements larger itself."""
+    if delivery.intensity == 1 or not isinstance(face, Stageable):
+        return staging
+    return replace(staging, intensity=staging.intensity * delivery.intensity)
+
+
+def _with(generation: Generation, motion: Motion) -> Generation:
+    """Return a generation with more channels after its own, of variance 0."""
+    added = len(motion.channels) - len(generation.motion.channels)
+    variance = np.pad(generation.variance, ((0, 0), (0, added))) if added else generation.spread
+    return replace(generation, motion=motion, spread=variance)
+
+
+def _larger(generation: Generation, intensity: float) -> Generation:
+    if intensity == 1:
+        return generation
+    motion = generation.motion
+    opening = with_mouth(motion)["opening"].astype(np.float64) if is_of_blendshapes(motion) else None
+    return intensified(generation, intensity, opening)

@@ -1,0 +1,63 @@
+"""Several recordings in one call: which they are, and where the outputs of each go."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from lipmotion.corpora.source_recordings import AUDIO_SUFFIXES, VIDEO_SUFFIXES
+from lipmotion.errors import ExportError, InputError
+from lipmotion.storage.files import check_listable
+
+NAME = "{name}"
+"""In the path of an output, the name of the recording without its suffix."""
+
+
+def recordings_of(given: Sequence[Path]) -> list[Path]:
+    """Return recordings: files as they are given, and of folders the sounds and videos in them, sorted by name.
+
+    Raises InputError: a folder without recordings, or one that cannot be read.
+    """
+    found: list[Path] = []
+    for path in given:
+        if not path.is_dir():
+            found.append(path)
+            continue
+        check_listable(path)
+        inside = sorted(each for each in path.iterdir() if each.suffix.lower() in AUDIO_SUFFIXES | VIDEO_SUFFIXES)
+        if not inside:
+            raise InputError(f"{path}: no sounds and no videos in it; give a folder of recordings")
+        found += inside
+    return found
+
+
+def is_for_several(output: str) -> bool:
+    """Return whether an output is a place for many files: a folder, or a path with ``{name}``."""
+    return NAME in output or output.endswith(("/", os.sep)) or Path(output).is_dir()
+
+
+def planned_outputs(recordings: Sequence[Path], outputs: Sequence[str], kinds: Sequence[str]) -> list[list[str]]:
+    """Return the outputs of each recording.
+
+    outputs : folders, for which every kind is written, and paths with ``{name}``
+    kinds   : suffixes without the dot, as ``json``
+    Raises ExportError: an output is neither, or two recordings would be written to one file.
+    """
+    templates: list[str] = []
+    for output in outputs:
+        if not is_for_several(output):
+            raise ExportError(
+                f"{output}: is one file, and there are {len(recordings)} recordings; give a folder, or {NAME} in the "
+                f"name of the file: 'out/{NAME}{Path(output).suffix}'"
+            )
+        is_template = NAME in output
+        templates += [output] if is_template else [str(Path(output) / f"{NAME}.{kind}") for kind in kinds]
+    planned = [[each.replace(NAME, recording.stem) for each in templates] for recording in recordings]
+    seen: dict[str, Path] = {}
+    for recording, files in zip(recordings, planned, strict=True):
+        for file in files:
+            other = seen.setdefault(os.path.realpath(file), recording)
+            if other != recording:
+                raise ExportError(f"{file}: would be written for {other} and for {recording}; rename one of them")
+    return planned

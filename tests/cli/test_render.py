@@ -1,0 +1,81 @@
+"""``lipmotion render``: motion files are drawn, edited ones, and those of blendshapes."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+
+from cli.conftest import RunCommand, is_one_error
+from lipmotion.export.base import read_motion
+
+
+@pytest.fixture
+def motion_file(run: RunCommand, toy_model_file: Path, toy_speech: Path, here: Path) -> Path:
+    assert run("animate", toy_speech, "--model", toy_model_file, "-o", "said.json").code == 0
+    return here / "said.json"
+
+
+def pictures(path: Path) -> list[np.ndarray]:
+    with av.open(str(path)) as video:
+        return [frame.to_ndarray(format="rgb24").astype(int) for frame in video.decode(video=0)]
+
+
+def test_edited_values_are_drawn(run: RunCommand, motion_file: Path, toy_speech: Path, here: Path) -> None:
+    document = json.loads(motion_file.read_text())
+    column = [channel["name"] for channel in document["channels"]].index("opening")
+    for row in document["values"]:
+        row[column] = 0.0
+    (here / "shut.json").write_text(json.dumps(document))
+    for name in ("said", "shut"):
+        given = (f"{name}.json", "--sound", toy_speech, "-o", f"{name}.mp4", f"{name}.csv")
+        assert run("render", *given, "--size", "128", "--fps", "12") == (0, [f"{name}.mp4", f"{name}.csv"], [])
+    said, shut = pictures(here / "said.mp4"), pictures(here / "shut.mp4")
+    assert len(said) == len(shut)
+    assert max(int(np.abs(a - b).max()) for a, b in zip(said, shut, strict=True)) > 60
+    assert read_motion(here / "shut.csv")[0]["opening"].max() == pytest.approx(0)
+    with av.open(str(here / "said.mp4")) as video:
+        assert video.streams.audio
+
+
+def test_blendshapes_without_phones_or_sound(run: RunCommand, here: Path) -> None:
+    time_s = np.arange(50) / 50
+    jaw = np.maximum(np.sin(2 * np.pi * time_s), 0)
+    rows = "\n".join(f"{t:.2f},{w:.4f},0" for t, w in zip(time_s, jaw, strict=True))
+    (here / "rig.csv").write_text(f"time_s,jawOpen,mouthPucker\n{rows}\n")
+    assert run("render", "rig.csv", "-o", "a.mp4", "a.json", "--size", "128", "--curves", "arkit").code == 0
+    frames = pictures(here / "a.mp4")
+    assert int(np.abs(frames[6] - frames[20]).max()) > 60
+    weights = read_motion(here / "a.json")[0]
+    assert weights["jawOpen"] == pytest.approx(jaw, abs=1e-3)
+
+
+def test_sound_and_motion_of_other_lengths(run: RunCommand, motion_file: Path, toy_speech: Path, here: Path) -> None:
+    document = json.loads(motion_file.read_text())
+    document["values"] = document["values"][:60]
+    (here / "cut.json").write_text(json.dumps(document))
+    done = run("render", "cut.json", "--sound", toy_speech, "-o", "cut.csv")
+    assert done.code == 0
+    assert "the motion lasts 0.59 s, the sound" in done.err[0]
+    assert "the last pose stays" in done.err[0]
+    assert len(read_motion(here / "cut.csv")[0].values) == pytest.approx(len(read_motion(motion_file)[0].values), abs=2)
+
+
+@pytest.mark.usefixtures("motion_file")
+@pytest.mark.parametrize(
+    ("options", "code", "words"),
+    [
+        (["none.json", "-o", "a.csv"], 3, "none.json"),
+        (["said.json", "-o", "said.json"], 7, "said.json: is the motion file itself"),
+        (["said.json", "--sound", "none.wav", "-o", "a.csv"], 3, "none.wav: no such file"),
+        (["brows.csv", "-o", "a.mp4"], 7, "no channel 'opening' to draw a face from, nor the blendshape 'jawOpen'"),
+    ],
+)
+def test_what_cannot_be_drawn(run: RunCommand, here: Path, options: list[str], code: int, words: str) -> None:
+    (here / "brows.csv").write_text("time_s,browInnerUp\n0,0\n0.1,1\n")
+    done = run("render", *options)
+    assert is_one_error(done, code)
+    assert words in done.err[0]

@@ -1,0 +1,137 @@
+"""``animate`` of several recordings, through pipes, and with the controls of every output."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import shutil
+import sys
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cli.conftest import RunCommand, is_one_error
+from lipmotion.cli.main import main
+from lipmotion.export.base import read_motion
+
+
+@pytest.fixture
+def takes(here: Path, toy_speech: Path) -> Path:
+    folder = here / "takes"
+    folder.mkdir()
+    for name in ("a", "b"):
+        shutil.copy(toy_speech, folder / f"{name}{toy_speech.suffix}")
+    return folder
+
+
+def test_a_folder_of_recordings(run: RunCommand, takes: Path, toy_model_file: Path, here: Path) -> None:
+    done = run("animate", takes, "--model", toy_model_file, "-o", "out/", "{name}.TextGrid", "--to", "json,csv")
+    assert done == (0, ["out/a.json", "out/a.csv", "a.TextGrid", "out/b.json", "out/b.csv", "b.TextGrid"], [])
+    assert (here / "out" / "a.csv").read_bytes() == (here / "out" / "b.csv").read_bytes()
+
+
+def test_what_fails_does_not_stop_the_others(run: RunCommand, takes: Path, toy_model_file: Path) -> None:
+    (takes / "0.wav").write_text("no sound")
+    done = run("animate", takes, "--model", toy_model_file, "-o", "out/")
+    assert (done.code, done.out) == (3, ["out/a.json", "out/b.json"])
+    assert len(done.err) == 2
+    assert "skipped" in done.err[0]
+    assert "1 of 3 recordings were not animated" in done.err[1]
+    done = run("animate", takes, "--model", toy_model_file, "-o", "out/", "--machine-readable")
+    lines = [json.loads(line) for line in done.out]
+    outcomes = [line["outcome"] for line in lines if line["type"] == "item"]
+    assert outcomes == ["skipped", "animated", "animated"]
+    assert lines[-1]["type"] == "failure"
+    shares = [line["value"] for line in lines if line["type"] == "progress"]
+    assert shares == sorted(shares)
+
+
+def test_what_belongs_to_one_recording(run: RunCommand, takes: Path, toy_model_file: Path, here: Path) -> None:
+    done = run("animate", takes, "--model", toy_model_file, "-o", "out/", "--transcript", "bin blue")
+    assert is_one_error(done, 3)
+    assert "--transcript belongs to one recording, and there are 2" in done.err[0]
+    assert is_one_error(run("animate", takes, "--model", toy_model_file, "-o", "one.json"), 7)
+    assert not (here / "out").exists()
+
+
+def test_standard_input_and_output(
+    toy_model_file: Path, toy_speech: Path, here: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(toy_speech.read_bytes())))
+    written = io.BytesIO()
+    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(written))
+    words = ["animate", "-", "--model", str(toy_model_file), "-o", "-", "a.csv", "--format", "csv"]
+    assert main(words) == 0
+    assert written.getvalue() == (here / "a.csv").read_bytes()
+
+
+@pytest.mark.usefixtures("here")
+def test_events_go_to_standard_error_beside_motion(
+    run: RunCommand, toy_model_file: Path, toy_speech: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kept = io.BytesIO()
+    monkeypatch.setattr("lipmotion.cli.pipes.write_bytes", lambda path: kept.write(path.read_bytes()))
+    done = run("animate", toy_speech, "--model", toy_model_file, "-o", "-", "--machine-readable")
+    assert (done.code, done.out) == (0, [])
+    assert [json.loads(line)["type"] for line in done.err][0 :: len(done.err) - 1] == ["start", "success"]
+    assert json.loads(kept.getvalue())["format"] == "lipmotion.motion"
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes")
+def test_a_named_pipe(run: RunCommand, toy_model_file: Path, toy_speech: Path, here: Path) -> None:
+    os.mkfifo(here / "pipe")
+    writer = threading.Thread(target=lambda: (here / "pipe").write_bytes(toy_speech.read_bytes()))
+    writer.start()
+    assert run("animate", "pipe", "--model", toy_model_file, "-o", "a.json").code == 0
+    writer.join()
+    empty = threading.Thread(target=lambda: (here / "pipe").write_bytes(b""))
+    empty.start()
+    done = run("animate", "pipe", "--model", toy_model_file, "-o", "b.json")
+    empty.join()
+    assert is_one_error(done, 3)
+    assert "nothing comes through the pipe" in done.err[0]
+
+
+def test_controls_of_files(run: RunCommand, toy_model_file: Path, toy_speech: Path, here: Path) -> None:
+    basics = ("animate", toy_speech, "--model", toy_model_file, "-o")
+    assert run(*basics, "plain.json").code == 0
+    given = "--offset-ms 200 --anticipation-ms 50 --intensity 2".split()
+    assert run(*basics, "other.json", *given).code == 0
+    assert run(*basics, "steps.json", "--stepped", "--fps", "24", "--channels", "opening").code == 0
+    plain, other, steps = (read_motion(here / f"{name}.json") for name in ("plain", "other", "steps"))
+    assert len(other[0].values) == len(plain[0].values) + 20
+    assert other[1][1].start_s == pytest.approx(plain[1][1].start_s + 0.15)
+    assert other[0]["opening"].max() > 1.3 * plain[0]["opening"].max()
+    assert steps[0].rate_hz == 24
+    changes = np.flatnonzero(np.diff(steps[0]["opening"])) + 1
+    assert np.diff([0, *changes, len(steps[0].values)]).min() >= 2
+
+
+@pytest.mark.usefixtures("here")
+@pytest.mark.parametrize(
+    ("options", "code", "words"),
+    [
+        (["a.mp4", "--offset-ms", "40"], 7, "a video has its own sound"),
+        (["a.json", "--anticipation-ms", "5000"], 3, "the anticipation is 5000 ms"),
+        (["a.json", "--offset-ms", "-100000"], 3, "nothing is left"),
+    ],
+)
+def test_controls_that_cannot_be(
+    run: RunCommand, toy_model_file: Path, toy_speech: Path, options: list[str], code: int, words: str
+) -> None:
+    done = run("animate", toy_speech, "--model", toy_model_file, "-o", *options)
+    assert is_one_error(done, code)
+    assert words in done.err[0]
+
+
+@pytest.mark.usefixtures("here")
+def test_controls_of_cues(run: RunCommand, toy_model_file: Path, toy_speech: Path) -> None:
+    basics = ("cues", toy_speech, "--model", toy_model_file)
+    plain, late, long = run(*basics), run(*basics, "--offset-ms", "500"), run(*basics, "--min-hold-ms", "250")
+    times = [float(line.split("\t")[0]) for line in plain.out]
+    assert float(late.out[1].split("\t")[0]) == pytest.approx(times[1] + 0.5, abs=0.05)
+    assert len(long.out) < len(plain.out)
+    assert np.diff([float(line.split("\t")[0]) for line in long.out])[:-1].min() >= 0.24

@@ -1,0 +1,141 @@
+"""Intensity, anticipation, offset and held poses, on motion with known closures."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lipmotion.errors import InputError
+from lipmotion.motion.delivery import (
+    Delivery,
+    closed_frames,
+    closed_on_grid,
+    closed_times,
+    held,
+    intensified,
+    moved_in_time,
+    sound_units,
+)
+from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace
+from rig.speech import motion, units
+
+
+@pytest.fixture
+def said() -> Generation:
+    curves = motion()
+    states = StateTrace(("a", "b"), (np.arange(len(curves.values)) > 100).astype(np.intp))
+    return Generation(curves, np.full(curves.values.shape, 0.01), units(), states)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"intensity": 3.5}, "the intensity is 3.5, required 0 to 3"),
+        ({"intensity": float("nan")}, "the intensity is nan"),
+        ({"anticipation_ms": 2000}, "the anticipation is 2000 ms, required -1000 to 1000 ms"),
+        ({"offset_ms": 1e9}, "the offset is 1e\\+09 ms"),
+        ({"min_hold_ms": -1}, "the least hold is -1 ms, required 0 to 10000 ms"),
+    ],
+)
+def test_values_out_of_their_ranges(wrong: dict[str, Any], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        Delivery(**wrong)
+
+
+def test_nothing_asked_for_changes_nothing(said: Generation) -> None:
+    assert moved_in_time(said, Delivery()) is said
+    assert intensified(said, 1.0) is said
+    assert held(said, Delivery().hold_frames(100)) is said
+
+
+def test_the_mouth_moves_earlier_and_the_phones_with_it(said: Generation) -> None:
+    early = moved_in_time(said, Delivery(anticipation_ms=40))
+    assert early.motion["opening"][:-4] == pytest.approx(said.motion["opening"][4:])
+    assert len(early.motion.values) == len(said.motion.values)
+    assert early.units[1].start_s == pytest.approx(said.units[1].start_s - 0.04)
+    assert (early.units[0].start_s, early.units[len(early.units) - 1].end_s) == (0, 2)
+    assert early.trace.frames[:-4].tolist() == said.trace.frames[4:].tolist()
+
+
+def test_everything_comes_later(said: Generation) -> None:
+    late = moved_in_time(said, Delivery(offset_ms=500))
+    assert len(late.motion.values) == len(said.motion.values) + 50
+    assert late.motion["opening"][50:] == pytest.approx(said.motion["opening"])
+    assert late.motion["opening"][:50] == pytest.approx(said.motion["opening"][0])
+    assert (late.units[0].start_s, late.units[1].start_s) == (0, 1.0)
+    assert sound_units(said.units, Delivery(offset_ms=500, anticipation_ms=80), 2.0) == late.units
+
+
+def test_what_is_before_the_beginning_is_cut(said: Generation) -> None:
+    cut = moved_in_time(said, Delivery(offset_ms=-550))
+    assert cut.motion["opening"] == pytest.approx(said.motion["opening"][55:])
+    assert (cut.units[0].label.phone, cut.units[0].start_s) == ("m", 0)
+    with pytest.raises(InputError, match=r"the offset is -3000 ms, and the motion lasts 2\.00 s: nothing is left"):
+        moved_in_time(said, Delivery(offset_ms=-3000))
+
+
+def test_closures_survive_a_shift_between_two_frames(said: Generation) -> None:
+    spiky = said.motion.values.copy()
+    (column,) = [said.motion.column("opening")]
+    spiky[90:101, column] = 0.1
+    spiky[95, column] = 0.0
+    early = moved_in_time(replace(said, motion=replace(said.motion, values=spiky)), Delivery(anticipation_ms=33))
+    assert early.motion["opening"][86:100].min() == pytest.approx(0.0)
+
+
+@pytest.mark.parametrize("intensity", [0.5, 1.5, 2.0, 3.0])
+def test_movements_grow_and_closures_stay(said: Generation, intensity: float) -> None:
+    larger = intensified(said, intensity)
+    before, after = said.motion["opening"], larger.motion["opening"]
+    assert after.max() > before.max() if intensity > 1 else after.max() < before.max()
+    assert after.max() <= 2 * before.max()
+    closed = closed_frames(said)
+    assert after[closed] == pytest.approx(before[closed])
+    silent = said.motion.time_s < 0.45
+    assert larger.motion.values[silent] == pytest.approx(said.motion.values[silent])
+    points = larger.motion["y_13"] - larger.motion["y_14"]
+    rest = said.motion["y_13"][0] - said.motion["y_14"][0]
+    assert points - rest == pytest.approx(after - after[0], abs=0.01)
+
+
+def test_twice_the_movement_below_the_largest(said: Generation) -> None:
+    small = said.motion["opening"] < 0.1
+    wide = small & (said.motion["opening"] > 0.05)
+    assert wide.any()
+    twice = intensified(said, 2.0)
+    assert twice.motion["opening"][wide] - 0.005 == pytest.approx(2 * (said.motion["opening"][wide] - 0.005), rel=0.01)
+    assert np.asarray(twice.variance)[wide, 0] == pytest.approx(0.04, rel=0.01)
+
+
+def test_weights_stay_between_0_and_1(said: Generation) -> None:
+    time_s = said.motion.time_s
+    ramp = np.interp(time_s, [0.5, 0.9, 1.3], [0, 0.8, 0])[:, None]
+    weights = Motion(np.hstack([ramp, ramp]), 100.0, (Channel("jawOpen", WEIGHT), Channel("protrusion", WEIGHT)))
+    larger = intensified(replace(said, motion=weights, spread=np.zeros((len(ramp), 2))), 3.0).motion
+    assert larger.values.min() >= 0
+    assert larger.values.max() <= 1
+    assert larger["jawOpen"][70] > weights["jawOpen"][70] > 0
+
+
+@pytest.mark.parametrize(("rate_hz", "frames"), [(24.0, 2), (25.0, 3), (100.0, 12)])
+def test_held_poses_last_long_enough_and_close(said: Generation, rate_hz: float, frames: int) -> None:
+    closed_s = closed_times(said)
+    assert len(closed_s) == 2
+    steps = held(closed_on_grid(said, rate_hz).resampled(rate_hz), frames, closed_s)
+    changes = np.flatnonzero(np.abs(np.diff(steps.motion.values, axis=0)).max(axis=1) > 1e-12) + 1
+    assert np.diff([0, *changes, len(steps.motion.values)]).min() >= frames
+    for time_s in closed_s:
+        assert steps.motion["opening"][round(time_s * rate_hz)] == pytest.approx(said.motion["opening"].min(), abs=1e-9)
+    assert len(steps.trace.frames) == len(steps.motion.values) == len(np.asarray(steps.variance))
+
+
+@pytest.mark.parametrize(
+    ("delivery", "rate_hz", "frames"),
+    [(Delivery(), 24, 0), (Delivery(stepped=True), 24, 2), (Delivery(stepped=True), 100, 9),
+     (Delivery(min_hold_ms=120), 25, 3), (Delivery(min_hold_ms=1), 25, 1)],
+)  # fmt: skip
+def test_holds_in_frames(delivery: Delivery, rate_hz: float, frames: int) -> None:
+    assert delivery.hold_frames(rate_hz) == frames
