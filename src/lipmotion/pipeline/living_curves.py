@@ -32,8 +32,8 @@ def living_curves(
     Raises InputError: the motion has no channel ``opening``.
     """
     from lipmotion.faces.character import staged_pose
-    from lipmotion.faces.liveliness import SEED
     from lipmotion.faces.character.performance import head_poses
+    from lipmotion.faces.liveliness import SEED
 
     chosen = staging or Staging()
     poses = head_poses(motion, units, motion.rate_hz, seed=SEED + chosen.seed, prosody=prosody)

@@ -91,11 +91,11 @@ def head_scene(
 
     from lipmotion.faces.character import staged_pose
     from lipmotion.faces.character.figure import PIVOT
-    from lipmotion.faces.liveliness import SEED, turned
     from lipmotion.faces.character.performance import head_poses
     from lipmotion.faces.character.shape_fit import mouth_weights
     from lipmotion.faces.character.shapes import head_mesh
     from lipmotion.faces.character.stage import figure
+    from lipmotion.faces.liveliness import SEED, turned
 
     hertz, chosen = rate_hz or generation.motion.rate_hz, staging or Staging()
     drawn = head_poses(
