@@ -19,6 +19,7 @@ from lipmotion.faces.character.part import part
 from lipmotion.faces.character.pose import CharacterPose
 from lipmotion.faces.character.skin import REST, Skin, jaw_moved
 from lipmotion.faces.character.tint import skin_colours
+from lipmotion.faces.liveliness import turned
 from lipmotion.rig.lighting import Lighting
 from lipmotion.rig.occlusion import reaches
 from lipmotion.rig.rasteriser import normals_of
@@ -27,8 +28,8 @@ Real = NDArray[np.float64]
 
 PIVOT = np.array([0.0, -0.75, -0.9])
 """The head turns about this place, the top of the neck."""
-TONGUE_LIGHT = 1.7
-"""The tongue is wet, and drawn brighter than the rest of the mouth."""
+TONGUE_LIGHT, LOWER_TEETH_LIGHT = 1.35, 0.62
+"""The tongue is wet, and drawn brighter than the rest of the mouth; the lower teeth lie in the shade of the upper."""
 _EYES = ((1.0, ""), (-1.0, "right "))
 _MIDDLE, _LAST = 20, 60
 """Columns of the lips in the middle of the upper and of the lower lip."""
@@ -156,7 +157,10 @@ class Figure:
         inside = self._lit_inside(pose, places[self.rows["skin"]])
         for rows in (self.rows["tongue"], self.rows["teeth"], self.rows["upper teeth"], self._wall):
             arrives[rows] = inside(places[rows])[:, None]
-        arrives[self.rows["tongue"]] = np.minimum(1.0, TONGUE_LIGHT * arrives[self.rows["tongue"]])
+        arrives[self.rows["tongue"]] = np.minimum(
+            1.0, TONGUE_LIGHT * (1 - 0.35 * pose.tongue_up) * arrives[self.rows["tongue"]]
+        )
+        arrives[self.rows["teeth"]] *= LOWER_TEETH_LIGHT
         return colours, arrives
 
     def _lit_inside(self, pose: CharacterPose, skin: Real) -> Callable[[Real], Real]:
@@ -164,12 +168,13 @@ class Figure:
         ring = skin[self.skin.lip_rows()[VISIBLE - 1]]
         top, low, front = ring[_MIDDLE, 1], ring[_LAST, 1], 0.5 * (ring[_MIDDLE, 2] + ring[_LAST, 2])
         span, half = max(top - low, 0.0), max(0.26 * pose.width, 0.1)
+        shade, open_ = 1 - 0.92 * pose.roundness**1.1, min(span / 0.25, 1.0)
 
         def inside(places: Real) -> Real:
-            depth = np.clip((front - places[:, 2] - 0.10) / (0.22 + 0.8 * span), 0, 1)
+            depth = (0.93 - 0.22 * open_) * np.clip((front - places[:, 2] - 0.10) / (0.22 + 0.8 * span), 0, 1)
             under = np.clip((top - places[:, 1] + 0.01) / 0.05, 0, 1)
             aside = np.clip(1.35 - (places[:, 0] / half) ** 2, 0, 1)
-            return (1 - 0.55 * pose.roundness) * (1 - 0.93 * depth) ** 1.5 * (0.6 + 0.4 * under) * (0.35 + 0.65 * aside)
+            return shade * (1 - depth) ** 1.5 * (0.7 + 0.3 * under) * (0.35 + 0.65 * aside)
 
         return inside
 
@@ -188,12 +193,3 @@ class Figure:
         lit[self._wall] = 1
         lit[:, 0] = np.clip(1.08 * lit[:, 0], 0.12, 1) ** 1.15
         return lit
-
-
-def turned(yaw: float, pitch: float, roll: float = 0.0) -> Real:
-    """Return the rotation to the character's left, upwards and to the left shoulder, in radians [shape=(3, 3)]."""
-    (cy, sy), (cp, sp), (cr, sr) = ((np.cos(a), np.sin(a)) for a in (yaw, pitch, roll))
-    about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
-    about_x = np.array([[1, 0, 0], [0, cp, sp], [0, -sp, cp]])
-    about_z = np.array([[cr, sr, 0], [-sr, cr, 0], [0, 0, 1]])
-    return np.asarray(about_y @ about_x @ about_z)
