@@ -24,6 +24,8 @@ WIDEST = 0.4
 """Largest drawn gap; openings of speech stay below 0.35."""
 WIDTH_GAIN, WIDTH_REACH = 1.5, 0.34
 """Changes of width are exaggerated: small ones by the factor, none beyond the reach."""
+WIDER = {"round": -0.13, "pucker": -0.07, "spread": 0.05, "oval": -0.09}
+"""What gestures add to the width, relative to the rest pose."""
 TUCKED_GAP = 0.054
 """How far the upper lip bares the upper teeth while the lower lip is on them."""
 PUCKERED_GAP, HELD_GAP = 0.028, 0.036
@@ -90,12 +92,7 @@ def head_poses(
         "upper_rise": _rise(gap, said),
         "jaw": _jaw(motion, rest, gap, time_s) * (1 - 0.85 * bite),
         "bite": np.maximum(bite, said["press"]),
-        "width": 1
-        + change
-        - 0.13 * said["round"]
-        - 0.07 * said["pucker"]
-        + 0.05 * said["spread"]
-        - 0.09 * said["oval"],
+        "width": 1 + change + sum(WIDER[name] * said[name] for name in WIDER),
         "fullness": _at(motion, _fullness(motion, rest), time_s) * (1 + 0.08 * roundness),
         "roundness": roundness,
         "spread": wide,
