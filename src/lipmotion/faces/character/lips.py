@@ -76,7 +76,9 @@ def section_points(pose: CharacterPose, base_z: Real) -> Real:
     rise = pose.upper_rise
     drop = pose.gap - rise
     middle = MOUTH_Y + (1 - 0.8 * pose.roundness - 0.6 * pose.spread) * _LINE + pose.smile * ACROSS**2
-    middle = middle - 0.22 * pose.gap * (1 - 0.6 * pose.spread) * ACROSS**2 - (ROUND_DROP + 0.2 * pose.gap) * pose.roundness
+    middle = (
+        middle - 0.22 * pose.gap * (1 - 0.6 * pose.spread) * ACROSS**2 - (ROUND_DROP + 0.2 * pose.gap) * pose.roundness
+    )
     squeeze = _squeeze(pose)
     belly = _ENVELOPE + squeeze * (1 - _ENVELOPE)
     hole, contour = _opening(pose)

@@ -90,7 +90,12 @@ def head_poses(
         "upper_rise": _rise(gap, said),
         "jaw": _jaw(motion, rest, gap, time_s) * (1 - 0.85 * bite),
         "bite": np.maximum(bite, said["press"]),
-        "width": 1 + change - 0.13 * said["round"] - 0.07 * said["pucker"] + 0.05 * said["spread"] - 0.09 * said["oval"],
+        "width": 1
+        + change
+        - 0.13 * said["round"]
+        - 0.07 * said["pucker"]
+        + 0.05 * said["spread"]
+        - 0.09 * said["oval"],
         "fullness": _at(motion, _fullness(motion, rest), time_s) * (1 + 0.08 * roundness),
         "roundness": roundness,
         "spread": wide,
