@@ -252,4 +252,3 @@ def check_line_settings(settings: BatchSettings) -> None:
     _model(settings.model, _stamp(settings.model))
     _lexicon(settings.lexicon, _stamp(settings.lexicon))
     _face(settings.face, _stamp(settings.face))
-

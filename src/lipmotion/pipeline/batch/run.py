@@ -114,9 +114,7 @@ def _check_outside(lines: Sequence[Line], place: Place) -> None:
     inside = os.path.realpath(place.out) + os.sep
     for line in lines:
         if os.path.realpath(line.recording).startswith(inside):
-            raise ExportError(
-                f"{place.out}: holds the recording {line.recording}; give another folder for the outputs"
-            )
+            raise ExportError(f"{place.out}: holds the recording {line.recording}; give another folder for the outputs")
 
 
 def _forget(place: Place, record: Record) -> None:
@@ -177,5 +175,3 @@ class _Counter:
         finished = self.done + self.kept + self.failed
         self._monitor(Item(name, outcome, reason))
         self._monitor(Progress(STAGE, finished, self._lines, finished / self._lines))
-
-
