@@ -88,8 +88,12 @@ def _held_already(motion: Motion, curves: str) -> Motion | None:
 
 
 def _blendshapes(motion: Motion) -> Motion | None:
-    """Return the channels of a motion that are ARKit's blendshapes, by ARKit's names; None: it has no jawOpen."""
-    known = {arkit_name(name): column for column, name in reversed(list(enumerate(motion.names)))}
+    """Return the channels of a motion that are ARKit's blendshapes, by ARKit's names, and angles of head and eyes.
+
+    None: it has no jawOpen.
+    """
+    angles = {channel.name: channel.name for channel in motion.channels if channel.unit == RADIAN}
+    known = {angles.get(name) or arkit_name(name): n for n, name in reversed(list(enumerate(motion.names)))}
     columns = [(name, column) for name, column in sorted(known.items(), key=lambda each: each[1]) if name]
     if "jawOpen" not in known:
         return None

@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
 
-from lipmotion.faces.character.figure import turned
 from lipmotion.faces.character.forms import MOUTH_Y, head
 from lipmotion.faces.character.pose import CharacterPose
 from lipmotion.faces.character.shapes import POSES, SIDED_POSES, head_mesh
 from lipmotion.faces.character.skin import REST
 from lipmotion.faces.character.stage import camera_for, figure
+from lipmotion.faces.liveliness import turned
 
 VIEWER = camera_for(640, 360).place
 OPEN = CharacterPose(gap=0.25, upper_rise=0.04, jaw=0.18)

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.faces.character import gestures
-from lipmotion.faces.character.liveliness import SEED, liveliness
 from lipmotion.faces.character.pose import CharacterPose
+from lipmotion.faces.liveliness import SEED, accent_of, liveliness
 from lipmotion.motion.rest import against_rest, rest_frames
 from lipmotion.types import Motion, Prosody, Timeline, Unit
 from lipmotion.units import LIP_CLOSING
@@ -86,7 +86,7 @@ def head_poses(
     gap = _articulated(np.minimum(intensity * _gap(motion, time_s, fps), WIDEST), said, pause)
     gap = _closed(gap, units, time_s)
     bite = np.maximum(said["bite"], said["spread"] ** 1.5) * np.clip((BITTEN_GAP[1] - gap) / np.ptp(BITTEN_GAP), 0, 1)
-    alive = liveliness(gap, pause, fps, seed=seed, accent=_accent(prosody, time_s))
+    alive = liveliness(gap, pause, fps, seed=seed, accent=accent_of(prosody, time_s))
     curves = {
         "gap": gap,
         "upper_rise": _rise(gap, said),
@@ -129,21 +129,6 @@ def _said(motion: Motion, units: Timeline[Unit], time_s: Curve) -> dict[str, Cur
     if "teeth" in given:
         said["bite"] = np.clip(2 * given["teeth"] - 1, 0, 1)
     return said
-
-
-def _accent(prosody: Prosody | None, time_s: Curve) -> Curve | None:
-    """Return how loud and high the voice is against its surroundings, about -1 to 1 [shape=(T,)]; None: not known."""
-    if prosody is None or not len(prosody.level_db):
-        return None
-    at_s = np.arange(len(prosody.level_db)) / 100.0
-    voiced = np.isfinite(prosody.log_f0)
-    high = np.zeros(len(at_s))
-    if voiced.any():
-        high = np.interp(at_s, at_s[voiced], prosody.log_f0[voiced])
-        high = (high - np.median(high[voiced])) / max(float(np.std(high[voiced])), 0.02)
-    loud = np.asarray(prosody.level_db, float)
-    loud = (loud - np.median(loud)) / max(float(np.std(loud)), 1.0)
-    return np.interp(time_s, at_s, np.tanh(0.6 * high + 0.4 * loud) * np.clip(loud + 1, 0, 1))
 
 
 def _articulated(gap: Curve, said: dict[str, Curve], pause: Curve) -> Curve:

@@ -81,9 +81,10 @@ def check_names(lines: Iterable[Line], kinds: Sequence[str]) -> None:
             key = unicodedata.normalize("NFC", f"{line.name}.{kind}").casefold()
             if key in taken:
                 raise ExportError(
-                    f"{line.name}.{kind}: would be written for {taken[key]} and for {line.recording}; rename one "
-                    "of them, or name the outputs in a column 'output' of the list"
+                    f"{line.name}.{kind}: would be written for {taken[key]} and for {line.recording}; rename one of "
+                    "them, or name the outputs in a column 'output' of the list"
                 )
+            taken[key] = line.recording
 
 
 def _is_hidden(part: str) -> bool:

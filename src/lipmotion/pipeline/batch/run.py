@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import uuid
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -122,7 +122,7 @@ def _forget(place: Place, record: Record) -> None:
     place.receipt(record["name"]).unlink(missing_ok=True)
 
 
-def _finished(each: Pool, waiting: Sequence[LineWork]) -> Iterator[Record]:
+def _finished(each: Pool, waiting: Sequence[LineWork]) -> Generator[Record, None, None]:
     """Yield the record of every line. Where a worker dies, the lines go on that it had; one that kills again fails."""
     left, deaths = {work.line.name: work for work in waiting}, 0
     while left:

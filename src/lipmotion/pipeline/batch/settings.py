@@ -85,7 +85,7 @@ def fingerprint_of(settings: BatchSettings) -> str:
     files |= {"face": settings.face if os.path.isfile(settings.face) else ""}  # noqa: PTH113
     files |= {"curves": settings.curves if os.path.isfile(settings.curves) else ""}  # noqa: PTH113
     digests = {name: sha256_of(Path(path)) if path else "" for name, path in files.items()}
-    named: dict[str, Any] = asdict(settings) | {name: "" for name in ("model", "lexicon")}
+    named: dict[str, Any] = asdict(settings) | {"model": "", "lexicon": ""}
     named["lipmotion"] = installed_version()
     return _digest(as_json([named, digests], sort_keys=True))
 
