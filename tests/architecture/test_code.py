@@ -106,7 +106,7 @@ def test_a_rule_is_kept(rule: Rule) -> None:
 
 def test_one_module_prints() -> None:
     found = {place.rpartition(":")[0] for place in offences(printed)}
-    assert found == {"cli/output.py"}
+    assert found == {"cli/output.py", "addons/blender/script.py"}  # the second one runs in Blender
 
 
 OFFENCES: list[tuple[Rule, str, list[int]]] = [

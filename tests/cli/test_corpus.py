@@ -53,12 +53,19 @@ def test_prepare_prints_the_counts(run: RunCommand, monkeypatch: pytest.MonkeyPa
         )
 
     monkeypatch.setattr(prepare, "prepare", done)
-    assert run("corpus", "prepare", "videos", "-o", "mine", "--workers", "2", "--no-crops") == (
+    arguments = ("videos", "-o", "mine", "--workers", "2", "--no-crops", "--offset-ms", "-40")
+    assert run("corpus", "prepare", *arguments) == (
         0,
         ["mine: 2 prepared, 1 kept, 1 skipped (folder of videos)"],
         ["lipmotion: warning: skipped d: no face"],
     )
-    assert asked == {"directory": Path("videos"), "output": Path("mine"), "workers": 2, "crops": False}
+    assert asked == {
+        "directory": Path("videos"),
+        "output": Path("mine"),
+        "workers": 2,
+        "crops": False,
+        "offset_ms": -40.0,
+    }
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ import pytest
 
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.pipeline import workers as module
-from lipmotion.pipeline.workers import worker_pool
+from lipmotion.pipeline.workers import map_in_processes, worker_pool
 
 
 def square(number: int) -> int:
@@ -132,3 +132,31 @@ def test_a_signal_that_another_thread_takes_waits_until_a_process_has_started(nu
         other.join()
         signal.signal(number, before)
     assert seen == ["started", "answered"]
+
+
+def test_processes_begin_before_results_are_asked_for() -> None:
+    taken, called = [], []
+
+    def items() -> Iterator[int]:
+        for number in range(4):
+            taken.append(number)
+            yield number
+
+    results = map_in_processes(2, lambda: called.append(True))(square, items())
+    assert taken == [0, 1]  # each process has one
+    assert not called
+    assert list(results) == [0, 1, 4, 9]
+    assert called == [True]
+
+
+def test_nothing_is_called_meanwhile_where_there_is_no_process() -> None:
+    called = []
+    assert list(map_in_processes(2, lambda: called.append(True))(square, [3])) == [9]
+    assert not called
+
+
+def test_processes_that_nobody_waits_for_end() -> None:
+    results = map_in_processes(2)(square, range(9))
+    assert multiprocessing.active_children()
+    del results
+    assert not multiprocessing.active_children()

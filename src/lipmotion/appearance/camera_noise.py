@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import convolve1d
 
 from lipmotion.errors import InputError
 from lipmotion.storage.schema import Arrays, ArraySpec, checked_arrays, format_errors, refuse_undeclared
@@ -121,6 +120,8 @@ class NoiseSource:
     @cached_property
     def _field(self) -> NDArray[np.float32]:
         """The field of noise, followed by its own start, so that a part may begin anywhere."""
+        from scipy.ndimage import convolve1d
+
         values, vectors = np.linalg.eigh(self.noise.covariance)
         mixing = (vectors * np.sqrt(np.maximum(values, 0))).T.astype(np.float32)
         height, width = self.size

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_dilation
 
 from lipmotion.appearance.camera_noise import CameraNoise, estimate_noise
 from lipmotion.appearance.candidates import (
@@ -247,6 +246,8 @@ def _in_one_light(footage: FootagePictures) -> tuple[Pictures, Array, Array]:
 
 def _jaw_alone(pictures: Pictures, mean: Floats, shape: FaceShape) -> Pictures:
     """Return lower faces that differ in the jaw alone: mouth and surroundings are the mean ones [shape=(H, W, 3)]."""
+    from scipy.ndimage import binary_dilation
+
     scale = pictures.shape[1] // HEIGHT
     other = mouth_ellipse(scale) | ~binary_dilation(replaced_part(shape, scale), iterations=EDGE_PX * scale)
     result = pictures.copy()

@@ -8,11 +8,11 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
-from lipmotion.cli.options import add_execution, worker_count
+from lipmotion.cli.options import add_execution
 from lipmotion.cli.output import print_note
 from lipmotion.cli.paths import add_output
 from lipmotion.cli.pipes import add_pipe_format, read_pipe, written_pipe
-from lipmotion.cli.results import add_result_arguments, check_results, recognition_of, write_results
+from lipmotion.cli.results import add_result_arguments, check_results, work_of, write_results
 from lipmotion.cli.several import add_kinds_argument, animated_one_by_one
 from lipmotion.cli.speech import add_speech_arguments, model_loader, spoken_request
 from lipmotion.printable import printable
@@ -65,6 +65,6 @@ def _animate(load: Callable[[], Model], options: argparse.Namespace, report: Rep
         result, posteriors = animate_with_posteriors(request, model=model)
         write_posteriors(options.posteriors, result, posteriors)
     else:
-        result = animate(request, model=model, workers=worker_count(options), monitor=recognition_of(options, report))
+        result = animate(request, model=model, **work_of(options, report))
     write_results(options, result, options.speech, model, report)
     return result.outlook.text if result.outlook is not None else ""

@@ -16,6 +16,7 @@ from lipmotion.cli import (
     adapt,
     addon,
     animate,
+    batch,
     character,
     cite,
     corpus,
@@ -37,7 +38,7 @@ from lipmotion.cli.stop import Stopper
 from lipmotion.printable import printable
 
 VERBS = (
-    *(animate, speak, render, explain, cues, words, corpus, train, adapt, face),
+    *(animate, batch, speak, render, explain, cues, words, corpus, train, adapt, face),
     *(character, addon, evaluate, experiment, info, cite),
 )
 EXIT_CODES = """exit codes: 0 done, 1 a bug, 2 wrong command line, 3 unusable input, 4 corpus, 5 alignment,

@@ -1,10 +1,10 @@
-"""``lipmotion corpus prepare|info|sync|prompts|coverage``: make a corpus of recordings, inspect and correct it."""
+"""``lipmotion corpus prepare|info|sync|offset|prompts|coverage``: make a corpus of recordings, correct it."""
 
 from __future__ import annotations
 
 import argparse
 
-from lipmotion.cli import corpus_coverage, corpus_info, corpus_prompts, corpus_sync
+from lipmotion.cli import corpus_coverage, corpus_info, corpus_offset, corpus_prompts, corpus_sync
 from lipmotion.cli.options import add_machine_readable, add_workers
 from lipmotion.cli.paths import add_input, add_output
 
@@ -19,10 +19,13 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     add_output(prepare, "-o", "--output", is_folder=True, required=True, metavar="CORPUS")
     add_workers(prepare)
     prepare.add_argument("--no-crops", dest="crops", action="store_false", help="do not store mouth pictures")
+    late = "the sound of every recording is MS milliseconds late against its motion (default: in step, or found)"
+    prepare.add_argument("--offset-ms", type=float, metavar="MS", help=late)
     add_machine_readable(prepare)
     prepare.set_defaults(run=run_prepare)
     corpus_info.add(actions)
     corpus_sync.add(actions)
+    corpus_offset.add(actions)
     corpus_prompts.add(actions)
     corpus_coverage.add(actions)
 
@@ -38,6 +41,7 @@ def run_prepare(options: argparse.Namespace) -> None:
             options.output,
             workers=options.workers,
             crops=options.crops,
+            offset_ms=options.offset_ms,
             monitor=report.receive,
         )
         report.finish(str(done), corpus=str(done.corpus), kind=done.kind, **done.counts)

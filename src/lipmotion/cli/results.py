@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,13 +14,14 @@ from lipmotion.cli.characters import (
 )
 from lipmotion.cli.delivery import add_delivery_arguments, delivery_of
 from lipmotion.cli.faces import add_face_arguments, film_options
+from lipmotion.cli.options import worker_count
 from lipmotion.cli.paths import add_output
 from lipmotion.cli.staging import add_staging_arguments, staging_of
 
 if TYPE_CHECKING:
     from lipmotion.cli.progress import Report
     from lipmotion.pipeline.model import Model
-    from lipmotion.types import Audio, Generation, Monitor
+    from lipmotion.types import Audio, Generation
 
 RECOGNITION = 0.3
 """The share of the work that is recognition, where a video is drawn, too."""
@@ -91,13 +93,21 @@ def write_results(
     )
 
 
-def recognition_of(options: argparse.Namespace, report: Report) -> Monitor:
-    """Return the monitor of recognition: the whole work, or its first part where a video is drawn, too."""
-    from lipmotion.pipeline.drawn_video import shows_face
+def work_of(options: argparse.Namespace, report: Report) -> dict[str, Any]:
+    """Return how ``animate`` works for the outputs: processes, monitor, and what it loads meanwhile.
+
+    Recognition is the whole work, or its first part where a video is drawn, too; what draws it is loaded meanwhile.
+    """
+    from lipmotion.faces.base import Face
+    from lipmotion.pipeline.drawn_video import load_drawing, shows_face
     from lipmotion.types.progress import sub_monitor
 
     draws = any(shows_face(Path(output)) for output in options.output)
-    return sub_monitor(report.receive, 0.0, RECOGNITION if draws else 1.0)
+    return {
+        "workers": worker_count(options),
+        "monitor": sub_monitor(report.receive, 0.0, RECOGNITION if draws else 1.0),
+        "meanwhile": partial(load_drawing, options.face) if draws and isinstance(options.face, Face) else None,
+    }
 
 
 def rate_of(options: argparse.Namespace) -> float | None:

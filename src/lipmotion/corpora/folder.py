@@ -8,6 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from lipmotion.corpora.labels import RecordingLabels, labels_beside
+from lipmotion.corpora.separate_sounds import is_of_recorder
 from lipmotion.corpora.source_recordings import (
     AUDIO_SUFFIXES,
     MotionFile,
@@ -77,7 +78,7 @@ def _is_sound(path: Path) -> bool:
 
 
 def _has_motion(path: Path) -> bool:
-    return _is_sound(path) and path.is_file() and bool(motion_files(path))
+    return _is_sound(path) and not is_of_recorder(path) and path.is_file() and bool(motion_files(path))
 
 
 def _only(paths: list[Path]) -> Path:

@@ -44,6 +44,8 @@ class SourceRecording:
     motion_file : the motion; None: the face in ``file`` is to be tracked
     start_s     : where in the file the sentence begins, s
     end_s       : where it ends; None: the file is this one sentence
+    recorder    : its sound as a recorder of its own made it, not in step; None: the sound of ``file`` is used
+    offset_s    : by how much the sound that is used is late, where that is given
     """
 
     name: str
@@ -56,6 +58,8 @@ class SourceRecording:
     motion_file: MotionFile | None = None
     start_s: float = 0.0
     end_s: float | None = None
+    recorder: Path | None = None
+    offset_s: float | None = None
 
 
 @dataclass(frozen=True)

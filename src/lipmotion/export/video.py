@@ -50,7 +50,8 @@ def write_mp4(
 ) -> None:
     """Write a video with sound; frame n is shown at ``n / fps`` seconds, the sound starts at 0.
 
-    frames : RGB [shape=(H, W, 3)], even sizes, at least one; taken one at a time
+    frames : RGB [shape=(H, W, 3)], or brightness and colours, YUV 4:2:0 of BT.601 [shape=(H · 3 / 2, W)], as
+             ``faces.base.DrawsPlanes`` gives them; even sizes, at least one; taken one at a time
     fps    : 23.976, 29.97 and 59.94 stand for 24000/1001, 30000/1001 and 60000/1001
     tags   : metadata that players show, by names of ``TAGS``
     xmp    : metadata for programs, as an XMP packet (``synthetic_mark``)
@@ -85,14 +86,19 @@ def _checked(frames: Iterable[Frame], path: Path) -> Iterator[Frame]:
     shape: tuple[int, ...] | None = None
     for n, frame in enumerate(frames):
         shape = shape or frame.shape
-        height, width, *colours = frame.shape
-        if frame.shape != shape or frame.dtype != np.uint8 or colours != [3] or height % 2 or width % 2:
+        if frame.shape != shape or frame.dtype != np.uint8 or not _has_even_sizes(shape):
             raise ExportError(
                 f"{path}: frame {n} is {frame.dtype} {frame.shape}, required uint8 RGB of even sizes, all alike"
             )
         yield frame
     if shape is None:
         raise ExportError(f"{path}: there are no frames to write")
+
+
+def _has_even_sizes(shape: tuple[int, ...]) -> bool:
+    """Return whether frames of a shape are RGB or YUV 4:2:0 of even height and width."""
+    height, width, *colours = shape
+    return not width % 2 and (not height % 2 if colours == [3] else not colours and not height % 3)
 
 
 def _encode(
@@ -123,7 +129,7 @@ def _encode(
 
 def _video_stream(container: Any, first: Frame, rate: Fraction) -> Any:
     stream = container.add_stream("libx264", rate=rate, options=dict(_ENCODER))
-    stream.height, stream.width = first.shape[:2]
+    stream.height, stream.width = first.shape[:2] if first.ndim == 3 else (len(first) * 2 // 3, first.shape[1])
     stream.pix_fmt = "yuv420p"
     context = stream.codec_context
     context.time_base = 1 / rate
@@ -135,8 +141,12 @@ def _video_stream(container: Any, first: Frame, rate: Fraction) -> Any:
 def _picture(frame: Frame, n: int, rate: Fraction, converter: Any) -> Any:
     from av import VideoFrame
 
-    picture = VideoFrame.from_ndarray(np.ascontiguousarray(frame), format="rgb24")
-    picture = converter.reformat(picture, format="yuv420p", dst_colorspace="itu601")
+    if frame.ndim == 2:
+        picture = VideoFrame.from_numpy_buffer(np.ascontiguousarray(frame), format="yuv420p")
+        picture.colorspace, picture.color_range = _BT601, _LIMITED
+    else:
+        picture = VideoFrame.from_ndarray(np.ascontiguousarray(frame), format="rgb24")
+        picture = converter.reformat(picture, format="yuv420p", dst_colorspace="itu601")
     picture.pts, picture.time_base = n, 1 / rate
     return picture
 

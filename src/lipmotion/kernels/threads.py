@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import lru_cache
+from typing import Any
 
 
 @contextmanager
@@ -16,10 +19,17 @@ def one_thread() -> Iterator[None]:
     cannot be limited (Accelerate on macOS) are not changed.
     """
     import numpy as np  # noqa: F401 # only what is loaded can be limited
-    from threadpoolctl import threadpool_limits
 
-    with threadpool_limits(1, user_api="blas"):
+    with _loaded_libraries(len(sys.modules)).limit(limits=1, user_api="blas"):
         yield
+
+
+@lru_cache(maxsize=1)
+def _loaded_libraries(_: int) -> Any:
+    """Return threadpoolctl's controller of the libraries in use; asked for again when modules have been imported."""
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()
 
 
 def blas_kernels() -> list[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,8 @@ BLOCK = 2048
 """Frames whose scores are in memory at a time; earlier scores are computed again from checkpoints."""
 FRAME_S, ARC_S = 10e-6, 15e-9
 """Time that NumPy takes for a frame, and for every arc in it (docs/results/kernels.md)."""
+LEAST_RUN = 20.0
+"""Networks whose runs of arcs are shorter on average are searched arc by arc: a run costs as much as 30 single arcs."""
 
 
 def best_path(
@@ -74,7 +76,8 @@ class PathSearch:
     """The search for the best path through a network. Rows of scores are by place.
 
     order, place    : of the layout, or without one those of the states' own order
-    layout, weights : for the compiled form; None: NumPy computes
+    layout, weights : for the compiled form; None: NumPy computes, or arc by arc
+    by_arcs         : whether the compiled form goes arc by arc
     """
 
     network: NetworkArrays
@@ -83,6 +86,7 @@ class PathSearch:
     place: Index
     layout: ArcLayout | None = None
     weights: ArcWeights | None = None
+    by_arcs: bool = False
 
     def scores(self, first: Scores, log_emission: Scores) -> tuple[Scores, float]:
         """Return the scores of the best path to every state, relative to each frame's best, and the sum of these best.
@@ -92,15 +96,25 @@ class PathSearch:
         """
         delta = np.empty((len(log_emission), len(self.network.emission)), np.float32)
         delta[0] = first
-        if self.layout is None or self.weights is None:
+        if not self.by_arcs and (self.layout is None or self.weights is None):
             return delta, self._fill(delta, log_emission)
         from lipmotion.kernels.compiled import viterbi
 
-        _, _, runs, _, blocks, block_sources, _ = self.layout
         columns = self.network.emission[self.order].astype(np.uintp)  # indices that may be negative are not vectorised
         log_emission = np.ascontiguousarray(log_emission, np.float32)
+        if self.layout is None or self.weights is None:
+            sources, stops = self.network.arc_from.astype(np.uintp), self._arc_stops
+            arc_log = np.asarray(self.network.arc_log, np.float32)
+            beam = np.float32(-self.beam)
+            return delta, float(viterbi.scores_by_arcs(delta, log_emission, columns, sources, arc_log, stops, beam))
+        _, _, runs, _, blocks, block_sources, _ = self.layout
         arcs = (runs, self.weights.runs, blocks, block_sources, self.weights.blocks)
         return delta, float(viterbi.scores(delta, log_emission, columns, *arcs, np.float32(-self.beam)))
+
+    @property
+    def _arc_stops(self) -> Index:
+        """The end of every state's arcs."""
+        return np.append(self.network.arc_start[1:], len(self.network.arc_from))
 
     def _fill(self, delta: Scores, log_emission: Scores) -> float:
         """Compute all rows but the first, by NumPy; return the sum of the frames' best scores."""
@@ -122,12 +136,12 @@ class PathSearch:
     def trace(self, path: Index, delta: Scores, state: int) -> None:
         """Fill in the path before ``state`` in the last frame of ``delta``: without back-pointers, from the scores."""
         _, arc_from, arc_log, arc_start, _, _ = self.network
-        if self.layout is not None:
+        if self.layout is not None or self.by_arcs:
             from lipmotion.kernels.compiled import viterbi
 
             viterbi.trace(path, delta, state, self.place, arc_from, arc_log, arc_start)
             return
-        stops = np.append(arc_start[1:], len(arc_from))
+        stops = self._arc_stops
         for frame in range(len(path) - 1, -1, -1):
             arcs = slice(arc_start[state], stops[state])
             sources = arc_from[arcs]
@@ -148,4 +162,6 @@ def _plain_search(network: NetworkArrays, beam: float) -> PathSearch:
 
 
 def _compiled_search(network: NetworkArrays, beam: float, layout: ArcLayout) -> PathSearch:
+    if len(layout.run_arcs) < LEAST_RUN * len(layout.runs):
+        return replace(_plain_search(network, beam), by_arcs=True)
     return PathSearch(network, beam, layout.order, layout.place, layout, arc_weights(layout, network.arc_log, -np.inf))

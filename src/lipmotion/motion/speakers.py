@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import convolve1d
 
 from lipmotion.errors import InputError
 from lipmotion.motion.closure import OPENING, closable_ranges, closed_opening
@@ -155,6 +154,8 @@ def viseme_weights(units: Timeline[Unit], frames: int) -> Array:
     Visemes fade into each other over ``FADE_FRAMES``; in silence away from speech, and where no phone is known, all
     weights are 0.
     """
+    from scipy.ndimage import convolve1d
+
     weights = np.zeros((frames, len(VISEME_NAMES)))
     for span in units:
         if span.label.phone in VISEME_OF:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -81,6 +81,7 @@ def animate(
     constraints: Constraints | None = None,
     workers: int = 1,
     monitor: Monitor = silent_monitor,
+    meanwhile: Callable[[], None] | None = None,
 ) -> Generation:
     """Return lip motion for speech: values of all channels at 100 Hz, variances, phones in time, and states.
 
@@ -91,6 +92,7 @@ def animate(
     workers     : number of processes that recognise the words of a long recording. With more than one, a script must be
                   guarded by ``if __name__ == "__main__":``
     monitor     : receives reports of the progress
+    meanwhile   : is called while these processes work, where there are several: to prepare what is done next
     Raises InputError: the recording, the transcript or a constraint is not usable, or the model knows no such speaker.
     Raises AlignmentError: the transcript cannot be aligned with the recording.
     Source: Hofer, Yamagishi & Shimodaira 2008 (``engines.trajectory``, the engine of the shipped model).
@@ -106,7 +108,7 @@ def animate(
     chosen = model if isinstance(model, Model) else load_model(model)
     request = request_of(speech, transcript)
     person = person_of(chosen, request)
-    understood = understood_speech(chosen, request, map_in_processes(workers), monitor)
+    understood = understood_speech(chosen, request, map_in_processes(workers, meanwhile), monitor)
     monitor(Progress("moving the mouth", 0, 1, MOVING))
     generation = generate_for(person, chosen.engine, chosen.learned, understood.speech, constraints)
     monitor(Progress("moving the mouth", 1, 1, 1.0))

@@ -9,13 +9,15 @@ from pathlib import Path
 import numpy as np
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.faces.base import TRANSPARENT, Face, Staging
+from lipmotion.faces.base import SMALLEST, TRANSPARENT, DrawsPlanes, Face, Staging
 from lipmotion.faces.filmed.face import FilmedFace
 from lipmotion.faces.registry import staged_face
+from lipmotion.kernels.choice import numba_works
 from lipmotion.pipeline.film.video import RENDERING
 from lipmotion.speech.audio_files import SPEECH_RATE_HZ, read_audio
+from lipmotion.speech.decimation import decimated
 from lipmotion.speech.prosody import prosody_of
-from lipmotion.types import Audio, Generation, Monitor, Prosody
+from lipmotion.types import Audio, Channel, Generation, Monitor, Motion, Prosody, Timeline
 from lipmotion.types.progress import with_reports
 
 OPAQUE_SUFFIX = ".mp4"
@@ -60,7 +62,11 @@ def write_drawn_face(
     from lipmotion.export.transparent import write_pictures, write_with_alpha
     from lipmotion.export.video import write_mp4
 
-    drawn = staged_face(face, staging, prosody_heard(sound)).render(generation.motion, generation.units, fps=fps)
+    staged, drawn = staged_face(face, staging, prosody_heard(sound)), None
+    if path.suffix.lower() == OPAQUE_SUFFIX and isinstance(staged, DrawsPlanes):
+        drawn = staged.render_planes(generation.motion, generation.units, fps=fps)
+    if drawn is None:
+        drawn = staged.render(generation.motion, generation.units, fps=fps)
     frames = with_reports(drawn, int(generation.motion.time_s[-1] * fps + 1e-9) + 1, RENDERING, monitor)
     if is_picture_sequence(path):
         write_pictures(path, frames)
@@ -70,16 +76,27 @@ def write_drawn_face(
         write_with_alpha(path, frames, fps=fps, audio=sound)
 
 
+def load_drawing(face: Face) -> None:
+    """Load what draws a face for videos (compiled kernels), so that drawing it begins sooner."""
+    if isinstance(face, DrawsPlanes) and numba_works():
+        closed = Motion(np.zeros((1, 1)), 1.0, (Channel("opening"),))
+        smallest = staged_face(face, Staging(size=SMALLEST))
+        if isinstance(smallest, DrawsPlanes) and (frames := smallest.render_planes(closed, Timeline(()))) is not None:
+            list(frames)
+
+
 def prosody_heard(speech: str | Path | Audio) -> Prosody:
     """Return loudness and pitch of a recording or a sound, for movements of brows and head.
 
     Raises InputError: the recording cannot be read.
     """
-    from scipy.signal import resample_poly
-
     sound = speech if isinstance(speech, Audio) else read_audio(Path(speech), SPEECH_RATE_HZ, warn=False)
     ratio = Fraction(SPEECH_RATE_HZ, int(sound.rate_hz))
     samples = sound.samples.astype(np.float32)
-    if ratio != 1:
+    if ratio.numerator == 1:
+        samples = decimated(samples, ratio.denominator)
+    else:
+        from scipy.signal import resample_poly
+
         samples = resample_poly(samples, ratio.numerator, ratio.denominator).astype(np.float32)
     return prosody_of(Audio(samples, SPEECH_RATE_HZ))

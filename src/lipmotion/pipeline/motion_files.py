@@ -11,13 +11,16 @@ from lipmotion.export.base import motion_format, motion_suffix
 from lipmotion.faces.base import Staging
 from lipmotion.pipeline.characters import ARKIT, WHOLE_FACE, beside, curves_of
 from lipmotion.pipeline.living_curves import RADIAN, living_curves
+from lipmotion.rig.driven import at_times
 from lipmotion.rig.facial_animation import FAP
+from lipmotion.rig.point_motion import point_motion
 from lipmotion.rig.rig_tables import CONTROL
 from lipmotion.rig.shape_names import arkit_name
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Prosody
 
 CURVES = (WEIGHT, CONTROL, RADIAN)
 """The units of curves that drive a character."""
+SAME_HZ = 1e-6
 OPENING = "opening"
 
 
@@ -34,7 +37,8 @@ def in_format(
     chosen  : the generation with the channels, and at the rate, that the user asked for: what most formats hold
     rate_hz : the rate that the user asked for; None: that of the format, or else that of the motion
     staging, prosody : of what moves on its own, in formats that hold a whole face; None: everything moves; not known
-    Blendshapes that the motion has already, by any spelling of ARKit's names, are taken as they are.
+    Where the lips close between two frames of curves, the nearer one shows it. Blendshapes that the motion has
+    already, by any spelling of ARKit's names, are taken as they are.
     Raises ExportError: unknown suffix. Raises InputError: curves that cannot be computed.
     """
     form = motion_format(path)
@@ -44,7 +48,14 @@ def in_format(
         curves = _curves(generation, form.curves, staging, prosody)
         held = replace(generation, motion=curves, spread=np.zeros(curves.values.shape))
     hertz = rate_hz or form.rate_hz
-    return held if hertz in {None, held.motion.rate_hz} else held.resampled(hertz)
+    if hertz is None or abs(hertz - held.motion.rate_hz) < SAME_HZ:
+        return held
+    resampled = held.resampled(hertz)
+    if held is chosen or OPENING not in generation.motion.names:
+        return resampled
+    gap = point_motion(generation.motion, generation.units).gap
+    rows = at_times(held.motion.values.astype(np.float64), gap, held.motion.rate_hz, resampled.motion.time_s)
+    return replace(resampled, motion=replace(resampled.motion, values=rows))
 
 
 def needs_prosody(path: Path) -> bool:

@@ -21,6 +21,7 @@ from lipmotion.faces.character.stage import figure
 from lipmotion.faces.mesh import MeshFace
 from lipmotion.pipeline.living_curves import curves_of_poses, living_curves
 from lipmotion.rig.driven import DrivenCharacter, at_times
+from lipmotion.rig.gltf_animator import write_animated_gltf
 from lipmotion.rig.gltf_writer import write_gltf_scene
 from lipmotion.rig.mesh import Blendshape
 from lipmotion.rig.point_motion import point_motion
@@ -33,6 +34,8 @@ from lipmotion.types.motion import WEIGHT
 
 GLTF, USD = ".glb", ".usda"
 SCENE_SUFFIXES = (GLTF, USD)
+KEPT = (GLTF, ".vrm")
+"""Suffixes of files of characters that are kept as they are, with an animation more."""
 METRES = 0.09
 """The distance between the outer eye corners of the 3D head, in metres."""
 
@@ -59,14 +62,24 @@ def scene_of(
 def write_scene(path: Path, scene: Scene, sound: Path | None = None) -> None:
     """Write a character with its animation as ``.glb`` or ``.usda``, by the suffix.
 
+    A ``.glb`` of a character from a ``.glb`` or ``.vrm`` is that file with one animation more, where that is possible.
     sound : the file that is referred to, by its path from the folder of the output; None: none
     Raises ExportError: the file cannot be written.
     """
     heard = replace(scene, sound="" if sound is None else sound_reference(sound, path))
+    if _keeps_original(path, heard):
+        return
     if path.suffix.lower() == USD:
         write_usda(path, heard)
     else:
         write_gltf_scene(path, heard)
+
+
+def _keeps_original(path: Path, scene: Scene) -> bool:
+    """Write the user's file with its animation, and return whether that was possible."""
+    if path.suffix.lower() != GLTF or scene.original is None or scene.original.suffix.lower() not in KEPT:
+        return False
+    return scene.weights is not None and write_animated_gltf(path, scene.original, scene.weights, scene.sound)
 
 
 def head_scene(
@@ -126,7 +139,7 @@ def character_scene(
     hertz = rate_hz or motion.rate_hz
     time_s = np.arange(int(np.floor(motion.time_s[-1] * hertz + 1e-9)) + 1) / hertz
     rows = at_times(table, point_motion(motion, units).gap, motion.rate_hz, time_s)
-    return Scene(character.mesh, Motion(rows, hertz, channels))
+    return Scene(character.mesh, Motion(rows, hertz, channels), original=character.file)
 
 
 def _continued(rotations: NDArray[np.float64]) -> NDArray[np.float64]:

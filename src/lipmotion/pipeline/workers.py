@@ -37,14 +37,11 @@ class Workers:
         self._ends = ends
 
     def ordered_map(self, function: Callable[[ItemT], ResultT], items: Iterable[ItemT], /) -> Iterator[ResultT]:
-        """Yield the results in the order of the items. Raises CorpusError: a process died."""
-        waiting: dict[int, ResultT] = {}
-        following = 0
-        for number, result in self._numbered(function, items):
-            waiting[number] = result
-            while following in waiting:
-                yield waiting.pop(following)
-                following += 1
+        """Yield the results in the order of the items. The first items are sent at once.
+
+        Raises CorpusError: a process died.
+        """
+        return _ordered(self._numbered(function, items))
 
     def unordered_map(self, function: Callable[[ItemT], ResultT], items: Iterable[ItemT]) -> Iterator[ResultT]:
         """Yield the results in the order in which they are ready. Raises CorpusError: a process died."""
@@ -52,8 +49,7 @@ class Workers:
 
     def _numbered(self, function: Callable[[ItemT], ResultT], items: Iterable[ItemT]) -> Iterator[tuple[int, ResultT]]:
         if not self._ends:
-            yield from enumerate(map(function, items))
-            return
+            return enumerate(map(function, items))
         remaining, busy = enumerate(items), dict[Any, int]()
 
         def send_next(end: Any) -> None:
@@ -61,16 +57,29 @@ class Workers:
                 _send(end, (function, item))
                 busy[end] = number
 
+        def results() -> Iterator[tuple[int, ResultT]]:
+            while busy:
+                for end in pipes.wait(list(busy)):
+                    number = busy.pop(end)
+                    succeeded, result = _received(end)
+                    send_next(end)
+                    if not succeeded:
+                        raise result
+                    yield number, result
+
         for end in self._ends:
             send_next(end)
-        while busy:
-            for end in pipes.wait(list(busy)):
-                number = busy.pop(end)
-                succeeded, result = _received(end)
-                send_next(end)
-                if not succeeded:
-                    raise result
-                yield number, result
+        return results()
+
+
+def _ordered(numbered: Iterator[tuple[int, ResultT]]) -> Iterator[ResultT]:
+    waiting: dict[int, ResultT] = {}
+    following = 0
+    for number, result in numbered:
+        waiting[number] = result
+        while following in waiting:
+            yield waiting.pop(following)
+            following += 1
 
 
 @contextmanager
@@ -86,16 +95,34 @@ def worker_pool(count: int) -> Iterator[Workers]:
         yield Workers([stack.enter_context(_worker()) for _ in range(count)])
 
 
-def map_in_processes(count: int) -> ParallelMap:
-    """Return a map whose calls start up to ``count`` processes, and end them; of one item or none, no process."""
+def map_in_processes(count: int, meanwhile: Callable[[], None] | None = None) -> ParallelMap:
+    """Return a map whose calls start up to ``count`` processes, and end them; of one item or none, no process.
+
+    The processes begin with the first items when the map is called: the caller can work beside them, and then take the
+    results.
+    meanwhile : is called once, where processes have begun, before the first result is waited for
+    """
 
     def each(function: Callable[[ItemT], ResultT], items: Iterable[ItemT], /) -> Iterator[ResultT]:
         waiting = iter(items)
         first = list(islice(waiting, count))
-        with worker_pool(len(first)) as team:
-            yield from team.ordered_map(function, chain(first, waiting))
+        results = _begun(len(first), function, chain(first, waiting), meanwhile)
+        next(results)
+        return results
 
     return each
+
+
+def _begun(
+    count: int, function: Callable[[Any], Any], items: Iterable[Any], meanwhile: Callable[[], None] | None
+) -> Iterator[Any]:
+    """Yield None when ``count`` processes have begun with the first items, then the results."""
+    with worker_pool(count) as team:
+        results = team.ordered_map(function, items)
+        yield None
+        if meanwhile is not None and count > 1:
+            meanwhile()
+        yield from results
 
 
 @contextmanager

@@ -36,12 +36,14 @@ class DrivenCharacter:
 
     shapes  : the blendshapes of its mouth; None: control points move it
     binding : weights of control points; None: blendshapes move it
+    file    : where it was read from; None: from no file
     """
 
     mesh: Mesh
     placement: LipPlacement
     shapes: FaceShapes | None
     binding: ControlBinding | None
+    file: Path | None = None
 
     def weights(self, motion: Motion, units: Timeline[Unit]) -> Motion:
         """Return the weights of the blendshapes over time, channels by the names of the mesh, 0 to 1.
@@ -135,7 +137,7 @@ def driven_character(
     try:
         if is_stored and binding is not None:
             stored = load_binding(binding, mesh)
-            return DrivenCharacter(mesh, stored.placement, None, stored)
+            return DrivenCharacter(mesh, stored.placement, None, stored, Path(path))
         if points is not None:
             named = read_points(points)
             surface = surface_of_named(mesh, named)
@@ -144,11 +146,11 @@ def driven_character(
             surface = mesh_surface(mesh)
             placement = placed_by_shape(mesh, surface)
         if mesh.shapes and not by_points and binding is None:
-            return DrivenCharacter(mesh, placement, face_shapes(mesh, placement, only), None)
+            return DrivenCharacter(mesh, placement, face_shapes(mesh, placement, only), None, Path(path))
         bound = bind(mesh, surface, placement)
         if binding is not None:
             bound = painted(bound, mesh, read_weights(binding))
-        return DrivenCharacter(mesh, placement, None, bound)
+        return DrivenCharacter(mesh, placement, None, bound, Path(path))
     except InputError as error:
         text = str(error)
         raise InputError(text if str(path) in text else f"{path}: {text}") from error

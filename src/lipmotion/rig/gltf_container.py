@@ -13,7 +13,8 @@ from urllib.parse import unquote
 
 from lipmotion.errors import InputError, shortened
 from lipmotion.rig.limits import LARGEST_FILE, file_bytes
-from lipmotion.storage.json_text import from_json
+from lipmotion.storage.files import whole_file
+from lipmotion.storage.json_text import as_json, from_json
 
 MAGIC, VERSION = b"glTF", 2
 JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
@@ -77,6 +78,17 @@ def read_gltf_document(path: Path) -> GltfDocument:
     _check_extensions(json.get("extensionsRequired", []))
     document = GltfDocument(json)
     return GltfDocument(json, _buffers(document, path.parent, binary))
+
+
+def write_container(path: Path, json: dict[str, Any], body: bytes) -> None:
+    """Write a ``.glb`` of a document and one buffer. Raises ExportError: the file cannot be written."""
+    text = as_json(json, separators=(",", ":"), ensure_ascii=False).encode()
+    text += b" " * (-len(text) % 4)
+    padded = body + b"\0" * (-len(body) % 4)
+    with whole_file(path) as unfinished, unfinished.open("wb") as file:
+        file.write(struct.pack("<4sII", MAGIC, VERSION, 28 + len(text) + len(padded)))
+        file.write(struct.pack("<II", len(text), JSON_CHUNK) + text)
+        file.write(struct.pack("<II", len(padded), BINARY_CHUNK) + padded)
 
 
 def _chunks(content: bytes) -> tuple[bytes, bytes | None]:

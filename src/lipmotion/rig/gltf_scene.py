@@ -189,7 +189,7 @@ def _add_vertices(
     check_count("blendshapes", len(targets), MOST_SHAPES)
     surface.displacements += len(targets) * len(vertices)
     check_count("displacements", surface.displacements, MOST_DISPLACEMENTS)
-    names = _target_names(mesh, primitive, len(targets))
+    names = target_names(mesh, primitive, len(targets))
     for number, (name, target) in enumerate(zip(names, targets, strict=True)):
         surface.targets[(int(node["mesh"]), number)] = name
         moved = arrays.floats(target["POSITION"], 3) if "POSITION" in target else np.zeros_like(vertices)
@@ -295,7 +295,7 @@ def _numbers(value: Any) -> list[int]:
     return value
 
 
-def _target_names(mesh: dict[str, Any], primitive: dict[str, Any], count: int) -> list[str]:
+def target_names(mesh: dict[str, Any], primitive: dict[str, Any], count: int) -> list[str]:
     """Return the names of morph targets; those without a name are numbered."""
     for holder in (mesh, primitive):
         extras = holder.get("extras")

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from lipmotion.errors import InputError, shortened
 from lipmotion.rig.mesh import Blendshape, Mesh
@@ -195,7 +195,7 @@ def _slit(vertices: Places, surface: MeshSurface, drop: Places, skin: NDArray[np
     low, high = np.flatnonzero(skin & (drop > SLIT_STEP)), np.flatnonzero(skin & (drop < 1 - SLIT_STEP))
     if not reach or not len(low) or not len(high):
         return np.zeros((0, 3))
-    nearest = cKDTree(vertices[high]).query_ball_point(vertices[low], reach)
+    nearest = _tree(vertices[high]).query_ball_point(vertices[low], reach)
     listed = [(a, high[b]) for a, found in zip(low, nearest, strict=True) for b in found]
     pairs = np.array(listed, np.int64).reshape(-1, 2)
     pairs = pairs[drop[pairs[:, 0]] - drop[pairs[:, 1]] > SLIT_STEP]
@@ -204,7 +204,7 @@ def _slit(vertices: Places, surface: MeshSurface, drop: Places, skin: NDArray[np
     if not len(middle):
         return middle
     front = np.zeros(len(middle), bool)
-    tree = cKDTree(middle[:, :1])
+    tree = _tree(middle[:, :1])
     for number, around in enumerate(tree.query_ball_point(middle[:, :1], reach / 4)):
         front[number] = middle[number, 2] > middle[around, 2].max() - FRONT * reach / SLIT_REACH
     return middle[front]
@@ -226,9 +226,9 @@ def _apart(vertices: Places, surface: MeshSurface, pairs: Rows, reach: float) ->
 def _share_at_slit(vertices: Places, drop: Places, skin: NDArray[np.bool_], middle: Places) -> Places:
     """Return the share of the jaw's way that divides the lips, at every vertex: less near the corners [shape=(V,)]."""
     rows = np.flatnonzero(skin)
-    near = cKDTree(vertices[rows]).query(middle, k=min(12, len(rows)))[1].reshape(len(middle), -1)
+    near = _tree(vertices[rows]).query(middle, k=min(12, len(rows)))[1].reshape(len(middle), -1)
     share = (drop[rows][near].max(axis=1) + drop[rows][near].min(axis=1)) / 2
-    return share[cKDTree(middle).query(vertices)[1]]
+    return share[_tree(middle).query(vertices)[1]]
 
 
 def _targets(template: MouthTemplate, scale: float, centre: Places, middle: Places) -> Places:
@@ -265,7 +265,7 @@ def _nearest(
             if (chosen & edge).any():
                 if not len(rows):
                     raise InputError("no vertices are on one side of the lips; name the lip points by their vertices")
-                tree = cKDTree(mesh.vertices[rows] * stretch)
+                tree = _tree(mesh.vertices[rows] * stretch)
                 found[chosen & edge] = rows[tree.query(targets[chosen & edge] * stretch)[1]]
     return found
 
@@ -297,3 +297,10 @@ def _check_named(named: Mapping[int, int], vertices: int, template: MouthTemplat
             raise InputError(f"the point {point} is vertex {vertex}, required 0 to {vertices - 1}")
     if len({named[point] for point in NEEDED}) < len(NEEDED):
         raise InputError("two of the points 61, 291, 13, 14 are one vertex; name four different ones")
+
+
+def _tree(places: Places) -> Any:
+    """Return a tree of places [shape=(N, D)] that finds the nearest ones."""
+    from scipy.spatial import cKDTree  # a tenth of a second, which those who only draw faces need not wait
+
+    return cKDTree(places)

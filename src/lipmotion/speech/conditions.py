@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
-from scipy.signal import fftconvolve
 
 from lipmotion.errors import InputError
 from lipmotion.speech.audio_files import SPEECH_RATE_HZ
@@ -105,6 +104,8 @@ def _speech_power(audio: Audio) -> float:
 
 def _reverberation(samples: Samples, share: float, rng: np.random.Generator) -> Samples:
     """Return the reverberation of a room, with a share of the energy of the direct sound."""
+    from scipy.signal import fftconvolve
+
     duration_s = rng.uniform(*ROOM_S)
     response = rng.standard_normal(int(duration_s * SPEECH_RATE_HZ))
     response *= 10 ** (-3 * np.arange(len(response)) / len(response))

@@ -29,7 +29,7 @@ from lipmotion.speech.combined_phones import CombinedPhones, combine_phones, com
 from lipmotion.speech.mfcc import LOG_ENERGY
 from lipmotion.speech.recognition import HeardWord, LabelledFrames, Recognition, recognition_of, spliced
 from lipmotion.speech.speaker_similarity import SpeakerSimilarity, speaker_similarity
-from lipmotion.speech.word_search import WordSearch, free_labels
+from lipmotion.speech.word_search import WordSearch, begun_decoding, free_labels
 from lipmotion.types import FRAME_RATE_HZ, Audio, Features, ParallelMap, Span, Timeline, Unit
 from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent, most_similar_phone
 
@@ -99,11 +99,13 @@ class Recogniser:
             return recognition_of(silence, [LabelledFrames(0, SILENCE)], (), None)
         audio = analysed(audio, features)
         similarity = self._similarity(audio)
+        with_words = self.kind in USING_WORDS and not self._knows_voice_and_words(similarity)
+        spoken = begun_decoding(audio, each) if with_words else None
         hmm, log_likelihoods = self._log_likelihoods(audio, similarity)
         path = self._loop.network.best_path(log_likelihoods)
         labels, heard = self._free_labels(audio, features, path), list[HeardWord]()
-        if self.kind in USING_WORDS and not self._knows_voice_and_words(similarity):
-            parts, heard = self._word_search(audio, hmm, log_likelihoods, path).words_of(audio, each)
+        if spoken is not None:
+            parts, heard = self._word_search(audio, hmm, log_likelihoods, path).words_of(spoken)
             labels = spliced(labels if self.kind == "auto" else [LabelledFrames(0, SILENCE)], parts, len(path))
         units = _timeline(
             [(label.phone, heard[label.word].text if label.word >= 0 else "") for label in labels],

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
+
+import numpy as np
 
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.speech.analysed_audio import AnalysedAudio
+from lipmotion.stats.mixture import QuadraticForm
 
 WARPS = (0.88, 0.94, 1.0, 1.06, 1.12)
 """The lengths of adults' vocal tracts differ by about so much."""
@@ -33,9 +37,16 @@ def speaker_similarity(hmm: UnitHmm, audio: AnalysedAudio) -> SpeakerSimilarity:
     state path, so that the warp is chosen before anything is recognised.
     """
     stretch = audio.loudest_stretch(JUDGED_FRAMES)
-    fits = {warp: hmm.fit(features.values) for warp, features in zip(WARPS, stretch.mfcc_of_warps(WARPS), strict=True)}
+    form, heard = _densities(hmm), zip(WARPS, stretch.mfcc_of_warps(WARPS), strict=True)
+    fits = {warp: float(form.log_likelihood(features.values).max(axis=1).mean()) for warp, features in heard}
     warp = best_warp(fits)
     return SpeakerSimilarity(warp, fits[warp] - hmm.typical_fit)
+
+
+@lru_cache(maxsize=2)
+def _densities(hmm: UnitHmm) -> QuadraticForm:
+    """Return the densities of ``UnitHmm.fit``, ready for use; those of the last models are kept for short recordings."""
+    return hmm.mixtures.quadratic(np.arange(len(hmm.log_stay), dtype=np.intp))
 
 
 def best_warp(fits: dict[float, float]) -> float:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ from lipmotion.speech.combined_phones import NOISES
 from lipmotion.speech.heard_words import AlignedWords, align_heard_words, phone_bonus
 from lipmotion.speech.recognition import HeardWord, LabelledFrames, LabelledStretch, labels_of_words, spliced
 from lipmotion.speech.voice_activity import Stretch, stretches_of_sound
-from lipmotion.speech.word_decoder import stretch_samples, words_in
+from lipmotion.speech.word_decoder import FoundWord, stretch_samples, words_in
 from lipmotion.types import ParallelMap
 from lipmotion.units import SILENCE, Lexicon
 
@@ -32,6 +33,23 @@ SHORT_FRAMES = 3000
 """The words of so little sound are recognised in this process: to start another one would take as long."""
 DICTIONARY = Lexicon()
 """Words that were recognised are in the dictionary."""
+
+
+class WordsInStretches(NamedTuple):
+    """Stretches of sound, and the words that are found in each of them, as soon as they are known."""
+
+    stretches: Sequence[Stretch]
+    words: Iterable[Sequence[FoundWord]]
+
+
+def begun_decoding(audio: AnalysedAudio, each: ParallelMap = map) -> WordsInStretches:
+    """Return the words in all stretches of sound of a recording; where ``each`` starts processes, they begin now.
+
+    each : applies a function to many items, perhaps in several processes
+    """
+    stretches = stretches_of_sound(audio.log_energy)
+    each = each if sum(stretch.end - stretch.first for stretch in stretches) > SHORT_FRAMES else map
+    return WordsInStretches(stretches, each(words_in, (stretch_samples(audio, stretch) for stretch in stretches)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,17 +73,14 @@ class WordSearch:
     loud: NDArray[np.bool_]
     believing: bool = False
 
-    def words_of(self, audio: AnalysedAudio, each: ParallelMap = map) -> tuple[list[LabelledStretch], list[HeardWord]]:
+    def words_of(self, spoken: WordsInStretches) -> tuple[list[LabelledStretch], list[HeardWord]]:
         """Return the stretches in which words were heard, with their phones, and these words.
 
-        each : applies a function to many items, perhaps in several processes
+        spoken : of ``begun_decoding``
         Raises MissingDependencyError: as ``words_in``.
         """
-        stretches = stretches_of_sound(audio.log_energy)
-        each = each if sum(stretch.end - stretch.first for stretch in stretches) > SHORT_FRAMES else map
-        found = each(words_in, (stretch_samples(audio, stretch) for stretch in stretches))
         parts, heard = list[LabelledStretch](), list[HeardWord]()
-        for stretch, words in zip(stretches, found, strict=True):
+        for stretch, words in zip(spoken.stretches, spoken.words, strict=True):
             here, fits = self._part(stretch, [word.text for word in words], len(heard))
             parts += here
             heard += [

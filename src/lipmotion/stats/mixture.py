@@ -56,18 +56,7 @@ class Mixtures:
 
     def log_likelihood(self, x: NDArray[np.float32], chosen: NDArray[np.intp] | None = None) -> NDArray[np.float32]:
         """Return the log density of every frame under every chosen mixture [shape=(T, G')]; see ``log_components``."""
-        form = self.quadratic(chosen)
-        result = np.empty((len(x), form.constant.shape[1]), np.float32)
-        for start in range(0, len(x), BLOCK):
-            components = form.log_components(x[start : start + BLOCK])
-            if components.shape[1] == 1:
-                result[start : start + BLOCK] = components[:, 0]
-                continue
-            best = components.max(axis=1)
-            components -= best[:, None]
-            np.exp(components, out=components)
-            result[start : start + BLOCK] = best + np.log(components.sum(axis=1))
-        return result
+        return self.quadratic(chosen).log_likelihood(x)
 
     def quadratic(self, chosen: NDArray[np.intp] | None = None) -> QuadraticForm:
         """Return the chosen densities as the coefficients of a quadratic form; None: all."""
@@ -197,6 +186,23 @@ class QuadraticForm:
         values = (np.concatenate([x, x * x], axis=1) @ self.form).reshape(len(x), *self.constant.shape)
         values += self.constant
         return values
+
+    def log_likelihood(self, x: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return the log density of every frame under every mixture [shape=(T, G)].
+
+        x : [shape=(T, D)]
+        """
+        result = np.empty((len(x), self.constant.shape[1]), np.float32)
+        for start in range(0, len(x), BLOCK):
+            components = self.log_components(x[start : start + BLOCK])
+            if components.shape[1] == 1:
+                result[start : start + BLOCK] = components[:, 0]
+                continue
+            best = components.max(axis=1)
+            components -= best[:, None]
+            np.exp(components, out=components)
+            result[start : start + BLOCK] = best + np.log(components.sum(axis=1))
+        return result
 
     def log_density_and_shares(
         self, features: NDArray[np.float32]

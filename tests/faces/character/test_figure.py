@@ -97,7 +97,8 @@ def mesh():
 
 
 def test_the_mesh_has_the_shapes_that_are_promised(mesh):
-    wanted = {*POSES, *(name + side for name in SIDED_POSES for side in ("Left", "Right"))}
+    sided = (*SIDED_POSES, "eyeLookIn", "eyeLookOut", "eyeLookUp", "eyeLookDown")
+    wanted = {*POSES, *(name + side for name in sided for side in ("Left", "Right"))}
     assert set(mesh.shape_names) == wanted
     assert all(len(shape.rows) for shape in mesh.shapes)
     assert {"skin", "lips", "lids", "teeth", "tongue"} <= {part.name for part in mesh.parts}

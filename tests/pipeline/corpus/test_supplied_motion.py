@@ -91,7 +91,7 @@ def test_another_content_is_prepared_again(studio, tmp_path):
 
 def test_what_does_not_fit_is_listed_and_the_rest_goes_on(studio, tmp_path):
     write_curves(studio / "b.json", rate_hz=60, seconds=1.2)
-    (studio / "anna" / "c.csv").write_text("Timecode,BlendShapeCount\n1,2\n")
+    (studio / "anna" / "c.csv").write_text("frame,jaw\n1,2\n")
     write_sound(studio / "d.wav")
     write_curves(studio / "d.npz")
     (studio / "d.lab").write_text("0 10000000 t\n10000000 90000000 uw\n")

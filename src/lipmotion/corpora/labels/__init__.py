@@ -2,6 +2,7 @@
 
 from lipmotion.corpora.labels.label_files import (
     RecordingLabels,
+    label_files_beside,
     labels_beside,
     read_labels,
     read_phones,
@@ -9,4 +10,12 @@ from lipmotion.corpora.labels.label_files import (
 )
 from lipmotion.corpora.labels.plain_text import check_plain_text
 
-__all__ = ["RecordingLabels", "check_plain_text", "labels_beside", "read_labels", "read_phones", "read_transcript"]
+__all__ = [
+    "RecordingLabels",
+    "check_plain_text",
+    "label_files_beside",
+    "labels_beside",
+    "read_labels",
+    "read_phones",
+    "read_transcript",
+]

@@ -86,6 +86,11 @@ def each_labels_beside(
                 yield suffix, labels
 
 
+def label_files_beside(recording: Path) -> list[Path]:
+    """Return the files beside a recording that ``labels_beside`` reads, in the order of ``FOR_WORDS``."""
+    return [path for suffix in FOR_WORDS for path in _named(recording, suffix)]
+
+
 def _named(recording: Path, suffix: str) -> list[Path]:
     """Return the files that have a recording's name and a suffix."""
     names = [recording.with_suffix(suffix)]

@@ -27,8 +27,8 @@ Real = NDArray[np.float64]
 
 PIVOT = np.array([0.0, -0.75, -0.9])
 """The head turns about this place, the top of the neck."""
-TONGUE_LIGHT = 1.7
-"""The tongue is wet, and drawn brighter than the rest of the mouth."""
+TONGUE_LIGHT, LOWER_TEETH_LIGHT = 1.35, 0.62
+"""The tongue is wet, and drawn brighter than the rest of the mouth; the lower teeth lie in the shade of the upper."""
 _EYES = ((1.0, ""), (-1.0, "right "))
 _MIDDLE, _LAST = 20, 60
 """Columns of the lips in the middle of the upper and of the lower lip."""
@@ -156,7 +156,10 @@ class Figure:
         inside = self._lit_inside(pose, places[self.rows["skin"]])
         for rows in (self.rows["tongue"], self.rows["teeth"], self.rows["upper teeth"], self._wall):
             arrives[rows] = inside(places[rows])[:, None]
-        arrives[self.rows["tongue"]] = np.minimum(1.0, TONGUE_LIGHT * arrives[self.rows["tongue"]])
+        arrives[self.rows["tongue"]] = np.minimum(
+            1.0, TONGUE_LIGHT * (1 - 0.35 * pose.tongue_up) * arrives[self.rows["tongue"]]
+        )
+        arrives[self.rows["teeth"]] *= LOWER_TEETH_LIGHT
         return colours, arrives
 
     def _lit_inside(self, pose: CharacterPose, skin: Real) -> Callable[[Real], Real]:
@@ -164,12 +167,13 @@ class Figure:
         ring = skin[self.skin.lip_rows()[VISIBLE - 1]]
         top, low, front = ring[_MIDDLE, 1], ring[_LAST, 1], 0.5 * (ring[_MIDDLE, 2] + ring[_LAST, 2])
         span, half = max(top - low, 0.0), max(0.26 * pose.width, 0.1)
+        shade, open_ = 1 - 0.92 * pose.roundness**1.1, min(span / 0.25, 1.0)
 
         def inside(places: Real) -> Real:
-            depth = np.clip((front - places[:, 2] - 0.10) / (0.22 + 0.8 * span), 0, 1)
+            depth = (0.93 - 0.22 * open_) * np.clip((front - places[:, 2] - 0.10) / (0.22 + 0.8 * span), 0, 1)
             under = np.clip((top - places[:, 1] + 0.01) / 0.05, 0, 1)
             aside = np.clip(1.35 - (places[:, 0] / half) ** 2, 0, 1)
-            return (1 - 0.55 * pose.roundness) * (1 - 0.93 * depth) ** 1.5 * (0.6 + 0.4 * under) * (0.35 + 0.65 * aside)
+            return shade * (1 - depth) ** 1.5 * (0.7 + 0.3 * under) * (0.35 + 0.65 * aside)
 
         return inside
 

@@ -47,28 +47,31 @@ class Gesture:
 
 
 GESTURES = {
-    "close": Gesture(dict.fromkeys(LIP_CLOSING, 1.0), 0.03),
+    "close": Gesture(dict.fromkeys(LIP_CLOSING, 1.0), 0.07),
     "press": Gesture(dict.fromkeys(LIP_CLOSING, 1.0), 0.05),
     "tuck": Gesture({"f": 1.0, "v": 1.0}, 0.06),
     "tongue_out": Gesture({"th": 1.0, "dh": 0.9}, 0.06),
-    "tongue_up": Gesture({"l": 1.0, "el": 1.0, "t": 0.75, "d": 0.75, "n": 0.85, "en": 0.85}, 0.06),
+    "tongue_up": Gesture({"l": 0.85, "el": 0.85, "t": 0.65, "d": 0.65, "n": 0.75, "en": 0.75}, 0.06),
     "round": Gesture(
         {
-            "uw": 1.0, "w": 1.0, "ow": 0.8, "uh": 0.6, "ao": 0.45, "oy": 0.6, "r": 0.4, "er": 0.4, "axr": 0.3,
+            "uw": 1.0, "w": 1.0, "ow": 0.8, "uh": 0.6, "ao": 0.4, "oy": 0.6, "r": 0.4, "er": 0.4, "axr": 0.3,
             "sh": 0.5, "zh": 0.5, "ch": 0.5, "jh": 0.5, "aw": 0.35,
         },
         0.11, 0.03,
     ),
+    "pucker": Gesture({"w": 1.0}, 0.08, 0.02),
+    "hold": Gesture({"uw": 1.0, "ow": 0.8}, 0.05),
     "spread": Gesture(
         {
             "iy": 1.0, "ey": 0.7, "ih": 0.5, "ix": 0.4, "y": 0.6, "s": 0.4, "z": 0.4, "ae": 0.35, "ay": 0.3, "eh": 0.3,
         },
-        0.10,
+        0.10, 0.03,
     ),
-    "oval": Gesture({"aa": 1.0, "ao": 0.8, "aw": 0.7, "ay": 0.4, "ah": 0.4, "ax": 0.2}, 0.12),
+    "oval": Gesture({"aa": 1.0, "ao": 0.8, "aw": 0.7, "ay": 0.4, "ah": 0.4, "ax": 0.2}, 0.12, 0.03),
     "bite": Gesture(dict.fromkeys(("s", "z", "sh", "zh", "ch", "jh"), 1.0), 0.08),
 }  # fmt: skip
-"""The gestures by name. ``close`` brings the lips together; ``press`` rolls them in while they are."""
+"""The gestures by name. ``close`` brings the lips together; ``press`` rolls them in while they are.
+``pucker`` makes round lips tighter, almost closed; ``hold`` keeps them a little open."""
 SILENT = Gesture(dict.fromkeys((SILENCE, PAUSE), 1.0), 0.10)
 LEAST_PAUSE_S, AFTER_S, BEFORE_S = 0.25, 0.06, 0.12
 """In shorter pauses the mouth goes on; a pause begins later and ends earlier for the lips than for the ear."""

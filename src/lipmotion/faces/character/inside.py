@@ -15,14 +15,14 @@ from lipmotion.faces.character.skin import jaw_moved
 
 Real = NDArray[np.float64]
 
-_UPPER_EDGES = (0.0, 0.062, 0.112, 0.155, 0.192, 0.222, 0.247)
-_LOWER_EDGES = (0.0, 0.040, 0.082, 0.125, 0.165, 0.2, 0.23)
+_UPPER_EDGES = (0.0, 0.062, 0.112, 0.155, 0.192, 0.224, 0.252, 0.274)
+_LOWER_EDGES = (0.0, 0.040, 0.082, 0.125, 0.165, 0.202, 0.235, 0.26)
 """Where teeth touch their neighbours: distances from the middle, seen from the front."""
 LOWER_EDGE = TEETH_EDGE + 0.006
 """Height of the edge of the lower incisors, behind the upper ones, when the jaw is closed."""
 PARTED_TEETH = 0.035
 """Distance of the teeth behind closed lips."""
-_TONGUE_RINGS, _TONGUE_SIDES = 22, 20
+_TONGUE_RINGS, _TONGUE_SIDES = 24, 32
 
 
 def upper_teeth() -> Part:
@@ -40,7 +40,7 @@ def _row(name: str, edges: tuple[float, ...], edge_y: float, height: float, up: 
     for number, (near, far) in enumerate(pairwise(edges)):
         for side in (1, -1):
             teeth.append(_tooth(side * near, side * far, number, edge_y, height, up, front))
-    x = np.linspace(-0.26, 0.26, 41)
+    x = np.linspace(-0.28, 0.28, 41)
     y = edge_y + up * height * np.array([0.72, 0.86, 1.3, 1.9])
     depth = np.array([-0.02, 0.004, 0.008, 0.0])
     grid = np.stack([np.tile(x, 4), np.repeat(y, 41), np.concatenate([front - ARCH * x**2 + d for d in depth])], axis=1)
@@ -53,18 +53,18 @@ def _tooth(a: float, b: float, number: int, edge_y: float, height: float, up: fl
     """Return one tooth between two columns: a rounded plate that is bent over its edge."""
     across, down = np.meshgrid(np.linspace(-1, 1, 9), np.linspace(0, 1, 9))
     half, middle = abs(b - a) / 2, (a + b) / 2
-    x = middle + half * 0.985 * across
-    shorter = (0.0, 0.007, 0.002, 0.008, 0.014, 0.02)[number] if up > 0 else 0.004 * number
-    rounded = 0.010 * np.maximum(np.abs(across) - 0.45, 0) ** 2 / 0.3
+    x = middle + half * across
+    shorter = (0.0, 0.005, 0.002, 0.006, 0.010, 0.013, 0.016)[number] if up > 0 else 0.004 * number
+    rounded = 0.006 * np.maximum(np.abs(across) - 0.45, 0) ** 2 / 0.3
     level = np.clip(1 - down / 0.8, 0, 1)
     y = edge_y + up * (shorter + rounded + height * level)
-    bulge = 0.014 * np.sqrt(np.maximum(1 - 0.96 * across**2, 0)) * np.sin(np.pi * (0.25 + 0.55 * (1 - level)))
+    bulge = 0.012 * np.sqrt(np.maximum(1 - 0.75 * across**2, 0)) * np.sin(np.pi * (0.25 + 0.55 * (1 - level)))
     inward = 0.05 * np.clip((down - 0.8) / 0.2, 0, 1)
     tip = 0.012 * np.clip((down - 0.62) / 0.2, 0, 1) ** 2
     z = front - ARCH * x**2 - 0.012 + bulge - inward - tip
     places = np.stack([x, y, z], axis=-1).reshape(-1, 3)
-    colour = np.array(palette.TOOTH) * (1 - 0.025 * number)
-    shade = np.clip(np.abs(across) - 0.8, 0, 1)[..., None] / 0.2 * 0.4
+    colour = np.array(palette.TOOTH) * (1 - 0.05 * number)
+    shade = np.clip(np.abs(across) - 0.8, 0, 1)[..., None] / 0.2 * 0.22
     root = (0.25 * level**3)[..., None]
     colours = (1 - shade) * colour + shade * np.array(palette.TOOTH_GAP)
     colours = (1 - root) * colours + root * np.array(palette.TOOTH_GAP)
@@ -75,8 +75,11 @@ def _tooth(a: float, b: float, number: int, edge_y: float, height: float, up: fl
 
 
 def lower_drop(pose: CharacterPose) -> float:
-    """Return how far the lower teeth drop with the jaw, a length; bitten together they touch the upper ones."""
-    return pose.jaw + PARTED_TEETH * (1 - pose.bite)
+    """Return how far the lower teeth drop with the jaw, a length; bitten together they touch the upper ones.
+
+    Round and oval lips hide the lower teeth, which drop further there than the chin shows.
+    """
+    return pose.jaw + PARTED_TEETH * (1 - pose.bite) * (1 + max(pose.roundness, 0.7 * pose.oval))
 
 
 def tongue_triangles() -> NDArray[np.int32]:
@@ -89,7 +92,7 @@ def tongue(pose: CharacterPose) -> Real:
     floor = LOWER_EDGE - 0.075
     root, body = np.array([0, floor - 0.05, -0.46]), np.array([0, floor + 0.075, -0.36])
     blade, tip = np.array([0, floor + 0.02, -0.22]), np.array([0, floor - 0.012, TEETH_Z - 0.085])
-    points = jaw_moved(np.stack([root, body, blade, tip]), lower_drop(pose))
+    points = jaw_moved(np.stack([root, body, blade, tip]), pose.jaw + PARTED_TEETH * (1 - pose.bite))
     tooth = np.array([0, TEETH_EDGE - 0.014, TEETH_Z + 0.080])
     ridge = np.array([0, TEETH_EDGE + 0.035, TEETH_Z - 0.075])
     for weight, to_tip, lift in ((pose.tongue_up, ridge, 0.01), (pose.tongue_out, tooth, -0.008)):
@@ -108,7 +111,7 @@ def tongue(pose: CharacterPose) -> Real:
     thick = (0.085 - 0.052 * share) * blunt**0.7
     angle = 2 * np.pi * np.arange(_TONGUE_SIDES) / _TONGUE_SIDES
     x = wide * np.cos(angle)
-    groove = 0.25 * thick * np.exp(-((np.cos(angle) / 0.25) ** 2)) * (np.sin(angle) > 0)
+    groove = 0.16 * thick * np.exp(-((np.cos(angle) / 0.3) ** 2)) * (np.sin(angle) > 0)
     along = np.gradient(spine, axis=0)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     up = np.stack([np.zeros(len(along)), along[:, 2], -along[:, 1]], axis=1)

@@ -26,6 +26,12 @@ TEETH_EDGE = MOUTH_Y - 0.008
 ARCH = 1.15
 """Curvature of lips and teeth seen from above: how far they lie back, over x squared."""
 _UPPER_LIP, _LOWER_LIP = 0.076, 0.106
+OVAL_SQUEEZE = 0.14
+"""How much nearer to the middle the inner edge of an oval mouth lies than the corners."""
+HOLE_WIDTH = (0.021, 0.58)
+"""Half the width of a round hole, round which the lips run as a ring: a length, and so much of the gap."""
+ROUND_DROP = 0.016
+"""How far the line between round lips sinks: the upper lip hides the teeth."""
 _KNOTS = np.array([0, 0.22, 0.5, 0.72, 0.88, 0.98, 1.12, 1.4])
 _AT = np.array([0.0, 0.09, 0.2, 0.31, 0.41, 0.5, 0.58, 0.66, 0.74, 0.81, 0.88, 0.94, 1.0, 1.12, 1.4])
 _SECTION: Real = np.asarray(CubicSpline(_KNOTS, np.eye(len(_KNOTS)))(_AT))
@@ -69,10 +75,14 @@ def section_points(pose: CharacterPose, base_z: Real) -> Real:
     x = half * ACROSS
     rise = pose.upper_rise
     drop = pose.gap - rise
-    middle = MOUTH_Y + (1 - 0.8 * pose.roundness) * _LINE + pose.smile * ACROSS**2 - 0.22 * pose.gap * ACROSS**2
+    middle = MOUTH_Y + (1 - 0.8 * pose.roundness - 0.6 * pose.spread) * _LINE + pose.smile * ACROSS**2
+    middle = middle - 0.22 * pose.gap * (1 - 0.6 * pose.spread) * ACROSS**2 - (ROUND_DROP + 0.2 * pose.gap) * pose.roundness
+    squeeze = _squeeze(pose)
+    belly = _ENVELOPE + squeeze * (1 - _ENVELOPE)
     hole, contour = _opening(pose)
     inner_y = middle + np.where(upper, rise, -drop) * hole
-    full = _FULL + 0.7 * pose.roundness * np.where(upper, _ENVELOPE - _FULL, 0)
+    full = _FULL + 0.85 * pose.roundness * (_ENVELOPE - _FULL)
+    full = full + 0.4 * pose.spread * (_ENVELOPE - full)
     thick = np.where(upper, _UPPER_LIP, _LOWER_LIP) * full
     thick = thick * pose.fullness * (1 - 0.35 * pose.press) * np.where(upper, 1.0, 1 - 0.45 * pose.tuck)
     outer_y = middle + np.where(upper, rise, -drop) * contour + SIDE * thick * _rounded(pose)
@@ -82,22 +92,25 @@ def section_points(pose: CharacterPose, base_z: Real) -> Real:
     outer_z = base_z + 0.85 * forward + arch - back
     meet = np.interp(ACROSS, ACROSS[:_UPPER], 0.5 * (base_z[:_UPPER] + _opposite(base_z))) + forward + arch
     meet = meet - np.where(upper, 0.0, 0.25 * drop) * contour
-    bulge = np.where(upper, 0.05, 0.062) * _ENVELOPE * pose.fullness * (1 - 0.3 * pose.press)
-    inner_x = x * (1 - 0.12 * pose.roundness * _ENVELOPE)
-    teeth = TEETH_Z - ARCH * x**2
+    bulge = np.where(upper, 0.05, 0.062) * belly * pose.fullness * (1 - 0.3 * pose.press)
+    inner_x = x * (1 - squeeze)
+    teeth = TEETH_Z - ARCH * inner_x**2
     up = SIDE * 1.0
     tuck = pose.tuck * np.where(upper, 0.0, 1.0) * _ENVELOPE
-    contact_z = meet - 0.002 + 0.02 * _ENVELOPE * pose.roundness
+    contact_z = meet - 0.002 + 0.02 * belly * pose.roundness
     contact_z = contact_z + tuck * (teeth + 0.02 - contact_z)
-    inner_y = np.where(upper, inner_y, inner_y + tuck * (np.minimum(TEETH_EDGE + 0.004, inner_y + 0.07) - inner_y))
+    on_teeth = np.minimum(TEETH_EDGE + 0.010, inner_y + 0.08)
+    inner_y = np.where(upper, inner_y, np.maximum(inner_y, inner_y + tuck * (on_teeth - inner_y)))
     crest = meet + bulge * (1 - 0.25 * tuck) - 0.03 * tuck
     behind = np.maximum(teeth + 0.022, contact_z - 0.10)
     y, z = outer_y, outer_z
+    broad = inner_y + pose.roundness * (middle + np.where(upper, rise, -drop) * contour - inner_y)
+    crest_y = broad + 0.42 * (y - broad)
     rows = [
         (x, y, z),
-        (x, inner_y + 0.76 * (y - inner_y), outer_z + 0.5 * (crest - outer_z)),
-        (inner_x, inner_y + 0.42 * (y - inner_y), crest),
-        (inner_x, inner_y + 0.13 * (y - inner_y), contact_z + 0.66 * (crest - contact_z)),
+        (x * (1 - 0.2 * squeeze), inner_y + 0.76 * (y - inner_y), outer_z + 0.5 * (crest - outer_z)),
+        (x * (1 - 0.5 * squeeze), crest_y, crest),
+        (x * (1 - 0.88 * squeeze), inner_y + 0.31 * (crest_y - inner_y), contact_z + 0.66 * (crest - contact_z)),
         (inner_x, inner_y, contact_z),
         (inner_x, inner_y + up * 0.014 * _ENVELOPE, 0.5 * (contact_z + behind)),
         (x, inner_y + up * (0.05 * _ENVELOPE + 0.002), behind),
@@ -116,13 +129,20 @@ def _opening(pose: CharacterPose) -> tuple[Real, Real]:
 
     A round mouth has an elliptic hole that ends before the corners; a spread one is a slot with a flat edge.
     """
-    reach = 1 - 0.56 * pose.roundness - 0.10 * pose.oval
+    reach = 1 - 0.10 * pose.oval - 0.30 * pose.tuck
     power = 2 + 1.2 * pose.spread
     inside = np.maximum(1 - np.abs(ACROSS / reach) ** power, 0)
     oval = (0.25 * np.clip(pose.gap / 0.2, 0, 1) + 0.2 * pose.oval) * (1 - pose.spread) * (1 - pose.roundness)
     hole = inside ** (0.92 - 0.40 * pose.roundness - 0.36 * pose.spread - oval)
-    contour = np.maximum(1 - ACROSS**2, 0) ** (0.85 - 0.25 * pose.roundness)
+    contour = np.maximum(1 - ACROSS**2, 0) ** (0.85 - 0.25 * pose.roundness - 0.33 * pose.spread - 0.7 * oval)
     return hole, contour
+
+
+def _squeeze(pose: CharacterPose) -> float:
+    """Return how much nearer to the middle the inner edge of the lips lies than the corners, 0 to 1."""
+    hole = (HOLE_WIDTH[0] + HOLE_WIDTH[1] * pose.gap) / (REST_HALF_WIDTH * pose.width)
+    as_ring = max(1 - hole, 0.0) * (1 - 0.6 * pose.press)
+    return as_ring * pose.roundness + OVAL_SQUEEZE * pose.oval * (1 - pose.roundness)
 
 
 def _rounded(pose: CharacterPose) -> Real:

@@ -17,24 +17,29 @@ Curve = NDArray[np.float64]
 
 CLOSED_BELOW = 0.012
 """Tracked lips that touch have openings up to this; smaller openings are drawn closed."""
-OPEN_FROM, PARTED, GROWTH = 0.03, 0.022, 0.86
+OPEN_FROM, PARTED, GROWTH = 0.035, 0.02, 0.98
 """From this opening on the gap is the opening times the growth, plus the length: trackers read less of small openings
 and more of wide ones (docs/results/head.md). Below it rises from 0, where the lips touch."""
 WIDEST = 0.4
 """Largest drawn gap; openings of speech stay below 0.35."""
 WIDTH_GAIN, WIDTH_REACH = 1.5, 0.34
 """Changes of width are exaggerated: small ones by the factor, none beyond the reach."""
-TUCKED_GAP = (0.045, 0.06)
-"""Range of the gap while the lower lip is on the teeth."""
+TUCKED_GAP = 0.054
+"""How far the upper lip bares the upper teeth while the lower lip is on them."""
+PUCKERED_GAP, HELD_GAP = 0.028, 0.036
+"""Largest gap of W, whose lips are almost closed, and least gap of OO, whose lips stay a little open."""
 TONGUE_GAP = 0.045
 """Least gap while the tongue is between the teeth."""
-OVAL_GROWTH = 0.12
+OVAL_GROWTH = 0.04
 """How much further the mouth opens in AA and the like."""
-ROUND_GAP, TONGUE_UP_GAP = -0.012, 0.012
-"""Added to the gap of round lips, of which trackers read more, and where the tongue fills it: they read less."""
+ROUND_GROWTH, TEETH_GAP, TONGUE_OUT_GAP, TONGUE_UP_GAP = 0.45, 0.010, -0.012, 0.02
+"""Trackers read more of round lips, so that their gap grows so much less than that of others, and less where teeth or
+the tongue fill the gap, to which a length is added."""
+BITTEN_GAP = (0.12, 0.2)
+"""Teeth stay together up to the first gap, and part until the second one."""
 PAUSED_GAP = 0.03
 """Largest gap in pauses, in which people breathe with lips that hardly part."""
-ARTICULATED = ("tongue", "lip_tuck", "protrusion", "spread", "press", "teeth")
+ARTICULATED = ("tongue", "lip_tuck", "protrusion", "spread", "lip_press", "teeth")
 """Articulatory channels that a motion may have (docs/articulation.md); what it lacks follows from the phones."""
 RAISED = 0.6
 """The value of ``tongue`` with its tip behind the upper teeth; 1 is between the teeth."""
@@ -75,25 +80,27 @@ def head_poses(
     narrow = np.clip(-change / 0.16, 0, 1) * (1 - said["spread"])
     roundness = np.maximum(said["round"], 0.4 * narrow)
     wide = np.clip(np.maximum(said["spread"], np.clip(change / 0.12, 0, 1)) - roundness, 0, 1)
-    gap = _articulated(np.minimum(intensity * _gap(motion, time_s, fps), WIDEST), said, roundness, pause)
+    said |= {"roundness": roundness, "wide": wide, "pucker": said["pucker"] * roundness}
+    gap = _articulated(np.minimum(intensity * _gap(motion, time_s, fps), WIDEST), said, pause)
     gap = _closed(gap, units, time_s)
+    bite = np.maximum(said["bite"], said["spread"] ** 1.5) * np.clip((BITTEN_GAP[1] - gap) / np.ptp(BITTEN_GAP), 0, 1)
     alive = liveliness(gap, pause, fps, seed=seed, accent=_accent(prosody, time_s))
     curves = {
         "gap": gap,
-        "upper_rise": _rise(gap, roundness, said["tuck"]),
-        "jaw": _jaw(motion, rest, gap, time_s) * (1 - 0.85 * said["bite"]),
-        "bite": np.maximum(np.maximum(said["bite"], 0.6 * said["spread"]), said["press"]),
-        "width": 1 + change - 0.14 * said["round"] + 0.05 * said["spread"] - 0.05 * said["oval"],
+        "upper_rise": _rise(gap, said),
+        "jaw": _jaw(motion, rest, gap, time_s) * (1 - 0.85 * bite),
+        "bite": np.maximum(bite, said["press"]),
+        "width": 1 + change - 0.13 * said["round"] - 0.07 * said["pucker"] + 0.05 * said["spread"] - 0.09 * said["oval"],
         "fullness": _at(motion, _fullness(motion, rest), time_s) * (1 + 0.08 * roundness),
         "roundness": roundness,
         "spread": wide,
         "oval": said["oval"],
-        "protrusion": 0.085 * roundness,
+        "protrusion": 0.08 * roundness + 0.035 * said["pucker"],
         "press": said["press"],
         "tuck": said["tuck"],
         "tongue_out": said["tongue_out"],
         "tongue_up": said["tongue_up"] * (1 - said["tongue_out"]) * (1 - said["bite"]),
-        "smile": 0.012 * wide,
+        "smile": 0.004 * wide,
         "shut": alive.shut,
         "brows": alive.brows,
     }
@@ -112,7 +119,7 @@ def _said(motion: Motion, units: Timeline[Unit], time_s: Curve) -> dict[str, Cur
         for name in ARTICULATED
         if name in motion.names
     }
-    for name, channel in (("tuck", "lip_tuck"), ("round", "protrusion"), ("spread", "spread"), ("press", "press")):
+    for name, channel in (("tuck", "lip_tuck"), ("round", "protrusion"), ("spread", "spread"), ("press", "lip_press")):
         said[name] = given.get(channel, said[name])
     if "tongue" in given:
         said["tongue_out"] = np.clip((given["tongue"] - RAISED) / (1 - RAISED), 0, 1)
@@ -137,21 +144,27 @@ def _accent(prosody: Prosody | None, time_s: Curve) -> Curve | None:
     return np.interp(time_s, at_s, np.tanh(0.6 * high + 0.4 * loud) * np.clip(loud + 1, 0, 1))
 
 
-def _articulated(gap: Curve, said: dict[str, Curve], roundness: Curve, pause: Curve) -> Curve:
+def _articulated(gap: Curve, said: dict[str, Curve], pause: Curve) -> Curve:
     """Return the gap that suits what is said: teeth on the lip, tongue between the teeth, lips at rest in pauses."""
     gap = gap * (1 + OVAL_GROWTH * said["oval"])
-    gap = gap + ROUND_GAP * roundness * np.clip(gap / 0.03, 0, 1)
-    gap = gap + TONGUE_UP_GAP * said["tongue_up"] * np.clip(gap / 0.05, 0, 1)
-    gap = gap + said["tuck"] * (np.clip(gap, *TUCKED_GAP) - gap)
+    gap = gap - said["roundness"] * (1 - ROUND_GROWTH) * np.maximum(gap - PARTED, 0)
+    added = TEETH_GAP * said["wide"] + TONGUE_OUT_GAP * said["tongue_out"] + TONGUE_UP_GAP * said["tongue_up"] ** 2
+    gap = gap + added * np.clip(gap / 0.05, 0, 1)
+    held = said["hold"] * (1 - said["press"])
+    gap = gap + held * (np.maximum(gap, HELD_GAP) - gap)
+    gap = gap + said["pucker"] * (np.minimum(gap, PUCKERED_GAP) - gap)
+    gap = gap + said["tuck"] * (TUCKED_GAP - gap)
     gap = gap + said["tongue_out"] * (np.maximum(gap, TONGUE_GAP) - gap)
     gap = gap + pause * (np.minimum(gap, PAUSED_GAP) - gap)
     return np.maximum(gap * (1 - said["close"]), 0)
 
 
-def _rise(gap: Curve, roundness: Curve, tuck: Curve) -> Curve:
-    """Return how far the upper lip rises [shape=(T,)]: round lips part evenly, and F bares the upper teeth."""
-    rise = upper_share(gap) + roundness * np.maximum(0.42 * gap - upper_share(gap), 0)
-    return np.minimum(rise + tuck * np.maximum(0.036 - rise, 0), gap)
+def _rise(gap: Curve, said: dict[str, Curve]) -> Curve:
+    """Return how far the upper lip rises [shape=(T,)]: little in round lips, and spread lips and F bare the teeth."""
+    rise = upper_share(gap)
+    rise = rise + np.maximum(said["wide"], 0.7 * said["bite"]) * np.maximum(np.minimum(0.42 * gap, 0.05) - rise, 0)
+    rise = rise + said["roundness"] * (0.48 * gap - rise)
+    return np.minimum(rise + said["tuck"] * np.maximum(TUCKED_GAP - rise, 0), gap)
 
 
 def drawn_gap(opening: Curve) -> Curve:
@@ -227,4 +240,4 @@ def _jaw(motion: Motion, rest: NDArray[np.bool_], gap: Curve, time_s: Curve) -> 
     if "y_152" not in motion.names:
         return usual
     chin = motion["y_152"].astype(float)
-    return np.clip(_at(motion, np.median(chin[rest]) - chin, time_s), 0.65 * usual, 1.15 * usual + 0.01)
+    return np.clip(_at(motion, np.median(chin[rest]) - chin, time_s), 0.85 * usual, 1.2 * usual + 0.01)

@@ -22,6 +22,9 @@ SPACING = 0.033
 HINGE = np.array([0.0, -0.32, -0.82])
 """The axis of the jaw goes through here, from ear to ear."""
 REST = CharacterPose()
+_LEFT_CORNER = 40
+CALM_RADIUS = 0.035
+"""Round the corners of the lips, where the surface folds, the shading changes less than the surface."""
 
 
 class Skin:
@@ -61,6 +64,10 @@ class Skin:
         self.normals = meshed.copy()
         self.normals[len(contour) + len(edges) : len(self.face)] = outward(head, fill)
         self._meshed_rest = meshed
+        corners = self.rest[[0, _LEFT_CORNER]]
+        beside = np.linalg.norm(self.rest[: len(self.face), None] - corners, axis=2).min(axis=1)
+        self._calm = np.ones((len(self.rest), 1))
+        self._calm[: len(self.face), 0] -= 0.85 * np.exp(-((beside / CALM_RADIUS) ** 2))
 
     def lip_rows(self) -> Index:
         """Return the vertices of the lips, ring by ring from the skin inwards [shape=(RINGS, COLUMNS)]."""
@@ -82,7 +89,7 @@ class Skin:
         """Return places and normals of all vertices [shape=(V, 3), both], the head not turned."""
         places = self.places(pose)
         change = normals_of(places, self.triangles) - self._meshed_rest
-        normals = self.normals + change
+        normals = self.normals + self._calm * change
         return places, normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
 
     def _bind(self, contour: Real) -> None:

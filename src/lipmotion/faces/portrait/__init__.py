@@ -3,7 +3,8 @@
 The stages of a frame: ``pose`` (motion and phones → numbers) and ``expression`` (voice → blinks, glances, head) →
 ``geometry`` (numbers → outlines) → ``mouth`` (outlines → pixels, with ``textures``) → ``rasteriser`` (pixels →
 picture, moved by ``movement``). The still parts are painted once, by ``surroundings``, ``head`` and ``eyes`` on a
-``layer``. A character is a ``design``: ``woman``, ``man``, ``cartoon``.
+``layer``. ``planar`` draws the same for the encoder of a video.
+A character is a ``design``: ``woman``, ``man``, ``cartoon``.
 """
 
 from __future__ import annotations
@@ -45,6 +46,19 @@ class DrawnFace(Face):
 
     def render(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> Iterator[NDArray[np.uint8]]:  # noqa: D102
         return render(self.design, motion, units, fps=fps, staging=self.staging, prosody=self.prosody)
+
+    def render_planes(  # noqa: D102
+        self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0
+    ) -> Iterator[NDArray[np.uint8]] | None:
+        from lipmotion.faces.portrait.frames import face_poses, pictures
+        from lipmotion.faces.portrait.planar import PlanarRasteriser
+
+        chosen = self.staging
+        if chosen.background == TRANSPARENT:
+            return None
+        poses = face_poses(motion, units, fps, chosen, self.prosody)
+        background, size = chosen.colour or chosen.background, chosen.size or OWN_SIZE
+        return pictures(lambda: PlanarRasteriser(self.design, size, background), poses)
 
 
 @final

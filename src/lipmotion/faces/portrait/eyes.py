@@ -20,12 +20,17 @@ GAZE_STEPS = 8
 
 
 class EyePainter:
-    """Paints both eyes of a character, with the lids."""
+    """Paints both eyes of a character, with the lids.
+
+    iris : the irises, looking straight ahead [shape=(h, w, 4)]
+    lids : returns what is under the irises, the openings between the lids, and what is over the irises, by the position
+           of the lids: 0 (open) to ``LID_POSITIONS``
+    """
 
     def __init__(self, design: Design, window: Window) -> None:
         self._design, self._window = design, window
-        self._iris = _iris(window, design).pixels
-        self._lids = lru_cache(maxsize=LID_POSITIONS + 1)(self._painted_lids)
+        self.iris = _iris(window, design).pixels
+        self.lids = lru_cache(maxsize=LID_POSITIONS + 1)(self._painted_lids)
         self._cached = lru_cache(maxsize=128)(self._painted)
 
     def painted(self, shut: float, gaze_x: float, gaze_y: float) -> Pixels:
@@ -38,11 +43,11 @@ class EyePainter:
         return self._cached(round(shut * LID_POSITIONS), round(gaze_x * step), round(gaze_y * step))
 
     def _painted(self, lids: int, gaze_x: int, gaze_y: int) -> Pixels:
-        under, almond, over = self._lids(lids)
-        iris = np.empty_like(self._iris)
+        under, almond, over = self.lids(lids)
+        iris = np.empty_like(self.iris)
         grid = np.ones((2, 2))
         step = max(iris.shape[:2])
-        warp(self._iris, -gaze_x / GAZE_STEPS * grid, -gaze_y / GAZE_STEPS * grid, step, iris)
+        warp(self.iris, -gaze_x / GAZE_STEPS * grid, -gaze_y / GAZE_STEPS * grid, step, iris)
         iris *= almond[..., None]
         picture = iris + (1 - iris[..., 3:]) * under
         return over + (1 - over[..., 3:]) * picture

@@ -6,6 +6,7 @@ import threading
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +15,10 @@ from lipmotion.faces.base import Staging
 from lipmotion.faces.portrait.expression import expression
 from lipmotion.faces.portrait.movement import HeadPlacement
 from lipmotion.faces.portrait.pose import frame_times, mouth_poses
-from lipmotion.faces.portrait.rasteriser import FacePose, Rasteriser
+from lipmotion.faces.portrait.rasteriser import FacePose
 from lipmotion.types import Motion, Prosody, Timeline, Unit
 
+CanvasT = TypeVar("CanvasT")
 THREADS, AHEAD = 2, 6
 """Threads that draw, and frames that may be drawn before they are asked for."""
 
@@ -44,7 +46,17 @@ def face_poses(
     ]
 
 
-def pictures(rasteriser: Callable[[], Rasteriser], poses: Sequence[FacePose]) -> Iterator[NDArray[np.uint8]]:
+class Draws(Protocol[CanvasT]):
+    """What draws the pictures of poses, each thread on a canvas of its own."""
+
+    def canvas(self) -> CanvasT:
+        """Return what ``picture`` draws on."""
+
+    def picture(self, pose: FacePose, canvas: CanvasT) -> NDArray[np.uint8]:
+        """Return one frame."""
+
+
+def pictures(rasteriser: Callable[[], Draws[CanvasT]], poses: Sequence[FacePose]) -> Iterator[NDArray[np.uint8]]:
     """Yield the pictures of poses in order; they are drawn while earlier ones are used.
 
     rasteriser : makes what draws; called when the first picture is asked for

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from lipmotion.faces.portrait.design import Design
 from lipmotion.faces.portrait.geometry import Heights, LipOutlines, MouthInterior, lip_outlines, mouth_interior
 from lipmotion.faces.portrait.pose import MouthPose
-from lipmotion.faces.portrait.textures import SPAN, Texture, mouth_textures
+from lipmotion.faces.portrait.textures import SPAN, MouthTextures, Texture, mouth_textures
 from lipmotion.faces.portrait.view import Window
 from lipmotion.kernels.painting import paint_band
 
@@ -21,10 +21,13 @@ CORNER_REACH = 1.28
 
 
 class MouthPainter:
-    """Paints mouths of one character into the pixels of one window."""
+    """Paints mouths of one character into the pixels of one window.
 
-    def __init__(self, design: Design, window: Window) -> None:
-        self._lips, self._textures = design.lips, mouth_textures(design)
+    textures : of the mouth, in the colours of the layers that it is painted on; None: the design's own
+    """
+
+    def __init__(self, design: Design, window: Window, textures: MouthTextures | None = None) -> None:
+        self._lips, self._textures = design.lips, textures or mouth_textures(design)
         self._x = window.columns(COLUMNS).reshape(-1, COLUMNS).T.astype(np.float64)
         self._scale, self._first_row = window.view.scale, window.y0 - window.view.origin[1]
 

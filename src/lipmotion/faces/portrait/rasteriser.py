@@ -54,22 +54,9 @@ class Rasteriser:
     def __init__(self, design: Design, size: int, background: Colour | str | None = SCENE) -> None:
         view = View(size)
         whole = view.window(-9, -9, 9, 9)
-        line_y = design.lips.line_y
         self._opaque = background is not None
-        self._jaw = view.window(-0.86, line_y - 0.5, 0.86, line_y + 0.95)
-        self._mouth = view.window(-0.56, line_y - 0.24, 0.56, line_y + 0.7)
-        self._eyes = view.window(-0.66, -0.24, 0.66, 0.21)
-        self._brow = view.window(-0.8, -0.64, 0.8, -0.06)
-        self._below_brows = Window(view, self._eyes.x0, self._brow.y1, self._eyes.x1, self._eyes.y1)
-        self._head = view.window(-1.3, -9, 1.3, 1.9)
-        behind, skin = surroundings.behind_head(whole, design), paint_head(whole, design)
-        front = surroundings.hair(whole, design).pixels
-        below = _over(behind.pixels, _backdrop(whole, design, background))
-        shade = _over(surroundings.shaded_neck(whole, design).pixels, below) - below
-        shadow = surroundings.chin_shadow(whole, design)
-        self._skin = np.dstack([skin.pixels, shadow])
-        self._below, self._shade, self._front = below, shade, front
-        still = _over(front, _over(skin.pixels, below + shadow[..., None] * shade))
+        self._jaw, self._mouth, self._eyes, self._brow, self._below_brows, self._head = moving_parts(view, design)
+        self._skin, self._below, self._shade, self._front, still = still_layers(whole, design, background)
         self._eye_painter = EyePainter(design, self._eyes)
         self._still = (still * (1, 1, 1, 255) + 0.5).astype(np.uint16)
         self._frame = self._still[..., : 3 if self._opaque else 4].astype(np.uint8)
@@ -116,6 +103,59 @@ class Rasteriser:
     def _lay(self, skin: Pixels, window: Window, target: Canvas) -> None:
         area = window.area
         stack(self._below[area], self._shade[area], skin, self._front[area], target)
+
+
+class MovingParts(NamedTuple):
+    """Windows of what moves; ``below_brows`` is the part of the eyes' window that the brows' does not have."""
+
+    jaw: Window
+    mouth: Window
+    eyes: Window
+    brow: Window
+    below_brows: Window
+    head: Window
+
+
+def moving_parts(view: View, design: Design) -> MovingParts:
+    """Return the windows of what moves in a view of a character."""
+    line_y = design.lips.line_y
+    eyes, brow = view.window(-0.66, -0.24, 0.66, 0.21), view.window(-0.8, -0.64, 0.8, -0.06)
+    return MovingParts(
+        jaw=view.window(-0.86, line_y - 0.5, 0.86, line_y + 0.95),
+        mouth=view.window(-0.56, line_y - 0.24, 0.56, line_y + 0.7),
+        eyes=eyes,
+        brow=brow,
+        below_brows=Window(view, eyes.x0, brow.y1, eyes.x1, eyes.y1),
+        head=view.window(-1.3, -9, 1.3, 1.9),
+    )
+
+
+class PaintedLayers(NamedTuple):
+    """What is painted once: premultiplied colour 0..255, and cover 0..1 [shape=(h, w, 4)].
+
+    skin  : of the head, with the strength of its shadow on what is behind it as one more channel [shape=(h, w, 5)]
+    below : what is behind it
+    shade : is added to that where the shadow falls
+    front : what is in front of it
+    still : all of them over one another, at rest
+    """
+
+    skin: Pixels
+    below: Pixels
+    shade: Pixels
+    front: Pixels
+    still: Pixels
+
+
+def still_layers(whole: Window, design: Design, background: Colour | str | None) -> PaintedLayers:
+    """Return the layers of a character without eyes and mouth."""
+    behind, skin = surroundings.behind_head(whole, design), paint_head(whole, design).pixels
+    front = surroundings.hair(whole, design).pixels
+    below = _over(behind.pixels, _backdrop(whole, design, background))
+    shade = _over(surroundings.shaded_neck(whole, design).pixels, below) - below
+    shadow = surroundings.chin_shadow(whole, design)
+    still = _over(front, _over(skin, below + shadow[..., None] * shade))
+    return PaintedLayers(np.dstack([skin, shadow]), below, shade, front, still)
 
 
 _WHOLE = np.array([1, 1, 1, 255], np.float32)

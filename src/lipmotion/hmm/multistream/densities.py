@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.hmm.multistream.streams import Stream
-from lipmotion.stats.mixture import LOG_2PI, Mixtures
+from lipmotion.stats.mixture import LOG_2PI, Mixtures, QuadraticForm
 
 LEAST_FRAMES = 2.0
 """A Gaussian with less data, in frames, is not re-estimated."""
@@ -110,7 +110,8 @@ class TiedDensities:
             values -= np.float32(log_determinant) * rows[:, 1:2]
             return values
         used, local = np.unique(leaves, return_inverse=True)
-        values = self.mixtures.log_likelihood(self.values(rows), used) - np.float32(log_determinant)
+        form = self._whole if len(used) == self.mixtures.size[0] else self.mixtures.quadratic(used)
+        values = form.log_likelihood(self.values(rows)) - np.float32(log_determinant)
         values *= rows[:, 1:2]
         values += rows[:, :2] @ self._linear[used].T
         return values[:, local]
@@ -118,6 +119,11 @@ class TiedDensities:
     def values(self, rows: Floats) -> Floats:
         """Return the standardised values of frames, 0 where there is none [shape=(T, D)]."""
         return rows[:, 2 : 2 + self.mixtures.size[2]]
+
+    @cached_property
+    def _whole(self) -> QuadraticForm:
+        """All mixtures as a quadratic form."""
+        return self.mixtures.quadratic()
 
     @cached_property
     def _linear(self) -> Floats:

@@ -16,6 +16,7 @@ from lipmotion.corpora.labels import labels_beside
 from lipmotion.corpora.source_recordings import RecordingFolder, SourceRecording
 from lipmotion.corpora.splits import LISTS
 from lipmotion.errors import InputError
+from lipmotion.pipeline.corpus.separate_sound import on_own_time, separate_sound
 from lipmotion.pipeline.corpus.spoken_lines import spoken_lines, transcript_beside
 from lipmotion.pipeline.corpus.utterance_spans import SpokenPart, utterance_spans
 from lipmotion.speech.audio_files import read_audio
@@ -118,7 +119,7 @@ def divided(recording: SourceRecording, reached: Callable[[float], None], *, spl
     scan = scan_video(recording.file, reached)
     for note in scan.damage:
         LOG.warning("%s: %s", recording.file, note)
-    audio = read_audio(recording.file)
+    audio = _sound_of(recording)
     levels = levels_db(audio)
     parts = _lines(recording) or [SpokenPart(*span) for span in spoken_spans(levels)]
     end_s = min(audio.duration_s, scan.end_s)
@@ -129,6 +130,15 @@ def divided(recording: SourceRecording, reached: Callable[[float], None], *, spl
         VideoPart(_recording_of(span, recording, split), _sound(audio, span), scan.person)
         for span, split in zip(spans, splits, strict=True)
     ]
+
+
+def _sound_of(recording: SourceRecording) -> Audio:
+    """Return the sound of a video: its recorder's, brought into step, or its own."""
+    separate = separate_sound(recording)
+    if separate is None:
+        return read_audio(recording.file)
+    LOG.info("%s: %s", recording.file, separate.note)
+    return on_own_time(separate, read_audio(recording.file).duration_s)
 
 
 def _lines(recording: SourceRecording) -> list[SpokenPart]:

@@ -15,10 +15,12 @@ from typing import Any
 
 from lipmotion.corpora.discover import discover
 from lipmotion.corpora.entry import quantise, read_entry, write_utterance
+from lipmotion.corpora.separate_sounds import with_separate_sounds
 from lipmotion.corpora.source_recordings import VIDEO_SUFFIXES, RecordingFolder, SourceRecording
 from lipmotion.corpora.store import UTTERANCES, Corpus
 from lipmotion.errors import AlignmentError, CorpusError, ExportError, InputError, MissingDependencyError
 from lipmotion.pipeline.corpus.long_videos import DIVIDING_SHARE, VideoPart, single_video, with_long_videos_divided
+from lipmotion.pipeline.corpus.separate_sound import earlier_phones, in_step, separate_sound
 from lipmotion.pipeline.corpus.supplied_motion import DIGESTS, source_digests, supplied_phones, supplied_track
 from lipmotion.pipeline.workers import worker_pool
 from lipmotion.speech.audio_files import read_audio
@@ -101,6 +103,7 @@ def prepare(
     *,
     workers: int | None = None,
     crops: bool = True,
+    offset_ms: float | None = None,
     monitor: Monitor = silent_monitor,
 ) -> PrepareReport:
     """Create a corpus from recordings, or add the recordings to a corpus; return a report.
@@ -111,6 +114,8 @@ def prepare(
     workers   : number of processes; None: one for each core. With more than one, a script must be guarded by
                 ``if __name__ == "__main__":``
     crops     : store the mouth pictures, which eigenlips need
+    offset_ms : by how much the sound of every recording is late against its motion; None: it is in step, or a
+                recorder's sound beside it (``take.recorder.wav``) says it. ``offsets.csv`` in the folder goes before
     monitor   : called with reports of progress, and with the outcome of every recording
     Recordings that cannot be used are reported and left out. The corpus depends neither on ``workers`` nor on
     interruptions.
@@ -128,6 +133,7 @@ def prepare(
         raise InputError(f"{workers} processes, required at least 1; leave it out for one a core")
     check_apart((), [Source(directory, "folder of recordings")], folders=[output])
     folder, place = _found(directory)
+    folder = with_separate_sounds(folder, place, None if offset_ms is None else offset_ms / 1000)
     packages = package_versions() if any(item.motion_file is None for item in folder.recordings) else {}
     is_new = not is_folder(output)
     with locked(output):
@@ -191,6 +197,8 @@ def _job(
     else:
         settings, packages = {"tracker": "none: motion was given"}, {"av": metadata.version("av")}
     settings["recipe"] = RECIPE
+    if recording.offset_s is not None:
+        settings["sound"] = f"{recording.offset_s * 1000:.3f} ms late, as given"
     source = {
         "collection": collection,
         "file": recording.file.name,
@@ -261,22 +269,33 @@ def _up_to_date(job: _Job, source: dict[str, str]) -> dict[str, Any] | None:
 
 
 def _utterance(job: _Job, source: dict[str, str]) -> Utterance:
-    audio = quantise(job.part.sound if job.part else read_audio(job.recording.file))
-    check_words(job.recording.words or (), audio.duration_s)
+    recording = job.recording
+    separate = None if job.part else separate_sound(recording)
+    if separate is None:
+        audio = job.part.sound if job.part else read_audio(recording.file)
+        found = _track(job, audio.duration_s)
+    else:
+        own_s = None if recording.recorder is None else read_audio(recording.file, warn=False).duration_s
+        audio, found, begin_s = in_step(separate, _track(job, own_s))
+        labelled_s = begin_s if recording.recorder is not None else begin_s + separate.late_s
+        recording = replace(recording, phones=earlier_phones(recording.phones, labelled_s))
+        source = source | {"sound_late_ms": f"{separate.late_s * 1000:.3f}", "sound_found_by": separate.how}
+    audio = quantise(audio)
+    check_words(recording.words or (), audio.duration_s)
     return Utterance(
-        name=job.recording.name,
+        name=recording.name,
         audio=audio,
         features=mfcc(audio),
-        track=_track(job, audio.duration_s),
-        words=job.recording.words,
-        split=job.recording.split,
+        track=found,
+        words=recording.words,
+        split=recording.split,
         source=source,
-        speaker=job.recording.speaker,
-        phones=supplied_phones(job.recording, audio.duration_s),
+        speaker=recording.speaker,
+        phones=supplied_phones(recording, audio.duration_s),
     )
 
 
-def _track(job: _Job, duration_s: float) -> Track:
+def _track(job: _Job, duration_s: float | None) -> Track:
     if job.recording.motion_file is not None:
         return supplied_track(job.recording.motion_file, duration_s)
     recording, crops = job.recording, job.settings["crops"] == "yes"

@@ -18,7 +18,7 @@ from lipmotion.storage.files import sha256_of
 from lipmotion.types import Span, Timeline, Track, Unit
 from lipmotion.units import PAUSE, SILENCE, check_phones, is_silent
 
-DIGESTS = ("sha256", "motion_sha256", "phones_sha256")
+DIGESTS = ("sha256", "motion_sha256", "phones_sha256", "recorder_sha256")
 """Keys of the digests in the source of an utterance; if a digest changes, the recording is prepared again."""
 CURVES_MARGIN_S, CURVES_MARGIN_SHARE = 0.5, 0.02
 """Largest difference of duration between curves and sound: seconds, or share of the sound. It is larger where the frame
@@ -28,21 +28,24 @@ PHONES_MARGIN_S = 0.1
 
 
 def source_digests(recording: SourceRecording) -> dict[str, str]:
-    """Return file name and digests of the motion and of the phones that are supplied with a recording, by key."""
+    """Return file names and digests of motion, phones and sound that are supplied with a recording, by key."""
     digests = {}
     if recording.motion_file is not None:
         digests["motion_file"] = recording.motion_file.file.name
         digests["motion_sha256"] = sha256_of(recording.motion_file.file)
+    if recording.recorder is not None:
+        digests["recorder_file"] = recording.recorder.name
+        digests["recorder_sha256"] = sha256_of(recording.recorder)
     if recording.phones is not None:
         text = "\n".join(f"{span.start_s!r} {span.end_s!r} {span.label.phone}" for span in recording.phones)
         digests["phones_sha256"] = hashlib.sha256(text.encode()).hexdigest()
     return digests
 
 
-def supplied_track(curves: MotionFile, duration_s: float) -> Track:
+def supplied_track(curves: MotionFile, duration_s: float | None) -> Track:
     """Return the motion in a file as a track that is valid in all frames, without mouth pictures.
 
-    duration_s : of the sound
+    duration_s : of the sound that is in step with it; None: there is none, so any length is right
     Of a table of Live Link Face, the curves that speech moves.
     Raises InputError: not a motion file, or of another length than the sound.
     """
@@ -50,7 +53,7 @@ def supplied_track(curves: MotionFile, duration_s: float) -> Track:
     if is_live_link_file(curves.file):
         motion = speech_curves(motion)
     length_s = len(motion.values) / motion.rate_hz
-    if abs(length_s - duration_s) > max(CURVES_MARGIN_S, CURVES_MARGIN_SHARE * duration_s):
+    if duration_s is not None and abs(length_s - duration_s) > max(CURVES_MARGIN_S, CURVES_MARGIN_SHARE * duration_s):
         raise InputError(
             f"{curves.file}: {len(motion.values)} frames at {motion.rate_hz:g} Hz last {length_s:.2f} s, the sound "
             f"lasts {duration_s:.2f} s; required: the same time from the same start"

@@ -11,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter1d
 
 from lipmotion.appearance.frame_descriptors import describe_frames
 from lipmotion.appearance.identity import SAME_PERSON, face_signature, likeness
@@ -216,6 +215,8 @@ def _warn_of_somebody_else(footage: Footage, appearance: Appearance) -> None:
 
 def chin_px(footage: Footage) -> NDArray[np.float64]:
     """Return how far the tip of the chin is below the eyes in every frame, px of the face [shape=(T,)]."""
+    from scipy.ndimage import gaussian_filter1d
+
     return -EYE_DISTANCE_PX * gaussian_filter1d(np.asarray(footage.track.motion[CHIN], np.float64), SMOOTHING_FRAMES)
 
 

@@ -1,0 +1,69 @@
+"""``lipmotion batch``: many recordings to motion files, videos or cues, with a report."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from lipmotion.cli.options import add_machine_readable
+from lipmotion.cli.paths import add_input, add_output
+from lipmotion.cli.speech import add_lexicon_argument, add_model_argument, add_recogniser_argument, add_speaker_argument
+from lipmotion.cli.staging import add_staging_arguments, staging_of
+from lipmotion.printable import printable
+
+
+def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the verb to the parser of the command line."""
+    parser = verbs.add_parser("batch", help="turn thousands of recordings into lip motion, with a report")
+    listed = "a folder of recordings, or a list: a path a line, or a table with columns file,transcript,output,speaker"
+    add_input(parser, "source", what="list or folder of recordings", metavar="LIST|DIR", help=listed)
+    add_output(parser, "--out", is_folder=True, required=True, metavar="DIR", help="folder of the outputs")
+    kinds = "json csv npz TextGrid mp4 webm mov cues.tsv cues.xml cues.json cues.dat, with commas (default: json)"
+    parser.add_argument("--to", default="json", metavar="KIND,KIND", help=kinds)
+    parser.add_argument("--jobs", type=int, metavar="N", help="number of processes (default: one per core)")
+    address = "scheduler of a Dask cluster that does the work, as tcp://HOST:8786"
+    parser.add_argument("--cluster", default="", metavar="ADDRESS", help=address)
+    for add_argument in (add_recogniser_argument, add_model_argument, add_lexicon_argument, add_speaker_argument):
+        add_argument(parser)
+    parser.add_argument("--rate", type=float, metavar="HZ", help="frames per second of motion files (default: 100)")
+    parser.add_argument("--fps", type=float, help="frames per second of videos (default: 25) and of cues (24)")
+    parser.add_argument("--channels", metavar="NAME,NAME", help="write only these to motion files: opening,width,...")
+    curves = "what motion files hold: arkit, visemes, fap, or the controls of a rig (FILE.csv)"
+    parser.add_argument("--curves", default="", metavar="SET", help=curves)
+    articulation = "add tongue, lip_tuck, protrusion, spread, lip_press, teeth to motion files"
+    parser.add_argument("--articulation", action="store_true", help=articulation)
+    face = "face of videos: woman, man, cartoon, head, FILE.svg (default: portrait, the woman)"
+    add_input(parser, "--face", what="face", type=str, default="portrait", metavar="NAME|FILE", help=face)
+    parser.add_argument("--background", default="", metavar="COLOUR", help="of that face: transparent, or as #40a0ff")
+    add_staging_arguments(parser)
+    add_machine_readable(parser)
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Call ``batch``; print how many lines were done, and the report. Raises InputError: some lines failed."""
+    from lipmotion.cli.progress import reporting
+    from lipmotion.errors import InputError
+    from lipmotion.pipeline.batch import BatchSettings, batch
+
+    text = {"recogniser": options.recogniser, "speaker": options.speaker, "curves": options.curves}
+    paths = {name: str(Path(path).absolute()) for name in ("model", "lexicon") if (path := getattr(options, name))}
+    settings = BatchSettings(
+        kinds=tuple(options.to.split(",")),
+        channels=tuple((options.channels or "").split(",")) if options.channels else (),
+        articulation=options.articulation,
+        rate_hz=options.rate,
+        fps=options.fps,
+        face=options.face,
+        staging=staging_of(options),
+        **text,
+        **paths,
+    )
+    with reporting(options) as report:
+        found = batch(
+            options.source, options.out, settings, jobs=options.jobs, cluster=options.cluster, monitor=report.receive
+        )
+        if found.failed:
+            raise InputError(f"{found.text}; the reasons are in {found.csv}; mend them and run the same command again")
+        figures = {"done": found.done, "kept": found.kept, "report": [str(found.csv), str(found.html)]}
+        report.finish(printable(f"{found.text}; report: {found.html}"), **figures)

@@ -1,0 +1,100 @@
+"""Sound that was recorded apart from the motion: which file it is, and by how much it is late where that is known."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+
+from lipmotion.corpora.source_recordings import AUDIO_SUFFIXES, RecordingFolder, SourceRecording
+from lipmotion.errors import CorpusError, InputError, shortened
+from lipmotion.storage.files import read_text_file
+
+RECORDER = ".recorder"
+"""``take.recorder.wav`` is the sound that a recorder of its own made of ``take.mp4``, or of ``take.wav``."""
+OFFSETS = "offsets.csv"
+COLUMNS = ["name", "offset_ms"]
+LARGEST_TABLE = 1 << 22
+LARGEST_OFFSET_S = 6 * 3600.0
+
+
+def with_separate_sounds(folder: RecordingFolder, directory: Path, offset_s: float | None = None) -> RecordingFolder:
+    """Return the recordings with the sounds of their recorders, and with the offsets of the table ``offsets.csv``.
+
+    offset_s : by how much the sound of each recording that is not in the table is late; None: that is not known
+    Names of the table without a recording become problems.
+    Raises CorpusError: the table is damaged. Raises InputError: an offset that no recording has.
+    """
+    if offset_s is not None:
+        _check(offset_s)
+    table = read_offsets(directory / OFFSETS) if (directory / OFFSETS).is_file() else {}
+    recordings, problems = [], dict(folder.problems)
+    for recording in folder.recordings:
+        try:
+            sound = recorder_of(recording)
+        except InputError as error:
+            problems[recording.name] = str(error)
+            continue
+        recordings.append(replace(recording, recorder=sound, offset_s=table.get(recording.name, offset_s)))
+    known = {recording.name for recording in folder.recordings} | problems.keys()
+    problems |= {name: f"in {OFFSETS}, but there is no such recording" for name in table if name not in known}
+    return RecordingFolder(folder.kind, tuple(recordings), problems)
+
+
+def recorder_of(recording: SourceRecording) -> Path | None:
+    """Return the sound that a recorder made of a recording, or None. Raises InputError: there are several."""
+    stem = recording.file.with_suffix(RECORDER)
+    found = [path for suffix in sorted(AUDIO_SUFFIXES) if (path := stem.with_name(stem.name + suffix)).is_file()]
+    if len(found) > 1:
+        raise InputError(f"{recording.file}: {len(found)} recorders' sounds beside it: {_listed(found)}; keep one")
+    return found[0] if found else None
+
+
+def is_of_recorder(path: Path) -> bool:
+    """Return whether a file is the sound of a recorder, which is no recording of its own."""
+    return path.suffix.lower() in AUDIO_SUFFIXES and path.stem.lower().endswith(RECORDER)
+
+
+def read_offsets(path: Path) -> dict[str, float]:
+    """Return by how many seconds the sound of each recording is late, from a table ``name,offset_ms``.
+
+    Raises CorpusError: other columns, a row that is damaged, or a name twice.
+    """
+    try:
+        rows = list(csv.reader(io.StringIO(read_text_file(path, "table of offsets", LARGEST_TABLE))))
+        if not rows or [field.strip() for field in rows[0]] != COLUMNS:
+            raise InputError(
+                f"{path}: the columns are {shortened(','.join(rows[0] if rows else []))!r}, required name,offset_ms"
+            )
+        found: dict[str, float] = {}
+        for number, row in enumerate(rows[1:], 2):
+            if not any(field.strip() for field in row):
+                continue
+            name, offset_s = row[0].strip().replace("/", "-"), _offset_s(row, f"{path}: line {number}")
+            if found.setdefault(name, offset_s) != offset_s:
+                raise InputError(f"{path}: line {number}: {shortened(name)!r} has another offset above; keep one")
+    except (InputError, csv.Error) as error:
+        raise CorpusError(str(error)) from error
+    return found
+
+
+def _offset_s(row: list[str], where: str) -> float:
+    try:
+        if len(row) != len(COLUMNS):
+            raise ValueError(f"{len(row)} fields")
+        offset_s = float(row[1]) / 1000
+    except ValueError as error:
+        raise InputError(f"{where}: {shortened(str(error))}, required a name and milliseconds") from error
+    _check(offset_s)
+    return offset_s
+
+
+def _check(offset_s: float) -> None:
+    if not abs(offset_s) <= LARGEST_OFFSET_S:
+        raise InputError(f"the offset is {offset_s * 1000:g} ms, required within ±{LARGEST_OFFSET_S * 1000:.0f}")
+
+
+def _listed(paths: Iterable[Path]) -> str:
+    return ", ".join(path.name for path in paths)

@@ -1,0 +1,179 @@
+"""The lines of a batch: one recording each, from a list or a folder, with the names of their outputs."""
+
+from __future__ import annotations
+
+import csv
+import io
+import logging
+import os
+import unicodedata
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+
+from lipmotion.corpora.source_recordings import AUDIO_SUFFIXES, VIDEO_SUFFIXES
+from lipmotion.errors import ExportError, InputError, shortened
+from lipmotion.storage.files import check_listable, read_text_file
+
+LOG = logging.getLogger("lipmotion")
+FILE_COLUMNS = ("file", "path", "recording", "audio", "wav")
+"""Names of the column with the recording; the first row of a table is a header if it has one of them."""
+COLUMNS = ("transcript", "output", "speaker")
+"""Names of the other columns that are read."""
+OWN_FILES = ("batch.jsonl", "report.csv", "report.html")
+"""Files that a batch writes beside the outputs of its lines."""
+OWN_FOLDER = ".batch"
+"""Folder of unfinished work in the folder of the outputs."""
+LARGEST_LIST = 1 << 27
+"""Most bytes of a list: a million lines with their words."""
+MOST_NAMED = 3
+
+
+@dataclass(frozen=True)
+class Line:
+    """One recording of a batch.
+
+    name       : relative path of its outputs without their suffixes, with ``/`` between folders; unique in the batch
+    recording  : absolute path of the sound or the video
+    transcript : the words; empty: those of a file beside the recording, if there is one
+    speaker    : whose motion; empty: that of the whole batch
+    """
+
+    name: str
+    recording: str
+    transcript: str = ""
+    speaker: str = ""
+
+
+def read_lines(source: Path, kinds: Sequence[str]) -> list[Line]:
+    """Return the lines of a folder of recordings, or of a list of them, in their order.
+
+    source : a folder, which is searched with its sub-folders; or a file: a path a line, or a table (``.csv``, ``.tsv``)
+             whose first row names the columns ``file`` and, if there are, ``transcript``, ``output``, ``speaker``.
+             Relative paths begin at the folder of the list
+    kinds  : suffixes of the outputs without the first dot, for the check of their names
+    Raises InputError: no such file or folder, no recordings, or a table with a row that is not usable.
+    Raises ExportError: two lines would have the same output, or one would lie outside the folder of the outputs.
+    """
+    if source.is_dir():
+        lines = _in_folder(source)
+    elif source.is_file():
+        lines = _in_list(source, kinds)
+    else:
+        raise InputError(f"{source}: no such file or folder; give a list of recordings, or a folder of them")
+    if not lines:
+        raise InputError(f"{source}: no recordings in it; required at least one")
+    check_names(lines, kinds)
+    return lines
+
+
+def check_names(lines: Iterable[Line], kinds: Sequence[str]) -> None:
+    """Raise ExportError if two outputs of a batch would be the same file, also where case does not count."""
+    taken = dict.fromkeys(OWN_FILES, "the batch itself")
+    for line in lines:
+        path = PurePosixPath(line.name)
+        if path.is_absolute() or not path.name or ".." in path.parts or any(map(_is_hidden, path.parts)):
+            raise ExportError(
+                f"{line.recording}: the output {line.name!r} lies outside the folder of the outputs, or is hidden; "
+                "give a relative name without '..' and without names that begin with a dot"
+            )
+        for kind in kinds:
+            key = unicodedata.normalize("NFC", f"{line.name}.{kind}").casefold()
+            if key in taken:
+                raise ExportError(
+                    f"{line.name}.{kind}: would be written for {taken[key]} and for {line.recording}; rename one "
+                    "of them, or name the outputs in a column 'output' of the list"
+                )
+
+
+def _is_hidden(part: str) -> bool:
+    return part.startswith(".")
+
+
+def _in_folder(folder: Path) -> list[Line]:
+    check_listable(folder)
+    found = []
+    for root, folders, names in os.walk(folder):
+        folders[:] = sorted(name for name in folders if not _is_hidden(name))
+        for name in sorted(names):
+            path = Path(root) / name
+            if not _is_hidden(name) and _is_recording(path) and path.is_file():
+                inner = path.relative_to(folder).with_suffix("").as_posix()
+                found.append(Line(inner, os.path.abspath(path)))  # noqa: PTH100 # links are not followed
+    return sorted(found, key=lambda line: line.name)
+
+
+def _is_recording(path: Path) -> bool:
+    return path.suffix.lower() in AUDIO_SUFFIXES | VIDEO_SUFFIXES
+
+
+def _in_list(source: Path, kinds: Sequence[str]) -> list[Line]:
+    text = read_text_file(source, "list of recordings", LARGEST_LIST)
+    rows = _table(source, text)
+    if rows is None:
+        rows = [{"file": row.strip()} for row in text.splitlines() if row.strip()]
+    base = Path(os.path.abspath(source)).parent  # noqa: PTH100
+    paths = [os.path.normpath(base / Path(row["file"]).expanduser()) for row in rows]
+    names = [_output_name(row.get("output", ""), kinds) for row in rows]
+    unnamed = [path for path, name in zip(paths, names, strict=True) if not name]
+    shared = _shared_folder(unnamed, base)
+    return [
+        Line(
+            name or Path(os.path.relpath(path, shared)).with_suffix("").as_posix(),
+            path,
+            row.get("transcript", ""),
+            row.get("speaker", ""),
+        )
+        for row, path, name in zip(rows, paths, names, strict=True)
+    ]
+
+
+def _shared_folder(paths: Sequence[str], base: Path) -> str:
+    """Return the folder from which the names of outputs are counted: that of the list, if it holds all recordings."""
+    folders = {os.path.dirname(path) for path in paths}  # noqa: PTH120 # a hundred thousand of them
+    try:
+        common = os.path.commonpath([str(base), *folders])
+        return common if common == str(base) or not folders else os.path.commonpath(list(folders))
+    except ValueError as error:  # several drives
+        raise InputError("the recordings are on several drives; name the outputs in a column 'output'") from error
+
+
+def _output_name(text: str, kinds: Sequence[str]) -> str:
+    """Return the name of an output without the suffix, if it has that of one of the outputs."""
+    name = text.strip().replace("\\", "/")
+    suffix = next((f".{kind}" for kind in sorted(kinds, key=len, reverse=True) if name.endswith(f".{kind}")), "")
+    return name.removesuffix(suffix)
+
+
+def _table(source: Path, text: str) -> list[dict[str, str]] | None:
+    """Return the rows of a table with a header by the names of its columns; None: it has no header.
+
+    Raises InputError: a row without a recording, or one that is longer than the header.
+    """
+    first = text.split("\n", 1)[0]
+    delimiter = max("\t;,", key=first.count)
+    try:
+        header = [name.strip().lower() for name in next(csv.reader([first], delimiter=delimiter), [])]
+        file = next((name for name in header if name in FILE_COLUMNS), None)
+        if file is None:
+            return None
+        rows = list(csv.reader(io.StringIO(text, newline=""), delimiter=delimiter))[1:]
+    except csv.Error as error:
+        raise InputError(f"{source}: not a readable table ({error}); export it again as CSV") from error
+    unused = [name for name in header if name and name != file and name not in COLUMNS]
+    if unused:
+        named = ", ".join(map(shortened, unused[:MOST_NAMED]))
+        LOG.warning("%s: columns that are not used: %s; used are %s", source, named, ", ".join((file, *COLUMNS)))
+    return [_row(source, number, header, file, cells) for number, cells in enumerate(rows, 2) if any(cells)]
+
+
+def _row(source: Path, number: int, header: Sequence[str], file: str, cells: Sequence[str]) -> dict[str, str]:
+    if len(cells) > len(header):
+        raise InputError(
+            f"{source}, row {number}: {len(cells)} columns, required at most the {len(header)} of the header; put "
+            "texts with commas into quotes"
+        )
+    row = {name: cell.strip() for name, cell in zip(header, cells, strict=False)}
+    if not row.get(file):
+        raise InputError(f"{source}, row {number}: no recording in the column {file!r}; fill it in, or remove the row")
+    return {"file": row[file]} | {name: row.get(name, "") for name in COLUMNS}

@@ -1,0 +1,255 @@
+"""One line of a batch, from its recording to its outputs and its record; this runs in worker processes."""
+
+from __future__ import annotations
+
+import errno
+import logging
+import os
+import shutil
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from lipmotion.corpora.labels import labels_beside
+from lipmotion.errors import ExportError, LipMotionError
+from lipmotion.faces.base import Face
+from lipmotion.faces.filmed.face import FilmedFace
+from lipmotion.measures.closures import CLOSED_SHARE
+from lipmotion.motion.closure import OPENING, closable_ranges
+from lipmotion.pipeline.animate import animate, opened_face, with_articulation, write
+from lipmotion.pipeline.batch.ledger import (
+    DONE,
+    FAILED,
+    Place,
+    Record,
+    are_in_place,
+    is_in_place,
+    read_receipt,
+    write_receipt,
+)
+from lipmotion.pipeline.batch.lines import Line
+from lipmotion.pipeline.batch.settings import CUES, BatchSettings, input_files, line_fingerprint
+from lipmotion.pipeline.characters import with_curves
+from lipmotion.pipeline.cues import cues, write_cues
+from lipmotion.pipeline.model import Model, load_model
+from lipmotion.pipeline.request import SpeechRequest
+from lipmotion.storage.files import sha256_of
+from lipmotion.types import Generation
+from lipmotion.units import Lexicon
+
+LOG = logging.getLogger("lipmotion")
+ONE_AT_A_TIME = threading.Lock()
+"""A worker of a cluster may have several threads: warnings and the threads of matrix products belong to a process."""
+MOST_WARNINGS = 10
+
+
+@dataclass(frozen=True)
+class LineWork:
+    """What a worker needs to know of a line.
+
+    of_settings : from ``fingerprint_of``
+    """
+
+    line: Line
+    settings: BatchSettings
+    of_settings: str
+    place: Place
+
+
+def finished_line(work: LineWork) -> Record:
+    """Return the record of a line, whose outputs are in place; or that of an error, without outputs.
+
+    A line whose receipt is there, because another worker died after it had finished it, is not done again.
+    Raises ExportError: the disk is full, or a later run has begun in the same folder.
+    """
+    with ONE_AT_A_TIME:
+        receipt = read_receipt(work.place.receipt(work.line.name))
+        if receipt is not None and receipt["run"] == work.place.run and are_in_place(Path(work.place.out), receipt):
+            return receipt
+        folder = work.place.work(work.line.name)
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir(parents=True)
+        try:
+            return _finished(work, folder)
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+def _finished(work: LineWork, folder: Path) -> Record:
+    start_s = time.perf_counter()
+    record: Record = {
+        "name": work.line.name,
+        "recording": work.line.recording,
+        "run": work.place.run,
+        "fingerprint": line_fingerprint(work.line, work.of_settings),
+        "outcome": DONE,
+        "inputs": [],
+        "outputs": {},
+    }
+    with _kept_warnings() as warnings:
+        try:
+            record["inputs"] = [asdict(each) for each in input_files(work.line)]
+            generation = _written(work, folder)
+            record |= _findings(generation)
+        except (LipMotionError, OSError, MemoryError) as error:
+            if _is_final(error):
+                raise
+            record |= {"outcome": FAILED, "error": str(error) or type(error).__name__}
+    record |= {"warnings": warnings[:MOST_WARNINGS], "seconds": round(time.perf_counter() - start_s, 4)}
+    if record["outcome"] == DONE:
+        _put_in_place(work, folder, record)
+    return record
+
+
+def _is_final(error: BaseException) -> bool:
+    """Return whether an error would befall every line that follows: a full disk."""
+    cause = error if isinstance(error, OSError) else error.__cause__
+    return isinstance(cause, OSError) and cause.errno in (errno.ENOSPC, errno.EDQUOT)
+
+
+def _put_in_place(work: LineWork, folder: Path, record: Record) -> None:
+    """Write the receipt, and rename the outputs; one that is in place from an earlier run is left alone."""
+    out = Path(work.place.out)
+    staged = {f"{work.line.name}.{kind}": _staged(folder, work.line, kind) for kind in work.settings.kinds}
+    record["outputs"] = {name: sha256_of(path) for name, path in staged.items()}
+    if not work.place.is_current():
+        raise ExportError(f"{out}: another run of this batch has begun; this one ends")
+    write_receipt(work.place.receipt(work.line.name), record)
+    for name, path in staged.items():
+        target = out / name
+        if not is_in_place(target, record["outputs"][name]):
+            target.parent.mkdir(parents=True, exist_ok=True)
+            path.replace(target)
+
+
+def _staged(folder: Path, line: Line, kind: str) -> Path:
+    """Return the path at which an output is written before it is renamed; formats may store the name of the file."""
+    return folder / f"{line.name.rpartition('/')[2]}.{kind}"
+
+
+def _written(work: LineWork, folder: Path) -> Generation:
+    """Write the outputs of a line into a folder; return its motion. Raises as ``animate`` and ``write``."""
+    line, settings = work.line, work.settings
+    model = _model(settings.model, _stamp(settings.model))
+    generation = animate(_request(line, settings), model=model)
+    plain = [_staged(folder, line, kind) for kind in settings.kinds if not kind.startswith(CUES)]
+    sheets = [(kind, _staged(folder, line, kind)) for kind in settings.kinds if kind.startswith(CUES)]
+    if sheets:
+        sheet = cues(generation) if settings.fps is None else cues(generation, fps=settings.fps)
+        for kind, path in sheets:
+            write_cues(sheet, path, speech=line.recording, form=kind.removeprefix(CUES))
+    if plain:
+        channels = list(settings.channels) or None
+        drawn = generation
+        if settings.curves:
+            drawn, names = with_curves(generation, settings.curves)
+            channels = channels or list(names)
+        write(
+            with_articulation(drawn) if settings.articulation else drawn,
+            plain,
+            speech=line.recording,
+            model=model,
+            channels=channels,
+            rate_hz=settings.rate_hz,
+            fps=settings.fps,
+            face=_face(settings.face, _stamp(settings.face)),
+            staging=settings.staging,
+        )
+    return generation
+
+
+def _request(line: Line, settings: BatchSettings) -> SpeechRequest:
+    """Return the request of a line, with the labels beside its recording where the row has no words."""
+    labels = None if line.transcript else labels_beside(Path(line.recording))
+    transcript = line.transcript or (labels.transcript if labels else None)
+    return SpeechRequest(
+        line.recording,
+        transcript=transcript,
+        units=labels.phones if labels and transcript is None else None,
+        lexicon=_lexicon(settings.lexicon, _stamp(settings.lexicon)),
+        recogniser=settings.recogniser,
+        speaker=line.speaker or settings.speaker,
+    )
+
+
+def _findings(generation: Generation) -> Record:
+    """Return what the report says of generated motion."""
+    outlook, motion = generation.outlook, generation.motion
+    found: Record = {"duration_s": round(max(len(motion.values) - 1, 0) / motion.rate_hz, 3)}
+    if outlook is not None:
+        found |= {
+            "words": outlook.words,
+            "confidence": round(float(outlook.confidence), 3),
+            "voice": None if outlook.voice is None else round(float(outlook.voice), 3),
+            "range_db": round(float(outlook.range_db), 1),
+            "advice": list(outlook.advice),
+        }
+    if OPENING in motion.names and len(motion.values):
+        opening = motion[OPENING]
+        closed = CLOSED_SHARE * float(np.percentile(opening, 95))
+        ranges = closable_ranges(generation.units, len(opening))
+        found |= {
+            "widest": round(float(opening.max()), 4),
+            "closures_heard": len(ranges),
+            "closures_made": sum(bool(opening[frames].min() <= closed) for frames in ranges),
+        }
+    return found
+
+
+@contextmanager
+def _kept_warnings() -> Iterator[list[str]]:
+    """Give a list that receives the package's warnings inside the block, instead of the terminal; each once."""
+    kept: list[str] = []
+
+    class Keeper(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            text = record.getMessage()
+            if text not in kept:
+                kept.append(text)
+
+    handler, others, goes_up = Keeper(logging.WARNING), LOG.handlers[:], LOG.propagate
+    LOG.handlers[:], LOG.propagate = [handler], False
+    try:
+        yield kept
+    finally:
+        LOG.handlers[:], LOG.propagate = others, goes_up
+
+
+def _stamp(path: str) -> int:
+    """Return the time of change of a file, so that what is kept of it is renewed; 0: there is no such file."""
+    try:
+        return os.stat(path).st_mtime_ns if path else 0  # noqa: PTH116
+    except OSError:
+        return 0
+
+
+@lru_cache(maxsize=1)
+def _model(path: str, _: int) -> Model:
+    return load_model(path or None)
+
+
+@lru_cache(maxsize=1)
+def _lexicon(path: str, _: int) -> Lexicon | None:
+    return Lexicon.from_file(Path(path)) if path else None
+
+
+@lru_cache(maxsize=1)
+def _face(name: str, _: int) -> Face | FilmedFace:
+    return opened_face(name)
+
+
+def check_line_settings(settings: BatchSettings) -> None:
+    """Load what all lines need, so that a mistake in it ends the batch before its first line.
+
+    Raises InputError, ModelFormatError, ExportError: as ``load_model``, ``Lexicon.from_file``, ``opened_face``.
+    """
+    _model(settings.model, _stamp(settings.model))
+    _lexicon(settings.lexicon, _stamp(settings.lexicon))
+    _face(settings.face, _stamp(settings.face))
+

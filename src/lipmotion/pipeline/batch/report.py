@@ -1,0 +1,91 @@
+"""The report of a batch: a table of all lines as CSV, and as one HTML file that needs no network."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
+from importlib import resources
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from lipmotion.pipeline.batch.ledger import FAILED, Ledger, Record
+from lipmotion.pipeline.batch.lines import Line
+from lipmotion.speech.recognition import NOISY_DB
+from lipmotion.storage.files import as_text, whole_file
+from lipmotion.types.generation import ALL_FITS
+
+CSV_REPORT, HTML_REPORT = "report.csv", "report.html"
+COLUMNS = (
+    "name outcome doubt duration_s words confidence voice closures_heard closures_made widest range_db warnings advice "
+    "error seconds recording outputs"
+).split()
+"""Columns of the table, in order; docs/batch.md says what they mean."""
+ROWS, BETWEEN = "/*ROWS*/", " | "
+"""Where the page has its rows; what stands between several texts in a field of the CSV file."""
+SURE_OF_WORDS = 0.8
+"""Words that were recognised with less confidence deserve an ear."""
+
+
+def write_reports(lines: Sequence[Line], ledger: Ledger, out: Path) -> tuple[Path, Path]:
+    """Write the reports of some lines into a folder, the most doubtful line first; return their paths.
+
+    Raises ExportError: they cannot be written.
+    Memory: a number and a reference a line; the records are read one by one.
+    """
+    doubts = [doubt_of(ledger.record_of(line.name) or {}) for line in lines]
+    order = sorted(range(len(lines)), key=lambda number: (-doubts[number], lines[number].name))
+    table, page = out / CSV_REPORT, out / HTML_REPORT
+    before, _, after = resources.files(__package__).joinpath("report_page.html").read_text("utf-8").partition(ROWS)
+    with ExitStack() as stack:
+        paths = [stack.enter_context(whole_file(path)) for path in (table, page)]
+        table_file = stack.enter_context(paths[0].open("w", encoding="utf-8", newline=""))
+        page_file = stack.enter_context(paths[1].open("w", encoding="utf-8"))
+        rows = csv.writer(table_file)
+        rows.writerow(COLUMNS)
+        page_file.write(before)
+        for number, record in enumerate(_records(lines, ledger, order)):
+            values = [record.get(name) for name in COLUMNS]
+            rows.writerow([_field(value) for value in values])
+            page_file.write(f"{',' if number else ''}\n{_for_page(record, values)}")
+        page_file.write(after)
+    return table, page
+
+
+def doubt_of(record: Record) -> float:
+    """Return how much a line deserves to be looked at, 0 (nothing is known against it) to 100 (it failed)."""
+    if record.get("outcome") in (FAILED, None):
+        return 100.0
+    words, heard = record.get("words"), record.get("closures_heard") or 0
+    doubt = 50.0 if words == "no speech" else 0.0
+    doubt += 10 * len(record.get("warnings", ()))
+    doubt += 5 * (record.get("range_db", NOISY_DB) < NOISY_DB)
+    if words == "words":
+        doubt += 10 * max(SURE_OF_WORDS - record["confidence"], 0) / SURE_OF_WORDS
+    if words == "transcript" and record["confidence"] < ALL_FITS:
+        doubt += 10 * (1 - record["confidence"])
+    if heard:
+        doubt += 5 * (1 - record["closures_made"] / heard)
+    return round(min(doubt, 99.0), 1)
+
+
+def _records(lines: Sequence[Line], ledger: Ledger, order: Sequence[int]) -> Iterator[Record]:
+    for number in order:
+        record = ledger.record_of(lines[number].name) or {"name": lines[number].name, "outcome": "missing"}
+        yield record | {"doubt": doubt_of(record), "outputs": list(record.get("outputs", ()))}
+
+
+def _field(value: Any) -> str:
+    """Return a value as a field of the CSV file."""
+    if value is None:
+        return ""
+    return as_text(BETWEEN.join(value) if isinstance(value, list) else str(value))
+
+
+def _for_page(record: Record, values: Sequence[Any]) -> str:
+    """Return a row of the page: its values, and the addresses of the outputs, relative to the page."""
+    links = [quote(as_text(name)) for name in record["outputs"]]
+    text = json.dumps([*values, links], ensure_ascii=True, separators=(",", ":"))
+    return text.replace("<", "\\u003c")  # nothing that a name says ends the script

@@ -1,0 +1,181 @@
+"""Thousands of recordings to files: ``batch(lines, out) → summary``; resumable, in many processes."""
+
+from __future__ import annotations
+
+import os
+import uuid
+from collections.abc import Iterator, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+
+from lipmotion.errors import CorpusError, ExportError
+from lipmotion.pipeline.batch.ledger import FAILED, Place, Record, opened_ledger
+from lipmotion.pipeline.batch.lines import Line, check_names, read_lines
+from lipmotion.pipeline.batch.one_line import LineWork, check_line_settings, finished_line
+from lipmotion.pipeline.batch.pool import Pool, WorkerDied, cluster_pool, died_alone, local_pool
+from lipmotion.pipeline.batch.report import write_reports
+from lipmotion.pipeline.batch.settings import BatchSettings, check_kinds, fingerprint_of, line_fingerprint
+from lipmotion.storage.sources import Source, check_apart
+from lipmotion.types import Item, Monitor, Progress, silent_monitor
+
+STAGE = "animating"
+MOST_DEATHS = 3
+"""After so many deaths of workers in a row that no line explains, the batch ends."""
+
+
+@dataclass(frozen=True)
+class BatchSummary:
+    """How a batch ended.
+
+    done   : lines that were done in this run
+    kept   : lines that an earlier run had done
+    failed : lines that could not be done; the report says why
+    csv, html : paths of the report
+    """
+
+    done: int
+    kept: int
+    failed: int
+    csv: Path
+    html: Path
+
+    @property
+    def text(self) -> str:
+        """The summary in one line."""
+        total = self.done + self.kept + self.failed
+        return f"{total} lines: {self.done} done, {self.kept} kept, {self.failed} failed"
+
+
+def batch(
+    source: str | Path | Sequence[Line],
+    out: str | Path,
+    settings: BatchSettings | None = None,
+    *,
+    jobs: int | None = None,
+    cluster: str = "",
+    monitor: Monitor = silent_monitor,
+) -> BatchSummary:
+    """Turn many recordings into motion files, videos or cues, and write a report of all of them.
+
+    source   : a folder of recordings, a list of them (docs/batch.md), or lines
+    out      : folder of the outputs, created if needed; their names are those of the recordings, with the same
+               sub-folders
+    settings : what is made, and how; None: motion as ``.json``
+    jobs     : number of processes; None: one a core. With more than one, a script must be guarded by
+               ``if __name__ == "__main__":``
+    cluster  : address of the scheduler of a Dask cluster that does the work instead of this machine
+    monitor  : receives an ``Item`` for every line and the progress
+    A line that was done before, with the same settings and from the same files, is kept. A line that cannot be done is
+    part of the report, and the others go on. The motion is that of ``animate``, whatever the number of processes.
+    Raises InputError: there are no recordings, a setting is not usable, or the cluster is not.
+    Raises ExportError: two lines have the same output, an output would replace a recording, another process is at
+    work on the folder, or the disk is full.
+
+    >>> from lipmotion.pipeline.batch import BatchSettings, batch
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     batch("examples", folder, BatchSettings(kinds=("csv",)), jobs=1).text
+    '1 lines: 1 done, 0 kept, 0 failed'
+    """
+    settings = settings or BatchSettings()
+    check_kinds(settings.kinds)
+    place = Place(os.path.abspath(out), uuid.uuid4().hex)  # noqa: PTH100
+    if isinstance(source, str | Path):
+        lines = read_lines(Path(source), settings.kinds)
+        check_apart([], [Source(Path(source), "list or folder of recordings")], folders=[Path(out)])
+    else:
+        lines = list(source)
+        check_names(lines, settings.kinds)
+    _check_outside(lines, place)
+    check_line_settings(settings)
+    of_settings = fingerprint_of(settings)
+    with opened_ledger(place) as ledger:
+        counter = _Counter(len(lines), monitor)
+        waiting = []
+        for line in lines:
+            if ledger.kept(line, of_settings, Path(place.out)) is None:
+                waiting.append(LineWork(line, settings, of_settings, place))
+            else:
+                counter.count(line.name, "kept")
+        pool = cluster_pool(cluster, Path(place.out)) if cluster else local_pool(jobs or os.cpu_count() or 1)
+        if waiting:
+            with pool as each, closing(_finished(each, waiting)) as records:
+                for record in records:
+                    ledger.append(record)
+                    _forget(place, record)
+                    counter.count(record["name"], record["outcome"], record.get("error", ""))
+        csv, html = write_reports(lines, ledger, Path(place.out))
+    return BatchSummary(counter.done, counter.kept, counter.failed, csv, html)
+
+
+def _check_outside(lines: Sequence[Line], place: Place) -> None:
+    """Raise ExportError if a recording lies in the folder of the outputs, where an output could replace it."""
+    inside = os.path.realpath(place.out) + os.sep
+    for line in lines:
+        if os.path.realpath(line.recording).startswith(inside):
+            raise ExportError(
+                f"{place.out}: holds the recording {line.recording}; give another folder for the outputs"
+            )
+
+
+def _forget(place: Place, record: Record) -> None:
+    """Delete the receipt of a line that is in the ledger."""
+    place.receipt(record["name"]).unlink(missing_ok=True)
+
+
+def _finished(each: Pool, waiting: Sequence[LineWork]) -> Iterator[Record]:
+    """Yield the record of every line. Where a worker dies, the lines go on that it had; one that kills again fails."""
+    left, deaths = {work.line.name: work for work in waiting}, 0
+    while left:
+        try:
+            for record in each(finished_line, list(left.values())):
+                del left[record["name"]]
+                deaths = 0
+                yield record
+        except WorkerDied as error:
+            deaths += 1
+            suspects = [work for work in left.values() if work.place.work(work.line.name).is_dir()]
+            if not suspects and deaths >= MOST_DEATHS:
+                raise CorpusError(
+                    f"the worker processes die before they begin ({error}); is there enough memory? what is finished "
+                    "is kept: run it again, with fewer --jobs"
+                ) from error
+            for work in suspects:
+                del left[work.line.name]
+                yield _alone(each, work)
+
+
+def _alone(each: Pool, work: LineWork) -> Record:
+    """Return the record of a line that was being done when a worker died, done while nothing else is."""
+    try:
+        return next(iter(each(finished_line, [work])))
+    except WorkerDied:
+        return {
+            "name": work.line.name,
+            "recording": work.line.recording,
+            "run": work.place.run,
+            "fingerprint": line_fingerprint(work.line, work.of_settings),
+            "outcome": FAILED,
+            "inputs": [],
+            "outputs": {},
+            "error": str(died_alone(work.line.recording)),
+        }
+
+
+class _Counter:
+    """Counts the outcomes of lines, and reports them."""
+
+    def __init__(self, lines: int, monitor: Monitor) -> None:
+        self._lines, self._monitor = lines, monitor
+        self.done = self.kept = self.failed = 0
+        monitor(Progress(STAGE, 0, lines, 0.0))
+
+    def count(self, name: str, outcome: str, reason: str = "") -> None:
+        """Count and report the outcome of one line."""
+        setattr(self, outcome, getattr(self, outcome) + 1)
+        finished = self.done + self.kept + self.failed
+        self._monitor(Item(name, outcome, reason))
+        self._monitor(Progress(STAGE, finished, self._lines, finished / self._lines))
+
+

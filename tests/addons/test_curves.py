@@ -1,0 +1,106 @@
+"""What the add-on for Blender does without Blender: files, names, frames."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lipmotion.addons.blender.curves import at_frames, closures, control, matched, read_motion, spelling
+from lipmotion.export.base import write_motion
+from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace, Timeline
+
+NAMES = ("jawOpen", "mouthSmileLeft", "tongueOut")
+
+
+@pytest.fixture
+def generation() -> Generation:
+    rng = np.random.default_rng(3)
+    moved = Motion(rng.random((121, 3)), 60.0, tuple(Channel(name, WEIGHT) for name in NAMES))
+    return Generation(moved, np.zeros((121, 3)), Timeline(()), StateTrace(("a",), np.zeros(121, np.intp)))
+
+
+@pytest.mark.parametrize("suffix", [".json", ".csv", ".livelink.csv"])
+def test_files_of_lipmotion_are_read(tmp_path: Path, generation: Generation, suffix: str) -> None:
+    path = tmp_path / f"a{suffix}"
+    write_motion(path, generation, source={}, model={})
+    curves, times = read_motion(str(path))
+    spelt = {spelling(name): values for name, values in curves.items()}
+    assert times == pytest.approx(generation.motion.time_s.tolist(), abs=1e-4)
+    for name in NAMES:
+        assert spelt[spelling(name)] == pytest.approx(generation.motion[name].tolist(), abs=1e-5)
+
+
+def test_a_take_at_30_frames_keeps_its_time(tmp_path: Path) -> None:
+    codes = [f"01:59:59:{frame:02d}.500" for frame in (50, 52, 54, 56, 58)] + ["02:00:00:00.500"]
+    rows = "".join(f"{code},61,0.5\n" for code in codes) + "02:00:00:02.500,0\n"
+    (tmp_path / "take.csv").write_text("Timecode,BlendShapeCount,JawOpen\n" + rows)
+    curves, times = read_motion(str(tmp_path / "take.csv"))
+    assert times == pytest.approx([number / 30 for number in range(6)])
+    assert len(curves["JawOpen"]) == 6
+
+
+@pytest.mark.parametrize("text", ["", "frame,a\n1,2\n", "{}", json.dumps({"format": "other"})])
+def test_other_files_are_refused(tmp_path: Path, text: str) -> None:
+    for name in ("a.csv", "a.json"):
+        (tmp_path / name).write_text(text)
+        with pytest.raises(ValueError, match=r"first column|'format' must be|Expecting value"):
+            read_motion(str(tmp_path / name))
+
+
+@pytest.mark.parametrize(
+    "name", ["mouthSmile_L", "mouthSmileLeft", "MouthSmileLeft", "head.mouthSmile_L", "Mouth Smile l"]
+)
+def test_spellings_of_one_name(name: str) -> None:
+    assert spelling(name) == "mouthsmileleft"
+
+
+def test_curves_find_their_shape_keys() -> None:
+    keys = ["Basis", "head.jawOpen", "mouthSmile_R", "mouthSmileLeft", "mouthSmile_L"]
+    found = matched(["jawOpen", "mouthSmileLeft", "mouthSmileRight", "tongueOut"], keys)
+    assert found == {"jawOpen": "head.jawOpen", "mouthSmileLeft": "mouthSmileLeft", "mouthSmileRight": "mouthSmile_R"}
+
+
+@pytest.mark.parametrize(
+    ("name", "found"),
+    [
+        ("jaw.master.rotation.x", ("jaw.master", "rotation", "x")),
+        ("Lip_T.location.z", ("Lip_T", "location", "z")),
+        ("rig bone[open]", ("rig bone", "property", "open")),
+        ("[lips]", ("", "property", "lips")),
+        ("jawOpen", None),
+        ("Jaw.rotateX", None),
+    ],
+)
+def test_controls_are_told_from_shapes(name: str, found: tuple[str, str, str] | None) -> None:
+    assert control(name) == found
+
+
+def test_frames_lie_on_straight_lines_between_values() -> None:
+    times = [number / 100 for number in range(101)]
+    curves = {"tongueOut": [float(number**2) for number in range(101)]}
+    frames = at_frames(curves, times, 24.0)["tongueOut"]
+    assert len(frames) == 25
+    assert frames == pytest.approx(np.interp(np.arange(25) / 24, times, curves["tongueOut"]).tolist())
+
+
+def test_lips_that_close_between_two_frames_are_closed_at_the_nearer_one() -> None:
+    times = [number / 100 for number in range(101)]
+    jaw = [0.3 + 0.0 * time_s for time_s in times]
+    close = [0.0 if number != 52 else 0.3 for number in range(101)]
+    eyes = [number / 100 for number in range(101)]
+    curves = {"jawOpen": jaw, "mouthClose": close, "eyeBlinkLeft": eyes}
+    assert closures(curves, 101) == [52]
+    frames = at_frames(curves, times, 25.0)
+    assert frames["mouthClose"][13] == pytest.approx(0.3)
+    assert sum(frames["mouthClose"]) == pytest.approx(0.3)
+    assert frames["eyeBlinkLeft"] == pytest.approx([number / 25 for number in range(26)])
+    late = at_frames({"jawOpen": jaw, "mouthClose": [0.3 if n == 51 else 0.0 for n in range(101)]}, times, 25.0)
+    assert late["mouthClose"][13] == pytest.approx(0.3)
+
+
+def test_curves_that_are_no_blendshapes_have_no_closures() -> None:
+    assert closures({"opening": [0.0, 0.1, 0.0]}, 3) == []
+    assert at_frames({"a": []}, [], 24.0) == {"a": []}

@@ -1,0 +1,118 @@
+"""The add-on and the script in Blender itself: what is evaluated at frames is the motion."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lipmotion.addons.blender.curves import at_frames
+from lipmotion.export.addon import write_addon
+from lipmotion.pipeline.animate import write
+from lipmotion.pipeline.characters import with_curves
+from lipmotion.types import Audio, Generation, StateTrace
+from programs import python_with, run_with
+from rig.speech import motion, units
+
+pytestmark = [
+    pytest.mark.skipif(python_with("bpy") is None, reason="needs bpy (tests/programs)"),
+    pytest.mark.long,
+]
+RIG = "jaw.master.rotation.x,jawOpen,25\njaw.master[open],opening,1\n[lips],opening,2\n"
+
+
+@pytest.fixture(scope="module")
+def generation() -> Generation:
+    moved = motion()
+    trace = StateTrace(("a",), np.zeros(len(moved.values), np.intp))
+    return Generation(moved, np.zeros(moved.values.shape), units(), trace)
+
+
+@pytest.fixture(scope="module")
+def wanted(generation: Generation) -> dict[str, list[float]]:
+    """What Blender should evaluate at 24 frames a second, for shape keys."""
+    curves, names = with_curves(generation, "face")
+    values = {name: np.round(curves.motion[name], 5).tolist() for name in names}
+    return at_frames(values, generation.motion.time_s.tolist(), 24.0)
+
+
+@pytest.fixture(scope="module")
+def names(wanted: dict[str, list[float]], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("names") / "names.json"
+    path.write_text(json.dumps([name for name in wanted if not name.startswith("head")]))
+    return path
+
+
+@pytest.fixture(scope="module")
+def sound() -> Audio:
+    return Audio(np.zeros(2 * 48_000, np.float32), 48_000)
+
+
+def compare(found: dict[str, Any], wanted: dict[str, list[float]], names: Path, least: float) -> None:
+    """Compare all frames of both faces; the earlier keys at frames 2 and 500 are gone."""
+    listed = json.loads(names.read_text())
+    assert found["fps"] == 24
+    assert found["last"] == len(wanted["jawOpen"])
+    for which in ("face", "other"):
+        values = np.array([frame[which] for frame in found["frames"]])
+        expected = np.array([wanted[name] for name in listed]).T
+        assert np.abs(values - expected).max() < least
+    assert np.ptp([frame["face"][listed.index("jawOpen")] for frame in found["frames"]]) > 0.2
+    assert found["strips"] == ["lipmotion sound"] * found["plays_sound"]
+    assert found["end"] >= found["last"]
+
+
+@pytest.mark.parametrize("kind", ["legacy", "extension"])
+def test_the_addon_keys_a_face(
+    kind: str, generation: Generation, wanted: dict[str, list[float]], names: Path, sound: Audio, tmp_path: Path
+) -> None:
+    write_addon("blender", tmp_path / "addon.zip")
+    curves, chosen = with_curves(generation, "face")
+    write(curves, [tmp_path / "a.json", tmp_path / "a.wav"], speech=sound, channels=chosen)
+    files = (tmp_path / "addon.zip", tmp_path / "a.json", tmp_path / "a.wav", names)
+    found = run_with("bpy", "blender_keys.py", kind, *files, folder=tmp_path / "user")
+    assert found["answer"] == ["FINISHED"]
+    compare(found, wanted, names, 1e-5)
+
+
+def test_the_addon_keys_from_a_take_of_live_link_face(
+    generation: Generation, wanted: dict[str, list[float]], names: Path, sound: Audio, tmp_path: Path
+) -> None:
+    write_addon("blender", tmp_path / "addon.zip")
+    write(generation, [tmp_path / "a.livelink.csv", tmp_path / "a.wav"], speech=sound, rate_hz=100.0)
+    files = (tmp_path / "addon.zip", tmp_path / "a.livelink.csv", tmp_path / "a.wav", names)
+    found = run_with("bpy", "blender_keys.py", "legacy", *files, folder=tmp_path / "user")
+    mouth = [name for name in json.loads(names.read_text()) if name.startswith(("jaw", "mouth"))]
+    listed = json.loads(names.read_text())
+    values = np.array([[frame["face"][listed.index(name)] for name in mouth] for frame in found["frames"]])
+    assert np.abs(values - np.array([wanted[name] for name in mouth]).T).max() < 1e-5
+
+
+def test_the_script_keys_a_face(
+    generation: Generation, names: Path, sound: Audio, wanted: dict[str, list[float]], tmp_path: Path
+) -> None:
+    write(generation, [tmp_path / "a.blender.py", tmp_path / "a.wav"], speech=sound)
+    found = run_with("bpy", "blender_keys.py", "script", tmp_path / "a.blender.py", names)
+    listed = json.loads(names.read_text())
+    mouth = [name for name in listed if name.startswith(("jaw", "mouth"))]
+    values = np.array([[frame["face"][listed.index(name)] for name in mouth] for frame in found["frames"]])
+    assert np.abs(values - np.array([wanted[name] for name in mouth]).T).max() < 1e-5
+    assert found["strips"] == ["lipmotion sound"] * found["plays_sound"]
+
+
+def test_the_script_keys_bones_and_properties(
+    generation: Generation, names: Path, sound: Audio, tmp_path: Path
+) -> None:
+    (tmp_path / "rig.csv").write_text("control,source,gain\n" + RIG)
+    curves, chosen = with_curves(generation, tmp_path / "rig.csv")
+    write(curves, tmp_path / "a.blender.py", speech=sound, channels=chosen)
+    found = run_with("bpy", "blender_keys.py", "script", tmp_path / "a.blender.py", names)
+    time_s = np.arange(len(found["frames"])) / 24
+    for name, field in (("jaw.master.rotation.x", "jaw"), ("jaw.master[open]", "open"), ("[lips]", "lips")):
+        curve = np.interp(time_s, curves.motion.time_s, curves.motion[name])
+        got = [frame[field] for frame in found["frames"]]
+        assert got[: len(time_s)] == pytest.approx(curve.tolist(), abs=2e-4)
+        assert max(got) > 0.1

@@ -1,0 +1,36 @@
+"""``lipmotion addon``."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from cli.conftest import RunCommand, is_one_error
+
+
+@pytest.fixture
+def basics(toy_model_file: Path, toy_speech: Path) -> tuple[object, ...]:
+    return ("animate", toy_speech, "--model", toy_model_file)
+
+
+def test_the_addon_is_written(run: RunCommand, here: Path) -> None:
+    assert run("addon", "blender", "-o", "a.zip").code == 0
+    assert zipfile.is_zipfile(here / "a.zip")
+
+
+@pytest.mark.parametrize(("program", "name"), [("maya", "a.zip"), ("blender", "a.blend")])
+def test_what_is_wrong_is_said_in_one_line(run: RunCommand, here: Path, program: str, name: str) -> None:
+    assert is_one_error(run("addon", program, "-o", name), 7)
+    assert list(here.iterdir()) == []
+
+
+def test_scenes_takes_and_scripts_are_written_without_a_character(
+    run: RunCommand, here: Path, basics: tuple[object, ...]
+) -> None:
+    names = ["a.glb", "a.usda", "a.livelink.csv", "a.blender.py"]
+    assert run(*basics, "-o", *names, "--rate", "30").code == 0
+    assert sorted(path.name for path in here.iterdir()) == sorted(names)
+    assert (here / "a.usda").read_text().startswith("#usda 1.0")
+    assert "SpatialAudio" in (here / "a.usda").read_text()

@@ -1,0 +1,59 @@
+"""Sounds of recorders, and tables of offsets."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from lipmotion.corpora.discover import discover
+from lipmotion.corpora.separate_sounds import read_offsets, with_separate_sounds
+from lipmotion.errors import CorpusError, InputError
+
+
+@pytest.fixture
+def studio(tmp_path: Path) -> Path:
+    for name in ("a.wav", "a.csv", "a.recorder.flac", "b.mp4", "b.recorder.wav", "b.recorder.mp3", "anna/c.mov"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).touch()
+    return tmp_path
+
+
+def test_a_recorder_belongs_to_its_recording(studio):
+    (studio / "offsets.csv").write_text("name,offset_ms\nanna/c, -12.5\n\ngone,3\n")
+    found = with_separate_sounds(discover(studio), studio, 0.1)
+    assert [(item.name, item.recorder, item.offset_s) for item in found.recordings] == [
+        ("a", studio / "a.recorder.flac", 0.1),
+        ("anna-c", None, -0.0125),
+    ]
+    assert "2 recorders' sounds beside it: b.recorder.mp3, b.recorder.wav; keep one" in found.problems["b"]
+    assert found.problems["gone"] == "in offsets.csv, but there is no such recording"
+
+
+def test_without_them_nothing_changes(studio):
+    (studio / "a.recorder.flac").unlink()
+    found = with_separate_sounds(discover(studio), studio)
+    assert {(item.recorder, item.offset_s) for item in found.recordings} == {(None, None)}
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "the columns are '', required name,offset_ms"),
+        ("file,ms\na,1\n", "the columns are 'file,ms'"),
+        ("name,offset_ms\na\n", "line 2: 1 fields, required a name and milliseconds"),
+        ("name,offset_ms\na,soon\n", "line 2: could not convert"),
+        ("name,offset_ms\na,nan\n", "the offset is nan ms"),
+        ("name,offset_ms\na,1e12\n", "required within ±21600000"),
+        ("name,offset_ms\na,1\na,2\n", "line 3: 'a' has another offset above"),
+    ],
+)
+def test_what_is_wrong_with_a_table_is_said(tmp_path, text, message):
+    (tmp_path / "offsets.csv").write_text(text)
+    with pytest.raises(CorpusError, match=message):
+        read_offsets(tmp_path / "offsets.csv")
+
+
+def test_an_offset_of_a_day_is_refused(studio):
+    with pytest.raises(InputError, match="required within"):
+        with_separate_sounds(discover(studio), studio, 86_400.0)

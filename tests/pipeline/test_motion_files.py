@@ -1,0 +1,92 @@
+"""What formats hold: the channels that were asked for, or curves of their own."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lipmotion.faces import Staging
+from lipmotion.pipeline.characters import curves_of
+from lipmotion.pipeline.living_curves import HEAD, living_curves
+from lipmotion.pipeline.motion_files import in_format, needs_prosody
+from lipmotion.rig.shape_names import ARKIT_MOUTH
+from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace
+from rig.speech import motion, units
+
+TAKE = Path("a.livelink.csv")
+
+
+@pytest.fixture(scope="module")
+def generation() -> Generation:
+    moved = motion()
+    trace = StateTrace(("a",), np.zeros(len(moved.values), np.intp))
+    return Generation(moved, np.zeros(moved.values.shape), units(), trace)
+
+
+def test_plain_formats_hold_what_was_chosen(generation: Generation) -> None:
+    chosen = generation.selected(["opening"])
+    assert in_format(Path("a.csv"), generation, chosen, None) is chosen
+
+
+def test_a_take_holds_a_whole_face_at_60_frames(generation: Generation) -> None:
+    held = in_format(TAKE, generation, generation.selected(["opening"]), None)
+    assert held.motion.rate_hz == pytest.approx(60.0)
+    assert set(ARKIT_MOUTH) < set(held.motion.names)
+    assert {"eyeBlinkLeft", "browInnerUp", *HEAD} < set(held.motion.names)
+    assert held.motion["jawOpen"].max() > 0.2
+
+
+def test_a_take_shows_the_closures_of_the_motion(generation: Generation) -> None:
+    at_100 = curves_of(generation.motion, generation.units, "arkit")
+    held = in_format(TAKE, generation, generation, 12.0).motion
+    for start_s, end_s in ((0.46, 0.64), (0.86, 1.04)):
+        slow, fast = (
+            (each["jawOpen"] - each["mouthClose"])[(each.time_s >= start_s) & (each.time_s <= end_s)].min()
+            for each in (held, at_100)
+        )
+        assert slow == pytest.approx(fast, abs=0.01)
+
+
+def test_blendshapes_that_the_motion_has_are_kept(generation: Generation) -> None:
+    frames = len(generation.motion.values)
+    names = ("head.jawOpen", "mouthSmile_L", "eyeBlink_L", "opening")
+    values = np.random.default_rng(2).random((frames, 4))
+    given = Motion(values, 100.0, tuple(Channel(name, WEIGHT) for name in names))
+    edited = replace(generation, motion=given, spread=np.zeros(values.shape))
+    held = in_format(TAKE, edited, edited, 100.0).motion
+    for column, name in enumerate(("jawOpen", "mouthSmileLeft", "eyeBlinkLeft")):
+        assert held[name] == pytest.approx(values[:, column])
+    assert "eyeBlinkRight" in held.names
+    alone = edited.selected(["head.jawOpen", "mouthSmile_L"])
+    assert in_format(TAKE, alone, alone, 100.0).motion.names == ("jawOpen", "mouthSmileLeft")
+
+
+def test_the_script_takes_controls_that_were_asked_for(generation: Generation) -> None:
+    control = Motion(np.zeros((201, 1)), 100.0, (Channel("Jaw.rotation.x", "control"),))
+    chosen = replace(generation, motion=control, spread=np.zeros((201, 1)))
+    assert in_format(Path("a.blender.py"), generation, chosen, None).motion.names == ("Jaw.rotation.x",)
+    assert "jawOpen" in in_format(Path("a.blender.py"), generation, generation, None).motion.names
+
+
+@pytest.mark.parametrize(("name", "needs"), [("a.livelink.csv", True), ("a.csv", False), ("a.mp4", False)])
+def test_only_whole_faces_need_the_prosody(name: str, needs: bool) -> None:
+    assert needs_prosody(Path(name)) == needs
+
+
+def test_what_moves_on_its_own_can_be_switched_off(generation: Generation) -> None:
+    said = (generation.motion, generation.units)
+    still = living_curves(*said, Staging(blinks=False, gaze=False, brows=False, head=False))
+    moving = living_curves(*said)
+    assert np.abs(still.values).max() < 1e-9
+    assert all(np.abs(moving[name]).max() > 1e-3 for name in ("browInnerUp", *HEAD))
+    assert 0 <= moving["eyeBlinkLeft"].min() <= moving["eyeBlinkLeft"].max() <= 1
+
+
+def test_eyes_look_to_one_side_together(generation: Generation) -> None:
+    moving = living_curves(generation.motion, generation.units)
+    assert moving["eyeLookOutLeft"] == pytest.approx(moving["eyeLookInRight"])
+    assert moving["eyeLookInLeft"] == pytest.approx(moving["eyeLookOutRight"])
+    assert np.abs(moving["eyeLookOutLeft"] * moving["eyeLookInLeft"]).max() < 1e-12

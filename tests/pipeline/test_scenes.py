@@ -1,0 +1,190 @@
+"""Characters with their animation: what is written, and what other programs read of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lipmotion.errors import InputError
+from lipmotion.faces import Staging
+from lipmotion.faces.character.lips import VISIBLE
+from lipmotion.faces.character.shapes import head_mesh
+from lipmotion.faces.character.stage import figure
+from lipmotion.pipeline.scenes import character_scene, head_scene, is_scene, sound_reference, write_scene
+from lipmotion.rig.driven import driven_character
+from lipmotion.rig.gltf_container import read_gltf_document
+from lipmotion.rig.gltf_writer import write_glb
+from lipmotion.rig.scene import Scene
+from lipmotion.types import Channel, Generation, Motion, StateTrace
+from programs import gltf_report, gltf_validator, python_with, run_with
+from rig.heads import head
+from rig.speech import motion, units
+
+TIMES_S = (0.0, 0.31, 0.555, 0.75, 0.95, 1.15, 1.62, 2.0)
+"""Times at which other programs are asked for values; most lie between two keys."""
+
+
+@pytest.fixture(scope="module")
+def generation() -> Generation:
+    moved = motion()
+    trace = StateTrace(("a",), np.zeros(len(moved.values), np.intp))
+    return Generation(moved, np.zeros(moved.values.shape), units(), trace)
+
+
+@pytest.fixture(scope="module")
+def own_head(generation: Generation) -> Scene:
+    return head_scene(generation)
+
+
+@pytest.fixture(scope="module")
+def character(generation: Generation, tmp_path_factory: pytest.TempPathFactory) -> Scene:
+    path = tmp_path_factory.mktemp("character") / "head.glb"
+    write_glb(path, head())
+    return character_scene(generation, driven_character(path))
+
+
+@pytest.fixture(scope="module", params=["own_head", "character"])
+def scene(request: pytest.FixtureRequest) -> Scene:
+    made: Scene = request.getfixturevalue(request.param)
+    return made
+
+
+@pytest.mark.parametrize(("name", "is_one"), [("a.glb", True), ("a.USDA", True), ("a.usd", False), ("glb", False)])
+def test_scenes_are_known_by_their_suffix(name: str, is_one: bool) -> None:
+    assert is_scene(Path(name)) == is_one
+
+
+def test_the_head_closes_its_lips_in_m_and_p_and_opens_them_in_aa(own_head: Scene) -> None:
+    assert own_head.weights is not None
+    table, mesh = own_head.table(), own_head.mesh
+    ring = figure().skin.lip_rows()[VISIBLE - 1]
+    upper, lower = ring[20], ring[60]
+    places = mesh.vertices[[upper, lower], 1]
+    gaps = places + np.einsum("ts,sv->tv", table, mesh.displacements(np.array([upper, lower]))[:, :, 1])
+    gap = (gaps[:, 0] - gaps[:, 1]) / 0.09
+    at_rest = float((places[0] - places[1]) / 0.09)
+    time_s = own_head.weights.time_s
+    for start_s, end_s in ((0.5, 0.6), (0.9, 1.0)):
+        said = (time_s >= start_s) & (time_s <= end_s)
+        assert abs(gap[said].min() - at_rest) < 1e-6
+    assert gap[(time_s > 0.7) & (time_s < 0.8)].max() > 0.15
+
+
+def test_what_moves_on_its_own_can_be_switched_off(generation: Generation) -> None:
+    still = head_scene(generation, 25.0, staging=Staging(blinks=False, gaze=False, brows=False, head=False))
+    moving = head_scene(generation, 25.0)
+    assert still.weights is not None
+    assert moving.weights is not None
+    eyes = [name for name in still.weights.names if name.startswith(("eye", "brow"))]
+    assert len(eyes) == 11
+    assert max(float(np.abs(still.weights[name]).max()) for name in eyes) < 1e-9
+    assert max(float(np.abs(moving.weights[name]).max()) for name in eyes) > 0.01
+    assert still.turn is not None
+    assert np.abs(still.turn.rotations - [0, 0, 0, 1]).max() < 1e-9
+
+
+def test_another_seed_moves_the_head_otherwise(generation: Generation, own_head: Scene) -> None:
+    other = head_scene(generation, staging=Staging(seed=5))
+    assert other.turn is not None
+    assert own_head.turn is not None
+    assert np.abs(other.turn.rotations - own_head.turn.rotations).max() > 1e-3
+    assert np.linalg.norm(other.turn.rotations, axis=1) == pytest.approx(np.ones(len(other.turn.rotations)))
+
+
+def test_the_rate_is_that_of_the_keys(generation: Generation) -> None:
+    made = head_scene(generation, 30.0)
+    assert made.weights is not None
+    assert made.weights.rate_hz == pytest.approx(30.0)
+    assert len(made.weights.values) == 61
+
+
+def test_closures_between_two_keys_are_kept(generation: Generation, character: Scene, tmp_path: Path) -> None:
+    path = tmp_path / "head.glb"
+    write_glb(path, head())
+    slow = character_scene(generation, driven_character(path), 12.0)
+    assert slow.weights is not None
+    assert character.weights is not None
+    parted = slow.weights["jawOpen"] - slow.weights["mouthClose"]
+    closed = (slow.weights.time_s > 0.45) & (slow.weights.time_s < 0.65)
+    assert parted[closed].min() < 0.02
+
+
+def test_a_motion_without_opening_is_refused() -> None:
+    other = Motion(np.zeros((10, 1)), 100.0, (Channel("x_61"),))
+    trace = StateTrace(("a",), np.zeros(10, np.intp))
+    with pytest.raises(InputError, match="no channel 'opening'"):
+        head_scene(Generation(other, np.zeros((10, 1)), units(), trace))
+
+
+def test_the_sound_is_named_from_the_folder_of_the_file(tmp_path: Path) -> None:
+    assert sound_reference(tmp_path / "a.wav", tmp_path / "out.glb") == "a.wav"
+    assert sound_reference(tmp_path / "in" / "a b.wav", tmp_path / "out" / "a.glb") == "../in/a b.wav"
+
+
+def test_the_sound_is_in_the_extras_of_the_scene(character: Scene, tmp_path: Path) -> None:
+    write_scene(tmp_path / "a.glb", character, tmp_path / "said.wav")
+    stored = read_gltf_document(tmp_path / "a.glb").items("scenes")[0]
+    assert stored["extras"] == {"audio": {"uri": "said.wav", "start_s": 0.0}}
+    write_scene(tmp_path / "b.glb", character)
+    assert "extras" not in read_gltf_document(tmp_path / "b.glb").items("scenes")[0]
+
+
+def test_the_same_scene_gives_the_same_bytes(character: Scene, tmp_path: Path) -> None:
+    for suffix in (".glb", ".usda"):
+        for name in "ab":
+            write_scene(tmp_path / f"{name}{suffix}", character)
+        assert (tmp_path / f"a{suffix}").read_bytes() == (tmp_path / f"b{suffix}").read_bytes()
+
+
+def test_the_shapes_of_the_head_are_those_of_its_mesh(own_head: Scene) -> None:
+    assert own_head.mesh.shape_names == head_mesh(figure()).shape_names
+    assert own_head.weights is not None
+    assert set(own_head.weights.names) == set(own_head.mesh.shape_names)
+
+
+@pytest.mark.skipif(gltf_validator() is None, reason="needs Khronos' gltf-validator (tests/programs)")
+@pytest.mark.long
+def test_khronos_finds_no_error_and_no_warning(scene: Scene, tmp_path: Path) -> None:
+    write_scene(tmp_path / "a.glb", scene, tmp_path / "a.wav")
+    report = gltf_report(tmp_path / "a.glb")
+    assert (report["numErrors"], report["numWarnings"]) == (0, 0), report["messages"]
+
+
+@pytest.mark.skipif(python_with("pxr") is None, reason="needs usd-core (tests/programs)")
+@pytest.mark.long
+def test_openusd_finds_no_error_and_reads_the_same_values(scene: Scene, tmp_path: Path) -> None:
+    (tmp_path / "a b.wav").write_bytes(b"")
+    write_scene(tmp_path / "a.usda", scene, tmp_path / "a b.wav")
+    found = run_with("pxr", "usd_scene.py", tmp_path / "a.usda", *(24 * time_s for time_s in TIMES_S))
+    assert found["errors"] == []
+    assert found["sound"] == "./a b.wav"
+    assert (found["rate"], found["end"]) == pytest.approx((24.0, 48.0))
+    assert found["shapes"] == list(scene.mesh.shape_names)
+    assert found["joints"] == (["body"] if scene.turn is None else ["body", "body/head"])
+    assert largest_error(scene, found["values"]) < 1e-5
+
+
+@pytest.mark.skipif(python_with("bpy") is None, reason="needs bpy (tests/programs)")
+@pytest.mark.long
+@pytest.mark.parametrize("suffix", [".glb", ".usda"])
+def test_blender_plays_the_same_values(scene: Scene, suffix: str, tmp_path: Path) -> None:
+    path = tmp_path / f"a{suffix}"
+    write_scene(path, scene)
+    found = run_with("bpy", "blender_scene.py", path, *TIMES_S)
+    assert largest_error(scene, found["values"]) < 2e-4
+    assert np.ptp(np.array(found["moved"]), axis=0).max() > 1e-3
+    if scene.turn is not None and scene.weights is not None:
+        rotations = scene.turn.rotations[[round(time_s * 100) for time_s in TIMES_S]]
+        angles = 2 * np.arccos(np.clip(np.abs(rotations[:, 3]), 0, 1))
+        turned = 2 * np.arccos(np.clip(np.abs(np.array(found["turns"])[:, 0]), 0, 1))
+        assert turned == pytest.approx(angles, abs=2e-3)
+
+
+def largest_error(scene: Scene, values: list[dict[str, float]]) -> float:
+    """Return how far the values that a program gives are from those of the scene."""
+    assert scene.weights is not None
+    wanted = scene.weights.at(np.array(TIMES_S))
+    named = dict(zip(scene.weights.names, wanted.T, strict=True))
+    return max(abs(float(named[name][row]) - at[name]) for row, at in enumerate(values) for name in named)
