@@ -87,10 +87,17 @@ def asked(path: Path, scene: Scene) -> dict[str, object]:
         about = {"version": usd["version"], "validators": usd["validators"], "errors": len(usd["errors"])}
         found["OpenUSD"] = about | {"largest_error": error}
     if python_with("bpy"):
-        blender = run_with("bpy", "blender_scene.py", path, *times_s)
-        error = largest_error(scene, times_s, blender["values"])
-        found["Blender"] = {"version": blender["version"], "largest_error": error}
+        found["Blender"] = played(path, scene, times_s)
     return found
+
+
+def played(path: Path, scene: Scene, times_s: np.ndarray) -> dict[str, object]:
+    """Return what Blender plays of a scene's file."""
+    try:
+        blender = run_with("bpy", "blender_scene.py", path, *times_s)
+    except AssertionError as refusal:
+        return {"refused": str(refusal).strip().splitlines()[-1]}
+    return {"version": blender["version"], "largest_error": largest_error(scene, times_s, blender["values"])}
 
 
 def largest_error(scene: Scene, times_s: np.ndarray, values: list[dict[str, float]]) -> float:
@@ -121,8 +128,8 @@ def keyed(folder: Path, result: Generation, sound: Path) -> None:
         user = Path(tempfile.mkdtemp(dir=folder))
         try:
             found = run_with("bpy", "blender_keys.py", *arguments, folder=user)
-        except AssertionError as error:
-            print(json.dumps({"keyed by": name, "failed": str(error)[-300:]}))
+        except AssertionError as refusal:
+            print(json.dumps({"keyed by": name, "refused": str(refusal).strip().splitlines()[-1]}))
             continue
         values = np.array([frame["face"] for frame in found["frames"]])
         error = float(np.abs(values - expected).max())
