@@ -48,6 +48,8 @@ LOG = logging.getLogger("lipmotion")
 ONE_AT_A_TIME = threading.Lock()
 """A worker of a cluster may have several threads: warnings and the threads of matrix products belong to a process."""
 MOST_WARNINGS = 10
+CUES_FPS = 24.0
+"""Frame rate of cues where none is given."""
 
 
 @dataclass(frozen=True)
@@ -139,8 +141,7 @@ def _written(work: LineWork) -> Generation:
     next(iter(staged.values())).parent.mkdir(parents=True, exist_ok=True)
     sheets = [kind for kind in settings.kinds if kind.startswith(CUES)]
     if sheets:
-        rate = {} if settings.fps is None else {"fps": settings.fps}
-        sheet = cues(generation, delivery=settings.delivery, **rate)
+        sheet = cues(generation, fps=settings.fps or CUES_FPS, delivery=settings.delivery)
         for kind in sheets:
             write_cues(sheet, staged[kind], speech=line.recording, form=kind.removeprefix(CUES))
     plain = [path for kind, path in staged.items() if kind not in sheets]
